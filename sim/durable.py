@@ -1,0 +1,54 @@
+"""Files that are there whole or not at all, and trouble with them told with its reason."""
+
+import contextlib
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+# HDF5 reports trouble with its file as a RuntimeError
+_WRITE_TROUBLE = (OSError, RuntimeError)
+
+
+class StoreTrouble(OSError):
+    """The disk or a file made trouble; the message says what and where."""
+
+
+def write_whole(path: Path, content: memoryview | bytes) -> None:
+    """Write a file so that it is there whole or not at all."""
+    beside = path.with_name(f".{path.name}.tmp")
+    try:
+        with open(beside, "wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(beside, path)
+    except BaseException:
+        beside.unlink(missing_ok=True)
+        raise
+    sync_folder(path.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Make a rename in a folder last."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+@contextlib.contextmanager
+def explained(folder: Path) -> Iterator[None]:
+    """Turn trouble with files into one message with its reason, which HDF5 by itself does not give."""
+    try:
+        yield
+    except StoreTrouble:
+        raise
+    except _WRITE_TROUBLE as trouble:
+        reason = trouble.strerror if isinstance(trouble, OSError) and trouble.errno else str(trouble)
+        with contextlib.suppress(OSError):
+            if shutil.disk_usage(folder).free < 2**20:
+                reason = os.strerror(errno.ENOSPC)
+        raise StoreTrouble(f"{folder}: {reason}") from trouble

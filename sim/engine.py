@@ -1,0 +1,125 @@
+"""The engine: in which order the parts act in one step. It knows no physics of its own.
+
+drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(fraction) − χ ΔΓ → contact → radius.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from sim.motion import Motion
+from sim.noise import Noise
+from sim.parts.bonds import Population
+from sim.parts.contact import Touch
+from sim.parts.shear import Fluctuation
+from sim.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class State:
+    """Everything a batch of members needs to go on, at the end of one step.
+
+    Arrays have the member as first axis, or length 1 there where all members agree.
+    """
+
+    step: int
+    position: np.ndarray
+    speed: np.ndarray
+    bonds: Population
+    shear: Fluctuation
+    contact: Touch
+
+
+@dataclass(frozen=True)
+class Dice:
+    """The addressed noise of each part for one batch of members."""
+
+    bonds: Noise
+    shear: Noise
+
+    @classmethod
+    def of(cls, seed: int, members: np.ndarray) -> "Dice":
+        return cls(Noise(seed, "bonds", members), Noise(seed, "shear", members))
+
+
+def start(scenario: Scenario, dice: Dice) -> State:
+    """The state at t = 0."""
+    motion = scenario.drive.motion(0, 0.0, 0.0, scenario.clock.duration)
+    bonds = scenario.bonds.start(motion, dice.bonds)
+    stress = scenario.bonds.shear_stress(bonds)
+    shear = scenario.process.start(motion, stress, dice.shear)
+    work = _work_left(scenario, bonds, shear)
+    contact = scenario.contact.start(work, scenario.sphere.radius, scenario.solid.contact_modulus)
+    return State(0, np.zeros(1), motion.speed, bonds, shear, contact)
+
+
+def advance(scenario: Scenario, state: State, dice: Dice) -> State:
+    """The state one clock step later."""
+    motion = _motion(scenario, state.step + 1)
+    bonds = scenario.bonds.advance(state.bonds, motion, dice.bonds)
+    stress = scenario.bonds.shear_stress(bonds)
+    shear = scenario.process.advance(state.shear, motion, stress, dice.shear)
+    work = _work_left(scenario, bonds, shear)
+    contact = scenario.contact.advance(state.contact, work, scenario.sphere.radius, scenario.solid.contact_modulus)
+    return State(motion.step, state.position + motion.slip, motion.speed, bonds, shear, contact)
+
+
+def march(scenario: Scenario, members: np.ndarray, state: State | None = None) -> Iterator[State]:
+    """Advance a batch of members to the end of the run, yielding the state after every step.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        One point; its sweep is not looked at.
+    members : array of int, shape (members,)
+        Absolute numbers of the members, which address their noise.
+    state : State, optional
+        Where to go on from; without it the march starts at t = 0 and yields that state first.
+
+    Yields
+    ------
+    State
+        The same numbers, bit for bit, for any batch and after any restart.
+    """
+    dice = Dice.of(scenario.seed, members)
+    if state is None:
+        state = start(scenario, dice)
+        yield state
+    while state.step < scenario.clock.steps:
+        state = advance(scenario, state, dice)
+        yield state
+
+
+def _motion(scenario: Scenario, step: int) -> Motion:
+    clock = scenario.clock
+    return scenario.drive.motion(step, clock.time(step - 1), clock.time(step), clock.duration)
+
+
+def _work_left(scenario: Scenario, bonds: Population, shear: Fluctuation) -> np.ndarray:
+    """w = Δγ(bond fraction) − χ ΔΓ [J/m^2]."""
+    bonded = scenario.adhesion.work_of_bonds(scenario.bonds.fraction(bonds))
+    return np.asarray(bonded - scenario.shear.paid_by_adhesion * shear.energy)
+
+
+def pack(state: Any, prefix: str = "") -> dict[str, np.ndarray]:
+    """A state as named arrays, ``{"bonds.bound": ...}``, from which ``unpack`` makes it again."""
+    arrays: dict[str, np.ndarray] = {}
+    for item in fields(state):
+        value = getattr(state, item.name)
+        if is_dataclass(value):
+            arrays |= pack(value, f"{prefix}{item.name}.")
+        else:
+            arrays[prefix + item.name] = np.asarray(value)
+    return arrays
+
+
+def unpack(arrays: dict[str, np.ndarray]) -> State:
+    """The state that ``pack`` took apart."""
+    inner = {"bonds": Population, "shear": Fluctuation, "contact": Touch}
+    parts = {
+        name: kind(**{item.name: arrays[f"{name}.{item.name}"] for item in fields(kind)})
+        for name, kind in inner.items()
+    }
+    return State(int(arrays["step"]), arrays["position"], arrays["speed"], **parts)

@@ -1,0 +1,215 @@
+"""Running a scenario: its sweep, its members, in memory or onto the disk."""
+
+import builtins
+import contextlib
+import datetime
+import fcntl
+import json
+import os
+import platform
+import shutil
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import netCDF4
+import numpy as np
+
+from sim.durable import StoreTrouble, explained, sync_folder
+from sim.engine import State, march, pack
+from sim.gauges import GAUGES
+from sim.parts.shear import MappedProcess
+from sim.scenario import Scenario
+from sim.store import (
+    MemoryParts,
+    PartFiles,
+    Parts,
+    Plan,
+    moments,
+    part_name,
+    work,
+    write_dataset,
+)
+
+Progress = Callable[[int], None]
+
+
+class OutputExists(FileExistsError):
+    """The output is there already and was not to be replaced."""
+
+
+class OutputBusy(RuntimeError):
+    """Another run is writing this output."""
+
+
+def run(
+    scenario: Scenario,
+    to: str | os.PathLike | None = None,
+    *,
+    replace: bool = False,
+    progress: Progress | None = None,
+) -> Any:
+    """Run a scenario with its ensemble and its sweep.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        What to run.
+    to : path, optional
+        The netCDF file to make; without it everything stays in memory.
+    replace : bool
+        Whether an existing file may be replaced.
+    progress : callable, optional
+        Called with the number of member-steps done since the last call.
+
+    Returns
+    -------
+    xarray.Dataset or pathlib.Path
+        The dataset, or the path of the file.
+
+    Raises
+    ------
+    OutputExists
+        If the file is there and ``replace`` is False.
+    OutputBusy
+        If another run holds the output.
+    StoreTrouble
+        If the disk or a file makes trouble; what the disk holds of an older output stays.
+    """
+    plan = Plan.of(scenario)
+    if to is None:
+        return _in_memory(plan, progress)
+    target = Path(to)
+    if target.exists() and not replace:
+        raise OutputExists(f"{target} exists; replace it (--force) or name another output (-o)")
+    with explained(target.parent):
+        target.parent.mkdir(parents=True, exist_ok=True)
+    with _held(target) as folder:
+        parts = PartFiles(folder)
+        simulate(plan, parts, progress)
+        with explained(target.parent):
+            _write_file(target, plan, parts)
+    return target
+
+
+def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None:
+    """Advance every group of members at every point of the sweep and save the parts."""
+    for number, point in enumerate(plan.points):
+        for group, members in enumerate(plan.groups()):
+            stretches = plan.stretches(point)
+            states = march(point, members)
+            for index, records in enumerate(stretches):
+                arrays = _record(plan, point, members, states, records, progress)
+                parts.save(part_name(number, group, index), arrays)
+
+
+def _record(
+    plan: Plan,
+    point: Scenario,
+    members: np.ndarray,
+    states: Iterator[State],
+    records: range,
+    progress: Progress | None,
+) -> dict[str, np.ndarray]:
+    """One part: every gauge over a stretch of records, the maps in it, and the state at its end."""
+    rows = {g.name: np.empty((len(members) if plan.varies(g) else 1, len(records))) for g in GAUGES}
+    maps: dict[str, np.ndarray] = {}
+    snapshots = {
+        round(t / point.clock.duration * point.clock.steps): k for k, t in enumerate(sorted(point.record.maps))
+    }
+    drawn = int(np.sum(members < point.record.map_members))
+    for column, record in enumerate(records):
+        state = next(states)
+        while state.step < record * point.clock.stride:
+            state = next(states)
+        for gauge in GAUGES:
+            rows[gauge.name][:, column] = gauge.read(point, state)
+        if state.step in snapshots and drawn:
+            maps[f"map.{snapshots[state.step]}"] = cast(MappedProcess, point.process).maps(
+                state.shear, np.broadcast_to(state.position, drawn), drawn
+            )
+        if progress is not None:
+            progress(len(members) * (point.clock.stride if record else 1))
+    if not plan.scenario.record.per_member:
+        rows = {g.name: moments(rows[g.name]) if plan.varies(g) else rows[g.name] for g in GAUGES}
+    return rows | maps | {f"state.{name}": array for name, array in pack(state).items()}
+
+
+def _in_memory(plan: Plan, progress: Progress | None) -> Any:
+    import xarray
+
+    parts = MemoryParts()
+    simulate(plan, parts, progress)
+    file = netCDF4.Dataset("in-memory", "w", format="NETCDF4", memory=1)
+    write_dataset(file, plan, parts)
+    content = file.close()
+    with netCDF4.Dataset("in-memory", "r", memory=content) as file:
+        return xarray.open_dataset(xarray.backends.NetCDF4DataStore(file)).load()
+
+
+def _write_file(target: Path, plan: Plan, parts: Parts) -> None:
+    """Make the dataset under a temporary name, sync it and rename it into place."""
+    descriptor, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
+    os.close(descriptor)
+    beside = Path(name)
+    try:
+        with netCDF4.Dataset(beside, "w", format="NETCDF4") as file:
+            write_dataset(file, plan, parts)
+        beside.chmod(0o666 & ~_umask())
+        with builtins.open(beside, "rb") as written:
+            os.fsync(written.fileno())
+        os.replace(beside, target)
+    finally:
+        beside.unlink(missing_ok=True)
+    sync_folder(target.parent)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+@contextlib.contextmanager
+def _held(target: Path) -> Iterator[Path]:
+    """The folder of an output's parts, held under a lock and removed after a run that ended well."""
+    folder = target.with_name(f"{target.name}.parts")
+    with explained(target.parent):
+        folder.mkdir(exist_ok=True)
+        lock = builtins.open(folder / "lock", "w")  # noqa: SIM115  held for the whole run
+    try:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise OutputBusy(f"another run is writing {target}; wait for it or name another output") from None
+        for left in folder.glob("*.npz"):  # of a run that was cut off: there is no resuming yet
+            left.unlink()
+        yield folder
+        shutil.rmtree(folder)
+    finally:
+        lock.close()
+
+
+def open(path: str | os.PathLike) -> Any:
+    """Open the dataset of a finished run lazily: an ``xarray.Dataset`` with named dimensions and units."""
+    import xarray
+
+    return xarray.open_dataset(path, engine="netcdf4")
+
+
+def write_log(target: Path, began: float, arguments: list[str]) -> None:
+    """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments."""
+    entry = {
+        "began": datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds"),
+        "seconds": round(time.time() - began, 2),
+        "host": platform.node(),
+        "platform": platform.platform(),
+        "arguments": arguments,
+    }
+    with explained(target.parent), builtins.open(f"{target}.log", "a", encoding="utf-8") as log:
+        log.write(json.dumps(entry) + "\n")
+
+
+__all__ = ["OutputBusy", "OutputExists", "StoreTrouble", "open", "run", "simulate", "work", "write_log"]

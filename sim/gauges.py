@@ -1,0 +1,66 @@
+"""What can be read off a state, each with unit, long name and symbol."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.engine import State
+from sim.scenario import Scenario
+
+
+@dataclass(frozen=True)
+class Gauge:
+    """One recorded quantity.
+
+    ``part`` names the part whose class decides whether members differ; ``read`` takes the scenario
+    and a state and gives an array of shape (1,) or (members,).
+    """
+
+    name: str
+    unit: str
+    long_name: str
+    symbol: str
+    part: str
+    read: Callable[[Scenario, State], np.ndarray]
+
+
+def _radius(scene: Scenario, state: State) -> np.ndarray:
+    return np.nan_to_num(state.contact.radius, nan=0.0)
+
+
+def _area(scene: Scenario, state: State) -> np.ndarray:
+    return np.pi * _radius(scene, state) ** 2
+
+
+def _stress(scene: Scenario, state: State) -> np.ndarray:
+    return scene.bonds.shear_stress(state.bonds)
+
+
+def _load(scene: Scenario, state: State) -> np.ndarray:
+    return scene.contact.normal_load(state.contact.radius, scene.sphere.radius, scene.solid.contact_modulus)
+
+
+def _indentation(scene: Scenario, state: State) -> np.ndarray:
+    return scene.contact.depth(state.contact.radius, scene.sphere.radius, scene.solid.contact_modulus)
+
+
+GAUGES = (
+    Gauge("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.speed),
+    Gauge("slider_position", "m", "displacement of the slider", "X", "drive", lambda scene, state: state.position),
+    Gauge("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
+          lambda scene, state: scene.bonds.fraction(state.bonds)),
+    Gauge("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds", _stress),
+    Gauge("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
+          "DeltaGamma", "shear", lambda scene, state: state.shear.energy),
+    Gauge("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
+          lambda scene, state: state.contact.work),
+    Gauge("contact_radius", "m", "contact radius", "a", "contact", _radius),
+    Gauge("contact_area", "m^2", "contact area", "A", "contact", _area),
+    Gauge("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact", _load),
+    Gauge("indentation", "m", "indentation of the sphere", "delta", "contact", _indentation),
+    Gauge("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
+          lambda scene, state: _stress(scene, state) * _area(scene, state)),
+    Gauge("in_contact", "1", "whether the contact is closed", "", "contact",
+          lambda scene, state: np.isfinite(state.contact.radius).astype(float)),
+)  # fmt: skip

@@ -1,0 +1,104 @@
+"""The only place where numba decorates.
+
+Three decorators: ``device`` for a scalar helper that compiles into its callers, ``kernel`` for a
+loop over arrays, ``law`` for a formula that broadcasts as a numpy ufunc but keeps its Python
+signature, defaults and docstring. Kernels and laws compile at their first call and are cached on
+disk, in a folder named by a hash of all compiled sources: numba itself does not notice a change in
+a helper of another file. A cache that is broken, read-only or full costs time, never a run.
+"""
+
+import functools
+import hashlib
+import inspect
+import os
+import tempfile
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core import config
+
+device = numba.njit
+_building = threading.RLock()
+
+
+@functools.cache
+def _cache_folder() -> str:
+    """A folder of compiled code that belongs to exactly these sources."""
+    package = Path(__file__).parent
+    digest = hashlib.sha256(numba.__version__.encode())
+    for source in sorted(package.rglob("*.py")):
+        text = source.read_bytes()
+        if b"sim.jit" in text or source.name == "jit.py":
+            digest.update(text)
+    base = os.environ.get("SIM_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
+    return str(Path(base).expanduser() / "sliding-sim" / digest.hexdigest()[:16])
+
+
+def _build(compile_it: Callable[[bool], Any]) -> Any:
+    """Compile with the disk cache; if the cache is at fault in any way, compile without it.
+
+    numba signals a bad cache by whatever its file layer or unpickler meets (OSError, EOFError,
+    UnpicklingError, RuntimeError, ...), so every exception leads to the second try, where a fault
+    of the code itself shows again.
+    """
+    with _building:
+        before = config.CACHE_DIR  # type: ignore[attr-defined]
+        try:
+            folder = _cache_folder()
+            os.makedirs(folder, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()
+            config.CACHE_DIR = folder  # type: ignore[attr-defined]
+            return compile_it(True)
+        except Exception:
+            return compile_it(False)
+        finally:
+            config.CACHE_DIR = before  # type: ignore[attr-defined]
+
+
+def kernel(signature: str) -> Callable[[Callable], Callable]:
+    """Compile a loop over arrays for one ``signature``, at the first call."""
+
+    def decorate(function: Callable) -> Callable:
+        @functools.cache
+        def compiled() -> Callable:
+            return _build(lambda cache: numba.njit(signature, cache=cache)(function))
+
+        @functools.wraps(function)
+        def call(*arguments):
+            return compiled()(*arguments)
+
+        return call
+
+    return decorate
+
+
+def law(function: Callable) -> Callable:
+    """Turn a scalar formula of floats into one that broadcasts over arrays.
+
+    The result keeps name, signature, defaults and docstring; where no answer exists it gives nan
+    without a warning.
+    """
+    parameters = inspect.signature(function).parameters
+    count = len(parameters)
+
+    @functools.cache
+    def compiled() -> Callable:
+        signature = f"float64({', '.join(['float64'] * count)})"
+        return _build(lambda cache: numba.vectorize([signature], cache=cache)(function))
+
+    bind = inspect.signature(function).bind
+
+    @functools.wraps(function)
+    def call(*arguments, **keywords):
+        if keywords or len(arguments) != count:
+            bound = bind(*arguments, **keywords)
+            bound.apply_defaults()
+            arguments = bound.args
+        with np.errstate(all="ignore"):
+            return compiled()(*arguments)
+
+    return call

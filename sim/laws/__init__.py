@@ -1,0 +1,10 @@
+"""Closed forms: half-space elasticity, JKR contact, bond populations. Everything broadcasts over arrays."""
+
+import importlib
+from types import ModuleType
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name in ("halfspace", "jkr", "schallamach"):
+        return importlib.import_module(f"sim.laws.{name}")
+    raise AttributeError(f"module 'sim.laws' has no attribute {name!r}")

@@ -1,0 +1,243 @@
+"""The Fourier modes of a periodic cell: which there are, and the variance each pair carries.
+
+A pair ±q stands for the pixel (2π/L)² of the wavevector plane around its lattice point. Its
+variance is the spectrum *integrated* over that pixel, so that a cell's field has the spectrum's
+variance but for the pixel of q = 0, even where the spectrum ends inside a pixel. Nothing is
+renormalised; what the cell lacks is told by ``error_variance`` and ``error_energy``.
+"""
+
+import functools
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import PydanticCustomError
+
+from sim.pixels import radial_quadrant
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+#: Pairs below this share of the variance are left out: all of them together would not change a bit.
+_NEGLIGIBLE = 1e-22
+
+#: Relative distance below which a wavevector counts as on the lattice, or a circle as touched only.
+_TOUCH = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Modes:
+    """One of each pair ±q of a periodic square cell: qy > 0, or qy = 0 and qx > 0.
+
+    Parameters
+    ----------
+    spectrum : object
+        The spectrum whose modes these are.
+    cell : float
+        Side L of the cell [m].
+    points : int
+        Points of the grid along a side.
+    ix, iy : array of int, shape (pairs,)
+        Lattice indices: qx = 2π ix/L along sliding, qy = 2π iy/L.
+    qx, qy : array, shape (pairs,)
+        Wavevectors [rad/m], sorted by length.
+    variance : array, shape (pairs,)
+        Share of the mean square stress that each pair carries [Pa²].
+    on_lattice : bool
+        False where a ripple does not fit the cell; qx, qy are then its own, ix, iy the nearest.
+    """
+
+    spectrum: Any
+    cell: float
+    points: int
+    ix: Indices
+    iy: Indices
+    qx: Array
+    qy: Array
+    variance: Array
+    on_lattice: bool = True
+
+    def energies(self, shear_modulus: float, poisson_ratio: float = 0.5) -> Array:
+        """Mean energy per area of each pair [J/m²], shape (pairs,).
+
+        Notes
+        -----
+        ``½ G_x(q) · variance = G_x(q) C(q) / L²`` with C averaged over the pixel and
+        ``G_x = (1 - ν qx²/q²) / (G q)``. The cell's mean ΔΓ is their sum.
+        """
+        q = np.hypot(self.qx, self.qy)
+        return (1 - poisson_ratio * (self.qx / q) ** 2) / (2 * shear_modulus * q) * self.variance
+
+    @functools.cached_property
+    def error_variance(self) -> float:
+        """Relative error of the cell's variance against the spectrum's own."""
+        return _relative(float(np.sum(self.variance)), self.spectrum.variance)
+
+    def error_energy(self, shear_modulus: float = 1.0, poisson_ratio: float = 0.5) -> float:
+        """Relative error of the cell's mean ΔΓ against the infinite plane's; any modulus gives the same."""
+        total = float(np.sum(self.energies(shear_modulus, poisson_ratio)))
+        return _relative(total, float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)))
+
+    @functools.cached_property
+    def variance_spread(self) -> float:
+        """Expected relative standard deviation of one realisation's mean square, Gaussian amplitudes."""
+        return _spread(self.variance)
+
+    def energy_spread(self, poisson_ratio: float = 0.5) -> float:
+        """Expected relative standard deviation of one realisation's ΔΓ, Gaussian amplitudes."""
+        return _spread(self.energies(1.0, poisson_ratio))
+
+
+def _relative(value: float, exact: float) -> float:
+    return (value - exact) / exact if exact > 0.0 else 0.0
+
+
+def _spread(weights: Array) -> float:
+    total = float(np.sum(weights))
+    return math.sqrt(float(np.sum(weights**2))) / total if total > 0.0 else 0.0
+
+
+@functools.lru_cache(maxsize=4)  # a sweep asks for the same modes again and again
+def modes(spectrum: Any, cell: float, points: int | None = None) -> Modes:
+    """The mode pairs of a spectrum on a periodic square cell.
+
+    Parameters
+    ----------
+    spectrum : object
+        Any family of ``sim.spectrum`` or a measured one.
+    cell : float
+        Side L of the cell [m].
+    points : int, optional
+        Points of the grid along a side, odd or even. Without it the smallest even grid that holds
+        all of the spectrum, which then must have a shortest wavelength.
+
+    Returns
+    -------
+    Modes
+        All pairs whose pixel meets the spectrum; q = 0, and the Nyquist row and column of an even
+        grid, are left out.
+
+    Raises
+    ------
+    PydanticCustomError
+        (a ValueError) if the grid is too coarse for the shortest wavelength, if ``points`` is needed,
+        or if no mode fits the cell; each names the cure.
+
+    Examples
+    --------
+    One ripple is one pair; of a band whose longest wave is half the cell nothing is lost:
+
+    >>> from sim.spectrum import Band, Ripple
+    >>> modes(Ripple(2.0, 1.0), cell=4.0).variance.tolist()
+    [2.0]
+    >>> print(f"{abs(modes(Band(1.0, longest=2.0, shortest=0.5), cell=4.0).error_variance):.9f}")
+    0.000000000
+    """
+    if not (math.isfinite(cell) and cell > 0.0):
+        raise PydanticCustomError("bad_cell", "the cell must be a positive length", {})
+    wavevector = getattr(spectrum, "wavevector", None)
+    if wavevector is not None:
+        return _single(spectrum, cell, points, wavevector)
+    step = 2 * math.pi / cell
+    low, high = spectrum.support
+    needed = None if math.isinf(high) else math.ceil(high / step * (1 - _TOUCH) - 0.5)
+    reach, points = _reach(needed, points)
+    if spectrum.isotropic:
+        ix, iy, share = _isotropic_half(spectrum, step, low, high, reach)
+    else:
+        ix, iy, share = _half(pixel_variances(spectrum, cell, reach))
+    kept = 2 * share > _NEGLIGIBLE * spectrum.variance
+    ix, iy, share = ix[kept], iy[kept], share[kept]
+    if not len(ix):
+        raise PydanticCustomError(
+            "no_modes", "no wave of the spectrum fits the cell of {cell} m; make the cell longer", {"cell": f"{cell:g}"}
+        )
+    order = np.lexsort((iy, ix, ix**2 + iy**2))
+    ix, iy, share = ix[order], iy[order], share[order]
+    return Modes(spectrum, cell, points, *map(_read_only, (ix, iy, step * ix, step * iy, 2 * share)))
+
+
+def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
+    """Largest lattice index below Nyquist and the points of the grid."""
+    if points is None:
+        if needed is None:
+            raise PydanticCustomError(
+                "points_needed", "the spectrum has no shortest wavelength; give points (such as points = 256)", {}
+            )
+        points = 2 * (needed + 1)
+    elif points < 3:
+        raise PydanticCustomError("too_few_points", "points must be at least 3, not {points}", {"points": points})
+    reach = (points - 1) // 2
+    if needed is not None and needed > reach:
+        raise PydanticCustomError(
+            "grid_too_coarse",
+            "the shortest wavelength needs at least {needed} points, not {points}; give more points, a "
+            "longer shortest wavelength or a smaller cell",
+            {"needed": 2 * needed + 1, "points": points},
+        )
+    return (reach if needed is None else needed), points
+
+
+def _single(spectrum: Any, cell: float, points: int | None, wavevector: tuple[float, float]) -> Modes:
+    """The one pair of a ripple, at its own wavevector."""
+    qx, qy = wavevector
+    size = math.hypot(qx, qy)
+    qx, qy = (0.0 if abs(part) < 1e-12 * size else part for part in (qx, qy))
+    if qy < 0.0 or (qy == 0.0 and qx < 0.0):
+        qx, qy = -qx, -qy
+    exact = np.array([qx, qy]) * cell / (2 * math.pi)
+    nearest = np.rint(exact).astype(np.int64)
+    on_lattice = bool(np.all(np.abs(exact - nearest) <= _TOUCH * np.hypot(*exact)) and nearest.any())
+    needed = nearest if on_lattice else np.ceil(np.abs(exact)).astype(np.int64)
+    _, points = _reach(int(np.max(np.abs(needed))), points)
+    arrays = nearest[:1], nearest[1:], np.array([qx]), np.array([qy]), np.array([spectrum.variance])
+    return Modes(spectrum, cell, points, *map(_read_only, arrays), on_lattice=on_lattice)
+
+
+def _read_only(array: NDArray) -> NDArray:
+    array.flags.writeable = False
+    return array
+
+
+def pixel_variances(spectrum: Any, cell: float, reach: int) -> Array:
+    """Variance in each pixel of a cell's wavevector lattice, the one of q = 0 included.
+
+    Parameters
+    ----------
+    spectrum : object
+        Any family with a density.
+    cell : float
+        Side of the cell [m].
+    reach : int
+        Largest lattice index.
+
+    Returns
+    -------
+    array, shape (2 reach + 1, reach + 1)
+        C integrated over the pixel / 4π² [Pa²]: rows ix = -reach ... reach, columns iy = 0 ... reach.
+    """
+    step = 2 * math.pi / cell
+    if not spectrum.isotropic:
+        edges = step * (np.arange(-reach, reach + 2) - 0.5)
+        return spectrum.boxes(edges, edges[reach:])
+    quadrant = radial_quadrant(spectrum, step, reach)
+    return np.concatenate([quadrant[:0:-1], quadrant])
+
+
+def _half(pixels: Array) -> tuple[Indices, Indices, Array]:
+    """Lattice indices and variance of one of each pair, q = 0 left out."""
+    reach = pixels.shape[1] - 1
+    ix, iy = (index.ravel() for index in np.mgrid[-reach : reach + 1, 0 : reach + 1])
+    kept = (iy > 0) | (ix > 0)
+    return ix[kept], iy[kept], pixels.ravel()[kept]
+
+
+def _isotropic_half(spectrum: Any, step: float, low: float, high: float, reach: int) -> tuple[Indices, Indices, Array]:
+    """``_half`` of an isotropic spectrum, pixels that its annulus does not meet left out."""
+    ix, iy, share = _half(pixel_variances(spectrum, 2 * math.pi / step, reach))
+    nearest = np.hypot(np.maximum(np.abs(ix) - 0.5, 0.0), np.maximum(iy - 0.5, 0.0))
+    farthest = np.hypot(np.abs(ix) + 0.5, iy + 0.5)
+    meets = (farthest * step > low * (1 + _TOUCH)) & (nearest * step < high * (1 - _TOUCH))
+    return ix[meets], iy[meets], share[meets]

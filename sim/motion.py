@@ -1,0 +1,33 @@
+"""What a drive hands to the other parts for one clock step."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Sliding during one clock step, each array of shape (1,) or (members,).
+
+    Attributes
+    ----------
+    step : int
+        Number of the step; 0 is the start, which has no duration.
+    time : float
+        Time at the end of the step [s].
+    duration : float
+        Length of the step [s].
+    slip : array
+        Displacement of the slider over the step, signed [m].
+    path : array
+        Distance slid over the step, the integral of the absolute speed [m].
+    speed : array
+        Speed at the end of the step [m/s].
+    """
+
+    step: int
+    time: float
+    duration: float
+    slip: np.ndarray
+    path: np.ndarray
+    speed: np.ndarray

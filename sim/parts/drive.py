@@ -1,0 +1,163 @@
+"""Drives: how the slider moves. Shallow to deep: steady, ramp, table.
+
+A prescribed drive is a function of time, the same for all members. It gives the exact slip of a
+step, never the speed times the step, so that parts that live on slip see no step error.
+"""
+
+import itertools
+import math
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, ValidationInfo, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
+
+from sim.motion import Motion
+from sim.quantity import Quantity
+from sim.table import TableError, columns, file_text
+
+_SPEED = Quantity("m/s", "sliding speed", "V")
+_TIME = Quantity("s", "time", "t")
+
+
+class _Prescribed:
+    """A drive whose speed is a given function of time; a subclass gives ``pieces``."""
+
+    per_member: ClassVar[bool] = False
+
+    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
+        """The motion from ``start`` to ``stop`` as pieces (slip [m], path [m], speed at the end [m/s])."""
+        raise NotImplementedError
+
+    def motion(self, step: int, start: float, stop: float, duration: float) -> Motion:
+        """Slip, path and final speed from time ``start`` to ``stop`` of a run of ``duration`` [s]."""
+        pieces = self.pieces(start, stop, duration)
+        return Motion(
+            step=step,
+            time=stop,
+            duration=stop - start,
+            slip=np.array([math.fsum(slip for slip, _, _ in pieces)]),
+            path=np.array([math.fsum(path for _, path, _ in pieces)]),
+            speed=np.array([pieces[-1][2]]),
+        )
+
+
+def _linear_piece(first: float, last: float, time: float) -> tuple[float, float, float]:
+    """Slip, path and final speed where the speed changes linearly over ``time``."""
+    slip = 0.5 * (first + last) * time
+    if first * last >= 0.0:
+        return slip, abs(slip), last
+    return slip, 0.5 * (first**2 + last**2) / abs(last - first) * time, last
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Steady(_Prescribed):
+    """A constant speed; zero is a contact at rest.
+
+    >>> float(Steady(speed=1e-3).motion(1, 0.0, 2.0, 10.0).slip[0])
+    0.002
+    """
+
+    speed: Annotated[float, _SPEED] = 0.0
+    model: Literal["steady"] = "steady"
+
+    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
+        slip = self.speed * (stop - start)
+        return [(slip, abs(slip), self.speed)]
+
+
+@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+class Ramp(_Prescribed):
+    """A speed that goes from ``start`` to ``stop`` over the whole run, linearly or logarithmically.
+
+    In a scenario file the two ends are called ``from`` and ``to``.
+
+    Notes
+    -----
+    Logarithmic: V(t) = V0 r^(t/T) with r = V1/V0, and the slip of a step is
+    V(t) T/ln r (r^(dt/T) − 1), taken with expm1.
+    """
+
+    start: Annotated[float, _SPEED, Field(alias="from")]
+    stop: Annotated[float, _SPEED, Field(alias="to")]
+    scale: Literal["linear", "log"] = "linear"
+    model: Literal["ramp"] = "ramp"
+
+    @model_validator(mode="after")
+    def _log_needs_one_sign(self) -> "Ramp":
+        if self.scale == "log" and self.start * self.stop <= 0.0:
+            raise PydanticCustomError(
+                "log_through_zero",
+                'a logarithmic ramp cannot reach or pass zero; give two speeds above zero or scale = "linear"',
+            )
+        return self
+
+    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
+        if self.scale == "linear":
+            slope = (self.stop - self.start) / duration
+            return [_linear_piece(self.start + slope * start, self.start + slope * stop, stop - start)]
+        rate = math.log(self.stop / self.start) / duration
+        before, after = (self.start * math.exp(rate * time) for time in (start, stop))
+        slip = before * math.expm1(rate * (stop - start)) / rate if rate else before * (stop - start)
+        return [(slip, abs(slip), after)]
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Table(_Prescribed):
+    """A speed tabulated over time, linear between the rows; two rows at one time are a jump.
+
+    In a scenario file ``file`` names a CSV with the columns ``time`` and ``speed``, each with its
+    unit in brackets; in Python give the two columns [s], [m/s].
+    """
+
+    time: tuple[Annotated[float, _TIME], ...]
+    speed: tuple[Annotated[float, _SPEED], ...]
+    file: str = ""
+    model: Literal["table"] = "table"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
+        if not isinstance(values, dict) or "file" not in values or "time" in values:
+            return values
+        try:
+            text = file_text(values["file"], info.context)
+            return {**values, **columns(text, {"time": _TIME, "speed": _SPEED})}
+        except TableError as fault:
+            raise PydanticCustomError("table", "{file}: {said}", {"file": values["file"], "said": str(fault)}) from None
+
+    @model_validator(mode="after")
+    def _rows_in_order(self) -> "Table":
+        if len(self.time) != len(self.speed) or len(self.time) < 2:
+            raise PydanticCustomError("short_table", "a table of speeds needs two rows or more")
+        if np.any(np.diff(self.time) < 0.0) or self.time[0] > 0.0:
+            raise PydanticCustomError("time_order", "times must start at 0 s or before and never decrease")
+        return self
+
+    @cached_property
+    def _knots(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.array(self.time), np.array(self.speed)
+
+    def _between(self, row: int, time: float) -> float:
+        times, speeds = self._knots
+        part = (time - times[row]) / (times[row + 1] - times[row])
+        return float(speeds[row] + part * (speeds[row + 1] - speeds[row]))
+
+    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
+        times, _ = self._knots
+        if stop == start:
+            row = min(int(np.searchsorted(times, stop, "right")) - 1, len(times) - 2)
+            return [(0.0, 0.0, self._between(row, stop))]
+        inside = times[(times > start) & (times < stop)]
+        edges = np.unique(np.concatenate([[start], inside, [stop]]))
+        pieces = []
+        for left, right in itertools.pairwise(edges):
+            row = min(int(np.searchsorted(times, 0.5 * (left + right), "right")) - 1, len(times) - 2)
+            first, last = self._between(row, left), self._between(row, right)
+            pieces.append(_linear_piece(first, last, right - left))
+        return pieces
+
+
+Drive = Annotated[Steady | Ramp | Table, Field(discriminator="model")]

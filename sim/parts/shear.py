@@ -1,0 +1,376 @@
+"""Shear-stress fluctuations and the elastic energy they store. Shallow to deep: uniform, mean, modal, mapped.
+
+A depth is a frozen recipe; with the solid and the cell it becomes a *process* with ``start`` and
+``advance``. All the contact ever feels of it is one number a step, the stored energy per area ΔΓ.
+"""
+
+from dataclasses import dataclass as plain_dataclass
+from dataclasses import replace
+from functools import cached_property
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
+
+from sim.grid import Grid
+from sim.jit import kernel
+from sim.memory import Constant, Growth, Memory
+from sim.modes import Modes, modes
+from sim.motion import Motion
+from sim.noise import Noise
+from sim.quantity import Quantity
+from sim.spectrum import Spectrum
+
+_Paid = Annotated[
+    float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)
+]
+_Cell = Annotated[float, Quantity("m", "side of the periodic cell", "L", above=0)]
+_Points = Annotated[int, Field(ge=2, le=2**14, description="grid points along a side of the cell")]
+
+
+@plain_dataclass(frozen=True)
+class Fluctuation:
+    """State of the fluctuations.
+
+    Attributes
+    ----------
+    energy : array, shape (1,) or (members,)
+        Elastic energy per area ΔΓ [J/m^2].
+    growth : array, shape (1,) or (members,)
+        Growth factor g [1] at this time.
+    amplitude : array
+        Own numbers of the process: complex amplitudes (members, pairs, 2) in units of each mode's
+        standard deviation, or phases (members, pairs) [rad]; empty where there are none.
+    """
+
+    energy: np.ndarray
+    growth: np.ndarray
+    amplitude: np.ndarray
+
+
+@plain_dataclass(frozen=True)
+class SmoothProcess:
+    """ΔΓ = g² × a given energy, without noise: the ensemble mean, or nothing at all."""
+
+    energy: float
+    growth: Growth
+    pairs: ClassVar[int] = 0
+
+    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        return Fluctuation(growth**2 * self.energy, growth, np.empty(0))
+
+    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        return self.start(motion, stress, noise)
+
+    def known_errors(self) -> dict[str, float]:
+        """Errors and spreads known before the run."""
+        return {}
+
+
+@plain_dataclass(frozen=True)
+class ModalProcess:
+    """Every Fourier mode of the cell as a complex Ornstein-Uhlenbeck process.
+
+    Notes
+    -----
+    With λ the mode's rate, a step keeps e = exp(−∫λdt) of an amplitude and adds √(1 − e²) of a new
+    standard one: exact, and stationary for any step. By Parseval ΔΓ = Σ over pairs of
+    ½ G_x(q) (variance of the pair) \\|a\\|², the spectral form of ½⟨τ1 w1⟩. Sliding only turns the
+    phases of the modes, so ΔΓ of the periodic cell does not feel it: amplitudes are kept in the
+    slider's frame and turned where a map is made.
+    """
+
+    modes: Modes
+    shear_modulus: float
+    poisson_ratio: float
+    infinite_energy: float
+    infinite_variance: float
+    memory: Memory
+    growth: Growth
+
+    @property
+    def pairs(self) -> int:
+        """Number of mode pairs."""
+        return self.modes.qx.size
+
+    @cached_property
+    def weights(self) -> np.ndarray:
+        """Energy of each pair for a unit normal in each component, shape (pairs,) [J/m^2]."""
+        return 0.5 * self.modes.energies(self.shear_modulus, self.poisson_ratio)
+
+    @cached_property
+    def wavenumber(self) -> np.ndarray:
+        """\\|q\\| of each pair [rad/m]."""
+        return np.hypot(self.modes.qx, self.modes.qy)
+
+    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        size = growth if self.growth.relaxing else np.ones(1)
+        empty = np.zeros((len(noise.members), len(self.wavenumber), 2))
+        return self._renewed(empty, np.zeros(1), np.ones(1), size, growth, motion.step, noise)
+
+    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        # renewed amplitudes get the mean variance over the step, which is second order in the step
+        size = np.sqrt(0.5 * (growth**2 + state.growth**2)) if self.growth.relaxing else np.ones(1)
+        exponents = self.memory.exponents(self.wavenumber, motion)
+        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
+        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
+
+    def _renewed(
+        self,
+        amplitude: np.ndarray,
+        keep: np.ndarray,
+        renew: np.ndarray,
+        size: np.ndarray,
+        growth: np.ndarray,
+        step: int,
+        noise: Noise,
+    ) -> Fluctuation:
+        members, pairs, _ = amplitude.shape
+        after, energy = np.empty_like(amplitude), np.empty(members)
+        _renew(
+            amplitude,
+            noise.normals(step, 2 * pairs),
+            np.full(pairs, keep),
+            np.full(pairs, renew),
+            np.full(members, size),
+            self.weights,
+            after,
+            energy,
+        )
+        scale = np.ones(1) if self.growth.relaxing else growth
+        return Fluctuation(scale**2 * energy, growth, after)
+
+    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
+        """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
+        amplitude = state.amplitude[..., 0] + 1j * state.amplitude[..., 1]
+        scale = np.ones(1) if self.growth.relaxing else state.growth
+        return amplitude * (0.5 * np.sqrt(self.modes.variance)) * scale[:, np.newaxis]
+
+    def known_errors(self) -> dict[str, float]:
+        """The cell's own errors against the infinite plane, and the spreads of one realisation."""
+        energies = self.modes.energies(self.shear_modulus, self.poisson_ratio)
+        return {
+            "cell_error_variance": float(np.sum(self.modes.variance)) / self.infinite_variance - 1.0,
+            "cell_error_energy": float(np.sum(energies)) / self.infinite_energy - 1.0,
+            "realization_spread_variance": _spread(self.modes.variance),
+            "realization_spread_energy": _spread(energies),
+        }
+
+
+class FixedProcess(ModalProcess):
+    """Modes that keep their modulus and diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
+
+    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
+        return Fluctuation(self._energy(growth), growth, phases)
+
+    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        turn = np.sqrt(2.0 * self.memory.exponents(self.wavenumber, motion))
+        phases = state.amplitude + turn * noise.normals(motion.step, len(self.wavenumber))
+        return Fluctuation(self._energy(growth), growth, phases)
+
+    def _energy(self, growth: np.ndarray) -> np.ndarray:
+        return growth**2 * (2.0 * np.sum(self.weights))
+
+    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
+        modulus = np.sqrt(0.5 * self.modes.variance)
+        return np.exp(1j * state.amplitude) * modulus * state.growth[:, np.newaxis]
+
+    def known_errors(self) -> dict[str, float]:
+        fixed = {"realization_spread_variance": 0.0, "realization_spread_energy": 0.0}
+        return super().known_errors() | fixed
+
+
+def _spread(weights: np.ndarray) -> float:
+    """Coefficient of variation of Σ w ξ with independent ξ ~ Exp(1)."""
+    return float(np.sqrt(np.sum(weights**2)) / np.sum(weights))
+
+
+@kernel(
+    "void(float64[:,:,::1], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
+    " float64[:,:,::1], float64[::1])"
+)
+def _renew(before, normals, keep, renew, size, weights, after, energy):
+    """One Ornstein-Uhlenbeck step of all modes of all members, and the energy by Parseval.
+
+    The sum runs in runs of 128 modes, in the same order for every batch.
+    """
+    members, pairs, _ = before.shape
+    for m in range(members):
+        total = 0.0
+        for first in range(0, pairs, 128):
+            run = 0.0
+            for k in range(first, min(first + 128, pairs)):
+                kick = renew[k] * size[m]
+                x = keep[k] * before[m, k, 0] + kick * normals[m, 2 * k]
+                y = keep[k] * before[m, k, 1] + kick * normals[m, 2 * k + 1]
+                after[m, k, 0] = x
+                after[m, k, 1] = y
+                run += weights[k] * (x * x + y * y)
+            total += run
+        energy[m] = total
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Uniform:
+    """No fluctuation: a uniform shear stress, which stores nothing at the expense of adhesion."""
+
+    per_member: ClassVar[bool] = False
+    draws_maps: ClassVar[bool] = False
+    reads_stress: ClassVar[bool] = False
+    paid_by_adhesion: ClassVar[float] = 1.0
+
+    model: Literal["uniform"] = "uniform"
+
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
+        """The process on a given solid and cell."""
+        return SmoothProcess(0.0, Constant())
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Mean:
+    """The ensemble mean of ΔΓ on the infinite plane, in closed form. Limit: uniform as rms -> 0."""
+
+    per_member: ClassVar[bool] = False
+    draws_maps: ClassVar[bool] = False
+
+    spectrum: Spectrum
+    growth: Growth = Field(default_factory=Constant)
+    paid_by_adhesion: _Paid = 1.0
+    model: Literal["mean"] = "mean"
+
+    @property
+    def reads_stress(self) -> bool:
+        """Whether the growth follows the bonds' stress."""
+        return self.growth.reads_stress
+
+    @model_validator(mode="after")
+    def _no_memory(self) -> "Mean":
+        if self.growth.relaxing:
+            raise PydanticCustomError(
+                "mean_has_no_memory",
+                'growth that relaxes needs a memory, which "mean" has not; use model = "modal"',
+            )
+        return self
+
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
+        return SmoothProcess(float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))), self.growth)
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Modal:
+    """ΔΓ(t) from every Fourier mode of a periodic cell. Limit: mean as the cell grows.
+
+    ``cell`` None means √π times the radius at rest, the square of the contact's area; ``points``
+    None means the grid that holds the spectrum's shortest wavelength.
+    """
+
+    draws_maps: ClassVar[bool] = False
+
+    spectrum: Spectrum
+    memory: Memory
+    growth: Growth = Field(default_factory=Constant)
+    cell: _Cell | None = None
+    points: _Points | None = None
+    amplitudes: Literal["gaussian", "fixed"] = "gaussian"
+    paid_by_adhesion: _Paid = 1.0
+    model: Literal["modal"] = "modal"
+
+    @property
+    def per_member(self) -> bool:
+        """Whether ΔΓ differs between members: with fixed amplitudes it does not."""
+        return self.amplitudes == "gaussian"
+
+    @property
+    def reads_stress(self) -> bool:
+        """Whether the growth follows the bonds' stress."""
+        return self.growth.reads_stress
+
+    @model_validator(mode="after")
+    def _fixed_cannot_relax(self) -> "Modal":
+        if self.amplitudes == "fixed" and self.growth.relaxing:
+            raise PydanticCustomError(
+                "fixed_cannot_relax",
+                'fixed amplitudes are never renewed; use amplitudes = "gaussian" or relaxing = false',
+            )
+        return self
+
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
+        return self._process(ModalProcess, FixedProcess, shear_modulus, poisson_ratio, cell)
+
+    def _process(self, gaussian: Any, fixed: Any, shear_modulus: float, poisson_ratio: float, cell: float) -> Any:
+        side = cell if self.cell is None else self.cell
+        kind = fixed if self.amplitudes == "fixed" else gaussian
+        return kind(
+            modes(self.spectrum, side, self.points),
+            shear_modulus,
+            poisson_ratio,
+            float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))),
+            float(self.spectrum.variance),
+            self.memory,
+            self.growth,
+        )
+
+
+class _Maps:
+    """A process whose stress map can be drawn."""
+
+    modes: Modes
+
+    def maps(self, state: Fluctuation, position: np.ndarray, members: int) -> np.ndarray:
+        """Stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
+
+        The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
+        e^{iq(x − X)}.
+        """
+        grid = Grid(self.modes.cell, self.modes.points)
+        first = replace(state, amplitude=state.amplitude[:members])
+        if len(state.growth) > 1:
+            first = replace(first, growth=state.growth[:members])
+        turn = np.exp(-1j * position[:members, np.newaxis] * self.modes.qx)
+        amplitudes = self.complex_amplitudes(first) * turn * self.modes.cell**2  # type: ignore[attr-defined]
+        half = np.zeros((members, grid.points, grid.points // 2 + 1), dtype=complex)
+        ix, iy = self.modes.ix, self.modes.iy
+        half[:, ix % grid.points, iy] = amplitudes
+        edge = iy == 0  # the column q_y = 0 holds both of a pair
+        half[:, -ix[edge] % grid.points, 0] = amplitudes[:, edge].conj()
+        return grid.inverse(half)
+
+
+class MappedProcess(_Maps, ModalProcess):
+    """``ModalProcess`` that also draws its map."""
+
+
+class MappedFixedProcess(_Maps, FixedProcess):
+    """``FixedProcess`` that also draws its map."""
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Mapped(Modal):
+    """The map τ1(x, y, t) on a grid, carried with the slider. Limit: the same ΔΓ as ``Modal``, number for number.
+
+    A map costs one inverse FFT when it is recorded; ΔΓ never needs one.
+    """
+
+    model: Literal["mapped"] = "mapped"  # type: ignore[assignment]
+
+    draws_maps: ClassVar[bool] = True
+
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> MappedProcess:
+        process = self._process(MappedProcess, MappedFixedProcess, shear_modulus, poisson_ratio, cell)
+        if not process.modes.on_lattice:
+            raise PydanticCustomError(
+                "off_lattice",
+                "a map is periodic: make the cell a whole number of wavelengths along x and along y",
+            )
+        return process
+
+
+Shear = Annotated[Uniform | Mean | Modal | Mapped, Field(discriminator="model")]

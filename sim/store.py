@@ -1,0 +1,366 @@
+"""From recorded numbers to a netCDF file: immutable part files while running, one CF dataset at the end.
+
+A part holds a fixed group of members over a fixed stretch of records. Its shape is a function of
+the scenario alone, and the dataset is made from the parts in a fixed order, so equal runs give
+equal bytes. netCDF is written only once all parts are there: a file that HDF5 is still writing is
+lost when the run is killed, a renamed part is not.
+"""
+
+import hashlib
+import importlib.metadata
+import io
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol, cast
+
+import netCDF4
+import numpy as np
+from pydantic import TypeAdapter
+
+from sim.durable import explained, write_whole
+from sim.gauges import GAUGES, Gauge
+from sim.laws import jkr
+from sim.parts.shear import MappedProcess
+from sim.scenario import Scenario, quantities
+
+_GROUP = 64
+_PART_NUMBERS = 2**22
+_STATE_NUMBERS = 2**25
+_STATISTICS = {
+    "mean": "ensemble mean of",
+    "std": "standard deviation over the ensemble of",
+    "sem": "standard error of the ensemble mean of",
+}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which parts a scenario's dataset is made of."""
+
+    scenario: Scenario
+    points: tuple[Scenario, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Plan":
+        return cls(scenario, tuple(scenario.points()))
+
+    @property
+    def members(self) -> int:
+        """Members that are advanced: one where no part differs between members."""
+        varies = any(any(point.varies.values()) for point in self.points)
+        return self.scenario.ensemble.members if varies else 1
+
+    @property
+    def group(self) -> int:
+        """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
+        pairs = max(point.process.pairs for point in self.points)
+        return min(_GROUP, self.members, max(1, _STATE_NUMBERS // max(2 * pairs, 1)))
+
+    @property
+    def stretch(self) -> int:
+        """Records of one part."""
+        most = max(1, _PART_NUMBERS // (self.group * len(GAUGES)))
+        return min(self.points[0].clock.records, most)
+
+    def groups(self) -> list[np.ndarray]:
+        """The members of each group."""
+        return [np.arange(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
+
+    def stretches(self, point: Scenario) -> list[range]:
+        """The records of each stretch."""
+        records = point.clock.records
+        return [range(first, min(first + self.stretch, records)) for first in range(0, records, self.stretch)]
+
+    def varies(self, gauge: Gauge) -> bool:
+        """Whether the gauge's variable has the member dimension."""
+        return any(point.varies[gauge.part] for point in self.points)
+
+
+def work(plan: Plan) -> int:
+    """Member-steps that a plan takes."""
+    return sum(plan.members * (point.clock.steps + 1) for point in plan.points)
+
+
+def part_name(point: int, group: int, stretch: int) -> str:
+    """Name of a part, the same in every run of a scenario."""
+    return f"point{point:06d}-group{group:06d}-stretch{stretch:06d}"
+
+
+class Parts(Protocol):
+    """Where parts are kept until the dataset is made."""
+
+    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None: ...
+
+    def load(self, name: str) -> dict[str, np.ndarray]: ...
+
+
+class MemoryParts(dict):
+    """Parts kept in memory."""
+
+    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None:
+        self[name] = arrays
+
+    def load(self, name: str) -> dict[str, np.ndarray]:
+        return self[name]
+
+
+@dataclass(frozen=True)
+class PartFiles:
+    """Parts kept as files of a folder: built in memory, written, synced, then renamed into place."""
+
+    folder: Path
+
+    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None:
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **arrays)
+        with explained(self.folder):
+            write_whole(self.folder / f"{name}.npz", buffer.getbuffer())
+
+    def load(self, name: str) -> dict[str, np.ndarray]:
+        with explained(self.folder), np.load(self.folder / f"{name}.npz", allow_pickle=False) as arrays:
+            return dict(arrays)
+
+
+def write_dataset(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
+    """Fill an open netCDF file from all parts of a plan."""
+    _dimensions(file, plan)
+    _attributes(file, plan)
+    _scenario_variables(file, plan)
+    _derived_variables(file, plan)
+    for gauge in GAUGES:
+        _trajectories(file, plan, parts, gauge)
+    if plan.scenario.record.maps:
+        _maps(file, plan, parts)
+
+
+def _sweep_names(plan: Plan) -> tuple[str, ...]:
+    return tuple(axis.name for axis in plan.scenario.sweep)
+
+
+def _sweep_shape(plan: Plan) -> tuple[int, ...]:
+    return tuple(len(axis.values) for axis in plan.scenario.sweep)
+
+
+def _per_member(plan: Plan, gauge: Gauge) -> bool:
+    return plan.varies(gauge) and plan.scenario.record.per_member
+
+
+def _variable(
+    file: netCDF4.Dataset, name: str, kind: Any, dimensions: tuple[str, ...], unit: str, long_name: str,
+    symbol: str = "", chunks: tuple[int, ...] | None = None,
+) -> netCDF4.Variable:  # fmt: skip
+    packed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True} if dimensions and kind is not str else {}
+    variable = file.createVariable(name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed)
+    if unit:
+        variable.units = unit
+    variable.long_name = long_name
+    if symbol:
+        variable.symbol = symbol
+    return variable
+
+
+def _dimensions(file: netCDF4.Dataset, plan: Plan) -> None:
+    scene = plan.points[0]
+    for axis in plan.scenario.sweep:
+        file.createDimension(axis.name, len(axis.values))
+        _sweep_coordinates(file, plan, axis)
+    if plan.scenario.record.per_member and any(plan.varies(gauge) for gauge in GAUGES):
+        file.createDimension("realization", plan.members)
+        variable = _variable(file, "realization", "i4", ("realization",), "1", "number of the ensemble member")
+        variable.standard_name = "realization"
+        variable[:] = np.arange(plan.members)
+    file.createDimension("t", scene.clock.records)
+    _variable(file, "t", "f8", ("t",), "s", "time since the start", "t")[:] = scene.clock.times
+
+
+def _sweep_coordinates(file: netCDF4.Dataset, plan: Plan, axis: Any) -> None:
+    """The swept values as coordinates: numbers in SI, anything else as a label."""
+    stride = int(np.prod([len(a.values) for a in plan.scenario.sweep[plan.scenario.sweep.index(axis) + 1 :]]))
+    for position, key in enumerate(axis.keys):
+        name = axis.name if position == 0 else key.replace(".", "_")
+        tables = [quantities(plan.points[i * stride]) for i in range(len(axis.values))]
+        if all(key in table for table in tables):
+            quantity = tables[0][key][0]
+            variable = _variable(file, name, "f8", (axis.name,), quantity.unit, quantity.meaning, quantity.symbol)
+            variable[:] = [table[key][1] for table in tables]
+        else:
+            variable = _variable(file, name, str, (axis.name,), "", f"swept {key}")
+            for i, row in enumerate(axis.values):
+                variable[i] = _label(row[position])
+
+
+def _label(value: Any) -> str:
+    if isinstance(value, dict):
+        return str(value.get("model") or json.dumps(value, sort_keys=True))
+    return str(value)
+
+
+def scenario_json(scenario: Scenario) -> str:
+    """The resolved scenario, SI numbers throughout, as canonical JSON."""
+    dumped = TypeAdapter(Scenario).dump_python(scenario, by_alias=True, exclude={"source", "sweep"}, mode="json")
+    return json.dumps(dumped, sort_keys=True)
+
+
+def _attributes(file: netCDF4.Dataset, plan: Plan) -> None:
+    scene, source = plan.scenario, plan.scenario.source
+    resolved = scenario_json(scene)
+    digest = hashlib.sha256((resolved + json.dumps([list(a.values) for a in scene.sweep], default=str)).encode())
+    versions = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
+    sim_version = importlib.metadata.version("sliding-sim")
+    attributes = {
+        "Conventions": "CF-1.11",
+        "title": scene.name,
+        "source": f"sliding-sim {sim_version}, simulation of an adhesive sliding interface",
+        "history": f"sim run; scenario {digest.hexdigest()[:16]}; "
+        + ", ".join(f"{name} {version}" for name, version in versions.items()),
+        "references": "N. Menga, G. Carbone, D. Dini, arXiv:1710.06506; J. Mech. Phys. Solids 112 (2018) 145 and"
+        " 133 (2019) 103744 (corrigendum)",
+        "scenario_toml": source.text,
+        "scenario_overrides": json.dumps(source.overrides, sort_keys=True, default=str),
+        "scenario_resolved": resolved,
+        "scenario_files": json.dumps(
+            {n: {"sha256": hashlib.sha256(t.encode()).hexdigest(), "text": t} for n, t in source.files.items()},
+            sort_keys=True,
+        ),
+        "seed": str(scene.seed),
+        "members": np.int32(scene.ensemble.members),
+        "sim_version": sim_version,
+    }
+    for name, version in versions.items():
+        attributes[f"{name}_version"] = version
+    file.setncatts(attributes)
+
+
+def _scenario_variables(file: netCDF4.Dataset, plan: Plan) -> None:
+    """Every number of the scenario that is the same at all points, as a 0-d variable."""
+    tables = [quantities(point) for point in plan.points]
+    for key, (quantity, value) in tables[0].items():
+        if all(key in table and table[key][1] == value for table in tables):
+            name = key.replace(".", "_")
+            variable = _variable(file, name, "f8", (), quantity.unit, quantity.meaning, quantity.symbol)
+            variable[...] = value
+
+
+def _derived_variables(file: netCDF4.Dataset, plan: Plan) -> None:
+    """What readers of the file need beside the trajectories, at each point of the sweep."""
+    derived: dict[str, tuple[str, str, str, list[float]]] = {}
+
+    def add(name: str, unit: str, long_name: str, symbol: str, value: float) -> None:
+        derived.setdefault(name, (unit, long_name, symbol, []))[3].append(value)
+
+    for point in plan.points:
+        modulus, (shear_modulus, poisson_ratio) = point.solid.contact_modulus, point.solid.effective
+        hertz = point.contact.equilibrium_radius(np.zeros(1), point.sphere.radius, modulus)[0]
+        add("contact_modulus", "Pa", "contact modulus", "E*", modulus)
+        add("effective_shear_modulus", "Pa", "shear modulus of the tangential compliance", "G", shear_modulus)
+        add("effective_poisson_ratio", "1", "Poisson ratio of the tangential compliance", "nu", poisson_ratio)
+        add("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", point.rest_radius)
+        add("radius_without_adhesion", "m", "Hertz radius", "a_H", hertz)
+        if point.contact.load is not None:
+            pull_off = jkr.pull_off_load(point.adhesion.work, point.sphere.radius)
+            add(
+                "pull_off_load",
+                "N",
+                "load at pull-off with the full work of adhesion",
+                "P_c",
+                float(pull_off),
+            )
+        for name, value in point.process.known_errors().items():
+            add(name, "1", name.replace("_", " "), "", value)
+    complete = {n: entry for n, entry in derived.items() if len(entry[3]) == len(plan.points)}
+    for name, (unit, long_name, symbol, values) in complete.items():
+        variable = _variable(file, name, "f8", _sweep_names(plan), unit, long_name, symbol)
+        variable[...] = np.reshape(values, _sweep_shape(plan)) if _sweep_names(plan) else values[0]
+        if "error" in name:
+            file.setncattr(name, max(values, key=abs))
+
+
+def _trajectories(file: netCDF4.Dataset, plan: Plan, parts: Parts, gauge: Gauge) -> None:
+    names, shape = _sweep_names(plan), _sweep_shape(plan)
+    ones = (1,) * len(shape)
+    kind = {"float64": "f8", "float32": "f4"}[plan.scenario.record.precision]
+    if _per_member(plan, gauge):
+        dimensions, chunks = (*names, "realization", "t"), (*ones, plan.group, plan.stretch)
+        wanted = {gauge.name: ""}
+    elif plan.varies(gauge):
+        dimensions, chunks = (*names, "t"), (*ones, plan.stretch)
+        wanted, kind = {f"{gauge.name}_{s}": s for s in _STATISTICS}, "f8"
+    else:
+        dimensions, chunks = (*names, "t"), (*ones, plan.stretch)
+        wanted = {gauge.name: ""}
+    variables = {}
+    for name, statistic in wanted.items():
+        long_name = f"{_STATISTICS[statistic]} {gauge.long_name}" if statistic else gauge.long_name
+        if gauge.name == "in_contact" and not statistic:
+            kind = "i1"
+        variable = _variable(file, name, kind, dimensions, gauge.unit, long_name, gauge.symbol, chunks)
+        if kind == "i1":
+            variable.delncattr("units")
+            variable.flag_values = np.array([0, 1], "i1")
+            variable.flag_meanings = "detached in_contact"
+        variables[name] = variable
+    for number, point in enumerate(plan.points):
+        where = np.unravel_index(number, shape) if shape else ()
+        for index, records in enumerate(plan.stretches(point)):
+            time = slice(records.start, records.stop)
+            if _per_member(plan, gauge):
+                for group, members in enumerate(plan.groups()):
+                    values = parts.load(part_name(number, group, index))[gauge.name]
+                    variables[gauge.name][(*where, slice(members[0], members[-1] + 1), time)] = values
+            elif plan.varies(gauge):
+                loaded = [
+                    parts.load(part_name(number, group, index))[gauge.name] for group in range(len(plan.groups()))
+                ]
+                for statistic, values in pooled(loaded).items():
+                    variables[f"{gauge.name}_{statistic}"][(*where, time)] = values
+            else:
+                values = parts.load(part_name(number, 0, index))[gauge.name]
+                variables[gauge.name][(*where, time)] = values[0]
+
+
+def moments(values: np.ndarray) -> np.ndarray:
+    """Count, mean and sum of squared deviations over the first axis, shape (3, records)."""
+    mean = np.ascontiguousarray(values.T).mean(axis=1)
+    squares = np.ascontiguousarray(((values - mean) ** 2).T).sum(axis=1)
+    return np.stack([np.full_like(mean, len(values)), mean, squares])
+
+
+def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """Mean, standard deviation and standard error from the ``moments`` of groups, pooled in their order."""
+    count, mean, squares = groups[0]
+    for other, other_mean, other_squares in groups[1:]:
+        total, step = count + other, other_mean - mean
+        mean = mean + step * other / total
+        squares = squares + other_squares + step**2 * count * other / total
+        count = total
+    with np.errstate(invalid="ignore", divide="ignore"):
+        deviation = np.sqrt(squares / (count - 1.0))
+    return {"mean": mean, "std": deviation, "sem": deviation / np.sqrt(count)}
+
+
+def _maps(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
+    scene = plan.points[0]
+    process = cast(MappedProcess, scene.process)
+    points, cell = process.modes.points, process.modes.cell
+    count = min(scene.record.map_members, plan.members)
+    file.createDimension("map_realization", count)
+    file.createDimension("snapshot", len(scene.record.maps))
+    _variable(file, "map_realization", "i4", ("map_realization",), "1", "member of a map")[:] = np.arange(count)
+    times = sorted(scene.record.maps)
+    _variable(file, "snapshot", "f8", ("snapshot",), "s", "time of a map", "t")[:] = times
+    for axis, text in (("x", "along"), ("y", "across")):
+        file.createDimension(axis, points)
+        variable = _variable(file, axis, "f8", (axis,), "m", f"position {text} the sliding direction", axis)
+        variable[:] = np.arange(points) * (cell / points)
+    names = (*_sweep_names(plan), "map_realization", "snapshot", "x", "y")
+    variable = _variable(file, "shear_map", "f8", names, "Pa", "shear-stress fluctuation", "tau_1")
+    for number, point in enumerate(plan.points):
+        where = np.unravel_index(number, _sweep_shape(plan)) if plan.scenario.sweep else ()
+        for index in range(len(plan.stretches(point))):
+            for group, members in enumerate(plan.groups()):
+                part = parts.load(part_name(number, group, index))
+                for name in (n for n in part if n.startswith("map.")):
+                    snapshot, mapped = int(name.removeprefix("map.")), part[name]
+                    rows = slice(members[0], members[0] + len(mapped))
+                    variable[(*where, rows, snapshot)] = mapped

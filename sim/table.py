@@ -1,0 +1,197 @@
+"""Tables from CSV text: named columns with units in the header, and the files that hold them."""
+
+import csv
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic_core import PydanticCustomError
+
+from sim.quantity import Quantity
+
+_HEADER = re.compile(r"\s*(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?\s*")
+
+
+class TableError(ValueError):
+    """A table that cannot be read; the message names the line and the cure, not the file."""
+
+
+def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.float64]]:
+    """Named columns of a CSV text in SI units.
+
+    Parameters
+    ----------
+    text : str
+        Comma-separated cells. The first line that is neither empty nor a ``#`` comment names the
+        columns, each with its unit in brackets; a column without brackets is in SI units. Columns
+        that nobody wants are ignored.
+    wanted : dict of str to Quantity
+        The columns to read, each with its SI unit and bounds.
+
+    Returns
+    -------
+    dict of str to array, shape (rows,)
+        At least one row.
+
+    Raises
+    ------
+    TableError
+        If a column is missing or there twice, its unit is unknown or of another dimension, a row has
+        another number of cells, or a cell is no finite number within the bounds.
+
+    Examples
+    --------
+    >>> table = columns("time [s], speed [mm/s]\\n0, 1\\n2, 5", {"speed": Quantity("m/s", "speed")})
+    >>> table["speed"].tolist()
+    [0.001, 0.005]
+    """
+    lines = _lines(text)
+    example = ", ".join(_column(name, quantity) for name, quantity in wanted.items())
+    if not lines:
+        raise TableError(f'the table is empty; begin with a header such as "{example}", then rows of numbers')
+    (number, header), rows = lines[0], lines[1:]
+    found = _header(number, header, wanted, example)
+    if not rows:
+        raise TableError(f"line {number}: no rows follow the header; add rows of numbers below it")
+    for at, cells in rows:
+        if len(cells) != len(header):
+            raise TableError(
+                f"line {at}: {len(cells)} cells where the header has {len(header)}; separate cells by "
+                "commas, write decimals with a point"
+            )
+    return {
+        name: np.array([_number(at, name, cells[place], factor, wanted[name]) for at, cells in rows])
+        for name, (place, factor) in found.items()
+    }
+
+
+def matrix(text: str, quantity: Quantity) -> NDArray[np.float64]:
+    """A plain rectangular block of comma-separated SI numbers, shape (rows, columns).
+
+    Raises
+    ------
+    TableError
+        If it is empty or ragged, or a cell is no finite number within the bounds.
+    """
+    lines = _lines(text)
+    if not lines:
+        raise TableError("the table is empty; write one row of comma-separated numbers per line")
+    width = len(lines[0][1])
+    for at, cells in lines:
+        if len(cells) != width:
+            raise TableError(f"line {at}: {len(cells)} cells where the first row has {width}; complete the row")
+    return np.array([[_number(at, "value", cell, 1.0, quantity) for cell in cells] for at, cells in lines])
+
+
+def _lines(text: str) -> list[tuple[int, list[str]]]:
+    """Line numbers and cells of all lines that are neither empty nor comments."""
+    lines = []
+    for at, line in enumerate(text.removeprefix("\ufeff").splitlines(), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            try:
+                cells = next(csv.reader([line], skipinitialspace=True, strict=True))
+            except csv.Error as fault:
+                raise TableError(f"line {at}: cannot be read as comma-separated cells ({fault})") from None
+            lines.append((at, [cell.strip() for cell in cells]))
+    return lines
+
+
+def _column(name: str, quantity: Quantity) -> str:
+    return name if quantity.unit == "1" else f"{name} [{quantity.unit}]"
+
+
+def _header(at: int, header: list[str], wanted: dict[str, Quantity], example: str) -> dict[str, tuple[int, float]]:
+    """Place and factor to SI of each wanted column."""
+    split = [match for cell in header if (match := _HEADER.fullmatch(cell))]
+    if len(split) != len(header):
+        raise TableError(f'line {at}: a header cell cannot be read; write the header as "{example}"')
+    names = [match["name"] for match in split]
+    found = {}
+    for name, quantity in wanted.items():
+        if names.count(name) != 1:
+            what = "is there twice" if name in names else f"is missing (found: {', '.join(names)[:80]})"
+            raise TableError(f'line {at}: column "{name}" {what}; write the header as "{example}"')
+        place = names.index(name)
+        found[name] = (place, _factor(at, name, split[place]["unit"], quantity))
+    return found
+
+
+def _factor(at: int, name: str, unit: str | None, quantity: Quantity) -> float:
+    """Factor from a header's unit to SI."""
+    if unit is None or (unit in ("", "1", "-") and quantity.unit == "1"):
+        return 1.0
+    free = Quantity(quantity.unit, quantity.meaning)  # a factor has no bounds
+    try:
+        if not re.match(r"[A-Za-zµμΩ°%]|1/", unit):
+            raise ValueError(f'has the unit "{unit}", which is no unit')
+        return free.read(f"1 {unit}")
+    except ValueError as fault:
+        cure = _column(name, quantity)
+        raise TableError(f'line {at}: column "{name}" {_words(fault)}; write the column as "{cure}"') from None
+
+
+def _number(at: int, name: str, cell: str, factor: float, quantity: Quantity) -> float:
+    try:
+        number = float(cell)
+    except ValueError:
+        said = f'"{cell[:40]}"' if cell else "an empty cell"
+        raise TableError(f"line {at}: {name} is {said}, not a number; write a plain number") from None
+    try:
+        return quantity.read(number * factor)
+    except ValueError as fault:
+        raise TableError(f"line {at}: {name} {_words(fault)} (the cell holds {cell})") from None
+
+
+def _words(fault: ValueError) -> str:
+    """The first sentence of a fault, without the example that does not fit a table."""
+    text = fault.message() if isinstance(fault, PydanticCustomError) else str(fault)
+    return text.split("; write for example")[0]
+
+
+def file_text(name: str, context: Any) -> str:
+    """Text of a file that a scenario names, for validators of its parts.
+
+    Parameters
+    ----------
+    name : str
+        Path, relative to the scenario.
+    context : dict or None
+        The validation's context; ``context["files"].text(name)`` reads beside the scenario. Without
+        it the path is relative to the current directory.
+
+    Raises
+    ------
+    PydanticCustomError
+        If the file cannot be read, with the reason and a cure.
+    """
+    try:
+        if context and "files" in context:
+            return context["files"].text(name)
+        return Path(name).read_text(encoding="utf-8")
+    except UnicodeDecodeError:
+        raise PydanticCustomError(
+            "file_not_text", "{file} is not UTF-8 text; save it as plain CSV in UTF-8", {"file": name}
+        ) from None
+    except (OSError, ValueError) as fault:
+        raise _unreadable(name, fault) from None
+
+
+def file_path(name: str, context: Any) -> Path:
+    """Where a file that a scenario names lies; arguments and errors as ``file_text``."""
+    try:
+        path = context["files"].path(name) if context and "files" in context else Path(name)
+        path.open("rb").close()
+    except (OSError, ValueError) as fault:
+        raise _unreadable(name, fault) from None
+    return path
+
+
+def _unreadable(name: str, fault: Exception) -> PydanticCustomError:
+    reason = getattr(fault, "strerror", None) or str(fault) or "not found"
+    return PydanticCustomError(
+        "file_unreadable",
+        "{file} cannot be read ({reason}); give a path relative to the scenario",
+        {"file": name[:200], "reason": reason},
+    )

@@ -1,0 +1,76 @@
+"""Small scenes for the tests: one builder and the depths of every part."""
+
+from sim.bodies import Adhesion, Solid, Sphere
+from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
+from sim.parts import bonds, drive, shear
+from sim.parts.contact import Equilibrium
+from sim.scenario import Clock, Ensemble, Scenario
+from sim.spectrum import Band, Gaussian, Ripple, SelfAffine
+
+SPECTRUM = Band(rms=120e3, longest=120e-6, shortest=60e-6)
+CELL = 0.24e-3
+
+DRIVES = {
+    "steady": drive.Steady(speed=2e-3),
+    "at rest": drive.Steady(speed=0.0),
+    "linear ramp": drive.Ramp(start=-1e-3, stop=5e-3),
+    "log ramp": drive.Ramp(start=1e-5, stop=1e-1, scale="log"),
+    "table": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
+}
+BONDS = {
+    "none": bonds.Unbroken(stress=2e5),
+    "steady": bonds.Steady(critical_speed=1e-2, stress=2e5),
+    "rate": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=2e5, start_from="bonded"),
+    "counted": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=40, stress=2e5, start_from="steady"),
+}
+SHEARS = {
+    "uniform": shear.Uniform(),
+    "mean": shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), growth=Stress(reference=2e5)),
+    "modal, time, constant": shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3)),
+    "modal, slip, onset": shear.Modal(
+        spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6), growth=Onset(speed=2e-3, width=0.3, floor=0.1)
+    ),
+    "modal, wave, relaxing stress": shear.Modal(
+        spectrum=SPECTRUM, cell=CELL, memory=Wave(waves=2.0), growth=Stress(reference=2e5, relaxing=True)
+    ),
+    "modal, fixed": shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), amplitudes="fixed"),
+    "mapped, diffusion, constant": shear.Mapped(
+        spectrum=SPECTRUM, cell=CELL, points=12, memory=Diffusion(diffusivity=1e-9), growth=Constant()
+    ),
+    "mapped, fixed, stress": shear.Mapped(
+        spectrum=SPECTRUM,
+        cell=CELL,
+        points=13,
+        memory=Slip(length=1e-5),
+        growth=Stress(reference=2e5),
+        amplitudes="fixed",
+    ),
+    "modal ripple": shear.Modal(
+        spectrum=Ripple(amplitude=1e5, wavelength=24e-6), cell=CELL, points=32, memory=Slip(length=1e-5)
+    ),
+    "modal self-affine": shear.Modal(
+        spectrum=SelfAffine(rms=1e5, hurst=0.8, longest=120e-6, rolloff=100e-6, shortest=50e-6),
+        cell=CELL,
+        memory=Wave(waves=1.0),
+        growth=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=True),
+    ),
+}
+CONTACTS = {
+    "load": Equilibrium(load=4e-3),
+    "tension": Equilibrium(load=-0.3e-3),
+    "indentation": Equilibrium(indentation=2e-6),
+    "lifted": Equilibrium(indentation=-0.5e-6),
+}
+
+
+def scene(members=3, steps=8, **parts):
+    """A PDMS lens for a few milliseconds, with the parts given."""
+    parts = {"contact": CONTACTS["load"], "seed": 5} | parts
+    return Scenario(
+        clock=parts.pop("clock", Clock(duration=steps * 1e-3, step=1e-3)),
+        solid=Solid(shear_modulus=1.6e6),
+        sphere=Sphere(radius=2e-3),
+        adhesion=parts.pop("adhesion", Adhesion(work=42e-3)),
+        ensemble=Ensemble(members=members),
+        **parts,
+    )

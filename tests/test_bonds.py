@@ -1,0 +1,91 @@
+"""Bond populations against their exact laws."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scenes import scene
+from scipy.stats import binom, chi2
+
+from sim.engine import march
+from sim.parts import bonds, drive
+from sim.scenario import Clock
+
+STEPPED = drive.Table(time=(0.0, 0.7, 0.7, 1.4, 1.4, 2.1), speed=(1e-5, 1e-5, 8e-2, 8e-2, 2e-3, 2e-3))
+
+
+def fractions(population, motion, steps, members=1, seed=5, duration=2.1):
+    scenario = scene(bonds=population, drive=motion, clock=Clock(duration=duration, step=duration / steps), seed=seed)
+    states = march(scenario, np.arange(members))
+    return np.array([scenario.bonds.fraction(state.bonds) for state in states])
+
+
+@pytest.mark.parametrize("motion", [drive.Steady(speed=3e-3), STEPPED], ids=["steady", "stepped"])
+@pytest.mark.parametrize("start", ["steady", "bonded", "empty"])
+def test_the_rate_equation_has_no_step_error(motion, start):
+    rate = bonds.Rate(critical_speed=1e-2, healing=3.0, start_from=start)
+    coarse, fine = fractions(rate, motion, 21), fractions(rate, motion, 147)
+    assert_allclose(fine[::7], coarse, rtol=1e-12, atol=0)
+
+
+def test_the_rate_equation_is_second_order_under_a_ramp():
+    rate, ramp = bonds.Rate(critical_speed=1e-2, healing=3.0), drive.Ramp(start=1e-3, stop=5e-2)
+    ends = [fractions(rate, ramp, steps)[-1, 0] for steps in (32, 64, 128, 256)]
+    steps = np.diff(ends)
+    assert_allclose(np.log2(steps[:-1] / steps[1:]), 2.0, atol=0.1)
+
+
+def test_bonds_of_a_rest_contact_stay_bonded():
+    rate = bonds.Rate(critical_speed=1e-2, healing=3.0)
+    assert_allclose(fractions(rate, drive.Steady(speed=0.0), 10), 1.0, rtol=1e-15)
+
+
+@pytest.mark.parametrize("step", [1e-9, 1e-3, 1.0, 1e9])
+def test_the_rate_equation_relaxes_for_any_step(step):
+    rate = bonds.Rate(critical_speed=1e-2, healing=1.0, start_from="empty")
+    values = fractions(rate, drive.Steady(speed=1e-2), 1, duration=step)[:, 0]
+    assert_allclose(values, [0.0, -0.5 * np.expm1(-2.0 * step)], rtol=1e-13)
+
+
+@pytest.mark.parametrize("start", ["bonded", "empty", "steady"])
+def test_counted_bonds_have_the_exact_distribution_at_every_time(start):
+    # sites are independent, so their number is binomial at all times, with the probability of the rate equation
+    sites, members = 6, 20_000
+    rate = bonds.Rate(critical_speed=1e-2, healing=3.0, start_from=start)
+    counted = bonds.Counted(critical_speed=1e-2, healing=3.0, sites=sites, start_from=start)
+    expected = fractions(rate, STEPPED, 9)[:, 0]
+    numbers = np.rint(sites * fractions(counted, STEPPED, 9, members)).astype(int)
+    for probability, found in zip(expected[1:], numbers[1:], strict=True):
+        wanted = members * binom.pmf(np.arange(sites + 1), sites, probability)
+        observed = np.bincount(found, minlength=sites + 1)
+        enough = wanted > 5.0
+        wanted = np.append(wanted[enough], wanted[~enough].sum() + 1e-300)
+        observed = np.append(observed[enough], observed[~enough].sum())
+        kept = wanted > 1e-3
+        statistic = np.sum((observed[kept] - wanted[kept]) ** 2 / wanted[kept])
+        assert chi2.sf(statistic, kept.sum() - 1) > 5.7e-7  # five sigma
+
+
+def test_counted_bonds_remember_with_the_rate_of_the_population():
+    # correlation over one step of a stationary two-state site: exp(-(h + h V/Vc) dt)
+    sites, members, healing, step = 30, 20_000, 3.0, 0.1
+    counted = bonds.Counted(critical_speed=1e-2, healing=healing, sites=sites)
+    values = fractions(counted, drive.Steady(speed=1e-2), 3, members, duration=3 * step)
+    found = np.corrcoef(values[1], values[2])[0, 1]
+    expected = np.exp(-2.0 * healing * step)
+    assert abs(found - expected) < 5.0 * (1.0 - expected**2) / np.sqrt(members)
+
+
+@pytest.mark.parametrize("sites", [1, 10**8])
+def test_counted_bonds_serve_one_bond_and_a_hundred_million(sites):
+    counted = bonds.Counted(critical_speed=1e-2, healing=3.0, sites=sites)
+    values = fractions(counted, drive.Steady(speed=1e-2), 4, 500)
+    spread = np.sqrt(0.25 / sites)
+    assert np.all((values >= 0.0) & (values <= 1.0))
+    assert np.all(np.abs(values.mean(axis=1) - 0.5) < 5.0 * spread / np.sqrt(500))
+    assert np.all(np.abs(values.std(axis=1) / spread - 1.0) < 5.0 / np.sqrt(2 * 500) + 1e-3)
+    assert_allclose(values * sites, np.rint(values * sites), rtol=1e-12, atol=1e-6)
+
+
+def test_the_steady_law_follows_the_speed_at_once():
+    law = bonds.Steady(critical_speed=1e-2)
+    assert_allclose(fractions(law, STEPPED, 21)[[1, 10, 20], 0], [1 / 1.001, 1 / 9, 1 / 1.2], rtol=1e-12)

@@ -1,0 +1,79 @@
+"""Drives hand over the exact slip of each step."""
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydantic import ValidationError
+from scenes import DRIVES
+from scipy.integrate import quad
+
+from sim.parts.drive import Ramp, Steady, Table
+
+DURATION = 0.02
+
+
+def speed(drive, time):
+    return drive.motion(1, time, time, DURATION).speed[0]
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_the_slip_of_a_step_is_the_integral_of_the_speed(name):
+    drive, (first, last) = DRIVES[name], (0.0011, 0.0175)
+    motion = drive.motion(1, first, last, DURATION)
+    kinks = [0.003, DURATION / 6.0]
+    slip, _ = quad(lambda t: speed(drive, t), first, last, points=kinks, epsabs=0, epsrel=1e-12)
+    path, _ = quad(lambda t: abs(speed(drive, t)), first, last, points=kinks, epsabs=0, epsrel=1e-12)
+    assert_allclose([motion.slip[0], motion.path[0]], [slip, path], rtol=1e-11, atol=1e-25)
+    assert_allclose(motion.speed[0], speed(drive, last), rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("name", DRIVES)
+def test_the_slips_of_many_steps_add_up(name):
+    drive = DRIVES[name]
+    times = np.linspace(0.0, DURATION, 1001)
+    parts = [drive.motion(1, a, b, DURATION) for a, b in itertools.pairwise(times)]
+    whole = drive.motion(1, 0.0, DURATION, DURATION)
+    assert_allclose(sum(part.slip[0] for part in parts), whole.slip[0], rtol=1e-12, atol=1e-22)
+    assert_allclose(sum(part.path[0] for part in parts), whole.path[0], rtol=1e-12, atol=1e-22)
+
+
+def test_a_ramp_through_zero_counts_the_path_of_both_directions():
+    motion = Ramp(start=-1.0, stop=3.0).motion(1, 0.0, 4.0, 4.0)
+    assert_allclose([motion.slip[0], motion.path[0]], [4.0, 5.0], rtol=1e-15)
+
+
+def test_a_ramp_between_equal_speeds_is_steady():
+    for scale in ("linear", "log"):
+        ramp = Ramp(start=2e-3, stop=2e-3, scale=scale).motion(1, 0.001, 0.005, DURATION)
+        steady = Steady(speed=2e-3).motion(1, 0.001, 0.005, DURATION)
+        assert_allclose([ramp.slip[0], ramp.speed[0]], [steady.slip[0], steady.speed[0]], rtol=1e-15)
+
+
+def test_a_table_of_one_speed_is_steady():
+    table = Table(time=(0.0, 0.5, 1.0), speed=(2e-3,) * 3).motion(1, 0.1, 0.7, 1.0)
+    assert_allclose([table.slip[0], table.path[0], table.speed[0]], [1.2e-3, 1.2e-3, 2e-3], rtol=1e-14)
+
+
+def test_a_jump_of_the_table_lies_between_two_steps():
+    table = Table(time=(0.0, 1.0, 1.0, 2.0), speed=(1.0, 1.0, 5.0, 5.0))
+    before, after = table.motion(1, 0.5, 1.0, 2.0), table.motion(2, 1.0, 1.5, 2.0)
+    assert_allclose([before.slip[0], after.slip[0]], [0.5, 2.5], rtol=1e-15)
+    assert_allclose([before.speed[0], after.speed[0]], [1.0, 5.0], rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "word"),
+    [
+        (lambda: Ramp(start=0.0, stop=1.0, scale="log"), "logarithmic"),
+        (lambda: Ramp(start=-1.0, stop=1.0, scale="log"), "logarithmic"),
+        (lambda: Table(time=(0.0,), speed=(1.0,)), "two rows"),
+        (lambda: Table(time=(0.0, 2.0, 1.0), speed=(1.0, 1.0, 1.0)), "never decrease"),
+        (lambda: Table(time=(0.5, 2.0), speed=(1.0, 1.0)), "start at 0 s"),
+        (lambda: Steady(speed=float("inf")), "finite"),
+    ],
+)
+def test_impossible_drives_are_refused(wrong, word):
+    with pytest.raises(ValidationError, match=word):
+        wrong()

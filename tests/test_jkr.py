@@ -1,0 +1,344 @@
+"""JKR and Hertz: closed states, twenty decades against fifty digits, the folds, the potentials.
+
+Tolerances: u = 2^-53 is the unit roundoff. Let d be the relative distance of a load or indentation
+from its fold. The fold itself carries a few u (products, pi, a cube root: at most 4 u for the load,
+11 u for the indentation), which sqrt(d) turns into a relative error of the radius of
+(4/3) u/sqrt(d) and 8 u/sqrt(d); elsewhere some ten roundings remain. That is below 1e-12 from
+d = 1e-6 on.
+"""
+
+import itertools
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import brentq
+
+from sim.laws import jkr
+
+U = 2.0**-53
+MAUGIS = {"work": 1.0 / math.pi, "sphere_radius": 1.0, "modulus": 0.75}
+LENS = {"work": 0.042, "sphere_radius": 2e-3, "modulus": 6.4e6}
+
+decades = st.floats(-10.0, 10.0).map(lambda power: 10.0**power)
+magnitudes = st.tuples(decades, st.sampled_from([-1.0, 1.0])).map(math.prod)
+distances = st.floats(-12.0, -2.0).map(lambda power: 10.0**power)
+
+
+def exact_radius_at_load(load, work, sphere_radius, modulus):
+    """Fifty digits; None where no equilibrium exists."""
+    with mpmath.workdps(50):
+        load, work, sphere_radius, modulus = map(mpmath.mpf, (load, work, sphere_radius, modulus))
+        c = 3 * mpmath.pi * work * sphere_radius
+        if 2 * load + c < 0:
+            return None
+        return mpmath.cbrt(3 * sphere_radius / (4 * modulus) * (load + c + mpmath.sqrt(c * (2 * load + c))))
+
+
+def exact_radius_at_indentation(indentation, work, sphere_radius, modulus):
+    """The larger root of the quartic in sqrt(a), bisected to sixty digits; None if there is none."""
+    with mpmath.workdps(80):
+        indentation, work, sphere_radius, modulus = map(mpmath.mpf, (indentation, work, sphere_radius, modulus))
+        c = sphere_radius * mpmath.sqrt(2 * mpmath.pi * work / modulus)
+        d = indentation * sphere_radius
+        low, high = mpmath.cbrt(c / 4), mpmath.cbrt(c) + mpmath.root(abs(d), 4)
+        if low**4 - c * low - d > 0:
+            return None
+        for _ in range(400):  # decades of distance between the bounds, then 60 digits
+            middle = (low + high) / 2
+            low, high = (middle, high) if middle**4 - c * middle - d < 0 else (low, middle)
+            if high - low < mpmath.mpf(10) ** -60 * high:
+                break
+        return high**2
+
+
+def relative_distance(value, fold):
+    return max(abs((value - fold) / fold), 1e-300)
+
+
+STATES = [  # radius, load, indentation in Maugis units
+    (6.0 ** (1 / 3), 0.0, 6.0 ** (2 / 3) / 3.0),
+    ((8.0 / 3.0) ** (1 / 3), -4.0 / 3.0, 0.0),
+    (1.5, -9.0 / 8.0, 0.25),
+    (8.0 / 3.0, 224.0 / 27.0, 40.0 / 9.0),
+    (6.0, 180.0, 32.0),
+]
+FOLD_AT_LOAD = (1.5 ** (1 / 3), -1.5, -(1.5 ** (2 / 3)) / 3.0)
+FOLD_AT_GRIPS = (6.0 ** (-1 / 3), -5.0 / 6.0, -3.0 * 6.0 ** (-2 / 3))
+ONLY_AT_GRIPS = (2.0 / 3.0, -28.0 / 27.0, -8.0 / 9.0)
+
+
+@pytest.mark.parametrize(("radius", "load", "indentation"), [*STATES, FOLD_AT_LOAD, FOLD_AT_GRIPS, ONLY_AT_GRIPS])
+def test_load_and_indentation_of_the_known_states(radius, load, indentation):
+    # atol: zero load and zero indentation are differences of numbers of order one
+    assert_allclose(jkr.load_at_radius(radius, **MAUGIS), load, rtol=1e-12, atol=1e-14)
+    assert_allclose(jkr.indentation_at_radius(radius, **MAUGIS), indentation, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.parametrize(("radius", "load", "indentation"), STATES)
+def test_radius_of_the_known_states(radius, load, indentation):
+    assert_allclose(jkr.radius_at_load(load, **MAUGIS), radius, rtol=1e-12, atol=0)
+    assert_allclose(jkr.radius_at_indentation(indentation, **MAUGIS), radius, rtol=1e-12, atol=0)
+
+
+def test_a_neck_that_no_load_holds_stands_at_an_indentation():
+    radius, load, indentation = ONLY_AT_GRIPS
+    assert_allclose(jkr.radius_at_indentation(indentation, **MAUGIS), radius, rtol=1e-12, atol=0)
+    assert jkr.radius_at_load(load, **MAUGIS) > 1.1 * radius
+
+
+def test_the_last_contact_at_a_load_and_at_grips():
+    load = jkr.pull_off_load(MAUGIS["work"], 1.0)
+    indentation = jkr.pull_off_indentation(**MAUGIS)
+    assert_allclose(load, FOLD_AT_LOAD[1], rtol=1e-12, atol=0)
+    assert_allclose(indentation, FOLD_AT_GRIPS[2], rtol=1e-12, atol=0)
+    assert_allclose(jkr.radius_at_load(load, **MAUGIS), FOLD_AT_LOAD[0], rtol=1e-12, atol=0)
+    assert_allclose(jkr.radius_at_indentation(indentation, **MAUGIS), FOLD_AT_GRIPS[0], rtol=1e-12, atol=0)
+    assert np.isnan(jkr.radius_at_load(np.nextafter(load, -9.0), **MAUGIS))
+    assert np.isnan(jkr.radius_at_indentation(np.nextafter(indentation, -9.0), **MAUGIS))
+
+
+@settings(max_examples=300, deadline=None)
+@given(load=magnitudes, work=decades, sphere_radius=decades, modulus=decades)
+@example(load=5e-4, work=0.042, sphere_radius=2e-3, modulus=6.4e6)
+@example(load=-1e-10, work=0.05, sphere_radius=1e-8, modulus=1e10)
+def test_radius_at_load_over_twenty_decades(load, work, sphere_radius, modulus):
+    rest = {"work": work, "sphere_radius": sphere_radius, "modulus": modulus}
+    computed = float(jkr.radius_at_load(load, **rest))
+    exact = exact_radius_at_load(load, **rest)
+    distance = relative_distance(load, -1.5 * math.pi * work * sphere_radius)
+    if distance < 1e-12:
+        return
+    if exact is None:
+        assert math.isnan(computed)
+        return
+    assert abs(computed / exact - 1) < 20.0 * U + 2.0 * U / math.sqrt(distance)
+
+
+@settings(max_examples=300, deadline=None)
+@given(indentation=magnitudes, work=decades, sphere_radius=decades, modulus=decades)
+@example(indentation=1e-6, work=0.042, sphere_radius=2e-3, modulus=6.4e6)
+@example(indentation=-1e-10, work=0.05, sphere_radius=1e-8, modulus=1e10)
+@example(indentation=1e10, work=1e-10, sphere_radius=1e10, modulus=1e10)
+@example(indentation=1e-10, work=1e10, sphere_radius=1e10, modulus=1e-10)
+def test_radius_at_indentation_over_twenty_decades(indentation, work, sphere_radius, modulus):
+    rest = {"work": work, "sphere_radius": sphere_radius, "modulus": modulus}
+    computed = float(jkr.radius_at_indentation(indentation, **rest))
+    exact = exact_radius_at_indentation(indentation, **rest)
+    distance = relative_distance(indentation, float(jkr.pull_off_indentation(**rest)))
+    if distance < 1e-12:
+        return
+    if exact is None:
+        assert math.isnan(computed)
+        return
+    assert abs(computed / exact - 1) < 20.0 * U + 8.0 * U / math.sqrt(distance)
+
+
+@settings(max_examples=100, deadline=None)
+@given(distance=distances, work=decades, sphere_radius=decades, modulus=decades)
+def test_near_both_folds_only_half_the_digits_are_lost(distance, work, sphere_radius, modulus):
+    rest = {"work": work, "sphere_radius": sphere_radius, "modulus": modulus}
+    load = float(jkr.pull_off_load(work, sphere_radius)) * (1.0 - distance)
+    indentation = float(jkr.pull_off_indentation(**rest)) * (1.0 - distance)
+    at_load = exact_radius_at_load(load, **rest)
+    at_indentation = exact_radius_at_indentation(indentation, **rest)
+    assert abs(jkr.radius_at_load(load, **rest) / at_load - 1) < 20.0 * U + 2.0 * U / math.sqrt(distance)
+    assert abs(jkr.radius_at_indentation(indentation, **rest) / at_indentation - 1) < (
+        20.0 * U + 8.0 * U / math.sqrt(distance)
+    )
+
+
+@pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_the_contact_leaves_each_fold_as_a_square_root(distance):
+    load = jkr.pull_off_load(MAUGIS["work"], 1.0) * (1.0 - distance)
+    indentation = jkr.pull_off_indentation(**MAUGIS) * (1.0 - distance)
+    wider = jkr.radius_at_load(load, **MAUGIS) / FOLD_AT_LOAD[0] - 1.0
+    longer = jkr.radius_at_indentation(indentation, **MAUGIS) / FOLD_AT_GRIPS[0] - 1.0
+    # leading terms (1 + sqrt d)^(2/3) and (1 + t)^2, t^2 = d/2; the next is smaller by sqrt d
+    room = math.sqrt(distance) + 20.0 * U / distance
+    assert_allclose(wider, 2.0 / 3.0 * math.sqrt(distance), rtol=room, atol=0)
+    assert_allclose(longer, math.sqrt(2.0 * distance), rtol=room, atol=0)
+
+
+def test_radius_at_indentation_is_the_root_that_scipy_finds():
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        work, sphere_radius, modulus = 10.0 ** rng.uniform(-3, 3, 3)
+        fold = float(jkr.pull_off_indentation(work, sphere_radius, modulus))
+        indentation = fold * rng.uniform(-5.0, 0.9)
+        last = float(np.cbrt(math.pi * work * sphere_radius**2 / (8.0 * modulus)))
+
+        def gap(a, indentation=indentation, sphere_radius=sphere_radius, work=work, modulus=modulus):
+            return a * a / sphere_radius - indentation - math.sqrt(2.0 * math.pi * work * a / modulus)
+
+        wanted = brentq(gap, last, 100.0 * last, xtol=1e-15 * last, rtol=1e-14)
+        computed = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+        assert_allclose(computed, wanted, rtol=1e-12, atol=0)
+
+
+def random_states(count=200, seed=8):
+    """Works, spheres and moduli over twenty decades, with stable loads and indentations."""
+    rng = np.random.default_rng(seed)
+    work, sphere_radius, modulus = 10.0 ** rng.uniform(-10, 10, (3, count))
+    beyond = rng.choice([-1.0, 1.0], count) * 10.0 ** rng.uniform(-2, 3, count)
+    beyond = np.maximum(beyond, -0.9)
+    load = -jkr.pull_off_load(work, sphere_radius) * beyond
+    indentation = -jkr.pull_off_indentation(work, sphere_radius, modulus) * beyond
+    return load, indentation, work, sphere_radius, modulus
+
+
+def test_the_energy_release_rate_of_the_solution_is_the_work():
+    load, indentation, work, sphere_radius, modulus = random_states()
+    a = jkr.radius_at_load(load, work, sphere_radius, modulus)
+    b = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+    # P_H - P and a^2/R - delta are small beside their terms by up to (beyond)^(1/2) and ^(3/4)
+    assert_allclose(jkr.energy_release_rate(a, load, sphere_radius, modulus), work, rtol=1e-12, atol=0)
+    rate = jkr.energy_release_rate_at_indentation(b, indentation, sphere_radius, modulus)
+    assert_allclose(rate, work, rtol=1e-12, atol=0)
+
+
+def test_the_solution_is_stable_at_its_control():
+    load, indentation, work, sphere_radius, modulus = random_states()
+    a = jkr.radius_at_load(load, work, sphere_radius, modulus)
+    b = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+    wider, narrower = 1.0 + 1e-4, 1.0 - 1e-4
+    assert np.all(jkr.energy_release_rate(a * wider, load, sphere_radius, modulus) > work)
+    assert np.all(jkr.energy_release_rate(a * narrower, load, sphere_radius, modulus) < work)
+    at_grips = jkr.energy_release_rate_at_indentation
+    assert np.all(at_grips(b * wider, indentation, sphere_radius, modulus) > work)
+    assert np.all(at_grips(b * narrower, indentation, sphere_radius, modulus) < work)
+
+
+def test_load_and_indentation_are_two_views_of_one_contact():
+    load, _, work, sphere_radius, modulus = random_states()
+    a = jkr.radius_at_load(load, work, sphere_radius, modulus)
+    indentation = jkr.indentation_under_load(a, load, sphere_radius, modulus)
+    scale = a**2 / sphere_radius
+    gap = jkr.indentation_at_radius(a, work, sphere_radius, modulus) - indentation
+    assert np.max(np.abs(gap / scale)) < 1e-12
+    back = jkr.load_under_indentation(a, indentation, sphere_radius, modulus)
+    assert np.max(np.abs((back - load) / (modulus * a * scale))) < 1e-12
+    assert_allclose(
+        jkr.energy_release_rate_at_indentation(a, indentation, sphere_radius, modulus), work, rtol=1e-11, atol=0
+    )
+
+
+@pytest.mark.parametrize("work", [0.0, -0.0, -1e-12, -3.0, -1e10])
+def test_radius_at_no_or_negative_work_is_hertz(work):
+    load = np.array([0.0, 1e-12, 1.0, 1e12])
+    assert_array_equal(jkr.radius_at_load(load, work, 2e-3, 6.4e6), jkr.hertz_radius_at_load(load, 2e-3, 6.4e6))
+    assert_array_equal(jkr.radius_at_indentation(load, work, 2e-3, 6.4e6), jkr.hertz_radius_at_indentation(load, 2e-3))
+    assert jkr.radius_at_load(0.0, work, 2e-3, 6.4e6) == 0.0
+    assert np.isnan(jkr.radius_at_load(-1e-12, work, 2e-3, 6.4e6))
+    assert np.isnan(jkr.radius_at_indentation(-1e-12, work, 2e-3, 6.4e6))
+    assert jkr.pull_off_load(work, 2e-3) == 0.0
+    assert jkr.pull_off_indentation(work, 2e-3, 6.4e6) == 0.0
+    a = 1e-4
+    assert_allclose(jkr.load_at_radius(a, work, 2e-3, 6.4e6), 4 * 6.4e6 * a**3 / 6e-3, rtol=1e-14, atol=0)
+    assert_allclose(jkr.indentation_at_radius(a, work, 2e-3, 6.4e6), a**2 / 2e-3, rtol=1e-14, atol=0)
+
+
+def test_hertz_is_the_limit_of_vanishing_work():
+    load, indentation = 4e-3, 5e-6
+    hertz = jkr.hertz_radius_at_load(load, 2e-3, 6.4e6), jkr.hertz_radius_at_indentation(indentation, 2e-3)
+    assert_allclose(hertz, [(3 * load * 2e-3 / (4 * 6.4e6)) ** (1 / 3), 1e-4], rtol=1e-14, atol=0)
+    for work in (1e-30, 1e-100, 1e-300, 5e-324):
+        assert_allclose(jkr.radius_at_load(load, work, 2e-3, 6.4e6), hertz[0], rtol=1e-12, atol=0)
+        assert_allclose(jkr.radius_at_indentation(indentation, work, 2e-3, 6.4e6), hertz[1], rtol=1e-12, atol=0)
+    # to first order the radius exceeds Hertz's by the square root of the work
+    small = jkr.radius_at_indentation(indentation, 1e-14, 2e-3, 6.4e6) / hertz[1] - 1.0
+    wanted = math.sqrt(2 * math.pi * 1e-14 * 1e-4 / 6.4e6) * 2e-3 / (2 * 1e-4**2)
+    assert_allclose(small, wanted, rtol=2.0 * wanted, atol=0)
+
+
+def test_an_adhesive_contact_is_never_smaller_than_hertz():
+    load, indentation, work, sphere_radius, modulus = random_states()
+    a = jkr.radius_at_load(load, work, sphere_radius, modulus)
+    b = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+    pressed = load > 0.0
+    assert np.all(a[pressed] >= jkr.hertz_radius_at_load(load, sphere_radius, modulus)[pressed])
+    assert np.all(b[pressed] >= jkr.hertz_radius_at_indentation(indentation, sphere_radius)[pressed])
+
+
+@pytest.mark.parametrize("name", ["radius_at_load", "radius_at_indentation"])
+def test_no_input_raises_or_hangs(name):
+    solve = getattr(jkr, name)
+    special = [0.0, -1.0, 1.0, math.inf, -math.inf, math.nan, 1e-300, 1e300, 5e-324]
+    cases = np.array(list(itertools.product(special, repeat=4)))
+    assert solve(*cases.T).shape == (9**4,)
+    decisive = np.isnan(cases[:, :2]).any(axis=1)
+    assert np.all(np.isnan(solve(*cases[decisive].T)))
+    assert solve(math.inf, 0.042, 2e-3, 6.4e6) == math.inf
+    assert np.isnan(solve(-math.inf, 0.042, 2e-3, 6.4e6))
+    assert np.isnan(solve(1.0, 0.042, 2e-3, math.nan))
+
+
+def test_laws_broadcast():
+    load, work = np.array([0.0, 1e-3])[:, None], np.array([0.0, 0.02, 0.042])
+    radius = jkr.radius_at_load(load, work, sphere_radius=2e-3, modulus=6.4e6)
+    assert radius.shape == (2, 3)
+    assert radius[1, 2] == jkr.radius_at_load(1e-3, 0.042, 2e-3, 6.4e6)
+    assert np.all(np.diff(radius, axis=0) > 0.0)
+    assert np.all(np.diff(radius, axis=1) > 0.0)
+
+
+POTENTIAL = {"stress": 0.7, "work": 0.9, "sphere_radius": 1.7, "modulus": 1.3}
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(40)
+
+
+def integral(function, low, high):
+    """Gauss-Legendre: exact for the polynomials here, converged for the inverse powers."""
+    middle, half = (low + high) / 2, (high - low) / 2
+    return half * np.sum(WEIGHTS * function(middle + half * NODES))
+
+
+@pytest.mark.parametrize(
+    ("potential", "slope", "control"),
+    [
+        (jkr.potential_at_indentation, jkr.potential_slope_at_indentation, -0.8),
+        (jkr.potential_at_indentation, jkr.potential_slope_at_indentation, 0.3),
+        (jkr.potential_at_load, jkr.potential_slope_at_load, -2.1),
+        (jkr.potential_at_load, jkr.potential_slope_at_load, 1.4),
+    ],
+)
+def test_the_slope_of_a_potential_integrates_to_it(potential, slope, control):
+    gained = integral(lambda a: slope(control, radius=a, **POTENTIAL), 0.8, 1.9)
+    wanted = potential(control, radius=1.9, **POTENTIAL) - potential(control, radius=0.8, **POTENTIAL)
+    assert_allclose(gained, wanted, rtol=1e-12, atol=0)
+
+
+def test_the_tractive_force_is_the_slope_of_the_potential_over_separation():
+    middle, low, high = 0.1, -0.6, 0.8  # the potential is quadratic in s: its mid-slope is exact
+    force = -jkr.load_under_indentation(1.2, -middle, POTENTIAL["sphere_radius"], POTENTIAL["modulus"])
+    gained = jkr.potential_at_indentation(high, radius=1.2, **POTENTIAL) - jkr.potential_at_indentation(
+        low, radius=1.2, **POTENTIAL
+    )
+    assert_allclose(force * (high - low), gained, rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("force", [-2.0, 0.4])
+def test_the_potentials_are_legendre_transforms(force):
+    radius = np.linspace(0.5, 2.0, 7)
+    separation = -jkr.indentation_under_load(radius, -force, POTENTIAL["sphere_radius"], POTENTIAL["modulus"])
+    at_grips = jkr.potential_at_indentation(separation, radius=radius, **POTENTIAL)
+    at_load = jkr.potential_at_load(force, radius=radius, **POTENTIAL)
+    scale = np.abs(at_grips) + np.abs(force * separation)
+    assert np.max(np.abs(at_load - (at_grips - force * separation)) / scale) < 1e-12
+
+
+@pytest.mark.parametrize("stress", [0.0, 1e5, 1e7])
+def test_a_uniform_stress_of_any_size_leaves_the_jkr_contact(stress):
+    load, indentation = 2e-3, 3e-6
+    a = jkr.radius_at_load(load, **LENS)
+    b = jkr.radius_at_indentation(indentation, **LENS)
+    for slope, control, radius in (
+        (jkr.potential_slope_at_load, -load, a),
+        (jkr.potential_slope_at_indentation, -indentation, b),
+    ):
+        done = -12.0 * stress**2 * radius**2 / LENS["modulus"]
+        scale = abs(done) + 2.0 * math.pi * LENS["work"] * radius
+        assert abs(slope(control, stress, radius, **LENS) - done) / scale < 1e-12

@@ -1,0 +1,321 @@
+"""Spectra from tables and stress maps: conventions, estimates, files and their faults."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose
+from pydantic import TypeAdapter, ValidationError
+
+from sim.grid import Grid
+from sim.measured import Measured, Tabulated, periodogram, radial_average
+from sim.spectrum import Band, SelfAffine, Spectrum
+
+TURN = 2 * math.pi
+
+
+class Files:
+    """Reads beside a scenario and counts how often."""
+
+    def __init__(self, folder):
+        self.folder, self.reads = folder, 0
+
+    def path(self, name):
+        self.reads += 1
+        return self.folder / name
+
+    def text(self, name):
+        return self.path(name).read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def files(tmp_path):
+    return Files(tmp_path)
+
+
+def read(files, **given):
+    return TypeAdapter(Spectrum).validate_python(given, context={"files": files})
+
+
+def white_map(points, level, cell, seed=1):
+    """A stress map whose density is ``level`` at every wavevector but zero, with random phases."""
+    generator = np.random.default_rng(seed)
+    grid = Grid(cell, points)
+    half = grid.forward(generator.normal(size=(points, points)))
+    half *= math.sqrt(level) * cell / np.abs(half)
+    half[0, 0] = 0.0
+    return grid.inverse(half)
+
+
+def test_a_table_in_persson_s_convention_is_four_pi_squared_larger():
+    rows = (1.0, 2.0, 4.0), (3.0, 2.0, 0.5)
+    plain, persson = Tabulated(*rows), Tabulated(*rows, convention="persson")
+    factor = 4 * math.pi**2
+    assert_allclose(persson.radial_density(1.7), factor * plain.radial_density(1.7), rtol=1e-15, atol=0)
+    assert_allclose(persson.variance, factor * plain.variance, rtol=1e-15, atol=0)
+    assert_allclose(persson.surface_energy(1.0), factor * plain.surface_energy(1.0), rtol=1e-15, atol=0)
+
+
+def test_a_table_of_a_power_law_is_exact_between_its_rows():
+    law = SelfAffine(1.3, 0.7, longest=6.0, rolloff=6.0, shortest=0.2)
+    low, high = law.support
+    q = np.geomspace(low, high, 7)
+    q[[0, -1]] = low, high
+    table = Tabulated(q, law.radial_density(q))
+    between = np.geomspace(low * 1.001, high * 0.999, 50)
+    assert_allclose(table.radial_density(between), law.radial_density(between), rtol=1e-13, atol=0)
+    assert_allclose(table.variance, law.variance, rtol=1e-13, atol=0)
+    assert_allclose(table.surface_energy(2.0, 0.3), law.surface_energy(2.0, 0.3), rtol=1e-13, atol=0)
+
+
+def test_a_table_is_linear_next_to_a_zero():
+    table = Tabulated((1.0, 3.0, 4.0), (0.0, 4.0, 0.0))
+    assert_allclose(table.radial_density([1.0, 2.0, 3.0, 3.5, 4.0, 4.1]), [0, 2, 4, 2, 0, 0], rtol=1e-15, atol=0)
+
+
+def test_rows_of_hundreds_of_decades_do_not_overflow():
+    table = Tabulated((1e-3, 1.0, 1e3), (1e-300, 1e300, 1e-300))
+    assert math.isfinite(table.variance)
+    assert table.variance > 0.0
+
+
+def test_a_table_is_read_from_csv_with_its_units(files):
+    (files.folder / "psd.csv").write_text("# rubber\nq [1/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n")
+    table = read(files, model="tabulated", file="psd.csv", convention="persson")
+    assert_allclose(table.wavenumbers, [1e3, 3e3], rtol=1e-15, atol=0)
+    assert_allclose(table.densities, [2e-6, 4e-6], rtol=1e-15, atol=0)
+    assert_allclose(table.radial_density(3e3), 4e-6 * 4 * math.pi**2, rtol=1e-13, atol=0)
+    again = read(files, **TypeAdapter(Tabulated).dump_python(table))
+    assert again == table
+    assert files.reads == 1  # what was read is not read again
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("q [rad/m], C [Pa^2 m^2]\n1, 2\n", "at least two rows"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 2\n1, 2\n", "row 2 does not exceed the one before; sort"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 0\n", "every density is zero"),
+        ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, -1\n2, 0\n", "line 2: C must be at least 0"),
+        ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", r'line 1: column "C" has the unit "Pa\^2", which is not a unit of'),
+        ("k, S\n1, 1\n2, 0\n", 'psd.csv: line 1: column "q" is missing'),
+        ("", "psd.csv: the table is empty"),
+    ],
+)
+def test_a_wrong_table_is_refused_with_file_line_and_cure(files, text, words):
+    (files.folder / "psd.csv").write_text(text)
+    with pytest.raises(ValidationError, match=words):
+        read(files, model="tabulated", file="psd.csv")
+
+
+@pytest.mark.parametrize("given", [{}, {"file": ""}, {"file": 3}])
+def test_a_table_without_rows_or_file_says_what_to_give(files, given):
+    with pytest.raises(ValidationError, match=r'needs file = "psd.csv"'):
+        read(files, model="tabulated", **given)
+    with pytest.raises(ValidationError, match="psd2"):
+        read(files, model="tabulated", file="psd2.csv")
+
+
+@pytest.mark.parametrize("points", [15, 16])
+@pytest.mark.parametrize("window", ["none", "hann"])
+def test_periodogram_of_white_noise_is_flat_on_average(points, window):
+    cell, count = 3.0, 400
+    grid = Grid(cell, points)
+    field = np.random.default_rng(4).normal(size=(count, points, points))
+    density = np.mean(periodogram(field, cell, window), axis=0)
+    level = grid.spacing**2  # unit variance spread over (2π/spacing)²
+    inner = density[2:-2, 2:-2] / level  # away from what the mean takes with it
+    # Hann correlates neighbouring amplitudes by 2/3 and 1/6, powers by the squares, in each direction
+    clumps = (1 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2) ** 2 if window == "hann" else 1.0
+    assert abs(np.mean(inner) - 1) < 5 * math.sqrt(clumps / (count * inner.size))
+    assert np.all(np.abs(inner - 1) < 5 / math.sqrt(count))
+    assert density[0, 0] == 0.0
+
+
+@pytest.mark.parametrize("points", [15, 16])
+def test_periodogram_sums_to_the_mean_square(points):
+    field = np.random.default_rng(2).normal(size=(3, points, points)) + 7.0
+    grid = Grid(2.0, points)
+    total = grid.mode_sum(periodogram(field, 2.0)) / 2.0**2
+    assert_allclose(total, np.var(field, axis=(1, 2)), rtol=1e-13, atol=0)
+
+
+def test_a_ripple_stands_where_its_wavevector_is():
+    grid = Grid(2.0, 16)
+    x, y = grid.position[:, None], grid.position
+    density = periodogram(np.cos(TURN * (3 * x - 2 * y) / 2.0), 2.0)
+    place = np.unravel_index(np.argmax(density), density.shape)
+    assert place == (16 - 3, 2)
+    assert_allclose(density[place], 2.0**2 / 4, rtol=1e-13, atol=0)
+
+
+def test_an_unknown_window_is_refused():
+    with pytest.raises(ValueError, match='"none" or "hann"'):
+        periodogram(np.ones((8, 8)), 1.0, "box")
+
+
+@pytest.mark.parametrize("points", [15, 16])
+def test_rings_hold_every_mode_below_nyquist_once(points):
+    grid = Grid(2.0, points)
+    ring = radial_average(np.ones((points, points // 2 + 1)), grid)
+    reach = (points - 1) // 2
+    n = np.arange(-reach - 1, reach + 2)
+    radius = np.hypot(n[:, None], n)
+    for k in range(1, reach + 1):
+        inside = (radius >= k - 0.5) & (radius < k + 0.5)
+        assert ring.pairs[k - 1] == inside.sum() / 2
+        assert_allclose(ring.q[k - 1], np.mean(radius[inside]) * TURN / 2.0, rtol=1e-14, atol=0)
+    assert len(ring.q) == reach
+    assert_allclose(ring.density, 1.0, rtol=1e-14, atol=0)
+    assert np.max(ring.standard_error) < 1e-15
+
+
+def test_the_standard_error_of_a_ring_is_that_of_exponential_scatter():
+    grid = Grid(1.0, 101)
+    field = np.random.default_rng(3).normal(size=(101, 101))
+    ring = radial_average(periodogram(field, 1.0), grid)
+    ratio = (ring.standard_error * np.sqrt(ring.pairs) / ring.density)[20:]  # one for an exponential law
+    # scatter over mean of n exponential numbers has variance (2 + 1 - 2)/n: that of s, of m, their covariance
+    error = 1 / math.sqrt(np.sum(ring.pairs[20:]))
+    assert abs(np.average(ratio, weights=ring.pairs[20:]) - 1) < 5 * error
+    level = grid.spacing**2
+    assert np.all(np.abs(ring.density - level) < 5 * level / np.sqrt(ring.pairs))
+
+
+@pytest.mark.parametrize("points", [31, 32])
+def test_a_measured_map_is_a_table_of_its_own_density(files, points):
+    level, spacing = 2.5, 0.1
+    cell = points * spacing
+    np.savetxt(files.folder / "map.csv", white_map(points, level, cell), delimiter=",", header="Pa")
+    found = read(files, model="measured", file="map.csv", spacing="10 cm")
+    assert_allclose(found.densities, level, rtol=1e-10, atol=0)
+    low, high = found.support
+    assert_allclose(found.variance, level * (high**2 - low**2) / (4 * math.pi), rtol=1e-9, atol=0)
+    exact = 0.75 / (4 * math.pi) * level * (high - low)  # (2 - ν)/(8πG) ∫ C dq at ν = 1/2
+    assert_allclose(found.surface_energy(1.0), exact, rtol=1e-9, atol=0)
+    table = Tabulated(found.wavenumbers, found.densities)
+    q = np.linspace(0.0, 50.0, 99)
+    assert np.array_equal(table.radial_density(q), found.radial_density(q))
+    assert np.array_equal(table.cumulative(q), found.cumulative(q))
+    assert read(files, **TypeAdapter(Measured).dump_python(found)) == found
+    assert files.reads == 1
+
+
+def test_a_map_that_is_not_square_is_cropped_to_its_leading_square(files):
+    field = white_map(32, 1.0, 3.2)
+    long = np.concatenate([field, np.full((5, 32), 9.0)])
+    for name, one in {"a.csv": field, "b.csv": long, "c.csv": long.T}.items():
+        np.savetxt(files.folder / name, one, delimiter=",")
+    a, b, c = (read(files, model="measured", file=name, spacing=0.1) for name in ("a.csv", "b.csv", "c.csv"))
+    assert a.densities == b.densities
+    assert_allclose(c.densities, a.densities, rtol=1e-12, atol=0)  # exchange of x and y
+
+
+def dataset(fields, spacing, units="Pa", metre=1.0, unit="m", dims=("realization", "x", "y")):
+    position = np.arange(fields.shape[-1]) * spacing / metre
+    data = xr.DataArray(fields, dims=dims, attrs={"units": units})
+    coordinates = {axis: (axis, position, {"units": unit}) for axis in ("x", "y")}
+    return xr.Dataset({"shear_map": data}).assign_coords(coordinates)
+
+
+def test_netcdf_maps_give_units_spacing_and_average_over_members(files):
+    fields = np.stack([white_map(16, level, 1.6, seed=int(level)) for level in (1.0, 3.0)])
+    dataset(fields * 1e-3, 0.1, "kPa", 1e-3, "mm").to_netcdf(files.folder / "maps.nc")
+    found = read(files, model="measured", file="maps.nc")
+    assert_allclose(found.spacing, 0.1, rtol=1e-12, atol=0)
+    assert_allclose(found.densities, 2.0, rtol=1e-10, atol=0)
+    assert read(files, **TypeAdapter(Measured).dump_python(found)) == found
+
+
+def test_netcdf_without_coordinates_takes_the_spacing_of_the_key(files):
+    field = white_map(16, 1.0, 1.6)
+    xr.Dataset({"tau": (("row", "column"), field)}).to_netcdf(files.folder / "maps.nc")
+    found = read(files, model="measured", file="maps.nc", variable="tau", spacing="10 cm")
+    assert_allclose(found.densities, 1.0, rtol=1e-10, atol=0)
+    for given, words in [
+        ({"variable": "tau"}, "no coordinates; give spacing"),
+        ({"variable": "tua", "spacing": 0.1}, r'no variable "tua" \(found: tau\)'),
+    ]:
+        with pytest.raises(ValidationError, match=words):
+            read(files, model="measured", file="maps.nc", **given)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda d: d.assign_coords(y=d.y.to_numpy() * 2), "not spaced by one step"),
+        (lambda d: d.assign_coords(x=d.x.to_numpy() ** 2), "not spaced by one step"),
+        (lambda d: d.assign_coords(x=d.x.to_numpy() * 2, y=d.y.to_numpy() * 2), "equal in x and y and to the key"),
+        (lambda d: d.where(d.x > 0.05), "gaps"),
+        (lambda d: d * 0.0, "every density is zero"),
+        (lambda d: d.isel(x=slice(5)), "too small"),
+        (lambda d: d.isel(x=0, realization=0), "no two dimensions"),
+        (lambda d: d.assign(shear_map=d.shear_map.assign_attrs(units="N")), "not a unit of Pa"),
+    ],
+)
+def test_a_wrong_map_is_refused_with_the_cure(files, change, words):
+    whole = dataset(white_map(16, 1.0, 1.6)[None], 0.1)
+    change(whole).to_netcdf(files.folder / "maps.nc")
+    with pytest.raises(ValidationError, match=words):
+        read(files, model="measured", file="maps.nc", spacing=0.1)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"file": "a.csv"}, "no coordinates; give spacing"),
+        ({"file": "missing.csv", "spacing": 1}, "missing.csv cannot be read"),
+        ({"file": "missing.nc", "spacing": 1}, "missing.nc cannot be read"),
+        ({"file": "a.nc", "spacing": 1}, "a.nc: "),
+        ({"file": "bad.csv", "spacing": 1}, 'bad.csv: line 1: value is "x"'),
+        ({"file": "a.csv", "spacing": "-1 m"}, "above 0"),
+        ({"file": "a.csv", "spacing": 1, "window": "box"}, "'none' or 'hann'"),
+        ({"spacing": 1}, "file"),
+    ],
+)
+def test_a_wrong_measurement_is_refused_with_the_cure(files, given, words):
+    np.savetxt(files.folder / "a.csv", white_map(8, 1.0, 1.0), delimiter=",")
+    (files.folder / "a.nc").write_text("no netCDF")
+    (files.folder / "bad.csv").write_text("x,y\n1,2\n")
+    with pytest.raises(ValidationError, match=words):
+        read(files, model="measured", **given)
+
+
+def test_a_hann_window_keeps_the_border_of_a_steep_map_from_leaking():
+    # A quarter of a periodic map is not periodic: its jump at the borders leaks as 1/q², far above
+    # a density that falls as q⁻⁴. The window's own bias is C'' times its width: (2 + 2H)² / (6 k²).
+    points, count = 128, 40
+    generator = np.random.default_rng(8)
+    law = SelfAffine(1.0, 1.0, longest=0.5, rolloff=0.5, shortest=2.2 / points)
+    grid = Grid(1.0, points)
+    density = law.density(*grid.wavevectors)
+    white = grid.forward(generator.normal(size=(count, points, points))) / grid.spacing
+    fields = grid.inverse(white * np.sqrt(density))[:, : points // 2, : points // 2]
+    part = Grid(0.5, points // 2)
+    asked = law.density(*part.wavevectors)
+    asked[asked == 0.0] = np.inf
+    rings = slice(11, 23)
+    ratio = {}
+    for window in ("none", "hann"):
+        mean = np.mean(periodogram(fields, part.cell, window), axis=0)
+        ring = radial_average(mean / asked, part)
+        ratio[window] = np.average(ring.density[rings], weights=ring.pairs[rings])
+        pairs = np.sum(ring.pairs[rings])
+    error = math.sqrt(4 / (count * pairs))  # about four neighbours share their numbers under Hann
+    assert abs(ratio["hann"] - 1) < 5 * error + 16 / (6 * 12**2)
+    assert ratio["none"] > 1.5
+
+
+def test_the_estimate_of_a_realisation_has_its_variance_and_energy():
+    grid = Grid(1.0, 64)
+    band = Band(1.0, longest=1 / 5, shortest=1 / 20)
+    white = grid.forward(np.random.default_rng(9).normal(size=(64, 64))) / grid.spacing
+    half = white * np.sqrt(band.density(*grid.wavevectors))
+    ring = radial_average(periodogram(grid.inverse(half), 1.0), grid)
+    found = Tabulated(ring.q, ring.density)
+    modes = math.pi * (20**2 - 5**2) / 2
+    # one realisation scatters by 1/sqrt(modes); a row at the cut-off smears it by half a ring, 5 %
+    assert abs(found.variance - 1) < 5 / math.sqrt(modes) + 0.05
+    assert abs(found.surface_energy(1.0) / band.surface_energy(1.0) - 1) < 5 / math.sqrt(modes) + 0.05

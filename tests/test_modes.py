@@ -1,0 +1,345 @@
+"""The modes of a periodic cell: exact pixel variances, which modes there are, realisations."""
+
+import itertools
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy import integrate, special
+
+from sim.grid import Grid
+from sim.modes import Modes, modes, pixel_variances
+from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
+
+TURN = 2 * math.pi
+
+AFFINE = SelfAffine(1.3, 0.8, longest=1 / 2.2, rolloff=1 / 4.3, shortest=1 / 9.1)
+STEEP = Tabulated(tuple(TURN * n for n in (0.3, 1.9, 2.0, 5.3, 5.4, 8.0)), (0.0, 1.0, 1e-6, 1e-6, 3e-2, 1e-9))
+CUT_OFF = {
+    "self_affine": AFFINE,
+    "band": Band(1.3, longest=1 / 2.2, shortest=1 / 9.1),
+    "thin_band": Band(1.3, longest=1 / 3.2, shortest=1 / 3.3),
+    "wider_than_the_cell": SelfAffine(1.3, 1.0, longest=5.0, rolloff=4.0, shortest=1 / 7.3),
+    "h0": SelfAffine(1.3, 0.0, longest=1 / 2.2, rolloff=1 / 2.2, shortest=1 / 9.1),
+    "h1": SelfAffine(1.3, 1.0, longest=1 / 2.2, rolloff=1 / 4.3, shortest=1 / 9.1),
+    "steep_table": STEEP,
+}
+SMOOTH = {
+    "gaussian": Gaussian(1.3, 0.11),
+    "von_karman": VonKarman(1.3, 0.2, 0.3),
+    "anisotropic": AnisotropicGaussian(1.3, 0.11, 0.23),
+    "turned": AnisotropicGaussian(1.3, 0.11, 0.23, angle=0.4),
+    "turned_over": AnisotropicGaussian(1.3, 0.23, 0.11, angle=2.0),
+    "long_streaks": AnisotropicGaussian(1.3, 0.05, 3.0, angle=0.1),
+}
+
+
+def pixel_by_quadrature(spectrum, ix, iy):
+    """The density integrated over one pixel of the unit cell / 4π², y inside x, split at the breaks."""
+    circles = np.asarray(getattr(spectrum, "breaks", ())) / TURN
+    left, right, low, high = ix - 0.5, ix + 0.5, iy - 0.5, iy + 0.5
+
+    def across(x):
+        cuts = [math.sqrt(c * c - x * x) for c in circles if c > abs(x)]
+        cuts = sorted({low, high} | {s * y for y in cuts for s in (-1, 1) if low < s * y < high})
+        return math.fsum(
+            integrate.quad(lambda y: float(spectrum.density(TURN * x, TURN * y)), a, b, epsabs=0, epsrel=1e-11)[0]
+            for a, b in itertools.pairwise(cuts)
+        )
+
+    corners = {s * math.sqrt(max(c * c - y * y, 0.0)) for c in circles for y in (low, high, 0.0) for s in (-1, 1)}
+    cuts = sorted({left, right} | {x for x in corners if left < x < right})
+    return math.fsum(
+        integrate.quad(across, a, b, epsabs=1e-15 * spectrum.variance, epsrel=1e-10, limit=200)[0]
+        for a, b in itertools.pairwise(cuts)
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "pixels"),
+    [
+        ("self_affine", [(0, 2), (2, 1), (3, 3), (0, 4), (4, 2), (9, 0), (9, 2), (6, 7), (5, 5)]),
+        ("thin_band", [(0, 3), (2, 2), (3, 1)]),
+        ("wider_than_the_cell", [(0, 0), (1, 0), (1, 1), (7, 2), (3, 4)]),
+        ("steep_table", [(0, 0), (1, 0), (2, 0), (1, 2), (5, 0), (4, 4), (3, 4), (8, 0), (6, 6)]),
+    ],
+)
+def test_a_pixel_cut_by_the_cut_offs_has_the_integral_of_the_density(name, pixels):
+    spectrum = CUT_OFF[name]
+    reach = 9
+    found = pixel_variances(spectrum, 1.0, reach)
+    for ix, iy in pixels:
+        # inner end points with a square root leave quad with 1e-9 at worst
+        exact = pixel_by_quadrature(spectrum, ix, iy)
+        assert_allclose(found[reach + ix, iy], exact, rtol=1e-9, atol=1e-13 * spectrum.variance)
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_a_pixel_of_a_smooth_spectrum_has_the_integral_of_the_density(name):
+    spectrum = SMOOTH[name]
+    found = pixel_variances(spectrum, 1.0, 7)
+    for ix, iy in [(0, 0), (1, 0), (-1, 1), (0, 2), (-3, 2), (7, 7), (-7, 6)]:
+        exact = pixel_by_quadrature(spectrum, ix, iy)
+        assert_allclose(found[7 + ix, iy], exact, rtol=1e-9, atol=1e-14 * spectrum.variance)
+
+
+@pytest.mark.parametrize("spectrum", CUT_OFF.values(), ids=CUT_OFF)
+def test_all_pixels_together_hold_the_variance_of_a_spectrum_that_ends(spectrum):
+    pixels = pixel_variances(spectrum, 1.0, 10)
+    assert_allclose(whole_plane(pixels), spectrum.variance, rtol=1e-13, atol=0)
+
+
+def whole_plane(pixels):
+    return math.fsum(pixels[:, 1:].ravel()) * 2 + math.fsum(pixels[:, 0])
+
+
+@pytest.mark.parametrize("name", ["gaussian", "anisotropic"])
+def test_all_pixels_together_hold_the_share_of_a_gaussian_inside_the_square(name):
+    spectrum, reach = SMOOTH[name], 3
+    pixels = pixel_variances(spectrum, 1.0, reach)
+    edge = TURN * (reach + 0.5) / 2
+    lengths = (spectrum.length,) * 2 if name == "gaussian" else (spectrum.length_x, spectrum.length_y)
+    share = math.prod(special.erf(edge * length) for length in lengths)
+    assert_allclose(whole_plane(pixels), spectrum.variance * share, rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize("spectrum", (CUT_OFF | SMOOTH).values(), ids=CUT_OFF | SMOOTH)
+def test_pixels_add_up_to_the_one_large_pixel_that_they_fill(spectrum):
+    reach = 4
+    pixels = pixel_variances(spectrum, 1.0, reach)
+    large = pixel_variances(spectrum, 1.0 / (2 * reach + 1), 0)
+    assert_allclose(whole_plane(pixels), large[0, 0], rtol=1e-12, atol=0)
+
+
+@pytest.mark.parametrize("name", ["gaussian", "von_karman"])
+def test_far_pixels_keep_their_relative_accuracy(name):
+    spectrum, reach = SMOOTH[name], 60
+    pixels = pixel_variances(spectrum, 1.0, reach)
+    node, weight = np.polynomial.legendre.leggauss(20)
+    for ix, iy in [(20, 5), (30, 0)]:
+        x, y = TURN * (ix + node[:, None] / 2), TURN * (iy + node / 2)
+        exact = weight @ spectrum.density(x, y) @ weight / 4
+        assert_allclose(pixels[reach + ix, iy], exact, rtol=1e-11, atol=0)
+
+
+def test_modes_are_one_of_each_pair_sorted_by_length():
+    found = modes(AFFINE, 1.0)
+    lattice = set(zip(found.ix.tolist(), found.iy.tolist(), strict=True))
+    assert len(lattice) == len(found.ix)
+    assert not lattice & {(-ix, -iy) for ix, iy in lattice}
+    assert all(iy > 0 or (iy == 0 and ix > 0) for ix, iy in lattice)
+    assert np.all(np.diff(found.ix**2 + found.iy**2) >= 0)
+    assert_allclose(np.hypot(found.qx, found.qy), TURN * np.hypot(found.ix, found.iy), rtol=1e-15, atol=0)
+    assert np.all(found.variance > 0.0)
+
+
+def test_modes_are_all_pixels_that_meet_the_annulus_and_no_other():
+    found = set(zip(*(index.tolist() for index in (modes(AFFINE, 1.0).ix, modes(AFFINE, 1.0).iy)), strict=True))
+    low, high = AFFINE.support[0] / TURN, AFFINE.support[1] / TURN
+    for ix, iy in itertools.product(range(-11, 12), range(12)):
+        nearest = math.hypot(max(abs(ix) - 0.5, 0), max(iy - 0.5, 0))
+        farthest = math.hypot(abs(ix) + 0.5, iy + 0.5)
+        meets = nearest < high and farthest > low and (iy > 0 or ix > 0)
+        assert ((ix, iy) in found) == meets
+
+
+def test_variance_of_a_cell_lacks_only_the_pixel_around_zero():
+    spectrum = Gaussian(2.0, 0.1)
+    found = modes(spectrum, 1.0, 64)
+    lost = special.erf(math.pi * 0.1 / 2) ** 2
+    assert_allclose(found.error_variance, -lost, rtol=1e-12, atol=0)
+    inside = modes(AFFINE, 1.0)
+    assert abs(inside.error_variance) < 1e-14
+
+
+def test_energies_of_pairs_are_compliance_times_density_over_area():
+    found = modes(Band(1.3, longest=1 / 4, shortest=1 / 12), 2.5)
+    nu, modulus = 0.3, 1.7
+    inside = np.hypot(found.ix, found.iy) / 2.5
+    inside = (inside > 4.4) & (inside < 11.6)  # pixels of constant density
+    q = np.hypot(found.qx, found.qy)
+    compliance = (1 - nu + nu * (found.qy / q) ** 2) / (modulus * q)
+    exact = compliance * found.spectrum.density(found.qx, found.qy) / 2.5**2
+    assert_allclose(found.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0)
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.5, 0.3])
+@pytest.mark.parametrize(
+    "spectrum", [Gaussian(1.3, 1.0), AnisotropicGaussian(1.3, 1.0, 1.6, angle=0.7)], ids=["gaussian", "turned"]
+)
+def test_a_smooth_spectrum_loses_the_energy_around_zero(spectrum, poisson_ratio):
+    # -(2 - ν)/(8π) 3.900265 C(0)/(G L); the pixel's curvature adds a term in 1/L²
+    beta = (mpmath.zeta(0.5, 0.25) - mpmath.zeta(0.5, 0.75)) / 2
+    constant = float(-4 * mpmath.zeta(0.5) * beta)  # minus the lattice sum of 1/|n|
+    deficit = (2 - poisson_ratio) / (8 * math.pi) * constant * float(spectrum.density(0.0, 0.0))
+    rest = []
+    for cell in (40.0, 80.0):
+        found = modes(spectrum, cell, int(6 * cell))
+        exact = spectrum.surface_energy(1.0, poisson_ratio)
+        rest.append(np.sum(found.energies(1.0, poisson_ratio)) - exact + deficit / cell)
+        assert abs(rest[-1]) < 0.05 * deficit / cell * (40.0 / cell)
+        assert_allclose(found.error_energy(1.0, poisson_ratio), (rest[-1] - deficit / cell) / exact, rtol=1e-9, atol=0)
+    assert 3.5 < rest[0] / rest[1] < 4.5  # second order
+
+
+def test_the_curvature_of_a_pixel_costs_the_energy_that_its_laplacian_says():
+    cell, spectrum = 160.0, Gaussian(1.0, 1.0)
+    found = np.sum(modes(spectrum, cell, 960).energies(1.0))
+    bias = spectrum.surface_energy(1.0) - 0.23277991551983515 * math.pi / cell
+    curvature = -(math.pi**2.5) / 64 / cell**2  # (2π/L)²/24 of (1/8π²) ∫ G ∇²C d²q
+    rest = (found - bias) / curvature - 1
+    assert abs(rest) < 0.1
+
+
+def test_energy_of_a_spectrum_with_cut_offs_converges_with_the_cell():
+    spectrum = SelfAffine(1.3, 0.8, longest=1.0, rolloff=0.5, shortest=0.1)
+    errors = [abs(modes(spectrum, cell).error_energy()) for cell in (2.0, 8.0)]
+    assert errors[1] < errors[0] / 8  # second order would be 16, less the lattice's own irregularity
+
+
+def test_a_ripple_is_one_pair_of_its_own():
+    ripple = Ripple(3.0, 0.25, angle=math.pi)
+    found = modes(ripple, 1.0)
+    assert (found.ix.tolist(), found.iy.tolist(), found.on_lattice) == ([4], [0], True)
+    assert found.variance.tolist() == [4.5]
+    assert found.error_variance == 0.0
+    for nu in (0.5, 0.3):
+        assert_allclose(found.energies(1.7, nu).sum(), ripple.surface_energy(1.7, nu), rtol=1e-15, atol=0)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, math.pi / 2, 2.5, -0.4, math.pi])
+def test_a_ripple_that_does_not_fit_keeps_its_own_energy_and_says_so(angle):
+    ripple = Ripple(3.0, 0.26, angle)
+    found = modes(ripple, 1.0)
+    assert not found.on_lattice
+    assert found.qy[0] > 0.0 or (found.qy[0] == 0.0 and found.qx[0] > 0.0)
+    assert_allclose(found.energies(1.7, 0.3).sum(), ripple.surface_energy(1.7, 0.3), rtol=1e-14, atol=0)
+    assert_allclose(np.abs(found.qx**2 + found.qy**2), (TURN / 0.26) ** 2, rtol=1e-14, atol=0)
+
+
+def test_a_ripple_along_the_diagonal_of_the_cell_is_on_its_lattice():
+    found = modes(Ripple(1.0, 1.0 / math.hypot(3, 4), math.atan2(4, -3)), 1.0)
+    assert (found.ix.tolist(), found.iy.tolist(), found.on_lattice) == ([-3], [4], True)
+
+
+def test_a_ripple_of_no_amplitude_is_still_a_pair_without_errors():
+    found = modes(Ripple(0.0, 0.25), 1.0)
+    assert (found.error_variance, found.error_energy(), found.variance_spread) == (0.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("spectrum", [AFFINE, Band(1.0, 1 / 2, 1 / 8), Ripple(1.0, 0.25)])
+def test_without_points_the_grid_is_the_smallest_even_one_that_holds_the_spectrum(spectrum):
+    found = modes(spectrum, 1.0)
+    assert found.points % 2 == 0
+    reach = max(np.max(np.abs(found.ix)), np.max(found.iy))
+    assert reach == found.points // 2 - 1
+    smaller = modes(spectrum, 1.0, found.points - 1)  # odd, and just as far
+    assert np.array_equal(smaller.variance, found.variance)
+    with pytest.raises(ValueError, match=f"at least {found.points - 1} points"):
+        modes(spectrum, 1.0, found.points - 2)
+
+
+@pytest.mark.parametrize("points", [16, 17])
+def test_nyquist_and_zero_are_left_out(points):
+    found = modes(VonKarman(1.0, 0.2, 0.5), 1.0, points)
+    reach = (points - 1) // 2
+    assert len(found.ix) == ((2 * reach + 1) ** 2 - 1) // 2
+    assert np.max(np.abs(found.ix)) == np.max(found.iy) == reach
+
+
+def test_a_grid_finer_than_needed_has_the_same_modes():
+    a, b = modes(AFFINE, 1.0), modes(AFFINE, 1.0, 101)
+    assert np.array_equal(a.ix, b.ix)
+    assert np.array_equal(a.variance, b.variance)
+
+
+@pytest.mark.parametrize("name", ["self_affine", "h0", "wider_than_the_cell"])
+def test_the_set_of_modes_does_not_depend_on_the_rms(name):
+    spectrum = CUT_OFF[name]
+    waves = spectrum.longest, spectrum.rolloff, spectrum.shortest
+    small, large = (modes(SelfAffine(rms, spectrum.hurst, *waves), 1.0) for rms in (1e-6, 1e9))
+    assert np.array_equal(small.ix, large.ix)
+    assert_allclose(small.variance, large.variance * 1e-30, rtol=1e-11, atol=0)
+
+
+def test_a_circle_that_only_touches_pixels_adds_none():
+    touched = modes(Band(1.0, longest=1 / 1.5, shortest=1 / 4.5), 1.0)
+    assert touched.points == 10
+    assert (0, 0) not in zip(touched.ix, touched.iy, strict=True)
+    assert np.max(touched.iy) == 4
+
+
+def test_a_spectrum_without_an_end_asks_for_points():
+    with pytest.raises(ValueError, match="give points"):
+        modes(Gaussian(1.0, 0.1), 1.0)
+
+
+def test_a_cell_without_modes_is_refused():
+    with pytest.raises(ValueError, match="make the cell longer"):
+        modes(Band(1.0, longest=9.0, shortest=8.0), 1.0)
+    with pytest.raises(ValueError, match="make the cell longer"):
+        modes(AnisotropicGaussian(1.0, 1.0, 2000.0, angle=0.8), 1.0, 8)
+    with pytest.raises(ValueError, match="at least 3"):
+        modes(Gaussian(1.0, 0.1), 1.0, 2)
+    with pytest.raises(ValueError, match="positive length"):
+        modes(AFFINE, 0.0)
+
+
+def realisations(found: Modes, grid: Grid, count: int, seed: int):
+    """Gaussian fields of the modes: amplitudes of variance/2 on +q, their conjugates on -q."""
+    generator = np.random.Generator(np.random.Philox(key=np.array([seed, 2], dtype=np.uint64)))
+    normals = generator.standard_normal((count, len(found.variance), 2))
+    amplitude = np.sqrt(found.variance) / 2 * (normals[..., 0] + 1j * normals[..., 1])
+    half = np.zeros((count, grid.points, grid.points // 2 + 1), complex)
+    half[:, found.ix % grid.points, found.iy] = amplitude
+    first = found.iy == 0  # its column holds q and -q
+    half[:, -found.ix[first] % grid.points, 0] = amplitude[:, first].conj()
+    return grid.inverse(half * grid.cell**2)
+
+
+@pytest.mark.parametrize("points", [21, 24])
+@pytest.mark.parametrize("name", ["self_affine", "h0", "turned"])
+def test_realisations_have_the_density_asked_for_in_every_ring_and_sector(name, points):
+    spectrum, count = (CUT_OFF | SMOOTH)[name], 200
+    grid = Grid(1.0, points)
+    found = modes(spectrum, grid.cell, points)
+    density = np.abs(grid.forward(realisations(found, grid, count, seed=5))) ** 2 / grid.cell**2
+    place = (slice(None), found.ix % points, found.iy)
+    relative = np.mean(density[place] / (found.variance * grid.cell**2 / 2), axis=0)
+    radius = np.hypot(found.ix, found.iy).astype(int)
+    sector = (np.arctan2(found.iy, found.ix) / math.pi * 8).astype(int)
+    for bins in (radius, sector):
+        for one in np.unique(bins):
+            inside = relative[bins == one]  # each the mean of ``count`` exponential variables of mean one
+            assert abs(np.mean(inside) - 1) < 5 / math.sqrt(count * len(inside))
+    power = np.sum(density[0] * grid.multiplicity)
+    density[place] = 0.0
+    density[:, -found.ix[found.iy == 0] % points, 0] = 0.0
+    assert np.max(density) < 1e-28 * power  # nothing anywhere else
+
+
+@pytest.mark.parametrize("points", [21, 24])
+def test_mean_square_and_energy_of_realisations_scatter_as_foretold(points):
+    count = 2000
+    grid = Grid(1.0, points)
+    found = modes(AFFINE, grid.cell, points)
+    fields = realisations(found, grid, count, seed=6)
+    weights = found.energies(1.0)
+    power = np.abs(grid.forward(fields)[:, found.ix % points, found.iy]) ** 2 / grid.cell**4
+    for sample, share, spread in [
+        (np.mean(fields**2, axis=(1, 2)), found.variance, found.variance_spread),
+        (2 * power @ (weights / found.variance), weights, found.energy_spread()),
+    ]:
+        total = np.sum(share)
+        assert abs(np.mean(sample) / total - 1) < 5 * spread / math.sqrt(count)
+        excess = 6 * np.sum(share**4) / np.sum(share**2) ** 2  # Σ share · Exp(1)
+        error = math.sqrt((excess + 2) / count)
+        assert abs(np.var(sample) / (spread * total) ** 2 - 1) < 5 * error
+
+
+def test_the_spread_is_that_of_the_number_of_equal_pairs():
+    ring = Modes(None, 1.0, 8, *np.zeros((2, 10), int), *np.ones((2, 10)), np.full(10, 0.3))
+    assert_allclose(ring.variance_spread, 1 / math.sqrt(10), rtol=1e-15, atol=0)
+    assert_allclose(ring.energy_spread(), 1 / math.sqrt(10), rtol=1e-15, atol=0)

@@ -1,0 +1,241 @@
+"""Fluctuations: stationarity, memory, growth, and the energy of their own map."""
+
+import itertools
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydantic import ValidationError
+from scenes import CELL, SPECTRUM, scene
+
+from sim.engine import march
+from sim.laws import halfspace
+from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
+from sim.parts import bonds, drive, shear
+from sim.scenario import Clock
+from sim.spectrum import Gaussian, Ripple
+
+G = 1.6e6
+MEMORIES = {
+    "time": Time(time=1e-3),
+    "slip": Slip(length=2e-6),
+    "wave": Wave(waves=0.025),
+    "diffusion": Diffusion(diffusivity=1e-7),
+}
+
+
+def states(part, members, clock, motion=None, population=None, seed=5):
+    scenario = scene(
+        shear=part,
+        drive=motion or drive.Steady(speed=2e-3),
+        bonds=population or bonds.Unbroken(stress=2e5),
+        clock=clock,
+        seed=seed,
+    )
+    return scenario, list(march(scenario, np.arange(members)))
+
+
+def energies(*arguments, **keywords):
+    scenario, found = states(*arguments, **keywords)
+    return scenario.process, np.array([state.shear.energy for state in found])
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1.0, 1e3, 1e6])
+@pytest.mark.parametrize("name", MEMORIES)
+def test_modes_are_stationary_for_any_step(name, ratio):
+    step, members = ratio * 1e-3, 400
+    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=MEMORIES[name])
+    process, found = energies(part, members, Clock(duration=4 * step, step=step))
+    pairs = process.modes.energies(G)
+    error = np.sqrt(np.sum(pairs**2) / members)
+    assert np.all(np.abs(found.mean(axis=1) - pairs.sum()) < 5.0 * error)
+    # the relative error of a variance of these sums of exponentials is below sqrt((kurtosis - 1)/members)
+    assert np.all(np.abs(found.var(axis=1) / np.sum(pairs**2) - 1.0) < 5.0 * np.sqrt(8.0 / members))
+
+
+@pytest.mark.parametrize("name", MEMORIES)
+def test_the_energy_forgets_with_twice_the_rate_of_the_amplitudes(name):
+    members, step = 4000, 0.4e-3
+    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=MEMORIES[name])
+    process, found = energies(part, members, Clock(duration=2 * step, step=step))
+    pairs = process.modes.energies(G)
+    rates = {
+        "time": 1e3 * np.ones_like(process.wavenumber),
+        "slip": 2e-3 / 2e-6 * np.ones_like(process.wavenumber),
+        "wave": 2e-3 * process.wavenumber / (2 * np.pi * 0.025),
+        "diffusion": 1e-7 * process.wavenumber**2,
+    }[name]
+    for lag in (1, 2):
+        expected = np.sum(pairs**2 * np.exp(-2.0 * rates * lag * step))
+        products = (found[0] - pairs.sum()) * (found[lag] - pairs.sum())
+        assert abs(products.mean() - expected) < 5.0 * products.std() / np.sqrt(members)
+
+
+def test_a_contact_at_rest_keeps_its_pattern_under_slip_memory():
+    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, memory=Slip(length=1e-6))
+    scenario, found = states(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=0.0))
+    first, last = (scenario.process.maps(s.shear, s.position, 2) for s in (found[0], found[-1]))
+    assert np.array_equal(first, last)
+
+
+@pytest.mark.parametrize("points", [12, 13])
+@pytest.mark.parametrize("amplitudes", ["gaussian", "fixed"])
+def test_the_energy_is_that_of_the_map_by_the_greens_function(points, amplitudes):
+    part = shear.Mapped(
+        spectrum=SPECTRUM,
+        cell=CELL,
+        points=points,
+        memory=Slip(length=3e-6),
+        growth=Onset(speed=2e-3, width=0.3),
+        amplitudes=amplitudes,
+    )
+    scenario, found = states(part, 3, Clock(duration=4e-3, step=1e-3), drive.Ramp(start=1e-3, stop=5e-3))
+    for state in found:
+        maps = scenario.process.maps(state.shear, np.full(3, state.position[0]), 3)
+        stored = halfspace.surface_energy(maps, CELL, G)
+        assert_allclose(stored, np.broadcast_to(state.shear.energy, 3), rtol=1e-12)
+        w1 = halfspace.displacement(maps, CELL, G)
+        assert_allclose(0.5 * np.mean(maps * w1, axis=(1, 2)), stored, rtol=1e-12)
+
+
+@pytest.mark.parametrize("amplitudes", ["gaussian", "fixed"])
+def test_a_frozen_pattern_moves_with_the_slider(amplitudes):
+    spacing = CELL / 16
+    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=16, memory=Time(time=1e30), amplitudes=amplitudes)
+    clock = Clock(duration=3.0, step=1.0)
+    scenario, found = states(part, 2, clock, drive.Steady(speed=spacing))
+    maps = [scenario.process.maps(s.shear, np.full(2, s.position[0]), 2) for s in found]
+    for cells, moved in enumerate(maps):
+        assert_allclose(moved, np.roll(maps[0], cells, axis=1), rtol=0, atol=1e-9 * np.abs(maps[0]).max())
+
+
+def test_mapped_and_modal_give_the_same_energy_number_for_number():
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "points": 12, "memory": Slip(length=3e-6)}
+    clock = Clock(duration=5e-3, step=1e-3)
+    _, modal = energies(shear.Modal(**recipe), 3, clock)
+    _, mapped = energies(shear.Mapped(**recipe), 3, clock)
+    assert np.array_equal(modal, mapped)
+
+
+def test_a_ripple_of_fixed_amplitude_stores_the_papers_energy():
+    wavelength, amplitude = 24e-6, 375.158e3
+    for angle, share in ((0.0, 1.0), (np.pi / 2, 2.0)):
+        part = shear.Modal(
+            spectrum=Ripple(amplitude=amplitude, wavelength=wavelength, angle=angle),
+            memory=Slip(length=1e-6),
+            amplitudes="fixed",
+        )
+        _, found = energies(part, 2, Clock(duration=3e-3, step=1e-3))
+        exact = share * amplitude**2 * wavelength / (16.0 * np.pi * G)
+        assert found.shape[1] == 1
+        assert_allclose(found, exact, rtol=1e-12)
+
+
+def test_fixed_phases_diffuse_by_twice_the_exponent():
+    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, memory=Time(time=1e-3), amplitudes="fixed")
+    members = 200
+    _, found = states(part, members, Clock(duration=1e-3, step=0.5e-3))
+    turns = found[1].shear.amplitude - found[0].shear.amplitude
+    assert abs(turns.var() - 1.0) < 5.0 * np.sqrt(2.0 / turns.size)
+
+
+@pytest.mark.parametrize("motion", [drive.Steady(speed=4e-3), drive.Ramp(start=1e-4, stop=2e-2, scale="log")])
+def test_growth_multiplies_the_field_at_once(motion):
+    onset = Onset(speed=2e-3, width=0.3, floor=0.1)
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Slip(length=3e-6)}
+    clock = Clock(duration=5e-3, step=1e-3)
+    _, unit = energies(shear.Modal(**recipe), 3, clock, motion)
+    _scenario, grown = states(shear.Modal(**recipe, growth=onset), 3, clock, motion)
+    for before, state in zip(unit, grown, strict=True):
+        assert_allclose(state.shear.energy, before * onset.factor(state.speed, 0.0) ** 2, rtol=1e-14)
+
+
+def test_relaxing_growth_follows_the_exact_second_moment():
+    # with g constant after a jump of the speed, the mean energy relaxes as 1 + (g^2 - 1) (1 - exp(-2 t/t_m))
+    part = shear.Modal(
+        spectrum=SPECTRUM,
+        cell=CELL,
+        memory=Time(time=1e-3),
+        growth=Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True),
+    )
+    motion = drive.Table(time=(0.0, 0.5e-3, 0.5e-3, 2.5e-3), speed=(1e-5, 1e-5, 1.0, 1.0))
+    members, step = 3000, 0.5e-3
+    process, found = energies(part, members, Clock(duration=5 * step, step=step), motion)
+    pairs = process.modes.energies(G)
+    expected = [0.25, 0.25]
+    sizes = [0.5 * (0.25 + 1.0), 1.0, 1.0, 1.0]
+    for size in sizes:
+        expected.append(size + (expected[-1] - size) * np.exp(-2.0 * step / 1e-3))
+    error = np.sqrt(np.sum(pairs**2) / members)
+    assert np.all(np.abs(found.mean(axis=1) - np.array(expected) * pairs.sum()) < 5.0 * error)
+
+
+def test_relaxing_growth_is_second_order_in_the_step():
+    onset = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
+    ramp = drive.Ramp(start=5e-4, stop=6e-3)
+    duration, time = 4e-3, 1e-3
+
+    def mean_energy(steps):
+        """The mean of the process, from the same two coefficients that the step uses."""
+        times = np.linspace(0.0, duration, steps + 1)
+        growth = [onset.factor(ramp.motion(1, t, t, duration).speed, 0.0)[0] for t in times]
+        energy = growth[0] ** 2
+        for before, after in itertools.pairwise(growth):
+            share = -np.expm1(-2.0 * duration / steps / time)
+            energy += share * (0.5 * (before**2 + after**2) - energy)
+        return energy
+
+    ends = np.array([mean_energy(steps) for steps in (16, 32, 64, 128)])
+    changes = np.diff(ends)
+    assert_allclose(np.log2(changes[:-1] / changes[1:]), 2.0, atol=0.1)
+
+
+def test_stress_growth_follows_the_bonds():
+    part = shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), growth=Stress(reference=1e5))
+    population = bonds.Steady(critical_speed=2e-3, stress=4e5)
+    process, found = energies(part, 1, Clock(duration=2e-3, step=1e-3), population=population)
+    assert_allclose(found, process.energy * 2.0**2, rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "word"),
+    [
+        (
+            lambda: shear.Mean(spectrum=SPECTRUM, growth=Onset(speed=1.0, width=1.0, relaxing=True)),
+            'use model = "modal"',
+        ),
+        (
+            lambda: shear.Modal(
+                spectrum=SPECTRUM,
+                memory=Time(time=1.0),
+                growth=Stress(reference=1.0, relaxing=True),
+                amplitudes="fixed",
+            ),
+            "gaussian",
+        ),
+        (
+            lambda: scene(
+                shear=shear.Mapped(
+                    spectrum=Ripple(amplitude=1.0, wavelength=25e-6), cell=CELL, points=64, memory=Time(time=1.0)
+                )
+            ),
+            "whole number of wavelengths",
+        ),
+        (
+            lambda: scene(
+                shear=shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=1.0), growth=Stress(reference=1.0)),
+                bonds=bonds.Unbroken(),
+            ),
+            "bonds.stress",
+        ),
+    ],
+)
+def test_depths_that_do_not_go_together_are_refused(wrong, word):
+    with pytest.raises(ValidationError, match=word):
+        wrong()
+
+
+def test_growth_at_rest_is_its_floor():
+    for growth, floor in ((Onset(speed=1e-3, width=0.3, floor=0.05), 0.05), (Constant(), 1.0)):
+        assert_allclose(growth.factor(np.zeros(1), np.zeros(1)), floor, rtol=1e-15)
+    assert Stress(reference=1e5).factor(np.zeros(1), np.zeros(1)) == 0.0

@@ -1,0 +1,279 @@
+"""The spectrum families: variance, closed-form energy, cut-offs, checks and round trips."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydantic import TypeAdapter, ValidationError
+from scipy import integrate
+
+from sim.spectrum import (
+    AnisotropicGaussian,
+    Band,
+    Gaussian,
+    Measured,
+    Ripple,
+    SelfAffine,
+    Spectrum,
+    Tabulated,
+    VonKarman,
+)
+
+TURN = 2 * math.pi
+
+ISOTROPIC = {
+    "band": Band(1.3, longest=5.0, shortest=0.7),
+    "gaussian": Gaussian(1.3, 0.8),
+    "von_karman_rough": VonKarman(1.3, 0.8, 0.1),
+    "exponential": VonKarman(1.3, 0.8, 0.5),
+    "von_karman_smooth": VonKarman(1.3, 0.8, 1.0),
+    "self_affine": SelfAffine(1.3, 0.8, longest=5.0, rolloff=2.0, shortest=0.1),
+    "self_affine_no_plateau": SelfAffine(1.3, 0.3, longest=5.0, rolloff=5.0, shortest=0.1),
+    "self_affine_plateau_only": SelfAffine(1.3, 0.3, longest=5.0, rolloff=0.1, shortest=0.1),
+    "self_affine_h0": SelfAffine(1.3, 0.0, longest=5.0, rolloff=2.0, shortest=0.1),
+    "self_affine_h1": SelfAffine(1.3, 1.0, longest=5.0, rolloff=2.0, shortest=0.1),
+    "tabulated": Tabulated((1.0, 2.0, 3.0, 5.0, 9.0), (0.0, 3.0, 3.0, 0.2, 0.0)),
+}
+ANISOTROPIC = {
+    "across": AnisotropicGaussian(1.3, 0.5, 1.1),
+    "along": AnisotropicGaussian(1.3, 1.1, 0.5),
+    "turned": AnisotropicGaussian(1.3, 0.5, 1.1, angle=0.4),
+}
+WITH_DENSITY = ISOTROPIC | ANISOTROPIC
+ALL = WITH_DENSITY | {
+    "ripple": Ripple(2.0, 3.0, 0.3),
+    "measured": Measured("map.csv", 0.1, "hann", "shear_map", (1.0, 2.0), (3.0, 4.0)),
+}
+
+
+def along_ray(spectrum, angle, power):
+    """∫ q^power C dq along a direction, by quadrature in log q between the breaks."""
+    edges = [math.log(q) for q in getattr(spectrum, "breaks", ())]
+    edges = edges or [-30.0, 0.0, 10.0, 130.0]  # H = 0.1 then lacks e^-26
+
+    def integrand(u):
+        q = math.exp(u)
+        return q ** (power + 1) * float(spectrum.density(q * math.cos(angle), q * math.sin(angle)))
+
+    pieces = [
+        integrate.quad(integrand, a, b, epsabs=0.0, epsrel=1e-11, limit=400)[0]
+        for a, b in itertools.pairwise(edges)
+        if b <= 10.0 or isinstance(spectrum, VonKarman)  # a Gaussian has nothing there
+    ]
+    return math.fsum(pieces)
+
+
+def angular_mean(spectrum, power, weight):
+    """Mean over directions of weight(θ) ∫ q^power C dq; the trapezium rule is exact for smooth periods."""
+    count = 4 if spectrum.isotropic else 64
+    angles = TURN * (np.arange(count) + 0.5) / count
+    if spectrum.isotropic:
+        return np.mean(weight(angles)) * along_ray(spectrum, 0.3, power)
+    return np.mean([weight(t) * along_ray(spectrum, t, power) for t in angles])
+
+
+@pytest.mark.parametrize("spectrum", WITH_DENSITY.values(), ids=WITH_DENSITY)
+def test_variance_is_the_integral_of_the_density(spectrum):
+    assert_allclose(spectrum.variance, angular_mean(spectrum, 1, np.ones_like) / TURN, rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.5, 0.3, 0.0])
+@pytest.mark.parametrize("spectrum", WITH_DENSITY.values(), ids=WITH_DENSITY)
+def test_energy_in_closed_form_is_the_quadrature_of_the_compliance(spectrum, poisson_ratio):
+    modulus = 1.7
+    mean = angular_mean(spectrum, 0, lambda t: 1 - poisson_ratio * np.cos(t) ** 2)
+    assert_allclose(spectrum.surface_energy(modulus, poisson_ratio), mean / (2 * TURN * modulus), rtol=1e-8, atol=0)
+
+
+@pytest.mark.parametrize("spectrum", [s for s in ALL.values() if s.model != "tabulated" and s.model != "measured"])
+def test_variance_is_the_square_of_the_rms(spectrum):
+    exact = spectrum.amplitude**2 / 2 if spectrum.model == "ripple" else spectrum.rms**2
+    assert_allclose(spectrum.variance, exact, rtol=2e-15, atol=0)  # a few roundings
+
+
+@pytest.mark.parametrize("spectrum", ISOTROPIC.values(), ids=ISOTROPIC)
+def test_variance_within_a_circle_grows_as_the_density_says(spectrum):
+    low, high = spectrum.support
+    q = np.geomspace(max(low, 1e-2), min(high, 1e2), 23)[1:-1]
+    q = q[np.min(np.abs(q[:, None] / np.append(spectrum.breaks, np.inf) - 1), axis=1) > 1e-3]
+    step = 1e-4
+    slope = (spectrum.cumulative(q * (1 + step)) - spectrum.cumulative(q * (1 - step))) / (2 * step * q)
+    # central differences: second order, a few 1e-8 times the second derivative of a steep piece,
+    # and rounding of the difference 1e-16 variance / (step q² C)
+    expected = q * spectrum.radial_density(q) / TURN
+    assert_allclose(slope, expected, rtol=1e-6, atol=1e-11 * spectrum.variance)
+
+
+@pytest.mark.parametrize("spectrum", ISOTROPIC.values(), ids=ISOTROPIC)
+def test_within_and_beyond_share_the_variance(spectrum):
+    q = np.concatenate([[0.0], np.geomspace(1e-3, 1e3, 61), spectrum.breaks])
+    total = spectrum.cumulative(q) + spectrum.beyond(q)
+    assert_allclose(total, spectrum.variance, rtol=1e-14, atol=0)
+    assert spectrum.cumulative(0.0) == 0.0
+    assert np.all(np.diff(spectrum.cumulative(np.sort(q))) >= 0.0)
+
+
+@pytest.mark.parametrize("name", ["band", "self_affine", "tabulated"])
+def test_nothing_lies_outside_the_cut_offs(name):
+    spectrum = ISOTROPIC[name]
+    low, high = spectrum.support
+    assert spectrum.radial_density(low * (1 - 1e-12)) == 0.0
+    assert spectrum.radial_density(high * (1 + 1e-12)) == 0.0
+    assert spectrum.cumulative(low) == 0.0
+    assert spectrum.beyond(high) == 0.0
+
+
+@pytest.mark.parametrize("spectrum", WITH_DENSITY.values(), ids=WITH_DENSITY)
+def test_density_broadcasts_and_is_even(spectrum):
+    qx, qy = np.linspace(-3, 3, 5)[:, None], np.linspace(-2, 2, 4)
+    density = spectrum.density(qx, qy)
+    assert density.shape == (5, 4)
+    assert_allclose(density, density[::-1, ::-1], rtol=1e-14, atol=0)
+    assert np.ndim(spectrum.density(1.0, 2.0)) == 0
+    energies = spectrum.surface_energy(np.array([1.0, 2.0])[:, None], np.array([0.0, 0.3, 0.5]))
+    assert energies.shape == (2, 3)
+    assert_allclose(energies[0], 2 * energies[1], rtol=1e-15, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "exact"),
+    [
+        (Gaussian(1.0, 1.0), 0.33233509704478426),
+        (Gaussian(1.0, math.sqrt(2.0)), 0.4699928014933126),
+        (VonKarman(1.0, 1.0, 0.5), 0.375),
+        (Band(1.0, TURN / 2.0, TURN / 3.0), 3 / 20),
+        (Ripple(1.0, TURN), 1 / 8),
+        (Ripple(1.0, TURN, math.pi / 2), 1 / 4),
+        (Ripple(1.0, TURN, 0.7), (1 + math.sin(0.7) ** 2) / 8),
+    ],
+)
+def test_energy_at_poisson_one_half_has_the_known_coefficient(spectrum, exact):
+    assert_allclose(spectrum.surface_energy(1.0), exact, rtol=1e-15, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "seven_digits"),
+    [(VonKarman(1.0, 1.0, h), e) for h, e in [(0.1, 0.1040438), (0.3, 0.2586699), (0.8, 0.5123748), (1, 0.5890486)]]
+    + [
+        (SelfAffine(1.0, h, TURN / 0.5, TURN / 1.3, TURN / 40.0), e)
+        for h, e in [(0, 0.1185192), (0.3, 0.1899818), (0.8, 0.2751208), (1, 0.2956922)]
+    ]
+    + [(SelfAffine(1.0, h, TURN, TURN, TURN / 100.0), e) for h, e in [(0.3, 0.1500007), (0.8, 0.2309135)]]
+    + [
+        (AnisotropicGaussian(1.0, a, b), e)
+        for a, b, e in [(1, 3, 0.4888006), (3, 1, 0.5811675), (1, 100, 0.9861138), (100, 1, 1.5491804)]
+    ],
+)
+def test_energy_matches_the_tabulated_seven_digits(spectrum, seven_digits):
+    assert_allclose(spectrum.surface_energy(1.0), seven_digits, rtol=0, atol=5.001e-8)
+
+
+@pytest.mark.parametrize("hurst", [0.3, 0.8, 1.0])
+def test_self_affine_energy_is_the_textbook_quotient(hurst):
+    longest, rolloff, shortest = 60e-6, 24e-6, 1e-6
+    ratio, reach, q = rolloff / longest, rolloff / shortest, TURN / rolloff
+    upper = 1 - ratio + (1 - reach ** (-1 - 2 * hurst)) / (1 + 2 * hurst)
+    lower = 1 - ratio**2 + (1 - reach ** (-2 * hurst)) / hurst
+    exact = 3 * 150e3**2 / (4 * 1.6e6 * q) * upper / lower
+    energy = SelfAffine(150e3, hurst, longest, rolloff, shortest).surface_energy(1.6e6)
+    assert_allclose(energy, exact, rtol=1e-14, atol=0)
+
+
+def test_hurst_zero_is_the_limit_of_small_hurst():
+    def energy(hurst):
+        return SelfAffine(1.0, hurst, 5.0, 2.0, 0.1).surface_energy(1.0)
+
+    rises = [energy(h) - energy(0.0) for h in (1e-6, 1e-8)]
+    assert_allclose(rises[0] / rises[1], 100.0, rtol=1e-4, atol=0)  # linear in H; 1e-16 / 1e-8 of rounding
+    assert_allclose(energy(1e-15), energy(0.0), rtol=1e-13, atol=0)
+
+
+def test_hurst_one_half_has_the_exponential_density():
+    q = np.array([0.0, 0.5, 3.0, 100.0])
+    exact = TURN * 0.8**2 * 1.3**2 * (1 + (0.8 * q) ** 2) ** -1.5
+    assert_allclose(ISOTROPIC["exponential"].radial_density(q), exact, rtol=1e-14, atol=0)
+
+
+def test_equal_lengths_make_the_anisotropic_gaussian_isotropic():
+    for angle in (0.0, 0.3, 2.0):
+        both = AnisotropicGaussian(1.3, 0.8, 0.8, angle), Gaussian(1.3, 0.8)
+        energies = [s.surface_energy(1.0, 0.3) for s in both]
+        assert_allclose(energies[0], energies[1], rtol=1e-14, atol=0)
+        assert_allclose(both[0].density(1.0, 2.0), both[1].density(1.0, 2.0), rtol=1e-14, atol=0)
+
+
+def test_a_quarter_turn_exchanges_the_two_lengths():
+    turned, exchanged = AnisotropicGaussian(1.0, 0.5, 2.0, math.pi / 2), AnisotropicGaussian(1.0, 2.0, 0.5)
+    assert_allclose(turned.surface_energy(1.0, 0.3), exchanged.surface_energy(1.0, 0.3), rtol=1e-14, atol=0)
+    assert_allclose(turned.density(1.0, 2.0), exchanged.density(1.0, 2.0), rtol=1e-14, atol=0)
+
+
+def test_endless_streaks_store_energy_as_the_logarithm_of_their_length():
+    energies = [AnisotropicGaussian(1.0, 1.0, b).surface_energy(1.0) for b in (1e4, 1e6, 1e8)]
+    assert_allclose(np.diff(energies)[1], np.diff(energies)[0], rtol=1e-6, atol=0)
+
+
+def test_energy_of_a_ripple_falls_with_poisson_ratio_only_along_sliding():
+    along, across = Ripple(2.0, 3.0, 0.0), Ripple(2.0, 3.0, math.pi / 2)
+    q = TURN / 3.0
+    assert_allclose(along.surface_energy(1.5, 0.3), 4.0 * 0.7 / (4 * 1.5 * q), rtol=1e-15, atol=0)
+    assert_allclose(across.surface_energy(1.5, 0.3), 4.0 / (4 * 1.5 * q), rtol=1e-15, atol=0)
+
+
+def test_a_ripple_refuses_to_give_a_density():
+    with pytest.raises(ValueError, match="no density"):
+        Ripple(1.0, 1.0).density(0.0, 0.0)
+
+
+def test_a_narrow_band_is_a_ring():
+    band = Band(1.0, TURN / 2.0, TURN / 2.0002)
+    assert_allclose(band.surface_energy(1.0), 3 / (8 * 2.0001), rtol=1e-11, atol=0)
+
+
+@pytest.mark.parametrize("spectrum", ALL.values(), ids=ALL)
+def test_a_spectrum_survives_dumping_and_reading(spectrum):
+    for reader in (TypeAdapter(type(spectrum)), TypeAdapter(Spectrum)):
+        dumped = reader.dump_python(spectrum)
+        again = reader.validate_python(dumped)
+        assert again == spectrum
+        assert reader.validate_json(reader.dump_json(spectrum)) == spectrum
+        assert hash(again) == hash(spectrum)
+
+
+def test_quantities_may_carry_units():
+    read = TypeAdapter(Spectrum).validate_python
+    assert read({"model": "ripple", "amplitude": "3 kPa", "wavelength": "2 mm", "angle": "180 deg"}) == Ripple(
+        3000.0, 0.002, math.pi
+    )
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"model": "band", "rms": 1, "longest": 1, "shortest": 2}, "longest .* is shorter than shortest"),
+        ({"model": "band", "rms": 1, "longest": 2, "shortest": 2}, "leaves no band"),
+        (
+            {"model": "self_affine", "rms": 1, "hurst": 1, "longest": 2, "rolloff": 3, "shortest": 1},
+            "longest .* is shorter than rolloff",
+        ),
+        (
+            {"model": "self_affine", "rms": 1, "hurst": 1, "longest": 5, "rolloff": 3, "shortest": 4},
+            "rolloff .* is shorter than shortest",
+        ),
+        ({"model": "self_affine", "rms": 1, "hurst": 1, "longest": 2, "rolloff": 2, "shortest": 2}, "no band"),
+        (
+            {"model": "self_affine", "rms": 1, "hurst": 1.1, "longest": 5, "rolloff": 3, "shortest": 1},
+            "at most 1",
+        ),
+        ({"model": "von_karman", "rms": 1, "length": 1, "hurst": 0}, "above 0"),
+        ({"model": "gaussian", "rms": 0, "length": 1}, "above 0"),
+        ({"model": "gaussian", "rms": 1, "length": "1 Pa"}, "not a unit of m"),
+        ({"model": "gaussian", "rms": 1, "length": 1, "lenght": 1}, "lenght"),
+        ({"model": "ripple", "amplitude": -1, "wavelength": 1}, "at least 0"),
+    ],
+)
+def test_a_wrong_spectrum_is_refused_with_the_cure(given, words):
+    with pytest.raises(ValidationError, match=words):
+        TypeAdapter(Spectrum).validate_python(given)

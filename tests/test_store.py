@@ -1,0 +1,203 @@
+"""From parts to a dataset: names and units, equal bytes, and trouble with the disk."""
+
+import json
+import resource
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.testing import assert_allclose
+from scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
+
+from sim import ensemble, store
+from sim.durable import StoreTrouble
+from sim.engine import march
+from sim.gauges import GAUGES
+from sim.memory import Slip
+from sim.parts import shear
+from sim.scenario import Clock, Record, read_sweep
+
+MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, memory=Slip(length=3e-6))
+
+
+def sample(**parts):
+    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["rate"], "contact": CONTACTS["load"]}
+    return scene(parts.pop("members", 5), parts.pop("steps", 6), **(defaults | parts))
+
+
+def test_the_dataset_is_what_the_engine_marched():
+    scenario = sample()
+    dataset = ensemble.run(scenario)
+    for record, state in enumerate(march(scenario, np.arange(5))):
+        for gauge in GAUGES:
+            found = dataset[gauge.name].isel(t=record).values
+            assert np.array_equal(np.atleast_1d(found), gauge.read(scenario, state)), gauge.name
+
+
+def test_every_variable_has_unit_and_long_name():
+    dataset = ensemble.run(sample(shear=MAPPED, record=Record(maps=(2e-3,))))
+    for name, variable in dataset.variables.items():
+        assert variable.attrs["long_name"], name
+        assert "units" in variable.attrs or "flag_values" in variable.attrs, name
+    assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}
+
+
+def test_the_file_opens_lazily_and_equals_the_run_in_memory(tmp_path):
+    scenario = replace(sample(), sweep=read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]}))
+    path = ensemble.run(scenario, tmp_path / "out.nc")
+    with ensemble.open(path) as from_disk:
+        assert from_disk["contact_radius"].dims == ("load", "bond_share", "realization", "t")
+        assert from_disk["speed"].dims == ("load", "bond_share", "t")
+        xr.testing.assert_identical(from_disk.load(), ensemble.run(scenario))
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["out.nc"]
+
+
+def test_equal_runs_are_equal_bytes(tmp_path):
+    one, two = (ensemble.run(sample(), tmp_path / name).read_bytes() for name in ("a.nc", "b.nc"))
+    assert one == two
+
+
+def test_parts_of_any_shape_give_the_same_numbers(monkeypatch):
+    whole = ensemble.run(sample())
+    monkeypatch.setattr(store, "_GROUP", 2)
+    monkeypatch.setattr(store, "_PART_NUMBERS", 60)
+    pieces = ensemble.run(sample())
+    xr.testing.assert_identical(whole, pieces)
+
+
+def test_recording_seldom_gives_the_same_numbers():
+    often = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3)))
+    seldom = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3, record=3e-3)))
+    for gauge in GAUGES:
+        assert np.array_equal(often[gauge.name].isel(t=[0, 3, 6]).values, seldom[gauge.name].values)
+
+
+def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
+    each = ensemble.run(sample())
+    monkeypatch.setattr(store, "_GROUP", 2)
+    pooled = ensemble.run(sample(record=Record(per_member=False)))
+    assert "realization" not in pooled.dims
+    for name in ("contact_radius", "fluctuation_energy", "friction_force"):
+        values = each[name].transpose("realization", "t").values
+        assert_allclose(pooled[f"{name}_mean"], values.mean(0), rtol=1e-13)
+        assert_allclose(pooled[f"{name}_std"], values.std(0, ddof=1), rtol=1e-11)
+        assert_allclose(pooled[f"{name}_sem"], values.std(0, ddof=1) / np.sqrt(5), rtol=1e-11)
+    assert pooled["bond_fraction"].dims == ("t",)
+
+
+def test_maps_are_those_of_the_members_and_times_asked_for():
+    scenario = sample(shear=MAPPED, record=Record(maps=(4e-3, 1e-3), map_members=2))
+    dataset = ensemble.run(scenario)
+    assert dataset["shear_map"].dims == ("map_realization", "snapshot", "x", "y")
+    assert_allclose(dataset["snapshot"], [1e-3, 4e-3])
+    states = list(march(scenario, np.arange(5)))
+    for snapshot, step in enumerate((1, 4)):
+        maps = scenario.process.maps(states[step].shear, np.full(2, states[step].position[0]), 2)
+        assert np.array_equal(dataset["shear_map"].isel(snapshot=snapshot).values, maps)
+
+
+def test_a_detached_contact_is_zero_and_not_in_contact():
+    dataset = ensemble.run(
+        sample(contact=CONTACTS["tension"].__class__(load=-1e-3), shear=shear.Uniform(), bonds=BONDS["none"])
+    )
+    for name in ("contact_radius", "contact_area", "friction_force", "in_contact", "normal_load"):
+        assert np.all(dataset[name] == 0), name
+    assert np.all(np.isnan(dataset["indentation"]))
+
+
+def test_members_that_do_not_differ_are_computed_once():
+    dataset = ensemble.run(sample(members=64, shear=shear.Uniform()))
+    assert "realization" not in dataset.dims
+
+
+def test_swept_models_are_labelled():
+    scenario = replace(
+        sample(),
+        sweep=read_sweep(
+            {
+                "shear": [
+                    {"model": "uniform"},
+                    {"model": "mean", "spectrum": {"model": "gaussian", "rms": "1e5 Pa", "length": "5 um"}},
+                ]
+            }
+        ),
+    )
+    dataset = ensemble.run(scenario)
+    assert list(dataset["shear"].values) == ["uniform", "mean"]
+    assert dataset["fluctuation_energy"].isel(shear=0).max() == 0.0 < dataset["fluctuation_energy"].isel(shear=1).min()
+
+
+def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
+    scenario = replace(
+        sample(),
+        sweep=read_sweep(
+            [{"contact.load": "1 mN", "sphere.radius": "1 mm"}, {"contact.load": "4 mN", "sphere.radius": "2 mm"}]
+        ),
+    )
+    dataset = ensemble.run(scenario)
+    assert_allclose(dataset["load"], [1e-3, 4e-3])
+    assert dataset["sphere_radius"].dims == ("load",)
+    assert_allclose(dataset["sphere_radius"], [1e-3, 2e-3])
+
+
+def test_the_scenario_can_be_run_again_from_its_dataset():
+    from pydantic import TypeAdapter
+
+    from sim.scenario import Scenario
+
+    scenario = sample()
+    dataset = ensemble.run(scenario)
+    again = TypeAdapter(Scenario).validate_python(json.loads(dataset.attrs["scenario_resolved"]))
+    xr.testing.assert_identical(ensemble.run(again), dataset)
+
+
+def test_an_existing_output_is_kept(tmp_path):
+    path = tmp_path / "out.nc"
+    path.write_text("precious")
+    with pytest.raises(ensemble.OutputExists, match="--force"):
+        ensemble.run(sample(), path)
+    assert path.read_text() == "precious"
+    ensemble.run(sample(), path, replace=True)
+    assert xr.open_dataset(path).attrs["sim_version"]
+
+
+def test_a_run_that_fails_leaves_the_older_output(tmp_path, monkeypatch):
+    path = ensemble.run(sample(), tmp_path / "out.nc")
+    before = path.read_bytes()
+
+    def broken(*arguments):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(ensemble, "write_dataset", broken)
+    with pytest.raises(StoreTrouble, match="No space left"):
+        ensemble.run(sample(seed=6), path, replace=True)
+    assert path.read_bytes() == before
+    assert not list(tmp_path.glob(".out*"))
+
+
+def test_two_runs_do_not_share_an_output(tmp_path):
+    with ensemble._held(tmp_path / "out.nc"), pytest.raises(ensemble.OutputBusy):
+        ensemble.run(sample(), tmp_path / "out.nc")
+
+
+def test_a_full_disk_is_told_with_its_reason(tmp_path):
+    # a limit on the size of files stands for the disk: the kernel refuses further bytes
+    program = (
+        "import signal, sys; signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
+        "from sim.cli import main\n"
+        f"sys.argv = ['sim', 'run', 'scenarios/pdms_lens.toml', '--members', '2', '-o', {str(tmp_path / 'o.nc')!r}]\n"
+        "main()\n"
+    )
+    limit = lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))  # noqa: E731
+    # no bytecode: the limit would cut the interpreter's own files short, too
+    environment = {"PATH": "", "SIM_CACHE_DIR": str(tmp_path / "cache"), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", program], preexec_fn=limit, env=environment, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 74, done.stderr
+    assert "File too large" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "o.nc").exists()

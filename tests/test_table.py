@@ -1,0 +1,128 @@
+"""CSV tables: units in the header, and one clear error for each way to get them wrong."""
+
+import pytest
+
+from sim.quantity import Quantity
+from sim.table import TableError, columns, file_path, file_text, matrix
+
+TIME = Quantity("s", "time", at_least=0)
+SPEED = Quantity("m/s", "speed")
+WANTED = {"time": TIME, "speed": SPEED}
+
+
+def test_columns_come_in_si_units_whatever_the_header_says():
+    table = columns("time [ms], speed [mm/s]\n0, 1\n250, -2.5e3\n", WANTED)
+    assert table["time"].tolist() == [0.0, 0.25]
+    assert table["speed"].tolist() == [0.001, -2.5]
+
+
+def test_a_column_without_brackets_is_si_already():
+    assert columns("time,speed\n1,2", WANTED)["speed"].tolist() == [2.0]
+
+
+@pytest.mark.parametrize("header", ["share", "share [1]", "share []", "share [-]", "share [ 1 ]"])
+def test_a_pure_number_needs_no_unit(header):
+    assert columns(f"{header}\n0.5", {"share": Quantity("1", "share")})["share"].tolist() == [0.5]
+
+
+def test_percent_is_a_unit_of_a_pure_number():
+    assert columns("share [percent]\n50", {"share": Quantity("1", "share")})["share"].tolist() == [0.5]
+
+
+def test_comments_blank_lines_other_columns_order_and_a_byte_order_mark_do_not_matter():
+    text = "\ufeff# recorded on Monday\n\nspeed [m/s], remark, time [s]\n# rising\n3, fast, 1\r\n\n4, faster, 2\n"
+    table = columns(text, WANTED)
+    assert table["time"].tolist() == [1.0, 2.0]
+    assert table["speed"].tolist() == [3.0, 4.0]
+
+
+def test_quoted_cells_are_read():
+    assert columns('"time [s]","speed [m/s]"\n"1","2"', WANTED)["time"].tolist() == [1.0]
+
+
+def test_units_of_more_than_one_word_are_read():
+    density = {"C": Quantity("Pa^2 m^2", "density")}
+    assert columns("C [kPa^2 um^2]\n2", density)["C"].tolist() == [2e6 * 1e-12]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", r'the table is empty; begin with a header such as "time \[s\], speed \[m/s\]"'),
+        ("# only this\n\n", "the table is empty"),
+        ("time [s], speed [m/s]\n", "line 1: no rows follow the header"),
+        ("time [s], sped [m/s]\n1,2", r'line 1: column "speed" is missing \(found: time, sped\); write the header'),
+        ("time [s]; speed [m/s]\n1;2", 'line 1: a header cell cannot be read; write the header as "time'),
+        ("time [s]\tspeed [m/s]\n1\t2", "line 1: a header cell cannot be read"),
+        ("1, 2\n3, 4", 'line 1: column "time" is missing'),
+        ("time [s], time [ms], speed [m/s]\n1,2,3", 'column "time" is there twice'),
+        ("#\ntime [s], speed [m]\n1,2", r'line 2: column "speed" has the unit "m", which is not a unit of m/s; .*\['),
+        ("time [s], speed [furlongs/blink]\n1,2", "unknown unit"),
+        ("time [s], speed [1]\n1,2", 'the unit "1"'),
+        ("time [s], speed []\n1,2", 'the unit ""'),
+        ("time [s], speed [m/s\n1,2", "header cell cannot be read"),
+        ("time [s], speed [m/s]\n1,2\n3", "line 3: 1 cells where the header has 2"),
+        ("time [s], speed [m/s]\n1,2,3", "line 2: 3 cells where the header has 2; .* decimals with a point"),
+        ("time [s], speed [m/s]\n1,2\n\n3,fast", 'line 4: speed is "fast", not a number; write a plain number'),
+        ("time [s], speed [m/s]\n1,", "line 2: speed is an empty cell"),
+        ("time [s], speed [m/s]\n1,nan", "line 2: speed must be finite"),
+        ("time [s], speed [m/s]\n1,-inf", "line 2: speed must be finite"),
+        ("time [s], speed [m/s]\n1,1e999", "line 2: speed must be finite"),
+        ("time [s], speed [m/s]\n-1,1", r"line 2: time must be at least 0 s, not -1 \(the cell holds -1\)"),
+        ("time [s], speed [m/s]\n1,2 m/s", 'speed is "2 m/s", not a number'),
+        ('time [s], speed [m/s]\n1,"2', "line 2"),
+    ],
+)
+def test_a_wrong_table_is_refused_with_line_and_cure(text, words):
+    with pytest.raises(TableError, match=words):
+        columns(text, WANTED)
+
+
+def test_a_matrix_is_read_row_by_row():
+    assert matrix("# Pa\n1, 2, 3\n4, 5, 6\n", Quantity("Pa", "stress")).tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [("", "empty"), ("1,2\n3", "line 2: 1 cells where the first row has 2"), ("1,nan", "finite"), ("1,x", '"x"')],
+)
+def test_a_wrong_matrix_is_refused_with_line_and_cure(text, words):
+    with pytest.raises(TableError, match=words):
+        matrix(text, Quantity("Pa", "stress"))
+
+
+class Files:
+    """Reads beside a scenario, as the reader's object does."""
+
+    def __init__(self, folder):
+        self.folder = folder
+
+    def path(self, name):
+        return self.folder / name
+
+    def text(self, name):
+        return self.path(name).read_text(encoding="utf-8")
+
+
+def test_files_are_read_beside_the_scenario_and_otherwise_here(tmp_path, monkeypatch):
+    (tmp_path / "a.csv").write_text("words")
+    context = {"files": Files(tmp_path)}
+    assert file_text("a.csv", context) == "words"
+    assert file_path("a.csv", context) == tmp_path / "a.csv"
+    monkeypatch.chdir(tmp_path)
+    assert file_text("a.csv", None) == "words"
+    assert file_path("a.csv", {}).read_text() == "words"
+
+
+@pytest.mark.parametrize("read", [file_text, file_path])
+@pytest.mark.parametrize("name", ["missing.csv", "", "bad\0name"])
+def test_a_file_that_is_not_there_is_named_with_a_cure(tmp_path, read, name):
+    for context in ({"files": Files(tmp_path)}, None):
+        with pytest.raises(ValueError, match=r"cannot be read .*; give a path relative to the scenario"):
+            read(name, context)
+
+
+def test_a_file_that_is_not_text_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ValueError, match="csv is not UTF-8 text; save it"):
+        file_text("a.csv", {"files": Files(tmp_path)})
