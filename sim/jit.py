@@ -21,8 +21,9 @@ import numba
 import numpy as np
 from numba.core import config
 
-device = numba.njit
+device = numba.njit(error_model="numpy")
 _building = threading.RLock()
+_BLOCK = 4096
 
 
 @functools.cache
@@ -65,7 +66,7 @@ def kernel(signature: str) -> Callable[[Callable], Callable]:
     def decorate(function: Callable) -> Callable:
         @functools.cache
         def compiled() -> Callable:
-            return _build(lambda cache: numba.njit(signature, cache=cache)(function))
+            return _build(lambda cache: numba.njit(signature, cache=cache, error_model="numpy")(function))
 
         @functools.wraps(function)
         def call(*arguments):
@@ -99,6 +100,31 @@ def law(function: Callable) -> Callable:
             bound.apply_defaults()
             arguments = bound.args
         with np.errstate(all="ignore"):
-            return compiled()(*arguments)
+            return _in_blocks(compiled(), arguments)
 
     return call
+
+
+def _in_blocks(ufunc: Callable, arguments: tuple) -> Any:
+    """Call a ufunc; with large arrays beside single numbers in blocks in which the numbers are arrays, too.
+
+    The compiler's vector instructions need every argument contiguous; a block that stays in the
+    cache makes that free. Elementwise, so the blocks change no bit.
+    """
+    arrays = [np.asarray(argument, dtype=float) for argument in arguments]
+    size = max([array.size for array in arrays])
+    if size < _BLOCK // 16:
+        return ufunc(*arrays)
+    shapes = {array.shape for array in arrays if array.size != 1}
+    if len(shapes) != 1:
+        return ufunc(*arrays)
+    (shape,) = shapes
+    if size <= _BLOCK:
+        return ufunc(*[np.full(shape, array) if array.size == 1 else array for array in arrays])
+    flat = [np.full(_BLOCK, a) if a.size == 1 else np.ascontiguousarray(a).ravel() for a in arrays]
+    out = np.empty(size)
+    for first in range(0, size, _BLOCK):
+        block = slice(first, min(first + _BLOCK, size))
+        length = block.stop - first
+        ufunc(*[a[:length] if array.size == 1 else a[block] for a, array in zip(flat, arrays, strict=True)], out[block])
+    return out.reshape(shape)

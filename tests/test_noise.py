@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import kstest, norm
 
-from sim.noise import BLOCK_NUMBERS, Noise, steps_per_block
+from sim.noise import BLOCK_NUMBERS, PARTS, Noise, steps_per_block
 
 
 def numbers(members, step, count, seed=7, part="shear"):
@@ -23,21 +25,53 @@ def test_a_step_can_be_asked_for_in_any_order():
     assert np.array_equal(early, numbers(range(4), 2, 5))
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 1000, 2**15, 2**15 + 1, 10**6])
+@pytest.mark.parametrize("count", [1, 2, 3, 1000, 2**13, 2**13 + 1, 10**6])
 def test_a_block_is_a_power_of_two_of_steps_and_bounded(count):
     steps = steps_per_block(count)
     assert steps & (steps - 1) == 0
     assert steps == 1 or steps * count <= BLOCK_NUMBERS
 
 
-def test_a_block_is_numpys_philox_at_its_address():
-    count, member, seed = 3, 9, 2**63 + 5
-    block, row = divmod(20_000, steps_per_block(count))
-    generator = np.random.Generator(
-        np.random.Philox(key=np.array([seed, 2], dtype=np.uint64), counter=np.array([0, block, member, 0], np.uint64))
-    )
-    expected = generator.standard_normal((steps_per_block(count), count))[row]
-    assert np.array_equal(numbers([member], 20_000, count, seed)[0], expected)
+def philox(seed, part, block, member, counters):
+    """Words of numpy's own generator at an address, shape (4, counters)."""
+    key, counter = np.array([seed, part], dtype=np.uint64), np.array([0, block, member, 0], dtype=np.uint64)
+    return np.random.Philox(key=key, counter=counter).random_raw(4 * counters).reshape(-1, 4).T
+
+
+def unit(words):
+    return (words >> np.uint64(12)) * 2.0**-52
+
+
+@pytest.mark.parametrize(("seed", "member"), [(0, 0), (7, 3), (2**64 - 1, 10**7), (2**63 + 5, 2**40)])
+def test_the_words_are_those_of_numpys_philox(seed, member):
+    found = Noise(seed, "bonds", np.array([member])).uniforms(7 * 2**10, 8)
+    assert steps_per_block(8) == 2**10
+    words = philox(seed, PARTS["bonds"], 7, member, 1024)
+    assert np.array_equal(found[0], unit(words).ravel()[:8])
+
+
+def test_the_normals_are_box_and_mullers_of_the_words():
+    count = 8192
+    found = Noise(11, "shear", np.array([2])).normals(3, count)[0].reshape(2, 4, 1024)
+    words = philox(11, PARTS["shear"], 3, 2, 2048)
+    for run in range(2):
+        u, v = (unit(words[first::2, run * 1024 : (run + 1) * 1024]) for first in (0, 1))
+        radius = np.sqrt(-2.0 * np.log(1.0 - u))
+        # a few units in the last place of the radius, which is 8.5 at the most
+        assert_allclose(found[run, 0::2], radius * np.cos(2 * np.pi * v), rtol=0, atol=4e-15)
+        assert_allclose(found[run, 1::2], radius * np.sin(2 * np.pi * v), rtol=0, atol=4e-15)
+
+
+def test_the_normals_are_standard_normal():
+    sample = Noise(5, "shear", np.arange(100)).normals(1, 20_000).ravel()
+    assert kstest(sample, "norm").pvalue > 5.7e-7
+    beyond = 4.0
+    expected = 2 * norm.sf(beyond) * sample.size
+    assert abs(np.sum(np.abs(sample) > beyond) - expected) < 5.0 * np.sqrt(expected)
+    for power, moment, spread in ((2, 1.0, 2.0), (4, 3.0, 96.0), (6, 15.0, 10170.0)):
+        assert abs(np.mean(sample**power) - moment) < 5.0 * np.sqrt(spread / sample.size)
+    pairs = sample.reshape(100, -1)
+    assert abs(np.mean(pairs[:, :1024] * pairs[:, 1024:2048])) < 5.0 / np.sqrt(100 * 1024)
 
 
 def test_seeds_parts_members_and_steps_differ():

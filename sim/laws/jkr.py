@@ -16,6 +16,7 @@ import math
 import numpy as np
 
 from sim.jit import device, law
+from sim.roots import cube_root
 
 
 @device
@@ -71,9 +72,7 @@ def hertz_radius_at_load(load, sphere_radius, modulus):
     >>> print(f"{hertz_radius_at_load(4.0 / 3.0, 1.0, 1.0):.3f}")
     1.000
     """
-    if not load >= 0.0:
-        return math.nan
-    return np.cbrt(0.75 * load * (sphere_radius / modulus))
+    return cube_root(0.75 * (sphere_radius / modulus) * load)
 
 
 @law
@@ -116,9 +115,9 @@ def radius_at_load(load, work, sphere_radius, modulus):
     Notes
     -----
     ``a^3 = (3R/4E*) [P + c + sqrt(c (2P + c))]``, c = 3 pi w R (Johnson, Kendall & Roberts 1971; MCD
-    at fixed load), evaluated as ``(3R/8E*) (sqrt(c) + sqrt(2P + c))^2``, the same without a square
-    root of a product. Towards the fold 2P + c cancels: at a relative distance d from it, a relative
-    change e of the load or the work moves the radius by about e/sqrt(d).
+    at fixed load), with the square root of the product taken factor by factor lest it overflow.
+    Towards the fold 2P + c cancels: at a relative distance d from it, a relative change e of the load
+    or the work moves the radius by about e/sqrt(d).
 
     Examples
     --------
@@ -130,16 +129,10 @@ def radius_at_load(load, work, sphere_radius, modulus):
     >>> print(f"{rest:.3e} {last / rest:.3f}")
     7.186e-05 0.630
     """
-    if work <= 0.0:
-        if not load >= 0.0:
-            return math.nan
-        return np.cbrt(0.75 * load * (sphere_radius / modulus))
-    pull = _pull(work, sphere_radius)
-    above = 2.0 * load + pull
-    if not above >= 0.0:
-        return math.nan
-    total = math.sqrt(pull) + math.sqrt(above)
-    return np.cbrt(0.375 * (sphere_radius / modulus) * total * total)
+    # no branch but selections: the compiler turns them into vector instructions
+    pull = 0.0 if work <= 0.0 else _pull(work, sphere_radius)
+    root = 0.0 if pull == 0.0 else math.sqrt(pull) * math.sqrt(2.0 * load + pull)
+    return cube_root(0.75 * (sphere_radius / modulus) * (load + pull + root))
 
 
 @law

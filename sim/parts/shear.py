@@ -41,7 +41,7 @@ class Fluctuation:
     growth : array, shape (1,) or (members,)
         Growth factor g [1] at this time.
     amplitude : array
-        Own numbers of the process: complex amplitudes (members, pairs, 2) in units of each mode's
+        Own numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
         standard deviation, or phases (members, pairs) [rad]; empty where there are none.
     """
 
@@ -109,7 +109,7 @@ class ModalProcess:
     def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
         growth = self.growth.factor(motion.speed, stress)
         size = growth if self.growth.relaxing else np.ones(1)
-        empty = np.zeros((len(noise.members), len(self.wavenumber), 2))
+        empty = np.zeros((len(noise.members), 2, self.pairs))
         return self._renewed(empty, np.zeros(1), np.ones(1), size, growth, motion.step, noise)
 
     def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
@@ -130,7 +130,7 @@ class ModalProcess:
         step: int,
         noise: Noise,
     ) -> Fluctuation:
-        members, pairs, _ = amplitude.shape
+        members, _, pairs = amplitude.shape
         after, energy = np.empty_like(amplitude), np.empty(members)
         _renew(
             amplitude,
@@ -147,7 +147,7 @@ class ModalProcess:
 
     def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
         """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
-        amplitude = state.amplitude[..., 0] + 1j * state.amplitude[..., 1]
+        amplitude = state.amplitude[:, 0] + 1j * state.amplitude[:, 1]
         scale = np.ones(1) if self.growth.relaxing else state.growth
         return amplitude * (0.5 * np.sqrt(self.modes.variance)) * scale[:, np.newaxis]
 
@@ -200,21 +200,31 @@ def _spread(weights: np.ndarray) -> float:
 def _renew(before, normals, keep, renew, size, weights, after, energy):
     """One Ornstein-Uhlenbeck step of all modes of all members, and the energy by Parseval.
 
-    The sum runs in runs of 128 modes, in the same order for every batch.
+    Two passes, so that the compiler can use vector instructions in the first; the sum of the second
+    runs in eight lanes, in the same order for every batch.
     """
-    members, pairs, _ = before.shape
+    members, _, pairs = before.shape
+    part, lanes = np.empty(pairs), np.empty(8)
     for m in range(members):
+        real, imaginary = before[m, 0], before[m, 1]
+        new_real, new_imaginary = after[m, 0], after[m, 1]
+        for k in range(pairs):
+            kick = renew[k] * size[m]
+            x = keep[k] * real[k] + kick * normals[m, k]
+            y = keep[k] * imaginary[k] + kick * normals[m, pairs + k]
+            new_real[k] = x
+            new_imaginary[k] = y
+            part[k] = weights[k] * (x * x + y * y)
+        lanes[:] = 0.0
+        whole = pairs - pairs % 8
+        for first in range(0, whole, 8):
+            for lane in range(8):
+                lanes[lane] += part[first + lane]
         total = 0.0
-        for first in range(0, pairs, 128):
-            run = 0.0
-            for k in range(first, min(first + 128, pairs)):
-                kick = renew[k] * size[m]
-                x = keep[k] * before[m, k, 0] + kick * normals[m, 2 * k]
-                y = keep[k] * before[m, k, 1] + kick * normals[m, 2 * k + 1]
-                after[m, k, 0] = x
-                after[m, k, 1] = y
-                run += weights[k] * (x * x + y * y)
-            total += run
+        for k in range(whole, pairs):
+            total += part[k]
+        for lane in range(8):
+            total += lanes[lane]
         energy[m] = total
 
 

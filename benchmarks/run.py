@@ -1,0 +1,183 @@
+"""Speed against plain numpy, as ratios of two programs that take turns in one run: ``make bench``.
+
+Every ratio is the median over the turns of (time of the other) / (time of ours), with the span of
+the middle half of the turns; absolute times are only as seen. Machines are noisy, so compare ratios.
+"""
+
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import plain
+from rich.console import Console
+from rich.table import Table
+
+from sim.bodies import Adhesion, Solid, Sphere
+from sim.engine import Dice, advance, march, start
+from sim.laws import jkr
+from sim.memory import Slip
+from sim.noise import Noise
+from sim.parts import bonds, drive, shear
+from sim.parts.contact import Equilibrium
+from sim.scenario import Clock, Ensemble, Scenario
+from sim.spectrum import Gaussian, SelfAffine, VonKarman
+
+TURNS = 31
+SPECTRUM = VonKarman(rms=150e3, length=5e-6, hurst=0.8)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One comparison: what takes how long beside what, and what was promised."""
+
+    ours: str
+    other: str
+    promise: str
+    seconds: float
+    ratios: np.ndarray
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        low, middle, high = np.quantile(self.ratios, [0.25, 0.5, 0.75])
+        return self.ours, self.other, f"{middle:.2f}", f"{low:.2f} to {high:.2f}", self.promise, f"{self.seconds:.2e} s"
+
+
+def compare(ours: str, mine: Callable, other: str, theirs: Callable, promise: str, repeats: int = 1) -> Row:
+    """Time two programs in turns, after one turn each that is not counted."""
+    times = np.array([[_timed(mine, repeats), _timed(theirs, repeats)] for _ in range(TURNS + 1)])[1:]
+    return Row(ours, other, promise, float(np.median(times[:, 0])), times[:, 1] / times[:, 0])
+
+
+def _timed(program: Callable, repeats: int) -> float:
+    began = time.perf_counter()
+    for _ in range(repeats):
+        program()
+    return (time.perf_counter() - began) / repeats
+
+
+def scene(members: int, **parts) -> Scenario:
+    """The PDMS lens of the scenarios, in as many members."""
+    return Scenario(
+        clock=Clock(duration=0.2, step=1e-3),
+        solid=Solid(shear_modulus=1.6e6),
+        sphere=Sphere(radius=2e-3),
+        adhesion=Adhesion(work=42e-3),
+        contact=Equilibrium(load=4e-3),
+        drive=drive.Ramp(start=1e-5, stop=1e-1, scale="log"),
+        ensemble=Ensemble(members=members),
+        **parts,
+    )
+
+
+def mean_field() -> list[Row]:
+    """A batch costs the Python of the loop once; what all members share is computed once."""
+    shared = {
+        "bonds": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=3e5),
+        "shear": shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6)),
+    }
+    counted = {"bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=100, stress=3e5)}
+    modal = {
+        "shear": shear.Modal(
+            spectrum=SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=16e-6),
+            cell=0.24e-3,
+            memory=Slip(length=5e-6),
+        )
+    }
+
+    def run(members: int, parts: dict) -> Callable:
+        scenario = scene(members, **parts)
+        return lambda: sum(1 for _ in march(scenario, np.arange(members)))
+
+    rows = []
+    for name, parts, promise in (
+        ("mean-field", shared, "1/3 or more"),
+        ("counted bonds", counted, ""),
+        ("modal, 370 pairs", modal, ""),
+    ):
+        rows.append(compare(f"64 members, {name}", run(64, parts), "1 member", run(1, parts), promise))
+    return rows
+
+
+def modal() -> list[Row]:
+    """One Ornstein-Uhlenbeck step of all modes of a 256² grid and its energy."""
+    points, cell, exponent = 256, 0.24e-3, 0.1
+    recipe = shear.Modal(spectrum=SPECTRUM, cell=cell, points=points, memory=Slip(length=5e-6))
+    scenario = scene(1, shear=recipe)
+    process, noise = scenario.process, Noise(1, "shear", np.arange(1))
+    motion = scenario.drive.motion(0, 0.0, 0.0, 0.2)
+    stress = np.zeros(1)
+    state = {"now": process.start(motion, stress, noise), "step": 0}
+
+    def ours() -> None:
+        state["step"] += 1
+        moved = drive.Steady(speed=exponent * 5e-6).motion(state["step"], 0.0, 1.0, 1.0)
+        state["now"] = process.advance(state["now"], moved, stress, noise)
+
+    rows = []
+    counter = itertools.count(10**6)
+    numbers = np.empty((1, 2 * process.pairs))
+    generator = np.random.Generator(np.random.Philox(1))
+    textbook = plain.TextbookModes(points, cell, SPECTRUM.radial_density, 1.6e6, 1)
+    half = plain.HalfSpectrumModes(points, cell, SPECTRUM.radial_density, 1.6e6, 1)
+    for name, program, promise in (
+        ("numpy, noise by rfft2", lambda: textbook.step(exponent), "2 or more"),
+        ("numpy, half spectrum drawn", lambda: half.step(exponent), ""),
+        ("numpy's normals alone", lambda: generator.standard_normal(out=numbers), ""),
+        ("our normals alone", lambda: noise.normals(next(counter), 2 * process.pairs), "1/2 or more"),
+    ):
+        rows.append(compare(f"modal step, 256² ({process.pairs} pairs)", ours, name, program, promise, 4))
+    return rows
+
+
+def radius() -> list[Row]:
+    """The closed form at a load, for an ensemble and for many."""
+    rows = []
+    for count, repeats in ((1000, 200), (1_000_000, 1)):
+        random = np.random.default_rng(1)
+        load, work = random.uniform(-1e-4, 4e-3, count), random.uniform(-1e-3, 42e-3, count)
+        rows.append(
+            compare(
+                f"laws.jkr at a load, {count:,} radii",
+                lambda load=load, work=work: jkr.radius_at_load(load, work, 2e-3, 6.4e6),
+                "numpy closed form",
+                lambda load=load, work=work: plain.jkr_radius_at_load(load, work, 2e-3, 6.4e6),
+                "1.5 or more",
+                repeats,
+            )
+        )
+    return rows
+
+
+def step() -> list[Row]:
+    """What a step of the whole engine costs beside its modes."""
+    recipe = shear.Modal(spectrum=SPECTRUM, cell=0.24e-3, points=256, memory=Slip(length=5e-6))
+    scenario = scene(1, shear=recipe, bonds=bonds.Rate(critical_speed=1e-2, healing=500.0))
+    dice = Dice.of(1, np.arange(1))
+    state = {"now": start(scenario, dice)}
+
+    def whole() -> None:
+        state["now"] = advance(scenario, state["now"], dice) if state["now"].step < 200 else start(scenario, dice)
+
+    fluctuation, noise, counter = state["now"].shear, Noise(1, "shear", np.arange(1)), itertools.count(1)
+
+    def alone() -> None:
+        moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
+        scenario.process.advance(fluctuation, moved, np.zeros(1), noise)
+
+    return [compare("engine step, modal 256²", whole, "its modes alone", alone, "", 4)]
+
+
+def main() -> None:
+    """Print all rows."""
+    table = Table("ours", "beside", "ratio", "middle half", "promised", "ours, as seen", box=None)
+    for rows in (mean_field, modal, radius, step):
+        for row in rows():
+            table.add_row(*row.texts)
+    Console(width=140).print(table)
+    print("ratio: time of the other / time of ours, median of", TURNS, "turns")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+"""The house: a module imports only from floors below its own."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import sim
+
+ROOT = Path(sim.__file__).parent
+
+#: Every module, lowest floor first.
+FLOORS = (
+    ("quantity", "jit", "noise", "grid", "motion", "durable"),
+    ("table", "radial", "laws.halfspace", "laws.jkr", "laws.schallamach", "laws"),
+    ("bodies", "spectrum", "modes", "memory"),
+    ("measured",),
+    ("parts.drive", "parts.bonds", "parts.shear", "parts.contact", "parts"),
+    ("scenario",),
+    ("engine", "reader"),
+    ("gauges",),
+    ("store",),
+    ("ensemble",),
+    ("preview",),
+    ("cli", "__main__"),
+)
+WING = ("analysis", "plots", "paper")
+#: What the wing may read: laws and the spectra with what they stand on, never parts or engine.
+WING_READS = {*FLOORS[0], *FLOORS[1], *FLOORS[2], *FLOORS[3]}
+
+
+def module_name(path):
+    name = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+    return name.removesuffix(".__init__")
+
+
+def imported(path):
+    """Names of our own modules that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names if alias.name.split(".")[0] == "sim"}
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "sim":
+            inner = [f"{node.module}.{alias.name}" for alias in node.names]
+            found |= {name if is_module(name) else node.module for name in inner}
+    return {name.removeprefix("sim").lstrip(".") for name in found}
+
+
+def is_module(name):
+    path = ROOT.joinpath(*name.split(".")[1:])
+    return path.with_suffix(".py").exists() or (path / "__init__.py").exists()
+
+
+MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py")) if path != ROOT / "__init__.py"}
+
+
+def test_every_module_has_a_floor():
+    placed = {name for floor in FLOORS for name in floor} | set(WING)
+    assert placed == set(MODULES)
+
+
+@pytest.mark.parametrize("name", sorted(MODULES))
+def test_a_module_imports_only_from_floors_below_its_own(name):
+    height = {module: level for level, floor in enumerate(FLOORS) for module in floor}
+    for other in imported(MODULES[name]):
+        assert other, f"{name} imports the package root"
+        if name in WING:
+            assert other in WING_READS or other in WING, f"{name} of the wing imports {other}"
+        elif name in ("cli", "preview"):
+            assert other in WING or height[other] <= height[name]
+        else:
+            assert height[other] < height[name], f"{name} imports {other}, which is not below it"
+
+
+def test_public_names_are_all_there():
+    for name in sim.__all__:
+        assert getattr(sim, name) is not None

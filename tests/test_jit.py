@@ -1,0 +1,73 @@
+"""Compiled laws broadcast like numpy, and their cache may be missing, broken, read-only or full."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from sim.laws import halfspace, jkr
+
+PROGRAM = "from sim.laws import jkr; print(repr(float(jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6))))"
+
+
+def test_a_law_keeps_its_signature_defaults_and_docstring():
+    assert "G_x(q)" in halfspace.compliance.__doc__
+    one = halfspace.compliance(1e4, 0.0, 1e6)
+    assert one == halfspace.compliance(qx=1e4, qy=0.0, shear_modulus=1e6, poisson_ratio=0.5)
+    with pytest.raises(TypeError):
+        halfspace.compliance(1e4)
+
+
+@pytest.mark.parametrize("size", [1, 3, 255, 256, 4095, 4096, 4097, 10_000])
+def test_a_law_of_large_arrays_is_that_of_single_numbers(size):
+    random = np.random.default_rng(3)
+    load, work = random.uniform(-1e-4, 4e-3, size), random.uniform(-1e-2, 42e-3, size)
+    whole = jkr.radius_at_load(load, work, 2e-3, 6.4e6)
+    some = random.integers(0, size, 50)
+    singly = [jkr.radius_at_load(load[i], work[i], 2e-3, 6.4e6) for i in some]
+    assert_array_equal(whole[some], singly)
+
+
+def test_a_law_broadcasts_and_keeps_shapes():
+    load, work = np.linspace(0, 4e-3, 30).reshape(5, 1, 6), np.linspace(0, 42e-3, 40).reshape(40, 1)
+    assert jkr.radius_at_load(load, work, 2e-3, 6.4e6).shape == (5, 40, 6)
+    square = np.linspace(0, 4e-3, 90_000).reshape(300, 300)
+    assert_array_equal(
+        jkr.radius_at_load(square.T, 0.042, 2e-3, 6.4e6), jkr.radius_at_load(square, 0.042, 2e-3, 6.4e6).T
+    )
+    assert jkr.radius_at_load(np.empty((0, 3)), 0.042, 2e-3, 6.4e6).shape == (0, 3)
+    assert jkr.radius_at_load(np.zeros(1), 0.042, np.full(5000, 2e-3), 6.4e6).shape == (5000,)
+
+
+def compiled_in(folder, before=None):
+    environment = {"PATH": os.environ.get("PATH", ""), "SIM_CACHE_DIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], env=environment, preexec_fn=before, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0, done.stderr
+    return float(done.stdout)
+
+
+def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path):
+    import resource
+    import signal
+
+    def full():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+
+    fresh = compiled_in(tmp_path / "cache")
+    files = [path for path in (tmp_path / "cache").rglob("*") if path.suffix in (".nbi", ".nbc")]
+    assert files
+    again = compiled_in(tmp_path / "cache")
+    for path in files:
+        path.write_bytes(b"broken")
+    broken = compiled_in(tmp_path / "cache")
+    (tmp_path / "file").write_text("no folder")
+    no_folder = compiled_in(tmp_path / "file")
+    unmakeable = compiled_in("/proc/no-such-place")
+    no_room = compiled_in(tmp_path / "full", before=full)
+    assert fresh == again == broken == no_folder == unmakeable == no_room
