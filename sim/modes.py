@@ -141,13 +141,10 @@ def modes(spectrum: Any, cell: float, points: int | None = None) -> Modes:
     if wavevector is not None:
         return _single(spectrum, cell, points, wavevector)
     step = 2 * math.pi / cell
-    low, high = spectrum.support
+    _, high = spectrum.support
     needed = None if math.isinf(high) else math.ceil(high / step * (1 - _TOUCH) - 0.5)
     reach, points = _reach(needed, points)
-    if spectrum.isotropic:
-        ix, iy, share = _isotropic_half(spectrum, step, low, high, reach)
-    else:
-        ix, iy, share = _half(pixel_variances(spectrum, cell, reach))
+    ix, iy, share = _half(pixel_variances(spectrum, cell, reach))
     kept = 2 * share > _NEGLIGIBLE * spectrum.variance
     ix, iy, share = ix[kept], iy[kept], share[kept]
     if not len(ix):
@@ -156,7 +153,15 @@ def modes(spectrum: Any, cell: float, points: int | None = None) -> Modes:
         )
     order = np.lexsort((iy, ix, ix**2 + iy**2))
     ix, iy, share = ix[order], iy[order], share[order]
-    return Modes(spectrum, cell, points, *map(_read_only, (ix, iy, step * ix, step * iy, 2 * share)))
+    return _frozen(spectrum, cell, points, ix, iy, step * ix, step * iy, 2 * share)
+
+
+def _frozen(spectrum: Any, cell: float, points: int, *arrays: NDArray, on_lattice: bool = True) -> Modes:
+    """Modes whose arrays cannot be written: several callers share them."""
+    for array in arrays:
+        array.flags.writeable = False
+    ix, iy, qx, qy, variance = arrays
+    return Modes(spectrum, cell, points, ix, iy, qx, qy, variance, on_lattice)
 
 
 def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
@@ -193,12 +198,7 @@ def _single(spectrum: Any, cell: float, points: int | None, wavevector: tuple[fl
     needed = nearest if on_lattice else np.ceil(np.abs(exact)).astype(np.int64)
     _, points = _reach(int(np.max(np.abs(needed))), points)
     arrays = nearest[:1], nearest[1:], np.array([qx]), np.array([qy]), np.array([spectrum.variance])
-    return Modes(spectrum, cell, points, *map(_read_only, arrays), on_lattice=on_lattice)
-
-
-def _read_only(array: NDArray) -> NDArray:
-    array.flags.writeable = False
-    return array
+    return _frozen(spectrum, cell, points, *arrays, on_lattice=on_lattice)
 
 
 def pixel_variances(spectrum: Any, cell: float, reach: int) -> Array:
@@ -232,12 +232,3 @@ def _half(pixels: Array) -> tuple[Indices, Indices, Array]:
     ix, iy = (index.ravel() for index in np.mgrid[-reach : reach + 1, 0 : reach + 1])
     kept = (iy > 0) | (ix > 0)
     return ix[kept], iy[kept], pixels.ravel()[kept]
-
-
-def _isotropic_half(spectrum: Any, step: float, low: float, high: float, reach: int) -> tuple[Indices, Indices, Array]:
-    """``_half`` of an isotropic spectrum, pixels that its annulus does not meet left out."""
-    ix, iy, share = _half(pixel_variances(spectrum, 2 * math.pi / step, reach))
-    nearest = np.hypot(np.maximum(np.abs(ix) - 0.5, 0.0), np.maximum(iy - 0.5, 0.0))
-    farthest = np.hypot(np.abs(ix) + 0.5, iy + 0.5)
-    meets = (farthest * step > low * (1 + _TOUCH)) & (nearest * step < high * (1 - _TOUCH))
-    return ix[meets], iy[meets], share[meets]

@@ -90,18 +90,21 @@ def _integrate(spectrum: Any, step: float, line: Array, start: Array, end: Array
     total = np.zeros((2, len(line)))
     owner = np.arange(len(line))
     whole = _legendre(spectrum, step, line, start, end)
-    for _ in range(40):
+    for depth in range(20):
         middle = (start + end) / 2
         left = _legendre(spectrum, step, line, start, middle)
         right = _legendre(spectrum, step, line, middle, end)
         halves = left + right
         turn = line * (end - start) / (line**2 + middle**2)
-        floor = 2e-16 * spectrum.variance * turn
-        rough = np.any(np.abs(halves - whole) > 1e-14 * np.abs(halves) + floor, axis=0)
+        # rounding grows with the steepness of f, the error of the sums falls 4096-fold by each halving
+        allowed = 8.0**depth * (1e-14 * np.abs(halves) + 2e-16 * spectrum.variance * turn)
+        rough = np.any(np.abs(halves - whole) > allowed, axis=0)
         fine = ~rough
         for sums, part in zip(total, halves, strict=True):
             sums += np.bincount(owner[fine], part[fine], len(sums))
         if not rough.any():
+            return total
+        if np.count_nonzero(rough) > 8 * len(total[0]) + 10_000:
             break
         line, owner = (np.concatenate([a[rough], a[rough]]) for a in (line, owner))
         start, end = (
@@ -109,7 +112,7 @@ def _integrate(spectrum: Any, step: float, line: Array, start: Array, end: Array
             np.concatenate([middle[rough], end[rough]]),
         )
         whole = np.concatenate([left[:, rough], right[:, rough]], axis=1)
-    return total
+    raise ArithmeticError("the pixel integrals of the spectrum do not converge")
 
 
 def _legendre(spectrum: Any, step: float, line: Array, start: Array, end: Array) -> Array:

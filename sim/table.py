@@ -62,8 +62,8 @@ def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.floa
                 "commas, write decimals with a point"
             )
     return {
-        name: np.array([_number(at, name, cells[place], factor, wanted[name]) for at, cells in rows])
-        for name, (place, factor) in found.items()
+        name: np.array([_number(at, name, cells[place], unit, wanted[name]) for at, cells in rows])
+        for name, (place, unit) in found.items()
     }
 
 
@@ -82,7 +82,7 @@ def matrix(text: str, quantity: Quantity) -> NDArray[np.float64]:
     for at, cells in lines:
         if len(cells) != width:
             raise TableError(f"line {at}: {len(cells)} cells where the first row has {width}; complete the row")
-    return np.array([[_number(at, "value", cell, 1.0, quantity) for cell in cells] for at, cells in lines])
+    return np.array([[_number(at, "value", cell, "", quantity) for cell in cells] for at, cells in lines])
 
 
 def _lines(text: str) -> list[tuple[int, list[str]]]:
@@ -102,8 +102,8 @@ def _column(name: str, quantity: Quantity) -> str:
     return name if quantity.unit == "1" else f"{name} [{quantity.unit}]"
 
 
-def _header(at: int, header: list[str], wanted: dict[str, Quantity], example: str) -> dict[str, tuple[int, float]]:
-    """Place and factor to SI of each wanted column."""
+def _header(at: int, header: list[str], wanted: dict[str, Quantity], example: str) -> dict[str, tuple[int, str]]:
+    """Place and unit of each wanted column, "" for SI."""
     split = [match for cell in header if (match := _HEADER.fullmatch(cell))]
     if len(split) != len(header):
         raise TableError(f'line {at}: a header cell cannot be read; write the header as "{example}"')
@@ -114,32 +114,33 @@ def _header(at: int, header: list[str], wanted: dict[str, Quantity], example: st
             what = "is there twice" if name in names else f"is missing (found: {', '.join(names)[:80]})"
             raise TableError(f'line {at}: column "{name}" {what}; write the header as "{example}"')
         place = names.index(name)
-        found[name] = (place, _factor(at, name, split[place]["unit"], quantity))
+        found[name] = (place, _unit(at, name, split[place]["unit"], quantity))
     return found
 
 
-def _factor(at: int, name: str, unit: str | None, quantity: Quantity) -> float:
-    """Factor from a header's unit to SI."""
+def _unit(at: int, name: str, unit: str | None, quantity: Quantity) -> str:
+    """A header's unit, checked; "" where the column is in SI."""
     if unit is None or (unit in ("", "1", "-") and quantity.unit == "1"):
-        return 1.0
-    free = Quantity(quantity.unit, quantity.meaning)  # a factor has no bounds
+        return ""
+    free = Quantity(quantity.unit, quantity.meaning)  # one unit need not lie within the bounds
     try:
         if not re.match(r"[A-Za-zµμΩ°%]|1/", unit):
             raise ValueError(f'has the unit "{unit}", which is no unit')
-        return free.read(f"1 {unit}")
+        free.read(f"1 {unit}")
     except ValueError as fault:
         cure = _column(name, quantity)
         raise TableError(f'line {at}: column "{name}" {_words(fault)}; write the column as "{cure}"') from None
+    return unit
 
 
-def _number(at: int, name: str, cell: str, factor: float, quantity: Quantity) -> float:
+def _number(at: int, name: str, cell: str, unit: str, quantity: Quantity) -> float:
     try:
         number = float(cell)
     except ValueError:
         said = f'"{cell[:40]}"' if cell else "an empty cell"
         raise TableError(f"line {at}: {name} is {said}, not a number; write a plain number") from None
     try:
-        return quantity.read(number * factor)
+        return quantity.read(f"{number!r} {unit}" if unit else number)
     except ValueError as fault:
         raise TableError(f"line {at}: {name} {_words(fault)} (the cell holds {cell})") from None
 

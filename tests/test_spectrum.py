@@ -210,6 +210,15 @@ def test_a_quarter_turn_exchanges_the_two_lengths():
     assert_allclose(turned.density(1.0, 2.0), exchanged.density(1.0, 2.0), rtol=1e-14, atol=0)
 
 
+def test_the_first_length_lies_along_the_angle():
+    a, b, angle, q = 0.5, 2.0, 0.4, np.array([0.3, 1.0, 2.0])
+    spectrum = AnisotropicGaussian(1.3, a, b, angle)
+    for direction, length in [(angle, a), (angle + math.pi / 2, b)]:
+        exact = math.pi * a * b * 1.3**2 * np.exp(-((q * length) ** 2) / 4)
+        found = spectrum.density(q * math.cos(direction), q * math.sin(direction))
+        assert_allclose(found, exact, rtol=1e-14, atol=0)
+
+
 def test_endless_streaks_store_energy_as_the_logarithm_of_their_length():
     energies = [AnisotropicGaussian(1.0, 1.0, b).surface_energy(1.0) for b in (1e4, 1e6, 1e8)]
     assert_allclose(np.diff(energies)[1], np.diff(energies)[0], rtol=1e-6, atol=0)

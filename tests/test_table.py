@@ -16,6 +16,11 @@ def test_columns_come_in_si_units_whatever_the_header_says():
     assert table["speed"].tolist() == [0.001, -2.5]
 
 
+def test_a_cell_is_rounded_as_the_same_quantity_in_a_scenario():
+    text = "time [ms]\n" + "\n".join(str(n) for n in range(1100))
+    assert columns(text, {"time": TIME})["time"].tolist() == [TIME.read(f"{n} ms") for n in range(1100)]
+
+
 def test_a_column_without_brackets_is_si_already():
     assert columns("time,speed\n1,2", WANTED)["speed"].tolist() == [2.0]
 
@@ -68,7 +73,7 @@ def test_units_of_more_than_one_word_are_read():
         ("time [s], speed [m/s]\n1,nan", "line 2: speed must be finite"),
         ("time [s], speed [m/s]\n1,-inf", "line 2: speed must be finite"),
         ("time [s], speed [m/s]\n1,1e999", "line 2: speed must be finite"),
-        ("time [s], speed [m/s]\n-1,1", r"line 2: time must be at least 0 s, not -1 \(the cell holds -1\)"),
+        ("time [s], speed [m/s]\n-1,1", r"line 2: time must be at least 0 s, not -1 s \(the cell holds -1\)"),
         ("time [s], speed [m/s]\n1,2 m/s", 'speed is "2 m/s", not a number'),
         ('time [s], speed [m/s]\n1,"2', "line 2"),
     ],

@@ -1,0 +1,40 @@
+"""The datasets keep the Climate and Forecast conventions, as their own checker sees it."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from scenes import BONDS, CELL, SPECTRUM, scene
+
+from sim.ensemble import run
+from sim.memory import Slip
+from sim.parts import shear
+from sim.reader import load
+from sim.scenario import Record, read_sweep
+
+SCENARIOS = sorted((Path(__file__).parent.parent / "scenarios").glob("*.toml"))
+
+
+def check(path):
+    checker = Path(sys.executable).with_name("compliance-checker")
+    done = subprocess.run([checker, "--test=cf:1.11", path], capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0 and "All tests passed" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("path", SCENARIOS, ids=lambda path: path.stem)
+def test_every_scenario_gives_a_conforming_dataset(path, tmp_path):
+    check(run(load(path, {"ensemble.members": 2}), tmp_path / "out.nc"))
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("per_member", [True, False])
+def test_maps_labels_and_statistics_conform(per_member, tmp_path):
+    mapped = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, memory=Slip(length=3e-6))
+    scenario = scene(
+        3, shear=mapped, bonds=BONDS["counted"], record=Record(maps=(2e-3,), map_members=2, per_member=per_member)
+    )
+    sweep = read_sweep({"bonds": [{"model": "none"}, {"model": "steady", "critical_speed": "1 cm/s"}], "contact.load": [1e-3, 2e-3]})
+    check(run(replace(scenario, sweep=sweep), tmp_path / "out.nc"))
