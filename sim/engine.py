@@ -13,7 +13,7 @@ from sim.motion import Motion
 from sim.noise import Noise
 from sim.parts.bonds import Population
 from sim.parts.contact import Touch
-from sim.parts.shear import Fluctuation
+from sim.processes import Fluctuation
 from sim.scenario import Scenario
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from sim.durable import StoreTrouble, explained, sync_folder
 from sim.engine import State, march, pack
 from sim.gauges import GAUGES
-from sim.parts.shear import MappedProcess
+from sim.processes import MappedProcess
 from sim.scenario import Scenario
 from sim.store import (
     MemoryParts,

@@ -15,6 +15,7 @@ FLOORS = (
     ("noise", "roots", "table", "sweep", "faults"),
     ("laws.halfspace", "laws.jkr", "laws.schallamach", "laws", "bodies", "modes", "memory", "measured"),
     ("spectrum",),
+    ("processes",),
     ("parts.drive", "parts.bonds", "parts.shear", "parts.contact", "parts"),
     ("scenario",),
     ("engine", "reader"),

@@ -4,9 +4,6 @@ A depth is a frozen recipe; with the solid and the cell it becomes a *process* w
 ``advance``. All the contact ever feels of it is one number a step, the stored energy per area ΔΓ.
 """
 
-from dataclasses import dataclass as plain_dataclass
-from dataclasses import replace
-from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -14,12 +11,9 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.grid import Grid
-from sim.jit import kernel
 from sim.memory import Constant, Growth, Memory
-from sim.modes import Modes, modes
-from sim.motion import Motion
-from sim.noise import Noise
+from sim.modes import modes
+from sim.processes import FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
 from sim.quantity import Quantity
 from sim.spectrum import Spectrum
 
@@ -28,198 +22,6 @@ _Paid = Annotated[
 ]
 _Cell = Annotated[float, Quantity("m", "side of the periodic cell", "L", above=0)]
 _Points = Annotated[int, Field(ge=2, le=2**14, description="grid points along a side of the cell")]
-
-
-@plain_dataclass(frozen=True)
-class Fluctuation:
-    """State of the fluctuations.
-
-    Attributes
-    ----------
-    energy : array, shape (1,) or (members,)
-        Elastic energy per area ΔΓ [J/m^2].
-    growth : array, shape (1,) or (members,)
-        Growth factor g [1] at this time.
-    amplitude : array
-        Own numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
-        standard deviation, or phases (members, pairs) [rad]; empty where there are none.
-    """
-
-    energy: np.ndarray
-    growth: np.ndarray
-    amplitude: np.ndarray
-
-
-@plain_dataclass(frozen=True)
-class SmoothProcess:
-    """ΔΓ = g² × a given energy, without noise: the ensemble mean, or nothing at all."""
-
-    energy: float
-    growth: Growth
-    pairs: ClassVar[int] = 0
-
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        return Fluctuation(growth**2 * self.energy, growth, np.empty(0))
-
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        return self.start(motion, stress, noise)
-
-    def known_errors(self) -> dict[str, float]:
-        """Errors and spreads known before the run."""
-        return {}
-
-
-@plain_dataclass(frozen=True)
-class ModalProcess:
-    """Every Fourier mode of the cell as a complex Ornstein-Uhlenbeck process.
-
-    Notes
-    -----
-    With λ the mode's rate, a step keeps e = exp(−∫λdt) of an amplitude and adds √(1 − e²) of a new
-    standard one: exact, and stationary for any step. By Parseval ΔΓ = Σ over pairs of
-    ½ G_x(q) (variance of the pair) \\|a\\|², the spectral form of ½⟨τ1 w1⟩. Sliding only turns the
-    phases of the modes, so ΔΓ of the periodic cell does not feel it: amplitudes are kept in the
-    slider's frame and turned where a map is made.
-    """
-
-    modes: Modes
-    shear_modulus: float
-    poisson_ratio: float
-    infinite_energy: float
-    infinite_variance: float
-    memory: Memory
-    growth: Growth
-
-    @property
-    def pairs(self) -> int:
-        """Number of mode pairs."""
-        return self.modes.qx.size
-
-    @cached_property
-    def weights(self) -> np.ndarray:
-        """Energy of each pair for a unit normal in each component, shape (pairs,) [J/m^2]."""
-        return 0.5 * self.modes.energies(self.shear_modulus, self.poisson_ratio)
-
-    @cached_property
-    def wavenumber(self) -> np.ndarray:
-        """\\|q\\| of each pair [rad/m]."""
-        return np.hypot(self.modes.qx, self.modes.qy)
-
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        size = growth if self.growth.relaxing else np.ones(1)
-        empty = np.zeros((len(noise.members), 2, self.pairs))
-        return self._renewed(empty, np.zeros(1), np.ones(1), size, growth, motion.step, noise)
-
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        # renewed amplitudes get the mean variance over the step, which is second order in the step
-        size = np.sqrt(0.5 * (growth**2 + state.growth**2)) if self.growth.relaxing else np.ones(1)
-        exponents = self.memory.exponents(self.wavenumber, motion)
-        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
-
-    def _renewed(
-        self,
-        amplitude: np.ndarray,
-        keep: np.ndarray,
-        renew: np.ndarray,
-        size: np.ndarray,
-        growth: np.ndarray,
-        step: int,
-        noise: Noise,
-    ) -> Fluctuation:
-        members, _, pairs = amplitude.shape
-        after, energy = np.empty_like(amplitude), np.empty(members)
-        _renew(
-            amplitude,
-            noise.normals(step, 2 * pairs),
-            np.full(pairs, keep),
-            np.full(pairs, renew),
-            np.full(members, size),
-            self.weights,
-            after,
-            energy,
-        )
-        scale = np.ones(1) if self.growth.relaxing else growth
-        return Fluctuation(scale**2 * energy, growth, after)
-
-    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
-        """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
-        amplitude = state.amplitude[:, 0] + 1j * state.amplitude[:, 1]
-        scale = np.ones(1) if self.growth.relaxing else state.growth
-        return amplitude * (0.5 * np.sqrt(self.modes.variance)) * scale[:, np.newaxis]
-
-    def known_errors(self) -> dict[str, float]:
-        """The cell's own errors against the infinite plane, and the spreads of one realisation."""
-        return {
-            "cell_error_variance": self.modes.error_variance,
-            "cell_error_energy": self.modes.error_energy(self.shear_modulus, self.poisson_ratio),
-            "realization_spread_variance": self.modes.variance_spread,
-            "realization_spread_energy": self.modes.energy_spread(self.poisson_ratio),
-        }
-
-
-class FixedProcess(ModalProcess):
-    """Modes that keep their modulus and diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
-
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
-        return Fluctuation(self._energy(growth), growth, phases)
-
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        turn = np.sqrt(2.0 * self.memory.exponents(self.wavenumber, motion))
-        phases = state.amplitude + turn * noise.normals(motion.step, len(self.wavenumber))
-        return Fluctuation(self._energy(growth), growth, phases)
-
-    def _energy(self, growth: np.ndarray) -> np.ndarray:
-        return growth**2 * (2.0 * np.sum(self.weights))
-
-    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
-        modulus = np.sqrt(0.5 * self.modes.variance)
-        return np.exp(1j * state.amplitude) * modulus * state.growth[:, np.newaxis]
-
-    def known_errors(self) -> dict[str, float]:
-        fixed = {"realization_spread_variance": 0.0, "realization_spread_energy": 0.0}
-        return super().known_errors() | fixed
-
-
-@kernel(
-    "void(float64[:,:,::1], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
-    " float64[:,:,::1], float64[::1])"
-)
-def _renew(before, normals, keep, renew, size, weights, after, energy):
-    """One Ornstein-Uhlenbeck step of all modes of all members, and the energy by Parseval.
-
-    Two passes, so that the compiler can use vector instructions in the first; the sum of the second
-    runs in eight lanes, in the same order for every batch.
-    """
-    members, _, pairs = before.shape
-    part, lanes = np.empty(pairs), np.empty(8)
-    for m in range(members):
-        real, imaginary = before[m, 0], before[m, 1]
-        new_real, new_imaginary = after[m, 0], after[m, 1]
-        for k in range(pairs):
-            kick = renew[k] * size[m]
-            x = keep[k] * real[k] + kick * normals[m, k]
-            y = keep[k] * imaginary[k] + kick * normals[m, pairs + k]
-            new_real[k] = x
-            new_imaginary[k] = y
-            part[k] = weights[k] * (x * x + y * y)
-        lanes[:] = 0.0
-        whole = pairs - pairs % 8
-        for first in range(0, whole, 8):
-            for lane in range(8):
-                lanes[lane] += part[first + lane]
-        total = 0.0
-        for k in range(whole, pairs):
-            total += part[k]
-        for lane in range(8):
-            total += lanes[lane]
-        energy[m] = total
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -321,39 +123,6 @@ class Modal:
             self.memory,
             self.growth,
         )
-
-
-class _Maps:
-    """A process whose stress map can be drawn."""
-
-    modes: Modes
-
-    def maps(self, state: Fluctuation, position: np.ndarray, members: int) -> np.ndarray:
-        """Stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
-
-        The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
-        e^{iq(x − X)}.
-        """
-        grid = Grid(self.modes.cell, self.modes.points)
-        first = replace(state, amplitude=state.amplitude[:members])
-        if len(state.growth) > 1:
-            first = replace(first, growth=state.growth[:members])
-        turn = np.exp(-1j * position[:members, np.newaxis] * self.modes.qx)
-        amplitudes = self.complex_amplitudes(first) * turn * self.modes.cell**2  # type: ignore[attr-defined]
-        half = np.zeros((members, grid.points, grid.points // 2 + 1), dtype=complex)
-        ix, iy = self.modes.ix, self.modes.iy
-        half[:, ix % grid.points, iy] = amplitudes
-        edge = iy == 0  # the column q_y = 0 holds both of a pair
-        half[:, -ix[edge] % grid.points, 0] = amplitudes[:, edge].conj()
-        return grid.inverse(half)
-
-
-class MappedProcess(_Maps, ModalProcess):
-    """``ModalProcess`` that also draws its map."""
-
-
-class MappedFixedProcess(_Maps, FixedProcess):
-    """``FixedProcess`` that also draws its map."""
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
