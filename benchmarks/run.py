@@ -40,13 +40,17 @@ class Row:
 
     @property
     def texts(self) -> tuple[str, ...]:
-        low, middle, high = np.quantile(self.ratios, [0.25, 0.5, 0.75])
-        return self.ours, self.other, f"{middle:.2f}", f"{low:.2f} to {high:.2f}", self.promise, f"{self.seconds:.2e} s"
+        low, middle, high = (f"{q:.4g}" if q > 10 else f"{q:.2f}" for q in np.quantile(self.ratios, [0.25, 0.5, 0.75]))
+        return self.ours, self.other, middle, f"{low} to {high}", self.promise, f"{self.seconds:.2e} s"
 
 
-def compare(ours: str, mine: Callable, other: str, theirs: Callable, promise: str, repeats: int = 1) -> Row:
-    """Time two programs in turns, after one turn each that is not counted."""
-    times = np.array([[_timed(mine, repeats), _timed(theirs, repeats)] for _ in range(TURNS + 1)])[1:]
+def compare(
+    ours: str, mine: Callable, other: str, theirs: Callable, promise: str,
+    repeats: int = 1, others: int = 0, members: int = 1, other_members: int = 1,
+) -> Row:  # fmt: skip
+    """Time two programs in turns, per member, after one turn each that is not counted."""
+    times = np.array([[_timed(mine, repeats), _timed(theirs, others or repeats)] for _ in range(TURNS + 1)])[1:]
+    times /= [members, other_members]
     return Row(ours, other, promise, float(np.median(times[:, 0])), times[:, 1] / times[:, 0])
 
 
@@ -169,10 +173,69 @@ def step() -> list[Row]:
     return [compare("engine step, modal 256²", whole, "its modes alone", alone, "", 4)]
 
 
+LENS = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=1e-6)
+
+
+def lens(exponent: float, points: int, members: int, recipe: shear.Modal | shear.Banded) -> Callable:
+    """A program that advances ΔΓ of a lens's cell by one step, for a batch of members."""
+    process, noise = recipe.process(1.6e6, 0.5, 0.24e-3), Noise(1, "shear", np.arange(members))
+    rest, stress, counter = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), np.zeros(1), itertools.count(1)
+    state = [process.start(rest, stress, noise)]
+
+    def program() -> None:
+        moved = drive.Steady(speed=exponent * 5e-6).motion(next(counter), 0.0, 1.0, 1.0)
+        state[0] = process.advance(state[0], moved, stress, noise)
+
+    return program
+
+
+def depths() -> list[Row]:
+    """The same ensemble of ΔΓ on a 512² cell, self-affine with a roll-off and slip memory, per member-step."""
+    exponent, points = 0.1, 512
+    recipe = {"spectrum": LENS, "cell": 0.24e-3, "memory": Slip(length=5e-6), "points": points}
+    half = plain.HalfSpectrumModes(points, 0.24e-3, LENS.radial_density, 1.6e6, 1)
+    real = plain.RealSpaceMap(points, 0.24e-3, LENS.radial_density, 1.6e6, 1)
+    rows = []
+    for name, members, depth, promise in (
+        ("banded, 1 %", 64, shear.Banded(**recipe, tolerance=0.01), "1000 or more"),
+        ("banded, 10 %", 64, shear.Banded(**recipe, tolerance=0.1), ""),
+        ("modal", 1, shear.Modal(**recipe), ""),
+        ("mapped", 1, shear.Mapped(**recipe), ""),
+    ):
+        ours = lens(exponent, points, members, depth)
+        repeats = 50 if members > 1 else 1
+        for other, program, goal in (
+            ("numpy, half spectrum drawn", lambda: half.step(exponent), promise),
+            ("numpy, through real space", lambda: real.step(exponent), ""),
+        ):
+            rows.append(compare(f"{name}, 512²", ours, other, program, goal, repeats, 1, members))
+    modal_program = lens(exponent, points, 1, shear.Modal(**recipe))
+    banded = lens(exponent, points, 64, shear.Banded(**recipe, tolerance=0.01))
+    rows.append(compare("banded, 1 %, 512²", banded, "modal", modal_program, "100 or more", 50, 1, 64))
+    return rows
+
+
+def sizes() -> list[Row]:
+    """Banded costs the same per member-step for any number of modes; here beside the 64² cell."""
+    exponent, rows = 0.1, []
+
+    def program(points: int) -> Callable:
+        spectrum = SelfAffine(
+            rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=0.24e-3 / (points // 2 - 1) * 1.001
+        )
+        recipe = shear.Banded(spectrum=spectrum, cell=0.24e-3, memory=Slip(length=5e-6), points=points)
+        return lens(exponent, points, 64, recipe)
+
+    smallest = program(64)
+    for points in (64, 256, 1024, 4096):
+        rows.append(compare(f"banded, {points}²", program(points), "banded, 64²", smallest, "", 50, 50, 64, 64))
+    return rows
+
+
 def main() -> None:
     """Print all rows."""
     table = Table("ours", "beside", "ratio", "middle half", "promised", "ours, as seen", box=None)
-    for rows in (mean_field, modal, radius, step):
+    for rows in (mean_field, modal, radius, step, depths, sizes):
         for row in rows():
             table.add_row(*row.texts)
     Console(width=140).print(table)

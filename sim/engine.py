@@ -100,7 +100,7 @@ def _motion(scenario: Scenario, step: int) -> Motion:
 def _work_left(scenario: Scenario, bonds: Population, shear: Fluctuation) -> np.ndarray:
     """w = Δγ(bond fraction) − χ ΔΓ [J/m^2]."""
     bonded = scenario.adhesion.work_of_bonds(scenario.bonds.fraction(bonds))
-    return np.asarray(bonded - scenario.shear.paid_by_adhesion * shear.energy)
+    return np.asarray(bonded - scenario.fluctuations.paid_by_adhesion * shear.energy)
 
 
 def pack(state: Any, prefix: str = "") -> dict[str, np.ndarray]:

@@ -19,6 +19,9 @@ from sim.quantity import Quantity
 class Time:
     """Modes renew in time: λ = 1/time."""
 
+    #: The rate goes with |q| to this power.
+    power: ClassVar[int] = 0
+
     time: Annotated[float, Quantity("s", "memory time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
 
@@ -31,6 +34,9 @@ class Time:
 class Slip:
     """Modes renew by sliding: λ = \\|V\\|/length, so a contact at rest keeps its pattern."""
 
+    #: The rate goes with |q| to this power.
+    power: ClassVar[int] = 0
+
     length: Annotated[float, Quantity("m", "memory length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
 
@@ -42,6 +48,9 @@ class Slip:
 class Wave:
     """A mode renews after sliding ``waves`` of its own wavelengths: λ = \\|V\\| q/(2π waves)."""
 
+    #: The rate goes with |q| to this power.
+    power: ClassVar[int] = 1
+
     waves: Annotated[float, Quantity("1", "own wavelengths after which a mode renews", "n", above=0)]
     model: Literal["wave"] = "wave"
 
@@ -52,6 +61,9 @@ class Wave:
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Diffusion:
     """Modes diffuse away in time: λ = D q²."""
+
+    #: The rate goes with |q| to this power.
+    power: ClassVar[int] = 2
 
     diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
     model: Literal["diffusion"] = "diffusion"

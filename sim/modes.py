@@ -141,12 +141,8 @@ def modes(spectrum: Any, cell: float, points: int | None = None) -> Modes:
     if wavevector is not None:
         return _single(spectrum, cell, points, wavevector)
     step = 2 * math.pi / cell
-    _, high = spectrum.support
-    needed = None if math.isinf(high) else math.ceil(high / step * (1 - _TOUCH) - 0.5)
-    reach, points = _reach(needed, points)
-    ix, iy, share = _half(pixel_variances(spectrum, cell, reach))
-    kept = 2 * share > _NEGLIGIBLE * spectrum.variance
-    ix, iy, share = ix[kept], iy[kept], share[kept]
+    reach, points = grid_reach(spectrum, cell, points)
+    ix, iy, share = half_lattice(spectrum, cell, reach)
     if not len(ix):
         raise PydanticCustomError(
             "no_modes", "no wave of the spectrum fits the cell of {cell} m; make the cell longer", {"cell": f"{cell:g}"}
@@ -162,6 +158,13 @@ def _frozen(spectrum: Any, cell: float, points: int, *arrays: NDArray, on_lattic
         array.flags.writeable = False
     ix, iy, qx, qy, variance = arrays
     return Modes(spectrum, cell, points, ix, iy, qx, qy, variance, on_lattice)
+
+
+def grid_reach(spectrum: Any, cell: float, points: int | None) -> tuple[int, int]:
+    """Largest lattice index that holds modes of a spectrum, and the points of the grid; raises as ``modes``."""
+    _, high = spectrum.support
+    step = 2 * math.pi / cell
+    return _reach(None if math.isinf(high) else math.ceil(high / step * (1 - _TOUCH) - 0.5), points)
 
 
 def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
@@ -226,9 +229,10 @@ def pixel_variances(spectrum: Any, cell: float, reach: int) -> Array:
     return np.concatenate([quadrant[:0:-1], quadrant])
 
 
-def _half(pixels: Array) -> tuple[Indices, Indices, Array]:
-    """Lattice indices and variance of one of each pair, q = 0 left out."""
-    reach = pixels.shape[1] - 1
+def half_lattice(spectrum: Any, cell: float, reach: int) -> tuple[Indices, Indices, Array]:
+    """Lattice indices and pixel variance of one of each pair up to ``reach``, without q = 0 and without negligible ones."""
+    pixels = pixel_variances(spectrum, cell, reach)
     ix, iy = (index.ravel() for index in np.mgrid[-reach : reach + 1, 0 : reach + 1])
-    kept = (iy > 0) | (ix > 0)
-    return ix[kept], iy[kept], pixels.ravel()[kept]
+    share = pixels.ravel()
+    kept = ((iy > 0) | (ix > 0)) & (2 * share > _NEGLIGIBLE * spectrum.variance)
+    return ix[kept], iy[kept], share[kept]

@@ -75,14 +75,21 @@ class Noise:
         """Uniform numbers in [0, 1) of one step, shape (members, count)."""
         return self._numbers(_uniforms, step, count)
 
-    def _numbers(self, fill, step: int, count: int) -> np.ndarray:
+    def gammas(self, step: int, shapes: np.ndarray) -> np.ndarray:
+        """Standard gamma numbers of given ``shapes`` >= 0.5, the same at all steps; shape (members, shapes).
+
+        Their words are others than those of ``normals`` and ``uniforms``.
+        """
+        return self._numbers(_gammas, step, len(shapes), shapes)
+
+    def _numbers(self, fill, step: int, count: int, *laws: np.ndarray) -> np.ndarray:
         steps = steps_per_block(count)
         block, row = divmod(step, steps)
         kept_block, numbers = self._kept.get((fill, count), (None, None))
         if kept_block != block:
             if numbers is None:
                 numbers = np.empty((len(self.members), steps * count))
-            fill(_U(self.seed), _U(PARTS[self.part]), _U(block), self.members.astype(_U), numbers)
+            fill(_U(self.seed), _U(PARTS[self.part]), _U(block), self.members.astype(_U), *laws, numbers)
             self._kept[fill, count] = (block, numbers)
         return numbers[:, row * count : (row + 1) * count]
 
@@ -97,11 +104,11 @@ def _high_product(a, b):
 
 
 @device
-def _words(seed, part, block, member, first, words):
-    """Philox words of the counters after ``first`` of one block, shape (4, counters)."""
+def _words(seed, part, block, member, lane, first, words):
+    """Philox words of the counters after ``first`` of one block, shape (4, counters); ``lane`` 0 but for gammas."""
     zero, one, two, three = words[0], words[1], words[2], words[3]
     for i in range(words.shape[1]):
-        c0, c1, c2, c3 = first + _U(i) + _U(1), block, member, _U(0)
+        c0, c1, c2, c3 = first + _U(i) + _U(1), block, member, lane
         k0, k1 = seed, part
         for _ in range(10):
             high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0
@@ -174,7 +181,7 @@ def _normals(seed, part, block, members, numbers):
         for first in range(0, count, 4 * _RUN):
             run = min(_RUN, (count - first + 3) // 4)
             words, drawn = np.empty((4, run), np.uint64), np.empty((4, run))
-            _words(seed, part, block, members[m], _U(first // 4), words)
+            _words(seed, part, block, members[m], _U(0), _U(first // 4), words)
             _box_muller(words[0], words[1], drawn[0], drawn[1])
             _box_muller(words[2], words[3], drawn[2], drawn[3])
             some = min(4 * run, count - first)
@@ -189,7 +196,57 @@ def _uniforms(seed, part, block, members, numbers):
         for first in range(0, count, 4 * _RUN):
             run = min(_RUN, (count - first + 3) // 4)
             words = np.empty((4, run), np.uint64)
-            _words(seed, part, block, members[m], _U(first // 4), words)
+            _words(seed, part, block, members[m], _U(0), _U(first // 4), words)
             flat = words.ravel()
             for i in range(min(4 * run, count - first)):
                 numbers[m, first + i] = _unit(flat[i]) - 1.0
+
+
+@device
+def _gamma(d, c, x, word):
+    """Marsaglia & Tsang's gamma number of shape d + 1/3 from a normal x and a word; -1 where they reject it.
+
+    ``c`` is 1/(3 sqrt d). Without branches, so that the compiler can use vector instructions.
+    """
+    v = 1.0 + c * x
+    v = v * v * v
+    positive = v if v > 0.0 else 1.0
+    bound = 0.5 * x * x + d * (1.0 - v + _logarithm(positive))
+    accepted = (_logarithm(2.0 - _unit(word)) < bound) & (v > 0.0)
+    return d * v if accepted else -1.0
+
+
+@kernel("void(uint64, uint64, uint64, uint64[::1], float64[::1], float64[:,::1])")
+def _gammas(seed, part, block, members, shapes, numbers):
+    """Fill rows of standard gamma numbers, shape (members, steps of a block × shapes).
+
+    Number i takes the words of counter i + 1 in lane 1; while it is rejected, in lanes 2, 3, ... A
+    shape a below 1 is that of a + 1 times u^(1/a).
+    """
+    count, kinds = numbers.shape[1], shapes.size
+    words, x, y = np.empty((4, _RUN), np.uint64), np.empty(_RUN), np.empty(_RUN)
+    law, d, c = np.empty(_RUN), np.empty(_RUN), np.empty(_RUN)
+    again, z, rest = np.empty((4, 1), np.uint64), np.empty(1), np.empty(1)
+    for m in range(members.size):
+        kind = 0
+        for first in range(0, count, _RUN):
+            run = min(_RUN, count - first)
+            _words(seed, part, block, members[m], _U(1), _U(first), words)
+            _box_muller(words[0], words[1], x, y)
+            for i in range(run):
+                law[i] = shapes[kind]
+                kind = kind + 1 if kind + 1 < kinds else 0
+            for i in range(run):
+                d[i] = (law[i] if law[i] >= 1.0 else law[i] + 1.0) - 1.0 / 3.0
+                c[i] = 1.0 / (3.0 * math.sqrt(d[i]))
+                y[i] = _gamma(d[i], c[i], x[i], words[2, i])
+            for i in range(run):
+                lane = _U(1)
+                while y[i] < 0.0:
+                    lane += _U(1)
+                    _words(seed, part, block, members[m], lane, _U(first + i), again)
+                    _box_muller(again[0], again[1], z, rest)
+                    y[i] = _gamma(d[i], c[i], z[0], again[2, 0])
+                if law[i] < 1.0:
+                    y[i] *= math.exp(_logarithm(2.0 - _unit(words[3, i])) / law[i])
+                numbers[m, first + i] = y[i]

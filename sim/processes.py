@@ -3,12 +3,14 @@
 A process is a depth of ``parts.shear`` on a given solid and cell.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
 
+from sim.bands import Bands
 from sim.grid import Grid
 from sim.jit import kernel
 from sim.memory import Growth, Memory
@@ -101,8 +103,7 @@ class ModalProcess:
 
     def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
         growth = self.growth.factor(motion.speed, stress)
-        # renewed amplitudes get the mean variance over the step, which is second order in the step
-        size = np.sqrt(0.5 * (growth**2 + state.growth**2)) if self.growth.relaxing else np.ones(1)
+        size = _mean_size(growth, state.growth) if self.growth.relaxing else np.ones(1)
         exponents = self.memory.exponents(self.wavenumber, motion)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
         return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
@@ -207,6 +208,105 @@ def _renew(before, normals, keep, renew, size, weights, after, energy):
         for lane in range(8):
             total += lanes[lane]
         energy[m] = total
+
+
+@dataclass(frozen=True)
+class BandedProcess:
+    """ΔΓ as a sum of squared Ornstein-Uhlenbeck processes, one for each band of modes.
+
+    Notes
+    -----
+    A band's X is chi-square distributed with k degrees of freedom, k >= 2 and not whole. With
+    e = exp(−∫λdt) and c = 1 − e² one step is exact for any dt:
+    X' = (√c Z + e √X)² + 2c Γ((k − 1)/2), Z normal and Γ a standard gamma number; ΔΓ = ½ Σ weight X.
+    Where growth relaxes, c is that of the renewed part times its g².
+    """
+
+    bands: Bands
+    cell_errors: dict[str, float]
+    memory: Memory
+    growth: Growth
+
+    @property
+    def pairs(self) -> int:
+        """Numbers that a state holds, half as many as for a mode pair."""
+        return (self.bands.weight.size + 1) // 2
+
+    @cached_property
+    def half_weight(self) -> np.ndarray:
+        """Energy of a band for X = 1, shape (bands,) [J/m^2]."""
+        return 0.5 * self.bands.weight
+
+    @cached_property
+    def shapes(self) -> np.ndarray:
+        """Shapes of the gamma numbers, shape (bands,)."""
+        return 0.5 * (self.bands.freedom - 1.0)
+
+    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        size = growth if self.growth.relaxing else np.ones(1)
+        empty = np.zeros((len(noise.members), self.bands.weight.size))
+        return self._renewed(empty, np.zeros(1), np.ones(1), size, growth, motion.step, noise)
+
+    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        size = _mean_size(growth, state.growth) if self.growth.relaxing else np.ones(1)
+        exponents = self.memory.exponents(self.bands.wavenumber, motion)
+        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
+        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
+
+    def _renewed(
+        self,
+        amplitude: np.ndarray,
+        keep: np.ndarray,
+        renew: np.ndarray,
+        size: np.ndarray,
+        growth: np.ndarray,
+        step: int,
+        noise: Noise,
+    ) -> Fluctuation:
+        members, bands = amplitude.shape
+        after, energy = np.empty_like(amplitude), np.empty(members)
+        _renew_bands(
+            amplitude,
+            noise.normals(step, bands),
+            noise.gammas(step, self.shapes),
+            np.full(bands, keep),
+            np.full(bands, renew),
+            np.full(members, size),
+            self.half_weight,
+            after,
+            energy,
+        )
+        scale = np.ones(1) if self.growth.relaxing else growth
+        return Fluctuation(scale**2 * energy, growth, after)
+
+    def known_errors(self) -> dict[str, float]:
+        """What banding adds to the cell's own mode sum, and the cell's own errors beside it."""
+        return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,:], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
+    " float64[:,::1], float64[::1])"
+)
+def _renew_bands(before, normals, gammas, keep, renew, size, half_weight, after, energy):
+    """One exact step of all bands of all members, and their energy."""
+    members, bands = before.shape
+    for m in range(members):
+        total = 0.0
+        for k in range(bands):
+            kick = renew[k] * size[m]
+            moved = kick * normals[m, k] + keep[k] * math.sqrt(before[m, k])
+            x = moved * moved + 2.0 * kick * kick * gammas[m, k]
+            after[m, k] = x
+            total += half_weight[k] * x
+        energy[m] = total
+
+
+def _mean_size(growth: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """Growth of what a step renews: the mean variance of its two ends, second order in the step."""
+    return np.sqrt(0.5 * (growth**2 + before**2))
 
 
 class _Maps:

@@ -5,6 +5,7 @@ A field of a part is declared as ``radius: Annotated[float, Quantity("m", "radiu
 the JSON schema, the netCDF attributes and ``sim check``. SI inside, always.
 """
 
+import difflib
 import functools
 import math
 import re
@@ -14,11 +15,34 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
+_NUMBER = r"[+-]?(?:(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|inf(?:inity)?|nan)"
 _TEXT = re.compile(
-    r"\s*(?P<number>[+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d{1,4})?|[+-]?(?:inf|nan))"
-    r"(?:\s*(?P<unit>(?:1/)?[A-Za-zµμΩ°%][A-Za-z0-9µμΩ°%^*/. \-]{0,60}))?\s*"
+    rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>[^\s0-9+,-](?:.*\S)?|1\s*/.*\S)?\s*", re.IGNORECASE | re.DOTALL
 )
-_HUGE_POWER = re.compile(r"(?:\^|\*\*)\s*-?\s*\d{3}|\d{4}")
+_COMMA = re.compile(r"\s*[+-]?[0-9]+,[0-9]+(?![0-9,])")
+
+# Only products of names with small whole powers reach pint, so that no text makes it compute.
+_NAME = r"[A-Za-zµμΩΩ°%ÅÅ]+(?:_[A-Za-z]+)*"
+_POWER = re.compile(rf"({_NAME})\s*(?:\^|\*\*)?\s*(-?[0-9]+)")
+_FACTOR = rf"{_NAME}(?:\s*(?:\^|\*\*)\s*-?[1-9][0-9]?|-?[1-9][0-9]?)?"
+_UNIT = re.compile(rf"(?:1?\s*/\s*)?{_FACTOR}(?:\s*[*/]\s*{_FACTOR}|\s+{_FACTOR})*")
+_LONGEST_TEXT, _LONGEST_UNIT = 200, 60
+_TYPESET = str.maketrans("−·⋅×⁄⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-***/-0123456789")
+
+# Beyond these nothing is measurable, and products of a few such numbers leave the range of floats.
+_LARGEST, _SMALLEST = 1e60, 1e-60
+
+_TYPICAL = {
+    "m": "2 mm",
+    "Pa": "1.6 MPa",
+    "N": "4 mN",
+    "s": "10 ms",
+    "m/s": "1 mm/s",
+    "J/m^2": "42 mJ/m^2",
+    "1/s": "500 1/s",
+    "m^2/s": "1 um^2/s",
+    "rad": "30 deg",
+}
 
 
 @functools.cache
@@ -34,21 +58,74 @@ def _units() -> Any:
 @functools.lru_cache(maxsize=1024)
 def _scale(unit: str, target: str) -> float | None:
     """Factor from ``unit`` to ``target``; None where the dimensions differ, ValueError if unknown."""
+    registry = _units()
     try:
-        given = _units().Quantity(1.0, _units().parse_units(unit))
+        given = registry.Quantity(1.0, registry.parse_units(unit))
+        wanted = registry.parse_units(target) if target != "1" else registry.dimensionless
+        if not given.is_compatible_with(wanted):
+            return None
+        scale = float(given.to(wanted).magnitude)
     except Exception as fault:  # pint raises its own, tokenizer's and arithmetic errors here
         raise ValueError(unit) from fault
-    wanted = _units().parse_units(target) if target != "1" else _units().dimensionless
-    if not given.is_compatible_with(wanted):
+    if not (0.0 < scale < math.inf and given._is_multiplicative):
+        raise ValueError(unit)
+    return scale
+
+
+def _times(number: float, scale: float) -> float:
+    """``number * scale``, correctly rounded where the scale is a power of ten, so "100 um" is 1e-4."""
+    power = round(math.log10(scale))
+    if abs(power) > 22 or abs(scale / 10.0**power - 1.0) > 1e-12:
+        return number * scale
+    return number * 10.0**power if power >= 0 else number / 10.0**-power
+
+
+def in_words(value: Any) -> str:
+    """What a value of a scenario file is, for messages."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    kinds = {dict: "a table", list: "a list", tuple: "a list", str: "text", int: "a whole number", float: "a number"}
+    dates = ("date", "time", "datetime")
+    return kinds.get(type(value)) or ("a date" if type(value).__name__ in dates else "something else")
+
+
+def _read_text(text: str) -> re.Match[str] | None:
+    return _TEXT.fullmatch(text.translate(_TYPESET)) if len(text) < _LONGEST_TEXT else None
+
+
+def number_and_unit(value: Any) -> tuple[float, str] | None:
+    """A finite number and the text of its unit as they stand in a scenario file; None if it is neither.
+
+    >>> number_and_unit("-2.5 mN"), number_and_unit(3), number_and_unit("much")
+    ((-2.5, 'mN'), (3.0, ''), None)
+    """
+    match = _read_text(value) if isinstance(value, str) else None
+    if match is None and (isinstance(value, bool | str) or not isinstance(value, int | float)):
         return None
-    return float(given.to(wanted).magnitude)
+    number = float(match["number"]) if match else _finite(value)
+    return (number, (match and match["unit"]) or "") if math.isfinite(number) else None
+
+
+def _finite(value: Any) -> float:
+    """A number as a float, nan where it is too large for one."""
+    try:
+        return float(value)
+    except OverflowError:
+        return math.nan
 
 
 @dataclass(frozen=True)
 class Quantity:
     """Declaration of a number: its SI ``unit``, ``meaning``, ``symbol`` and bounds.
 
-    ``above`` and ``below`` exclude the bound, ``at_least`` and ``at_most`` include it.
+    ``above`` and ``below`` exclude the bound, ``at_least`` and ``at_most`` include it. Beside its
+    own bounds no number may exceed 1e60, nor one that excludes zero fall below 1e-60.
+
+    Examples
+    --------
+    >>> work = Quantity("J/m^2", "work of adhesion", "w", at_least=0)
+    >>> work.read("42 mJ/m^2"), work.read("0.042 N/m"), work.read(0.042)
+    (0.042, 0.042, 0.042)
     """
 
     unit: str
@@ -70,48 +147,59 @@ class Quantity:
         """
         number = self._parse(value) if isinstance(value, str) else self._number(value)
         if not math.isfinite(number):
-            raise PydanticCustomError("not_finite", "must be finite; give a number{unit}", self._about())
+            raise PydanticCustomError("not_finite", "must be finite; write for example {example}", self._about())
         self._check(number)
         return number
 
     def _number(self, value: Any) -> float:
         if isinstance(value, bool) or not hasattr(value, "__float__"):
-            raise PydanticCustomError(
-                "not_a_quantity",
-                'must be a number{unit}, or a string with a unit such as "{example}"',
-                self._about(),
-            )
+            about = {"given": in_words(value), **self._about()}
+            raise PydanticCustomError("not_a_quantity", "must be {kind} such as {example}, not {given}", about)
         try:
             return float(value)
         except (OverflowError, TypeError, ValueError):
-            raise PydanticCustomError("too_large", "is too large for a number", {}) from None
+            raise PydanticCustomError("too_large", "is too large; write for example {example}", self._about()) from None
 
     def _parse(self, text: str) -> float:
-        match = _TEXT.fullmatch(text) if len(text) < 200 else None
-        if match is None or _HUGE_POWER.search(match["unit"] or ""):
+        match = _read_text(text)
+        if match is None or (match["unit"] and _COMMA.match(text)):
+            cure = "write decimals with a point" if _COMMA.match(text) else "write a number"
+            if self.unit != "1":
+                cure += " and a unit"
             raise PydanticCustomError(
                 "not_a_quantity",
-                'cannot be read: {text}; write a number and a unit, such as "{example}"',
-                {"text": repr(text[:40]), **self._about()},
+                'cannot be read: "{text}"; {cure}, such as {example}',
+                {"text": text[:40], "cure": cure, **self._about()},
             )
-        number, unit = float(match["number"]), (match["unit"] or "").strip()
-        if not unit:
-            return number
+        number = float(match["number"])
+        return number if match["unit"] is None else _times(number, self._factor(match["unit"]))
+
+    def _factor(self, given: str) -> float:
+        """Factor from a unit's text to SI."""
+        about = {"given": given[:40], "wanted": self.wanted, **self._about()}
         try:
-            scale = _scale(unit, self.unit)
+            if len(given) > _LONGEST_UNIT or not _UNIT.fullmatch(given):
+                raise ValueError(given)
+            scale = _scale(re.sub(r"^/", "1/", _POWER.sub(r"\1^\2", given)), self.unit)
         except ValueError:
-            raise PydanticCustomError(
-                "unknown_unit",
-                'has the unknown unit "{given}"; write for example "{example}"',
-                {"given": unit, **self._about()},
-            ) from None
+            near = self._near(given)
+            if near:
+                text = 'has the unknown unit "{given}"; did you mean "{near}"?'
+                raise PydanticCustomError("unknown_unit", text, {"near": near, **about}) from None
+            text = 'has the unknown unit "{given}"; write for example {example}'
+            raise PydanticCustomError("unknown_unit", text, about) from None
         if scale is None:
-            raise PydanticCustomError(
-                "wrong_dimension",
-                'has the unit "{given}", which is not a unit of {wanted}; write for example "{example}"',
-                {"given": unit, "wanted": self.wanted, **self._about()},
-            )
-        return number * scale
+            text = 'has the unit "{given}", which is not a unit of {wanted}; write for example {example}'
+            raise PydanticCustomError("wrong_dimension", text, about)
+        return scale
+
+    def _near(self, given: str) -> str | None:
+        """The unit that was probably meant: the same letters in another case, else a similar one."""
+        if self.unit == "1" or self.unit[0].isdigit():
+            return None
+        known = [prefix + self.unit for prefix in ("", "M", "m", "k", "G", "u", "n")]
+        same = [unit for unit in known if unit.casefold() == given.casefold()]
+        return next(iter(same or difflib.get_close_matches(given, known, 1, 0.7)), None)
 
     def _check(self, number: float) -> None:
         for wrong, text, bound in (
@@ -123,9 +211,16 @@ class Quantity:
             if wrong:
                 raise PydanticCustomError(
                     "out_of_bounds",
-                    "must be {text} {bound}{unit}, not {number}",
+                    "must be {text} {bound}{unit}, not {number}{unit}",
                     {"text": text, "bound": f"{bound:g}", "number": f"{number:g}", **self._about()},
                 )
+        if abs(number) > _LARGEST or (self.above >= 0.0 and number < _SMALLEST):
+            size = "large" if abs(number) > 1.0 else "small"
+            raise PydanticCustomError(
+                "beyond_measure",
+                "is too {size} to be real: {number}{unit}; write for example {example}",
+                {"size": size, "number": f"{number:g}", **self._about()},
+            )
 
     @property
     def wanted(self) -> str:
@@ -133,9 +228,20 @@ class Quantity:
         return "a pure number" if self.unit == "1" else self.unit
 
     def _about(self) -> dict[str, Any]:
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        inside = next((b for b in (1.0, 0.5, 2.0 * self.above, 0.0) if self._holds(b)), 1.0)
-        return {"unit": unit, "example": f"{inside:g}{unit}"}
+        pure = self.unit == "1"
+        unit = "" if pure else f" {self.unit}"
+        kind = "a number" if pure else "a number or text with a unit"
+        return {"unit": unit, "kind": kind, "example": self.example}
+
+    @property
+    def example(self) -> str:
+        """An admissible value as it is written in a scenario file."""
+        if self.unit in _TYPICAL and self._holds(1e-6) and self._holds(1e6):
+            return f'"{_TYPICAL[self.unit]}"'
+        usual = (0.5, 1.0) if math.isfinite(min(self.below, self.at_most)) else (1.0, 0.5)
+        bounds = (2.0 * self.above, self.at_least, self.at_most, 0.0)
+        inside = next((number for number in (*usual, *bounds) if self._holds(number)), 1.0)
+        return f"{inside:g}" if self.unit == "1" else f'"{inside:g} {self.unit}"'
 
     def _holds(self, number: float) -> bool:
         return self.above < number < self.below and self.at_least <= number <= self.at_most
@@ -146,4 +252,12 @@ class Quantity:
         )
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict:
-        return {"type": ["number", "string"], "description": f"{self.meaning} [{self.unit}]"}
+        described: dict[str, Any] = {"type": ["number", "string"], "description": f"{self.meaning} [{self.unit}]"}
+        bounds = {
+            "exclusiveMinimum": self.above,
+            "minimum": self.at_least,
+            "exclusiveMaximum": self.below,
+            "maximum": self.at_most,
+        }
+        described |= {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
+        return described | {"examples": [self.example.strip('"') if self.unit != "1" else float(self.example)]}

@@ -1,9 +1,11 @@
 """A scenario: one of each part, a clock, and what must hold between them."""
 
+import errno
 import math
 from dataclasses import dataclass as plain_dataclass
 from dataclasses import field, fields, is_dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -16,18 +18,20 @@ from sim.parts.bonds import Bonds, Unbroken
 from sim.parts.contact import Contact
 from sim.parts.drive import Drive, Table
 from sim.parts.drive import Steady as SteadyDrive
-from sim.parts.shear import Mean, ModalProcess, Shear, SmoothProcess, Uniform
+from sim.parts.shear import Auto, Depth, Mean, Modal, Shear, Uniform
+from sim.processes import BandedProcess, ModalProcess, SmoothProcess
 from sim.quantity import Quantity
-
-#: Names that the dataset gives away itself, so that no sweep may take them.
-RESERVED = frozenset(
-    ["t", "realization", "snapshot", "x", "y", "map_realization", "shear_map", "name", "seed"]
-    + ["speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion"]
-    + ["contact_radius", "contact_area", "normal_load", "indentation", "friction_force", "in_contact"]
-)
+from sim.sweep import read_sweep, set_key
 
 _Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
 _MOST_RECORDS = 10_000_000
+_MOST_STEPS = 10**9
+_MOST_BYTES = 2**28
+#: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
+_MOST_PAIRS = 2**21
+_MOST_WAVES = 1e9
+#: Columns that a part has read from its file, read anew where its table changes.
+_FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -40,13 +44,14 @@ class Clock:
 
     @model_validator(mode="after")
     def _whole_multiples(self) -> "Clock":
-        if self.record is not None and not _is_multiple(self.record, self.step):
-            raise PydanticCustomError("clock", "record must be a whole multiple of step")
-        if not _is_multiple(self.duration, self.record or self.step):
-            word = "record" if self.record else "step"
-            raise PydanticCustomError("clock", f"duration must be a whole multiple of {word}")
+        if self.record is not None:
+            _require_multiple("record", self.record, "step", self.step)
+        word = "step" if self.record is None else "record"
+        _require_multiple("duration", self.duration, word, self.record or self.step)
+        if self.steps > _MOST_STEPS:
+            raise PydanticCustomError("clock", f"asks for more than {_MOST_STEPS:,} steps; make step longer")
         if self.records > _MOST_RECORDS:
-            raise PydanticCustomError("clock", f"asks for more than {_MOST_RECORDS:,} records; make record longer")
+            raise PydanticCustomError("clock", f"asks for more than {_MOST_RECORDS:,} records; give a longer record")
         return self
 
     @property
@@ -74,9 +79,17 @@ class Clock:
         return np.array([self.time(k * self.stride) for k in range(self.records)])
 
 
-def _is_multiple(long: float, short: float) -> bool:
+def _require_multiple(name: str, long: float, other: str, short: float) -> None:
+    """Refuse a time that is no whole multiple of another."""
     ratio = long / short
-    return math.isfinite(ratio) and round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-9 * ratio
+    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-9 * ratio:
+        return
+    below, above = max(math.floor(ratio), 1) * short, (math.floor(ratio) + 1) * short
+    cure = f"{above:g} s" if ratio < 1.0 else f"{below:g} s or {above:g} s"
+    raise PydanticCustomError(
+        "clock",
+        f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s), such as {cure}",
+    )
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -97,15 +110,6 @@ class Record:
 
 
 @plain_dataclass(frozen=True)
-class Axis:
-    """One dimension of a sweep: its ``keys`` take the rows of ``values`` together."""
-
-    name: str
-    keys: tuple[str, ...]
-    values: tuple[tuple[Any, ...], ...]
-
-
-@plain_dataclass(frozen=True)
 class Source:
     """Where a scenario came from: the file's text, what was changed on top, and every file it names."""
 
@@ -113,6 +117,29 @@ class Source:
     text: str = ""
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
+
+
+@plain_dataclass(frozen=True)
+class Files:
+    """The files that a scenario names, relative to its own folder; remembers the text of each."""
+
+    folder: Path
+    texts: dict[str, str] = field(default_factory=dict)
+
+    def path(self, name: str) -> Path:
+        """Where the file is."""
+        return self.folder / name
+
+    def text(self, name: str) -> str:
+        """The file's text, kept for the dataset's provenance."""
+        if name not in self.texts:
+            path = self.path(name)
+            if path.exists() and not path.is_file():
+                raise OSError(errno.EINVAL, "it is no plain file")
+            if path.stat().st_size > _MOST_BYTES:
+                raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
+            self.texts[name] = path.read_text(encoding="utf-8")
+        return self.texts[name]
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "arbitrary_types_allowed": True})
@@ -154,68 +181,34 @@ class Scenario:
     def _across_parts(self) -> "Scenario":
         faults = [
             InitErrorDetails(type=PydanticCustomError("across", text), loc=where, input=None)
-            for where, text in self._faults()
+            for where, text in faults_across({name: getattr(self, name) for name in CHECKED})
         ]
         if faults:
             raise ValidationError.from_exception_data("Scenario", faults)
         return self
 
-    def _faults(self) -> list[tuple[tuple[str, ...], str]]:
-        """What does not go together, each as (place, what is wrong and the cure)."""
-        faults: list[tuple[tuple[str, ...], str]] = []
-        if isinstance(self.drive, Table) and self.drive.time[-1] < self.clock.duration * (1 - 1e-9):
-            faults.append((("drive",), f"the table ends at {self.drive.time[-1]:g} s, before clock.duration; add rows"))
-        if self.shear.reads_stress and not self.bonds.stress > 0.0:
-            faults.append(
-                (
-                    ("shear", "growth"),
-                    'growth "stress" follows the bonds\' stress: give bonds.stress above 0 Pa',
-                )
-            )
-        if self.record.maps and not self.shear.draws_maps:
-            faults.append((("record", "maps"), 'maps need shear.model = "mapped"'))
-        for time in self.record.maps:
-            ratio = time / (self.clock.step * self.clock.stride)
-            if time > self.clock.duration * (1 + 1e-9) or abs(ratio - round(ratio)) > 1e-9 * max(ratio, 1.0):
-                faults.append(
-                    (
-                        ("record", "maps"),
-                        f"{time:g} s is not one of the recorded times; choose a multiple of clock.record",
-                    )
-                )
-        if self.record.map_members > self.ensemble.members:
-            faults.append((("record", "map_members"), "is more than ensemble.members"))
-        return faults + self._shear_faults()
-
-    def _shear_faults(self) -> list[tuple[tuple[str, ...], str]]:
-        if isinstance(self.shear, Uniform | Mean):
-            return []
-        if self.shear.cell is None and not self.rest_radius > 0.0:
-            return [(("shear",), "there is no contact at rest to set the cell by; give shear.cell")]
-        try:
-            self.process  # noqa: B018  built here so that its faults come with all others
-        except PydanticCustomError as fault:
-            return [(("shear",), fault.message())]
-        return []
-
     @cached_property
     def rest_radius(self) -> float:
         """Contact radius with every bond of rest and no fluctuation [m]; nan without equilibrium."""
-        work, modulus = np.array([self.adhesion.work]), self.solid.contact_modulus
-        return float(self.contact.equilibrium_radius(work, self.sphere.radius, modulus)[0])
+        return _rest_radius(self.solid, self.sphere, self.adhesion, self.contact)
 
     @cached_property
-    def process(self) -> SmoothProcess | ModalProcess:
+    def fluctuations(self) -> Depth:
+        """The shear part at its depth, chosen by what is recorded if the scenario leaves the choice."""
+        return self.shear.chosen(bool(self.record.maps)) if isinstance(self.shear, Auto) else self.shear
+
+    @cached_property
+    def process(self) -> SmoothProcess | BandedProcess | ModalProcess:
         """The shear part on this solid and cell."""
         shear_modulus, poisson_ratio = self.solid.effective
         cell = math.sqrt(math.pi) * self.rest_radius
-        return self.shear.process(shear_modulus, poisson_ratio, cell)
+        return self.fluctuations.process(shear_modulus, poisson_ratio, cell)
 
     @cached_property
     def varies(self) -> dict[str, bool]:
         """For each part whether its values differ between members: by its class, never by looking."""
         bonded = self.bonds.per_member
-        sheared = self.shear.per_member or (self.shear.reads_stress and bonded)
+        sheared = self.fluctuations.per_member or (self.fluctuations.reads_stress and bonded)
         return {
             "drive": self.drive.per_member,
             "bonds": bonded,
@@ -234,87 +227,153 @@ class Scenario:
         document = TypeAdapter(Scenario).dump_python(self, by_alias=True, exclude={"source", "sweep"})
         for key, value in values.items():
             set_key(document, key, value)
+            _forget_file(document, key)
         document["source"] = self.source
-        return TypeAdapter(Scenario).validate_python(document, context={"files": None})
+        files = Files(Path(self.source.path).parent, self.source.files)
+        return TypeAdapter(Scenario).validate_python(document, context={"files": files})
 
     def points(self) -> list["Scenario"]:
-        """The scenario at each point of its sweep, the last axis fastest; one point where there is none."""
-        points: list[dict[str, Any]] = [{}]
+        """The scenario at each point of its sweep, the last axis fastest; one point where there is none.
+
+        Raises
+        ------
+        ValueError
+            If values do not go together, or points would not fit into one dataset.
+        """
+        values: list[dict[str, Any]] = [{}]
         for axis in self.sweep:
-            points = [{**point, **dict(zip(axis.keys, row, strict=True))} for point in points for row in axis.values]
-        return [self.with_values(point) for point in points]
+            values = [{**point, **dict(zip(axis.keys, row, strict=True))} for point in values for row in axis.values]
+        points = [self.with_values(point) for point in values]
+        for what, found in (
+            ("records; give clock.record", {point.clock.records for point in points}),
+            ("maps; run once for each cell and number of points", set(map(_map_size, points))),
+        ):
+            if len(found) > 1:
+                raise PydanticCustomError("unlike_points", f"the points of the sweep would have different {what}")
+        return points
 
 
-def set_key(document: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key in a nested document, making the tables on its way."""
+def _map_size(scenario: Scenario) -> tuple[float, int] | None:
+    """Side of the cell [m] and points of the maps that a scenario draws."""
+    modes = getattr(scenario.process, "modes", None) if scenario.record.maps else None
+    return None if modes is None else (modes.cell, modes.points)
+
+
+def _forget_file(document: dict[str, Any], key: str) -> None:
+    """Drop what a table has read from its file where one of the table's other keys was changed."""
     *tables, last = key.split(".")
     for name in tables:
-        inner = document.get(name)
-        document[name] = dict(inner) if isinstance(inner, dict) else {}
         document = document[name]
-    document[last] = value
+    if document.get("file") and last not in _FILE_COLUMNS:
+        for column in _FILE_COLUMNS:
+            document.pop(column, None)
 
 
-def read_sweep(sweep: Any) -> tuple[Axis, ...]:
-    """Axes from a table of keys (outer product) or a list of tables (zipped into one axis)."""
-    if isinstance(sweep, tuple) and all(isinstance(axis, Axis) for axis in sweep):
-        return sweep
-    if isinstance(sweep, list) and sweep and all(isinstance(row, dict) and row for row in sweep):
-        keys = tuple(sweep[0])
-        if any(set(row) != set(keys) for row in sweep):
-            raise PydanticCustomError("sweep", "the tables of a zipped sweep must have the same keys")
-        rows = tuple(tuple(row[key] for key in keys) for row in sweep)
-        return (Axis(_axis_name(keys[0], set()), keys, rows),)
-    if not isinstance(sweep, dict):
-        raise PydanticCustomError("sweep", 'must be a table such as {"contact.load" = ["1 mN", "4 mN"]}')
-    axes: list[Axis] = []
-    for key, values in sweep.items():
-        name = _axis_name(key, {axis.name for axis in axes})
-        axes.append(Axis(name, (key,), tuple((value,) for value in _sweep_values(key, values))))
-    return tuple(axes)
+def _rest_radius(solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> float:
+    work = np.array([adhesion.work])
+    return float(contact.equilibrium_radius(work, sphere.radius, solid.contact_modulus)[0])
 
 
-def _axis_name(key: str, taken: set[str]) -> str:
-    words = key.split(".")
-    for count in range(1, len(words) + 1):
-        name = "_".join(words[-count:])
-        if name not in taken and name not in RESERVED:
-            return name
-    raise PydanticCustomError("sweep", "sweeps {key}, which cannot be swept", {"key": key})
+Faults = list[tuple[tuple[str, ...], str]]
 
 
-def _sweep_values(key: str, values: Any) -> list[Any]:
-    if isinstance(values, list) and values:
-        return values
-    if isinstance(values, dict) and set(values) <= {"from", "to", "count", "scale"} >= {"from"}:
-        return _range(key, values)
-    raise PydanticCustomError(
-        "sweep",
-        'the values of {key} must be a list, or {{from, to, count, scale = "linear" or "log"}}',
-        {"key": key},
-    )
+def faults_across(parts: dict[str, Any]) -> Faults:
+    """What does not go together between those parts that are there, each as (place, what is wrong and the cure)."""
+    if isinstance(parts.get("shear"), Auto):
+        record = parts.get("record")
+        try:
+            chosen = parts["shear"].chosen(record is not None and bool(record.maps))
+        except (PydanticCustomError, ValidationError) as fault:
+            text = fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
+            return [(("shear",), text)]
+        parts = parts | {"shear": chosen}
+    return [
+        fault
+        for reads, check in _CHECKS
+        if all(name in parts for name in reads)
+        for fault in check(*(parts[name] for name in reads))
+    ]
 
 
-def _range(key: str, values: dict[str, Any]) -> list[Any]:
-    """Evenly spaced values, linearly or logarithmically; both ends in one unit."""
-    ends = [str(values.get(end, "")).strip().partition(" ") for end in ("from", "to")]
-    count, scale = values.get("count"), values.get("scale", "linear")
+def _table_too_short(drive: Drive, clock: Clock) -> Faults:
+    if isinstance(drive, Table) and drive.time[-1] < clock.duration * (1 - 1e-9):
+        said = f"the table ends at {drive.time[-1]:g} s, before clock.duration ({clock.duration:g} s)"
+        return [(("drive",), f"{said}; add rows or shorten the run")]
+    return []
+
+
+def _no_stress(shear: Depth, bonds: Bonds) -> Faults:
+    if shear.reads_stress and not bonds.stress > 0.0:
+        said = 'growth model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
+        return [(("shear", "growth"), said)]
+    return []
+
+
+def _no_maps(record: Record, shear: Depth) -> Faults:
+    if record.maps and not shear.draws_maps:
+        return [(("record", "maps"), 'needs shear.model = "mapped"; choose it or leave the maps out')]
+    return []
+
+
+def _unrecorded_maps(record: Record, clock: Clock) -> Faults:
+    faults: Faults = []
+    between = clock.step * clock.stride
+    for time in record.maps:
+        ratio = time / between
+        if time > clock.duration * (1 + 1e-9) or abs(ratio - round(ratio)) > 1e-9 * max(ratio, 1.0):
+            said = f"{time:g} s is none of the recorded times; choose whole multiples of {between:g} s"
+            faults.append((("record", "maps"), f"{said} up to {clock.duration:g} s"))
+    return faults[:1]
+
+
+def _too_many_map_members(record: Record, ensemble: Ensemble) -> Faults:
+    if record.map_members > ensemble.members:
+        said = f"is more than ensemble.members ({ensemble.members}); lower it or add members"
+        return [(("record", "map_members"), said)]
+    return []
+
+
+def _shear_faults(shear: Depth, solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> Faults:
+    """What keeps the shear part from being built on its solid and cell."""
+    if isinstance(shear, Uniform | Mean):
+        return []
+    cell = shear.cell or math.sqrt(math.pi) * _rest_radius(solid, sphere, adhesion, contact)
+    if not cell > 0.0:
+        return [(("shear",), 'there is no contact at rest to set the cell by; give a cell such as cell = "0.2 mm"')]
+    too_many = _too_many_modes(shear, cell)
+    if too_many:
+        return [(("shear",), f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
     try:
-        first, last = (float(number) for number, _, _ in ends)
-    except ValueError:
-        first = last = math.nan
-    sound = math.isfinite(first) and math.isfinite(last) and ends[0][2] == ends[1][2]
-    if not sound or type(count) is not int or not 2 <= count <= 10**5 or scale not in ("linear", "log"):
-        raise PydanticCustomError(
-            "sweep",
-            'the range of {key} needs from and to in the same unit, a count of 2 or more and scale "linear" or "log"',
-            {"key": key},
-        )
-    if scale == "log" and not (first > 0.0 and last > 0.0):
-        raise PydanticCustomError("sweep", "the log range of {key} needs ends above zero", {"key": key})
-    spaced = np.geomspace(first, last, count) if scale == "log" else np.linspace(first, last, count)
-    unit = ends[0][2].strip()
-    return [f"{value!r} {unit}" if unit else value for value in spaced.tolist()]
+        shear.process(*solid.effective, cell)
+    except PydanticCustomError as fault:
+        return [(("shear",), fault.message())]
+    return []
+
+
+def _too_many_modes(shear: Any, cell: float) -> str | None:
+    """What is too large about the smallest grid that holds the spectrum, or about the one asked for."""
+    ripple = getattr(shear.spectrum, "wavevector", None)
+    waves = (max(map(abs, ripple)) if ripple else shear.spectrum.support[1]) * cell / (2.0 * math.pi)
+    if math.isfinite(waves) and waves > _MOST_WAVES:
+        return f"the cell of {cell:g} m holds {waves:.2g} of the shortest waves along a side"
+    reach = waves if shear.points is None else min(waves, (shear.points - 1) // 2)
+    pairs = (2.0 * reach + 1.0) * (reach + 1.0)
+    kept = isinstance(shear, Modal) and (shear.draws_maps or not ripple)
+    if kept and math.isfinite(reach) and pairs > _MOST_PAIRS:
+        return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes, of which {_MOST_PAIRS:.2g} can be kept"
+    return None
+
+
+_CHECKS: tuple[tuple[tuple[str, ...], Any], ...] = (
+    (("drive", "clock"), _table_too_short),
+    (("shear", "bonds"), _no_stress),
+    (("record", "shear"), _no_maps),
+    (("record", "clock"), _unrecorded_maps),
+    (("record", "ensemble"), _too_many_map_members),
+    (("shear", "solid", "sphere", "adhesion", "contact"), _shear_faults),
+)
+#: The parts that the checks read.
+CHECKED = sorted({name for reads, _ in _CHECKS for name in reads})
 
 
 def quantities(part: Any, prefix: str = "") -> dict[str, tuple[Quantity, float]]:

@@ -186,8 +186,9 @@ def _sweep_coordinates(file: netCDF4.Dataset, plan: Plan, axis: Any) -> None:
             variable[:] = [table[key][1] for table in tables]
         else:
             variable = _variable(file, name, str, (axis.name,), "", f"swept {key}")
-            for i, row in enumerate(axis.values):
-                variable[i] = _label(row[position])
+            labels = [_label(row[position]) for row in axis.values]
+            for i, label in enumerate(labels):
+                variable[i] = label if labels.count(label) == 1 else f"{label} {i + 1}"
 
 
 def _label(value: Any) -> str:

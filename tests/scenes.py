@@ -45,6 +45,19 @@ SHEARS = {
         growth=Stress(reference=2e5),
         amplitudes="fixed",
     ),
+    "banded, slip, onset": shear.Banded(
+        spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6), growth=Onset(speed=2e-3, width=0.3, floor=0.1)
+    ),
+    "banded, wave, relaxing stress": shear.Banded(
+        spectrum=SPECTRUM,
+        cell=CELL,
+        tolerance=0.1,
+        memory=Wave(waves=2.0),
+        growth=Stress(reference=2e5, relaxing=True),
+    ),
+    "banded, fixed": shear.Banded(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), amplitudes="fixed"),
+    "auto with memory": shear.Auto(spectrum=SPECTRUM, cell=CELL, memory=Diffusion(diffusivity=1e-9)),
+    "auto without memory": shear.Auto(spectrum=SPECTRUM),
     "modal ripple": shear.Modal(
         spectrum=Ripple(amplitude=1e5, wavelength=24e-6), cell=CELL, points=32, memory=Slip(length=1e-5)
     ),

@@ -13,8 +13,8 @@ ROOT = Path(sim.__file__).parent
 FLOORS = (
     ("jit", "quantity", "motion", "durable", "lines", "grid", "radial", "pixels"),
     ("noise", "roots", "table", "sweep", "faults"),
-    ("laws.halfspace", "laws.jkr", "laws.schallamach", "laws", "bodies", "modes", "memory", "measured"),
-    ("spectrum",),
+    ("laws.halfspace", "laws.jkr", "laws.schallamach", "laws", "bodies", "modes", "memory", "measured", "document"),
+    ("spectrum", "bands"),
     ("processes",),
     ("parts.drive", "parts.bonds", "parts.shear", "parts.contact", "parts"),
     ("scenario",),

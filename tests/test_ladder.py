@@ -1,14 +1,17 @@
 """Each depth becomes its shallower neighbour in the limit that it names."""
 
+import math
+
 import numpy as np
 from numpy.testing import assert_allclose
 from scenes import CELL, SPECTRUM, scene
 
 from sim.engine import march
 from sim.laws import jkr
-from sim.memory import Onset, Slip
+from sim.memory import Onset, Slip, Wave
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
+from sim.scenario import Record
 from sim.spectrum import Gaussian
 
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
@@ -74,6 +77,37 @@ def test_the_ensemble_mean_of_modal_energies_is_the_cells_own():
     state = last(members, shear=part)
     pairs = scene(shear=part).process.modes.energies(1.6e6)
     assert abs(state.shear.energy.mean() - pairs.sum()) < 5.0 * np.sqrt(np.sum(pairs**2) / members)
+
+
+def test_banded_fluctuations_become_modal_as_the_tolerance_falls():
+    # every cumulant tends to that of the sum over modes; the first two are exact at any tolerance
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Wave(waves=2.0)}
+    pairs = scene(shear=shear.Modal(**recipe)).process.modes.energies(1.6e6)
+    exact = np.array([math.factorial(n - 1) * np.sum(pairs**n) for n in range(1, 7)])
+    before = np.full(4, np.inf)
+    for tolerance in (0.5, 0.1, 0.02, 0.004):
+        bands = scene(shear=shear.Banded(**recipe, tolerance=tolerance)).process.bands
+        found = [
+            math.factorial(n - 1) * 0.5 * np.sum(bands.weight**n * bands.freedom) for n in range(1, 7)
+        ]  # of ½ weight × chi-square
+        errors = np.abs(found / exact - 1.0)
+        assert np.all(errors[:2] < 1e-13)
+        assert np.all(errors[2:4] <= tolerance)
+        assert np.all(errors[2:] < before)
+        before = errors[2:]
+
+
+def test_auto_is_the_depth_that_it_chooses():
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Slip(length=5e-6)}
+    for auto, chosen in (
+        (shear.Auto(spectrum=SPECTRUM), shear.Mean(spectrum=SPECTRUM)),
+        (shear.Auto(**recipe), shear.Banded(**recipe)),
+    ):
+        assert scene(shear=auto).fluctuations == chosen
+        assert np.array_equal(last(3, shear=auto).shear.energy, last(3, shear=chosen).shear.energy)
+    maps = Record(maps=(2e-3,))
+    assert scene(shear=shear.Auto(**recipe), record=maps).fluctuations == shear.Mapped(**recipe)
+    assert scene(shear=shear.Auto(**recipe), record=maps).process.modes.points > 2
 
 
 def test_modal_with_fixed_amplitudes_is_the_mean_with_the_cells_error():

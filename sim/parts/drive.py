@@ -120,7 +120,7 @@ class Table(_Prescribed):
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        if not isinstance(values, dict) or "file" not in values or "time" in values:
+        if not isinstance(values, dict) or not isinstance(values.get("file"), str) or "time" in values:
             return values
         try:
             text = file_text(values["file"], info.context)

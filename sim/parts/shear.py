@@ -4,16 +4,19 @@ A depth is a frozen recipe; with the solid and the cell it becomes a *process* w
 ``advance``. All the contact ever feels of it is one number a step, the stored energy per area ΔΓ.
 """
 
-from typing import Annotated, Any, ClassVar, Literal
+import functools
+import math
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from sim.bands import Bands, cell_pairs, group
 from sim.memory import Constant, Growth, Memory
 from sim.modes import modes
-from sim.processes import FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
+from sim.processes import BandedProcess, FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
 from sim.quantity import Quantity
 from sim.spectrum import Spectrum
 
@@ -21,6 +24,7 @@ _Paid = Annotated[
     float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)
 ]
 _Cell = Annotated[float, Quantity("m", "side of the periodic cell", "L", above=0)]
+_Tolerance = Annotated[float, Quantity("1", "tolerance of the errors of banding", "", above=0, below=1)]
 _Points = Annotated[int, Field(ge=2, le=2**14, description="grid points along a side of the cell")]
 
 
@@ -71,8 +75,8 @@ class Mean:
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Modal:
-    """ΔΓ(t) from every Fourier mode of a periodic cell. Limit: mean as the cell grows.
+class _Fluctuating:
+    """What every depth with a periodic cell and a memory is given.
 
     ``cell`` None means √π times the radius at rest, the square of the contact's area; ``points``
     None means the grid that holds the spectrum's shortest wavelength.
@@ -87,7 +91,6 @@ class Modal:
     points: _Points | None = None
     amplitudes: Literal["gaussian", "fixed"] = "gaussian"
     paid_by_adhesion: _Paid = 1.0
-    model: Literal["modal"] = "modal"
 
     @property
     def per_member(self) -> bool:
@@ -100,13 +103,20 @@ class Modal:
         return self.growth.reads_stress
 
     @model_validator(mode="after")
-    def _fixed_cannot_relax(self) -> "Modal":
+    def _fixed_cannot_relax(self) -> "_Fluctuating":
         if self.amplitudes == "fixed" and self.growth.relaxing:
             raise PydanticCustomError(
                 "fixed_cannot_relax",
                 'fixed amplitudes are never renewed; use amplitudes = "gaussian" or relaxing = false',
             )
         return self
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Modal(_Fluctuating):
+    """ΔΓ(t) from every Fourier mode of a periodic cell. Limit: mean as the cell grows."""
+
+    model: Literal["modal"] = "modal"
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
         return self._process(ModalProcess, FixedProcess, shear_modulus, poisson_ratio, cell)
@@ -146,4 +156,101 @@ class Mapped(Modal):
         return process
 
 
-Shear = Annotated[Uniform | Mean | Modal | Mapped, Field(discriminator="model")]
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Banded(_Fluctuating):
+    """ΔΓ(t) of a periodic cell with its modes grouped into bands, every error known beforehand. Limit: modal.
+
+    ``tolerance`` bounds what banding adds to the cell's own sum over modes: relative errors of the
+    third and fourth cumulant and of the integral correlation time, and the largest difference of the
+    autocorrelation. Mean and variance are exact.
+    """
+
+    tolerance: _Tolerance = 0.01
+    model: Literal["banded"] = "banded"
+
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
+        side = cell if self.cell is None else self.cell
+        recipe = _BandRecipe(
+            self.spectrum, side, self.points, shear_modulus, poisson_ratio, self.memory.power, self.tolerance
+        )
+        bands, errors = _grouped(recipe)
+        if self.amplitudes == "fixed":
+            return SmoothProcess(bands.mean, self.growth)
+        return BandedProcess(bands, errors, self.memory, self.growth)
+
+
+class _BandRecipe(NamedTuple):
+    """All that a grouping depends on."""
+
+    spectrum: Any
+    cell: float
+    points: int | None
+    shear_modulus: float
+    poisson_ratio: float
+    power: int
+    tolerance: float
+
+
+@functools.lru_cache(maxsize=16)  # a sweep over anything else asks for the same bands again and again
+def _grouped(recipe: _BandRecipe) -> tuple[Bands, dict[str, float]]:
+    """The bands of a cell, and the cell's own errors against the infinite plane."""
+    spectrum = recipe.spectrum
+    pairs = cell_pairs(spectrum, recipe.cell, recipe.points, recipe.shear_modulus, recipe.poisson_ratio)
+    energy = float(np.sum(pairs.count * pairs.weight))
+    infinite = float(np.asarray(spectrum.surface_energy(recipe.shear_modulus, recipe.poisson_ratio)))
+    spread = math.sqrt(float(np.sum(pairs.count * pairs.weight**2)))
+    errors = {
+        "cell_error_energy": energy / infinite - 1.0 if infinite else 0.0,
+        "realization_spread_energy": spread / energy if energy else 0.0,
+        "mode_pairs": float(np.sum(pairs.count)),
+    }
+    return group(pairs, recipe.power, recipe.tolerance), errors
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Auto:
+    """The shallowest depth that gives what the scene records; it takes the keys of all of them."""
+
+    spectrum: Spectrum
+    memory: Memory | None = None
+    growth: Growth = Field(default_factory=Constant)
+    cell: _Cell | None = None
+    points: _Points | None = None
+    amplitudes: Literal["gaussian", "fixed"] = "gaussian"
+    tolerance: _Tolerance = 0.01
+    paid_by_adhesion: _Paid = 1.0
+    model: Literal["auto"] = "auto"
+
+    def chosen(self, maps: bool) -> "Mean | Banded | Mapped":
+        """The depth for a scene that records ``maps`` or does not.
+
+        Raises
+        ------
+        PydanticCustomError
+            If maps are recorded and no memory is given.
+        """
+        common: dict[str, Any] = {
+            "spectrum": self.spectrum,
+            "growth": self.growth,
+            "paid_by_adhesion": self.paid_by_adhesion,
+        }
+        if self.memory is None and maps:
+            raise PydanticCustomError("maps_need_memory", "maps change in time: give shear.memory")
+        if self.memory is None:
+            return Mean(**common)
+        common |= {"memory": self.memory, "cell": self.cell, "points": self.points, "amplitudes": self.amplitudes}
+        return Mapped(**common) if maps else Banded(**common, tolerance=self.tolerance)
+
+    def why(self, maps: bool) -> str:
+        """The reason for the choice, in words."""
+        if self.memory is None:
+            return "no memory is given, so the ensemble mean answers, exactly and without noise"
+        if maps:
+            return "maps are recorded"
+        return "a memory is given and no maps are recorded: energies in time are all the contact feels"
+
+
+#: A depth, chosen.
+Depth = Uniform | Mean | Banded | Modal | Mapped
+
+Shear = Annotated[Uniform | Mean | Banded | Modal | Mapped | Auto, Field(discriminator="model")]

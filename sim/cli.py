@@ -1,0 +1,293 @@
+"""The commands. Each imports what it needs when it runs, so that ``sim --help`` is instant."""
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, NoReturn
+
+import click
+
+DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, STOPPED, INTERRUPTED = 0, 1, 2, 73, 74, 75, 130
+
+_SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of the file.")
+
+
+def main() -> None:
+    """Run the command line; every foreseen trouble ends in one message and its exit code."""
+    try:
+        cli.main(standalone_mode=False)
+    except click.exceptions.Exit as done:
+        sys.exit(done.exit_code)
+    except (click.Abort, KeyboardInterrupt):
+        _fail("stopped; nothing was written to the output", INTERRUPTED)
+    except click.ClickException as fault:
+        fault.show()
+        sys.exit(fault.exit_code)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(DONE)
+    except ValueError as fault:
+        if type(fault).__name__ != "BadInput":
+            raise
+        _fail(str(fault), BAD_INPUT)
+    except MemoryError:
+        _fail("there is not enough memory; fewer points, members or records take less (see `sim check`)", FAILED)
+    except (OSError, RuntimeError) as trouble:
+        code = {"OutputExists": EXISTS, "OutputBusy": STOPPED, "StoreTrouble": TROUBLE}.get(type(trouble).__name__)
+        if code is not None:
+            _fail(str(trouble), code)
+        if not isinstance(trouble, OSError) or trouble.strerror is None:
+            raise
+        _fail(f"{trouble.filename or 'files'}: {trouble.strerror}", TROUBLE)
+
+
+def _fail(text: str, code: int) -> NoReturn:
+    click.echo(text, err=True)
+    sys.exit(code)
+
+
+@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(package_name="sliding-sim", prog_name="sim")
+def cli() -> None:
+    """Adhesive sliding interfaces: a smooth sphere slides on a soft half-space.
+
+    Bonds break and re-form, the shear stress fluctuates and stores elastic energy, and the contact
+    follows JKR with the work of adhesion that is left. Begin with `sim new first.toml`, then
+    `sim run first.toml`.
+    """
+
+
+@cli.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="The netCDF file; default outputs/<name>.nc.")
+@_SET
+@click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
+@click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
+@click.option("--force", is_flag=True, help="Replace an existing output.")
+@click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+def run(
+    scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
+    force: bool, quiet: bool,
+) -> None:  # fmt: skip
+    """Run a scenario with its ensemble and its sweep, into a netCDF file."""
+    target = output or Path("outputs") / f"{scenario.stem}.nc"
+    from sim.reader import load
+
+    scene = load(scenario, _overrides(changes, seed, members))
+    if target.is_dir() or (target.exists() and target.samefile(scenario)):
+        _fail(f"{target} is {'a folder' if target.is_dir() else 'the scenario'}; name a file with -o", BAD_INPUT)
+    if target.exists() and not force:
+        _fail(f"{target} exists; replace it with --force or name another output with -o", EXISTS)
+
+    from sim import ensemble, store
+
+    began = time.time()
+    with _progress(ensemble.work(store.Plan.of(scene)), quiet) as advance:
+        ensemble.run(scene, target, replace=force, progress=advance)
+    ensemble.write_log(target, began, sys.argv[1:])
+    if not quiet:
+        _show_table(target)
+        click.echo(str(target))
+
+
+def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> dict[str, Any]:
+    """The values of --set, each read as TOML, else taken as a string."""
+    import tomllib
+
+    overrides: dict[str, Any] = {}
+    for change in changes:
+        key, sign, text = change.partition("=")
+        if not sign or not key.strip():
+            raise click.UsageError(f'--set takes TABLE.KEY=VALUE, such as contact.load="2 mN", not {change!r}')
+        try:
+            document = tomllib.loads(f"value = {text}")
+        except (ValueError, RecursionError):
+            document = {}
+        overrides[key.strip()] = document["value"] if len(document) == 1 else text.strip()
+    if seed is not None:
+        overrides["seed"] = seed
+    if members is not None:
+        overrides["ensemble.members"] = members
+    return overrides
+
+
+def _progress(total: int, quiet: bool) -> Any:
+    """A context that gives a callback taking member-steps: a bar on a terminal, else a line every half minute."""
+
+    @contextlib.contextmanager
+    def bar() -> Any:
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        shown = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f}%"))
+        with Progress(*shown, TimeRemainingColumn(), transient=True) as progress:
+            task = progress.add_task("member-steps", total=total)
+            yield lambda done: progress.advance(task, done)
+
+    @contextlib.contextmanager
+    def lines() -> Any:
+        state = {"done": 0, "said": time.monotonic()}
+
+        def advance(done: int) -> None:
+            state["done"] += done
+            if time.monotonic() - state["said"] > 30.0:
+                state["said"] = time.monotonic()
+                click.echo(f"{100 * state['done'] / total:.0f} % of {total:,} member-steps", err=True)
+
+        yield advance
+
+    if quiet:
+        return contextlib.nullcontext()
+    return bar() if sys.stderr.isatty() and sys.stdout.isatty() else lines()
+
+
+def _show_table(path: Path) -> None:
+    import xarray
+
+    from sim import analysis
+
+    with xarray.open_dataset(path) as dataset:
+        _print_rows(analysis.table(dataset))
+
+
+def _print_rows(rows: list[dict[str, str]]) -> None:
+    """A table on the terminal, its headings the keys of the rows."""
+    from rich.console import Console
+    from rich.table import Table
+
+    shown = Table(box=None, header_style="bold", pad_edge=False)
+    for heading in rows[0] if rows else ():
+        shown.add_column(heading, justify="right", no_wrap=True)
+    for row in rows:
+        shown.add_row(*row.values())
+    console = Console(highlight=False, markup=False, emoji=False)
+    wide = console.options.update(max_width=10_000)
+    console.width = max(
+        console.width, console.measure(shown, options=wide).maximum
+    )  # a number cut short is a wrong one
+    console.print(shown)
+
+
+@cli.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@_SET
+def check(scenario: Path, changes: tuple[str, ...]) -> None:
+    """Say what a scenario would run: quantities in SI, depths, errors known beforehand, time, memory, file size."""
+    from sim.preview import preview
+    from sim.reader import load
+
+    click.echo(preview(load(scenario, _overrides(changes))))
+
+
+@cli.command()
+@click.argument("output", type=click.Path(path_type=Path))
+@click.option("--csv", type=click.Path(path_type=Path), help="Also write every time and sweep value to this CSV file.")
+def stats(output: Path, csv: Path | None) -> None:
+    """Ensemble statistics over time and sweep."""
+    from sim import analysis
+    from sim.durable import explained
+
+    with _opened(output) as dataset:
+        _print_rows(analysis.table(dataset))
+        if csv is not None:
+            with explained(csv.parent):
+                csv.parent.mkdir(parents=True, exist_ok=True)
+                analysis.to_csv(dataset, csv)
+            click.echo(str(csv))
+
+
+@cli.command()
+@click.argument("output", type=click.Path(path_type=Path))
+@click.argument("kind", required=False)
+@click.option("-o", "--picture", type=click.Path(path_type=Path), help="The picture; default beside the dataset.")
+def plot(output: Path, kind: str | None, picture: Path | None) -> None:
+    """Draw a figure: curve, time, sweep, map or spectrum; without a KIND the one that fits."""
+    from sim import plots
+    from sim.durable import explained
+
+    with _opened(output) as dataset:
+        target = picture or output.with_name(f"{output.stem}{'-' + kind if kind else ''}.png")
+        try:
+            figure = plots.draw(dataset, kind)
+            with explained(target.parent):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                figure.savefig(target)
+        except ValueError as fault:  # an unknown kind or format of picture
+            _fail(f"{output}: {fault}", BAD_INPUT)
+    click.echo(str(target))
+
+
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """A dataset of ours, or one message."""
+    import xarray
+
+    if not path.is_file():
+        _fail(f"{path}: {'is a folder' if path.is_dir() else 'there is no such file'}; name a dataset", BAD_INPUT)
+    broken = f"{path}: is not a netCDF file, or is cut short; run the scenario again"
+    try:
+        dataset = xarray.open_dataset(path, engine="netcdf4")
+    except (OSError, ValueError, RuntimeError):
+        _fail(broken, BAD_INPUT)
+    with dataset:
+        if "sim_version" not in dataset.attrs:
+            _fail(f"{path}: was not written by `sim run`; name one of its outputs", BAD_INPUT)
+        try:
+            yield dataset
+        except RuntimeError as trouble:
+            if "NetCDF" not in str(trouble):
+                raise
+            _fail(broken, BAD_INPUT)
+
+
+@cli.command()
+def paper() -> None:
+    """Reproduce every equation and number of the paper, one line each with its error; exit 1 if any fails."""
+    from sim.paper import checks
+
+    results = checks()
+    _print_rows(
+        [
+            {
+                "": "ok" if line.passed else "FAILS",
+                "equation": line.equation,
+                "what": line.name,
+                "computed": f"{line.computed:.9g}",
+                "expected": f"{line.expected:.9g}",
+                "error": f"{line.error:.1e}",
+                "allowed": f"{line.tolerance:.0e}",
+            }
+            for line in results
+        ]
+    )
+    failed = sum(not line.passed for line in results)
+    click.echo(f"{len(results) - failed} of {len(results)} hold")
+    sys.exit(FAILED if failed else DONE)
+
+
+@cli.command()
+@click.argument("name", default="first.toml", type=click.Path(path_type=Path))
+def new(name: Path) -> None:
+    """Write a commented starter scenario."""
+    from importlib.resources import files
+
+    target = name if name.suffix else name.with_suffix(".toml")
+    text = files("sim").joinpath("starter.toml").read_text(encoding="utf-8")
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        _fail(f"{target} exists; name another file", EXISTS)
+    click.echo(f"{target}: run it with `sim run {target}`")
+
+
+@cli.command()
+def schema() -> None:
+    """Print the JSON schema of scenario files."""
+    import json
+
+    from sim.reader import scenario_schema
+
+    click.echo(json.dumps(scenario_schema(), indent=2))

@@ -1,0 +1,178 @@
+"""Sweeps: which keys of a scenario take which values, as an outer product of axes."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydantic_core import PydanticCustomError
+
+from sim.quantity import number_and_unit
+
+#: Names that the dataset gives away itself, so that no axis may take them.
+RESERVED = frozenset(
+    ["t", "time", "realization", "snapshot", "x", "y", "map_realization", "shear_map", "name", "seed"]
+    + ["speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion"]
+    + ["contact_radius", "contact_area", "normal_load", "indentation", "friction_force", "in_contact"]
+)
+_SHARED = ("clock", "clock.duration", "clock.record", "name", "ensemble", "record")
+_RANGE = ("from", "to", "count", "scale")
+_MOST_POINTS = 20_000
+
+Fault = tuple[tuple[str | int, ...], str]
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One dimension of a sweep: its ``keys`` take the rows of ``values`` together."""
+
+    name: str
+    keys: tuple[str, ...]
+    values: tuple[tuple[Any, ...], ...]
+
+
+def set_key(document: dict[str, Any], key: str, value: Any) -> None:
+    """Set a dotted key in a nested document, copying or making the tables on its way."""
+    *tables, last = key.split(".")
+    for name in tables:
+        inner = document.get(name)
+        document[name] = dict(inner) if isinstance(inner, dict) else {}
+        document = document[name]
+    document[last] = value
+
+
+def read_sweep(sweep: Any) -> tuple[Axis, ...]:
+    """Axes from a table of keys (outer product) or a list of tables (zipped into one axis).
+
+    Raises
+    ------
+    PydanticCustomError
+        (a ValueError) with the first fault.
+
+    Examples
+    --------
+    >>> loads, _ = read_sweep({"contact.load": ["1 mN", "4 mN"], "solid.poisson_ratio": [0.4, 0.5]})
+    >>> loads.name, loads.values
+    ('load', (('1 mN',), ('4 mN',)))
+    """
+    axes, faults = sweep_axes(sweep)
+    for path, said in faults:
+        where = ".".join(str(word) for word in path)
+        raise PydanticCustomError("sweep", "{text}", {"text": f"{where}: {said}" if where else said})
+    return axes
+
+
+def sweep_axes(sweep: Any) -> tuple[tuple[Axis, ...], list[Fault]]:
+    """The sound axes of a sweep and all of its faults, each with its path in the sweep and its cure."""
+    if isinstance(sweep, tuple) and all(isinstance(axis, Axis) for axis in sweep):
+        return sweep, []
+    faults: list[Fault] = []
+    if isinstance(sweep, list):
+        columns = _zipped(sweep, faults)
+    elif isinstance(sweep, dict):
+        columns = [((key,), rows) for key, rows in _columns(sweep, (), faults)]
+    else:
+        return (), [((), 'must be a table of lists, such as "contact.load" = ["1 mN", "4 mN"]')]
+    keys = [key for several, _ in columns for key in several]
+    unfit = {key: said for key in keys if (said := _unfit(key, keys))}
+    faults += [((key,), said) for key, said in unfit.items()]
+    columns = [column for column in columns if not unfit.keys() & set(column[0])]
+    if math.prod(len(rows) for _, rows in columns) > _MOST_POINTS:
+        return (), [*faults, ((), f"asks for more than {_MOST_POINTS:,} points; take fewer values, or several runs")]
+    axes: list[Axis] = []
+    for several, rows in columns:
+        axes.append(Axis(_axis_name(several[0], {axis.name for axis in axes}), several, tuple(rows)))
+    return tuple(axes), faults
+
+
+def _zipped(tables: list[Any], faults: list[Fault]) -> list[tuple[tuple[str, ...], list[tuple]]]:
+    """One axis from a list of tables, each a row of values."""
+    if not tables or not all(isinstance(table, dict) and table for table in tables):
+        faults.append(((), 'must be a list of tables, each such as { "contact.load" = "1 mN" }'))
+        return []
+    keys = tuple(tables[0])
+    for place, table in enumerate(tables):
+        if set(table) != set(keys):
+            other = sorted(set(table) ^ set(keys))[0]
+            said = f'has other keys than the first table of the sweep ("{other}"); give all of them the same keys'
+            faults.append(((place,), said))
+            return []
+    return [(keys, [tuple(table.get(key) for key in keys) for table in tables])]
+
+
+def _columns(table: dict[str, Any], above: tuple[str, ...], faults: list[Fault]) -> list[tuple[str, list[tuple]]]:
+    """Each swept key with its values; keys may be quoted as one or nested as tables."""
+    columns: list[tuple[str, list[tuple]]] = []
+    for name, values in table.items():
+        path, key = (*above, name), ".".join((*above, name))
+        if isinstance(values, list) and values:
+            columns.append((key, [(value,) for value in values]))
+        elif isinstance(values, dict) and any(
+            word in values and not isinstance(values[word], list | dict) for word in _RANGE
+        ):
+            said = _range_fault(values)
+            if said:
+                faults.append((path, said))
+            else:
+                columns.append((key, [(value,) for value in _spaced(values)]))
+        elif isinstance(values, dict) and values:
+            columns += _columns(values, path, faults)
+        else:
+            what = "must not be an empty list" if values == [] else "must be a list of values"
+            faults.append((path, f'{what}; write ["1 mN", "4 mN"] or {{ from, to, count, scale = "linear" or "log" }}'))
+    return columns
+
+
+def _unfit(key: str, keys: list[str]) -> str | None:
+    """Why a key cannot be swept, and the cure."""
+    first, _, rest = key.partition(".")
+    if first == "seed":
+        return "cannot be swept; members differ in their noise already, so raise ensemble.members"
+    if first in ("sweep", "source"):
+        return "cannot be swept; sweep keys of the scenario"
+    if first in _SHARED[3:] or key in _SHARED:
+        return "cannot be swept, since all points of a sweep share it; run the scenario once for each value"
+    if rest.rpartition(".")[2] == "model":
+        table = key.removesuffix(".model")
+        return f'a model is swept as a whole table: "{table}" = [{{ model = ... }}, {{ model = ... }}]'
+    if any(other != key and key.startswith(f"{other}.") for other in keys) or keys.count(key) > 1:
+        return "is swept twice; take it out once"
+    return None
+
+
+def _axis_name(key: str, taken: set[str]) -> str:
+    """The key's last word, with the words before it where that is not unique."""
+    words = key.split(".")
+    names = ("_".join(words[-count:]) for count in range(1, len(words) + 1))
+    return next((name for name in names if name not in taken and name not in RESERVED), "_".join(["swept", *words]))
+
+
+def _range_fault(values: dict[str, Any]) -> str | None:
+    unknown = [key for key in values if key not in _RANGE]
+    if unknown:
+        return f'the range has the unknown key "{unknown[0]}"; it takes {", ".join(_RANGE)}'
+    missing = [key for key in _RANGE[:3] if key not in values]
+    if missing:
+        return f"the range lacks {' and '.join(missing)}; write {{ from = ..., to = ..., count = ... }}"
+    ends = [number_and_unit(values[end]) for end in ("from", "to")]
+    if ends[0] is None or ends[1] is None:
+        return "the range needs finite numbers, with or without a unit, as from and to"
+    if ends[0][1] != ends[1][1]:
+        given = [f'"{unit}"' if unit else "no unit" for _, unit in (ends[0], ends[1])]
+        return f"the range goes from {given[0]} to {given[1]}; write both ends in the same unit"
+    if type(values["count"]) is not int or not 2 <= values["count"] <= _MOST_POINTS:
+        return f"the count of the range must be a whole number from 2 to {_MOST_POINTS:,}"
+    scale = values.get("scale", "linear")
+    if scale not in ("linear", "log"):
+        return 'the scale of the range must be "linear" or "log"'
+    if scale == "log" and not (ends[0][0] > 0.0 and ends[1][0] > 0.0):
+        return 'a range with scale = "log" needs both ends above zero'
+    return None
+
+
+def _spaced(values: dict[str, Any]) -> list[Any]:
+    """Evenly spaced values of a sound range, linearly or logarithmically."""
+    (first, unit), (last, _) = (number_and_unit(values[end]) for end in ("from", "to"))  # type: ignore[misc]
+    spacing = np.geomspace if values.get("scale") == "log" else np.linspace
+    numbers = spacing(first, last, values["count"]).tolist()
+    return [f"{number!r} {unit}" for number in numbers] if unit else numbers

@@ -1,0 +1,425 @@
+"""The commands: what they print, write and refuse, and with which exit code."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import click
+import netCDF4
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+
+from sim import cli, paper
+from sim.reader import BadInput, load
+
+LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
+SCENE = """\
+name = "a scene"
+[clock]
+duration = "1 s"
+step = "0.1 s"
+[solid]
+shear_modulus = "1.6 MPa"
+[sphere]
+radius = "2 mm"
+[adhesion]
+work = "42 mJ/m^2"
+[drive]
+model = "ramp"
+from = "1 mm/s"
+to = "20 mm/s"
+[bonds]
+model = "counted"
+critical_speed = "10 mm/s"
+healing = "500 1/s"
+sites = 50
+stress = "0.3 MPa"
+[contact]
+load = "4 mN"
+[ensemble]
+members = 3
+"""
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder to work in, with one scenario."""
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(SCENE)
+    return tmp_path
+
+
+def sim(*arguments):
+    """A command as ``main`` runs it, in this process: exit code, output, errors."""
+    return CliRunner().invoke(_main(), list(map(str, arguments)))
+
+
+def _main():
+    """``cli.main`` as a click command, so that the runner can catch what it prints."""
+
+    @click.command(context_settings={"ignore_unknown_options": True, "help_option_names": []})
+    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
+    def run(arguments):
+        before, sys.argv = sys.argv, ["sim", *arguments]
+        try:
+            cli.main()
+        finally:
+            sys.argv = before
+
+    return run
+
+
+def command(*arguments, **options):
+    """A command in a process of its own."""
+    run = [sys.executable, "-m", "sim", *map(str, arguments)]
+    return subprocess.run(run, capture_output=True, text=True, timeout=120, check=False, **options)
+
+
+# --- processes of their own: exit codes and imports ---
+
+
+def loaded(*arguments):
+    """The modules that a command imports."""
+    code = (
+        "import sys\nfrom sim.cli import main\n"
+        f"sys.argv = ['sim', *{list(map(str, arguments))!r}]\n"
+        "try:\n    main()\nexcept SystemExit as done:\n    assert not done.code, done.code\n"
+        "print('MODULES', *sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=True)
+    return set(done.stdout.splitlines()[-1].split()[1:])
+
+
+def test_help_imports_nothing_heavy():
+    heavy = {
+        "numpy",
+        "scipy",
+        "numba",
+        "pydantic",
+        "pint",
+        "xarray",
+        "netCDF4",
+        "matplotlib",
+        "rich",
+        "tomllib",
+        "json",
+    }
+    assert not loaded("--help") & heavy
+    assert not loaded("run", "--help") & heavy
+
+
+def test_check_imports_neither_xarray_nor_figures_nor_statistics():
+    assert not loaded("check", LENS) & {"xarray", "pandas", "matplotlib", "scipy.stats", "rich", "dask"}
+
+
+def test_bad_input_ends_with_2_one_line_a_fault_and_nothing_written(here):
+    Path("bad.toml").write_text(SCENE.replace("4 mN", "4 kg").replace("members", "memebrs"))
+    before = sorted(here.iterdir())
+    done = command("run", "bad.toml")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.splitlines() == [
+        'bad.toml:22: contact.load: has the unit "kg", which is not a unit of N; write for example "4 mN"',
+        'bad.toml:24: ensemble.memebrs: is not a key; did you mean "members"?',
+    ]
+    assert sorted(here.iterdir()) == before
+
+
+def test_an_interrupt_ends_with_130_and_without_traceback(here):
+    long = ["run", "scene.toml", "--set", 'clock.duration="2000 s"', "--set", 'clock.record="1 s"', "--members", "64"]
+    run = subprocess.Popen(
+        [sys.executable, "-m", "sim", *long],
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a shell's background jobs ignore it
+    )
+    parts = here / "outputs" / "scene.nc.parts"
+    while not parts.exists() and run.poll() is None:
+        time.sleep(0.02)
+    time.sleep(0.2)  # into the march
+    run.send_signal(signal.SIGINT)
+    _, errors = run.communicate(timeout=60)
+    assert run.returncode == 130
+    assert errors.strip() == "stopped; nothing was written to the output"
+    assert not (here / "outputs" / "scene.nc").exists()
+
+
+def test_a_reader_that_leaves_early_is_no_error():
+    run = subprocess.Popen([sys.executable, "-m", "sim", "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    run.stdout.read(1)
+    run.stdout.close()
+    assert run.stderr.read() == b""
+    run.wait(timeout=60)
+    run.stderr.close()
+
+
+# --- run ---
+
+
+def test_run_writes_the_dataset_into_a_new_folder_and_ends_with_its_path(here):
+    done = sim("run", "scene.toml", "-o", "new/folder/x.nc")
+    assert done.exit_code == 0
+    assert done.stdout.splitlines()[-1] == "new/folder/x.nc"
+    assert len(done.stdout.splitlines()) > 3
+    assert sorted(path.name for path in (here / "new/folder").iterdir()) == ["x.nc", "x.nc.log"]
+    with xr.open_dataset("new/folder/x.nc") as dataset:
+        assert dataset.sizes["realization"] == 3
+    entry = json.loads(Path("new/folder/x.nc.log").read_text())
+    assert entry["arguments"] == ["run", "scene.toml", "-o", "new/folder/x.nc"]
+
+
+def test_run_writes_into_outputs_and_quietly_if_asked(here):
+    done = sim("run", "scene.toml", "--quiet")
+    assert (done.exit_code, done.output) == (0, "")
+    assert (here / "outputs" / "scene.nc").exists()
+
+
+def test_an_output_that_exists_is_refused_before_anything_is_computed(here, monkeypatch):
+    sim("run", "scene.toml", "-o", "x.nc", "--quiet")
+    content = Path("x.nc").read_bytes()
+    other = ["run", "scene.toml", "-o", "x.nc", "--set", 'contact.load="1 mN"']
+    with monkeypatch.context() as patched:
+        patched.setattr("sim.ensemble.run", None)  # computing would fail
+        done = sim(*other)
+    assert done.exit_code == 73
+    assert done.stderr.splitlines() == ["x.nc exists; replace it with --force or name another output with -o"]
+    assert Path("x.nc").read_bytes() == content
+    assert sim(*other, "--force", "--quiet").exit_code == 0
+    assert Path("x.nc").read_bytes() != content
+
+
+def test_seed_members_and_set_reach_the_run(here):
+    done = sim("run", "scene.toml", "--seed", 99, "--members", 2, "--set", "contact.load=2 mN", "--quiet")
+    assert done.exit_code == 0
+    with xr.open_dataset("outputs/scene.nc") as dataset:
+        assert dataset.attrs["seed"] == "99"
+        assert dataset.sizes["realization"] == 2
+        assert float(dataset["contact_load"]) == 2e-3
+        assert json.loads(dataset.attrs["scenario_overrides"])["contact.load"] == "2 mN"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["-o", "."], 2, ". is a folder; name a file with -o"),
+        (["-o", "scene.toml", "--force"], 2, "scene.toml is the scenario; name a file with -o"),
+        (["-o", "scene.toml/x.nc"], 74, "scene.toml"),
+        (["-o", "/proc/x.nc"], 74, "/proc"),
+        (["-o", "x" * 300], 74, "File name too long"),
+        (["--set", "contact"], 2, "--set takes TABLE.KEY=VALUE, such as contact.load=\"2 mN\", not 'contact'"),
+        (["--set", "=3"], 2, "--set takes TABLE.KEY=VALUE"),
+        (["--set", "contact.lod=3"], 2, '--set contact.lod: is not a key; did you mean "load"?'),
+        (["--set", "sites=3"], 2, '--set sites: is not a key here; did you mean "bonds.sites"?'),
+        (["--members", "0"], 2, "'--members'"),
+        (["--seed", "-1"], 2, "'--seed'"),
+    ],
+)
+def test_what_cannot_be_run_is_told_with_its_code(here, arguments, code, said):
+    done = sim("run", "scene.toml", *arguments)
+    assert done.exit_code == code
+    assert said in done.stderr
+    assert "Traceback" not in done.output
+    assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
+
+
+def test_a_folder_that_cannot_be_written_ends_with_74(here, monkeypatch):
+    def refuse(self, *_, **__):
+        raise PermissionError(13, "Permission denied", str(self))
+
+    monkeypatch.setattr(Path, "mkdir", refuse)
+    done = sim("run", "scene.toml", "-o", "locked/x.nc")
+    assert done.exit_code == 74
+    assert done.stderr.strip() == "locked: Permission denied"
+
+
+def test_a_full_disk_ends_with_74_and_its_reason(here, monkeypatch):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("sim.store.write_whole", full)
+    done = sim("run", "scene.toml")
+    assert done.exit_code == 74
+    assert done.stderr.strip().endswith("No space left on device")
+    assert not Path("outputs/scene.nc").exists()
+
+
+def test_too_little_memory_is_told(here, monkeypatch):
+    def greedy(*_, **__):
+        raise MemoryError
+
+    monkeypatch.setattr("sim.ensemble.run", greedy)
+    done = sim("run", "scene.toml")
+    assert done.exit_code == 1
+    assert done.stderr.startswith("there is not enough memory; ")
+
+
+def test_a_fault_of_our_own_is_not_hidden(here, monkeypatch):
+    def broken(*_, **__):
+        raise RuntimeError("ours")
+
+    monkeypatch.setattr("sim.ensemble.run", broken)
+    assert isinstance(sim("run", "scene.toml").exception, RuntimeError)
+
+
+# --- --set ---
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("3", 3), ("3.5", 3.5), ("true", True), ('"2 mN"', "2 mN"), ("2 mN", "2 mN"), ("", ""), (" 4 mN ", "4 mN"),
+        ('{ model = "uniform" }', {"model": "uniform"}), ('["1 mN", "2 mN"]', ["1 mN", "2 mN"]), ('"2 mN', '"2 mN'),
+        ("a = b", "a = b"), ("1\nother = 2", "1\nother = 2"), ("1" * 5000, "1" * 5000), ("[" * 5000, "[" * 5000),
+    ],
+)  # fmt: skip
+def test_a_value_of_set_is_toml_or_else_text(text, value):
+    assert cli._overrides((f"contact.load={text}",)) == {"contact.load": value}
+
+
+def test_a_whole_table_can_be_set(here):
+    done = sim("check", "scene.toml", "--set", 'bonds={ model = "none" }', "--set", 'drive.from="2 mm/s"')
+    assert done.exit_code == 0
+    assert "bonds    none         changed by --set" in done.stdout
+
+
+# --- check, new, schema, paper ---
+
+
+def test_check_prints_and_writes_nothing(here):
+    done = sim("check", "scene.toml")
+    assert done.exit_code == 0
+    assert done.stdout.startswith("a scene\n")
+    assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
+    assert sim("check", "nope.toml").exit_code == 2
+
+
+def test_new_writes_a_scenario_that_runs(here):
+    done = sim("new", "mine")
+    assert (done.exit_code, done.stdout) == (0, "mine.toml: run it with `sim run mine.toml`\n")
+    assert sim("run", "mine.toml", "--quiet", "--members", 2).exit_code == 0
+    again = sim("new", "mine.toml")
+    assert (again.exit_code, again.stderr) == (73, "mine.toml exists; name another file\n")
+    nowhere = sim("new", "no/where.toml")
+    assert (nowhere.exit_code, nowhere.stderr) == (74, "no/where.toml: No such file or directory\n")
+    assert sim("new").stdout.startswith("first.toml: ")
+
+
+def test_schema_is_json(here):
+    schema = json.loads(sim("schema").stdout)
+    assert schema["title"] == "sim scenario"
+    assert set(schema["required"]) == {"clock", "solid", "sphere", "adhesion", "contact"}
+
+
+def test_paper_ends_with_1_if_anything_fails(monkeypatch):
+    line = SimpleNamespace(name="a", equation="1", computed=1.0, expected=1.0, error=0.0, tolerance=1e-12, passed=True)
+    wrong = SimpleNamespace(**{**vars(line), "computed": 1.1, "error": 0.1, "passed": False})
+    monkeypatch.setattr(paper, "checks", lambda: [line])
+    done = sim("paper")
+    assert done.exit_code == 0
+    assert done.stdout.splitlines()[-1] == "1 of 1 hold"
+    monkeypatch.setattr(paper, "checks", lambda: [line, wrong])
+    done = sim("paper")
+    assert done.exit_code == 1
+    assert "FAILS" in done.stdout
+    assert done.stdout.splitlines()[-1] == "1 of 2 hold"
+
+
+@pytest.mark.parametrize("arguments", [[], ["nope"], ["run"], ["check"], ["run", "--nope"]])
+def test_a_wrong_command_ends_with_2(arguments):
+    done = sim(*arguments)
+    assert done.exit_code == 2
+    assert "Traceback" not in done.output
+
+
+def test_the_version_is_told():
+    assert sim("--version").stdout.startswith("sim, version ")
+
+
+# --- stats, plot ---
+
+
+@pytest.fixture(scope="module")
+def dataset(tmp_path_factory):
+    """A finished run."""
+    folder = tmp_path_factory.mktemp("run")
+    (folder / "scene.toml").write_text(SCENE)
+    assert sim("run", folder / "scene.toml", "-o", folder / "x.nc", "--quiet").exit_code == 0
+    return folder / "x.nc"
+
+
+def test_stats_prints_a_table_and_writes_csv(dataset, here):
+    done = sim("stats", dataset, "--csv", "new/table.csv")
+    assert done.exit_code == 0
+    assert done.stdout.splitlines()[-1] == "new/table.csv"
+    assert len(Path("new/table.csv").read_text().splitlines()) == 2 + 11  # about, header, records
+    assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
+
+
+def test_no_number_of_a_table_is_cut_short(capsys):
+    rows = [{"a long heading": "1.23456789(12)" * 9, "[mm/s]": "[bold]2[/bold]"}] * 2
+    cli._print_rows(rows)
+    printed = capsys.readouterr().out
+    assert printed.count("1.23456789(12)" * 9) == 2
+    assert "[mm/s]" in printed
+    assert "[bold]2[/bold]" in printed
+    cli._print_rows([])
+
+
+def test_plot_writes_a_picture_beside_the_dataset_or_where_asked(dataset, here):
+    done = sim("plot", dataset, "time", "-o", "new/picture.svg")
+    assert (done.exit_code, done.stdout) == (0, "new/picture.svg\n")
+    assert Path("new/picture.svg").read_text().startswith("<?xml")
+    assert sim("plot", dataset).stdout.strip() == str(dataset.with_suffix(".png"))
+    assert dataset.with_suffix(".png").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        (["banana"], 2, 'there is no figure "banana"; known: '),
+        (["map"], 2, "x.nc: "),
+        (["-o", "picture.xyz"], 2, "'xyz' is not supported"),
+        (["-o", "scene.toml/picture.png"], 74, "scene.toml"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(dataset, here, arguments, code, said):
+    done = sim("plot", dataset, *arguments)
+    assert done.exit_code == code
+    assert said in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["stats", "plot"])
+def test_what_is_no_dataset_is_told_in_one_line(dataset, here, name):
+    whole = dataset.read_bytes()
+    Path("cut.nc").write_bytes(whole[: len(whole) // 2])
+    Path("stub.nc").write_bytes(whole[:100])
+    Path("empty.nc").write_bytes(b"")
+    with netCDF4.Dataset("foreign.nc", "w") as foreign:
+        foreign.createDimension("x", 3)
+    for file, said in (
+        ("nope.nc", "nope.nc: there is no such file; name a dataset"),
+        (".", ".: is a folder; name a dataset"),
+        ("scene.toml", "scene.toml: is not a netCDF file, or is cut short; run the scenario again"),
+        ("cut.nc", "cut.nc: is not a netCDF file, or is cut short; run the scenario again"),
+        ("stub.nc", "stub.nc: is not a netCDF file, or is cut short; run the scenario again"),
+        ("empty.nc", "empty.nc: is not a netCDF file, or is cut short; run the scenario again"),
+        ("foreign.nc", "foreign.nc: was not written by `sim run`; name one of its outputs"),
+    ):
+        done = sim(name, file)
+        assert (done.exit_code, done.stdout, done.stderr) == (2, "", said + "\n")
+
+
+# --- the Python door ---
+
+
+def test_the_reader_raises_what_the_command_prints(here):
+    Path("bad.toml").write_text(SCENE.replace("4 mN", "4 kg"))
+    with pytest.raises(BadInput) as fault:
+        load("bad.toml")
+    assert sim("run", "bad.toml").stderr == f"{fault.value}\n"

@@ -1,0 +1,194 @@
+"""What ``sim check`` tells before a run."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+from numpy.testing import assert_allclose
+
+from sim.ensemble import run
+from sim.preview import preview
+from sim.reader import load
+from sim.scenario import quantities
+from sim.store import Plan
+
+FOLDER = Path(__file__).parent.parent / "scenarios"
+WIDE = {"model": "gaussian", "rms": "10 kPa", "length": "4 mm"}
+NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+
+MODAL = {
+    "model": "modal",
+    "cell": "0.24 mm",
+    "points": 32,
+    "spectrum": {"model": "band", "rms": "150 kPa", "longest": "60 um", "shortest": "16 um"},
+    "memory": {"model": "slip", "length": "5 um"},
+}
+
+
+def told(name, **overrides):
+    """The preview of a scenario: lines of each block by its title."""
+    scenario = load(FOLDER / f"{name}.toml", overrides)
+    title, *blocks = preview(scenario).split("\n\n")
+    assert title == scenario.name
+    return {block.partition("\n")[0]: [line.strip() for line in block.splitlines()[1:]] for block in blocks}
+
+
+def row(lines, key):
+    """The cells of the row that begins with a key."""
+    (line,) = (line for line in lines if line.startswith(f"{key}  "))
+    return re.split(r" {2,}", line)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_number_of_a_scenario_is_told_in_si_with_its_unit(name):
+    scenario = load(FOLDER / f"{name}.toml", {"sweep": {}})
+    lines = told(name, sweep={})["quantities in SI"]
+    for key, (quantity, value) in quantities(scenario).items():
+        if key.startswith("record."):
+            continue
+        number, _, unit = row(lines, key)[1].partition(" ")
+        assert_allclose(float(number), value, rtol=1e-5, atol=0)
+        assert unit == ("" if quantity.unit == "1" else quantity.unit)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_columns_of_a_block_line_up_and_no_line_trails(name):
+    for block in preview(load(FOLDER / f"{name}.toml")).split("\n\n")[1:]:
+        lines = block.splitlines()[1:]
+        assert all(line == line.rstrip() for line in lines)
+        starts = {re.match(r"  (?:\S+ )*\S+ {2,}", line).end() for line in lines if re.search(r"\S {2,}\S", line)}
+        assert len(starts) <= 1
+
+
+def test_each_depth_is_told_with_its_reason():
+    lines = told("masking", **{"drive.speed": "2 mm/s"})["depths"]
+    assert row(lines, "drive")[1:3] == ["steady", "changed by --set"]
+    assert row(lines, "bonds")[1:3] == ["none", "left out, so the shallowest"]
+    assert row(lines, "shear")[1:3] == ["mean", "in the file"]
+    assert row(lines, "contact")[3].startswith("The contact is in JKR equilibrium")
+    swept = told("masking", sweep={"bonds": [{"model": "none"}, {"model": "steady", "critical_speed": 0.01}]})["depths"]
+    assert [line.split()[1] for line in swept if line.startswith("bonds")] == ["none", "steady"]
+    assert all("swept" in line for line in swept if line.startswith("bonds"))
+
+
+def test_an_inline_table_counts_as_in_the_file(tmp_path):
+    text = "clock = { duration = 1, step = 1 }\nsolid.shear_modulus = 1e6\nsphere = { radius = 1e-3 }\n"
+    text += "adhesion = { work = 0.04 }\ncontact = { load = 0.0 }\n'drive' = { model = \"steady\" }\n"
+    (tmp_path / "x.toml").write_bytes(b"\xef\xbb\xbf" + text.replace("\n", "\r\n").encode())
+    said = preview(load(tmp_path / "x.toml"))
+    assert re.search(r"drive +steady +in the file", said)
+    assert re.search(r"bonds +none +left out", said)
+
+
+def test_a_swept_quantity_is_told_from_where_to_where():
+    lines = told("uniform_stress")["quantities in SI"]
+    assert row(lines, "contact.load")[1:] == ["-0.0003 to 0.016 N", "normal load, compression positive (5 values)"]
+    assert row(lines, "bonds.stress")[1] == "0 to 1e+07 Pa"
+    run = told("uniform_stress")["the run"]
+    assert row(run, "sweep")[1] == "6 stress × 5 load = 30 points"
+
+
+def test_choices_are_told_beside_the_numbers():
+    lines = told("fixed_grips", shear=MODAL)["quantities in SI"]
+    assert row(lines, "drive.scale")[1] == "log"
+    assert row(lines, "shear.spectrum.model")[1] == "band"
+    assert row(lines, "shear.amplitudes")[1] == "gaussian"
+    assert not any(line.startswith(("record", "name", "shear.model")) for line in lines)
+    lines = told("fixed_grips", record={"per_member": False})["quantities in SI"]
+    assert row(lines, "record.per_member")[1] == "false"
+
+
+def test_the_contact_at_rest_is_that_of_the_dataset():
+    lines = told("afm_tip")["contact at rest"]
+    scenario = load(FOLDER / "afm_tip.toml")
+    radii = [point.rest_radius for point in scenario.points() if math.isfinite(point.rest_radius)]
+    low, _, high, unit = row(lines, "JKR radius")[1].split()
+    assert_allclose([float(low), float(high)], [min(radii), max(radii)], rtol=1e-3)
+    assert unit == "m"
+    lost = len(scenario.points()) - len(radii)
+    assert row(lines, "open")[1] == f"beyond pull-off at {lost} of 61 points"
+    assert_allclose(float(row(lines, "pull-off load")[1].split()[0]), -1.5 * math.pi * 0.4 * 100e-9, rtol=1e-3)
+
+
+def test_an_open_contact_is_told():
+    lines = told("uniform_stress", sweep={}, **{"contact.load": "-1 N"})["contact at rest"]
+    assert lines[0] == "open           beyond pull-off"
+
+
+def test_the_errors_of_the_cell_are_those_of_the_dataset():
+    short = {"clock.duration": "10 ms", "clock.step": "10 ms", "ensemble.members": 2}
+    lines = told("soft_lens", **short)["fluctuations"]
+    dataset = run(load(FOLDER / "soft_lens.toml", short))
+    found = re.search(r"energy ([+-][0-9.e-]+) %", " ".join(row(lines, "error of the cell")))
+    assert_allclose(float(found[1]), 100 * float(dataset["cell_error_energy"].max()), rtol=0.05)
+    energies = [float(word) for word in row(lines, "stored energy")[1].split()[::2][:2]]
+    assert_allclose(energies[1] / energies[0], (45 / 10) ** 2, rtol=1e-3)
+    assert_allclose(float(row(lines, "cell")[1].split()[0]), 4e-3)
+
+
+def test_the_mean_depth_knows_its_energy():
+    lines = told("masking", sweep={})["fluctuations"]
+    assert row(lines, "stored energy")[1] == "0.04196 J/m^2 at growth 1, on the infinite plane"
+    assert row(lines, "rms of the stress")[1] == "2.652e+05 Pa at growth 1"
+
+
+@pytest.mark.parametrize(
+    ("name", "overrides", "said"),
+    [
+        ("soft_lens", {}, "adhesion pays for the stored energy: the paper's assumption"),
+        ("afm_tip", {}, "poisson_ratio is not 0.5: the normal-tangential coupling is neglected"),
+        ("uniform_stress", {"sphere.radius": "10 um"}, "the contact exceeds 0.3 of the sphere's radius"),
+        ("soft_lens", {"shear.spectrum.longest": "9 mm", "shear.cell": "9 mm"}, "the longest waves exceed the contact"),
+        ("soft_lens", {"shear.spectrum": WIDE, "shear.points": 32, "sweep": {}}, "the cell is off by more than 5%"),
+    ],
+)
+def test_what_the_theory_or_the_cell_cannot_hold_is_told(name, overrides, said):
+    lines = told(name, **overrides)["to know before the run"]
+    assert sum(line.startswith(said) for line in lines) == 1
+
+
+def test_nothing_is_told_where_nothing_is_to_know():
+    assert "to know before the run" not in told("uniform_stress")
+    assert "fluctuations" not in told("uniform_stress")
+
+
+def test_the_run_is_counted_as_it_will_be():
+    lines = told("fixed_grips")["the run"]
+    plan = Plan.of(load(FOLDER / "fixed_grips.toml"))
+    steps = plan.points[0].clock.steps
+    assert row(lines, "time")[1] == f"{steps} steps, {plan.points[0].clock.records} records"
+    assert row(lines, "work")[1].startswith(f"{len(plan.points) * plan.members * (steps + 1):,} member-steps, about ")
+    alone = told("masking", **{"ensemble.members": 9})["the run"]
+    assert row(alone, "members")[1] == "9, all alike, so one is computed"
+
+
+def test_the_file_is_no_larger_than_told(tmp_path):
+    for name, overrides in (("fixed_grips", {}), ("soft_lens", {"record": {"per_member": False}}), ("masking", {})):
+        number, unit = row(told(name, **overrides)["the run"], "file")[1].split()[:2]
+        size = run(load(FOLDER / f"{name}.toml", overrides), tmp_path / f"{name}.nc").stat().st_size
+        bare = float(number) * {"kB": 1e3, "MB": 1e6}[unit]
+        assert size < bare + 400e3  # what HDF5 itself takes, and the text of the scenario
+
+
+def test_maps_count_in_the_size_of_the_file():
+    def size(**record):
+        mapped = {**MODAL, "model": "mapped"}
+        overrides = {"shear": mapped, "clock": {"duration": "2 s", "step": "1 s"}, "ensemble.members": 9}
+        lines = told("uniform_stress", sweep={}, record=record, **overrides)["the run"]
+        number, unit = row(lines, "file")[1].split()[:2]
+        assert unit == "kB"
+        return float(number)
+
+    maps = 8 * 3 * 2 * 32**2 / 1e3  # 3 members, 2 times, a grid of 32 points a side
+    assert_allclose(size(maps=["1 s", "2 s"], map_members=3) - size(), maps, atol=1.5)
+
+
+def test_more_members_take_longer_and_more_memory():
+    def about(members):
+        lines = told("decomposition", **{"ensemble.members": members})["the run"]
+        number, unit = re.search(r"about ([0-9.]+) (s|min|h) on", row(lines, "work")[1]).groups()
+        return float(number) * {"s": 1.0, "min": 60.0, "h": 3600.0}[unit]
+
+    assert about(1) < about(1000) < about(100_000)

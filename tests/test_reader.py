@@ -1,0 +1,413 @@
+"""From a file to a scenario: lines of keys, overrides, sweeps, files beside it, the schema."""
+
+import dataclasses
+import itertools
+import json
+import re
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sim.lines import key_lines
+from sim.parts import bonds, drive, shear
+from sim.reader import BadInput, load, scenario_schema
+from sim.scenario import Scenario, quantities
+
+FOLDER = Path(__file__).parent.parent / "scenarios"
+STARTER = Path(__file__).parent.parent / "sim" / "starter.toml"
+NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
+
+SCENE = """\
+name = "a scene"
+[clock]
+duration = "1 s"
+step = "0.1 s"
+[solid]
+shear_modulus = "1.6 MPa"
+[sphere]
+radius = "2 mm"
+[adhesion]
+work = "42 mJ/m^2"
+[contact]
+load = "4 mN"
+"""
+
+
+@pytest.fixture
+def scene(tmp_path):
+    """Write a scene and load it."""
+
+    def write(text="", overrides=None, base=SCENE):
+        path = tmp_path / "x.toml"
+        path.write_text(base + text, encoding="utf-8")
+        return load(path, overrides)
+
+    return write
+
+
+# --- lines ---
+
+
+def test_every_key_of_every_kind_has_its_line():
+    text = '''# comment = 1
+top = 1
+"quoted key" = { inner = "x, y = 2 [no]", list = [1,
+  2, { deep = 3 }], "k\\u00e9" = 5 }
+[table]   # [other]
+text = """
+[fake]
+key = 1
+""""
+raw = \'\'\'
+also = "fake"\'\'\'
+when = 1979-05-27 07:32:00.5
+many = [
+  "a = 1", # c = 2
+  [2.5, 3.5],
+]
+[[rows]]
+"a.b" = 1
+[[rows]]
+"a.b" = 2
+[rows.below]
+c.d = -inf
+[ spaced . "out here" ]
+last = 0x1f'''
+    lines = key_lines(text)
+    assert lines["top",] == 2
+    assert lines["quoted key", "inner"] == lines["quoted key", "list", 0] == 3
+    assert lines["quoted key", "list", 2, "deep"] == lines["quoted key", "ké"] == 4
+    assert lines["table",] == 5
+    assert lines["table", "text"] == 6
+    assert lines["table", "raw"] == 10
+    assert lines["table", "when"] == 12
+    assert lines["table", "many", 0] == 14
+    assert lines["table", "many", 1, 1] == 15
+    assert [lines["rows", 0, "a.b"], lines["rows", 1], lines["rows", 1, "a.b"]] == [18, 19, 20]
+    assert lines["rows", 1, "below", "c", "d"] == 22
+    assert lines["spaced", "out here", "last"] == 24
+    assert not {("fake",), ("table", "fake"), ("table", "key"), ("comment",)} & set(lines)
+
+
+def paths(value, above=()):
+    """Every path of a document, places in lists included."""
+    if above:
+        yield above
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for key, inner in items:
+        yield from paths(inner, (*above, key))
+
+
+words = st.text(min_size=1, max_size=4)
+values = st.recursive(
+    st.integers(-9, 9) | st.text(max_size=6) | st.booleans(),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(words, inner, max_size=3),
+    max_leaves=6,
+)
+
+
+def written(value, breaks):
+    """A value as TOML, its lists broken over lines now and then."""
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{json.dumps(key)} = {written(inner, breaks)}" for key, inner in value.items()) + " }"
+    if isinstance(value, list):
+        gap = "\n  " if next(breaks) else " "
+        return "[" + ",".join(gap + written(inner, breaks) for inner in value) + gap + "]"
+    return json.dumps(value)
+
+
+@given(st.dictionaries(words, values, min_size=1, max_size=4), st.lists(st.booleans(), min_size=1, max_size=5))
+def test_the_lines_know_exactly_the_paths_of_the_parser(document, broken):
+    breaks = itertools.cycle(broken)
+    text = "".join(f"{json.dumps(key)} = {written(value, breaks)}\n" for key, value in document.items())
+    try:
+        found = tomllib.loads(text)
+    except tomllib.TOMLDecodeError:  # JSON escapes surrogates and line breaks in a way that TOML does not know
+        return
+    lines = key_lines(text)
+    assert set(lines) == set(paths(found))
+    assert all(1 <= line <= text.count("\n") + 1 for line in lines.values())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_lines_of_a_scenario_hold_its_keys(name):
+    text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
+    lines = key_lines(text)
+    assert set(lines) == set(paths(tomllib.loads(text)))
+    for path, line in lines.items():
+        if isinstance(path[-1], str):
+            assert path[-1] in text.splitlines()[line - 1]
+
+
+# --- reading ---
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_scenario_is_read_and_keeps_its_text(name):
+    path = FOLDER / f"{name}.toml"
+    scenario = load(path)
+    assert isinstance(scenario, Scenario)
+    assert scenario.source.text == path.read_text(encoding="utf-8")
+
+
+def test_tables_left_out_are_the_shallowest(scene):
+    scenario = scene()
+    assert scenario.drive == drive.Steady(speed=0.0)
+    assert scenario.bonds == bonds.Unbroken()
+    assert scenario.shear == shear.Uniform()
+
+
+def test_a_byte_order_mark_and_windows_line_ends_change_nothing(tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + SCENE.replace("\n", "\r\n").encode())
+    (tmp_path / "y.toml").write_text(SCENE)
+    assert quantities(load(path)) == quantities(load(tmp_path / "y.toml"))
+
+
+def test_inline_tables_and_dotted_keys_are_the_same_scene(scene):
+    same = 'clock = { duration = "1 s", step = "100 ms" }\nsolid.shear_modulus = 1.6e6\nsphere.radius = 2e-3\n'
+    same += 'adhesion.work = "0.042 N/m"\ncontact = { load = "4000 uN", model = "equilibrium" }\n'
+    assert quantities(scene(base=same)) == quantities(scene())
+
+
+# --- overrides ---
+
+
+def test_overrides_replace_values_tables_and_what_was_left_out(scene):
+    changed = scene(
+        overrides={
+            "contact.load": "2 mN",
+            "bonds": {"model": "steady", "critical_speed": "1 mm/s"},
+            "drive.model": "steady",
+            "drive.speed": "3 mm/s",
+            "ensemble.members": 5,
+        }
+    )
+    assert changed.contact.load == 2e-3
+    assert changed.bonds.critical_speed == 1e-3
+    assert changed.drive.speed == 3e-3
+    assert changed.ensemble.members == 5
+    assert changed.source.overrides["contact.load"] == "2 mN"
+
+
+def test_an_override_can_set_replace_and_drop_a_sweep(scene):
+    text = '[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n'
+    assert len(scene(text).points()) == 2
+    assert len(scene(text, {"sweep": {}}).points()) == 1
+    assert len(scene(text, {'sweep."contact.load"': ["1 mN", "2 mN", "3 mN"]}).points()) == 3
+    assert len(scene(text, {"sweep": {"solid.shear_modulus": [1e6]}}).points()) == 1
+
+
+# --- sweeps ---
+
+
+def loads(scenario):
+    return [point.contact.load for point in scenario.points()]
+
+
+def test_a_range_is_spaced_evenly_with_both_ends_in_one_unit(scene):
+    linear = scene('[sweep]\n"contact.load" = { from = "-1 mN", to = "3 mN", count = 5 }\n')
+    np.testing.assert_allclose(loads(linear), np.linspace(-1e-3, 3e-3, 5), rtol=1e-15, atol=1e-19)
+    log = scene('[sweep]\n"contact.load" = { from = "1mN", to = "100mN", count = 3, scale = "log" }\n')
+    np.testing.assert_allclose(loads(log), [1e-3, 1e-2, 1e-1], rtol=1e-15)
+    bare = scene('[sweep]\n"contact.load" = { from = 0, to = 1e-3, count = 2 }\n')
+    assert loads(bare) == [0.0, 1e-3]
+
+
+def test_several_keys_form_the_outer_product_the_last_fastest(scene):
+    swept = scene('[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n"adhesion.bond_share" = [0, 0.5, 1]\n')
+    found = [(point.contact.load, point.adhesion.bond_share) for point in swept.points()]
+    assert found == list(itertools.product([1e-3, 2e-3], [0.0, 0.5, 1.0]))
+    assert [axis.name for axis in swept.sweep] == ["load", "bond_share"]
+
+
+def test_nested_keys_of_a_sweep_mean_the_same_as_quoted_ones(scene):
+    assert loads(scene('[sweep]\ncontact.load = ["1 mN", "2 mN"]\n')) == [1e-3, 2e-3]
+    assert loads(scene('[sweep.contact]\nload = { from = "1 mN", to = "2 mN", count = 2 }\n')) == [1e-3, 2e-3]
+
+
+def test_a_list_of_tables_is_zipped_into_one_axis(scene):
+    swept = scene(
+        '[[sweep]]\n"contact.load" = "1 mN"\n"sphere.radius" = "1 mm"\n'
+        '[[sweep]]\n"contact.load" = "2 mN"\n"sphere.radius" = "3 mm"\n'
+    )
+    assert [(point.contact.load, point.sphere.radius) for point in swept.points()] == [(1e-3, 1e-3), (2e-3, 3e-3)]
+    assert len(swept.sweep) == 1
+
+
+def test_a_model_is_swept_as_a_whole_table(scene):
+    swept = scene('[sweep]\nbonds = [{ model = "none" }, { model = "steady", critical_speed = "1 mm/s" }]\n')
+    assert [point.bonds for point in swept.points()] == [bonds.Unbroken(), bonds.Steady(critical_speed=1e-3)]
+
+
+def test_the_name_of_an_axis_never_meets_a_variable_of_the_dataset(scene):
+    swept = scene(
+        '[sweep]\n"drive.speed" = ["1 mm/s"]\n"contact.load" = ["1 mN"]\n"sphere.radius" = ["1 mm"]\n',
+        {"drive": {"model": "steady", "speed": 0}},
+    )
+    assert [axis.name for axis in swept.sweep] == ["drive_speed", "load", "radius"]
+
+
+# --- files beside the scenario ---
+
+TABLE = '[drive]\nmodel = "table"\nfile = "speeds.csv"\n'
+
+
+def test_a_table_is_read_beside_the_scenario_and_its_text_kept(scene, tmp_path):
+    (tmp_path / "speeds.csv").write_text("time [ms], speed [mm/s]\n0, 1\n1000, 2\n")
+    scenario = scene(TABLE)
+    assert scenario.drive.time == (0.0, 1.0)
+    assert scenario.drive.speed == (1e-3, 2e-3)
+    assert scenario.source.files == {"speeds.csv": "time [ms], speed [mm/s]\n0, 1\n1000, 2\n"}
+
+
+def test_swept_files_are_each_read(scene, tmp_path):
+    for name, speed in (("slow", 1), ("fast", 5)):
+        (tmp_path / f"{name}.csv").write_text(f"time [s], speed [mm/s]\n0, {speed}\n1, {speed}\n")
+    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 9\n1, 9\n")
+    swept = scene(TABLE + '[sweep]\n"drive.file" = ["slow.csv", "fast.csv"]\n')
+    assert [point.drive.speed[0] for point in swept.points()] == [1e-3, 5e-3]
+    whole = scene('[sweep]\ndrive = [{ model = "table", file = "slow.csv" }, { model = "steady", speed = "2 mm/s" }]\n')
+    assert [type(point.drive) for point in whole.points()] == [drive.Table, drive.Steady]
+    assert set(whole.source.files) == {"slow.csv"}
+
+
+def test_a_sweep_beside_a_file_reads_it_once(scene, tmp_path):
+    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n1, 2\n")
+    swept = scene(TABLE + '[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n')
+    (tmp_path / "speeds.csv").unlink()
+    assert [point.drive.speed for point in swept.points()] == [(1e-3, 2e-3)] * 2
+
+
+# --- starter ---
+
+
+def test_the_starter_shows_every_table_key_and_model():
+    text = STARTER.read_text(encoding="utf-8")
+    schema = scenario_schema()
+    for name in schema["properties"]:
+        assert re.search(rf"(?m)^(# )?(\[{name}\]|{name} = )", text), name
+    columns = {"time", "speed", "wavenumbers", "densities", "variable"}  # of files, not written by hand
+    for definition in schema["$defs"].values():
+        for key in set(definition["properties"]) - columns:
+            assert re.search(rf"\b{key}( = |\])", text), key
+        if "model" in definition["properties"]:
+            assert f'"{definition["properties"]["model"]["const"]}"' in text
+
+
+def alternatives():
+    """The tables in the comments of the starter: the name of the table and its text."""
+    table = ""
+    for line in STARTER.read_text(encoding="utf-8").splitlines():
+        if line.startswith("["):
+            table = line[1 : line.index("]")]
+        if line.startswith("# or {"):
+            yield table, line.removeprefix("# or ").rpartition("}")[0] + "}"
+
+
+@pytest.mark.parametrize(("table", "text"), list(alternatives()))
+def test_every_alternative_of_the_starter_is_a_scene(table, text, tmp_path):
+    (tmp_path / "x.toml").write_text(STARTER.read_text(encoding="utf-8"), encoding="utf-8")
+    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n2, 5\n")
+    (tmp_path / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 1\n3e5, 1\n")
+    waves = np.cos(np.arange(16)[:, None] * 1.7) + np.sin(np.arange(16) * 2.1)
+    (tmp_path / "map.csv").write_text("\n".join(",".join(f"{v:.3e}" for v in row) for row in 1e5 * waves))
+    changed = tomllib.loads(f"value = {text}")["value"]
+    scenario = load(tmp_path / "x.toml", {table: changed})
+    for word in table.split("."):
+        scenario = getattr(scenario, word)
+    assert scenario.model == changed["model"]
+
+
+def test_every_setting_in_the_comments_of_the_starter_is_a_scene(tmp_path):
+    text = STARTER.read_text(encoding="utf-8")
+    opened = re.sub(r'(?m)^# (?=\[|"?[\w.]+"? = )', "", text).replace('model = "modal"', 'model = "mapped"')
+    path = tmp_path / "x.toml"
+    path.write_text(opened, encoding="utf-8")
+    scenario = load(path)
+    assert scenario.record.maps == (0.5, 1.0)
+    assert len(scenario.points()) == 15
+    assert scenario.solid.counter_body is not None
+
+
+# --- schema ---
+
+
+def fits(schema, node, value):
+    """Whether a value fits a node of a JSON schema; the words of it that ours uses."""
+    if "$ref" in node:
+        return fits(schema, schema["$defs"][node["$ref"].rsplit("/", 1)[1]], value)
+    if not all(
+        any(fits(schema, option, value) for option in node[word]) for word in ("anyOf", "oneOf") if word in node
+    ):
+        return False
+    kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
+    allowed = node.get("type", [])
+    allowed = [allowed] if isinstance(allowed, str) else allowed
+    named = [kinds[kind] for kind in allowed if kind != "null"]
+    if allowed and not any(isinstance(value, kind) for kind in named):
+        return False
+    if isinstance(value, dict) and not set(node.get("required", ())) <= set(value):
+        return False
+    if isinstance(value, dict) and "properties" in node:
+        known = node["properties"]
+        if set(value) - set(known):
+            return False
+        return all(fits(schema, known[key], inner) for key, inner in value.items())
+    if isinstance(value, list) and "items" in node:
+        return all(fits(schema, node["items"], inner) for inner in value)
+    return ("const" not in node or value == node["const"]) and ("enum" not in node or value in node["enum"])
+
+
+@pytest.mark.parametrize("path", [*sorted(FOLDER.glob("*.toml")), STARTER], ids=lambda path: path.stem)
+def test_every_scenario_fits_the_schema(path):
+    schema = json.loads(json.dumps(scenario_schema()))
+    document = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert fits(schema, schema, document)
+    assert not fits(schema, schema, {**document, "solid": {**document["solid"], "shear_modulos": 1}})
+    assert not fits(schema, schema, {**document, "drive": {"model": "stedy"}})
+    assert not fits(schema, schema, {key: value for key, value in document.items() if key != "clock"})
+
+
+def test_a_table_may_name_a_file_or_hold_its_columns_by_the_schema():
+    schema = scenario_schema()
+    steady = tomllib.loads(SCENE)
+    assert fits(schema, schema, {**steady, "drive": {"model": "table", "file": "speeds.csv"}})
+    assert fits(schema, schema, {**steady, "drive": {"model": "table", "time": [0, 1], "speed": [0, 1]}})
+    assert not fits(schema, schema, {**steady, "drive": {"model": "table"}})
+
+
+def test_every_number_of_the_schema_says_its_meaning_and_unit():
+    def numbers(node):
+        if isinstance(node, dict):
+            if node.get("type") == ["number", "string"]:
+                yield node
+            for inner in node.values():
+                yield from numbers(inner)
+        elif isinstance(node, list):
+            for inner in node:
+                yield from numbers(inner)
+
+    found = list(numbers(scenario_schema()))
+    assert len(found) > 30
+    assert all(node["description"].endswith("]") and node["examples"] for node in found)
+
+
+# --- refusals in Python ---
+
+
+def test_bad_input_is_a_value_error_with_one_line_for_each_problem(scene):
+    with pytest.raises(BadInput) as refused:
+        scene("[ensemble]\nmembers = 0\nmember = 1\n")
+    assert isinstance(refused.value, ValueError)
+    assert len(refused.value.problems) == 2
+    assert str(refused.value).splitlines() == refused.value.problems
+
+
+def test_a_scenario_cannot_be_changed(scene):
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scene().seed = 3
