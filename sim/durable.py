@@ -49,6 +49,7 @@ def explained(folder: Path) -> Iterator[None]:
     except _WRITE_TROUBLE as trouble:
         reason = trouble.strerror if isinstance(trouble, OSError) and trouble.errno else str(trouble)
         with contextlib.suppress(OSError):
-            if shutil.disk_usage(folder).free < 2**20:
+            usage = shutil.disk_usage(folder)
+            if usage.total > 0 and usage.free < 2**20:
                 reason = os.strerror(errno.ENOSPC)
         raise StoreTrouble(f"{folder}: {reason}") from trouble

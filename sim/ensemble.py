@@ -103,6 +103,7 @@ def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None
             for index, records in enumerate(stretches):
                 arrays = _record(plan, point, members, states, records, progress)
                 parts.save(part_name(number, group, index), arrays)
+        point.release()
 
 
 def _record(

@@ -11,6 +11,7 @@ import numpy as np
 
 from sim.gauges import GAUGES
 from sim.laws import jkr
+from sim.parts.shear import Auto
 from sim.scenario import Record, Scenario, Source, quantities
 from sim.store import Plan, work
 
@@ -84,9 +85,20 @@ def _depths(plan: Plan) -> Rows:
             why = "in the file" if name in named or not source.text else "left out, so the shallowest"
         for part in parts.values():
             rows.append((name, part.model, why, _meaning(part)))
+        rows += _chosen(plan.points) if name == "shear" else []
     differ = [name for name in _PARTS if any(point.varies[name] for point in plan.points)]
     said = f"differ in {', '.join(differ)}" if differ else "differ in nothing, so one is computed for all"
     return [*rows, ("members", str(plan.scenario.ensemble.members), said)]
+
+
+def _chosen(points: Sequence[Scenario]) -> Rows:
+    """The depths that scenes chose which leave the choice, and why."""
+    rows = {}
+    for point in points:
+        if isinstance(point.shear, Auto):
+            why = point.shear.why(bool(point.record.maps))
+            rows[point.fluctuations.model] = ("", f"→ {point.fluctuations.model}", "chosen", why)
+    return list(rows.values())
 
 
 def _meaning(part: Any) -> str:

@@ -204,6 +204,10 @@ class Scenario:
         cell = math.sqrt(math.pi) * self.rest_radius
         return self.fluctuations.process(shear_modulus, poisson_ratio, cell)
 
+    def release(self) -> None:
+        """Let go of the process, whose arrays may be large; it is made again when it is asked for."""
+        self.__dict__.pop("process", None)
+
     @cached_property
     def varies(self) -> dict[str, bool]:
         """For each part whether its values differ between members: by its class, never by looking."""

@@ -54,7 +54,10 @@ class Plan:
     @property
     def group(self) -> int:
         """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
-        pairs = max(point.process.pairs for point in self.points)
+        some = self.points[:: max(1, len(self.points) // 4)]
+        pairs = max(point.process.pairs for point in some)
+        for point in some:
+            point.release()
         return min(_GROUP, self.members, max(1, _STATE_NUMBERS // max(2 * pairs, 1)))
 
     @property
@@ -236,8 +239,9 @@ def _attributes(file: netCDF4.Dataset, plan: Plan) -> None:
 def _scenario_variables(file: netCDF4.Dataset, plan: Plan) -> None:
     """Every number of the scenario that is the same at all points, as a 0-d variable."""
     tables = [quantities(point) for point in plan.points]
+    swept = {key for axis in plan.scenario.sweep for key in axis.keys}
     for key, (quantity, value) in tables[0].items():
-        if all(key in table and table[key][1] == value for table in tables):
+        if key not in swept and all(key in table and table[key][1] == value for table in tables):
             name = key.replace(".", "_")
             variable = _variable(file, name, "f8", (), quantity.unit, quantity.meaning, quantity.symbol)
             variable[...] = value
@@ -269,6 +273,7 @@ def _derived_variables(file: netCDF4.Dataset, plan: Plan) -> None:
             )
         for name, value in point.process.known_errors().items():
             add(name, "1", name.replace("_", " "), "", value)
+        point.release()
     complete = {n: entry for n, entry in derived.items() if len(entry[3]) == len(plan.points)}
     for name, (unit, long_name, symbol, values) in complete.items():
         variable = _variable(file, name, "f8", _sweep_names(plan), unit, long_name, symbol)

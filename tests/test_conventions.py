@@ -36,5 +36,7 @@ def test_maps_labels_and_statistics_conform(per_member, tmp_path):
     scenario = scene(
         3, shear=mapped, bonds=BONDS["counted"], record=Record(maps=(2e-3,), map_members=2, per_member=per_member)
     )
-    sweep = read_sweep({"bonds": [{"model": "none"}, {"model": "steady", "critical_speed": "1 cm/s"}], "contact.load": [1e-3, 2e-3]})
+    sweep = read_sweep(
+        {"bonds": [{"model": "none"}, {"model": "steady", "critical_speed": "1 cm/s"}], "contact.load": [1e-3, 2e-3]}
+    )
     check(run(replace(scenario, sweep=sweep), tmp_path / "out.nc"))

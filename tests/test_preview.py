@@ -192,3 +192,11 @@ def test_more_members_take_longer_and_more_memory():
         return float(number) * {"s": 1.0, "min": 60.0, "h": 3600.0}[unit]
 
     assert about(1) < about(1000) < about(100_000)
+
+
+def test_a_depth_chosen_by_the_scene_is_named_with_its_reason():
+    from scenes import SHEARS, scene
+
+    with_memory, without = (preview(scene(shear=SHEARS[f"auto {name} memory"])) for name in ("with", "without"))
+    assert "→ banded" in with_memory and "a memory is given" in with_memory
+    assert "→ mean" in without and "no memory is given" in without

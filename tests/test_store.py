@@ -201,3 +201,10 @@ def test_a_full_disk_is_told_with_its_reason(tmp_path):
     assert "File too large" in done.stderr
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "o.nc").exists()
+
+
+def test_a_swept_key_may_keep_one_value():
+    scenario = replace(sample(), sweep=read_sweep({"sphere.radius": [2e-3, 2e-3], "contact.load": [1e-3, 4e-3]}))
+    dataset = ensemble.run(scenario)
+    assert dataset["contact_radius"].dims == ("radius", "load", "realization", "t")
+    assert_allclose(dataset["radius"], [2e-3, 2e-3])

@@ -33,8 +33,14 @@ class _Held:
 
     @model_validator(mode="after")
     def _one_control(self) -> "_Held":
-        if (self.load is None) == (self.indentation is None):
-            raise PydanticCustomError("control", "needs exactly one of load and indentation to hold the sphere")
+        if self.load is None and self.indentation is None:
+            raise PydanticCustomError(
+                "control", 'nothing holds the sphere; give a load such as "4 mN", or an indentation such as "2 um"'
+            )
+        if self.load is not None and self.indentation is not None:
+            raise PydanticCustomError(
+                "control", "a load and an indentation cannot both hold the sphere; leave one of them out"
+            )
         return self
 
     def equilibrium_radius(self, work: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
