@@ -1,4 +1,4 @@
-"""Writes docs/keys.md, every key of a scenario file, from the declarations in the code: ``python docs/make_keys.py``."""
+"""Writes docs/keys.md, every key of a scenario file, from the declarations in the code."""
 
 import sys
 import typing
@@ -13,13 +13,14 @@ TARGET = Path(__file__).with_name("keys.md")
 HEAD = """# Every key of a scenario file
 
 Made by `python docs/make_keys.py` from the declarations in the code. A quantity is a string with a unit (`"4 mN"`) or a
-bare number in the unit given here. A table that is left out means its first model. `[sweep]` takes any of these keys with a
-list of values, or `{from, to, count, scale}`; several keys form the outer product, a list of tables is one axis.
+bare number in the unit given here. A table that is left out means its first model. `[sweep]` takes any of these keys with
+a list of values, or `{from, to, count, scale}`; several keys form the outer product, a list of tables is one axis.
 """
 
 
 def text() -> str:
     """The page."""
+    _DONE.clear()
     lines = [HEAD, *_rows("top of the file", Scenario, skip={"source", "sweep"})]
     for name, field in Scenario.__pydantic_fields__.items():
         for part in _classes(field.annotation):
@@ -84,6 +85,5 @@ def _classes(annotation: typing.Any) -> typing.Iterator[type]:
 
 
 if __name__ == "__main__":
-    _DONE.clear()
     TARGET.write_text(text(), encoding="utf-8")
     sys.stdout.write(f"{TARGET}\n")

@@ -230,7 +230,7 @@ def pixel_variances(spectrum: Any, cell: float, reach: int) -> Array:
 
 
 def half_lattice(spectrum: Any, cell: float, reach: int) -> tuple[Indices, Indices, Array]:
-    """Lattice indices and pixel variance of one of each pair up to ``reach``, without q = 0 and without negligible ones."""
+    """Lattice indices and pixel variance of one of each pair up to ``reach``, without q = 0 and negligible ones."""
     pixels = pixel_variances(spectrum, cell, reach)
     ix, iy = (index.ravel() for index in np.mgrid[-reach : reach + 1, 0 : reach + 1])
     share = pixels.ravel()
