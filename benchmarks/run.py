@@ -13,6 +13,7 @@ import numpy as np
 import plain
 from rich.console import Console
 from rich.table import Table
+from scipy import fft
 
 from sim.bodies import Adhesion, Solid, Sphere
 from sim.engine import Dice, advance, march, start
@@ -173,6 +174,7 @@ def step() -> list[Row]:
     return [compare("engine step, modal 256²", whole, "its modes alone", alone, "", 4)]
 
 
+SLIP = Slip(length=5e-6)
 LENS = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=1e-6)
 
 
@@ -215,6 +217,38 @@ def depths() -> list[Row]:
     return rows
 
 
+def maps() -> list[Row]:
+    """A stress map on 256² points: a step and its map, beside its numbers and transform, and a public package."""
+    points, cell, spectrum = 256, 0.24e-3, Gaussian(rms=1e5, length=12e-6)
+    recipe = shear.Mapped(spectrum=VonKarman(rms=1e5, length=12e-6, hurst=0.8), cell=cell, points=points, memory=SLIP)
+    process, noise = recipe.process(1.6e6, 0.5, cell), Noise(1, "shear", np.arange(1))
+    rest, stress = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), np.zeros(1)
+    state, counter = [process.start(rest, stress, noise)], itertools.count(1)
+    generator, numbers = np.random.Generator(np.random.Philox(1)), np.empty(2 * process.pairs)
+    half = np.ones((points, points // 2 + 1), dtype=complex)
+
+    def drawn() -> None:
+        moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
+        state[0] = process.advance(state[0], moved, stress, noise)
+        process.maps(state[0], np.zeros(1), 1)
+
+    def parts() -> None:
+        generator.standard_normal(out=numbers)
+        fft.irfft2(half, s=(points, points))
+
+    rows = [compare("mapped, 256², step and map", drawn, "numpy's normals and one FFT", parts, "2/3 or more", 4)]
+    try:
+        import gstools
+    except ImportError:
+        print("GSTools is not installed (the extra bench): its row is left out")
+        return rows
+    model = gstools.Gaussian(dim=2, var=1e10, len_scale=spectrum.length, rescale=1.0)
+    field = gstools.SRF(model, seed=1)
+    axis = np.arange(points) * cell / points
+    theirs = lambda: field.structured((axis, axis), seed=next(counter))  # noqa: E731
+    return [*rows, compare("mapped, 256², step and map", drawn, "GSTools field, same size", theirs, "", 4, 1)]
+
+
 def sizes() -> list[Row]:
     """Banded costs the same per member-step for any number of modes; here beside the 64² cell."""
     exponent, rows = 0.1, []
@@ -235,7 +269,7 @@ def sizes() -> list[Row]:
 def main() -> None:
     """Print all rows."""
     table = Table("ours", "beside", "ratio", "middle half", "promised", "ours, as seen", box=None)
-    for rows in (mean_field, modal, radius, step, depths, sizes):
+    for rows in (mean_field, modal, radius, step, depths, maps, sizes):
         for row in rows():
             table.add_row(*row.texts)
     Console(width=140).print(table)

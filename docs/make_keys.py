@@ -13,8 +13,8 @@ TARGET = Path(__file__).with_name("keys.md")
 HEAD = """# Every key of a scenario file
 
 Made by `python docs/make_keys.py` from the declarations in the code. A quantity is a string with a unit (`"4 mN"`) or a
-bare number in the unit given here. A table that is left out means its first model. `[sweep]` takes any of these keys with
-a list of values, or `{from, to, count, scale}`; several keys form the outer product, a list of tables is one axis.
+bare number in the unit given here. A table that is left out means its first model. `[sweep]` takes any of these keys
+with a list of values, or `{from, to, count, scale}`; several keys form the outer product, a list of tables is one axis.
 """
 
 

@@ -59,8 +59,8 @@ GAUGES = (
     Gauge("contact_area", "m^2", "contact area", "A", "contact", _area),
     Gauge("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact", _load),
     Gauge("indentation", "m", "indentation of the sphere", "delta", "contact", _indentation),
-    Gauge("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
+    Gauge("friction_force", "N", "size of the friction force, shear stress times contact area", "F", "contact",
           lambda scene, state: _stress(scene, state) * _area(scene, state)),
     Gauge("in_contact", "1", "whether the contact is closed", "", "contact",
-          lambda scene, state: np.isfinite(state.contact.radius).astype(float)),
+          lambda scene, state: (state.contact.radius > 0.0).astype(float)),
 )  # fmt: skip

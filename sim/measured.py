@@ -148,8 +148,9 @@ class Measured(Rowed):
     Notes
     -----
     A map that is not square is cropped to the leading square. The mean is removed. Rings of one
-    lattice step 2π/L are averaged; the rows reach from the first ring to the last below Nyquist, so
-    that waves longer than the map and the corners beyond Nyquist are not part of the spectrum.
+    lattice step 2π/L are averaged; the rows reach from π/L to the outer edge of the last ring below
+    Nyquist, level in the innermost and the outermost half ring, so that waves longer than twice the
+    map and the corners beyond Nyquist are not part of the spectrum.
     """
 
     file: str
@@ -264,7 +265,10 @@ def _estimate(name: str, maps: Array, spacing: float | None, window: str) -> tup
     grid = Grid(points * spacing, points)
     density = np.mean(periodogram(field, grid.cell, window), axis=0)
     ring = radial_average(density, grid)
-    return ring.q, ring.density
+    # the innermost ring begins at half its wavenumber and the outermost ends half a ring beyond: there they stay level
+    first, last = (np.pi / grid.cell, (2 * len(ring.q) + 1) * np.pi / grid.cell)
+    q = np.concatenate([[first], ring.q, [last]])
+    return q, np.concatenate([ring.density[:1], ring.density, ring.density[-1:]])
 
 
 def periodogram(field: Array, cell: float, window: str = "none") -> Array:

@@ -229,6 +229,19 @@ def pixel_variances(spectrum: Any, cell: float, reach: int) -> Array:
     return np.concatenate([quadrant[:0:-1], quadrant])
 
 
+def cell_variance(spectrum: Any, cell: float, points: int | None = None) -> float:
+    """Variance that the modes of a cell carry together [Pa²], without listing them.
+
+    The square of all their pixels is itself a pixel, of a lattice as much coarser; that of q = 0 is
+    left out. Raises as ``modes``.
+    """
+    if getattr(spectrum, "wavevector", None) is not None:
+        return float(spectrum.variance)
+    reach, _ = grid_reach(spectrum, cell, points)
+    whole, middle = (pixel_variances(spectrum, cell / side, 0)[0, 0] for side in (2 * reach + 1, 1))
+    return float(whole - middle)
+
+
 def half_lattice(spectrum: Any, cell: float, reach: int) -> tuple[Indices, Indices, Array]:
     """Lattice indices and pixel variance of one of each pair up to ``reach``, without q = 0 and negligible ones."""
     pixels = pixel_variances(spectrum, cell, reach)

@@ -21,8 +21,10 @@ class Motion:
         Displacement of the slider over the step, signed [m].
     path : array
         Distance slid over the step, the integral of the absolute speed [m].
+    first : array
+        Speed at the beginning of the step [m/s]; after a jump of the speed, the new one.
     speed : array
-        Speed at the end of the step [m/s].
+        Speed at the end of the step [m/s]; before a jump there, the old one.
     """
 
     step: int
@@ -30,4 +32,5 @@ class Motion:
     duration: float
     slip: np.ndarray
     path: np.ndarray
+    first: np.ndarray
     speed: np.ndarray

@@ -52,8 +52,10 @@ class Noise:
 
     Notes
     -----
-    A member's block has the key (seed, part) and the counters (1, 2, ...; block, member, 0); step 0
-    is the draw of the start. The block in use is kept, which changes no answer.
+    A member's block has the key (seed, part) and the counters (1, 2, ...; block, member, lane); step 0
+    is the draw of the start. The lane is 256 × count plus 0 for normals, 1 for uniforms, 2 and more for
+    gammas: numbers of another law, or laid out otherwise, are independent. The block in use is kept,
+    which changes no answer.
 
     Examples
     --------
@@ -76,10 +78,7 @@ class Noise:
         return self._numbers(_uniforms, step, count)
 
     def gammas(self, step: int, shapes: np.ndarray) -> np.ndarray:
-        """Standard gamma numbers of given ``shapes`` >= 0.5, the same at all steps; shape (members, shapes).
-
-        Their words are others than those of ``normals`` and ``uniforms``.
-        """
+        """Standard gamma numbers of given ``shapes`` >= 0.5, the same at all steps; shape (members, shapes)."""
         return self._numbers(_gammas, step, len(shapes), shapes)
 
     def _numbers(self, fill, step: int, count: int, *laws: np.ndarray) -> np.ndarray:
@@ -89,7 +88,8 @@ class Noise:
         if kept_block != block:
             if numbers is None:
                 numbers = np.empty((len(self.members), steps * count))
-            fill(_U(self.seed), _U(PARTS[self.part]), _U(block), self.members.astype(_U), *laws, numbers)
+            address = _U(self.seed), _U(PARTS[self.part]), _U(block), self.members.astype(_U), _U(256 * count)
+            fill(*address, *laws, numbers)
             self._kept[fill, count] = (block, numbers)
         return numbers[:, row * count : (row + 1) * count]
 
@@ -105,7 +105,7 @@ def _high_product(a, b):
 
 @device
 def _words(seed, part, block, member, lane, first, words):
-    """Philox words of the counters after ``first`` of one block, shape (4, counters); ``lane`` 0 but for gammas."""
+    """Philox words of the counters after ``first`` of one block and lane, shape (4, counters)."""
     zero, one, two, three = words[0], words[1], words[2], words[3]
     for i in range(words.shape[1]):
         c0, c1, c2, c3 = first + _U(i) + _U(1), block, member, lane
@@ -173,30 +173,30 @@ def _box_muller(words_u, words_v, x, y):
         y[i] = radius * sine
 
 
-@kernel("void(uint64, uint64, uint64, uint64[::1], float64[:,::1])")
-def _normals(seed, part, block, members, numbers):
+@kernel("void(uint64, uint64, uint64, uint64[::1], uint64, float64[:,::1])")
+def _normals(seed, part, block, members, lane, numbers):
     """Fill rows of standard normals, shape (members, numbers of a block)."""
     count = numbers.shape[1]
     for m in range(members.size):
         for first in range(0, count, 4 * _RUN):
             run = min(_RUN, (count - first + 3) // 4)
             words, drawn = np.empty((4, run), np.uint64), np.empty((4, run))
-            _words(seed, part, block, members[m], _U(0), _U(first // 4), words)
+            _words(seed, part, block, members[m], lane, _U(first // 4), words)
             _box_muller(words[0], words[1], drawn[0], drawn[1])
             _box_muller(words[2], words[3], drawn[2], drawn[3])
             some = min(4 * run, count - first)
             numbers[m, first : first + some] = drawn.ravel()[:some]
 
 
-@kernel("void(uint64, uint64, uint64, uint64[::1], float64[:,::1])")
-def _uniforms(seed, part, block, members, numbers):
+@kernel("void(uint64, uint64, uint64, uint64[::1], uint64, float64[:,::1])")
+def _uniforms(seed, part, block, members, lane, numbers):
     """Fill rows of uniform numbers in [0, 1), shape (members, numbers of a block)."""
     count = numbers.shape[1]
     for m in range(members.size):
         for first in range(0, count, 4 * _RUN):
             run = min(_RUN, (count - first + 3) // 4)
             words = np.empty((4, run), np.uint64)
-            _words(seed, part, block, members[m], _U(0), _U(first // 4), words)
+            _words(seed, part, block, members[m], lane + _U(1), _U(first // 4), words)
             flat = words.ravel()
             for i in range(min(4 * run, count - first)):
                 numbers[m, first + i] = _unit(flat[i]) - 1.0
@@ -216,11 +216,11 @@ def _gamma(d, c, x, word):
     return d * v if accepted else -1.0
 
 
-@kernel("void(uint64, uint64, uint64, uint64[::1], float64[::1], float64[:,::1])")
-def _gammas(seed, part, block, members, shapes, numbers):
+@kernel("void(uint64, uint64, uint64, uint64[::1], uint64, float64[::1], float64[:,::1])")
+def _gammas(seed, part, block, members, lane, shapes, numbers):
     """Fill rows of standard gamma numbers, shape (members, steps of a block × shapes).
 
-    Number i takes the words of counter i + 1 in lane 1; while it is rejected, in lanes 2, 3, ... A
+    Number i takes the words of counter i + 1 in lane 2; while it is rejected, in lanes 3, 4, ... A
     shape a below 1 is that of a + 1 times u^(1/a).
     """
     count, kinds = numbers.shape[1], shapes.size
@@ -231,7 +231,7 @@ def _gammas(seed, part, block, members, shapes, numbers):
         kind = 0
         for first in range(0, count, _RUN):
             run = min(_RUN, count - first)
-            _words(seed, part, block, members[m], _U(1), _U(first), words)
+            _words(seed, part, block, members[m], lane + _U(2), _U(first), words)
             _box_muller(words[0], words[1], x, y)
             for i in range(run):
                 law[i] = shapes[kind]
@@ -241,10 +241,10 @@ def _gammas(seed, part, block, members, shapes, numbers):
                 c[i] = 1.0 / (3.0 * math.sqrt(d[i]))
                 y[i] = _gamma(d[i], c[i], x[i], words[2, i])
             for i in range(run):
-                lane = _U(1)
+                other = lane + _U(2)
                 while y[i] < 0.0:
-                    lane += _U(1)
-                    _words(seed, part, block, members[m], lane, _U(first + i), again)
+                    other += _U(1)
+                    _words(seed, part, block, members[m], other, _U(first + i), again)
                     _box_muller(again[0], again[1], z, rest)
                     y[i] = _gamma(d[i], c[i], z[0], again[2, 0])
                 if law[i] < 1.0:

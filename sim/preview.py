@@ -11,6 +11,7 @@ import numpy as np
 
 from sim.gauges import GAUGES
 from sim.laws import jkr
+from sim.laws.schallamach import steady_fraction
 from sim.parts.shear import Auto
 from sim.scenario import Record, Scenario, Source, quantities
 from sim.store import Plan, work
@@ -20,6 +21,8 @@ from sim.store import Plan, work
 _START, _STEP, _PAIR, _COUNTED, _PART = 1.5, 100e-6, 20e-9, 8e-6, 5e-3
 _PROGRAM_BYTES = 200e6
 _TOLERANCE = 0.05
+#: Share of the mean stress above which the rms of the fluctuations is warned of: some 2 % of the area is reversed.
+_MOST_REVERSED = 0.5
 _LARGEST_SHARE = 0.3
 _MOST_LATTICES = 8
 _PARTS = ("drive", "bonds", "shear", "contact")
@@ -254,10 +257,31 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             said.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
         if fluctuating and _longest_wave(point) > 2.0 * radius:
             said.append("the longest waves exceed the contact, but the stored energy is that of many waves")
+        if fluctuating and _reversed_friction(point) > _MOST_REVERSED:
+            said.append(
+                f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
+            )
+        pulled = min(value for value in (point.contact.load, point.contact.indentation) if value is not None) < 0.0
+        if pulled and point.varies["shear"]:
+            said.append("under tension detachment is a first passage: take clock steps well below the memory")
         off = (abs(value) for name, value in point.process.known_errors().items() if name.startswith("cell_error"))
         if max(off, default=0.0) > _TOLERANCE:
             said.append(f"the cell is off by more than {_TOLERANCE:.0%}: a larger cell or more points bring it closer")
     return [(text,) for text in dict.fromkeys(said)]
+
+
+def _reversed_friction(point: Scenario) -> float:
+    """Largest ratio of the rms of the fluctuations to the mean stress of the bonds over the run; 0 without a stress."""
+    if not point.bonds.stress > 0.0:
+        return 0.0
+    rms, duration, ratios = math.sqrt(point.shear.spectrum.variance), point.clock.duration, [0.0]  # type: ignore[union-attr]
+    for time in np.linspace(0.0, duration, 41):
+        speed = point.drive.motion(0, float(time), float(time), duration).speed
+        critical = getattr(point.bonds, "critical_speed", None)
+        stress = point.bonds.stress * (steady_fraction(speed, critical) if critical else np.ones(1))
+        growth = point.fluctuations.growth.factor(speed, stress)  # type: ignore[union-attr]
+        ratios.append(float(np.max(rms * growth / stress)))
+    return max(ratios)
 
 
 def _longest_wave(point: Scenario) -> float:

@@ -91,6 +91,11 @@ class ModalProcess:
         return 0.5 * self.modes.energies(self.shear_modulus, self.poisson_ratio)
 
     @cached_property
+    def deviation(self) -> np.ndarray:
+        """Standard deviation of the stress of each pair, shape (pairs,) [Pa]."""
+        return np.sqrt(self.modes.variance)
+
+    @cached_property
     def wavenumber(self) -> np.ndarray:
         """\\|q\\| of each pair [rad/m]."""
         return np.hypot(self.modes.qx, self.modes.qy)
@@ -103,7 +108,7 @@ class ModalProcess:
 
     def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
         growth = self.growth.factor(motion.speed, stress)
-        size = _mean_size(growth, state.growth) if self.growth.relaxing else np.ones(1)
+        size = _renewed_size(self.growth, state, motion, growth)
         exponents = self.memory.exponents(self.wavenumber, motion)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
         return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
@@ -135,9 +140,12 @@ class ModalProcess:
 
     def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
         """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
-        amplitude = state.amplitude[:, 0] + 1j * state.amplitude[:, 1]
         scale = np.ones(1) if self.growth.relaxing else state.growth
-        return amplitude * (0.5 * np.sqrt(self.modes.variance)) * scale[:, np.newaxis]
+        size = 0.5 * scale[:, np.newaxis] * self.deviation
+        amplitude = np.empty((len(state.amplitude), self.pairs), dtype=complex)
+        np.multiply(state.amplitude[:, 0], size, out=amplitude.real)
+        np.multiply(state.amplitude[:, 1], size, out=amplitude.imag)
+        return amplitude
 
     def known_errors(self) -> dict[str, float]:
         """The cell's own errors against the infinite plane, and the spreads of one realisation."""
@@ -167,8 +175,8 @@ class FixedProcess(ModalProcess):
         return growth**2 * (2.0 * np.sum(self.weights))
 
     def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
-        modulus = np.sqrt(0.5 * self.modes.variance)
-        return np.exp(1j * state.amplitude) * modulus * state.growth[:, np.newaxis]
+        size = np.sqrt(0.5) * state.growth[:, np.newaxis] * self.deviation
+        return size * np.exp(1j * state.amplitude)
 
     def known_errors(self) -> dict[str, float]:
         fixed = {"realization_spread_variance": 0.0, "realization_spread_energy": 0.0}
@@ -250,7 +258,7 @@ class BandedProcess:
 
     def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
         growth = self.growth.factor(motion.speed, stress)
-        size = _mean_size(growth, state.growth) if self.growth.relaxing else np.ones(1)
+        size = _renewed_size(self.growth, state, motion, growth)
         exponents = self.memory.exponents(self.bands.wavenumber, motion)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
         return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
@@ -304,8 +312,15 @@ def _renew_bands(before, normals, gammas, keep, renew, size, half_weight, after,
         energy[m] = total
 
 
-def _mean_size(growth: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Growth of what a step renews: the mean variance of its two ends, second order in the step."""
+def _renewed_size(law: Growth, state: Fluctuation, motion: Motion, growth: np.ndarray) -> np.ndarray:
+    """Growth of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
+
+    Second order in the step. Its beginning is seen after a jump of the speed; stress has no jumps
+    but under bonds that follow the speed at once.
+    """
+    if not law.relaxing:
+        return np.ones(1)
+    before = state.growth if law.reads_stress else law.factor(motion.first, np.zeros(1))
     return np.sqrt(0.5 * (growth**2 + before**2))
 
 
@@ -320,18 +335,28 @@ class _Maps:
         The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
         e^{iq(x − X)}.
         """
-        grid = Grid(self.modes.cell, self.modes.points)
         first = replace(state, amplitude=state.amplitude[:members])
         if len(state.growth) > 1:
             first = replace(first, growth=state.growth[:members])
-        turn = np.exp(-1j * position[:members, np.newaxis] * self.modes.qx)
-        amplitudes = self.complex_amplitudes(first) * turn * self.modes.cell**2  # type: ignore[attr-defined]
-        half = np.zeros((members, grid.points, grid.points // 2 + 1), dtype=complex)
-        ix, iy = self.modes.ix, self.modes.iy
-        half[:, ix % grid.points, iy] = amplitudes
-        edge = iy == 0  # the column q_y = 0 holds both of a pair
-        half[:, -ix[edge] % grid.points, 0] = amplitudes[:, edge].conj()
-        return grid.inverse(half)
+        lattice = np.arange(-self.grid.points, self.grid.points + 1)
+        turns = np.exp(-2j * np.pi / self.grid.cell * position[:members, np.newaxis] * lattice) * self.grid.cell**2
+        amplitudes = self.complex_amplitudes(first)  # type: ignore[attr-defined]
+        amplitudes *= np.take(turns, self.modes.ix + self.grid.points, axis=1)
+        half = np.zeros((members, self.grid.points * (self.grid.points // 2 + 1)), dtype=complex)
+        half[:, self._places] = amplitudes
+        edge = self.modes.iy == 0  # the column q_y = 0 holds both of a pair
+        half[:, -self.modes.ix[edge] % self.grid.points * (self.grid.points // 2 + 1)] = amplitudes[:, edge].conj()
+        return self.grid.inverse(half.reshape(members, self.grid.points, -1))
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The grid of the map."""
+        return Grid(self.modes.cell, self.modes.points)
+
+    @cached_property
+    def _places(self) -> np.ndarray:
+        """Where each pair stands in the flattened half spectrum."""
+        return self.modes.ix % self.grid.points * (self.grid.points // 2 + 1) + self.modes.iy
 
 
 class MappedProcess(_Maps, ModalProcess):

@@ -28,7 +28,7 @@ model = "table"
 file = "speeds.csv"
 [shear]
 model = "modal"
-points = 24
+points = 26
 spectrum = { model = "tabulated", file = "psd.csv", convention = "persson" }
 memory = { model = "wave", waves = 2.0 }
 growth = { model = "constant" }

@@ -32,9 +32,9 @@ def test_a_block_is_a_power_of_two_of_steps_and_bounded(count):
     assert steps == 1 or steps * count <= BLOCK_NUMBERS
 
 
-def philox(seed, part, block, member, counters):
+def philox(seed, part, block, member, lane, counters):
     """Words of numpy's own generator at an address, shape (4, counters)."""
-    key, counter = np.array([seed, part], dtype=np.uint64), np.array([0, block, member, 0], dtype=np.uint64)
+    key, counter = np.array([seed, part], dtype=np.uint64), np.array([0, block, member, lane], dtype=np.uint64)
     return np.random.Philox(key=key, counter=counter).random_raw(4 * counters).reshape(-1, 4).T
 
 
@@ -46,14 +46,14 @@ def unit(words):
 def test_the_words_are_those_of_numpys_philox(seed, member):
     found = Noise(seed, "bonds", np.array([member])).uniforms(7 * 2**10, 8)
     assert steps_per_block(8) == 2**10
-    words = philox(seed, PARTS["bonds"], 7, member, 1024)
+    words = philox(seed, PARTS["bonds"], 7, member, 256 * 8 + 1, 1024)
     assert np.array_equal(found[0], unit(words).ravel()[:8])
 
 
 def test_the_normals_are_box_and_mullers_of_the_words():
     count = 8192
     found = Noise(11, "shear", np.array([2])).normals(3, count)[0].reshape(2, 4, 1024)
-    words = philox(11, PARTS["shear"], 3, 2, 2048)
+    words = philox(11, PARTS["shear"], 3, 2, 256 * count, 2048)
     for run in range(2):
         u, v = (unit(words[first::2, run * 1024 : (run + 1) * 1024]) for first in (0, 1))
         radius = np.sqrt(-2.0 * np.log(1.0 - u))
@@ -86,3 +86,12 @@ def test_numbers_are_uncorrelated_between_members_and_steps():
     correlations = np.corrcoef(sample.T)[np.triu_indices(400, 1)]
     # 79,800 correlations of 400 numbers each have the standard deviation 1/20; their mean square is 1/400 on average
     assert abs(np.mean(correlations**2) * 400 - 1.0) < 5.0 * np.sqrt(2.0 / correlations.size)
+
+
+def test_numbers_of_another_law_or_layout_are_others():
+    noise = Noise(3, "shear", np.arange(20))
+    # the first normal and the first uniforms of one step, the same words if they shared an address
+    uniform = noise.uniforms(1, 8)
+    for other in (noise.normals(1, 8), noise.gammas(1, np.full(8, 0.5)), noise.uniforms(1, 9)[:, :8]):
+        assert abs(np.corrcoef(uniform.ravel(), np.abs(other).ravel())[0, 1]) < 5.0 / np.sqrt(160)
+    assert not np.any(np.isin(noise.uniforms(1, 9), noise.uniforms(0, 8)))

@@ -85,9 +85,9 @@ def test_an_inline_table_counts_as_in_the_file(tmp_path):
 def test_a_swept_quantity_is_told_from_where_to_where():
     lines = told("uniform_stress")["quantities in SI"]
     assert row(lines, "contact.load")[1:] == ["-0.0003 to 0.016 N", "normal load, compression positive (5 values)"]
-    assert row(lines, "bonds.stress")[1] == "0 to 1e+07 Pa"
+    assert row(lines, "bonds.stress")[1] == "0 to 1e+06 Pa"
     run = told("uniform_stress")["the run"]
-    assert row(run, "sweep")[1] == "6 stress × 5 load = 30 points"
+    assert row(run, "sweep")[1] == "4 stress × 5 load = 20 points"
 
 
 def test_choices_are_told_beside_the_numbers():

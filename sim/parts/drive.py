@@ -7,7 +7,7 @@ step, never the speed times the step, so that parts that live on slip see no ste
 import itertools
 import math
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -22,13 +22,22 @@ _SPEED = Quantity("m/s", "sliding speed", "V")
 _TIME = Quantity("s", "time", "t")
 
 
+class _Piece(NamedTuple):
+    """A stretch of motion: slip [m], path [m], and the speeds at its two ends [m/s]."""
+
+    slip: float
+    path: float
+    first: float
+    last: float
+
+
 class _Prescribed:
     """A drive whose speed is a given function of time; a subclass gives ``pieces``."""
 
     per_member: ClassVar[bool] = False
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
-        """The motion from ``start`` to ``stop`` as pieces (slip [m], path [m], speed at the end [m/s])."""
+    def pieces(self, start: float, stop: float, duration: float) -> list[_Piece]:
+        """The motion from ``start`` to ``stop`` [s] in pieces."""
         raise NotImplementedError
 
     def motion(self, step: int, start: float, stop: float, duration: float) -> Motion:
@@ -38,18 +47,19 @@ class _Prescribed:
             step=step,
             time=stop,
             duration=stop - start,
-            slip=np.array([math.fsum(slip for slip, _, _ in pieces)]),
-            path=np.array([math.fsum(path for _, path, _ in pieces)]),
-            speed=np.array([pieces[-1][2]]),
+            slip=np.array([math.fsum(piece.slip for piece in pieces)]),
+            path=np.array([math.fsum(piece.path for piece in pieces)]),
+            first=np.array([pieces[0].first]),
+            speed=np.array([pieces[-1].last]),
         )
 
 
-def _linear_piece(first: float, last: float, time: float) -> tuple[float, float, float]:
-    """Slip, path and final speed where the speed changes linearly over ``time``."""
+def _linear_piece(first: float, last: float, time: float) -> _Piece:
+    """A piece in which the speed changes linearly over ``time``."""
     slip = 0.5 * (first + last) * time
     if first * last >= 0.0:
-        return slip, abs(slip), last
-    return slip, 0.5 * (first**2 + last**2) / abs(last - first) * time, last
+        return _Piece(slip, abs(slip), first, last)
+    return _Piece(slip, 0.5 * (first**2 + last**2) / abs(last - first) * time, first, last)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -63,9 +73,9 @@ class Steady(_Prescribed):
     speed: Annotated[float, _SPEED] = 0.0
     model: Literal["steady"] = "steady"
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
+    def pieces(self, start: float, stop: float, duration: float) -> list[_Piece]:
         slip = self.speed * (stop - start)
-        return [(slip, abs(slip), self.speed)]
+        return [_Piece(slip, abs(slip), self.speed, self.speed)]
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -94,14 +104,14 @@ class Ramp(_Prescribed):
             )
         return self
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
+    def pieces(self, start: float, stop: float, duration: float) -> list[_Piece]:
         if self.scale == "linear":
             slope = (self.stop - self.start) / duration
             return [_linear_piece(self.start + slope * start, self.start + slope * stop, stop - start)]
         rate = math.log(self.stop / self.start) / duration
         before, after = (self.start * math.exp(rate * time) for time in (start, stop))
         slip = before * math.expm1(rate * (stop - start)) / rate if rate else before * (stop - start)
-        return [(slip, abs(slip), after)]
+        return [_Piece(slip, abs(slip), before, after)]
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -140,16 +150,24 @@ class Table(_Prescribed):
     def _knots(self) -> tuple[np.ndarray, np.ndarray]:
         return np.array(self.time), np.array(self.speed)
 
+    def _snapped(self, time: float, duration: float) -> float:
+        """The row's time where a clock time is meant to be the same but for rounding."""
+        times, _ = self._knots
+        nearest = float(times[np.argmin(np.abs(times - time))])
+        return nearest if abs(nearest - time) <= 1e-9 * duration else time
+
     def _between(self, row: int, time: float) -> float:
         times, speeds = self._knots
         part = (time - times[row]) / (times[row + 1] - times[row])
         return float(speeds[row] + part * (speeds[row + 1] - speeds[row]))
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[tuple[float, float, float]]:
+    def pieces(self, start: float, stop: float, duration: float) -> list[_Piece]:
         times, _ = self._knots
+        start, stop = (self._snapped(time, duration) for time in (start, stop))
         if stop == start:
             row = min(int(np.searchsorted(times, stop, "right")) - 1, len(times) - 2)
-            return [(0.0, 0.0, self._between(row, stop))]
+            speed = self._between(row, stop)
+            return [_Piece(0.0, 0.0, speed, speed)]
         inside = times[(times > start) & (times < stop)]
         edges = np.unique(np.concatenate([[start], inside, [stop]]))
         pieces = []

@@ -15,7 +15,7 @@ from pydantic_core import PydanticCustomError
 
 from sim.bands import Bands, cell_pairs, group
 from sim.memory import Constant, Growth, Memory
-from sim.modes import modes
+from sim.modes import cell_variance, modes
 from sim.processes import BandedProcess, FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
 from sim.quantity import Quantity
 from sim.spectrum import Spectrum
@@ -162,7 +162,8 @@ class Banded(_Fluctuating):
 
     ``tolerance`` bounds what banding adds to the cell's own sum over modes: relative errors of the
     third and fourth cumulant and of the integral correlation time, and the largest difference of the
-    autocorrelation. Mean and variance are exact.
+    autocorrelation; under growth that relaxes also the error of the mean while it does. Mean and
+    variance of the stationary field are exact.
     """
 
     tolerance: _Tolerance = 0.01
@@ -171,7 +172,14 @@ class Banded(_Fluctuating):
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
         side = cell if self.cell is None else self.cell
         recipe = _BandRecipe(
-            self.spectrum, side, self.points, shear_modulus, poisson_ratio, self.memory.power, self.tolerance
+            self.spectrum,
+            side,
+            self.points,
+            shear_modulus,
+            poisson_ratio,
+            self.memory.power,
+            self.tolerance,
+            self.growth.relaxing,
         )
         bands, errors = _grouped(recipe)
         if self.amplitudes == "fixed":
@@ -189,6 +197,7 @@ class _BandRecipe(NamedTuple):
     poisson_ratio: float
     power: int
     tolerance: float
+    relaxing: bool
 
 
 @functools.lru_cache(maxsize=16)  # a sweep over anything else asks for the same bands again and again
@@ -200,11 +209,14 @@ def _grouped(recipe: _BandRecipe) -> tuple[Bands, dict[str, float]]:
     infinite = float(np.asarray(spectrum.surface_energy(recipe.shear_modulus, recipe.poisson_ratio)))
     spread = math.sqrt(float(np.sum(pairs.count * pairs.weight**2)))
     errors = {
+        "cell_error_variance": cell_variance(spectrum, recipe.cell, recipe.points) / spectrum.variance - 1.0
+        if spectrum.variance
+        else 0.0,
         "cell_error_energy": energy / infinite - 1.0 if infinite else 0.0,
         "realization_spread_energy": spread / energy if energy else 0.0,
         "mode_pairs": float(np.sum(pairs.count)),
     }
-    return group(pairs, recipe.power, recipe.tolerance), errors
+    return group(pairs, recipe.power, recipe.tolerance, recipe.relaxing), errors
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
