@@ -106,6 +106,8 @@ def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) ->
     >>> print(len(bands.weight), f"{bands.freedom[0]:.0f} {bands.mean:.3f}")
     1 10000 0.010
     """
+    if not pairs.weight.any():  # a ripple of no amplitude
+        return Bands(np.zeros(1), np.full(1, 2.0), pairs.wavenumber[:1], dict.fromkeys(_ERRORS, 0.0))
     scaled = _Scaled.of(pairs, power, relaxing)
     live = [_Candidate.of(scaled, np.arange(scaled.weight.size), tolerance)]
     heap = [(-live[0].gain, 0)]
@@ -124,6 +126,11 @@ def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) ->
             live.append(_Candidate.of(scaled, part, tolerance))
             heapq.heappush(heap, (-live[-1].gain, len(live) - 1))
 
+
+#: What a grouping tells beside the error of a mean that relaxes.
+_ERRORS = tuple(
+    f"banded_error_{name}" for name in ("third_cumulant", "fourth_cumulant", "correlation_time", "autocorrelation")
+)
 
 #: Number of errors that a candidate's score adds up, each in units of what the tolerance allows.
 _SCORES = 5
@@ -207,12 +214,13 @@ def _merged(scaled: _Scaled, groups: list[NDArray[np.int64]], pairs: Pairs, powe
     s1, s2, _, _, by_rate, *_ = sums
     rate = by_rate / s2
     wavenumber = pairs.wavenumber.max() * (rate ** (1.0 / power) if power else np.ones_like(rate))
-    errors = {
-        "banded_error_third_cumulant": 1.0 - float(np.sum(s2 * (s2 / s1))) / scaled.totals[2],
-        "banded_error_fourth_cumulant": 1.0 - float(np.sum(s2 * (s2 / s1) ** 2)) / scaled.totals[3],
-        "banded_error_correlation_time": 1.0 - float(np.sum(s2 / rate)) / scaled.totals[5],
-        "banded_error_autocorrelation": _relaxation_error(scaled, 1, s2, rate),
-    }
+    found = (
+        1.0 - float(np.sum(s2 * (s2 / s1))) / scaled.totals[2],
+        1.0 - float(np.sum(s2 * (s2 / s1) ** 2)) / scaled.totals[3],
+        1.0 - float(np.sum(s2 / rate)) / scaled.totals[5],
+        _relaxation_error(scaled, 1, s2, rate),
+    )
+    errors = dict(zip(_ERRORS, found, strict=True))
     if scaled.relaxing:
         errors["banded_error_relaxing_mean"] = _relaxation_error(scaled, 0, s1, rate)
     freedom = np.maximum(2.0 * s1 * (s1 / s2), 2.0)
@@ -279,10 +287,10 @@ def cell_pairs(spectrum: Any, cell: float, points: int | None, shear_modulus: fl
     while block == 1 or _LISTED * (block // 3) + block // 6 < reach:
         levels.append(_level(spectrum, cell, reach, block, shear_modulus, poisson_ratio))
         block *= 3
-    found = Pairs(*(np.concatenate(parts) for parts in zip(*levels, strict=True)))
-    if not found.weight.size:
+    pairs = Pairs(*(np.concatenate(parts) for parts in zip(*levels, strict=True)))
+    if not pairs.weight.size:
         modes(spectrum, cell, points)  # says what is wrong
-    return found
+    return pairs
 
 
 def _level(

@@ -307,6 +307,8 @@ def _renew_bands(before, normals, gammas, keep, renew, size, half_weight, after,
             kick = renew[k] * size[m]
             moved = kick * normals[m, k] + keep[k] * math.sqrt(before[m, k])
             x = moved * moved + 2.0 * kick * kick * gammas[m, k]
+            if renew[k] == 0.0:  # nothing has passed: not even a rounding
+                x = before[m, k]
             after[m, k] = x
             total += half_weight[k] * x
         energy[m] = total

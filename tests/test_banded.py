@@ -1,0 +1,492 @@
+"""The banded process: its law at one time, at two times, through jumps of the speed, and its bits.
+
+Every law is held against that of all modes of the cell: the distribution of Σ w Exp(1) by its
+characteristic function, the covariance Σ w² e^(−2∫λdt), and a plain simulation of each mode.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pydantic import ValidationError
+from scenes import CELL, SPECTRUM, scene
+from scipy.interpolate import CubicSpline
+from scipy.stats import expon, kstest, ncx2
+
+from sim import ensemble
+from sim.bands import Bands
+from sim.engine import march, pack, unpack
+from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
+from sim.modes import modes
+from sim.noise import Noise
+from sim.parts import bonds, drive, shear
+from sim.processes import BandedProcess, Fluctuation
+from sim.scenario import Clock
+from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
+
+G, MEMBERS = 1.6e6, 400
+#: Two-sided probability of five standard deviations.
+FIVE_SIGMA = 5.7e-7
+
+SPECTRA = {
+    "band": (SPECTRUM, None, 0.5),
+    "self-affine": (SelfAffine(150e3, 0.8, longest=100e-6, rolloff=60e-6, shortest=8e-6), None, 0.5),
+    "exponential, nu 0.3": (VonKarman(150e3, 30e-6, 0.5), 41, 0.3),
+    "anisotropic, turned": (AnisotropicGaussian(150e3, 20e-6, 60e-6, angle=0.4), 24, 0.5),
+}
+
+
+def process_of(name, memory=None, tolerance=0.01, growth=None):
+    """The banded process of a spectrum, and the weights [J/m^2] and wavenumbers of all modes it stands for."""
+    spectrum, points, poisson_ratio = SPECTRA[name]
+    recipe = shear.Banded(
+        spectrum=spectrum,
+        memory=memory or Slip(length=1.0),
+        growth=growth or Constant(),
+        cell=CELL,
+        points=points,
+        tolerance=tolerance,
+    )
+    found = modes(spectrum, CELL, points)
+    return recipe.process(G, poisson_ratio, 1.0), found.energies(G, poisson_ratio), np.hypot(found.qx, found.qy)
+
+
+def moved(step, path=0.0, duration=1.0):
+    """A step of given length [m] and duration [s]."""
+    return drive.Steady(speed=path / duration).motion(step, 0.0, duration, duration)
+
+
+def starts(process, draws, seed=5):
+    """Stationary draws: the start of the members at many steps, each with numbers of its own."""
+    noise = Noise(seed, "shear", np.arange(MEMBERS))
+    found = [process.start(moved(step), np.zeros(1), noise).energy for step in range(draws // MEMBERS)]
+    return np.concatenate(found)
+
+
+def distribution(weights, shapes, at):
+    """P(Σ weight Gamma(shape) <= x) at increasing x, from the characteristic function Π (1 − i w t)^(−shape).
+
+    Gil-Pelaez (1951) on the midpoints of steps 2π/period (Davies 1973): off by the probability beyond
+    ``period`` − x, here e^-45, and by what |characteristic function| < 1e-14 leaves out.
+    """
+    weights, shapes = np.broadcast_arrays(np.asarray(weights, float), np.asarray(shapes, float))
+    largest, deviation = weights.max(), math.sqrt(np.sum(shapes * weights**2))
+    period = at[-1] + np.sum(shapes * weights) + 12.0 * deviation + 45.0 * largest
+    step, last = 2.0 * math.pi / period, 1.0 / deviation
+    while np.sum(0.5 * shapes * np.log1p((weights * last) ** 2)) < 32.0:
+        last *= 1.1
+    half = np.arange(math.ceil(last / step)) + 0.5
+    logarithm = np.zeros(half.size, dtype=complex)
+    for weight, shape in zip(weights, shapes, strict=True):
+        logarithm -= shape * np.log(1.0 - 1j * weight * step * half)
+    turned = np.exp(logarithm - 1j * np.multiply.outer(at, step * half))
+    return 0.5 - np.sum(turned.imag / half, axis=1) / math.pi
+
+
+def law_of(weights, shapes=1.0):
+    """The distribution function of Σ weight Gamma(shape), tabulated over all that a sample can reach."""
+    mean, deviation = np.sum(weights * shapes), math.sqrt(np.sum(weights**2 * shapes))
+    table = np.linspace(0.0, mean + 25.0 * deviation, 1200)
+    return CubicSpline(table, distribution(weights, shapes, table))
+
+
+def ks_bound(draws):
+    """Distance of an empirical distribution that five standard deviations allow (Kolmogorov's law)."""
+    return math.sqrt(math.log(2.0 / FIVE_SIGMA) / (2.0 * draws))
+
+
+def test_the_inverted_characteristic_function_is_the_hypoexponential_law():
+    weights = np.array([0.3, 0.5, 0.8, 1.1, 1.7, 2.0])
+    at = np.linspace(0.0, 60.0, 200)
+    # P(X > x) = Σ e^(−x/w_i) Π_j≠i w_i/(w_i − w_j) for distinct weights
+    beyond = np.zeros_like(at)
+    for i, weight in enumerate(weights):
+        others = np.delete(weights, i)
+        beyond += np.exp(-at / weight) * np.prod(weight / (weight - others))
+    assert_allclose(distribution(weights, 1.0, at), 1.0 - beyond, rtol=0, atol=1e-11)
+    # equal weights: Erlang, and degrees of freedom that are no whole number: chi-square
+    from scipy.stats import chi2
+
+    assert_allclose(distribution(np.full(1, 0.5), 8.3, at), chi2(16.6).cdf(4.0 * at), rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("tolerance", [0.1, 0.01])
+@pytest.mark.parametrize("name", SPECTRA)
+def test_stationary_draws_follow_the_law_of_all_modes(name, tolerance):
+    draws = 100_000
+    process, weights, _ = process_of(name, tolerance=tolerance)
+    exact, banded = law_of(weights), law_of(process.bands.weight, 0.5 * process.bands.freedom)
+    changed = np.max(np.abs(banded(banded.x) - exact(banded.x)))
+    assert changed < 0.1 * tolerance
+    sample = starts(process, draws)
+    assert kstest(sample, banded).pvalue > FIVE_SIGMA
+    if tolerance == 0.01:
+        assert changed < 0.1 * ks_bound(draws)  # far below what so many draws can see
+        assert kstest(sample, exact).pvalue > FIVE_SIGMA
+    error = np.sqrt(np.sum(weights**2) / draws)
+    assert abs(sample.mean() - weights.sum()) < 5.0 * error
+
+
+def test_one_ripple_is_exponentially_distributed():
+    part = shear.Banded(spectrum=Ripple(amplitude=1e5, wavelength=24e-6), memory=Slip(length=1.0), cell=CELL)
+    sample = starts(part.process(G, 0.5, 1.0), 100_000)
+    exact = 1e5**2 * 24e-6 / (16.0 * np.pi * G)
+    assert kstest(sample, expon(scale=exact).cdf).pvalue > FIVE_SIGMA
+
+
+@pytest.mark.parametrize("name", ["band", "self-affine"])
+def test_the_law_is_the_same_after_many_steps(name):
+    waves = 1.0
+    process, weights, wavenumbers = process_of(name, Wave(waves=waves))
+    path = 0.3 * 2.0 * np.pi * waves / wavenumbers.min()  # the slowest keeps e^-0.6 of its energy's deviation
+    noise = Noise(8, "shear", np.arange(MEMBERS))
+    state, sample = process.start(moved(0), np.zeros(1), noise), []
+    for step in range(1, 4001):
+        state = process.advance(state, moved(step, path), np.zeros(1), noise)
+        if step % 16 == 0:  # by then e^-9.6 of it: the draws count as independent
+            sample.append(state.energy)
+    assert kstest(np.concatenate(sample), law_of(weights)).pvalue > FIVE_SIGMA
+
+
+def lone(freedom, copies=1000):
+    """A process of equal bands of rate 1/s."""
+    bands = Bands(np.ones(copies), np.full(copies, freedom), np.ones(copies), {})
+    return BandedProcess(bands, {}, Time(time=1.0), Constant())
+
+
+def stepped(process, start, durations, seed=1):
+    """X of 25 members and all bands after steps of given ``durations`` [s] from one value."""
+    noise = Noise(seed, "shear", np.arange(25))
+    state = Fluctuation(np.zeros(25), np.ones(1), np.full((25, len(process.bands.weight)), float(start)))
+    for step, duration in enumerate(durations, 1):
+        state = process.advance(state, moved(step, 0.0, duration), np.zeros(1), noise)
+    return state.amplitude.ravel()
+
+
+@pytest.mark.parametrize("durations", [(0.4,), (0.2, 0.2), (0.01, 0.09, 0.3)])
+@pytest.mark.parametrize("start", [0.0, 30.0])
+@pytest.mark.parametrize("freedom", [2.0, 2.7, 40.3])
+def test_any_division_of_a_step_gives_the_noncentral_chi_square_law(freedom, start, durations):
+    found = stepped(lone(freedom), start, durations)
+    keep, renewed = math.exp(-2.0 * 0.4), -math.expm1(-2.0 * 0.4)
+    assert kstest(found / renewed, lambda x: ncx2.cdf(x, freedom, keep * start / renewed)).pvalue > FIVE_SIGMA
+
+
+@pytest.mark.parametrize("ratio", [1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e6])
+@pytest.mark.parametrize("freedom", [2.0, 7.3, 1e5])
+def test_a_step_of_any_length_has_the_exact_moments(freedom, ratio):
+    start = 1.5 * freedom
+    keep, renewed = math.exp(-2.0 * ratio), -math.expm1(-2.0 * ratio)
+    mean = keep * start + renewed * freedom
+    spread = 2.0 * freedom * renewed**2 + 4.0 * renewed * keep * start
+    fourth = 48.0 * (freedom * renewed**4 + 4.0 * renewed**3 * keep * start)  # the fourth cumulant
+    for durations in ((ratio,), (0.5 * ratio, 0.5 * ratio)):
+        change = stepped(lone(freedom), start, durations) - start
+        rounding = 1e-15 * start  # of X itself, where a change is as small
+        assert abs(change.mean() - (mean - start)) < 5.0 * np.sqrt(spread / change.size) + rounding
+        assert abs(change.var() - spread) < 5.0 * np.sqrt((fourth + 2.0 * spread**2) / change.size) + rounding**2
+
+
+@pytest.mark.parametrize("memory", [Slip(length=1e-6), Wave(waves=1.0)])
+def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit(memory):
+    process, _, _ = process_of("self-affine", memory)
+    noise = Noise(5, "shear", np.arange(20))
+    first = process.start(moved(0), np.zeros(1), noise)
+    state = first
+    for step in range(1, 4):
+        state = process.advance(state, moved(step, 0.0), np.zeros(1), noise)
+        assert np.array_equal(state.amplitude, first.amplitude)
+        assert np.array_equal(state.energy, first.energy)
+
+
+def two_times(process, step_of, draws, seed=6):
+    """ΔΓ at the two ends of one step of all draws, shape (2, draws); ``step_of`` a step's number gives its motion."""
+    noise, found = Noise(seed, "shear", np.arange(MEMBERS)), []
+    for pair in range(draws // MEMBERS):
+        before = process.start(moved(2 * pair), np.zeros(1), noise)
+        after = process.advance(before, step_of(2 * pair + 1), np.zeros(1), noise)
+        found.append((before.energy, after.energy))
+    return np.concatenate(found, axis=1)
+
+
+def all_modes(weights, exponents, draws, rng):
+    """The same of every mode by itself: Σ w |a|² with complex amplitudes that keep e^(−exponent)."""
+    pairs, parts = len(weights), []
+    for _ in range(draws // MEMBERS):
+        first, fresh = (
+            (rng.standard_normal((MEMBERS, pairs)) + 1j * rng.standard_normal((MEMBERS, pairs))) / np.sqrt(2.0)
+            for _ in range(2)
+        )
+        second = np.exp(-exponents) * first + np.sqrt(-np.expm1(-2.0 * exponents)) * fresh
+        parts.append([np.sum(weights * np.abs(a) ** 2, axis=1) for a in (first, second)])
+    return np.concatenate(parts, axis=1)
+
+
+def check_joint(found, plain, weights, exponents):
+    """Covariance, mean square change, and quantiles of the product of two times."""
+    draws = found.shape[1]
+    before, after = found - weights.sum()
+    exact = np.sum(weights**2 * np.exp(-2.0 * exponents))
+    assert abs(np.mean(before * after) - exact) < 5.0 * np.std(before * after) / np.sqrt(draws)
+    change = (after - before) ** 2
+    exact = 2.0 * np.sum(weights**2 * -np.expm1(-2.0 * exponents))
+    assert abs(change.mean() - exact) < 5.0 * change.std() / np.sqrt(draws)
+    products, others = found[0] * found[1], plain[0] * plain[1]
+    for share in (0.1, 0.5, 0.9):
+        below = np.mean(products < np.quantile(others, share))
+        assert abs(below - share) < 5.0 * np.sqrt(share * (1.0 - share) * (1 / draws + 1 / plain.shape[1]))
+
+
+@pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1.0, 1e3, 1e6])
+@pytest.mark.parametrize("name", ["time", "slip", "wave", "diffusion"])
+def test_the_joint_law_of_two_times_is_that_of_all_modes(name, ratio):
+    memory = {"time": Time(time=1e-3), "slip": Slip(length=2e-6), "wave": Wave(waves=0.5)}
+    memory = (memory | {"diffusion": Diffusion(diffusivity=1e-9)})[name]
+    process, weights, wavenumbers = process_of("band", memory, tolerance=0.001)
+    # the longest wave keeps e^(−ratio) of its amplitude
+    path = {"slip": 2e-6, "wave": 0.5 * 2.0 * np.pi / wavenumbers.min()}.get(name, 0.0)
+    duration = {"time": 1e-3, "diffusion": 1e9 / wavenumbers.min() ** 2}.get(name, 1.0)
+    exponents = ratio * (wavenumbers / wavenumbers.min()) ** memory.power
+    plain = all_modes(weights, exponents, 20_000, np.random.default_rng(3))
+    found = two_times(process, lambda step: moved(step, ratio * path, ratio * duration), 20_000)
+    check_joint(found, plain, weights, exponents)
+
+
+def test_the_joint_law_holds_through_a_jump_of_the_speed():
+    length, slow, fast = 5e-6, 1e-3, 2e-2
+    motion = drive.Table(time=(0.0, 3e-4, 3e-4, 1e-3), speed=(slow, slow, fast, fast))
+    process, weights, _ = process_of("band", Slip(length=length), tolerance=0.003)
+    times = (0.0, 1.5e-4, 4e-4, 5e-4)  # the second step crosses the jump
+    slipped = np.array([0.0, 1.5e-4 * slow, 3e-4 * slow + 1e-4 * fast, 3e-4 * slow + 2e-4 * fast])
+    noise, found = Noise(2, "shear", np.arange(MEMBERS)), []
+    for run in range(50):
+        state = process.start(moved(4 * run), np.zeros(1), noise)
+        energies = [state.energy]
+        for i in range(3):
+            step = motion.motion(4 * run + i + 1, times[i], times[i + 1], 1e-3)
+            state = process.advance(state, step, np.zeros(1), noise)
+            energies.append(state.energy)
+        found.append(energies)
+    found = np.concatenate(found, axis=1)
+    for first in range(4):
+        for second in range(first + 1, 4):
+            exponents = np.full(len(weights), (slipped[second] - slipped[first]) / length)
+            plain = all_modes(weights, exponents, 8000, np.random.default_rng(first + 4 * second))
+            check_joint(found[[first, second]], plain, weights, exponents)
+
+
+def march_energies(part, members, clock, motion, population=None, seed=5):
+    scenario = scene(shear=part, drive=motion, bonds=population or bonds.Unbroken(stress=2e5), clock=clock, seed=seed)
+    states = list(march(scenario, np.arange(members)))
+    return states, np.array([np.broadcast_to(state.shear.energy, members) for state in states])
+
+
+@pytest.mark.parametrize("motion", [drive.Steady(speed=4e-3), drive.Ramp(start=1e-4, stop=2e-2, scale="log")])
+@pytest.mark.parametrize("kind", ["constant", "onset", "stress"])
+def test_growth_multiplies_the_unit_process_at_once(kind, motion):
+    growths = {
+        "constant": Constant(),
+        "onset": Onset(speed=2e-3, width=0.3, floor=0.1),
+        "stress": Stress(reference=1e5),
+    }
+    growth, population = growths[kind], bonds.Steady(critical_speed=2e-3, stress=4e5)
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Wave(waves=1.0)}
+    clock = Clock(duration=5e-3, step=1e-3)
+    _, unit = march_energies(shear.Banded(**recipe), 3, clock, motion, population)
+    states, grown = march_energies(shear.Banded(**recipe, growth=growth), 3, clock, motion, population)
+    for before, after, state in zip(unit, grown, states, strict=True):
+        stress = population.shear_stress(state.bonds)
+        assert_allclose(after, before * growth.factor(state.speed, stress) ** 2, rtol=1e-14, atol=0)
+
+
+def test_relaxing_growth_follows_the_law_of_all_modes_after_a_jump():
+    # g is constant after the jump: equal rates keep the unit field's law, times g0² e^(−2s) + g1² (1 − e^(−2s))
+    growth = Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True)
+    process, weights, _ = process_of("self-affine", Time(time=1e-3), growth=growth)
+    motion = drive.Table(time=(0.0, 1e-3, 1e-3, 1.0), speed=(1e-5, 1e-5, 1.0, 1.0))
+    noise, found = Noise(4, "shear", np.arange(MEMBERS)), []
+    times = (0.0, 1e-3, 1.2e-3, 1.7e-3, 9e-3)
+    for run in range(50):
+        state = process.start(motion.motion(8 * run, 0.0, 0.0, 1.0), np.zeros(1), noise)
+        energies = [state.energy]
+        for i in range(4):
+            state = process.advance(
+                state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), np.zeros(1), noise
+            )
+            energies.append(state.energy)
+        found.append(energies)
+    law = law_of(weights)
+    for time, sample in zip(times, np.concatenate(found, axis=1), strict=True):
+        kept = math.exp(-2.0 * max(time - 1e-3, 0.0) / 1e-3)
+        size = 0.25 * kept + 1.0 * (1.0 - kept)
+        assert abs(sample.mean() - size * weights.sum()) < 5.0 * size * np.sqrt(np.sum(weights**2) / sample.size)
+        assert kstest(sample / size, law).pvalue > FIVE_SIGMA
+
+
+@pytest.mark.parametrize("relaxing", [False, True])
+@pytest.mark.parametrize("memory", [Time(time=2e-3), Slip(length=5e-6), Wave(waves=1.0), Diffusion(diffusivity=1e-9)])
+def test_members_restarts_and_records_leave_every_bit(memory, relaxing):
+    part = shear.Banded(
+        spectrum=SPECTRA["self-affine"][0],
+        cell=CELL,
+        memory=memory,
+        growth=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=relaxing),
+    )
+    parts = {
+        "shear": part,
+        "drive": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
+        "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=40, stress=2e5, start_from="steady"),
+    }
+    scenario, members = scene(5, 6, **parts), 5
+    straight = list(march(scenario, np.arange(members)))
+    for batch in ([3], [4, 3], [0, 3, 200, 10**6]):
+        row = batch.index(3)
+        for together, state in zip(straight, march(scenario, np.array(batch)), strict=True):
+            for one, other in zip(pack(together).values(), pack(state).values(), strict=True):
+                if one.ndim and len(one) == members:
+                    assert np.array_equal(other[row], one[3], equal_nan=True)
+    restarted = list(march(scenario, np.arange(members), unpack(pack(straight[2]))))
+    for one, other in zip(straight[3:], restarted, strict=True):
+        left, right = pack(one), pack(other)
+        assert all(np.array_equal(left[key], right[key], equal_nan=True) for key in left)
+    often = ensemble.run(scenario)
+    seldom = ensemble.run(scene(5, clock=Clock(duration=6e-3, step=1e-3, record=3e-3), **parts))
+    assert np.array_equal(often["fluctuation_energy"].isel(t=[0, 3, 6]).values, seldom["fluctuation_energy"].values)
+    assert np.array_equal(often["fluctuation_energy"].values.T, [state.shear.energy for state in straight])
+
+
+@pytest.mark.parametrize("name", SPECTRA)
+def test_fixed_amplitudes_store_the_cells_mean_at_all_times(name):
+    spectrum, points, _ = SPECTRA[name]
+    growth = Onset(speed=2e-3, width=0.3, floor=0.1)
+    part = shear.Banded(
+        spectrum=spectrum,
+        cell=CELL,
+        points=points,
+        memory=Slip(length=1e-6),
+        growth=growth,
+        amplitudes="fixed",
+        tolerance=0.1,
+    )
+    states, found = march_energies(part, 2, Clock(duration=4e-3, step=1e-3), drive.Ramp(start=1e-4, stop=1e-2))
+    mean = modes(spectrum, CELL, points).energies(G).sum()
+    for state, energy in zip(states, found, strict=True):
+        assert state.shear.energy.shape == (1,)
+        assert_allclose(energy, growth.factor(state.speed, 0.0)[0] ** 2 * mean, rtol=1e-12, atol=0)
+
+
+def test_the_state_holds_one_number_a_band():
+    process, _, _ = process_of("self-affine")
+    state = process.start(moved(0), np.zeros(1), Noise(1, "shear", np.arange(7)))
+    assert state.amplitude.shape == (7, len(process.bands.weight))
+    assert_allclose(state.energy, state.amplitude @ (0.5 * process.bands.weight), rtol=1e-14, atol=0)
+
+
+def test_a_ripple_of_no_amplitude_stores_nothing():
+    part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, memory=Slip(length=1e-6))
+    _, found = march_energies(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=1e-3))
+    assert np.all(found == 0.0)
+
+
+def banded(spectrum=SPECTRUM, **keys):
+    return shear.Banded(spectrum=spectrum, memory=Slip(length=1e-6), **({"cell": CELL} | keys))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        (lambda: banded(tolerance=0.0), "tolerance.*must be above 0, not 0"),
+        (lambda: banded(tolerance=-0.1), "tolerance.*must be above 0, not -0.1"),
+        (lambda: banded(tolerance=1.0), "tolerance.*must be below 1, not 1"),
+        (lambda: banded(tolerance=np.nan), "tolerance.*must be finite; write for example 0.5"),
+        (lambda: banded(tolerance="5 mm"), "tolerance.*which is not a unit of a pure number"),
+        (lambda: banded(cell=0.0), "cell.*must be above 0 m"),
+        (lambda: banded(tolerence=0.1), "tolerence"),
+        (
+            lambda: banded(amplitudes="fixed", growth=Stress(reference=1.0, relaxing=True)),
+            'use amplitudes = "gaussian"',
+        ),
+        (
+            lambda: scene(shear=banded(points=8)),
+            "the shortest wavelength needs at least 9 points, not 8; give more points, a longer shortest wavelength "
+            "or a smaller cell",
+        ),
+        (
+            lambda: scene(shear=banded(Band(1e5, longest=1e-3, shortest=0.9e-3))),
+            "no wave of the spectrum fits the cell of 0.00024 m; make the cell longer",
+        ),
+        (lambda: scene(shear=banded(Gaussian(1e5, 1e-5))), "the spectrum has no shortest wavelength; give points"),
+        (lambda: scene(shear=banded(cell=None), contact=None), "contact"),
+        (lambda: Tabulated((1e5, 2e5), (1.0, -1.0)), r"densities.1\s+must be at least 0 Pa\^2 m\^2, not -1"),
+        (lambda: Tabulated((-1e5, 2e5), (1.0, 1.0)), r"wavenumbers.0\s+must be above 0 rad/m, not -100000"),
+        (lambda: Tabulated((2e5, 1e5), (1.0, 1.0)), "row 2 does not exceed the one before; sort the rows and merge"),
+        (lambda: Tabulated((1e5, 1e5), (1.0, 1.0)), "row 2 does not exceed the one before; sort the rows and merge"),
+        (lambda: Tabulated((1e5, 2e5), (0.0, 0.0)), "every density is zero; give a row with a positive one"),
+    ],
+)
+def test_bad_input_is_refused_with_its_cure(wrong, words):
+    with pytest.raises(ValidationError, match=f"(?s){words}"):
+        wrong()
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("memory", ["slip", "wave"])
+def test_errors_of_a_thousand_seeds_are_standard_normal(tmp_path, memory):
+    """z-scores of mean, variance and covariance over 1000 seeds; their figure lies in the test's folder."""
+    process, weights, wavenumbers = process_of(
+        "self-affine", {"slip": Slip(length=2e-6), "wave": Wave(waves=0.1)}[memory], tolerance=0.001
+    )
+    exponents = 1e-6 * (wavenumbers / (0.2 * np.pi) if memory == "wave" else np.full(len(weights), 1 / 2e-6))
+    mean, variance = weights.sum(), np.sum(weights**2)
+    fourth = 6.0 * np.sum(weights**4) + 3.0 * variance**2
+    scores = {"mean": [], "variance": [], "covariance": []}
+    for seed in range(1000):
+        found = two_times(process, lambda step: moved(step, 1e-6), 2000, seed)
+        before, after = found - mean
+        scores["mean"].append(before.mean() / np.sqrt(variance / 2000))
+        scores["variance"].append((np.mean(before**2) - variance) / np.sqrt((fourth - variance**2) / 2000))
+        products = before * after
+        exact = np.sum(weights**2 * np.exp(-2.0 * exponents))
+        scores["covariance"].append((products.mean() - exact) / (products.std() / np.sqrt(2000)))
+    draw_scores(scores, tmp_path / f"scores_{memory}.png")
+    for name, values in scores.items():
+        values = np.array(values)
+        # the mean of 2000 skewed numbers is off normal by skewness/(6 sqrt 2000): looked at for the mean only
+        assert abs(values.mean()) < 5.0 / np.sqrt(1000) + (0.1 if name == "covariance" else 0.0), name
+        assert abs(values.var() - 1.0) < 5.0 * np.sqrt(2.0 / 1000) + (0.1 if name != "mean" else 0.0), name
+    assert kstest(scores["mean"], "norm").pvalue > FIVE_SIGMA
+
+
+def draw_scores(scores, path):
+    import matplotlib
+
+    matplotlib.use("Agg")
+    from matplotlib import pyplot as plt
+    from scipy.stats import norm
+
+    figure, axes = plt.subplots(1, len(scores), figsize=(4 * len(scores), 3), sharey=True)
+    z = np.linspace(-5.0, 5.0, 200)
+    for axis, (name, values) in zip(axes, scores.items(), strict=True):
+        axis.hist(values, bins=40, density=True)
+        axis.plot(z, norm.pdf(z))
+        axis.set_xlabel(f"z of the {name}")
+    figure.savefig(path)
+    plt.close(figure)
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("tolerance", [0.1, 0.01])
+def test_the_law_holds_on_a_large_cell(tolerance):
+    spectrum = SelfAffine(150e3, 0.8, longest=60e-6, rolloff=24e-6, shortest=CELL / 255)
+    process = shear.Banded(spectrum=spectrum, memory=Wave(waves=1.0), cell=CELL, tolerance=tolerance).process(
+        G, 0.5, 1.0
+    )
+    weights, shapes = np.unique(modes(spectrum, CELL).energies(G), return_counts=True)
+    exact = law_of(weights, shapes)
+    sample = starts(process, 1_000_000)
+    banding = law_of(process.bands.weight, 0.5 * process.bands.freedom)
+    assert kstest(sample, banding).pvalue > FIVE_SIGMA
+    if tolerance == 0.01:
+        assert kstest(sample, exact).pvalue > FIVE_SIGMA
+    assert np.max(np.abs(banding(banding.x) - exact(banding.x))) < 0.02 * tolerance + 1e-6
