@@ -201,11 +201,12 @@ def depths() -> list[Row]:
     for name, members, depth, promise in (
         ("banded, 1 %", 64, shear.Banded(**recipe, tolerance=0.01), "1000 or more"),
         ("banded, 10 %", 64, shear.Banded(**recipe, tolerance=0.1), ""),
+        ("banded, 1 %, one member", 1, shear.Banded(**recipe, tolerance=0.01), ""),
         ("modal", 1, shear.Modal(**recipe), ""),
         ("mapped", 1, shear.Mapped(**recipe), ""),
     ):
         ours = lens(exponent, points, members, depth)
-        repeats = 50 if members > 1 else 1
+        repeats = 50 if isinstance(depth, shear.Banded) else 1
         for other, program, goal in (
             ("numpy, half spectrum drawn", lambda: half.step(exponent), promise),
             ("numpy, through real space", lambda: real.step(exponent), ""),

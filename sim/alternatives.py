@@ -113,7 +113,11 @@ def _alike(one: Scenario, other: Scenario) -> bool:
     a, b = one.process, other.process
     if isinstance(a, BandedProcess) and isinstance(b, BandedProcess):
         return np.array_equal(a.bands.weight, b.bands.weight) and np.array_equal(a.bands.freedom, b.bands.freedom)
-    return isinstance(a, SmoothProcess) and a == b
+    return (
+        isinstance(a, SmoothProcess)
+        and isinstance(b, SmoothProcess)
+        and math.isclose(a.energy, b.energy, rel_tol=1e-12)
+    )
 
 
 def _table(scenario: Scenario, model: str) -> dict[str, Any]:
@@ -160,7 +164,7 @@ def _clocks(own: Setting, left_out: list[str]) -> list[Setting]:
         except (ValidationError, ValueError) as fault:
             left_out.append(f"clock step of {step:g} s: {_reason(fault)}")
             continue
-        label = f"step {engineering(step, 's')}"
+        label = f"{own.label}, step {engineering(step, 's')}"
         found.append(Setting(label, "clock step", scenario, "\n".join(lines), ratio, own.tolerance, own.points))
     return found if len(found) > 1 else []
 
@@ -179,5 +183,5 @@ def _grids(own: Setting, left_out: list[str]) -> list[Setting]:
             left_out.append(f"{points} points: {_reason(fault)}")
             continue
         toml = f"{own.toml}\npoints = {points}"
-        found.append(Setting(f"{points} points", "grid", scenario, toml, 1.0, own.tolerance, points))
+        found.append(Setting(f"{own.label}, {points} points", "grid", scenario, toml, 1.0, own.tolerance, points))
     return found

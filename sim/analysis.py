@@ -121,7 +121,7 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     words = "share of JKR's area lost to"
     found = {
         "lost_to_bonds": _pure((full - bonds_only) / full, f"{words} broken bonds, which are charged first"),
-        f"lost_to_fluctuations{suffix}": _pure((bonds_only - area) / full, f"{words} shear fluctuations, after the bonds"),
+        f"lost_to_fluctuations{suffix}": _pure((bonds_only - area) / full, f"{words} fluctuations, after the bonds"),
     }
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):

@@ -243,6 +243,38 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 @cli.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The netCDF file; default outputs/<name>-converge.nc."
+)
+@click.option("--budget", default="60 s", show_default=True, help="Computing time to share over the rows.")
+@_SET
+def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[str, ...]) -> None:
+    """Speed against error for this scene: every admissible depth, tolerance and clock step against the exact answer."""
+    from sim.document import BadInput
+    from sim.quantity import Quantity
+    from sim.reader import load
+
+    try:
+        seconds = Quantity("s", "budget", above=0).read(budget)
+    except ValueError as fault:
+        raise BadInput([f"--budget {budget}: {fault}"]) from None
+    scene = load(scenario, _overrides(changes))
+    from sim import converge as convergence
+    from sim.durable import explained
+
+    target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
+    found = convergence.converge(scene, seconds)
+    _print_rows(convergence.table(found))
+    click.echo(convergence.recommendation(found))
+    with explained(target.parent):
+        target.parent.mkdir(parents=True, exist_ok=True)
+        found.to_netcdf(target)
+        convergence.figure(found).savefig(target.with_suffix(".png"))
+    click.echo(f"{target}\n{target.with_suffix('.png')}")
+
+
+@cli.command()
 def paper() -> None:
     """Reproduce every equation and number of the paper, one line each with its error; exit 1 if any fails."""
     from sim.paper import checks

@@ -200,10 +200,10 @@ def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit(memory):
         assert np.array_equal(state.energy, first.energy)
 
 
-def two_times(process, step_of, draws, seed=6):
+def two_times(process, step_of, draws, seed=6, members=MEMBERS):
     """ΔΓ at the two ends of one step of all draws, shape (2, draws); ``step_of`` a step's number gives its motion."""
-    noise, found = Noise(seed, "shear", np.arange(MEMBERS)), []
-    for pair in range(draws // MEMBERS):
+    noise, found = Noise(seed, "shear", np.arange(members)), []
+    for pair in range(draws // members):
         before = process.start(moved(2 * pair), np.zeros(1), noise)
         after = process.advance(before, step_of(2 * pair + 1), np.zeros(1), noise)
         found.append((before.energy, after.energy))
@@ -324,6 +324,28 @@ def test_relaxing_growth_follows_the_law_of_all_modes_after_a_jump():
         assert kstest(sample / size, law).pvalue > FIVE_SIGMA
 
 
+def test_relaxing_growth_renews_with_the_mean_variance_of_the_ends_of_a_step():
+    growth = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
+    process, weights, _ = process_of("self-affine", Time(time=1e-3), growth=growth)
+    ramp, times = drive.Ramp(start=5e-4, stop=2e-2), np.linspace(0.0, 4e-3, 4)
+    noise, found = Noise(9, "shear", np.arange(MEMBERS)), []
+    for run in range(50):
+        state = process.start(ramp.motion(8 * run, 0.0, 0.0, 4e-3), np.zeros(1), noise)
+        energies = [state.energy]
+        for i in range(3):
+            motion = ramp.motion(8 * run + i + 1, times[i], times[i + 1], 4e-3)
+            state = process.advance(state, motion, np.zeros(1), noise)
+            energies.append(state.energy)
+        found.append(energies)
+    squares = [growth.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]
+    sizes = [squares[0]]
+    for before, after in zip(squares, squares[1:], strict=False):
+        renewed = -math.expm1(-2.0 * times[1] / 1e-3)
+        sizes.append(sizes[-1] + renewed * (0.5 * (before + after) - sizes[-1]))
+    for size, sample in zip(sizes, np.concatenate(found, axis=1), strict=True):
+        assert abs(sample.mean() - size * weights.sum()) < 5.0 * size * np.sqrt(np.sum(weights**2) / sample.size)
+
+
 @pytest.mark.parametrize("relaxing", [False, True])
 @pytest.mark.parametrize("memory", [Time(time=2e-3), Slip(length=5e-6), Wave(waves=1.0), Diffusion(diffusivity=1e-9)])
 def test_members_restarts_and_records_leave_every_bit(memory, relaxing):
@@ -437,24 +459,25 @@ def test_errors_of_a_thousand_seeds_are_standard_normal(tmp_path, memory):
     process, weights, wavenumbers = process_of(
         "self-affine", {"slip": Slip(length=2e-6), "wave": Wave(waves=0.1)}[memory], tolerance=0.001
     )
-    exponents = 1e-6 * (wavenumbers / (0.2 * np.pi) if memory == "wave" else np.full(len(weights), 1 / 2e-6))
-    mean, variance = weights.sum(), np.sum(weights**2)
-    fourth = 6.0 * np.sum(weights**4) + 3.0 * variance**2
-    scores = {"mean": [], "variance": [], "covariance": []}
+    kept = np.exp(-2e-6 * (wavenumbers / (0.2 * np.pi) if memory == "wave" else np.full(len(weights), 1 / 2e-6)))
+    draws, mean, variance, covariance = 2000, weights.sum(), np.sum(weights**2), np.sum(weights**2 * kept)
+    # E[x²y²] less σ⁴ + 2 cov² is the joint cumulant Σ w⁴ (4 ρ² + 2 ρ⁴) of two squared moduli of correlation ρ²
+    spreads = {
+        "mean": variance,
+        "variance": 2.0 * variance**2 + np.sum(6.0 * weights**4),
+        "covariance": variance**2 + covariance**2 + np.sum(weights**4 * (4.0 * kept + 2.0 * kept**2)),
+    }
+    scores = {name: [] for name in spreads}
     for seed in range(1000):
-        found = two_times(process, lambda step: moved(step, 1e-6), 2000, seed)
-        before, after = found - mean
-        scores["mean"].append(before.mean() / np.sqrt(variance / 2000))
-        scores["variance"].append((np.mean(before**2) - variance) / np.sqrt((fourth - variance**2) / 2000))
-        products = before * after
-        exact = np.sum(weights**2 * np.exp(-2.0 * exponents))
-        scores["covariance"].append((products.mean() - exact) / (products.std() / np.sqrt(2000)))
+        before, after = two_times(process, lambda step: moved(step, 1e-6), draws, seed, members=20) - mean
+        found = {"mean": before, "variance": before**2 - variance, "covariance": before * after - covariance}
+        for name, values in found.items():
+            scores[name].append(values.mean() / np.sqrt(spreads[name] / draws))
     draw_scores(scores, tmp_path / f"scores_{memory}.png")
     for name, values in scores.items():
         values = np.array(values)
-        # the mean of 2000 skewed numbers is off normal by skewness/(6 sqrt 2000): looked at for the mean only
-        assert abs(values.mean()) < 5.0 / np.sqrt(1000) + (0.1 if name == "covariance" else 0.0), name
-        assert abs(values.var() - 1.0) < 5.0 * np.sqrt(2.0 / 1000) + (0.1 if name != "mean" else 0.0), name
+        assert abs(values.mean()) < 5.0 / np.sqrt(values.size), name
+        assert abs(values.var() - 1.0) < 5.0 * np.sqrt((np.mean(values**4) - 1.0) / values.size), name
     assert kstest(scores["mean"], "norm").pvalue > FIVE_SIGMA
 
 
@@ -465,7 +488,7 @@ def draw_scores(scores, path):
     from matplotlib import pyplot as plt
     from scipy.stats import norm
 
-    figure, axes = plt.subplots(1, len(scores), figsize=(4 * len(scores), 3), sharey=True)
+    figure, axes = plt.subplots(1, len(scores), figsize=(4 * len(scores), 3), sharey=True, layout="constrained")
     z = np.linspace(-5.0, 5.0, 200)
     for axis, (name, values) in zip(axes, scores.items(), strict=True):
         axis.hist(values, bins=40, density=True)

@@ -268,14 +268,14 @@ COUNTED = {
     "high band": lambda fine: Band(RMS, 1.1 * fine, fine),
     "narrow high band": lambda fine: Band(RMS, 1.01 * fine, fine),
 }
-LARGE = [700, pytest.param(1500, marks=pytest.mark.verify)]
+LARGE = [704, pytest.param(1500, marks=pytest.mark.verify)]
 
 
 @pytest.mark.parametrize("points", LARGE)
 @pytest.mark.parametrize("name", COUNTED)
 def test_counted_cells_have_the_mean_and_variance_of_all_modes(name, points):
     off = counted_and_listed(COUNTED[name](finest(points)), points)
-    assert np.all(np.abs(off[:2]) < 1e-6)
+    assert np.all(np.abs(off[:2]) < (5e-9, 3e-7))
     # w varies within a block; a band a few pixels wide has pairs at its ends that hold any share of a full one
     allowed = {"narrow high band": 0.1, "high band": 1e-2, "wide band": 1e-5}.get(name, 1e-6)
     assert np.all(np.abs(off[2:]) < allowed)
@@ -324,10 +324,10 @@ def test_far_from_the_origin_a_band_holds_the_energy_of_the_infinite_plane(waves
 
 
 def test_a_counted_cell_is_grouped_like_the_listed_one():
-    spectrum = SelfAffine(RMS, 0.3, 50e-6, 20e-6, finest(700))
-    found = modes(spectrum, CELL, 700)
+    spectrum = SelfAffine(RMS, 0.3, 50e-6, 20e-6, finest(704))
+    found = modes(spectrum, CELL, 704)
     weights, wavenumbers = found.energies(G), np.hypot(found.qx, found.qy)
-    bands = group(cell_pairs(spectrum, CELL, 700, G, 0.5), 2, 0.01)
+    bands = group(cell_pairs(spectrum, CELL, 704, G, 0.5), 2, 0.01)
     lacks, squares, own_rates = relative_errors(weights, (wavenumbers / 1e5) ** 2, bands, 2)
     assert max(lacks.values()) <= 0.01 * (1 + 1e-4)
     for kind, lack in lacks.items():

@@ -423,3 +423,16 @@ def test_the_reader_raises_what_the_command_prints(here):
     with pytest.raises(BadInput) as fault:
         load("bad.toml")
     assert sim("run", "bad.toml").stderr == f"{fault.value}\n"
+
+
+def test_converge_prints_a_table_a_recommendation_and_its_files(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = tmp_path / "scene.toml"
+    path.write_text((Path(cli.__file__).parent / "starter.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    found = CliRunner().invoke(cli.cli, ["converge", str(path), "--budget", "2 s"], catch_exceptions=False)
+    assert found.exit_code == 0
+    assert "banded" in found.output and "tolerance" in found.output
+    assert (tmp_path / "outputs" / "scene-converge.nc").exists()
+    assert (tmp_path / "outputs" / "scene-converge.png").exists()
+    refused = CliRunner().invoke(cli.cli, ["converge", str(path), "--budget", "2 kg"])
+    assert refused.exception is not None and "budget" in str(refused.exception)

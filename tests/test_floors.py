@@ -27,6 +27,9 @@ FLOORS = (
     ("__main__",),
 )
 WING = ("analysis", "plots", "paper")
+#: The study of speed against error: it runs scenes, so it stands on the engine, beside the commands.
+STUDY = ("gammasum", "estimates", "expected", "moments", "alternatives")
+STUDY += ("converge_data", "converge_table", "converge_figure", "converge")
 #: What the wing may read: laws and the spectra with what they stand on, never parts or engine.
 WING_READS = {*FLOORS[0], *FLOORS[1], *FLOORS[2], *FLOORS[3]}
 
@@ -57,7 +60,7 @@ MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py")) if pat
 
 
 def test_every_module_has_a_floor():
-    placed = {name for floor in FLOORS for name in floor} | set(WING)
+    placed = {name for floor in FLOORS for name in floor} | set(WING) | set(STUDY)
     assert placed == set(MODULES)
 
 
@@ -68,8 +71,11 @@ def test_a_module_imports_only_from_floors_below_its_own(name):
         assert other, f"{name} imports the package root"
         if name in WING:
             assert other in WING_READS or other in WING, f"{name} of the wing imports {other}"
+        elif name in STUDY:
+            below = other in WING or height.get(other, len(FLOORS)) <= height["gauges"]
+            assert below or (other in STUDY and STUDY.index(other) < STUDY.index(name)), f"{name} imports {other}"
         elif name == "cli":
-            assert other in WING or height[other] < height[name]
+            assert other in WING + STUDY or height[other] < height[name]
         else:
             assert height[other] < height[name], f"{name} imports {other}, which is not below it"
 
