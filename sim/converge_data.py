@@ -224,7 +224,9 @@ def assembled(
         "quantity": ("quantity", list(QUANTITIES), {"long_name": "quantity"}),
         "statistic": ("statistic", list(STATISTICS), {"long_name": "statistic", "comment": _YARDSTICKS}),
     }
-    return xr.Dataset(variables, coordinates, _attributes(scenario, moments, left_out))
+    found = xr.Dataset(variables, coordinates, _attributes(scenario, moments, left_out))
+    found["t"].encoding["_FillValue"] = None  # the conventions allow a coordinate none
+    return found
 
 
 _YARDSTICKS = (
@@ -239,6 +241,7 @@ def _terms(process: Any) -> int:
 
 def _attributes(scenario: Scenario, moments: list[Moment], left_out: list[str]) -> dict[str, Any]:
     clock, moment = scenario.clock, moments[0]
+    version = importlib.metadata.version("sliding-sim")
     said = ["standard errors by the delta method over members"]
     if moment.pooled:
         said.append(
@@ -249,7 +252,8 @@ def _attributes(scenario: Scenario, moments: list[Moment], left_out: list[str]) 
     return {
         "Conventions": "CF-1.11",
         "title": f"speed against error: {scenario.name}",
-        "sim_version": importlib.metadata.version("sliding-sim"),
+        "history": f"sim converge; sliding-sim {version}",
+        "sim_version": version,
         "seed": str(scenario.seed),
         "model": scenario.shear.model,
         "asked_tolerance": tolerance_of(scenario),
