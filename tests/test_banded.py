@@ -4,6 +4,7 @@ Every law is held against that of all modes of the cell: the distribution of Σ 
 characteristic function, the covariance Σ w² e^(−2∫λdt), and a plain simulation of each mode.
 """
 
+import itertools
 import math
 
 import numpy as np
@@ -339,7 +340,7 @@ def test_relaxing_growth_renews_with_the_mean_variance_of_the_ends_of_a_step():
         found.append(energies)
     squares = [growth.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]
     sizes = [squares[0]]
-    for before, after in zip(squares, squares[1:], strict=False):
+    for before, after in itertools.pairwise(squares):
         renewed = -math.expm1(-2.0 * times[1] / 1e-3)
         sizes.append(sizes[-1] + renewed * (0.5 * (before + after) - sizes[-1]))
     for size, sample in zip(sizes, np.concatenate(found, axis=1), strict=True):

@@ -290,18 +290,13 @@ def test_a_cliff_in_a_table_is_counted_to_a_few_parts_in_ten_thousand():
     assert np.all(np.abs(off[2:]) < 3e-3)
 
 
-def entries_and_peak(spectrum, cell):
+def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
+    cell = 0.24e-3
+    spectrum = SelfAffine(RMS, 0.8, longest=60e-6, rolloff=24e-6, shortest=cell / 8000)
     tracemalloc.start()
     pairs = cell_pairs(spectrum, cell, None, G, 0.5)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
-    return pairs, peak
-
-
-def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
-    cell = 0.24e-3
-    spectrum = SelfAffine(RMS, 0.8, longest=60e-6, rolloff=24e-6, shortest=cell / 8000)
-    pairs, peak = entries_and_peak(spectrum, cell)
     low, high = (limit * cell / (2 * np.pi) for limit in spectrum.support)
     assert_allclose(pairs.count.sum(), 0.5 * np.pi * (high**2 - low**2), rtol=1e-3, atol=0)
     assert len(pairs.weight) < 1e6
@@ -317,7 +312,7 @@ def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
 @pytest.mark.parametrize("waves", [(2000, 2200), (7000, 8000), (7_000_000, 7_070_000)])
 def test_far_from_the_origin_a_band_holds_the_energy_of_the_infinite_plane(waves):
     spectrum = Band(RMS, CELL / waves[0], CELL / waves[1])
-    pairs, _ = entries_and_peak(spectrum, CELL)
+    pairs = cell_pairs(spectrum, CELL, None, G, 0.5)
     # blocks narrower than 1/85 of their wavenumber in 3 × 3 squares: (1/85/3)² / 24 = 6e-7 at the most
     assert_allclose(math.fsum(pairs.weight * pairs.count), spectrum.surface_energy(G), rtol=6e-7, atol=0)
     assert_allclose(pairs.count.sum(), 0.5 * np.pi * (waves[1] ** 2 - waves[0] ** 2), rtol=5e-3, atol=0)
