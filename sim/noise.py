@@ -6,7 +6,8 @@ batch of 64, alone, after a restart or on another machine therefore draws the sa
 The words are those of Philox4x64-10 (Salmon, Moraes, Dror & Shaw, SC11, 2011), equal to numpy's
 ``Philox(...).random_raw``; normals follow by Box & Muller. Both are written without branches or
 calls, so that the compiler uses vector instructions: about three times as fast as numpy's own
-normals, and the same bits on every machine, since only exactly rounded operations occur.
+normals, and the same bits on every machine, since only exactly rounded operations occur (but for
+gammas of shapes between 0.5 and 1, which take the library's exponential).
 """
 
 import math
@@ -55,7 +56,7 @@ class Noise:
     A member's block has the key (seed, part) and the counters (1, 2, ...; block, member, lane); step 0
     is the draw of the start. The lane is 256 × count plus 0 for normals, 1 for uniforms, 2 and more for
     gammas: numbers of another law, or laid out otherwise, are independent. The block in use is kept,
-    which changes no answer.
+    which changes no answer; what is returned is a view into it, good until the next step is asked for.
 
     Examples
     --------
@@ -247,6 +248,9 @@ def _gammas(seed, part, block, members, lane, shapes, numbers):
                     _words(seed, part, block, members[m], other, _U(first + i), again)
                     _box_muller(again[0], again[1], z, rest)
                     y[i] = _gamma(d[i], c[i], z[0], again[2, 0])
-                if law[i] < 1.0:
-                    y[i] *= math.exp(_logarithm(2.0 - _unit(words[3, i])) / law[i])
+                u = 2.0 - _unit(words[3, i])
+                if law[i] == 0.5:
+                    y[i] *= u * u
+                elif law[i] < 1.0:
+                    y[i] *= math.exp(_logarithm(u) / law[i])
                 numbers[m, first + i] = y[i]
