@@ -215,6 +215,14 @@ def depths() -> list[Row]:
     modal_program = lens(exponent, points, 1, shear.Modal(**recipe))
     banded = lens(exponent, points, 64, shear.Banded(**recipe, tolerance=0.01))
     rows.append(compare("banded, 1 %, 512²", banded, "modal", modal_program, "100 or more", 50, 1, 64))
+    shapes = np.tile(0.5 * (shear.Banded(**recipe).process(1.6e6, 0.5, 0.24e-3).bands.freedom - 1.0), (64, 1))
+    generator = np.random.Generator(np.random.Philox(1))
+
+    def numbers() -> None:
+        generator.standard_normal(shapes.shape)
+        generator.standard_gamma(shapes)
+
+    rows.append(compare("banded, 1 %, 512²", banded, "numpy's normals and gammas alone", numbers, "", 50, 50, 64, 64))
     return rows
 
 

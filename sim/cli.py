@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import signal
 import sys
 import time
 from collections.abc import Iterator
@@ -17,6 +18,8 @@ _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE"
 
 def main() -> None:
     """Run the command line; every foreseen trouble ends in one message and its exit code."""
+    for order in (signal.SIGTERM, signal.SIGHUP):  # schedulers stop a run by these
+        signal.signal(order, signal.default_int_handler)
     try:
         cli.main(standalone_mode=False)
     except click.exceptions.Exit as done:

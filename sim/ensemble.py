@@ -81,7 +81,9 @@ def run(
     plan = Plan.of(scenario)
     if to is None:
         return _in_memory(plan, progress)
-    target = Path(to)
+    target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
+    if target.exists() and not target.is_file():
+        raise OutputExists(f"{target} is no plain file; name another output (-o)")
     if target.exists() and not replace:
         raise OutputExists(f"{target} exists; replace it (--force) or name another output (-o)")
     with explained(target.parent):
@@ -185,10 +187,12 @@ def _held(target: Path) -> Iterator[Path]:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
             raise OutputBusy(f"another run is writing {target}; wait for it or name another output") from None
-        for left in folder.glob("*.npz"):  # of a run that was cut off: there is no resuming yet
+        for left in folder.glob("*.npz"):  # of a run that was killed: there is no resuming yet
             left.unlink()
-        yield folder
-        shutil.rmtree(folder)
+        try:
+            yield folder
+        finally:
+            shutil.rmtree(folder, ignore_errors=True)
     finally:
         lock.close()
 

@@ -95,7 +95,7 @@ class Parts(Protocol):
 
     def save(self, name: str, arrays: dict[str, np.ndarray]) -> None: ...
 
-    def load(self, name: str) -> dict[str, np.ndarray]: ...
+    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]: ...
 
 
 class MemoryParts(dict):
@@ -104,8 +104,8 @@ class MemoryParts(dict):
     def save(self, name: str, arrays: dict[str, np.ndarray]) -> None:
         self[name] = arrays
 
-    def load(self, name: str) -> dict[str, np.ndarray]:
-        return self[name]
+    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]:
+        return {key: array for key, array in self[name].items() if key.startswith(beginning)}
 
 
 @dataclass(frozen=True)
@@ -120,9 +120,10 @@ class PartFiles:
         with explained(self.folder):
             write_whole(self.folder / f"{name}.npz", buffer.getbuffer())
 
-    def load(self, name: str) -> dict[str, np.ndarray]:
+    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]:
+        """The arrays whose names begin so, without reading the others."""
         with explained(self.folder), np.load(self.folder / f"{name}.npz", allow_pickle=False) as arrays:
-            return dict(arrays)
+            return {key: arrays[key] for key in arrays.files if key.startswith(beginning)}
 
 
 def write_dataset(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
@@ -312,16 +313,17 @@ def _trajectories(file: netCDF4.Dataset, plan: Plan, parts: Parts, gauge: Gauge)
             time = slice(records.start, records.stop)
             if _per_member(plan, gauge):
                 for group, members in enumerate(plan.groups()):
-                    values = parts.load(part_name(number, group, index))[gauge.name]
+                    values = parts.load(part_name(number, group, index), gauge.name)[gauge.name]
                     variables[gauge.name][(*where, slice(members[0], members[-1] + 1), time)] = values
             elif plan.varies(gauge):
                 loaded = [
-                    parts.load(part_name(number, group, index))[gauge.name] for group in range(len(plan.groups()))
+                    parts.load(part_name(number, group, index), gauge.name)[gauge.name]
+                    for group in range(len(plan.groups()))
                 ]
                 for statistic, values in pooled(loaded).items():
                     variables[f"{gauge.name}_{statistic}"][(*where, time)] = values
             else:
-                values = parts.load(part_name(number, 0, index))[gauge.name]
+                values = parts.load(part_name(number, 0, index), gauge.name)[gauge.name]
                 variables[gauge.name][(*where, time)] = values[0]
 
 
@@ -365,8 +367,8 @@ def _maps(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
         where = np.unravel_index(number, _sweep_shape(plan)) if plan.scenario.sweep else ()
         for index in range(len(plan.stretches(point))):
             for group, members in enumerate(plan.groups()):
-                part = parts.load(part_name(number, group, index))
-                for name in (n for n in part if n.startswith("map.")):
+                part = parts.load(part_name(number, group, index), "map.")
+                for name in part:
                     snapshot, mapped = int(name.removeprefix("map.")), part[name]
                     rows = slice(members[0], members[0] + len(mapped))
                     variable[(*where, rows, snapshot)] = mapped
