@@ -85,10 +85,13 @@ def run(
     if target.exists() and not force:
         _fail(f"{target} exists; replace it with --force or name another output with -o", EXISTS)
 
-    from sim import ensemble, store
+    from sim import ensemble, preview, store
 
     began = time.time()
-    with _progress(ensemble.work(store.Plan.of(scene)), quiet) as advance:
+    plan = store.Plan.of(scene)
+    for remark in [] if quiet else preview.remarks(plan):
+        click.echo(f"note: {remark}", err=True)
+    with _progress(ensemble.work(plan), quiet) as advance:
         ensemble.run(scene, target, replace=force, progress=advance)
     ensemble.write_log(target, began, sys.argv[1:])
     if not quiet:

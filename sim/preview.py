@@ -242,6 +242,11 @@ def _percent(values: list[float]) -> str:
     return f"{100.0 * value:+.2g} %" if abs(value) > 1e-9 else "none"
 
 
+def remarks(plan: Plan) -> list[str]:
+    """What is to be known before a run, one sentence each."""
+    return [text for (text,) in _warnings(_spread(plan.points, _MOST_LATTICES))]
+
+
 def _warnings(points: Sequence[Scenario]) -> Rows:
     """What the theory or the cell cannot hold, and what is assumed."""
     said: list[str] = []
