@@ -269,6 +269,9 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
         pulled = min(value for value in (point.contact.load, point.contact.indentation) if value is not None) < 0.0
         if pulled and point.varies["shear"]:
             said.append("under tension detachment is a first passage: take clock steps well below the memory")
+        smallest = getattr(getattr(point.fluctuations, "spectrum", None), "support", (0.0,))[0]
+        if hasattr(point.fluctuations, "cell") and 2.0 * math.pi > _cell(point) * smallest > 0.0:
+            said.append("the spectrum has waves longer than the cell, which are missing: give a larger shear.cell")
         off = (abs(value) for name, value in point.process.known_errors().items() if name.startswith("cell_error"))
         if max(off, default=0.0) > _TOLERANCE:
             said.append(f"the cell is off by more than {_TOLERANCE:.0%}: a larger cell or more points bring it closer")

@@ -6,7 +6,7 @@ A process is a depth of ``parts.shear`` on a given solid and cell.
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -59,8 +59,30 @@ class SmoothProcess:
         return {}
 
 
+class _Renewing:
+    """What processes share that renew part of themselves at each step: the start is a whole renewal."""
+
+    memory: Memory
+    growth: Growth
+    wavenumber: Any
+    _empty: Any
+    _renewed: Any
+
+    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        size = growth if self.growth.relaxing else np.ones(1)
+        return self._renewed(self._empty(len(noise.members)), np.zeros(1), np.ones(1), size, growth, motion.step, noise)
+
+    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, stress)
+        size = _renewed_size(self.growth, state, motion, growth)
+        exponents = self.memory.exponents(self.wavenumber, motion)
+        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
+        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
+
+
 @dataclass(frozen=True)
-class ModalProcess:
+class ModalProcess(_Renewing):
     """Every Fourier mode of the cell as a complex Ornstein-Uhlenbeck process.
 
     Notes
@@ -100,18 +122,8 @@ class ModalProcess:
         """\\|q\\| of each pair [rad/m]."""
         return np.hypot(self.modes.qx, self.modes.qy)
 
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        size = growth if self.growth.relaxing else np.ones(1)
-        empty = np.zeros((len(noise.members), 2, self.pairs))
-        return self._renewed(empty, np.zeros(1), np.ones(1), size, growth, motion.step, noise)
-
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        size = _renewed_size(self.growth, state, motion, growth)
-        exponents = self.memory.exponents(self.wavenumber, motion)
-        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
+    def _empty(self, members: int) -> np.ndarray:
+        return np.zeros((members, 2, self.pairs))
 
     def _renewed(
         self,
@@ -219,7 +231,7 @@ def _renew(before, normals, keep, renew, size, weights, after, energy):
 
 
 @dataclass(frozen=True)
-class BandedProcess:
+class BandedProcess(_Renewing):
     """ΔΓ as a sum of squared Ornstein-Uhlenbeck processes, one for each band of modes.
 
     Notes
@@ -250,18 +262,13 @@ class BandedProcess:
         """Shapes of the gamma numbers, shape (bands,)."""
         return 0.5 * (self.bands.freedom - 1.0)
 
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        size = growth if self.growth.relaxing else np.ones(1)
-        empty = np.zeros((len(noise.members), self.bands.weight.size))
-        return self._renewed(empty, np.zeros(1), np.ones(1), size, growth, motion.step, noise)
+    @property
+    def wavenumber(self) -> np.ndarray:
+        """Where a mode has each band's rate [rad/m]."""
+        return self.bands.wavenumber
 
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
-        size = _renewed_size(self.growth, state, motion, growth)
-        exponents = self.memory.exponents(self.bands.wavenumber, motion)
-        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
+    def _empty(self, members: int) -> np.ndarray:
+        return np.zeros((members, self.bands.weight.size))
 
     def _renewed(
         self,

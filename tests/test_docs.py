@@ -35,4 +35,6 @@ def test_names_of_code_in_the_pages_exist(page):
             except ModuleNotFoundError:
                 module = module.rpartition(".")[0]
         for part in name[len(module) + 1 :].split(".") if name != module else []:
+            assert hasattr(found, part), name
             found = getattr(found, part)
+        assert found is not None, name

@@ -200,3 +200,15 @@ def test_a_depth_chosen_by_the_scene_is_named_with_its_reason():
     with_memory, without = (preview(scene(shear=SHEARS[f"auto {name} memory"])) for name in ("with", "without"))
     assert "→ banded" in with_memory and "a memory is given" in with_memory
     assert "→ mean" in without and "no memory is given" in without
+
+
+def test_waves_longer_than_the_cell_are_told():
+    from scenes import CELL, SHEARS, SPECTRUM, scene
+
+    from sim.memory import Slip
+    from sim.parts import shear
+
+    for cell, told_of in ((CELL, False), (0.4 * CELL, True)):
+        part = shear.Banded(spectrum=SPECTRUM, cell=cell, memory=Slip(length=1e-6))
+        assert ("longer than the cell" in preview(scene(shear=part))) == told_of
+    assert "longer than the cell" not in preview(scene(shear=SHEARS["modal ripple"]))
