@@ -24,6 +24,7 @@ from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Clock, Ensemble, Scenario
 from sim.spectrum import Gaussian, SelfAffine, VonKarman
+from sim.traction import Traction
 
 TURNS = 31
 SPECTRUM = VonKarman(rms=150e3, length=5e-6, hurst=0.8)
@@ -112,7 +113,7 @@ def modal() -> list[Row]:
     scenario = scene(1, shear=recipe)
     process, noise = scenario.process, Noise(1, "shear", np.arange(1))
     motion = scenario.drive.motion(0, 0.0, 0.0, 0.2)
-    stress = np.zeros(1)
+    stress = Traction.of_stress(np.zeros(1))
     state = {"now": process.start(motion, stress, noise), "step": 0}
 
     def ours() -> None:
@@ -169,7 +170,7 @@ def step() -> list[Row]:
 
     def alone() -> None:
         moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
-        scenario.process.advance(fluctuation, moved, np.zeros(1), noise)
+        scenario.process.advance(fluctuation, moved, Traction.of_stress(np.zeros(1)), noise)
 
     return [compare("engine step, modal 256²", whole, "its modes alone", alone, "", 4)]
 
@@ -181,7 +182,7 @@ LENS = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=1
 def lens(exponent: float, points: int, members: int, recipe: shear.Modal | shear.Banded) -> Callable:
     """A program that advances ΔΓ of a lens's cell by one step, for a batch of members."""
     process, noise = recipe.process(1.6e6, 0.5, 0.24e-3), Noise(1, "shear", np.arange(members))
-    rest, stress, counter = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), np.zeros(1), itertools.count(1)
+    rest, stress, counter = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), Traction.of_stress(np.zeros(1)), itertools.count(1)
     state = [process.start(rest, stress, noise)]
 
     def program() -> None:
@@ -231,7 +232,7 @@ def maps() -> list[Row]:
     points, cell, spectrum = 256, 0.24e-3, Gaussian(rms=1e5, length=12e-6)
     recipe = shear.Mapped(spectrum=VonKarman(rms=1e5, length=12e-6, hurst=0.8), cell=cell, points=points, memory=SLIP)
     process, noise = recipe.process(1.6e6, 0.5, cell), Noise(1, "shear", np.arange(1))
-    rest, stress = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), np.zeros(1)
+    rest, stress = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), Traction.of_stress(np.zeros(1))
     state, counter = [process.start(rest, stress, noise)], itertools.count(1)
     generator, numbers = np.random.Generator(np.random.Philox(1)), np.empty(2 * process.pairs)
     half = np.ones((points, points // 2 + 1), dtype=complex)

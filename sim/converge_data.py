@@ -122,7 +122,7 @@ def filled(chosen: Sequence[Setting], runs: list[Run], moments: list[Moment], la
         known[place] = laws.known(setting, number) - exact
     yard = _yardsticks(reference)
     value, error, sem, known = (_over(numbers, yard) for numbers in (measured, error, sem, known))
-    if not chosen[0].scenario.bonds.per_member:  # to first order in ΔΓ the radius remembers as long as it does
+    if not chosen[0].scenario.population.per_member:  # to first order in ΔΓ the radius remembers as long as it does
         follows = np.isfinite(known[..., 1, 0]) & np.isnan(known[..., 1, 5])
         known[..., 1, 5] = np.where(follows, known[..., 0, 5], known[..., 1, 5])
     return Filled(measured, value, _over(reference, yard), error, np.where(np.isnan(error), np.nan, sem), known)

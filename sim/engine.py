@@ -4,17 +4,18 @@ drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(f
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from sim.motion import Motion
 from sim.noise import Noise
-from sim.parts.bonds import Population
+from sim.parts.bonds import STATES
 from sim.parts.contact import Touch
 from sim.processes import Fluctuation
 from sim.scenario import Scenario
+from sim.tracks import Tracks
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class State:
     step: int
     position: np.ndarray
     speed: np.ndarray
-    bonds: Population
+    bonds: Any
     shear: Fluctuation
     contact: Touch
 
@@ -47,9 +48,8 @@ class Dice:
 def start(scenario: Scenario, dice: Dice) -> State:
     """The state at t = 0."""
     motion = scenario.drive.motion(0, 0.0, 0.0, scenario.clock.duration)
-    bonds = scenario.bonds.start(motion, dice.bonds)
-    stress = scenario.bonds.shear_stress(bonds)
-    shear = scenario.process.start(motion, stress, dice.shear)
+    bonds = scenario.population.start(motion, dice.bonds)
+    shear = scenario.process.start(motion, scenario.population.traction(bonds), dice.shear)
     work = _work_left(scenario, bonds, shear)
     contact = scenario.contact.start(work, scenario.sphere.radius, scenario.solid.contact_modulus)
     return State(0, np.zeros(1), motion.speed, bonds, shear, contact)
@@ -58,15 +58,15 @@ def start(scenario: Scenario, dice: Dice) -> State:
 def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     """The state one clock step later."""
     motion = _motion(scenario, state.step + 1)
-    bonds = scenario.bonds.advance(state.bonds, motion, dice.bonds)
-    stress = scenario.bonds.shear_stress(bonds)
-    shear = scenario.process.advance(state.shear, motion, stress, dice.shear)
+    over = scenario.population.over(state.bonds, state.contact.radius)
+    bonds = scenario.population.advance(over, motion, dice.bonds)
+    shear = scenario.process.advance(state.shear, motion, scenario.population.traction(bonds), dice.shear)
     work = _work_left(scenario, bonds, shear)
     contact = scenario.contact.advance(state.contact, work, scenario.sphere.radius, scenario.solid.contact_modulus)
     return State(motion.step, state.position + motion.slip, motion.speed, bonds, shear, contact)
 
 
-def march(scenario: Scenario, members: np.ndarray, state: State | None = None) -> Iterator[State]:
+def march(scenario: Scenario, members: np.ndarray, state: State | None = None, keep: bool = True) -> Iterator[State]:
     """Advance a batch of members to the end of the run, yielding the state after every step.
 
     Parameters
@@ -77,6 +77,9 @@ def march(scenario: Scenario, members: np.ndarray, state: State | None = None) -
         Absolute numbers of the members, which address their noise.
     state : State, optional
         Where to go on from; without it the march starts at t = 0 and yields that state first.
+    keep : bool
+        Whether a state stays good after the next has been asked for. Without it large arrays (those of
+        tracked bonds) are handed on from state to state, which saves a copy of them at each step.
 
     Yields
     ------
@@ -88,8 +91,15 @@ def march(scenario: Scenario, members: np.ndarray, state: State | None = None) -
         state = start(scenario, dice)
         yield state
     while state.step < scenario.clock.steps:
-        state = advance(scenario, state, dice)
+        state = advance(scenario, _copied(state) if keep else state, dice)
         yield state
+
+
+def _copied(state: State) -> State:
+    """The state with bonds of its own, so that the next step leaves those it was made from alone."""
+    if not isinstance(state.bonds, Tracks):
+        return state
+    return replace(state, bonds=Tracks(*(getattr(state.bonds, item.name).copy() for item in fields(Tracks))))
 
 
 def _motion(scenario: Scenario, step: int) -> Motion:
@@ -97,9 +107,9 @@ def _motion(scenario: Scenario, step: int) -> Motion:
     return scenario.drive.motion(step, clock.time(step - 1), clock.time(step), clock.duration)
 
 
-def _work_left(scenario: Scenario, bonds: Population, shear: Fluctuation) -> np.ndarray:
+def _work_left(scenario: Scenario, bonds: Any, shear: Fluctuation) -> np.ndarray:
     """w = Δγ(bond fraction) − χ ΔΓ [J/m^2]."""
-    bonded = scenario.adhesion.work_of_bonds(scenario.bonds.fraction(bonds))
+    bonded = scenario.adhesion.work_of_bonds(scenario.population.fraction(bonds))
     return np.asarray(bonded - scenario.fluctuations.paid_by_adhesion * shear.energy)
 
 
@@ -111,15 +121,33 @@ def pack(state: Any, prefix: str = "") -> dict[str, np.ndarray]:
         if is_dataclass(value):
             arrays |= pack(value, f"{prefix}{item.name}.")
         else:
-            arrays[prefix + item.name] = np.asarray(value)
+            arrays[prefix + item.name] = np.array(value)
     return arrays
 
 
 def unpack(arrays: dict[str, np.ndarray]) -> State:
     """The state that ``pack`` took apart."""
-    inner = {"bonds": Population, "shear": Fluctuation, "contact": Touch}
-    parts = {
-        name: kind(**{item.name: arrays[f"{name}.{item.name}"] for item in fields(kind)})
-        for name, kind in inner.items()
-    }
-    return State(int(arrays["step"]), arrays["position"], arrays["speed"], **parts)
+    parts: dict[str, dict[str, np.ndarray]] = {"bonds": {}, "shear": {}, "contact": {}}
+    for name, array in arrays.items():
+        part, _, rest = name.partition(".")
+        if rest:
+            parts[part][rest] = array
+    names = {key.partition(".")[0] for key in parts["bonds"]}
+    kind = next(kind for kind in STATES if {item.name for item in fields(kind)} == names)
+    return State(
+        int(arrays["step"]),
+        arrays["position"],
+        arrays["speed"],
+        _assembled(kind, parts["bonds"]),
+        _assembled(Fluctuation, parts["shear"]),
+        _assembled(Touch, parts["contact"]),
+    )
+
+
+def _assembled(kind: Any, arrays: dict[str, np.ndarray]) -> Any:
+    """A state of a part from its arrays, those of a state inside it by dotted names."""
+    values = {}
+    for item in fields(kind):
+        inner = {key.partition(".")[2]: array for key, array in arrays.items() if key.startswith(f"{item.name}.")}
+        values[item.name] = _assembled(item.type, inner) if inner else arrays[item.name]
+    return kind(**values)

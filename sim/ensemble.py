@@ -101,7 +101,7 @@ def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None
     for number, point in enumerate(plan.points):
         for group, members in enumerate(plan.groups()):
             stretches = plan.stretches(point)
-            states = march(point, members)
+            states = march(point, members, keep=False)
             for index, records in enumerate(stretches):
                 arrays = _record(plan, point, members, states, records, progress)
                 parts.save(part_name(number, group, index), arrays)

@@ -16,7 +16,7 @@ from sim.bands import cell_pairs
 from sim.estimates import RARE
 from sim.gammasum import GammaSum
 from sim.memory import Constant
-from sim.parts.bonds import Counted, Rate
+from sim.parts.bonds import Cohort, Counted, Rate, Steady, Tracked, Unbroken
 from sim.processes import BandedProcess, FixedProcess, ModalProcess, SmoothProcess
 from sim.scenario import Scenario
 
@@ -133,9 +133,9 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
     """
     part: Any = scenario.fluctuations
     growth, memory = getattr(part, "growth", Constant()), getattr(part, "memory", None)
-    bonds, clock = _mean_bonds(scenario.bonds), scenario.clock
+    bonds, clock = _mean_bonds(scenario.population), scenario.clock
     power = memory.power if memory is not None else 0
-    walked = _walked(steps, refine, growth.relaxing or isinstance(bonds, Rate))
+    walked = _walked(steps, refine, growth.relaxing or not isinstance(bonds, Unbroken | Steady))
     wanted = set((steps * refine).tolist())
     rows: list[tuple[float, float, float, float, Array]] = []
     before, exponent, renewal, size, population = 0, 0.0, 0.0, np.ones(1), None
@@ -165,10 +165,13 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
 
 
 def _mean_bonds(bonds: Any) -> Any:
-    """Bonds whose fraction is the ensemble mean: of counted ones the rate equation gives it exactly."""
+    """Bonds whose fraction is the ensemble mean: rate equation and cohorts give that of finite numbers."""
     if isinstance(bonds, Counted):
         shared = ("critical_speed", "healing", "stress", "start_from")
         return Rate(**{name: getattr(bonds, name) for name in shared})
+    if isinstance(bonds, Tracked):
+        shared = ("hazard", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
+        return Cohort(**{name: getattr(bonds, name) for name in shared})
     return bonds
 
 
@@ -199,12 +202,12 @@ class Expectation:
     @cached_property
     def tells_energy(self) -> bool:
         """Whether ΔΓ has this law: not where its growth follows bonds that differ between members."""
-        return not (self.scenario.fluctuations.reads_stress and self.scenario.bonds.per_member)
+        return not (self.scenario.fluctuations.reads_stress and self.scenario.population.per_member)
 
     @cached_property
     def tells_radius(self) -> bool:
         """Whether the radius is a function of ΔΓ and the bonds at one time: not where a contact may open for good."""
-        known = not self.scenario.bonds.per_member or isinstance(self.scenario.bonds, Counted)
+        known = not self.scenario.population.per_member or isinstance(self.scenario.population, Counted)
         return self.tells_energy and known and never_opens(self.scenario)
 
     def energy(self, step: int) -> GammaSum:
@@ -230,7 +233,7 @@ class Expectation:
 
         Counted sites are independent, so their number is binomial at every time.
         """
-        mean, bonds = float(self.course.fraction[self._place(step)]), self.scenario.bonds
+        mean, bonds = float(self.course.fraction[self._place(step)]), self.scenario.population
         if not isinstance(bonds, Counted):
             return np.array([mean]), np.ones(1)
         from scipy.stats import binom  # heavy, and only counted bonds need it
@@ -254,7 +257,7 @@ class Expectation:
 
     def radius_spread(self, step: int) -> float:
         """Roughly the standard deviation of the radius [m], counted bonds included: to see where it is largest."""
-        law, bonds = self.energy(step), self.scenario.bonds
+        law, bonds = self.energy(step), self.scenario.population
         low, high = self.radius(step, law.mean + law.std * np.array([1.0, -1.0]))
         spread = 0.5 * (high - low)
         if isinstance(bonds, Counted):

@@ -71,15 +71,18 @@ class Shape:
             if key in known:
                 yield from self._walk(known[key], inner, (*path, key))
             else:
-                yield self._unknown((*path, key), known, self._keys(options), options, chosen)
+                yield self._unknown((*path, key), known, value, options, chosen)
 
     def _unknown(
-        self, path: Path, known: dict[str, list[Node]], everywhere: dict, options: list[Node], chosen: list[Node]
+        self, path: Path, known: dict[str, list[Node]], given: Node, options: list[Node], chosen: list[Node]
     ) -> Fault:
         key = str(path[-1])
-        if key in everywhere:
-            having = [_tag(option) for option in options if key in option["properties"]]
-            model, others = _tag(chosen[0]), _either(having)
+        if key in self._keys(options):
+            having = [option for option in options if key in option["properties"]]
+            model, others = _tag(chosen[0]), _either(list(map(_tag, having)))
+            if model in map(_tag, having):
+                other = next((name for name in given if name in known and name not in having[0]["properties"]), "model")
+                return Fault(path, f"does not go with {other}; leave one of them out", "foreign")
             return Fault(path, f'is not a key of model = "{model}"; remove it, or choose model = {others}', "foreign")
         elsewhere = [table for table in self._tables() if key in self._keys(self._at(table))]
         closest = [table for table in elsewhere if table[:-1] == path[:-1] or path[: len(table)] == table] or elsewhere
@@ -155,7 +158,11 @@ class Shape:
 
     def _chosen(self, options: list[Node], value: dict[str, Any]) -> list[Node]:
         """The alternative that a table's model names, all of them where it names none."""
-        return [option for option in options if _tag(option) == value.get("model", "")] or options
+        named = [option for option in options if _tag(option) == value.get("model", "")] or options
+        if len({_tag(option) for option in named}) > 1:
+            return named
+        # several tables of one name: the one that takes most of the keys
+        return [max(named, key=lambda option: len(option.get("properties", {}).keys() & value.keys()))]
 
     def _keys(self, options: list[Node]) -> dict[str, list[Node]]:
         keys: dict[str, list[Node]] = {}
@@ -174,6 +181,8 @@ class Shape:
                 return Fault((*path[:-1], "file"), said, "missing")
             return Fault(path, f"is missing; add {self._example(path, options)}", "missing")
         models = [_tag(option) for option in options]
+        if kind == "union_tag_not_found" and not isinstance(given, dict):
+            return Fault(path, _no_table(path, given, models))
         if kind == "union_tag_not_found":
             return Fault((*path, "model"), f"is missing; choose {_either(models)}", "missing")
         if kind == "union_tag_invalid":

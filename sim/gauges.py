@@ -34,7 +34,7 @@ def _area(scene: Scenario, state: State) -> np.ndarray:
 
 
 def _stress(scene: Scenario, state: State) -> np.ndarray:
-    return scene.bonds.shear_stress(state.bonds)
+    return scene.population.shear_stress(state.bonds)
 
 
 def _load(scene: Scenario, state: State) -> np.ndarray:
@@ -49,7 +49,7 @@ GAUGES = (
     Gauge("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.speed),
     Gauge("slider_position", "m", "displacement of the slider", "X", "drive", lambda scene, state: state.position),
     Gauge("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
-          lambda scene, state: scene.bonds.fraction(state.bonds)),
+          lambda scene, state: scene.population.fraction(state.bonds)),
     Gauge("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds", _stress),
     Gauge("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
           "DeltaGamma", "shear", lambda scene, state: state.shear.energy),
@@ -59,7 +59,7 @@ GAUGES = (
     Gauge("contact_area", "m^2", "contact area", "A", "contact", _area),
     Gauge("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact", _load),
     Gauge("indentation", "m", "indentation of the sphere", "delta", "contact", _indentation),
-    Gauge("friction_force", "N", "size of the friction force, shear stress times contact area", "F", "contact",
+    Gauge("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
           lambda scene, state: _stress(scene, state) * _area(scene, state)),
     Gauge("in_contact", "1", "whether the contact is closed", "", "contact",
           lambda scene, state: (state.contact.radius > 0.0).astype(float)),

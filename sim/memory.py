@@ -125,7 +125,7 @@ class Stress:
     model: Literal["stress"] = "stress"
 
     def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
-        return stress / self.reference
+        return np.abs(stress) / self.reference
 
 
 Growth = Annotated[Constant | Onset | Stress, Field(discriminator="model")]

@@ -91,7 +91,7 @@ def stated_times(scenario: Scenario, terms: Terms, coarsest: int = 1) -> list[Mo
 
 def is_stationary(scenario: Scenario) -> bool:
     """Whether all has one distribution from t = 0 on: a steady speed, bonds that start steady, no way to open."""
-    settled = getattr(scenario.bonds, "start_from", "steady") == "steady"
+    settled = getattr(scenario.population, "start_from", "steady") == "steady"
     return isinstance(scenario.drive, Steady) and settled and never_opens(scenario)
 
 
@@ -102,7 +102,7 @@ def _memory(scenario: Scenario, terms: Terms, end: int, coarsest: int) -> tuple[
     law = Expectation(scenario, terms, walked)
     fluctuates = scenario.fluctuations.per_member
     kept = np.array([law.correlation(end - int(k), end) if fluctuates else 0.0 for k in back])
-    if isinstance(scenario.bonds, Counted):
+    if isinstance(scenario.population, Counted):
         kept = np.maximum(kept, np.exp(walked.renewal[walked.steps.searchsorted(end - back)] - walked.renewal[-1]))
     if kept[0] < math.exp(-1.0) or kept[-1] > math.exp(-1.0):
         return coarsest, 0

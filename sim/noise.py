@@ -254,3 +254,42 @@ def _gammas(seed, part, block, members, lane, shapes, numbers):
                 elif law[i] < 1.0:
                     y[i] *= math.exp(_logarithm(u) / law[i])
                 numbers[m, first + i] = y[i]
+
+
+@device
+def words_at(seed, part, c0, c1, c2, c3):
+    """The four words of one counter under the key (seed, part): for draws whose number depends on the state."""
+    k0, k1 = seed, part
+    for _ in range(10):
+        high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0
+        high1, low1 = _high_product(_FACTORS[1], c2), _FACTORS[1] * c2
+        c0, c1, c2, c3 = high1 ^ c1 ^ k0, low1, high0 ^ c3 ^ k1, low0
+        k0, k1 = k0 + _WEYL[0], k1 + _WEYL[1]
+    return c0, c1, c2, c3
+
+
+@device
+def exponential(word):
+    """A standard exponential number from a word, 0 to 36.04."""
+    return -_logarithm(2.0 - _unit(word))
+
+
+@device
+def unit_at(word):
+    """A uniform number in [0, 1) from a word."""
+    return _unit(word) - 1.0
+
+
+@device
+def fill_words(seed, part, first, second, member, lane, count, words):
+    """Two words of each of ``count`` counters (first[i], second[i], member, lane), shape (2, at least count)."""
+    one, two = words[0], words[1]
+    for i in range(count):
+        c0, c1, c2, c3 = first[i], second[i], member, lane
+        k0, k1 = seed, part
+        for _ in range(10):
+            high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0
+            high1, low1 = _high_product(_FACTORS[1], c2), _FACTORS[1] * c2
+            c0, c1, c2, c3 = high1 ^ c1 ^ k0, low1, high0 ^ c3 ^ k1, low0
+            k0, k1 = k0 + _WEYL[0], k1 + _WEYL[1]
+        one[i], two[i] = c0, c1

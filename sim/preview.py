@@ -10,10 +10,12 @@ from typing import Any
 import numpy as np
 
 from sim.gauges import GAUGES
+from sim.hazards import Bell
 from sim.laws import jkr
-from sim.laws.schallamach import steady_fraction
-from sim.parts.shear import Auto
+from sim.laws.schallamach import bell_peak, first_moment_peak
+from sim.parts.bonds import FirstMoment
 from sim.scenario import Record, Scenario, Source, quantities
+from sim.spectrum import BondMade
 from sim.store import Plan, work
 
 # Rough costs of one core, for the estimate only [s]: starting up, a step of a batch, and for each member of it
@@ -24,6 +26,7 @@ _TOLERANCE = 0.05
 #: Share of the mean stress above which the rms of the fluctuations is warned of: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5
 _LARGEST_SHARE = 0.3
+_SETTLED = "in steady sliding at the last speed"
 _MOST_LATTICES = 8
 _PARTS = ("drive", "bonds", "shear", "contact")
 _STATISTICS = 3
@@ -88,19 +91,19 @@ def _depths(plan: Plan) -> Rows:
             why = "in the file" if name in named or not source.text else "left out, so the shallowest"
         for part in parts.values():
             rows.append((name, part.model, why, _meaning(part)))
-        rows += _chosen(plan.points) if name == "shear" else []
+        rows += _chosen(plan.points, name)
     differ = [name for name in _PARTS if any(point.varies[name] for point in plan.points)]
     said = f"differ in {', '.join(differ)}" if differ else "differ in nothing, so one is computed for all"
     return [*rows, ("members", str(plan.scenario.ensemble.members), said)]
 
 
-def _chosen(points: Sequence[Scenario]) -> Rows:
-    """The depths that scenes chose which leave the choice, and why."""
+def _chosen(points: Sequence[Scenario], name: str) -> Rows:
+    """The depths of a part that scenes chose which leave the choice, and why."""
     rows = {}
     for point in points:
-        if isinstance(point.shear, Auto):
-            why = point.shear.why(bool(point.record.maps))
-            rows[point.fluctuations.model] = ("", f"→ {point.fluctuations.model}", "chosen", why)
+        chosen = {"shear": point.fluctuations, "bonds": point.population}.get(name)
+        if chosen is not None and chosen is not getattr(point, name):
+            rows[chosen.model] = ("", f"→ {chosen.model}", "chosen", point.why[name])
     return list(rows.values())
 
 
@@ -195,13 +198,18 @@ def _contact(points: Sequence[Scenario]) -> Rows:
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
     """The spectrum on the infinite plane, and how the cell stands to it."""
     some: list[Any] = [point for point in points if hasattr(point.shear, "spectrum")]
-    spectra = [(point.shear.spectrum, point.solid.effective) for point in some]
-    if not spectra:
+    if not some:
         return []
-    energies = [float(np.asarray(spectrum.surface_energy(*solid))) for spectrum, solid in spectra]
+    powers = [_power(point) for point in some]
+    rms = [(power * point.shear.spectrum.variance) ** 0.5 for power, point in zip(powers, some, strict=True)]
+    energies = [
+        power * float(np.asarray(point.shear.spectrum.surface_energy(*point.solid.effective)))
+        for power, point in zip(powers, some, strict=True)
+    ]
+    when = "at growth 1" if not any(isinstance(point.shear.spectrum, BondMade) for point in some) else _SETTLED
     rows: Rows = [
-        ("rms of the stress", f"{_about([spectrum.variance**0.5 for spectrum, _ in spectra], 'Pa')} at growth 1"),
-        ("stored energy", f"{_about(energies, 'J/m^2')} at growth 1, on the infinite plane"),
+        ("rms of the stress", f"{_about(rms, 'Pa')} {when}"),
+        ("stored energy", f"{_about(energies, 'J/m^2')} {when}, on the infinite plane"),
     ]
     celled: list[Any] = [point for point in points if hasattr(point.shear, "cell")]
     if not celled:
@@ -225,6 +233,15 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
         pairs, sides = _counted([each.qx.size for each in modes]), _counted([each.points for each in modes])
         rows.append(("modes", f"{pairs} pairs on a grid of {sides} points a side"))
     return rows
+
+
+def _power(point: Scenario) -> float:
+    """Factor of the spectrum's variance: 1, or n E[f²] of bonds that make the field, in steady sliding at the end."""
+    if not isinstance(point.shear.spectrum, BondMade):  # type: ignore[union-attr]
+        return 1.0
+    end = point.clock.duration
+    settled = point.population.settled(point.drive.motion(0, end, end, end).speed)
+    return float(settled.frozen[0] + settled.varying[0])
 
 
 def _cell(point: Scenario) -> float:
@@ -256,6 +273,10 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             said.append(
                 f"the contact exceeds {_LARGEST_SHARE} of the sphere's radius: the theory is for small contacts"
             )
+        if isinstance(point.population, FirstMoment) and isinstance(point.population.hazard, Bell):
+            said.append(_overprediction(point.population))
+        if fluctuating and isinstance(point.shear.spectrum, BondMade) and point.shear.paid_by_adhesion > 0.0:
+            said.append("friction has paid for the energy under each bond: with paid_by_adhesion it counts twice")
         if point.solid.poisson_ratio != 0.5:
             said.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         if fluctuating and point.shear.paid_by_adhesion > 0.0:
@@ -278,17 +299,23 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
     return [(text,) for text in dict.fromkeys(said)]
 
 
+def _overprediction(bonds: FirstMoment) -> str:
+    """By how much the first-moment closure overpredicts the friction maximum under Bell's hazard."""
+    recipe = bonds.hazard.zero_force_rate, bonds.hazard.bell_force, bonds.bond_stiffness, bonds.rebinding_rate  # type: ignore[union-attr]
+    excess = first_moment_peak(*recipe, 1.0).stress / bell_peak(*recipe, 1.0).stress - 1.0
+    return f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
+
+
 def _reversed_friction(point: Scenario) -> float:
     """Largest ratio of the rms of the fluctuations to the mean stress of the bonds over the run; 0 without a stress."""
-    if not point.bonds.stress > 0.0:
+    if not point.population.carries_stress or isinstance(point.shear.spectrum, BondMade):  # type: ignore[union-attr]
         return 0.0
     rms, duration, ratios = math.sqrt(point.shear.spectrum.variance), point.clock.duration, [0.0]  # type: ignore[union-attr]
     for time in np.linspace(0.0, duration, 41):
         speed = point.drive.motion(0, float(time), float(time), duration).speed
-        critical = getattr(point.bonds, "critical_speed", None)
-        stress = point.bonds.stress * (steady_fraction(speed, critical) if critical else np.ones(1))
-        growth = point.fluctuations.growth.factor(speed, stress)  # type: ignore[union-attr]
-        ratios.append(float(np.max(rms * growth / stress)))
+        stress = np.abs(point.population.settled(speed).stress)
+        size = rms * point.fluctuations.growth.factor(speed, stress)  # type: ignore[union-attr]
+        ratios += [float(part / whole) for part, whole in np.broadcast(size, stress) if whole > 0.0]
     return max(ratios)
 
 
@@ -305,10 +332,11 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     scene, clock = plan.scenario, plan.points[0].clock
     sample = Plan(scene, tuple(some))
     pairs = max(point.process.pairs for point in some)
+    bonds = max(point.population.numbers for point in some)
     batches = math.ceil(plan.members / sample.group) * len(plan.points)
-    counted = _COUNTED if any(point.bonds.per_member for point in plan.points) else 0.0
+    counted = _COUNTED if any(point.population.per_member for point in plan.points) else 0.0
     seconds = _START + batches * (clock.steps * _STEP + _PART) + work(plan) * (pairs * _PAIR + counted)
-    held = _PROGRAM_BYTES + 8.0 * sample.group * (8.0 * pairs + 2.0 * len(GAUGES) * sample.stretch)
+    held = _PROGRAM_BYTES + 8.0 * sample.group * (8.0 * pairs + bonds + 2.0 * len(GAUGES) * sample.stretch)
     rows: Rows = [
         ("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records"),
         ("members", f"{scene.ensemble.members:,}" + ("" if plan.members > 1 else ", all alike, so one is computed")),

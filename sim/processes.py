@@ -17,6 +17,7 @@ from sim.memory import Growth, Memory
 from sim.modes import Modes
 from sim.motion import Motion
 from sim.noise import Noise
+from sim.traction import Traction
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,12 @@ class SmoothProcess:
     growth: Growth
     pairs: ClassVar[int] = 0
 
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
+    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, traction.stress)
         return Fluctuation(growth**2 * self.energy, growth, np.empty(0))
 
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        return self.start(motion, stress, noise)
+    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        return self.start(motion, traction, noise)
 
     def known_errors(self) -> dict[str, float]:
         """Errors and spreads known before the run."""
@@ -68,13 +69,13 @@ class _Renewing:
     _empty: Any
     _renewed: Any
 
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
+    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, traction.stress)
         size = growth if self.growth.relaxing else np.ones(1)
         return self._renewed(self._empty(len(noise.members)), np.zeros(1), np.ones(1), size, growth, motion.step, noise)
 
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
+    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, traction.stress)
         size = _renewed_size(self.growth, state, motion, growth)
         exponents = self.memory.exponents(self.wavenumber, motion)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
@@ -172,13 +173,13 @@ class ModalProcess(_Renewing):
 class FixedProcess(ModalProcess):
     """Modes that keep their modulus and diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
 
-    def start(self, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
+    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, traction.stress)
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(growth), growth, phases)
 
-    def advance(self, state: Fluctuation, motion: Motion, stress: np.ndarray, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, stress)
+    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        growth = self.growth.factor(motion.speed, traction.stress)
         turn = np.sqrt(2.0 * self.memory.exponents(self.wavenumber, motion))
         phases = state.amplitude + turn * noise.normals(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(growth), growth, phases)
@@ -333,7 +334,7 @@ def _renewed_size(law: Growth, state: Fluctuation, motion: Motion, growth: np.nd
     return np.sqrt(0.5 * (growth**2 + before**2))
 
 
-class _Maps:
+class DrawsMaps:
     """A process whose stress map can be drawn."""
 
     modes: Modes
@@ -368,9 +369,9 @@ class _Maps:
         return self.modes.ix % self.grid.points * (self.grid.points // 2 + 1) + self.modes.iy
 
 
-class MappedProcess(_Maps, ModalProcess):
+class MappedProcess(DrawsMaps, ModalProcess):
     """``ModalProcess`` that also draws its map."""
 
 
-class MappedFixedProcess(_Maps, FixedProcess):
+class MappedFixedProcess(DrawsMaps, FixedProcess):
     """``FixedProcess`` that also draws its map."""

@@ -206,5 +206,5 @@ def _in_unions(node: Any) -> set[str]:
     if not isinstance(node, dict):
         return set()
     found = set().union(*map(_in_unions, node.values()))
-    mapping = node.get("discriminator", {}).get("mapping", {})
-    return found | {reference.rsplit("/", 1)[-1] for reference in mapping.values()}
+    options = [option["$ref"] for option in node.get("oneOf", ()) if "$ref" in option]
+    return found | {reference.rsplit("/", 1)[-1] for reference in options}

@@ -14,13 +14,16 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from sim.bodies import Adhesion, Solid, Sphere
+from sim.parts.bonds import Auto as AutoBonds
 from sim.parts.bonds import Bonds, Unbroken
+from sim.parts.bonds import Depth as BondDepth
 from sim.parts.contact import Contact
 from sim.parts.drive import Drive, Table
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.shear import Auto, Depth, Mean, Modal, Shear, Uniform
 from sim.processes import BandedProcess, ModalProcess, SmoothProcess
 from sim.quantity import Quantity
+from sim.spectrum import BondMade
 from sim.sweep import read_sweep, set_key
 
 _Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
@@ -193,9 +196,26 @@ class Scenario:
         return _rest_radius(self.solid, self.sphere, self.adhesion, self.contact)
 
     @cached_property
+    def population(self) -> BondDepth:
+        """The bonds at their depth, chosen by their number if the scenario leaves the choice."""
+        if not isinstance(self.bonds, AutoBonds):
+            return self.bonds
+        return self.bonds.chosen(math.pi * self.rest_radius**2, _reads_forces(self.fluctuations))
+
+    @cached_property
     def fluctuations(self) -> Depth:
         """The shear part at its depth, chosen by what is recorded if the scenario leaves the choice."""
         return self.shear.chosen(bool(self.record.maps)) if isinstance(self.shear, Auto) else self.shear
+
+    @cached_property
+    def why(self) -> dict[str, str]:
+        """Reasons for the depths that the scenario left open, by part."""
+        why = {}
+        if isinstance(self.shear, Auto):
+            why["shear"] = self.shear.why(bool(self.record.maps))
+        if isinstance(self.bonds, AutoBonds):
+            why["bonds"] = self.bonds.why(math.pi * self.rest_radius**2, _reads_forces(self.fluctuations))
+        return why
 
     @cached_property
     def process(self) -> SmoothProcess | BandedProcess | ModalProcess:
@@ -211,7 +231,7 @@ class Scenario:
     @cached_property
     def varies(self) -> dict[str, bool]:
         """For each part whether its values differ between members: by its class, never by looking."""
-        bonded = self.bonds.per_member
+        bonded = self.population.per_member
         sheared = self.fluctuations.per_member or (self.fluctuations.reads_stress and bonded)
         return {
             "drive": self.drive.per_member,
@@ -291,6 +311,10 @@ def faults_across(parts: dict[str, Any]) -> Faults:
             text = fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
             return [(("shear",), text)]
         parts = parts | {"shear": chosen}
+    if isinstance(parts.get("bonds"), AutoBonds):
+        held = [parts[name] for name in ("solid", "sphere", "adhesion", "contact") if name in parts]
+        radius = _rest_radius(*held) if len(held) == 4 else math.nan
+        parts = parts | {"bonds": parts["bonds"].chosen(math.pi * radius**2, _reads_forces(parts.get("shear")))}
     return [
         fault
         for reads, check in _CHECKS
@@ -306,10 +330,28 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
     return []
 
 
-def _no_stress(shear: Depth, bonds: Bonds) -> Faults:
-    if shear.reads_stress and not bonds.stress > 0.0:
+def _reads_forces(shear: Any) -> bool:
+    """Whether the shear part follows the forces of the single bonds."""
+    return isinstance(getattr(shear, "spectrum", None), BondMade)
+
+
+def _no_stress(shear: Depth, bonds: BondDepth) -> Faults:
+    if shear.reads_stress and not bonds.carries_stress:
         said = 'growth model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
         return [(("shear", "growth"), said)]
+    return []
+
+
+def _no_forces(shear: Depth, bonds: BondDepth, solid: Solid) -> Faults:
+    if not _reads_forces(shear):
+        return []
+    if not bonds.knows_forces:
+        said = 'the spectrum that bonds make needs the force of each bond; use bonds.model = "cohort" or "tracked"'
+        return [(("shear", "spectrum"), said)]
+    stiffest = shear.spectrum.stiffest(*solid.effective)  # type: ignore[union-attr]
+    if bonds.bond_stiffness > stiffest * (1.0 + 1e-9):  # type: ignore[union-attr]
+        said = f"the half-space under a bond of this footprint yields with {stiffest:.3g} N/m, in series with the bond"
+        return [(("bonds", "bond_stiffness"), f"{said}: give at most that, or a larger shear.spectrum.footprint")]
     return []
 
 
@@ -371,6 +413,7 @@ def _too_many_modes(shear: Any, cell: float) -> str | None:
 _CHECKS: tuple[tuple[tuple[str, ...], Any], ...] = (
     (("drive", "clock"), _table_too_short),
     (("shear", "bonds"), _no_stress),
+    (("shear", "bonds", "solid"), _no_forces),
     (("record", "shear"), _no_maps),
     (("record", "clock"), _unrecorded_maps),
     (("record", "ensemble"), _too_many_map_members),

@@ -21,6 +21,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 from scipy import special
 
+from sim.footprint import BondMade
 from sim.measured import Measured, Tabulated
 from sim.pixels import gaussian_boxes
 from sim.quantity import Quantity
@@ -384,6 +385,6 @@ class AnisotropicGaussian:
 
 #: Any spectrum, told apart in a scenario by its ``model``.
 Spectrum = Annotated[
-    Ripple | Band | SelfAffine | Gaussian | AnisotropicGaussian | VonKarman | Tabulated | Measured,
+    Ripple | Band | SelfAffine | Gaussian | AnisotropicGaussian | VonKarman | Tabulated | Measured | BondMade,
     Field(discriminator="model"),
 ]

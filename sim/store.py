@@ -55,10 +55,10 @@ class Plan:
     def group(self) -> int:
         """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
         some = self.points[:: max(1, len(self.points) // 4)]
-        pairs = max(point.process.pairs for point in some)
+        numbers = max(2 * point.process.pairs + point.population.numbers for point in some)
         for point in some:
             point.release()
-        return min(_GROUP, self.members, max(1, _STATE_NUMBERS // max(2 * pairs, 1)))
+        return min(_GROUP, self.members, max(1, _STATE_NUMBERS // numbers))
 
     @property
     def stretch(self) -> int:

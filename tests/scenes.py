@@ -1,7 +1,9 @@
 """Small scenes for the tests: one builder and the depths of every part."""
 
 from sim.bodies import Adhesion, Solid, Sphere
-from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
+from sim.hazards import Bell, Constant, CutOff
+from sim.memory import Constant as Ungrowing
+from sim.memory import Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Clock, Ensemble, Scenario
@@ -13,15 +15,30 @@ CELL = 0.24e-3
 DRIVES = {
     "steady": drive.Steady(speed=2e-3),
     "at rest": drive.Steady(speed=0.0),
+    "start": drive.Start(rest=3e-3, speed=4e-3),
     "linear ramp": drive.Ramp(start=-1e-3, stop=5e-3),
     "log ramp": drive.Ramp(start=1e-5, stop=1e-1, scale="log"),
     "table": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
 }
+#: Bonds whose life at rest is 5 ms and that feel their force from a stretch of 10 µm on, 0.2 MPa at the most.
+BELL = Bell(zero_force_rate=200.0, bell_force=4e-12)
+CUT_OFF = CutOff(stretch=20e-6, rate=50.0)
+STRETCHED = {"bond_stiffness": 4e-7, "rebinding_rate": 400.0, "site_density": 1e17}
 BONDS = {
     "none": bonds.Unbroken(stress=2e5),
     "steady": bonds.Steady(critical_speed=1e-2, stress=2e5),
     "rate": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=2e5, start_from="bonded"),
+    "rate, carried": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=2e5, area="carried"),
     "counted": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=40, stress=2e5, start_from="steady"),
+    "rate, bell": bonds.FirstMoment(hazard=BELL, **STRETCHED, start_from="bonded"),
+    "rate, cut-off, carried": bonds.FirstMoment(hazard=CUT_OFF, **STRETCHED, area="carried"),
+    "cohort": bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=1e-3),
+    "cohort, cut-off": bonds.Cohort(hazard=CUT_OFF, **STRETCHED, tolerance=1e-2, start_from="empty"),
+    "cohort, carried": bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=1e-2, start_from="empty", area="carried"),
+    "tracked": bonds.Tracked(hazard=BELL, **STRETCHED, sites=30),
+    "tracked, constant": bonds.Tracked(hazard=Constant(rate=200.0), **STRETCHED, sites=7, start_from="bonded"),
+    "auto, few sites": bonds.Auto(hazard=CUT_OFF, **STRETCHED, sites=20),
+    "auto, many sites": bonds.Auto(critical_speed=1e-2, healing=500.0, stress=2e5, sites=10**6),
 }
 SHEARS = {
     "uniform": shear.Uniform(),
@@ -35,7 +52,7 @@ SHEARS = {
     ),
     "modal, fixed": shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), amplitudes="fixed"),
     "mapped, diffusion, constant": shear.Mapped(
-        spectrum=SPECTRUM, cell=CELL, points=12, memory=Diffusion(diffusivity=1e-9), growth=Constant()
+        spectrum=SPECTRUM, cell=CELL, points=12, memory=Diffusion(diffusivity=1e-9), growth=Ungrowing()
     ),
     "mapped, fixed, stress": shear.Mapped(
         spectrum=SPECTRUM,

@@ -136,7 +136,7 @@ def test_a_key_in_the_wrong_table_is_told_with_the_right_one(refusal, line, adde
 def test_a_key_of_another_model_is_told_with_the_models_that_have_it(refusal):
     at = line_of('healing = "500 1/s"')
     assert refusal(**edited(('model = "rate"', 'model = "steady"'))) == [
-        f'x:{at}: bonds.healing: is not a key of model = "steady"; remove it, or choose model = "rate" or "counted"'
+        f'x:{at}: bonds.healing: is not a key of model = "steady"; remove it, or choose model = "rate", "counted" or "auto"'
     ]
 
 
@@ -175,7 +175,7 @@ def test_missing_keys_and_tables_are_told_with_an_example(refusal):
 
 def test_a_missing_model_is_told_with_the_choices(refusal):
     assert refusal(**edited(('[bonds]\nmodel = "rate"', "[bonds]"))) == [
-        f'x:{line_of("[bonds]")}: bonds.model: is missing; choose "none", "steady", "rate" or "counted"'
+        f'x:{line_of("[bonds]")}: bonds.model: is missing; choose "none", "steady", "rate", "cohort", "counted", "tracked" or "auto"'
     ]
 
 

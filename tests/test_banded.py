@@ -25,8 +25,10 @@ from sim.parts import bonds, drive, shear
 from sim.processes import BandedProcess, Fluctuation
 from sim.scenario import Clock
 from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
+from sim.traction import Traction
 
 G, MEMBERS = 1.6e6, 400
+UNLOADED = Traction.of_stress(np.zeros(1))
 #: Two-sided probability of five standard deviations.
 FIVE_SIGMA = 5.7e-7
 
@@ -61,7 +63,7 @@ def moved(step, path=0.0, duration=1.0):
 def starts(process, draws, seed=5):
     """Stationary draws: the start of the members at many steps, each with numbers of its own."""
     noise = Noise(seed, "shear", np.arange(MEMBERS))
-    found = [process.start(moved(step), np.zeros(1), noise).energy for step in range(draws // MEMBERS)]
+    found = [process.start(moved(step), UNLOADED, noise).energy for step in range(draws // MEMBERS)]
     return np.concatenate(found)
 
 
@@ -142,9 +144,9 @@ def test_the_law_is_the_same_after_many_steps(name):
     process, weights, wavenumbers = process_of(name, Wave(waves=waves))
     path = 0.3 * 2.0 * np.pi * waves / wavenumbers.min()  # the slowest keeps e^-0.6 of its energy's deviation
     noise = Noise(8, "shear", np.arange(MEMBERS))
-    state, sample = process.start(moved(0), np.zeros(1), noise), []
+    state, sample = process.start(moved(0), UNLOADED, noise), []
     for step in range(1, 4001):
-        state = process.advance(state, moved(step, path), np.zeros(1), noise)
+        state = process.advance(state, moved(step, path), UNLOADED, noise)
         if step % 16 == 0:  # by then e^-9.6 of it: the draws count as independent
             sample.append(state.energy)
     assert kstest(np.concatenate(sample), law_of(weights)).pvalue > FIVE_SIGMA
@@ -161,7 +163,7 @@ def stepped(process, start, durations, seed=1):
     noise = Noise(seed, "shear", np.arange(25))
     state = Fluctuation(np.zeros(25), np.ones(1), np.full((25, len(process.bands.weight)), float(start)))
     for step, duration in enumerate(durations, 1):
-        state = process.advance(state, moved(step, 0.0, duration), np.zeros(1), noise)
+        state = process.advance(state, moved(step, 0.0, duration), UNLOADED, noise)
     return state.amplitude.ravel()
 
 
@@ -193,10 +195,10 @@ def test_a_step_of_any_length_has_the_exact_moments(freedom, ratio):
 def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit(memory):
     process, _, _ = process_of("self-affine", memory)
     noise = Noise(5, "shear", np.arange(20))
-    first = process.start(moved(0), np.zeros(1), noise)
+    first = process.start(moved(0), UNLOADED, noise)
     state = first
     for step in range(1, 4):
-        state = process.advance(state, moved(step, 0.0), np.zeros(1), noise)
+        state = process.advance(state, moved(step, 0.0), UNLOADED, noise)
         assert np.array_equal(state.amplitude, first.amplitude)
         assert np.array_equal(state.energy, first.energy)
 
@@ -205,8 +207,8 @@ def two_times(process, step_of, draws, seed=6, members=MEMBERS):
     """ΔΓ at the two ends of one step of all draws, shape (2, draws); ``step_of`` a step's number gives its motion."""
     noise, found = Noise(seed, "shear", np.arange(members)), []
     for pair in range(draws // members):
-        before = process.start(moved(2 * pair), np.zeros(1), noise)
-        after = process.advance(before, step_of(2 * pair + 1), np.zeros(1), noise)
+        before = process.start(moved(2 * pair), UNLOADED, noise)
+        after = process.advance(before, step_of(2 * pair + 1), UNLOADED, noise)
         found.append((before.energy, after.energy))
     return np.concatenate(found, axis=1)
 
@@ -262,11 +264,11 @@ def test_the_joint_law_holds_through_a_jump_of_the_speed():
     slipped = np.array([0.0, 1.5e-4 * slow, 3e-4 * slow + 1e-4 * fast, 3e-4 * slow + 2e-4 * fast])
     noise, found = Noise(2, "shear", np.arange(MEMBERS)), []
     for run in range(50):
-        state = process.start(moved(4 * run), np.zeros(1), noise)
+        state = process.start(moved(4 * run), UNLOADED, noise)
         energies = [state.energy]
         for i in range(3):
             step = motion.motion(4 * run + i + 1, times[i], times[i + 1], 1e-3)
-            state = process.advance(state, step, np.zeros(1), noise)
+            state = process.advance(state, step, UNLOADED, noise)
             energies.append(state.energy)
         found.append(energies)
     found = np.concatenate(found, axis=1)
@@ -309,11 +311,11 @@ def test_relaxing_growth_follows_the_law_of_all_modes_after_a_jump():
     noise, found = Noise(4, "shear", np.arange(MEMBERS)), []
     times = (0.0, 1e-3, 1.2e-3, 1.7e-3, 9e-3)
     for run in range(50):
-        state = process.start(motion.motion(8 * run, 0.0, 0.0, 1.0), np.zeros(1), noise)
+        state = process.start(motion.motion(8 * run, 0.0, 0.0, 1.0), UNLOADED, noise)
         energies = [state.energy]
         for i in range(4):
             state = process.advance(
-                state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), np.zeros(1), noise
+                state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), UNLOADED, noise
             )
             energies.append(state.energy)
         found.append(energies)
@@ -331,11 +333,11 @@ def test_relaxing_growth_renews_with_the_mean_variance_of_the_ends_of_a_step():
     ramp, times = drive.Ramp(start=5e-4, stop=2e-2), np.linspace(0.0, 4e-3, 4)
     noise, found = Noise(9, "shear", np.arange(MEMBERS)), []
     for run in range(50):
-        state = process.start(ramp.motion(8 * run, 0.0, 0.0, 4e-3), np.zeros(1), noise)
+        state = process.start(ramp.motion(8 * run, 0.0, 0.0, 4e-3), UNLOADED, noise)
         energies = [state.energy]
         for i in range(3):
             motion = ramp.motion(8 * run + i + 1, times[i], times[i + 1], 4e-3)
-            state = process.advance(state, motion, np.zeros(1), noise)
+            state = process.advance(state, motion, UNLOADED, noise)
             energies.append(state.energy)
         found.append(energies)
     squares = [growth.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]
@@ -401,7 +403,7 @@ def test_fixed_amplitudes_store_the_cells_mean_at_all_times(name):
 
 def test_the_state_holds_one_number_a_band():
     process, _, _ = process_of("self-affine")
-    state = process.start(moved(0), np.zeros(1), Noise(1, "shear", np.arange(7)))
+    state = process.start(moved(0), UNLOADED, Noise(1, "shear", np.arange(7)))
     assert state.amplitude.shape == (7, len(process.bands.weight))
     assert_allclose(state.energy, state.amplitude @ (0.5 * process.bands.weight), rtol=1e-14, atol=0)
 

@@ -71,7 +71,7 @@ def check_case(case, members=3, steps=6):
 def check_waist(scenario, state, members):
     """Shapes follow from the classes; w is the balance of its parts; no contact is smaller than Hertz."""
     values = {
-        "bonds": scenario.bonds.fraction(state.bonds),
+        "bonds": scenario.population.fraction(state.bonds),
         "shear": state.shear.energy,
         "contact": state.contact.radius,
     }

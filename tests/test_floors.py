@@ -11,11 +11,27 @@ ROOT = Path(sim.__file__).parent
 
 #: Every module, lowest floor first.
 FLOORS = (
-    ("jit", "quantity", "motion", "durable", "lines", "grid", "radial", "pixels"),
-    ("noise", "roots", "table", "sweep", "faults"),
-    ("laws.halfspace", "laws.jkr", "laws.schallamach", "laws", "bodies", "modes", "memory", "measured", "document"),
+    ("jit", "quantity", "motion", "traction", "durable", "lines", "grid", "radial", "pixels"),
+    ("noise", "roots", "table", "sweep", "faults", "expint", "hazards", "footprint"),
+    ("laws.schallamach.linear", "laws.schallamach.renewal"),
+    tuple(f"laws.schallamach.{name}" for name in ("bell", "loading", "cut_off", "first_moment", "cluster")),
+    ("laws.halfspace", "laws.schallamach", "laws.jkr.scales"),
+    ("laws.jkr.hertz", "laws.jkr.load", "laws.jkr.indentation", "laws.jkr.energy"),
+    ("laws.jkr.machine",),
+    ("laws.jkr.travel",),
+    ("laws.jkr",),
+    ("laws.rivals", "laws.profiles", "laws.disc"),
+    ("laws", "bodies", "modes", "memory", "measured", "document"),
     ("spectrum", "bands"),
+    ("disc", "grips"),
+    ("cohort_merging", "cohort_steady", "following"),
+    ("cohort_steps", "lives"),
+    ("cohorts", "tracks", "first_moment"),
     ("processes",),
+    ("site_field",),
+    ("parts.area", "parts.control"),
+    ("parts.unstretched",),
+    ("parts.stretched",),
     ("parts.drive", "parts.bonds", "parts.shear", "parts.contact", "parts"),
     ("scenario",),
     ("engine", "reader"),
@@ -31,7 +47,7 @@ WING = ("analysis", "plots", "paper")
 STUDY = ("gammasum", "estimates", "expected", "moments", "alternatives")
 STUDY += ("converge_data", "converge_table", "converge_figure", "converge")
 #: What the wing may read: laws and the spectra with what they stand on, never parts or engine.
-WING_READS = {*FLOORS[0], *FLOORS[1], *FLOORS[2], *FLOORS[3]}
+WING_READS = {name for floor in FLOORS[: FLOORS.index(("disc", "grips")) + 1] for name in floor}
 
 
 def module_name(path):

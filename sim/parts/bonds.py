@@ -1,152 +1,143 @@
-"""Bond populations: the fraction of adhesive bonds left while sliding. Shallow to deep: none, steady, rate, counted.
+"""Bond populations: which depths there are, and the choice between them.
 
-``fraction`` is bonds over bonds at rest. These depths carry no stretch, so their shear stress is
-``stress`` times the fraction.
+Shallow to deep: none, steady, rate, counted without a stretch; rate, cohort, tracked with one. Both
+kinds of rate equation are called ``rate``: a hazard tells them apart.
 """
 
-from dataclasses import dataclass as plain_dataclass
-from typing import Annotated, ClassVar, Literal
+import math
+from typing import Annotated, Any, Literal
 
-import numpy as np
-from pydantic import Field
+from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
 
-from sim.laws.schallamach import relax_fraction, steady_fraction, transition_probabilities
-from sim.motion import Motion
-from sim.noise import Noise
+from sim.hazards import AnyHazard, Constant
+from sim.parts.area import Area
+from sim.parts.stretched import Ages, Cohort, Density, FirstMoment, Rebinding, Stiffness, Stretches, Tracked
+from sim.parts.unstretched import (
+    Counted,
+    CriticalSpeed,
+    Healing,
+    Population,
+    Rate,
+    Sites,
+    Start,
+    Steady,
+    Stress,
+    Unbroken,
+)
 from sim.quantity import Quantity
+from sim.tracks import Tracks
 
-_Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
-_CriticalSpeed = Annotated[float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)]
-_Healing = Annotated[float, Quantity("1/s", "healing rate of broken bonds", "h", above=0)]
-_Start = Literal["steady", "bonded", "empty"]
+__all__ = ["STATES", "Auto", "Bonds", "Cohort", "Counted", "Depth", "FirstMoment"]
+__all__ += ["Rate", "Steady", "Tracked", "Unbroken"]
 
+_MOST_TRACKED = 10**6
+_WITHOUT = ("critical_speed", "healing")
+_WITH = ("hazard", "bond_stiffness", "rebinding_rate", "site_density")
 
-@plain_dataclass(frozen=True)
-class Population:
-    """State of a population: ``bound`` is a fraction [1] or a number of bonds, per member."""
+#: A depth, chosen.
+Depth = Unbroken | Steady | Rate | Counted | FirstMoment | Cohort | Tracked
 
-    bound: np.ndarray
-
-
-class _WithoutStretch:
-    """What all depths without a stretch share: the stress follows the fraction."""
-
-    per_member: ClassVar[bool] = False
-    stress: float
-
-    def fraction(self, population: Population) -> np.ndarray:
-        """Bonds over bonds at rest [1]."""
-        return population.bound
-
-    def shear_stress(self, population: Population) -> np.ndarray:
-        """Mean shear stress tau_0 that the bonds carry [Pa]."""
-        return self.stress * self.fraction(population)
-
-
-@dataclass(frozen=True, config={"extra": "forbid"})
-class Unbroken(_WithoutStretch):
-    """Every bond of the contact at rest stays; the paper's uniform sliding stress."""
-
-    stress: _Stress = 0.0
-    model: Literal["none"] = "none"
-
-    def start(self, motion: Motion, noise: Noise) -> Population:
-        return Population(np.ones(1))
-
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        return population
-
-
-@dataclass(frozen=True, config={"extra": "forbid"})
-class Steady(_WithoutStretch):
-    """The paper's law N/N0 = 1/(1 + V/Vc), at once at every speed. Limit: none as Vc -> infinity."""
-
-    critical_speed: _CriticalSpeed
-    stress: _Stress = 0.0
-    model: Literal["steady"] = "steady"
-
-    def start(self, motion: Motion, noise: Noise) -> Population:
-        return Population(np.asarray(steady_fraction(motion.speed, self.critical_speed)))
-
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        return self.start(motion, noise)
+#: What the states of all depths are made of.
+STATES = (Population, Stretches, Ages, Tracks)
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class Rate(_WithoutStretch):
-    """The rate equation dN/dt = h (N0 − N) − h (V/Vc) N. Limit: ``Steady`` as h -> infinity.
+class Auto:
+    """The shallowest depth that is good to ``tolerance``; it takes the keys of all of them.
 
-    One step is exact for the slip of the step spread evenly over it.
+    A finite number N of bonds fluctuates by 1/√N: where that is above the tolerance they are counted, or
+    tracked if they have a hazard. Otherwise the rate equation answers, or cohorts where the hazard depends
+    on the stretch.
     """
 
-    critical_speed: _CriticalSpeed
-    healing: _Healing
-    stress: _Stress = 0.0
-    start_from: Annotated[_Start, Field(alias="start")] = "steady"
-    model: Literal["rate"] = "rate"
+    critical_speed: CriticalSpeed | None = None
+    healing: Healing | None = None
+    stress: Stress = 0.0
+    hazard: AnyHazard | None = None
+    bond_stiffness: Stiffness | None = None
+    rebinding_rate: Rebinding | None = None
+    site_density: Density | None = None
+    sites: Sites | None = None
+    tolerance: Annotated[float, Quantity("1", "noise of the bonds that may be left out", "", above=0, below=1)] = 0.01
+    start_from: Start = "steady"
+    area: Area = "present"
+    model: Literal["auto"] = "auto"
 
-    def start(self, motion: Motion, noise: Noise) -> Population:
-        return Population(_first_fraction(self.start_from, motion, self.critical_speed))
-
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        return Population(
-            np.asarray(
-                relax_fraction(population.bound, motion.path, motion.duration, self.critical_speed, self.healing)
+    @model_validator(mode="after")
+    def _one_kind(self) -> "Auto":
+        without, with_ = ([name for name in names if getattr(self, name) is not None] for names in (_WITHOUT, _WITH))
+        if bool(without) == bool(with_):
+            raise PydanticCustomError(
+                "one_kind",
+                "give either critical_speed and healing, or hazard, bond_stiffness, rebinding_rate and site_density",
             )
-        )
+        missing = [name for name in (_WITH if with_ else _WITHOUT) if getattr(self, name) is None]
+        if missing:
+            raise PydanticCustomError("one_kind", f"{' and '.join(missing)} is missing: bonds like these need it")
+        if with_ and self.stress:
+            raise PydanticCustomError("one_kind", "bonds with a hazard make their own stress; leave stress out")
+        return self
+
+    def number(self, area: float) -> float:
+        """Sites of a contact of this area [m²]: as given, else by their density; infinite without both."""
+        if self.sites is not None:
+            return self.sites
+        return math.inf if self.site_density is None or not area > 0.0 else max(1.0, round(self.site_density * area))
+
+    def chosen(self, area: float, forces: bool) -> Depth:
+        """The depth for a contact of this ``area`` [m²] whose shear part reads the bonds' ``forces`` or not."""
+        number = self.number(area)
+        noisy = self.tolerance**2 * number < 1.0
+        common: dict[str, Any] = {"start_from": self.start_from}
+        if self.hazard is None:
+            common |= {"critical_speed": self.critical_speed, "healing": self.healing, "stress": self.stress}
+            return Counted(**common, sites=int(number)) if noisy else Rate(**common, area=self.area)
+        common |= {name: getattr(self, name) for name in _WITH}
+        if noisy and number <= _MOST_TRACKED:
+            return Tracked(**common, sites=int(number))
+        if isinstance(self.hazard, Constant) and not forces:
+            return FirstMoment(**common, area=self.area)
+        return Cohort(**common, area=self.area, tolerance=min(1e-4, 0.1 * self.tolerance))
+
+    def why(self, area: float, forces: bool) -> str:
+        """The reason for the choice, in words."""
+        number, depth = self.number(area), self.chosen(area, forces)
+        if math.isinf(number):
+            size = "no number of sites is given"
+        else:
+            noise = 1.0 / math.sqrt(number)
+            size = f"1/√N of {number:,.0f} sites is {noise:.2g}, {'above' if noise > self.tolerance else 'within'}"
+            size += f" the tolerance of {self.tolerance:g}"
+        if isinstance(depth, Counted | Tracked):
+            return size
+        if isinstance(depth, Cohort):
+            return f"{size}; {'the forces of the bonds are read' if forces else 'the hazard depends on the stretch'}"
+        return f"{size}; the rupture rate does not depend on the stretch"
 
 
-@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class Counted(_WithoutStretch):
-    """A finite number of two-state sites with the rates of ``Rate``. Limit: ``Rate`` as sites -> infinity.
-
-    Notes
-    -----
-    Over a step each bound site stays bound with probability p and each free one binds with
-    probability r, both exact, so the next number is Binomial(n, p) + Binomial(sites − n, r). Each
-    binomial is the inverse of its distribution function at one addressed uniform number: two
-    numbers a step whatever the state, and members keep their noise across sweep values.
-    """
-
-    per_member: ClassVar[bool] = True
-
-    critical_speed: _CriticalSpeed
-    healing: _Healing
-    sites: Annotated[int, Field(ge=1, le=10**9, description="number of bond sites of the contact")]
-    stress: _Stress = 0.0
-    start_from: Annotated[_Start, Field(alias="start")] = "steady"
-    model: Literal["counted"] = "counted"
-
-    def fraction(self, population: Population) -> np.ndarray:
-        return population.bound / self.sites
-
-    def start(self, motion: Motion, noise: Noise) -> Population:
-        first = _first_fraction(self.start_from, motion, self.critical_speed)
-        uniform = noise.uniforms(motion.step, 2)
-        return Population(_binomial(uniform[:, 0], np.array([float(self.sites)]), first))
-
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        stay, bind = transition_probabilities(motion.path, motion.duration, self.critical_speed, self.healing)
-        uniform = noise.uniforms(motion.step, 2)
-        kept = _binomial(uniform[:, 0], population.bound, stay)
-        return Population(kept + _binomial(uniform[:, 1], self.sites - population.bound, bind))
+def _tag(value: Any) -> str | None:
+    """Which class a table or a part belongs to: both rate equations have one name."""
+    read = value.get if isinstance(value, dict) else lambda name, other=None: getattr(value, name, other)
+    model = read("model", None)
+    if not isinstance(model, str):
+        return None
+    return "rate[hazard]" if model == "rate" and _stretched(read) else model
 
 
-def _first_fraction(start: str, motion: Motion, critical_speed: float) -> np.ndarray:
-    if start == "steady":
-        return np.asarray(steady_fraction(motion.speed, critical_speed))
-    return np.full(1, 1.0 if start == "bonded" else 0.0)
+def _stretched(read: Any) -> bool:
+    return any(read(name, None) is not None for name in _WITH)
 
 
-def _binomial(uniform: np.ndarray, number: np.ndarray, probability: np.ndarray) -> np.ndarray:
-    """Binomial numbers by inversion at ``uniform`` in [0, 1), as floats of shape (members,)."""
-    from scipy.stats import binom  # heavy, and only counted bonds draw
-
-    uniform, number, probability = np.broadcast_arrays(uniform, number, probability)
-    # binom.ppf(0) is -1 by convention, so a uniform of 0 counts as the smallest above it
-    drawn = binom.ppf(np.maximum(uniform, 2.0**-54), number, np.clip(probability, 0.0, 1.0))
-    return np.where(number > 0, np.clip(drawn, 0.0, number), 0.0)
-
-
-Bonds = Annotated[Unbroken | Steady | Rate | Counted, Field(discriminator="model")]
+Bonds = Annotated[
+    Annotated[Unbroken, Tag("none")]
+    | Annotated[Steady, Tag("steady")]
+    | Annotated[Rate, Tag("rate")]
+    | Annotated[FirstMoment, Tag("rate[hazard]")]
+    | Annotated[Cohort, Tag("cohort")]
+    | Annotated[Counted, Tag("counted")]
+    | Annotated[Tracked, Tag("tracked")]
+    | Annotated[Auto, Tag("auto")],
+    Discriminator(_tag),
+]

@@ -1,4 +1,4 @@
-"""Drives: how the slider moves. Shallow to deep: steady, ramp, table.
+"""Drives: how the slider moves. Shallow to deep: steady, start, ramp, table.
 
 A prescribed drive is a function of time, the same for all members. It gives the exact slip of a
 step, never the speed times the step, so that parts that live on slip see no step error.
@@ -76,6 +76,29 @@ class Steady(_Prescribed):
     def pieces(self, start: float, stop: float, duration: float) -> list[_Piece]:
         slip = self.speed * (stop - start)
         return [_Piece(slip, abs(slip), self.speed, self.speed)]
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Start(_Prescribed):
+    """At rest for a while, then a constant speed at once: static friction and ageing.
+
+    >>> motion = Start(rest=1.0, speed=1e-3).motion(1, 0.0, 3.0, 10.0)
+    >>> print(float(motion.slip[0]), float(motion.first[0]), float(motion.speed[0]))
+    0.002 0.0 0.001
+    """
+
+    rest: Annotated[float, Quantity("s", "time at rest before sliding", "t_w", at_least=0)]
+    speed: Annotated[float, _SPEED]
+    model: Literal["start"] = "start"
+
+    def pieces(self, start: float, stop: float, duration: float) -> list[_Piece]:
+        near = [time for time in (start, stop) if abs(self.rest - time) <= 1e-9 * duration]
+        rest = near[0] if near else self.rest  # a clock time meant to be the same but for rounding
+        slip = self.speed * (stop - max(start, rest))
+        still, sliding = _Piece(0.0, 0.0, 0.0, 0.0), _Piece(slip, abs(slip), self.speed, self.speed)
+        if start >= rest:
+            return [sliding]
+        return [still] if stop <= rest else [still, sliding]
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -178,4 +201,4 @@ class Table(_Prescribed):
         return pieces
 
 
-Drive = Annotated[Steady | Ramp | Table, Field(discriminator="model")]
+Drive = Annotated[Steady | Start | Ramp | Table, Field(discriminator="model")]

@@ -18,7 +18,8 @@ from sim.memory import Constant, Growth, Memory
 from sim.modes import cell_variance, modes
 from sim.processes import BandedProcess, FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
 from sim.quantity import Quantity
-from sim.spectrum import Spectrum
+from sim.site_field import MappedSiteModes, SiteMean, SiteModes
+from sim.spectrum import BondMade, Spectrum
 
 _Paid = Annotated[
     float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)
@@ -44,6 +45,16 @@ class Uniform:
         return SmoothProcess(0.0, Constant())
 
 
+def _bonds_set_the_size(part: Any) -> None:
+    """Refuse what a field that bonds make cannot follow."""
+    if not isinstance(part.spectrum, BondMade):
+        return
+    if not isinstance(part.growth, Constant):
+        raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave growth out")
+    if getattr(part, "amplitudes", "gaussian") == "fixed":
+        raise PydanticCustomError("bond_made", 'bonds at random places make amplitudes = "gaussian"; leave it out')
+
+
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Mean:
     """The ensemble mean of ΔΓ on the infinite plane, in closed form. Limit: uniform as rms -> 0."""
@@ -58,8 +69,8 @@ class Mean:
 
     @property
     def reads_stress(self) -> bool:
-        """Whether the growth follows the bonds' stress."""
-        return self.growth.reads_stress
+        """Whether the size of the field follows the bonds."""
+        return self.growth.reads_stress or isinstance(self.spectrum, BondMade)
 
     @model_validator(mode="after")
     def _no_memory(self) -> "Mean":
@@ -68,10 +79,12 @@ class Mean:
                 "mean_has_no_memory",
                 'growth that relaxes needs a memory, which "mean" has not; use model = "modal"',
             )
+        _bonds_set_the_size(self)
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
-        return SmoothProcess(float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))), self.growth)
+        kind = SiteMean if isinstance(self.spectrum, BondMade) else SmoothProcess
+        return kind(float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))), self.growth)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -99,8 +112,8 @@ class _Fluctuating:
 
     @property
     def reads_stress(self) -> bool:
-        """Whether the growth follows the bonds' stress."""
-        return self.growth.reads_stress
+        """Whether the size of the field follows the bonds."""
+        return self.growth.reads_stress or isinstance(self.spectrum, BondMade)
 
     @model_validator(mode="after")
     def _fixed_cannot_relax(self) -> "_Fluctuating":
@@ -109,6 +122,7 @@ class _Fluctuating:
                 "fixed_cannot_relax",
                 'fixed amplitudes are never renewed; use amplitudes = "gaussian" or relaxing = false',
             )
+        _bonds_set_the_size(self)
         return self
 
 
@@ -119,7 +133,8 @@ class Modal(_Fluctuating):
     model: Literal["modal"] = "modal"
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
-        return self._process(ModalProcess, FixedProcess, shear_modulus, poisson_ratio, cell)
+        kind = SiteModes if isinstance(self.spectrum, BondMade) else ModalProcess
+        return self._process(kind, FixedProcess, shear_modulus, poisson_ratio, cell)
 
     def _process(self, gaussian: Any, fixed: Any, shear_modulus: float, poisson_ratio: float, cell: float) -> Any:
         side = cell if self.cell is None else self.cell
@@ -147,7 +162,8 @@ class Mapped(Modal):
     draws_maps: ClassVar[bool] = True
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> MappedProcess:
-        process = self._process(MappedProcess, MappedFixedProcess, shear_modulus, poisson_ratio, cell)
+        kind = MappedSiteModes if isinstance(self.spectrum, BondMade) else MappedProcess
+        process = self._process(kind, MappedFixedProcess, shear_modulus, poisson_ratio, cell)
         if not process.modes.on_lattice:
             raise PydanticCustomError(
                 "off_lattice",
@@ -168,6 +184,14 @@ class Banded(_Fluctuating):
 
     tolerance: _Tolerance = 0.01
     model: Literal["banded"] = "banded"
+
+    @model_validator(mode="after")
+    def _not_of_bonds(self) -> "Banded":
+        if isinstance(self.spectrum, BondMade):
+            raise PydanticCustomError(
+                "bond_made", 'the frozen part of a field that bonds make has no bands; use model = "mean" or "modal"'
+            )
+        return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
         side = cell if self.cell is None else self.cell
@@ -233,7 +257,7 @@ class Auto:
     paid_by_adhesion: _Paid = 1.0
     model: Literal["auto"] = "auto"
 
-    def chosen(self, maps: bool) -> "Mean | Banded | Mapped":
+    def chosen(self, maps: bool) -> "Mean | Banded | Modal":
         """The depth for a scene that records ``maps`` or does not.
 
         Raises
@@ -251,7 +275,9 @@ class Auto:
         if self.memory is None:
             return Mean(**common)
         common |= {"memory": self.memory, "cell": self.cell, "points": self.points, "amplitudes": self.amplitudes}
-        return Mapped(**common) if maps else Banded(**common, tolerance=self.tolerance)
+        if maps or isinstance(self.spectrum, BondMade):
+            return Mapped(**common) if maps else Modal(**common)
+        return Banded(**common, tolerance=self.tolerance)
 
     def why(self, maps: bool) -> str:
         """The reason for the choice, in words."""
@@ -259,6 +285,8 @@ class Auto:
             return "no memory is given, so the ensemble mean answers, exactly and without noise"
         if maps:
             return "maps are recorded"
+        if isinstance(self.spectrum, BondMade):
+            return "the field that bonds make has a frozen part, so each mode is followed"
         return "a memory is given and no maps are recorded: energies in time are all the contact feels"
 
 

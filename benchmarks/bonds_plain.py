@@ -1,0 +1,97 @@
+"""Bond populations as a user of numpy would step them: clear, vectorised, without waste."""
+
+import numpy as np
+
+
+class TrackedNumpy:
+    """Bonds under Bell's hazard in fixed steps: in each, a bond breaks and a free site binds by chance.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Independent sites that follow one slider.
+    rate, softness, rebinding_rate : float
+        k0 [1/s], κ/f_b [1/m], k_on [1/s].
+    random : numpy.random.Generator
+        Where the chances come from.
+
+    Notes
+    -----
+    First order in the step. A free site keeps the stretch 0; a bond breaks when an exponential number
+    is below its hazard times the step, which needs one exponential function less than its chance.
+    """
+
+    def __init__(self, shape, rate, softness, rebinding_rate, random):
+        self.rate, self.softness, self.rebinding_rate, self.random = rate, softness, rebinding_rate, random
+        self.stretch, self.bound = np.zeros(shape), np.zeros(shape, bool)
+        self.hazard, self.threshold = np.empty(shape), np.empty(shape)
+
+    def step(self, slip, duration):
+        """One step; share of sites bound, mean stretch and mean square stretch per site."""
+        np.multiply(self.stretch, self.softness, out=self.hazard)
+        np.exp(self.hazard, out=self.hazard)
+        self.hazard *= self.rate * duration
+        self.random.standard_exponential(out=self.threshold)
+        breaks = self.threshold < self.hazard
+        binds = self.threshold < self.rebinding_rate * duration
+        self.bound = np.where(self.bound, ~breaks, binds)
+        self.stretch += slip
+        self.stretch *= self.bound
+        stretch = self.stretch.ravel()
+        return self.bound.mean(), stretch.mean(), np.einsum("i,i->", stretch, stretch) / stretch.size
+
+
+class TrackedChances(TrackedNumpy):
+    """The same with uniform numbers against the chance of a rupture, 1 − e^(−k dt)."""
+
+    def step(self, slip, duration):
+        np.multiply(self.stretch, self.softness, out=self.hazard)
+        np.exp(self.hazard, out=self.hazard)
+        self.hazard *= -self.rate * duration
+        np.exp(self.hazard, out=self.hazard)
+        self.random.random(out=self.threshold)
+        stays = self.threshold < self.hazard
+        binds = self.threshold < -np.expm1(-self.rebinding_rate * duration)
+        self.bound = np.where(self.bound, stays, binds)
+        self.stretch += slip
+        self.stretch *= self.bound
+        stretch = self.stretch.ravel()
+        return self.bound.mean(), stretch.mean(), np.einsum("i,i->", stretch, stretch) / stretch.size
+
+
+def counted_gillespie_numpy(bound, sites, speed_ratio, healing, duration, random):
+    """Numbers of bound sites after a time, by Gillespie's algorithm on all members at once.
+
+    Parameters
+    ----------
+    bound : array of int, shape (members,)
+        Bound sites at the start.
+    sites : int
+        Sites of each member.
+    speed_ratio, healing, duration : float
+        V/Vc [1], h [1/s], time [s].
+    random : numpy.random.Generator
+        Where waiting times and choices come from.
+
+    Returns
+    -------
+    array of int, shape (members,)
+        Bound sites at the end.
+
+    Notes
+    -----
+    A free site binds with the rate h, a bound one breaks with h V/Vc. Each turn lets one event happen in
+    every member that is not done yet.
+    """
+    bound, time = bound.copy(), np.zeros(len(bound))
+    active = np.arange(len(bound))
+    while active.size:
+        number = bound[active]
+        bind = healing * (sites - number)
+        total = bind + healing * speed_ratio * number
+        time[active] += random.standard_exponential(active.size) / total
+        going = time[active] < duration
+        binds = random.random(active.size) * total < bind
+        bound[active] += np.where(going, np.where(binds, 1, -1), 0)
+        active = active[going]
+    return bound

@@ -1,0 +1,266 @@
+"""The compiled step of a cohort population: exact survival, births by collocation, steps of its own."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.cohort_merging import settle
+from sim.cohort_steady import fill_steady
+from sim.hazards import hazard_integral, time_to_rupture
+from sim.jit import device, kernel
+
+
+class Rules(NamedTuple):
+    """What all rows of a population share."""
+
+    rate: float
+    softness: float
+    limit: float
+    rebinding: float
+    tolerance: float
+    largest: float  # longest step of its own [s]
+    cell: float  # width of a merging cell [m]
+    heavy: float  # width × share of a cell allowed, in units of 1/softness
+    most: float  # cohorts left by merging
+
+
+@device
+def spent(age, pace, rate):
+    """∫k dt of a fresh bond, pace = \\|V\\| × softness; its analytic continuation at a negative age."""
+    change = pace * age
+    return rate * age * (math.expm1(change) / change if change != 0.0 else 1.0)
+
+
+@device
+def _inside(stretch, width, limit):
+    """The part of a segment that lies between ± ``limit``."""
+    if width == 0.0:
+        return 1.0 if math.fabs(stretch) < limit else 0.0
+    over = max(0.0, stretch + 0.5 * width - limit) + max(0.0, -limit - stretch + 0.5 * width)
+    return max(0.0, 1.0 - over / width)
+
+
+@device
+def _survive(pool, count, move, pace, step, rules):
+    """Bonds that outlive a third of a step and all of it; pool[4] gets what outlives it, cohort by cohort."""
+    weight, stretch, width, steepness, kept = pool[0], pool[1], pool[2], pool[3], pool[4]
+    early, short = step / 3.0, move / 3.0
+    soon, late = spent(early, pace, rules.rate), spent(step, pace, rules.rate)
+    at_early, at_end = 0.0, 0.0
+    for i in range(count):
+        if steepness[i] > 0.0:
+            one, two = math.exp(-steepness[i] * soon), math.exp(-steepness[i] * late)
+        else:
+            one = math.exp(-hazard_integral(stretch[i], short, early, rules.rate, rules.softness))
+            two = math.exp(-hazard_integral(stretch[i], move, step, rules.rate, rules.softness))
+        if rules.limit < math.inf:
+            one *= _inside(stretch[i] + short, width[i], rules.limit)
+            two *= _inside(stretch[i] + move, width[i], rules.limit)
+        kept[i] = weight[i] * two
+        at_early += weight[i] * one
+        at_end += kept[i]
+    return at_early, at_end
+
+
+@device
+def _steepen(pool, count, slip, softness):
+    """pool[3]: k/k0 of each bond that slides away from zero; 0 marks the others."""
+    for i in range(count):
+        forward = pool[1, i] * slip >= 0.0
+        pool[3, i] = math.exp(min(math.fabs(pool[1, i]) * softness, 690.0)) if forward else 0.0
+
+
+@device
+def _births(free, early, late, step, pace, rules):
+    """Births of a step by Radau IIA: weights at its third and at its end, free sites then, and the error.
+
+    F(t) = 1 − R(t) − ∫k_on F(s) S(t − s)ds at t = h/3 and h, R = ``early`` and ``late``, the integral by the
+    two-stage rule: third order, and stable for any k_on h. The error is the distance to the
+    trapezoidal rule.
+    """
+    z = rules.rebinding * step
+    before = math.exp(-spent(-2.0 / 3.0 * step, pace, rules.rate))
+    after = math.exp(-spent(2.0 / 3.0 * step, pace, rules.rate))
+    a, b, c, d = 1.0 + 5.0 / 12.0 * z, -z / 12.0 * before, 0.75 * z * after, 1.0 + 0.25 * z
+    p, q = max(0.0, 1.0 - early), max(0.0, 1.0 - late)
+    whole = a * d - b * c
+    first, last = (p * d - b * q) / whole, (a * q - c * p) / whole
+    other = 0.5 * z * free * math.exp(-spent(step, pace, rules.rate))
+    error = math.fabs(other + 0.25 * z * last - c * first)
+    if min(first, last) >= 0.0:
+        return c * first, 0.25 * z * last, 0.0, error
+    made = min(max(q - last, 0.0), q)  # only roundings, or a step too short to refuse, end with these
+    return (made if first > 0.0 else 0.0), (0.0 if first > 0.0 else made), min(first, last), error
+
+
+@device
+def _carry(pool, count, move, one, two, rules):
+    """Accept a step: keep what survived, move it, drop the negligible, add the births; the new count."""
+    weight, stretch, width, kept = pool[0], pool[1], pool[2], pool[4]
+    whole = one + two
+    for i in range(count):
+        whole += kept[i]
+    left = 0
+    for i in range(count):
+        if kept[i] > 1e-18 * whole:
+            weight[left], stretch[left], width[left] = kept[i], stretch[i] + move, width[i]
+            if rules.limit < math.inf:
+                low = max(stretch[left] - 0.5 * width[i], -rules.limit)
+                high = min(stretch[left] + 0.5 * width[i], rules.limit)
+                stretch[left], width[left] = 0.5 * (low + high), high - low
+            left += 1
+    if one + two <= 1e-18 * whole:
+        return left
+    far = 2.0 / 3.0 * move
+    if rules.limit < math.inf or far == 0.0:
+        share = one / (one + two)
+        weight[left], stretch[left], width[left] = one + two, share * far, 0.0
+        width[left] = math.sqrt(12.0 * share * (1.0 - share)) * math.fabs(far)
+        return left + 1
+    weight[left], stretch[left], width[left] = one, far, 0.0
+    weight[left + 1], stretch[left + 1], width[left + 1] = two, 0.0, 0.0
+    return left + (2 if two > 0.0 else 1)
+
+
+@device
+def _try(pool, count, move, pace, step, free, rules):
+    """One step tried: births at its two stages, and the factor by which the step should change; < 1 refuses it."""
+    early, late = _survive(pool, count, move, pace, step, rules)
+    if rules.rebinding == 0.0:
+        return 0.0, 0.0, 4.0
+    one, two, lowest, error = _births(free, early, late, step, pace, rules)
+    if lowest < -1e-14:
+        return one, two, 0.2
+    allowed = rules.tolerance / 3.0 * (late + one + two + 1e-9 * (1.0 - free)) + 1e-15 * (1.0 + rules.rebinding * step)
+    factor = 4.0 if error <= 0.0 else (allowed / error) ** (1.0 / 3.0)
+    if factor < 1.0:
+        return one, two, max(0.02, 0.85 * factor)
+    return one, two, min(4.0, max(1.0, 0.9 * factor))
+
+
+@device
+def _forgets(pool, other, count, speed, duration, rules):
+    """Number of cohorts of the steady state in pool[5:] if a step is so long that nothing else is left, else 0."""
+    if rules.rebinding == 0.0:
+        return 0, 0.0
+    depth = math.log(100.0 / rules.tolerance)
+    typical = time_to_rupture(0.0, speed, 1.0, rules.rate, rules.softness, rules.limit)
+    if not duration > depth * typical:
+        return 0, 0.0
+    found, life, square = fill_steady(other, speed, rules)
+    pause = 1.0 / rules.rebinding
+    cycle = life + pause
+    spread = max(0.0, 2.0 * square / life / life - 1.0) * (life / cycle) ** 2 + (pause / cycle) ** 2
+    lives = min(300.0, depth / min(1.0, 2.0 * math.pi**2 * spread))
+    rest = duration - lives * life
+    if rest <= 0.0:
+        return 0, 0.0
+    pace = math.fabs(speed) * rules.softness
+    _, left = _survive(pool, count, speed * rest, pace, rest, rules)
+    return (found if left <= 1e-3 * rules.tolerance * (life / cycle) else 0), life
+
+
+@device
+def _step_row(pool, count, travelled, settled, slip, duration, rules):
+    """Advance one population by a clock step in steps of its own; cohorts, slider position and settled number."""
+    speed = min(max(slip / duration, -1e200), 1e200) if duration > 0.0 else 0.0
+    pace = math.fabs(speed) * rules.softness
+    direction = -1.0 if slip < 0.0 else 1.0
+    _steepen(pool, count, slip, rules.softness)
+    found, _ = _forgets(pool, pool[5:], count, speed, duration, rules)
+    if found > 0:
+        for k in range(3):
+            pool[k, :found] = pool[5 + k, :found]
+        left = settle(pool[0], pool[1], pool[2], found, direction, 0.0, rules)
+        return left, 0.0, left
+    typical = time_to_rupture(0.0, speed, 1.0, rules.rate, rules.softness, rules.limit)
+    longest = min(rules.largest, typical * (7.0 * rules.tolerance) ** (1.0 / 3.0))
+    shortest = 1e-13 * duration
+    if speed != 0.0:
+        longest = min(longest, 0.75 * rules.cell / math.fabs(speed))
+        if rules.limit < math.inf:
+            shortest = max(shortest, 1e-15 * rules.limit / math.fabs(speed))
+    if rules.rebinding == 0.0:
+        longest = math.inf
+    done, step, going = 0.0, duration, True
+    while going:
+        step = min(step, longest)
+        remaining = duration - done
+        going = step < 0.999 * remaining
+        step = (step if step < 0.5 * remaining else 0.5 * remaining) if going else remaining
+        bound = 0.0
+        for i in range(count):
+            bound += pool[0, i]
+        move = speed * step if done > 0.0 or going else slip
+        one, two, factor = _try(pool, count, move, pace, step, max(0.0, 1.0 - bound), rules)
+        if factor < 1.0 and step > shortest:
+            step, going = max(step * factor, shortest), True
+            continue
+        count = _carry(pool, count, move, one, two, rules)
+        travelled += move
+        done += step
+        step *= max(factor, 1.0)
+        if count > 1.25 * settled + 16.0 or count + 2 > pool.shape[1]:
+            count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
+            settled = count
+        if going:
+            _steepen(pool, count, slip, rules.softness)
+    return count, travelled, settled
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:], float64, float64[::1],"
+    " float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])"
+)
+def step_rows(
+    weight, stretch, width, lattice, slip, duration, numbers, new_weight, new_stretch, new_width, new_lattice
+):
+    """Advance all rows, each by itself."""
+    rules = Rules(
+        numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8]
+    )
+    rows, capacity = new_weight.shape
+    wide = new_width.shape[1] == capacity
+    pool = np.empty((8, capacity + 520))
+    for m in range(rows):
+        old = m if weight.shape[0] > 1 else 0
+        count = 0
+        for i in range(capacity):
+            if weight[old, i] > 0.0:
+                pool[0, count], pool[1, count] = weight[old, i], stretch[old, i]
+                pool[2, count] = width[old, i] if wide else 0.0
+                count += 1
+        moved = slip[m] if slip.shape[0] > 1 else slip[0]
+        count, travelled, settled = _step_row(pool, count, lattice[old, 0], lattice[old, 1], moved, duration, rules)
+        if count > capacity:
+            direction = -1.0 if moved < 0.0 else 1.0
+            count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
+            settled = count
+        if rules.cell < math.inf:
+            travelled = travelled % (1048576.0 * rules.cell)
+        for i in range(count):
+            new_weight[m, i], new_stretch[m, i] = pool[0, i], pool[1, i]
+            if wide:
+                new_width[m, i] = pool[2, i]
+        for i in range(count, capacity):
+            new_weight[m, i], new_stretch[m, i] = 0.0, 0.0
+            if wide:
+                new_width[m, i] = 0.0
+        new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
+
+
+@kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
+def settle_steady(speed, numbers, weight, stretch, width, lattice):
+    """The merged steady state of one row; the arrays are zero before."""
+    rules = Rules(
+        numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8]
+    )
+    pool = np.empty((3, weight.shape[1] + 520))
+    count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
+    count = settle(pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules)
+    for i in range(count):
+        weight[0, i], stretch[0, i] = pool[0, i], pool[1, i]
+        if width.shape[1] > 1:
+            width[0, i] = pool[2, i]
+    lattice[0, 1] = count

@@ -1,0 +1,228 @@
+"""Mean energy of a fluctuating shear stress on a finite disc of contact, for every family of spectra.
+
+``surface_energy`` of a spectrum is that of the infinite plane, right for a contact of very many wavelengths. On
+a disc of radius a every wave counts with the share that ``laws.disc`` gives in closed form, so that
+
+``E/(pi a^2) = 1/(4 pi^3 G) integral of [(1 - nu/2) C0(q) P(2qa) + (nu/2) C2(q) S(2qa)] dq``,
+
+C0 and C2 the integrals of C and of C cos(2 theta) over the directions theta from the sliding direction. This is
+the overlap integral over the autocorrelation in another order, and one-dimensional for anisotropic spectra, too.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import special
+
+from sim.footprint import BondMade
+from sim.laws.disc import energy_factors, marginal_factors, ripple_energy, ripple_marginal_energy
+from sim.spectrum import AnisotropicGaussian, Gaussian, Ripple, Spectrum, VonKarman
+
+Array = NDArray[np.float64]
+Factors = Callable[[Array], tuple[Array, Array]]
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+_FINE_NODES, _FINE_WEIGHTS = np.polynomial.legendre.leggauss(80)
+
+#: P and S oscillate like cos(x)/x: followed within this distance of x = 0 and of each break of the spectrum, and
+#: faded out beyond over a length so large that nothing of a smooth spectrum is left of the oscillation.
+_FOLLOWED, _FADING = 60.0, 10.0
+#: Beyond this x only the two ends of a spectrum are followed, not the kinks of its rows.
+_LAST_KINK = 3000.0
+
+
+def disc_energy(
+    spectrum: Spectrum, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+) -> ArrayLike:
+    """Mean elastic energy per area that a fluctuating shear stress stores on a disc of contact.
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Any family of ``sim.spectrum``.
+    radius : float or array
+        a [m]; 0 stores nothing, inf is the infinite plane.
+    shear_modulus, poisson_ratio : float or array
+        G [Pa], nu [1]; they broadcast with the radius.
+
+    Returns
+    -------
+    float or array
+        ``E/(pi a^2)`` [J/m^2]: ``spectrum.surface_energy`` for a disc of many wavelengths, ``(2 - nu) 2 a
+        sigma^2/(3 pi G)`` on one much smaller than any of them.
+
+    Raises
+    ------
+    ValueError
+        If a radius is negative or nan.
+
+    Notes
+    -----
+    Relative accuracy 1e-12, or 1e-9 for tables whose rows scatter widely at hundreds of waves per contact. A
+    spectrum that is smooth through q = 0 lacks the share ``(2/pi) xi/(sqrt(pi) a)`` of the plane's energy (of
+    ``Gaussian``); without waves as long as the disc hardly anything is missing.
+
+    Examples
+    --------
+    Patches of a tenth of the radius store 3.6 % less than on the infinite plane:
+
+    >>> patches = Gaussian(rms=1.0, length=0.1)
+    >>> print(f"{disc_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.5f}")
+    0.96410
+    """
+    return _on_disc(energy_factors, ripple_energy, spectrum, radius, shear_modulus, poisson_ratio)
+
+
+def marginal_energy(
+    spectrum: Spectrum, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+) -> ArrayLike:
+    """Mean energy that a unit of new contact area stores at the edge of a growing disc: dE/dA.
+
+    Parameters
+    ----------
+    spectrum, radius, shear_modulus, poisson_ratio
+        As for ``disc_energy``.
+
+    Returns
+    -------
+    float or array
+        ``(1/(2 pi a)) dE/da`` [J/m^2], the exact derivative of the overlap integral; 0 at a = 0,
+        ``spectrum.surface_energy`` at a = inf.
+
+    Notes
+    -----
+    This, not the mean over the disc, enters the balance of energies at the contact's edge.
+
+    Examples
+    --------
+    The deficit of the whole disc comes from its edge; a unit of new area lacks half of it:
+
+    >>> patches = Gaussian(rms=1.0, length=0.1)
+    >>> print(f"{1 - marginal_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.4f}")
+    0.0180
+    """
+    return _on_disc(marginal_factors, ripple_marginal_energy, spectrum, radius, shear_modulus, poisson_ratio)
+
+
+def _on_disc(
+    factors: Factors,
+    ripple: Callable[..., Array],
+    spectrum: Spectrum,
+    radius: ArrayLike,
+    shear_modulus: ArrayLike,
+    poisson_ratio: ArrayLike,
+) -> ArrayLike:
+    radii = np.asarray(radius, float)
+    if not np.all(radii >= 0.0):
+        raise ValueError("the radius of a disc must be at least zero; give detached contacts the radius 0")
+    modulus, nu = np.asarray(shear_modulus, float), np.asarray(poisson_ratio, float)
+    if isinstance(spectrum, Ripple):
+        q = 2 * math.pi / spectrum.wavelength
+        return ripple(spectrum.amplitude, q, spectrum.angle, radii, modulus, nu)
+    sums = np.array([_sums(factors, spectrum, a) for a in radii.ravel().tolist()])
+    mean, skew = sums.T.reshape(2, *radii.shape)
+    return ((1 - 0.5 * nu) * mean + 0.5 * nu * skew) / (4 * math.pi**3 * modulus)
+
+
+def _sums(factors: Factors, spectrum: Any, radius: float) -> tuple[float, float]:
+    """``integral of C0 P dq`` and ``integral of C2 S dq`` for one disc."""
+    if radius == 0.0:
+        return 0.0, 0.0
+    if math.isinf(radius):
+        at_zero, at_one = (4 * math.pi**3 * float(spectrum.surface_energy(1.0, nu)) for nu in (0.0, 1.0))
+        return at_zero, 2 * at_one - at_zero
+    if isinstance(spectrum, BondMade):
+        return _bond_sum(factors, spectrum.footprint, radius), 0.0
+    q, step = _nodes(spectrum, radius)
+    x = 2 * radius * q
+    followed = _window(spectrum, radius, x)
+    mean, skew = factors(x)
+    # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
+    limit = 4.0 / x if factors is energy_factors else 2.0 / x
+    mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
+    skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
+    level, lean = _harmonics(spectrum, q)
+    return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
+
+
+def _harmonics(spectrum: Any, q: Array) -> tuple[Array, Array]:
+    """``integral of C`` and ``integral of C cos(2 theta)`` over the directions, at wavenumber q."""
+    if not isinstance(spectrum, AnisotropicGaussian):
+        return 2 * math.pi * spectrum.radial_density(q), np.zeros(())
+    a, b = spectrum.length_x, spectrum.length_y
+    level = 2 * math.pi**2 * a * b * spectrum.variance * np.exp(-((min(a, b) * q) ** 2) / 4)
+    bend = (a - b) * (a + b) / 8 * q**2
+    return level * special.ive(0, bend), -level * special.ive(1, bend) * math.cos(2 * spectrum.angle)
+
+
+def _breaks(spectrum: Any) -> Array:
+    """Wavenumbers at which the density jumps or kinks."""
+    return np.asarray(getattr(spectrum, "breaks", ()), float)
+
+
+def _reach(spectrum: Any, radius: float) -> tuple[float, float]:
+    """Wavenumbers below which nothing varies, and beyond which nothing is left of the integrals."""
+    if isinstance(spectrum, Gaussian):
+        return 0.25 / spectrum.length, 14.0 / spectrum.length
+    if isinstance(spectrum, AnisotropicGaussian):
+        both = spectrum.length_x, spectrum.length_y
+        return 0.25 / max(both), 14.0 / min(both)
+    if isinstance(spectrum, VonKarman):
+        return 0.25 / spectrum.length, 1e13 / min(spectrum.length, radius)
+    return spectrum.support
+
+
+def _nodes(spectrum: Any, radius: float) -> tuple[Array, Array]:
+    """Wavenumbers and steps of a composite Gauss-Legendre sum over all q that matter."""
+    low, high = _reach(spectrum, radius)
+    start = low if len(_breaks(spectrum)) else min(low, 0.5 / radius)
+    halves = math.ceil(2 * math.log2(high / start))
+    edges: list[ArrayLike] = [_breaks(spectrum), start * 2.0 ** (0.5 * np.arange(halves)), [high]]
+    if not len(_breaks(spectrum)):
+        edges.append([0.0])
+    for begin, end in _followed(spectrum, radius):
+        begin, end = max(begin - 6 * _FADING, 0.0), end + 6 * _FADING
+        count = math.ceil((end - begin) / (2 * math.pi))
+        turns = np.linspace(begin, end, count + 1) / (2 * radius)
+        edges.append(turns[(turns > start) & (turns < high)])
+    edge: Array = np.unique(np.concatenate(edges))
+    half = 0.5 * np.diff(edge)[:, None]
+    return (edge[:-1, None] + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
+
+
+def _followed(spectrum: Any, radius: float) -> list[tuple[float, float]]:
+    """Intervals of x = 2qa in which the oscillation of P and S is followed, increasing and apart."""
+    x = 2 * radius * _breaks(spectrum)
+    near = np.concatenate([[0.0], x[x < _LAST_KINK], x[:1], x[-1:]])
+    intervals: list[tuple[float, float]] = []
+    for begin, end in zip(np.sort(near) - _FOLLOWED, np.sort(near) + _FOLLOWED, strict=True):
+        if intervals and begin - intervals[-1][1] < 12 * _FADING:
+            begin = intervals.pop()[0]
+        intervals.append((begin, end))
+    return intervals
+
+
+def _window(spectrum: Any, radius: float, x: Array) -> Array:
+    """1 where the oscillation of P and S is followed, falling smoothly to 0 elsewhere."""
+    followed = np.zeros_like(x)
+    for number, (begin, end) in enumerate(_followed(spectrum, radius)):
+        rise = special.erfc((begin - x) / _FADING) if number else 2.0
+        followed += 0.25 * rise * special.erfc((x - end) / _FADING)
+    return followed
+
+
+def _bond_sum(factors: Factors, footprint: float, radius: float) -> float:
+    """``integral of C0 P dq`` of bond footprints, whose spectrum oscillates: in real space, where it ends.
+
+    The integral of J0(qs) q C/2pi over q is the autocorrelation, the overlap of two footprints.
+    """
+    least = min(footprint, radius)
+    phase, weight = 0.25 * math.pi * (1 + _FINE_NODES), 0.25 * math.pi * _FINE_WEIGHTS
+    distance = least * np.sin(phase)  # half of it; the root at the end of the overlap becomes smooth
+    u, v = distance / radius, distance / footprint
+    disc = np.arccos(u) - (u * np.sqrt(1 - u * u) if factors is energy_factors else 0.0)
+    bond = np.arccos(v) - v * np.sqrt(1 - v * v)
+    return 16 / footprint**2 * float(np.sum(disc * bond * np.cos(phase) * weight)) * least

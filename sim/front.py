@@ -1,0 +1,525 @@
+"""How fast the edge of an adhesive contact moves: crack-front kinetics, one clock step at a time.
+
+The edge of a contact of radius a moves at the speed at which its surplus of elastic energy is used
+up, ``G - w = work (v/speed)^exponent sgn(v)``, v = -da/dt, opening where the energy release rate
+G exceeds the work of adhesion w and healing, with a speed and an exponent of its own, where it
+falls short (after Maugis & Barquins). Unlike the form with G/w this one stays finite and defined
+for w <= 0, where stress fluctuations outweigh adhesion. Limits: infinite speed is the JKR
+equilibrium, zero speed a frozen edge.
+
+One formula serves every control. A machine pushes with ``P = load + stiffness (travel - delta)``:
+stiffness 0 is a load, an infinite one an indentation. With ``lambda = stiffness/(stiffness + 2 E* a)``
+and ``mu = 1/(stiffness + 2 E* a)`` the indentation missing from Hertz's at this radius is
+
+    y = a^2/R - delta = lambda (a^2/R - travel) + mu (4 E* a^3/(3R) - load),   G = E* y^2/(2 pi a).
+
+Integration. Radau IIA of three stages (order 5, L-stable; Hairer & Wanner, Solving ODEs II, IV.8)
+takes steps of its own choice inside the clock step. Where the edge runs open, the radius falls to
+zero in finite time with an infinite slope; there the same method advances the time over -ln a,
+which is smooth to the end. Control and work change linearly over the clock step, which is cut where
+the work or the force on the bare contact changes sign.
+
+The contact never falls below Hertz's (y = 0): pressing alone makes that area, and linear
+elasticity has no smaller one. An edge that opens against w <= 0 stops there, and one that heals more
+slowly than the press pushes rides on it.
+"""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from sim.jit import device, kernel
+
+_S6 = math.sqrt(6.0)
+_C1, _C2 = (4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0
+_B1, _B2, _B3 = (16.0 - _S6) / 36.0, (16.0 + _S6) / 36.0, 1.0 / 9.0
+# inverse of the method's matrix, and its real eigenvalue
+_I11, _I12, _I13 = 2.0 + _S6 / 2.0, -1.2 + 29.0 * _S6 / 30.0, 0.4 - 4.0 * _S6 / 15.0
+_I21, _I22, _I23 = -1.2 - 29.0 * _S6 / 30.0, 2.0 - _S6 / 2.0, 0.4 + 4.0 * _S6 / 15.0
+_I31, _I32, _I33 = -1.0 + 8.0 * _S6 / 3.0, -1.0 - 8.0 * _S6 / 3.0, 5.0
+_REAL = 3.0 + 3.0 ** (2.0 / 3.0) - 3.0 ** (1.0 / 3.0)
+_E1, _E2, _E3 = -(13.0 + 7.0 * _S6) / 3.0, -(13.0 - 7.0 * _S6) / 3.0, -1.0 / 3.0
+
+#: Local error of one inner step, relative to the radius, as the embedded method of order 3 sees it.
+TOLERANCE = 1e-8
+_TRIES = 3000
+_TOUCH = 1e-11
+_LEAST = 1e-9
+_ROUNDING = 1e-12
+_LONGEST = 0.2
+
+
+class Hold(NamedTuple):
+    """What presses the sphere during a clock step: P = load + stiffness (travel - delta), each linear in time.
+
+    ``stiffness`` 0 is a load and an infinite one an indentation, namely ``travel``.
+    """
+
+    load_before: Any = 0.0
+    load_after: Any = 0.0
+    travel_before: Any = 0.0
+    travel_after: Any = 0.0
+    stiffness: Any = 0.0
+
+
+class Kinetics(NamedTuple):
+    """The law of the edge: G - w = work (v/speed)^exponent where it opens, with numbers of its own where it heals."""
+
+    work: Any
+    speed: Any
+    exponent: Any
+    heal_speed: Any
+    heal_exponent: Any
+
+
+class Advance(NamedTuple):
+    """What a clock step did to each member."""
+
+    radius: np.ndarray
+    detached_at: np.ndarray
+    dissipated: np.ndarray
+
+
+@device
+def _excess(t, a, scene):
+    """The missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
+
+    Below Hertz's radius G goes on as -G: nothing else than a monotone continuation for the inner
+    solver, which never ends there.
+    """
+    modulus, curvature, stiffness, load, load_rate, travel, travel_rate, work, work_rate, scale = scene
+    if stiffness == math.inf:
+        machine, yielding = 1.0, 0.0
+    else:
+        yielding = 1.0 / (stiffness + 2.0 * modulus * a)
+        machine = stiffness * yielding
+    hertz = a * a * curvature
+    y = machine * (hertz - travel - travel_rate * t)
+    y += yielding * (4.0 / 3.0 * modulus * a * hertz - load - load_rate * t)
+    y_a = 2.0 * a * curvature - 2.0 * modulus * yielding * y
+    y_t = -machine * travel_rate - yielding * load_rate
+    unit = modulus * abs(y) / (2.0 * math.pi * a * scale)
+    s = unit * y - (work + work_rate * t) / scale
+    return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
+
+
+@device
+def _speed(s, front):
+    """da/dt at an excess s, and its slope with s.
+
+    Closer to equilibrium than rounding resolves the law is a straight line, lest its slope end at 0 or infinity.
+    """
+    speed, power = (front[0], front[1]) if s > 0.0 else (front[2], front[3])
+    near = _ROUNDING if power >= 1.0 else 1e3 * _ROUNDING
+    if abs(s) < near:
+        slope = -speed * math.pow(near, power - 1.0)
+        return slope * s, slope
+    rate = -math.copysign(speed * math.pow(abs(s), power), s)
+    return rate, rate * power / s
+
+
+@device
+def _slope(running, x, y, start, scene, front):
+    """The equation to integrate: its right side, that one's slopes with y and with x, and s times an area.
+
+    At rest in time, y is the radius and x the time; ``running``, y is the time and x the logarithm
+    of start/radius. The last number times \\|dy\\| (times dx, ``running``) is energy over 2 pi work.
+    """
+    if running:
+        a = start * math.exp(-x)
+        _, s, s_a, s_t = _excess(y, a, scene)
+        rate, bend = _speed(s, front)
+        if not rate < 0.0:
+            return math.nan, 0.0, 0.0, 0.0
+        pace = -a / rate
+        growth = bend / rate
+        return pace, -pace * growth * s_t, pace * (growth * s_a * a - 1.0), s * a * a
+    _, s, s_a, s_t = _excess(x, y, scene)
+    rate, bend = _speed(s, front)
+    return rate, bend * s_a, bend * s_t, s * y
+
+
+@device
+def _solved(m11, m22, m33, r1, r2, r3):
+    """Cramer's rule for the inverse matrix of the method with another diagonal."""
+    c1 = m22 * m33 - _I23 * _I32
+    c2 = _I21 * m33 - _I23 * _I31
+    c3 = _I21 * _I32 - m22 * _I31
+    d = 1.0 / (m11 * c1 - _I12 * c2 + _I13 * c3)
+    x1 = d * (r1 * c1 - _I12 * (r2 * m33 - _I23 * r3) + _I13 * (r2 * _I32 - m22 * r3))
+    x2 = d * (m11 * (r2 * m33 - _I23 * r3) - r1 * c2 + _I13 * (_I21 * r3 - r2 * _I31))
+    x3 = d * (m11 * (m22 * r3 - r2 * _I32) - _I12 * (_I21 * r3 - r2 * _I31) + r1 * c3)
+    return x1, x2, x3
+
+
+@device
+def _stages(running, x, y, h, z1, z2, z3, start, scene, front):
+    """The three stages' residuals, slopes and excesses, and the size of the residuals as a length.
+
+    A residual counts by the change of radius that would mend it: opening and healing may differ by
+    decades in speed.
+    """
+    if not (running or (y + z1 > 0.0 and y + z2 > 0.0 and y + z3 > 0.0)):
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, math.inf
+    f1, j1, _, s1 = _slope(running, x + _C1 * h, y + z1, start, scene, front)
+    f2, j2, _, s2 = _slope(running, x + _C2 * h, y + z2, start, scene, front)
+    f3, j3, _, s3 = _slope(running, x + h, y + z3, start, scene, front)
+    r1 = _I11 * z1 + _I12 * z2 + _I13 * z3 - h * f1
+    r2 = _I21 * z1 + _I22 * z2 + _I23 * z3 - h * f2
+    r3 = _I31 * z1 + _I32 * z2 + _I33 * z3 - h * f3
+    misfit = abs(r1) / (1.0 + h * abs(j1)) + abs(r2) / (1.0 + h * abs(j2)) + abs(r3) / (1.0 + h * abs(j3))
+    return r1, r2, r3, j1, j2, j3, s1, s2, s3, misfit
+
+
+@device
+def _radau(running, x, y, h, size, first, start, scene, front):
+    """One step of Radau IIA: change of y, error over tolerance (nan: no solution), and energy/(2 pi work).
+
+    Newton's steps are halved while they do not lower the residual. The error is that of the embedded
+    method, filtered by the stiffest slope met, so that a fast layer narrower than the tolerance is
+    stepped over. The energy is the method's own quadrature, of positive weights and signs.
+    """
+    f, j, f_x = first
+    g1, g2, g3 = _C1 * h, _C2 * h, h
+    z1 = g1 * (f + 0.5 * g1 * f_x) / (1.0 + 0.5 * g1 * abs(j))
+    z2 = g2 * (f + 0.5 * g2 * f_x) / (1.0 + 0.5 * g2 * abs(j))
+    z3 = g3 * (f + 0.5 * g3 * f_x) / (1.0 + 0.5 * g3 * abs(j))
+    now = _stages(running, x, y, h, z1, z2, z3, start, scene, front)
+    if not now[9] < math.inf:
+        z1 = z2 = z3 = 0.0
+        now = _stages(running, x, y, h, z1, z2, z3, start, scene, front)
+    for _ in range(20):
+        r1, r2, r3, j1, j2, j3, s1, s2, s3, residual = now
+        if not residual < math.inf:
+            return 0.0, math.nan, 0.0
+        d1, d2, d3 = _solved(_I11 - h * j1, _I22 - h * j2, _I33 - h * j3, r1, r2, r3)
+        change = max(abs(d1), abs(d2), abs(d3))
+        if change <= 1e-3 * TOLERANCE * size:
+            z1, z2, z3 = z1 - d1, z2 - d2, z3 - d3
+            error = (h * f + _E1 * z1 + _E2 * z2 + _E3 * z3) / (_REAL - h * min(0.0, j, j1, j2, j3))
+            v1 = _I11 * z1 + _I12 * z2 + _I13 * z3
+            v2 = _I21 * z1 + _I22 * z2 + _I23 * z3
+            v3 = _I31 * z1 + _I32 * z2 + _I33 * z3
+            if running:
+                v1 = v2 = v3 = h
+            energy = _B1 * abs(s1 * v1) + _B2 * abs(s2 * v2) + _B3 * abs(s3 * v3)
+            return z3, abs(error) / (TOLERANCE * size), energy
+        if not change < math.inf:
+            return 0.0, math.nan, 0.0
+        for _ in range(12):
+            now = _stages(running, x, y, h, z1 - d1, z2 - d2, z3 - d3, start, scene, front)
+            if now[9] < residual:
+                break
+            d1, d2, d3 = 0.5 * d1, 0.5 * d2, 0.5 * d3
+        z1, z2, z3 = z1 - d1, z2 - d2, z3 - d3
+    return 0.0, math.nan, 0.0
+
+
+@device
+def _bare_force(t, scene):
+    """What the control presses with on a contact of no size: N, or m where the stiffness is infinite."""
+    _, _, stiffness, load, load_rate, travel, travel_rate, _, _, _ = scene
+    if stiffness == math.inf:
+        return travel + travel_rate * t
+    return load + load_rate * t + stiffness * (travel + travel_rate * t)
+
+
+@device
+def _hertz_force(a, scene):
+    """The bare force that goes with Hertz's contact of radius a."""
+    if scene[2] == math.inf:
+        return a * a * scene[1]
+    return a * a * scene[1] * (scene[2] + 4.0 / 3.0 * scene[0] * a)
+
+
+@device
+def _hertz(t, scene):
+    """Hertz's radius under the control at t; 0 where nothing presses.
+
+    The force grows with the radius and is convex, so Newton's steps from the right go left.
+    """
+    modulus, curvature, stiffness = scene[0], scene[1], scene[2]
+    force = _bare_force(t, scene)
+    if not force > 0.0:
+        return 0.0
+    if stiffness == math.inf:
+        return math.sqrt(force / curvature)
+    a = np.cbrt(0.75 * force / (curvature * modulus))
+    if stiffness > 0.0:
+        a = min(a, math.sqrt(force / (curvature * stiffness)))
+    for _ in range(60):
+        lower = a - (_hertz_force(a, scene) - force) / (a * curvature * (2.0 * stiffness + 4.0 * modulus * a))
+        if not lower < a:
+            break
+        a = lower
+    return a
+
+
+@device
+def _pushed(t, scene, front):
+    """Whether Hertz's contact at t outruns the edge, and its radius."""
+    a = _hertz(t, scene)
+    modulus, curvature, stiffness, _, load_rate, _, travel_rate, work, work_rate, scale = scene
+    rate, _ = _speed(-(work + work_rate * t) / scale, front)
+    if stiffness == math.inf:
+        indenting = travel_rate
+    else:
+        indenting = (load_rate + stiffness * travel_rate) / (stiffness + 2.0 * modulus * a)
+    return rate <= indenting / (2.0 * a * curvature), a
+
+
+@device
+def _ride(t, a, end, least, scene, front):
+    """Follow Hertz's contact from t to ``end`` at most, or to where the edge leaves it.
+
+    The energy is that of new area against G = 0, int w a da, exact by Gauss's three points since
+    work and force are linear in time; none is counted where w <= 0, where pressing pays for the area.
+    """
+    riding, b = _pushed(end, scene, front)
+    if not riding:
+        low, high = t, end
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            riding, _ = _pushed(middle, scene, front)
+            low, high = (middle, high) if riding else (low, middle)
+        end = high
+        _, b = _pushed(end, scene, front)
+    if b <= least and b < a:
+        b, before, after = min(a, least), _bare_force(t, scene), _bare_force(end, scene)
+        end = t + (end - t) * min(max((before - _hertz_force(b, scene)) / (before - after), 0.0), 1.0)
+    energy = 0.0
+    if b > a and scene[7] + scene[8] * 0.5 * (t + end) > 0.0:
+        low, span = _hertz_force(a, scene), _hertz_force(b, scene) - _hertz_force(a, scene)
+        for node, weight in ((-math.sqrt(0.6), 5.0 / 18.0), (0.0, 8.0 / 18.0), (math.sqrt(0.6), 5.0 / 18.0)):
+            c = 0.5 * (a + b) + 0.5 * node * (b - a)
+            moment = t + (end - t) * (_hertz_force(c, scene) - low) / span
+            energy += weight * (b - a) * c * max(0.0, scene[7] + scene[8] * moment) / scene[9]
+    return end, b, energy
+
+
+@device
+def _resign(t, a, stop, least, scene, front):
+    """One implicit Euler step to ``stop``, for what the adaptive steps cannot finish.
+
+    Of its solutions the first that the edge meets on its way, found by a walk and bisection.
+    """
+    _, s, _, _ = _excess(stop, a, scene)
+    rate, _ = _speed(s, front)
+    factor, low, energy = (0.98 if s > 0.0 else 1.02), a, 0.0
+    for _ in range(4000):
+        if rate == 0.0 or not low > least:
+            break
+        high = low * factor
+        _, s, _, _ = _excess(stop, high, scene)
+        f, _ = _speed(s, front)
+        if (high - a - (stop - t) * f) * rate >= 0.0:
+            for _ in range(60):
+                middle = 0.5 * (low + high)
+                _, s, _, _ = _excess(stop, middle, scene)
+                f, _ = _speed(s, front)
+                low, high = (low, middle) if (middle - a - (stop - t) * f) * rate >= 0.0 else (middle, high)
+            break
+        energy += abs(s * high * (high - low))
+        low = high
+    return max(low, _hertz(stop, scene)), energy
+
+
+@device
+def _runs(a, rate, bend, s_a, s_t, left):
+    """Whether the edge runs open: it would lose much of the radius in the time left, without slowing down soon."""
+    if not -rate * left > 0.1 * a:
+        return False
+    growth = bend / rate
+    return growth * s_a * a < 3.0 and growth * s_t * a > 0.3 * rate
+
+
+@device
+def _start(running, t, a, rate, stop, least):
+    """First step, longest step, and size of an error that counts, in the variable that ``running`` makes the time."""
+    if running:
+        reach = math.log(a / least)
+        return 0.1, min(reach, _LONGEST), reach, 1e-3 * stop - a / rate
+    return min(stop - t, 0.1 * a / abs(rate)), stop - t, stop - t, a
+
+
+@device
+def _try(running, t, a, h, size, scene, front):
+    """An inner step: time and radius after it, error over tolerance, and energy/(2 pi work)."""
+    x, now = (0.0, t) if running else (t, a)
+    f, j, f_x, _ = _slope(running, x, now, a, scene, front)
+    change, error, energy = _radau(running, x, now, h, size, (f, j, f_x), a, scene, front)
+    if running:
+        return t + change, a * math.exp(-h), error, energy
+    return t + h, a + change, error, energy
+
+
+@device
+def _piece(t, a, stop, least, tries, scene, front):
+    """Advance to ``stop``: time, radius or 0 if open, energy/(2 pi work), and tries left.
+
+    A time below ``stop`` with a radius means that the tries are used up.
+    """
+    energy, h, tick = 0.0, 0.0, 0.125 * (stop - t)
+    was = cross = shy = refused = False
+    while t < stop and tries > 0:
+        tries -= 1
+        y, s, s_a, s_t = _excess(t, a, scene)
+        rate, bend = _speed(s, front)
+        if y <= _TOUCH * a * a * scene[1] and _pushed(t, scene, front)[0]:
+            t, a, more = _ride(t, a, min(stop, t + tick), least, scene, front)
+            energy, h = energy + more, 0.0
+            if a <= least:
+                return t, 0.0, energy, tries
+            continue
+        if a <= least and rate < 0.0:
+            return t, 0.0, energy, tries
+        running = rate < 0.0 and not shy and (cross or _runs(a, rate, bend, s_a, s_t, stop - t))
+        first, longest, reach, size = _start(running, t, a, rate, stop, least)
+        h = min(first if running != was or h == 0.0 else h, longest)
+        was, whole = running, h == reach
+        t1, a1, error, more = _try(running, t, a, h, size, scene, front)
+        if not error < math.inf:
+            shy, h = True, (0.0 if running else 0.25 * h)
+            continue
+        if error > 1.0:
+            h *= 0.1 if refused else max(0.1, 0.9 * error**-0.25)
+            refused = True
+            continue
+        refused = False
+        if running and t1 > stop and not (cross and whole and t1 - stop < 1e-6 * (stop - t)):
+            h *= 0.8 * (stop - t) / (t1 - t)
+            continue
+        if not running and a1 < min(least, a):
+            cross = True
+            continue
+        y1, _, _, _ = _excess(t1, a1, scene)
+        edge = _TOUCH * a1 * a1 * scene[1]
+        if y1 < -edge and y > edge:
+            h *= max(1e-6, y / (y - y1))
+            continue
+        t, energy, shy = (stop if whole and not running else min(t1, stop)), energy + more, False
+        a = max(a1, _hertz(t, scene)) if y1 < edge else a1
+        if running and whole:
+            return t, 0.0, energy, tries
+        h *= min(8.0, 0.9 * max(error, 1e-12) ** -0.25)
+    return t, a, energy, tries
+
+
+@device
+def _member(a, duration, least, scene, front):
+    """One member over one clock step: radius or nan, time of detachment or nan, dissipated energy."""
+    a = max(a, _hertz(0.0, scene))
+    if not a > 0.0:
+        return math.nan, math.nan, 0.0
+    ends = (_bare_force(0.0, scene), _bare_force(duration, scene))
+    first = _zero(scene[7], scene[7] + scene[8] * duration, duration)
+    second = _zero(ends[0], ends[1], duration)
+    t, energy, tries = 0.0, 0.0, _TRIES
+    for stop in (min(first, second), max(first, second), duration):
+        if t < stop:
+            t, a, more, tries = _piece(t, a, stop, least, tries, scene, front)
+            energy += more
+            if a > 0.0 and t < stop:
+                a, more = _resign(t, a, stop, least, scene, front)
+                t, energy = stop, energy + more
+                if a <= least:
+                    a = 0.0
+            if not a > 0.0:
+                return math.nan, t, 2.0 * math.pi * scene[9] * energy
+    return a, math.nan, 2.0 * math.pi * scene[9] * energy
+
+
+@device
+def _zero(before, after, duration):
+    """When a number that changes linearly changes sign; the end where it does not."""
+    if (before < 0.0) == (after < 0.0):
+        return duration
+    return duration * min(max(before / (before - after), 0.0), 1.0)
+
+
+@kernel("void(float64[:,::1], float64[:,::1])")
+def _advance(rows, out):
+    """Fill (radius, time of detachment, energy) of each member from its seventeen numbers."""
+    for m in range(rows.shape[0]):
+        a, w0, w1, load0, load1, travel0, travel1, stiffness = rows[m, :8]
+        duration, scale, speed, exponent, heal_speed, heal_exponent, sphere_radius, modulus, least = rows[m, 8:]
+        out[m, 0], out[m, 1], out[m, 2] = math.nan, math.nan, (0.0 if math.isnan(a) or a <= 0.0 else math.nan)
+        if stiffness == math.inf:
+            load0 = load1 = 0.0
+        if stiffness == 0.0:
+            travel0 = travel1 = 0.0
+        ends = abs(w0) + abs(w1) + abs(load0) + abs(load1) + abs(travel0) + abs(travel1)
+        positive = min(scale, exponent, heal_exponent, sphere_radius, modulus)
+        wide = max(abs(a), scale, exponent, heal_exponent, sphere_radius, modulus, duration, least)
+        lowest = min(stiffness, duration, speed, heal_speed, least)
+        if not (ends + wide < math.inf and positive > 0.0 and lowest >= 0.0):
+            continue
+        per = 1.0 / duration if duration > 0.0 else 0.0
+        power, heal_power = 1.0 / exponent, 1.0 / heal_exponent
+        speed = min(speed, a * per * min(_ROUNDING**-power, 1e250))
+        heal_speed = min(heal_speed, a * per * min(_ROUNDING**-heal_power, 1e250))
+        front = speed, power, heal_speed, heal_power
+        machine = modulus, 1.0 / sphere_radius, stiffness, load0, (load1 - load0) * per
+        scene = machine + (travel0, (travel1 - travel0) * per, w0, (w1 - w0) * per, scale)
+        end, opened, energy = _member(a, duration, max(least, _LEAST * a), scene, front)
+        if energy < math.inf and end != math.inf:
+            out[m, 0], out[m, 1], out[m, 2] = end, opened, energy
+
+
+def advance(radius, work, hold, kinetics, duration, sphere_radius, modulus, detached_below=0.0):
+    """Move the edge of each member's contact over one clock step.
+
+    Parameters
+    ----------
+    radius : array, shape (members,)
+        a at the start [m]; nan is an open contact, which stays open.
+    work : pair of arrays
+        Work of adhesion w at the start and at the end [J/m^2], of any sign.
+    hold : Hold
+        Load [N], travel [m] and stiffness [N/m] of what presses.
+    kinetics : Kinetics
+        Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
+        freezes the edge or leaves it in equilibrium.
+    duration : float or array
+        Length of the clock step [s].
+    sphere_radius, modulus : float or array
+        R [m], E* [Pa].
+    detached_below : float or array
+        Radius at which a shrinking contact counts as open [m], at least 1e-9 of the radius at the start. Under a dead
+        load the energy grows like 1/radius towards the end, because the load falls ever deeper; the time hardly
+        depends on it.
+
+    All broadcast against the radius.
+
+    Returns
+    -------
+    Advance
+        ``radius`` [m], nan where open; ``detached_at``, the time since the start of the step at which
+        it opened [s], nan where it did not; ``dissipated``, int \\|G - w\\| 2 pi a \\|da\\| [J] up to there.
+        Where a number that matters is nan or senseless all three are nan.
+
+    Notes
+    -----
+    Exponents above 1, whose edge is infinitely mobile at rest, cost much and lose digits in stiff
+    cases. A radius below Hertz's starts as Hertz's. Where pressing pushes the edge against w > 0 faster
+    than it heals, w dA is dissipated; against w <= 0 nothing is.
+
+    Examples
+    --------
+    Pulled with twice its pull-off load, a sphere lets go the later the slower its edge can run:
+
+    >>> rest, pull = np.full(3, 7.2e-5), Hold(-8e-4, -8e-4)
+    >>> edge = Kinetics(0.042, np.array([1e-6, 1e-5, 1e-4]), 0.6, 1e-6, 0.6)
+    >>> gone = advance(rest, (0.042, 0.042), pull, edge, 1e3, 2e-3, 6.4e6, 1e-8)
+    >>> print("%.2f %.3f %.4f" % tuple(gone.detached_at))
+    28.87 2.887 0.2887
+    """
+    radius = np.asarray(radius, dtype=float)
+    columns = (radius, *work, *hold, duration, *kinetics, sphere_radius, modulus, detached_below)
+    rows = np.empty((radius.size, len(columns)))
+    for row, column in zip(rows.T, columns, strict=True):
+        row[:] = column
+    out = np.empty((radius.size, 3))
+    _advance(rows, out)
+    return Advance(*out.T.copy())

@@ -1,0 +1,129 @@
+"""How a sphere is held at one time, and what its contact is then: at a load, an indentation, or behind a machine.
+
+Each grip gives the stable equilibrium for a work of adhesion and, for any radius, the load, the indentation
+and the potential. Radii are arrays, shape (1,) or (members,), nan where the contact is open.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from sim.laws import jkr, rivals
+
+
+class Bodies(NamedTuple):
+    """Radius R of the sphere [m], contact modulus E* [Pa] and Poisson ratio of the half-space [1]."""
+
+    sphere_radius: float
+    modulus: float
+    poisson_ratio: float
+
+
+def elastic_energy(radius: np.ndarray, indentation: np.ndarray, bodies: Bodies) -> np.ndarray:
+    """Elastic energy of a contact of any radius a and indentation δ [J].
+
+    ``E* (a δ² − 2 a³ δ/(3R) + a⁵/(5R²))``: its slope over δ is the load, over the area the energy release
+    rate G with the sign turned (Maugis 2000).
+    """
+    a, curvature = radius, 1.0 / bodies.sphere_radius
+    third = a**3 * curvature
+    return bodies.modulus * (a * indentation**2 - 2.0 / 3.0 * third * indentation + 0.2 * third * a**2 * curvature)
+
+
+@dataclass(frozen=True)
+class AtLoad:
+    """A dead load, compression positive [N]."""
+
+    load: float
+
+    @property
+    def closes(self) -> bool:
+        """Whether a sphere that is free touches the half-space: wherever it is not pulled."""
+        return self.load >= 0.0
+
+    def radius(self, work: np.ndarray, stress: np.ndarray, reversible: float, bodies: Bodies) -> np.ndarray:
+        """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
+        size, modulus, poisson_ratio = bodies
+        if reversible == 0.0:
+            return np.asarray(jkr.radius_at_load(self.load, work, size, modulus))
+        return np.asarray(
+            rivals.radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio)
+        )
+
+    def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Load on the sphere [N]; 0 where the contact is open."""
+        return np.where(np.isnan(radius), 0.0, self.load)
+
+    def depth(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Indentation [m]; nan where an open contact leaves the sphere without a place."""
+        return np.asarray(jkr.indentation_under_load(radius, self.load, bodies.sphere_radius, bodies.modulus))
+
+    def travel(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Travel of what holds the sphere [m]: its indentation, as nothing yields between."""
+        return self.depth(radius, bodies)
+
+    def released(self, radius: np.ndarray, work: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy given off between an open contact and this one: none that is known, as a free sphere flies away."""
+        return np.zeros(radius.shape)
+
+
+@dataclass(frozen=True)
+class AtTravel:
+    """A travel [m] behind a machine stiffness [N/m]; an infinite one is an indentation."""
+
+    place: float
+    stiffness: float = math.inf
+
+    @property
+    def closes(self) -> bool:
+        """Whether a sphere that is free touches the half-space."""
+        return self.place >= 0.0
+
+    def radius(self, work: np.ndarray, stress: np.ndarray, reversible: float, bodies: Bodies) -> np.ndarray:
+        """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
+        size, modulus, poisson_ratio = bodies
+        if math.isinf(self.stiffness):
+            if reversible == 0.0:
+                return np.asarray(jkr.radius_at_indentation(self.place, work, size, modulus))
+            law = rivals.radius_at_indentation_reversible
+            return np.asarray(law(self.place, work, stress, reversible, size, modulus, poisson_ratio))
+        found = jkr.radius_at_travel(self.place, self.stiffness, work, size, modulus)
+        if reversible == 0.0:
+            return np.asarray(found)
+        hertz = jkr.radius_at_travel(self.place, self.stiffness, 0.0, size, modulus)
+        return np.asarray(
+            rivals.shrunk_at_travel(
+                found, hertz, self.place, self.stiffness, work, stress, reversible, 0.0, size, modulus, poisson_ratio
+            )
+        )
+
+    def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Load on the sphere [N]; 0 where the contact is open."""
+        size, modulus, _ = bodies
+        if math.isinf(self.stiffness):
+            load = jkr.load_under_indentation(radius, self.place, size, modulus)
+        else:
+            load = jkr.load_under_travel(radius, self.place, self.stiffness, size, modulus)
+        return np.where(np.isnan(radius), 0.0, load)
+
+    def depth(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Indentation [m]; the travel where the contact is open and nothing loads the machine."""
+        if math.isinf(self.stiffness):
+            return np.full(radius.shape, self.place)
+        found = jkr.indentation_under_travel(radius, self.place, self.stiffness, *bodies[:2])
+        return np.where(np.isnan(radius), self.place, found)
+
+    def travel(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Travel of the machine [m]."""
+        return np.full(radius.shape, self.place)
+
+    def released(self, radius: np.ndarray, work: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy of this contact over that of an open one [J]: elastic, of the machine, and −w π a²."""
+        depth = self.depth(radius, bodies)
+        machine = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.place - depth) ** 2
+        return elastic_energy(radius, depth, bodies) + machine - work * math.pi * radius**2
+
+
+Grip = AtLoad | AtTravel

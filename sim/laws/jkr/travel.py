@@ -1,0 +1,147 @@
+"""The adhesive contact at a travel behind a machine of any stiffness: one compiled solver for all."""
+
+import math
+
+import numpy as np
+
+from sim.jit import device, kernel
+from sim.laws.jkr.machine import fold_level, fold_root
+from sim.laws.jkr.scales import adhesive_unit, grips_share
+from sim.roots import cube_root
+
+_BLOCK = 4096
+
+
+@device
+def _first_guess(excess, second, third, fourth, sixth, root, floor):
+    """A point right of the root t >= 0 of F(root + t) - F(root) = excess, at most 22 % too far.
+
+    The smaller of two bounds, each from a lower bound of the left side f_2 t^2 + ... + f_6 t^6. Near
+    the fold it is the square of ``A t + B t^2`` with A^2 = f_2 and 2 A B = f_3, for B^2 < f_4. Where x^6
+    prevails x^4 - 4x is -3 at least. Without adhesion, f_2 = f_3 = 0, the terms in x^4 and x^6 stay alone.
+    """
+    level = math.sqrt(excess)
+    linear = math.sqrt(second)
+    square = third / (2.0 * linear) if second > 0.0 else math.sqrt(fourth)
+    near = 2.0 * level / (linear + math.sqrt(second + 4.0 * square * level))
+    shift = 3.0 if second > 0.0 else 0.0
+    far = cube_root(shift + math.sqrt(excess + floor) / math.sqrt(sixth)) - root
+    guess = near if near < far else far
+    return guess if excess > 0.0 else 0.0
+
+
+@device
+def _step(t, excess, second, third, fourth, fifth, sixth):
+    """Newton's step towards the root of f_2 t^2 + ... + f_6 t^6 = excess; one that does not go left is rounding."""
+    value = t * t * (second + t * (third + t * (fourth + t * (fifth + t * sixth))))
+    slope = t * (2.0 * second + t * (3.0 * third + t * (4.0 * fourth + t * (5.0 * fifth + t * 6.0 * sixth))))
+    lower = t - (value - excess) / slope
+    return lower if lower < t else t
+
+
+@kernel("void(float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+def _solve(travels, stiffnesses, works, sphere_radii, moduli, radii):
+    """See ``radius_at_travel``.
+
+    No branch but selections, no call and no loop that ends early: the compiler turns the whole body into
+    vector instructions, which makes it fourteen times faster.
+    """
+    for i in range(radii.size):
+        travel, stiffness, work, sphere_radius, modulus = (
+            travels[i], stiffnesses[i], works[i], sphere_radii[i], moduli[i],
+        )  # fmt: skip
+        unit = adhesive_unit(work, sphere_radius, modulus)
+        depth = unit * (unit / sphere_radius)
+        sticks = work > 0.0 and depth > 1e-300 and travel / depth < 1e290  # else adhesion is lost in rounding
+        unit = unit if sticks else sphere_radius
+        depth = depth if sticks else sphere_radius
+        contact = 4.0 / 3.0 * modulus * unit
+        grips, load = grips_share(stiffness, contact)
+        root = fold_root(grips, load)
+        level = fold_level(root, grips, load) if sticks else 0.0
+        root = root if sticks else 0.0
+        last = level * (depth / grips)
+        excess = (travel - last) * (grips / depth) if last > -1e300 else grips * (travel / depth) - level
+        cube = root * root * root
+        second = 6.0 * grips * root * root + load * root * (15.0 * cube - 18.0)
+        third = 4.0 * grips * root + load * (20.0 * cube - 6.0) if sticks else 0.0
+        fourth = grips + 15.0 * load * root * root
+        fifth = 6.0 * load * root
+        floor = level + 3.0 * grips + 9.0 * load + 1e-14 if sticks else 0.0  # >= 0 but for rounding
+        t = _first_guess(excess, second, third, fourth, load, root, floor)
+        for _ in range(5):
+            t = _step(t, excess, second, third, fourth, fifth, load)
+        known = excess >= 0.0 and stiffness >= 0.0 and sphere_radius > 0.0 and modulus > 0.0 and work < math.inf
+        known = known and 1e-300 < contact < math.inf and (excess < math.inf or travel == math.inf)
+        known = known and (sticks or excess > 0.0 or travel == 0.0 or stiffness == 0.0)
+        radii[i] = unit * (root + t) * (root + t) if known else math.nan
+
+
+def radius_at_travel(travel, stiffness, work, sphere_radius, modulus):
+    """Contact radius at a prescribed travel behind a machine of given stiffness.
+
+    Parameters
+    ----------
+    travel : float or array
+        Delta = delta + P/k [m]; below 0 the machine pulls.
+    stiffness : float or array
+        k [N/m], 0 to inf.
+    work : float or array
+        Work of adhesion w [J/m^2].
+    sphere_radius : float or array
+        R [m].
+    modulus : float or array
+        E* [Pa].
+
+    Returns
+    -------
+    float or array
+        a [m]; nan below ``pull_off_travel`` and for a negative stiffness. At k = inf the radius at the
+        indentation Delta, at k = 0 the radius without load, for no travel can then press or pull. Where
+        w <= 0 Hertz's radius behind the machine, the root of ``a^2/R + 4 E* a^3/(3 R k) = Delta``.
+
+    Notes
+    -----
+    The sextic ``g (x^4 - 4x) + (1 - g) (x^6 - 6x^3) = g Delta/h`` in x = sqrt(a/a_g) has a_g =
+    (pi w R^2/8 E*)^(1/3), h = a_g^2/R and g = k/(k + 4 E* a_g/3). Call its left side F.
+
+    *One fold.* ``F' = 6 (1-g) x^5 + 4 g x^3 - 18 (1-g) x^2 - 4 g`` changes sign once in its coefficients, so
+    by Descartes' rule it has one root x_f > 0 (between 1 and 3^(1/3)); F falls before and grows after it.
+    The stable contact is the one root right of x_f, and exists if ``excess = g Delta/h - F(x_f) >= 0``.
+
+    *Convex beyond it.* ``F'' = 6x [5 (1-g) x^3 + 2 g x - 6 (1-g)]`` has a growing bracket, thus changes sign
+    at most once, from - to +. Up to there F' falls from ``-4g <= 0``, so x_f lies right of it.
+
+    *Newton's method from the right is monotone.* The tangent of a growing convex function lies below it and
+    so meets the level between the root and the point of contact: each step goes left, none passes the root.
+
+    Measured from the fold, x = x_f + t, the sextic ``f_2 t^2 + ... + f_6 t^6 = excess`` has no negative term.
+    A first guess that lies right of the root by 22 % at most, for any g and excess, leaves less than 1e-15
+    after five steps; their number is fixed. Towards the fold only the excess cancels: at a relative
+    distance d from it, a relative change e of an input moves the radius by about e/sqrt(d).
+
+    Where w R, R/E*, a_g^3 or a_g^2/R leave the range of numbers, adhesion is left out or the answer is nan.
+
+    Examples
+    --------
+    The same travel pulls a sphere off a stiff machine, not off a soft one:
+
+    >>> a = radius_at_travel(-9e-7, [100.0, 1e3, float("inf")], 0.042, 2e-3, 6.4e6)
+    >>> print("%.2e %.2e %.2e" % tuple(a))
+    6.68e-05 3.83e-05 nan
+    """
+    arrays = [np.asarray(value, dtype=float) for value in (travel, stiffness, work, sphere_radius, modulus)]
+    shape = np.broadcast(*arrays).shape
+    flat = [array if array.size == 1 or array.shape == shape else np.broadcast_to(array, shape) for array in arrays]
+    flat = [array.reshape(-1) for array in flat]
+    radii = np.empty(math.prod(shape))
+    block = np.empty((5, min(radii.size, _BLOCK)))
+    for first in range(0, radii.size, _BLOCK):
+        part = radii[first : first + _BLOCK]
+        for row, array in zip(block, flat, strict=True):
+            if array.size > 1:
+                row[: part.size] = array[first : first + _BLOCK]
+            elif first == 0:
+                row[:] = array
+        _solve(*block[:, : part.size], part)
+    return radii.reshape(shape)[()]

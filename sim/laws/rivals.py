@@ -1,0 +1,672 @@
+"""Competing theories of an adhesive contact under shear: what each says of its radius.
+
+They differ in what becomes of the elastic energy of the tangential stress when the contact grows.
+At nu = 1/2, with G the release rate of the normal load alone (``jkr.energy_release_rate``), T the
+tangential force, tau = T/(pi a^2) the mean shear stress and E* the contact modulus:
+
+    ``G = w``                           JKR, MCD as corrected: the drive pays, the contact feels nothing
+    ``G = w + 6 tau^2 a/(pi E*)``       MCD as first published in 2018: the contact grows
+    ``G + 3 T^2/(16 pi E* a^3) = w``    Savkoor & Briggs 1977: full stick at a given force
+    ``G + 2 T^2/(pi^3 E* a^3) = w``     uniform stress, reversible, force held: adhesion pays for all of it
+    ``G + 6 tau^2 a/(pi E*) = w``       uniform stress, reversible, stress held
+    ``G + alpha 6 tau^2 a/(pi E*) = w`` a reversible fraction alpha
+    ``A = A0 - alpha_S T^2``            Sahli et al. 2018, measured
+
+MCD is Menga, Carbone & Dini. The two laws at a held force differ by 32/(3 pi^2) = 1.08 in energy;
+both have the radius of the last but one at alpha = pi^2/32 and 1/3, but are less stable, for T is
+held and not tau. For another Poisson ratio all shear terms gain the factor (2 - nu)/(3 (1 - nu)),
+the coupling of normal and tangential fields being neglected.
+
+**One crossing.** G(a) is convex in a at a load, at an indentation and behind any machine stiffness:
+at a load it is ``(X - 2P + P^2/X)/(6 pi R)`` with X = 4 E* a^3/(3R), at an indentation
+``E*/(2 pi) (a^3/R^2 - 2 delta a/R + delta^2/a)``. The terms in T^2/a^3 are convex, too, while w and the
+terms in tau^2 a make a straight line. So there are at most two crossings, and only the wider is stable:
+there G rises above the line, whose slope is the dw/da in the condition of stability. Newton's
+method from the right of it goes left and never passes it. A step that does not go left is rounding
+and ends the search; a slope that is not positive means that there is no crossing.
+
+**Never below Hertz.** The edge can pull but not push: where adhesion does not pay for the shear even
+at Hertz's radius, the contact has that radius. It does so under a load or an indentation of at
+least zero, beyond the last adhesive state; a contact that is pulled comes off there, and the
+answer is nan.
+"""
+
+import math
+
+import numpy as np
+
+from sim.jit import device, law
+from sim.laws.jkr import (
+    hertz_radius_at_indentation,
+    hertz_radius_at_load,
+    radius_at_indentation,
+    radius_at_load,
+)
+from sim.roots import cube_root
+
+_STICK = 1.5  # of T^2 in the energy balance at a load: full stick,
+_UNIFORM = 16.0 / math.pi**2  # and uniform stress
+_AS_STICK = math.pi**2 / 32.0  # alpha at a held stress that gives the same radii
+_AS_UNIFORM = 1.0 / 3.0
+
+
+@device
+def _compressible(poisson_ratio):
+    """Shear energy at a given stress and modulus E*, relative to that at nu = 1/2."""
+    return (2.0 - poisson_ratio) / (3.0 * (1.0 - poisson_ratio))
+
+
+@device
+def _largest_force(load, work, sphere_radius, share):
+    """Tangential force at which the root below ends: sqrt(c (2P + c)/share), c = 3 pi w R [N]."""
+    pull = 3.0 * math.pi * work * sphere_radius
+    return math.sqrt(pull) * math.sqrt(2.0 * load + pull) / math.sqrt(share)
+
+
+@device
+def _crossing_at_load(z, p, m, s):
+    """Largest z with (z^3 - p)^2/z^3 = m + s z and the slope there, from a z right of it; nan if none."""
+    slope = math.nan
+    for _ in range(100):
+        cube = z * z * z
+        missing = cube - p
+        over = missing / cube * missing - m - s * z
+        slope = 3.0 * (missing / cube) * ((cube + p) / z) - s
+        if over <= 0.0:
+            break
+        lower = z - over / slope
+        if not (slope > 0.0 and lower > 0.0):
+            return math.nan, math.nan
+        if not lower < z:
+            break
+        z = lower
+    return z, slope
+
+
+@device
+def _crossing_at_travel(z, q, soft, m, s, stuck):
+    """Largest z with missing^2/z + stuck/z^3 = m + s z and the slope there, as at a load.
+
+    missing = (z^2 - q + (2/3) soft z^3)/(1 + soft z) is a^2/R - delta where the travel is q and a
+    machine of stiffness 2 E*/soft yields; a stiff one, soft = 0, leaves z^2 - q.
+    """
+    slope = math.nan
+    hard = 1.0 / (1.0 + soft)
+    soft = 1.0 - hard
+    for _ in range(100):
+        square = z * z
+        share = hard + soft * z
+        missing = (hard * (square - q) + 2.0 / 3.0 * soft * square * z) / share
+        over = missing / z * missing + stuck / square / z - m - s * z
+        growth = 2.0 * z - soft * missing / share
+        slope = missing / z * (2.0 * growth - missing / z) - s - 3.0 * stuck / square / square
+        if over <= 0.0:
+            break
+        lower = z - over / slope
+        if not (slope > 0.0 and lower > 0.0):
+            return math.nan, math.nan
+        if not lower < z:
+            break
+        z = lower
+    return z, slope
+
+
+@law
+def _shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
+    """JKR's radius less what reversible shear takes; held = 0 holds the stress, 4 the force."""
+    if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
+        return jkr
+    tilt = sphere_radius / jkr
+    shear = stress / modulus * tilt
+    s = 27.0 * reversible * _compressible(poisson_ratio) * shear * shear
+    if not s >= 0.0:
+        return math.nan
+    m = 4.5 * math.pi * (work / modulus / jkr) * tilt * tilt
+    start = min(1.0, m / s)
+    if load >= 0.0 and not start * jkr > hertz:
+        return hertz
+    z, slope = _crossing_at_load(start, 0.75 * (load / modulus / jkr) * (tilt / jkr), m, -s)
+    if not slope >= held * s:
+        return hertz if load >= 0.0 else math.nan
+    return max(z * jkr, hertz) if load >= 0.0 else z * jkr
+
+
+@law
+def shrunk_at_travel(
+    jkr, hertz, travel, stiffness, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio
+):
+    """JKR's radius behind a machine stiffness, less what reversible shear takes.
+
+    Parameters
+    ----------
+    jkr, hertz : float or array
+        Radii of the same travel without shear, with the work and with none [m].
+    travel, stiffness : float or array
+        Delta = delta + P/k [m], k [N/m]; k = inf holds the indentation.
+    work, stress, reversible, sphere_radius, modulus, poisson_ratio : float or array
+        As ``radius_at_load_reversible``.
+    held : float
+        0 where the stress is held as the edge moves, 4 where the tangential force is.
+
+    Returns
+    -------
+    float or array
+        a [m]; ``jkr`` bit for bit at alpha = 0, ``hertz`` where adhesion does not pay; nan where a pulled
+        contact has no equilibrium.
+
+    Notes
+    -----
+    With y = a^2/R - delta and k the stiffness in units of 2 E* (a length), ``y = (k (a^2/R - Delta) +
+    2 a^3/(3R))/(k + a)``, and G = E* y^2/(2 pi a) is convex in a for all k and Delta: its second derivative
+    is a quadratic form in y with a discriminant of ``(k + 4a)^2 - 4 (k^2 + 4 k a + 6 a^2) < 0``, times a
+    square. For a travel of at least zero Hertz's contact exists.
+    """
+    if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
+        return jkr
+    tilt = sphere_radius / jkr
+    shear = stress / modulus * tilt
+    s = 12.0 * reversible * _compressible(poisson_ratio) * shear * shear
+    if not s >= 0.0:
+        return math.nan
+    m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
+    start = min(1.0, m / s)
+    if travel >= 0.0 and not start * jkr > hertz:
+        return hertz
+    soft = 2.0 * modulus * jkr / stiffness
+    z, slope = _crossing_at_travel(start, travel / jkr * tilt, soft, m, -s, 0.0)
+    if not slope >= held * s:
+        return hertz if travel >= 0.0 else math.nan
+    return max(z * jkr, hertz) if travel >= 0.0 else z * jkr
+
+
+@law
+def _stuck_at_load(jkr, hertz, load, work, tangential_force, share, sphere_radius, modulus, poisson_ratio):
+    """JKR's radius less what shear at a given force takes: share T^2 in the energy balance."""
+    if tangential_force == 0.0 or work <= 0.0 or math.isnan(jkr):
+        return jkr
+    share *= _compressible(poisson_ratio)
+    limit = _largest_force(load, work, sphere_radius, share)
+    force = abs(tangential_force)
+    if force > limit:
+        return hertz if load >= 0.0 else math.nan
+    pull = 3.0 * math.pi * work * sphere_radius
+    rest = math.sqrt(share) * math.sqrt(limit - force) * math.sqrt(limit + force)
+    return cube_root(0.75 * (sphere_radius / modulus) * (load + pull + rest))
+
+
+@law
+def _stuck_at_indentation(
+    jkr, hertz, indentation, work, tangential_force, share, sphere_radius, modulus, poisson_ratio
+):
+    """JKR's radius at an indentation less what shear at a given force takes."""
+    if tangential_force == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
+        return jkr
+    tilt = sphere_radius / jkr
+    shear = tangential_force / modulus / jkr * (tilt / jkr)
+    stuck = 0.25 * share * _compressible(poisson_ratio) * shear * shear
+    if math.isnan(stuck):
+        return math.nan
+    m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
+    z, slope = _crossing_at_travel(1.0, indentation / jkr * tilt, 0.0, m, 0.0, stuck)
+    if not slope >= 0.0:
+        return hertz if indentation >= 0.0 else math.nan
+    return max(z * jkr, hertz) if indentation >= 0.0 else z * jkr
+
+
+def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at a load when adhesion pays for a fraction of the energy of the mean stress.
+
+    Parameters
+    ----------
+    load : float or array
+        P, compression positive [N].
+    work : float or array
+        w [J/m^2].
+    stress : float or array
+        tau, held while the contact grows or shrinks [Pa].
+    reversible : float or array
+        alpha [1], at least 0: MCD's 0 to 1.
+    sphere_radius, modulus, poisson_ratio : float or array
+        R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        a [m]: the wider, stable contact; bit for bit ``jkr.radius_at_load`` at alpha = 0; Hertz's radius
+        where adhesion does not pay there; nan where a pulled contact has no equilibrium, or alpha < 0.
+
+    Notes
+    -----
+    ``G(a) = w - alpha 2 (2 - nu)/(1 - nu) tau^2 a/(pi E*)``: 6 tau^2 a/(pi E*) at nu = 1/2. As ``P(X)``
+    with X = 4 E* a^3/(3R) this is ``X - sqrt(6 pi R X (w - b a))``, convex in X, hence with one fold.
+
+    Examples
+    --------
+    At 0.3 MPa a hundredth of the energy takes a sixth of the area, three hundredths all of adhesion:
+
+    >>> a = radius_at_load_reversible(4e-3, 0.042, 3e5, [0.0, 0.01, 0.03], 2e-3, 6.4e6)
+    >>> print("%.3f %.3f" % tuple((a[1:] / a[0]) ** 2))
+    0.831 0.662
+    """
+    jkr = radius_at_load(load, work, sphere_radius, modulus)
+    hertz = hertz_radius_at_load(load, sphere_radius, modulus)
+    return _shrunk_at_load(jkr, hertz, load, work, stress, reversible, 0.0, sphere_radius, modulus, poisson_ratio)
+
+
+def radius_at_indentation_reversible(indentation, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at an indentation when adhesion pays for a fraction of the energy of the mean stress.
+
+    Parameters
+    ----------
+    indentation : float or array
+        delta [m].
+    work, stress, reversible, sphere_radius, modulus, poisson_ratio : float or array
+        As ``radius_at_load_reversible``.
+
+    Returns
+    -------
+    float or array
+        a [m], as ``radius_at_load_reversible``; bit for bit ``jkr.radius_at_indentation`` at alpha = 0.
+
+    Notes
+    -----
+    ``delta(a) = a^2/R - sqrt(2 pi a (w - b a)/E*)`` is convex in a: a root of a concave parabola is
+    subtracted. So here, too, there is one fold.
+
+    Examples
+    --------
+    A lifted sphere comes off earlier:
+
+    >>> a = radius_at_indentation_reversible(-6e-7, 0.042, 1e5, [0.0, 0.1, 0.2], 2e-3, 6.4e6)
+    >>> print("%.2e %.2e %.2e" % tuple(a))
+    3.44e-05 2.57e-05 nan
+    """
+    jkr = radius_at_indentation(indentation, work, sphere_radius, modulus)
+    hertz = hertz_radius_at_indentation(indentation, sphere_radius)
+    rest = (sphere_radius, modulus, poisson_ratio)
+    return shrunk_at_travel(jkr, hertz, indentation, math.inf, work, stress, reversible, 0.0, *rest)
+
+
+@law
+def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at a load by MCD as first published in 2018: shear widens the contact.
+
+    Parameters
+    ----------
+    load, work, stress, sphere_radius, modulus, poisson_ratio : float or array
+        P [N], w [J/m^2], tau [Pa], R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        a [m]; nan where a pulled contact has no equilibrium.
+
+    Notes
+    -----
+    ``G = w + 6 tau^2 a/(pi E*)`` at nu = 1/2: the slope of the potential set to zero, where it should
+    equal the work of the stress (the corrigendum). Kept to be compared with, not to be used. With
+    reversible energies it is alpha = -1.
+
+    Examples
+    --------
+    >>> print("%.4f %.4f" % tuple(uncorrected_at_load(5.0, 1.0, [0.0, 1.0], 1.0, 4.0)))
+    1.7371 2.0640
+    """
+    normal = cube_root(0.75 * (sphere_radius / modulus) * abs(load))
+    adhesive = cube_root(4.5 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
+    sheared = math.sqrt(27.0 * _compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
+    scale = max(normal, max(adhesive, sheared))
+    known = normal + adhesive + sheared
+    if known == 0.0 or not known < math.inf:
+        return known
+    p = math.copysign((normal / scale) ** 3, load)
+    m = math.copysign((adhesive / scale) ** 3, work)
+    z, _ = _crossing_at_load(1.7, p, m, (sheared / scale) ** 2)  # z^3 < 2 p + m + s z <= 3 + z
+    if load >= 0.0:
+        return scale * z if scale * z > normal else normal
+    return scale * z
+
+
+@law
+def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at an indentation by MCD as first published in 2018.
+
+    Parameters
+    ----------
+    indentation, work, stress, sphere_radius, modulus, poisson_ratio : float or array
+        delta [m], w [J/m^2], tau [Pa], R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        a [m]; nan where a lifted contact has no equilibrium.
+
+    Notes
+    -----
+    See ``uncorrected_at_load``.
+
+    Examples
+    --------
+    >>> print("%.4f %.4f" % tuple(uncorrected_at_indentation(1.0, 1.0, [0.0, 1.0], 1.0, 4.0)))
+    1.6093 1.8197
+    """
+    normal = math.sqrt(sphere_radius) * math.sqrt(abs(indentation))
+    adhesive = cube_root(2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
+    sheared = math.sqrt(12.0 * _compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
+    scale = max(normal, max(adhesive, sheared))
+    known = normal + adhesive + sheared
+    if known == 0.0 or not known < math.inf:
+        return known
+    q = math.copysign((normal / scale) ** 2, indentation)
+    m = math.copysign((adhesive / scale) ** 3, work)
+    z, _ = _crossing_at_travel(1.9, q, 0.0, m, (sheared / scale) ** 2, 0.0)  # z^2 <= 1 + sqrt(z + z^2)
+    if indentation >= 0.0:
+        return scale * z if scale * z > normal else normal
+    return scale * z
+
+
+def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at a load and a tangential force, in full stick (Savkoor & Briggs 1977).
+
+    Parameters
+    ----------
+    load, work, tangential_force, sphere_radius, modulus, poisson_ratio : float or array
+        P [N], w [J/m^2], T [N] of either sign, R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        a [m]; beyond ``savkoor_briggs_limit`` the contact slides with Hertz's radius (nan if pulled).
+
+    Notes
+    -----
+    ``4 E* a^3/(3R) = P + c + sqrt(c (2P + c) - (3/2) T^2)`` with c = 3 pi w R, at nu = 1/2.
+
+    Examples
+    --------
+    Adhesion is peeled from the edge, and at the limit lost at once:
+
+    >>> limit = savkoor_briggs_limit(4e-3, 0.042, 2e-3)
+    >>> a = savkoor_briggs_at_load(4e-3, 0.042, limit * np.array([0.0, 1.0, 1.001]), 2e-3, 6.4e6)
+    >>> print("%.3e %.3e %.3e" % tuple(a))
+    1.203e-04 1.039e-04 9.787e-05
+    """
+    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
+    return _stuck_at_load(jkr, hertz, load, work, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
+
+
+def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at an indentation and a tangential force, in full stick.
+
+    Parameters
+    ----------
+    indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio : float or array
+        delta [m], w [J/m^2], T [N], R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        a [m]; as at a load.
+
+    Notes
+    -----
+    ``E* (delta - a^2/R)^2/(2 pi a) + 3 T^2/(16 pi E* a^3) = w`` at nu = 1/2.
+    """
+    jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
+    rest = (tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
+    return _stuck_at_indentation(jkr, hertz, indentation, work, *rest)
+
+
+@law
+def savkoor_briggs_limit(load, work, sphere_radius, poisson_ratio=0.5):
+    """Largest tangential force of a sticking contact at a load, by Savkoor & Briggs [N].
+
+    Parameters
+    ----------
+    load, work, sphere_radius, poisson_ratio : float or array
+        P [N], w [J/m^2], R [m], nu [1]. The modulus does not matter.
+
+    Returns
+    -------
+    float or array
+        T_c [N]; nan below the pull-off load, 0 without adhesion.
+
+    Notes
+    -----
+    ``T_c = sqrt((8/3) P_c (P + P_c))`` at nu = 1/2, with P_c = (3/2) pi w R; the contact then has
+    ``4 E* a^3/(3R) = P + 2 P_c``.
+
+    Examples
+    --------
+    >>> print(f"{savkoor_briggs_limit(0.0, 1.0, 1.0) / (1.5 * math.pi):.4f}")
+    1.6330
+    """
+    if work <= 0.0:
+        return 0.0
+    return _largest_force(load, work, sphere_radius, _STICK * _compressible(poisson_ratio))
+
+
+@law
+def savkoor_briggs_shrinkage(load, work, sphere_radius, modulus, poisson_ratio=0.5):
+    """Coefficient alpha_SB of ``A = A0 - alpha_SB T^2`` at small forces in full stick [m^2/N^2].
+
+    Parameters
+    ----------
+    load, work, sphere_radius, modulus, poisson_ratio : float or array
+        P [N], w [J/m^2], R [m], E* [Pa], nu [1].
+
+    Notes
+    -----
+    ``A0/(2 X0 S)`` at nu = 1/2, with A0 JKR's area, X0 = P + c + S, S = sqrt(c (2P + c)), c = 3 pi w R.
+
+    Examples
+    --------
+    The softer the contact, the more it loses:
+
+    >>> hard, soft = savkoor_briggs_shrinkage(1.0, 1.0, 1.0, [8.0, 1.0])
+    >>> print(f"{soft / hard:.2f}")
+    4.00
+    """
+    if work <= 0.0:
+        return 0.0
+    pull = 3.0 * math.pi * work * sphere_radius
+    root = math.sqrt(pull) * math.sqrt(2.0 * load + pull)
+    cube = load + pull + root
+    radius = cube_root(0.75 * (sphere_radius / modulus) * cube)
+    return _compressible(poisson_ratio) * 0.5 * math.pi * (radius / cube) * (radius / root)
+
+
+def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at a load and a tangential force spread evenly, its energy paid by adhesion.
+
+    Parameters
+    ----------
+    load, work, tangential_force, sphere_radius, modulus, poisson_ratio : float or array
+        P [N], w [J/m^2], T [N], R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        a [m]; Hertz's radius (nan if pulled) beyond the largest force.
+
+    Notes
+    -----
+    ``4 E* a^3/(3R) = P + c + sqrt(c (2P + c) - (16/pi^2) T^2)`` with c = 3 pi w R, at nu = 1/2: the
+    largest force is sqrt(3 pi^2/32) = 0.96 of Savkoor & Briggs'.
+
+    Examples
+    --------
+    >>> print(f"{reversible_force_at_load(5.0, 1.0, math.pi * 1.62492**2, 1.0, 4.0):.4f}")
+    1.6249
+    """
+    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
+    return _stuck_at_load(jkr, hertz, load, work, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
+
+
+def reversible_force_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
+    """Contact radius at an indentation and a tangential force spread evenly, paid by adhesion.
+
+    Parameters
+    ----------
+    indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio : float or array
+        delta [m], w [J/m^2], T [N], R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        a [m]; as at a load.
+    """
+    jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
+    rest = (tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
+    return _stuck_at_indentation(jkr, hertz, indentation, work, *rest)
+
+
+@device
+def _not_below(hertz, square):
+    """Radius of a given square, never below Hertz's; nan where neither is."""
+    if hertz >= 0.0 and square <= hertz * hertz:
+        return hertz
+    return math.sqrt(square)
+
+
+@law
+def _measured_at_force(jkr, hertz, shrinkage, force):
+    return _not_below(hertz, jkr * jkr - shrinkage * force * force / math.pi)
+
+
+@law
+def _measured_at_stress(jkr, hertz, shrinkage, stress):
+    """A = A0 - alpha_S (tau A)^2 solved for A."""
+    return _not_below(hertz, 2.0 * jkr * jkr / (1.0 + math.sqrt(1.0 + 4.0 * math.pi * shrinkage * (stress * jkr) ** 2)))
+
+
+def sahli_at_load(load, work, tangential_force, shrinkage, sphere_radius, modulus):
+    """Contact radius at a load by the law that Sahli et al. (2018) found in experiments.
+
+    Parameters
+    ----------
+    load, work, tangential_force, sphere_radius, modulus : float or array
+        P [N], w [J/m^2], T [N], R [m], E* [Pa].
+    shrinkage : float or array
+        alpha_S [m^2/N^2], measured for each contact; it fell with its area as A0^(-3/2).
+
+    Returns
+    -------
+    float or array
+        a [m], not below Hertz's radius; nan where a pulled contact has no area left.
+
+    Notes
+    -----
+    ``A = A0 - alpha_S T^2`` with A0 JKR's area; meant for forces up to the onset of sliding.
+
+    Examples
+    --------
+    >>> a = sahli_at_load(5.0, 1.0, [0.0, 1.0], 0.1 * math.pi, 1.0, 4.0)
+    >>> print(f"{a[0] ** 2 - a[1] ** 2:.3f}")
+    0.100
+    """
+    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
+    return _measured_at_force(jkr, hertz, shrinkage, tangential_force)
+
+
+def _at_load(load, work, sphere_radius, modulus):
+    """Radii of JKR and Hertz at a load."""
+    return radius_at_load(load, work, sphere_radius, modulus), hertz_radius_at_load(load, sphere_radius, modulus)
+
+
+def _at_indentation(indentation, work, sphere_radius, modulus):
+    """Radii of JKR and Hertz at an indentation."""
+    jkr = radius_at_indentation(indentation, work, sphere_radius, modulus)
+    return jkr, hertz_radius_at_indentation(indentation, sphere_radius)
+
+
+def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, shrinkage=math.nan):
+    """Contact radius at a load and a mean shear stress by every theory.
+
+    Parameters
+    ----------
+    stress, load, work, sphere_radius, modulus, poisson_ratio : float or array
+        tau [Pa], P [N], w [J/m^2], R [m], E* [Pa], nu [1].
+    reversible : float or array
+        alpha of ``"fraction"`` [1].
+    shrinkage : float or array
+        alpha_S of ``"sahli"`` [m^2/N^2]; nan, unknown, leaves its radius nan.
+
+    Returns
+    -------
+    dict of array
+        a [m] by theory: ``"jkr"``, ``"hertz"``, ``"uncorrected"`` (MCD 2018), ``"savkoor_briggs"``,
+        ``"reversible_force"``, ``"reversible_stress"``, ``"fraction"`` and ``"sahli"``. Each theory's
+        tangential force is ``pi a^2 tau`` with its own radius.
+
+    Notes
+    -----
+    The theories at a held force are drawn up to the largest force that they bear, from there as
+    Hertz's contact that slides.
+
+    Examples
+    --------
+    >>> for name, a in compare_at_load([0.0, 1.0], 5.0, 1.0, 1.0, 4.0).items():
+    ...     print(f"{name:17s} {a[0]:.4f} {a[1]:.4f}")
+    jkr               1.7371 1.7371
+    hertz             0.9787 0.9787
+    uncorrected       1.7371 2.0640
+    savkoor_briggs    1.7371 1.6333
+    reversible_force  1.7371 1.6249
+    reversible_stress 1.7371 1.3975
+    fraction          1.7371 1.7036
+    sahli             nan nan
+    """
+    stress = np.asarray(stress, dtype=float)
+    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
+    rest = (sphere_radius, modulus, poisson_ratio)
+
+    def shrunk(fraction, held):
+        return _shrunk_at_load(jkr, hertz, load, work, stress, fraction, held, *rest)
+
+    return _together(
+        jkr=jkr,
+        hertz=hertz,
+        uncorrected=uncorrected_at_load(load, work, stress, *rest),
+        savkoor_briggs=shrunk(_AS_STICK, 4.0),
+        reversible_force=shrunk(_AS_UNIFORM, 4.0),
+        reversible_stress=shrunk(1.0, 0.0),
+        fraction=shrunk(reversible, 0.0),
+        sahli=_measured_at_stress(jkr, hertz, shrinkage, stress),
+    )
+
+
+def compare_at_indentation(stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1):
+    """Contact radius at an indentation and a mean shear stress by every theory that has one.
+
+    Parameters
+    ----------
+    stress, indentation, work, sphere_radius, modulus, poisson_ratio, reversible : float or array
+        tau [Pa], delta [m], w [J/m^2], R [m], E* [Pa], nu [1], alpha [1].
+
+    Returns
+    -------
+    dict of array
+        a [m] by theory, as ``compare_at_load`` but for ``"sahli"``, measured at loads.
+    """
+    stress = np.asarray(stress, dtype=float)
+    jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
+    rest = (sphere_radius, modulus, poisson_ratio)
+
+    def shrunk(fraction, held):
+        return shrunk_at_travel(jkr, hertz, indentation, math.inf, work, stress, fraction, held, *rest)
+
+    return _together(
+        jkr=jkr,
+        hertz=hertz,
+        uncorrected=uncorrected_at_indentation(indentation, work, stress, *rest),
+        savkoor_briggs=shrunk(_AS_STICK, 4.0),
+        reversible_force=shrunk(_AS_UNIFORM, 4.0),
+        reversible_stress=shrunk(1.0, 0.0),
+        fraction=shrunk(reversible, 0.0),
+    )
+
+
+def _together(**radii):
+    """The radii broadcast to one shape."""
+    return dict(zip(radii, (np.array(a) for a in np.broadcast_arrays(*radii.values())), strict=True))

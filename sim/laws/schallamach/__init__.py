@@ -1,0 +1,85 @@
+"""Bonds between sliding surfaces, in closed form: how many are closed, and what force they bear.
+
+From the law of the paper to what replaces it, each with its own assumption on how bonds break:
+
+- ``linear``: the fraction ``1/(1 + V/Vc)`` of Menga, Carbone & Dini, its rate equation and exact step;
+- ``renewal``: any law of rupture, from three moments of the life of a bond; a constant rate;
+- ``bell``: force helps heat to open a bond; exact, with the friction maximum;
+- ``first_moment``: the same in mean field, whose maximum is too high;
+- ``cut_off``: bonds that break at a stretch, of which the law of the paper is the limit without heat;
+- ``loading``: a Bell bond pulled once: rupture forces and the static peak;
+- ``cluster``: a finite number of bonds under a shared force.
+
+``linear`` counts bonds relative to rest throughout. The others start from sites: ``bound`` is a share of
+the sites, ``*_fraction`` the number of bonds relative to rest.
+"""
+
+from sim.laws.schallamach.bell import (
+    bell_critical_speed,
+    bell_fraction,
+    bell_lives,
+    bell_moments,
+    bell_peak,
+    bell_stress,
+)
+from sim.laws.schallamach.cluster import cluster_lifetime
+from sim.laws.schallamach.cut_off import cut_off_fraction, cut_off_moments, cut_off_stress
+from sim.laws.schallamach.first_moment import (
+    first_moment_fraction,
+    first_moment_peak,
+    first_moment_stress,
+    first_moment_stretch,
+)
+from sim.laws.schallamach.linear import (
+    fraction_rate,
+    relax_fraction,
+    steady_fraction,
+    transition_probabilities,
+)
+from sim.laws.schallamach.loading import (
+    StartUpPeak,
+    bell_rupture_force,
+    bell_rupture_force_density,
+    start_up_force,
+    start_up_peak,
+)
+from sim.laws.schallamach.renewal import (
+    Lives,
+    Peak,
+    SiteMoments,
+    constant_moments,
+    renewal,
+    rest_share,
+)
+
+__all__ = [
+    "Lives",
+    "Peak",
+    "SiteMoments",
+    "StartUpPeak",
+    "bell_critical_speed",
+    "bell_fraction",
+    "bell_lives",
+    "bell_moments",
+    "bell_peak",
+    "bell_rupture_force",
+    "bell_rupture_force_density",
+    "bell_stress",
+    "cluster_lifetime",
+    "constant_moments",
+    "cut_off_fraction",
+    "cut_off_moments",
+    "cut_off_stress",
+    "first_moment_fraction",
+    "first_moment_peak",
+    "first_moment_stress",
+    "first_moment_stretch",
+    "fraction_rate",
+    "relax_fraction",
+    "renewal",
+    "rest_share",
+    "start_up_force",
+    "start_up_peak",
+    "steady_fraction",
+    "transition_probabilities",
+]

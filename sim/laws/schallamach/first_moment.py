@@ -1,0 +1,155 @@
+"""Bell bonds in mean field: every bond has the mean stretch. Closed forms by Lambert's W.
+
+The first-moment closure of a population follows the bound share phi and the mean stretch x,
+
+    ``dphi/dt = k_on (1 - phi) - k phi``,  ``dx/dt = V - x k_on (1 - phi)/phi``,  ``k = k_0 e^(kappa x/f_b)``
+
+and forgets that it is the stretched bonds that break. Its friction maximum is too high, by 24 to 55 %
+for k_on/k_0 from 0.1 to 1000 (``bell_peak`` is exact), at a speed right to 7 %. These are the steady
+states of that closure, not of bonds; for those see ``bell_moments``.
+"""
+
+import math
+
+import numpy as np
+
+from sim.expint import lambert
+from sim.jit import device, law
+from sim.laws.schallamach.renewal import Peak
+
+
+@device
+def _tilt(speed, zero_force_rate, bell_force, bond_stiffness):
+    """Steady stretch in units of f_b/kappa: W(eps)."""
+    return lambert(bond_stiffness * math.fabs(speed) / (zero_force_rate * bell_force))
+
+
+@device
+def _stretch(tilt, speed, zero_force_rate, bell_force, bond_stiffness):
+    """x = W f_b/kappa, or what is the same, V/k: the second also for an infinite Bell force."""
+    if tilt > 1.0:
+        return math.copysign(tilt * bell_force / bond_stiffness, speed)
+    return speed / zero_force_rate * math.exp(-tilt)
+
+
+@law
+def first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness):
+    """Mean stretch of the bonds of a mean-field Bell population in steady sliding [m].
+
+    Parameters
+    ----------
+    speed, zero_force_rate, bell_force, bond_stiffness : float or array
+        V [m/s], either sign; k_0 [1/s], above 0; f_b [N], above 0; kappa [N/m].
+
+    Notes
+    -----
+    ``(f_b/kappa) W(eps)`` with ``eps = kappa V/(k_0 f_b)``: the solution of x k(x) = V. Odd in the speed.
+
+    Examples
+    --------
+    >>> print("%.4f %.4f" % tuple(first_moment_stretch([1.0, -1.0], 1.0, 1.0, 1.0)))
+    0.5671 -0.5671
+    """
+    tilt = _tilt(speed, zero_force_rate, bell_force, bond_stiffness)
+    return _stretch(tilt, speed, zero_force_rate, bell_force, bond_stiffness)
+
+
+@law
+def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
+    """Bond fraction of a mean-field Bell population in steady sliding: bonds over bonds at rest [1].
+
+    Parameters
+    ----------
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate : float or array
+        As in ``first_moment_stretch``; k_on [1/s].
+
+    Notes
+    -----
+    ``(k_on + k_0)/(k_on + k)`` with ``k = k_0 e^W(eps)``: 1 at rest, 0 at infinite speed.
+
+    Examples
+    --------
+    Mean field loses bonds a little too early:
+
+    >>> print("%.3f %.3f" % tuple(first_moment_fraction([1.0, 10.0], 1.0, 1.0, 1.0, 1.0)))
+    0.724 0.297
+    """
+    if rebinding_rate == math.inf:
+        return 1.0
+    growth = math.exp(_tilt(speed, zero_force_rate, bell_force, bond_stiffness))
+    return (rebinding_rate + zero_force_rate) / (rebinding_rate + zero_force_rate * growth)
+
+
+@law
+def _force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
+    tilt = _tilt(speed, zero_force_rate, bell_force, bond_stiffness)
+    wait = zero_force_rate / rebinding_rate
+    if tilt == math.inf and wait > 0.0:
+        return 0.0
+    stretch = _stretch(tilt, speed, zero_force_rate, bell_force, bond_stiffness)
+    return bond_stiffness * stretch / (1.0 + wait * math.exp(tilt))
+
+
+def first_moment_stress(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
+    """Shear stress of a mean-field Bell population in steady sliding [Pa]; odd in the speed.
+
+    Parameters
+    ----------
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate : float or array
+        As in ``first_moment_fraction``.
+    site_density : float or array
+        n [1/m^2]: sites, bound or not, per area.
+
+    Notes
+    -----
+    ``n f_b W/(1 + (k_0/k_on) e^W)`` with W = W(eps).
+
+    Examples
+    --------
+    The exact population has 0.204 here:
+
+    >>> print(f"{first_moment_stress(10.0, 1.0, 1.0, 1.0, 1.0, 1.0):.3f}")
+    0.259
+    """
+    return np.multiply(site_density, _force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate))
+
+
+@law
+def _peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
+    tilt = 1.0 + lambert(rebinding_rate / zero_force_rate / math.e)
+    return zero_force_rate * bell_force / bond_stiffness * tilt * math.exp(tilt)
+
+
+@law
+def _peak_force(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
+    # the stiffness gives the answer its shape, nothing else
+    return bell_force * lambert(rebinding_rate / zero_force_rate / math.e)
+
+
+def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density):
+    """Friction maximum of a mean-field Bell population.
+
+    Parameters
+    ----------
+    zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density : float or array
+        As in ``first_moment_stress``.
+
+    Returns
+    -------
+    Peak
+        Speed [m/s] and stress [Pa] there.
+
+    Notes
+    -----
+    ``n f_b W(beta/e)`` at ``eps = (1 + W) e^(1 + W)``, with beta = k_on/k_0. The stress is also the one at
+    which Bell's cluster of bonds that share a given force equally comes apart.
+
+    Examples
+    --------
+    The exact population has 0.218485 at 4.503:
+
+    >>> print("%.3f %.6f" % first_moment_peak(1.0, 1.0, 1.0, 1.0, 1.0))
+    4.591 0.278465
+    """
+    given = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    return Peak(_peak_speed(*given), np.multiply(site_density, _peak_force(*given)))

@@ -1,0 +1,218 @@
+"""The lives of single bonds within one step: the compiled loops behind ``tracks``.
+
+Where all bonds of a row have the sign of the motion they are left to ``following``. Where the motion
+turns, or a step spans too many Bell forces for the common clock, each bond is asked singly until all
+follow again; its ``due`` is then what is left of its threshold.
+"""
+
+import math
+
+import numpy as np
+
+from sim.following import (
+    BOUND,
+    CLOCK,
+    HANDS,
+    LIVES,
+    PART,
+    SENSE,
+    SINGLY,
+    SLIDER,
+    SQUARES,
+    STEPS,
+    SUM,
+    TIME,
+    TINY,
+    follow,
+    least,
+)
+from sim.hazards import hazard_integral, time_to_rupture
+from sim.jit import device, kernel
+from sim.noise import exponential, unit_at, words_at
+
+#: What ``live`` has to say: all done, some rows need a draw of the steady law, the state is spent, endless numbers.
+DONE, LONG, SPENT, ENDLESS = range(4)
+
+_U = np.uint64
+_CYCLES = 300.0
+_FAR = 16.0  # Bell forces, cut-off stretches or natural lives after which a frame is set anew
+_LEAP = 24.0  # Bell forces within a step above which bonds are asked singly, lest the clock overflow
+
+
+@device
+def _cycle(speed, rate, softness, limit, rebinding):
+    """About the mean time from one birth to the next of a site: a fresh bond's life at ``speed`` and the wait.
+
+    Exact for constant hazards, with or without a limit; for Bell's within a sixth,
+    e^z E1(z) ~ ½ ln(1 + 2/z).
+    """
+    life = math.inf
+    if rate > 0.0:
+        growth = 2.0 * math.fabs(speed) * softness / rate
+        life = (math.log1p(growth) / growth if growth > 0.0 else 1.0) / rate
+    if speed != 0.0 and limit < math.inf:
+        longest = limit / math.fabs(speed)
+        life = longest if life == math.inf else -life * math.expm1(-longest / life)
+    return life + (1.0 / rebinding if rebinding > 0.0 else math.inf)
+
+
+@device
+def _ask(birth, due, life, row, slip, duration, law, seed, member):
+    """One step of a row that asks each bond singly, ``slip`` of any sign; True if all stretches now follow it."""
+    rate, softness, limit, rebinding = law
+    x0, t0, speed = row[SLIDER], row[TIME], slip / duration
+    bound, total, squares, lowest, highest = 0.0, 0.0, 0.0, math.inf, -math.inf
+    for i in range(due.size):
+        time = 0.0
+        for _ in range(LIVES):
+            left = duration - time
+            if math.copysign(1.0, due[i]) > 0.0:
+                stretch = x0 + speed * time - birth[i]
+                spent = hazard_integral(stretch, speed * left, left, rate, softness)
+                if spent < due[i] and math.fabs(stretch + speed * left) < limit:
+                    due[i] -= spent
+                    break
+                lasts = time_to_rupture(stretch, speed, due[i], rate, softness, limit)
+                time += min(lasts, left) if lasts > 0.0 else 0.0
+                life[i] += np.uint32(1)
+                one, two, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
+                birth[i] = exponential(one)
+                due[i] = -max(t0 + time + exponential(two) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+            elif -due[i] > t0 + duration:
+                break
+            else:
+                time = max(-due[i] - t0, 0.0)
+                due[i], birth[i] = birth[i], x0 + speed * time
+        if math.copysign(1.0, due[i]) > 0.0:
+            bound += 1.0
+            total += birth[i]
+            squares += birth[i] * birth[i]
+            lowest, highest = min(lowest, birth[i]), max(highest, birth[i])
+    row[SLIDER], row[TIME] = x0 + slip, t0 + duration
+    row[BOUND], row[SUM], row[SQUARES] = bound, total, squares
+    return (slip > 0.0 and highest <= x0 + slip) or (slip < 0.0 and lowest >= x0 + slip)
+
+
+@device
+def _set(birth, due, soonest, row, softness, bounded, singly, turn):
+    """Set the frame of a row anew at the slider and now, its bonds asked ``singly`` or not, its sense turned or not.
+
+    Takes the sums and least dues anew, so that roundings do not gather.
+    """
+    x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
+    scale = math.exp(-softness * x0)
+    sign = -1.0 if turn else 1.0
+    was_single = row[SINGLY] > 0.0
+    bound, total, squares = 0.0, 0.0, 0.0
+    for i in range(due.size):
+        if math.copysign(1.0, due[i]) < 0.0:
+            due[i] = -max(-due[i] - t0, TINY)
+            continue
+        x = sign * (birth[i] - x0)
+        if not was_single:
+            due[i] = max(due[i] - clock, 0.0) * (math.exp(-softness * birth[i]) if singly else scale)
+        elif not singly:
+            due[i] *= math.exp(softness * x)
+        birth[i] = x
+        bound += 1.0
+        total += x
+        squares += x * x
+    if not singly:
+        soonest[2] = math.inf
+        signed, unsigned = due.view(np.int64), due.view(np.uint64)
+        binding, rupture = soonest.view(np.int64), soonest.view(np.uint64)
+        blocks = np.arange(soonest.shape[1]).astype(np.uint64)
+        least(signed, unsigned, birth, binding[1], rupture[0], soonest[2], blocks, blocks.size, bounded)
+    row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
+    row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = 1.0 if singly else 0.0, bound, total, squares
+
+
+@kernel(
+    "int64(float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1],"
+    " float64[:], float64, float64, float64, float64, float64, uint64, uint64[:])"
+)
+def live(birth, due, life, soonest, stamp, frame, slip, duration, rate, softness, limit, rebinding, seed, members):
+    """Advance all rows by one step, in place; the worst of what it has to say.
+
+    ``frame`` is the new state's own copy. Rows in which a step is longer than some 300 lives of a site
+    are left as they are, their count of steps, too; nothing is touched when the state is spent or a
+    number endless.
+    """
+    rows = len(due)
+    for m in range(rows):
+        if stamp[m] != np.int64(frame[m, STEPS]):
+            return SPENT
+        if not (math.fabs(slip[m % slip.size]) < math.inf and 0.0 < duration < math.inf):
+            return ENDLESS
+    law, said = (rate, softness, limit, rebinding), DONE
+    work, drawn, hands = np.empty((3, HANDS), np.uint64), np.empty((4, HANDS)), np.zeros(2, np.int64)
+    words = np.empty((4, HANDS), np.uint64)
+    signed, unsigned = due.view(np.int64), due.view(np.uint64)
+    binding, rupture = soonest.view(np.int64), soonest.view(np.uint64)
+    for m in range(rows):
+        row, member, step = frame[m], members[m], slip[m % slip.size]
+        if duration > _CYCLES * _cycle(step / duration, rate, softness, limit, rebinding):
+            said = LONG
+            continue
+        along = row[SENSE] * step
+        single = row[SINGLY] > 0.0
+        if not single and (along < 0.0 or softness * along > _LEAP):
+            _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, True, False)
+            single = True
+        if single:
+            follows = _ask(birth[m], due[m], life[m], row, along, duration, law, seed, member)
+            if follows:
+                _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, False, along < 0.0)
+        else:
+            follow(
+                birth[m], due[m], signed[m], unsigned[m], life[m], binding[m, 1], rupture[m, 0], soonest[m, 2],
+                row, along, duration, law, seed, member, work, drawn, words, hands,
+            )  # fmt: skip
+        gone = math.fabs(row[SLIDER])
+        if gone * softness > _FAR or gone > _FAR * limit or row[TIME] * rate > _FAR:
+            _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, row[SINGLY] > 0.0, False)
+        row[STEPS] += 1.0
+        stamp[m] += 1
+    return said
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1], boolean[:],"
+    " float64[:], float64[:], float64[:], float64, float64, float64, float64, uint64, uint64[:])"
+)
+def draw(
+    birth, due, life, soonest, stamp, frame, chosen, speed, share, age, rate, softness, limit, rebinding, seed, members
+):
+    """Draw chosen rows anew: a ``share`` of sites bound, their ages by the survival law of a bond of mean life ``age``.
+
+    The density of ages S(t)/⟨T⟩ is log-concave with its mode at 0: rejection under
+    min(1, e^(1 − t/⟨T⟩))/⟨T⟩ accepts every second proposal (Devroye, Non-Uniform Random Variate
+    Generation, 1986, VII.2). Whatever its age, a bond has still an exponential threshold before it.
+    """
+    for m in range(due.shape[0]):
+        if not chosen[m % chosen.size]:
+            continue
+        v, mean, bonded = speed[m % speed.size], age[m % age.size], share[m % share.size]
+        for i in range(due.shape[1]):
+            life[m, i] += np.uint32(1)
+            site, number = _U(i + 1), _U(life[m, i])
+            one, two, three, _ = words_at(seed, PART, site, number, members[m], _U(1))
+            birth[m, i] = exponential(two)
+            due[m, i] = -max(exponential(three) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+            if unit_at(one) >= bonded:
+                continue
+            due[m, i], passed = birth[m, i], 0.0
+            for lane in range(2, 256 if mean > 0.0 else 2):
+                one, two, three, _ = words_at(seed, PART, site, number, members[m], _U(lane))
+                tail = 1.0 + exponential(two) if unit_at(one) >= 0.5 else unit_at(two)
+                passed, bar = tail * mean, exponential(three) + max(tail - 1.0, 0.0)
+                spent = hazard_integral(0.0, v * passed, passed, rate, softness)
+                if spent <= bar and math.fabs(v) * passed < limit:
+                    break
+            birth[m, i] = -v * passed
+        row = frame[m]
+        row[:STEPS] = 0.0
+        row[SENSE], row[SINGLY] = 1.0, 1.0
+        _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, False, v < 0.0)
+        row[STEPS] += 1.0
+        stamp[m] = np.int64(row[STEPS])

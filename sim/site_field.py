@@ -1,0 +1,65 @@
+"""The fluctuations that bonds make in time: a frozen part and one that the bonds' lives renew.
+
+Sites are fixed on the slider. Their mean force f̄ makes a pattern that never changes but in size, with
+the power n f̄²; what forces differ from the mean, n Var f, is forgotten as bonds break and rebind. Both
+follow the moments of the population in time, so no rms is put in by hand.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.motion import Motion
+from sim.noise import Noise
+from sim.processes import DrawsMaps, Fluctuation, ModalProcess, SmoothProcess
+from sim.traction import Traction
+
+
+@dataclass(frozen=True)
+class SiteMean(SmoothProcess):
+    """The ensemble mean of ΔΓ: ``energy`` is that for n E[f²] = 1 N²/m²."""
+
+    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        return Fluctuation((traction.frozen + traction.varying) * self.energy, np.ones(1), np.empty(0))
+
+
+class SiteModes(ModalProcess):
+    """Every mode of the cell as √(n f̄²) Z + √(n Var f) Y: Z a frozen standard normal, Y one that renews.
+
+    Y keeps e^(−∫λdt) of itself in a step, λ that of ``memory``. The state holds Z and Y, shape
+    (members, 4, pairs).
+    """
+
+    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        pairs = len(self.wavenumber)
+        parts = noise.normals(motion.step, 4 * pairs).reshape(-1, 4, pairs).copy()
+        return self._sized(parts, traction)
+
+    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+        exponents, pairs = self.memory.exponents(self.wavenumber, motion), len(self.wavenumber)
+        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
+        fresh = noise.normals(motion.step, 2 * pairs).reshape(-1, 2, pairs)
+        parts = np.concatenate([state.amplitude[:, :2], keep * state.amplitude[:, 2:] + renew * fresh], axis=1)
+        return self._sized(parts, traction)
+
+    def _sized(self, parts: np.ndarray, traction: Traction) -> Fluctuation:
+        """The state of these parts; ``growth`` holds the sizes of both, shape (2, 1) or (2, members)."""
+        sizes = np.sqrt(np.stack([traction.frozen, traction.varying]))
+        sizes[0] *= np.where(traction.stress < 0.0, -1.0, 1.0)
+        field = _combined(parts, sizes)
+        energy = np.sum(self.weights * np.sum(np.square(field), axis=1), axis=1)
+        return Fluctuation(energy, sizes.T, parts)
+
+    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
+        field = _combined(state.amplitude, state.growth.T)
+        return 0.5 * self.deviation * (field[:, 0] + 1j * field[:, 1])
+
+
+def _combined(parts: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """The field of both parts at their sizes (2, members), shape (members, 2, pairs)."""
+    frozen, varying = sizes[:, :, np.newaxis, np.newaxis]
+    return frozen * parts[:, :2] + varying * parts[:, 2:]
+
+
+class MappedSiteModes(DrawsMaps, SiteModes):
+    """``SiteModes`` that also draws its map."""

@@ -1,0 +1,375 @@
+"""Energy of a fluctuating shear stress on a finite disc: spectra, single waves and maps."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy import special
+
+from sim.disc import disc_energy, marginal_energy
+from sim.footprint import BondMade
+from sim.laws import disc, halfspace
+from sim.measured import Tabulated
+from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
+
+RATIOS = [0.0, 0.3, 0.5]
+SPECTRA = [
+    Ripple(1.0, 0.3, 0.4),
+    Band(1.0, 0.5, 0.2),
+    Gaussian(1.0, 0.15),
+    AnisotropicGaussian(1.0, 0.1, 0.4, 0.3),
+    VonKarman(1.0, 0.15, 0.3),
+    SelfAffine(1.0, 0.8, 0.5, 0.2, 0.01),
+    Tabulated((5.0, 10.0, 20.0, 80.0), (0.0, 2.0, 1.0, 0.01)),
+    BondMade(0.1),
+]
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
+#: k waves on the diameter: E/(pi a^2) along x, across, and dE/dA, over the plane's, from direct overlap integrals.
+TABLE = [
+    (1, 1.2067868845072907, 0.9028233335802799, 0.90282),
+    (2, 1.1019211152308137, 0.9499393397673098, 0.94994),
+    (5, 1.04056905249316, 0.9797763423077571, 0.97978),
+    (10, 1.020269354234092, 0.9898729991413905, 0.98987),
+    (20, 1.0101327595014724, 0.9949345819551205, 0.99493),
+]
+PLANE = {0.0: 1.0 / 8.0, math.pi / 2: 1.0 / 4.0}
+
+
+def name(spectrum):
+    return spectrum.model
+
+
+def overlap_integral(correlation, radius, nu=0.5, marginal=False, panels=400):
+    """The overlap integral of an isotropic field per area of the disc, at unit modulus, in real space.
+
+    The angular mean of the kernel is (2 - nu)/(4 pi s); with s = 2 a sin(phi) the overlap's root at s = 2a is smooth.
+    """
+    edge = 0.5 * np.pi * np.linspace(0.0, 1.0, panels + 1) ** 3  # finer towards s = 0
+    half = 0.5 * np.diff(edge)[:, None]
+    phi = edge[:-1, None] + half * (1.0 + NODES)
+    t = np.sin(phi)
+    area = np.arccos(t) - (0.0 if marginal else t * np.cos(phi))
+    return (
+        (2.0 - nu)
+        / 4.0
+        * 4.0
+        * radius
+        / np.pi
+        * np.sum(half * WEIGHTS * np.cos(phi) * area * correlation(2 * radius * t))
+    )
+
+
+def jinc_correlation(band):
+    """Autocorrelation of a flat band, sigma = 1."""
+    q1, q2 = band.support
+    return lambda s: 2.0 * (q2 * special.j1(q2 * s) - q1 * special.j1(q1 * s)) / ((q2**2 - q1**2) * s)
+
+
+@pytest.mark.parametrize("k, along, across, marginal", TABLE)
+def test_waves_along_and_across_a_disc_store_the_tabulated_energy(k, along, across, marginal):
+    q = np.pi * k
+    for angle, ratio in ((0.0, along), (math.pi / 2, across)):
+        assert_allclose(disc.ripple_energy(1.0, q, angle, 1.0, 1.0) * q / PLANE[angle], ratio, rtol=1e-10, atol=0)
+        wave = Ripple(2.0, 2e-5 / k, angle)
+        assert_allclose(disc_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6), ratio, rtol=1e-10, atol=0)
+        # the five digits given
+        edge = marginal_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6)
+        assert_allclose(edge, marginal, rtol=5e-6 / 0.9, atol=0)
+
+
+@pytest.mark.parametrize("factors", [disc.energy_factors, disc.marginal_factors])
+def test_factors_are_the_bessel_integrals_of_the_overlap(factors):
+    area = (lambda t: mpmath.acos(t) - t * mpmath.sqrt(1 - t * t)) if factors is disc.energy_factors else mpmath.acos
+    for x in (1e-3, 0.7, 2.999, 3.001, 9.0, 40.0):
+        cuts = mpmath.linspace(0, 1, 2 + int(x / 3))
+        mean = x * mpmath.quad(lambda t, x=x: area(t) * mpmath.besselj(0, x * t), cuts)
+        skew = -x * mpmath.quad(lambda t, x=x: area(t) * mpmath.besselj(2, x * t), cuts)
+        # P = q/(2 a^2) integral of A J0 ds; s = 2 a t. At x = 3 the closed form of S loses a digit
+        assert_allclose(factors(x), [float(mean), float(skew)], rtol=3e-14, atol=0)
+
+
+@pytest.mark.parametrize("xi", [0.01, 0.1, 1.0, 30.0])
+@pytest.mark.parametrize("nu", RATIOS)
+def test_gaussian_and_exponential_fields_obey_the_overlap_integral(xi, nu):
+    gaussian, exponential = Gaussian(1.0, xi), VonKarman(1.0, xi, 0.5)
+    for marginal, energy in ((False, disc_energy), (True, marginal_energy)):
+        exact = overlap_integral(lambda s: np.exp(-((s / xi) ** 2)), 1.0, nu, marginal)
+        assert_allclose(energy(gaussian, 1.0, 1.0, nu), exact, rtol=1e-12, atol=0)
+        exact = overlap_integral(lambda s: np.exp(-s / xi), 1.0, nu, marginal)
+        assert_allclose(energy(exponential, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
+
+
+@pytest.mark.parametrize("waves", [(50.0, 20.0), (1.0, 0.5), (0.1, 0.09), (0.02, 0.015), (0.002, 0.0018)])
+def test_bands_obey_the_overlap_integral(waves):
+    band = Band(1.0, *waves)
+    for marginal, energy in ((False, disc_energy), (True, marginal_energy)):
+        exact = overlap_integral(jinc_correlation(band), 1.0, 0.5, marginal, panels=400 + int(12.0 / waves[1]))
+        assert_allclose(energy(band, 1.0, 1.0), exact, rtol=1e-11, atol=0)
+
+
+def test_a_self_affine_field_is_the_sum_of_its_bands():
+    spectrum = SelfAffine(1.0, 0.8, 0.8, 0.3, 0.01)
+    q1, q2 = spectrum.support
+    edge = np.geomspace(q1, q2, 4001)
+    inner = np.sqrt(edge[1:] * edge[:-1])
+    waves = Ripple(1.0, 1.0)
+    ratio = disc.ripple_energy(1.0, inner, 0.0, 1.0, 1.0) + disc.ripple_energy(1.0, inner, math.pi / 2, 1.0, 1.0)
+    # a ring's energy is the mean of its two principal waves; variance of each ring from the closed form
+    rings = np.diff(spectrum.cumulative(edge)) * ratio / (2 * waves.variance)
+    # 4000 rings a step of 1.5e-3 wide: the oscillation sin(x)/x^2, x up to 1200, turns by 0.1 to 1 rad a ring
+    assert_allclose(disc_energy(spectrum, 1.0, 1.0), np.sum(rings), rtol=1e-5, atol=0)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.6, math.pi / 2])
+@pytest.mark.parametrize("nu", [0.0, 0.4])
+def test_streaks_obey_the_overlap_integral_in_two_dimensions(angle, nu):
+    spectrum = AnisotropicGaussian(1.0, 0.2, 0.7, angle)
+    edge = 0.5 * np.pi * np.linspace(0.0, 1.0, 41) ** 2
+    half = 0.5 * np.diff(edge)[:, None]
+    phi = (edge[:-1, None] + half * (1.0 + NODES)).ravel()
+    weight = (half * WEIGHTS).ravel() * np.cos(phi)
+    turn = 2 * np.pi * np.arange(256) / 256
+    s = 2.0 * np.sin(phi)[:, None]
+    u, v = s * np.cos(turn - angle), s * np.sin(turn - angle)
+    kernel = halfspace.point_displacement(s * np.cos(turn), s * np.sin(turn), 1.0, nu) * s
+    around = np.mean(kernel * np.exp(-((u / 0.2) ** 2) - (v / 0.7) ** 2), axis=1)
+    for marginal, energy in ((False, disc_energy), (True, marginal_energy)):
+        area = (np.pi / 2 - phi) - (0.0 if marginal else np.sin(phi) * np.cos(phi))
+        exact = 0.5 * (2 / np.pi) * 2.0 * 2 * np.pi * np.sum(weight * area * around)
+        assert_allclose(energy(spectrum, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
+
+
+def test_equal_lengths_make_a_streak_an_isotropic_patch():
+    for energy in (disc_energy, marginal_energy):
+        streak = energy(AnisotropicGaussian(2.0, 0.3, 0.3, 0.7), 1.0, 1.0)
+        assert_allclose(streak, energy(Gaussian(2.0, 0.3), 1.0, 1.0), rtol=1e-13, atol=0)
+
+
+def test_a_gaussian_field_lacks_its_share_at_the_edge():
+    ratio = [
+        disc_energy(Gaussian(1.0, xi), 1.0, 1.0) / Gaussian(1.0, xi).surface_energy(1.0) for xi in (0.01, 0.1, 1.0)
+    ]
+    assert_allclose(ratio, [0.99641, 0.96410, 0.65745], rtol=1e-5, atol=0)
+    # 1 - (2/pi) xi/(sqrt(pi) a), and half of it for the margin; what follows is cubic in xi/a
+    xi = 1e-3
+    spectrum = Gaussian(1.0, xi)
+    deficit = 2 / np.pi * xi / math.sqrt(math.pi)
+    assert_allclose(1 - disc_energy(spectrum, 1.0, 1.0) / spectrum.surface_energy(1.0), deficit, rtol=2e-6, atol=0)
+    margin = 1 - marginal_energy(spectrum, 1.0, 1.0) / spectrum.surface_energy(1.0)
+    assert_allclose(margin, deficit / 2, rtol=2e-6, atol=0)
+
+
+@pytest.mark.parametrize("spectrum", SPECTRA, ids=name)
+@pytest.mark.parametrize("nu", RATIOS)
+def test_a_disc_of_many_waves_is_the_infinite_plane(spectrum, nu):
+    plane = spectrum.surface_energy(1.6e6, nu)
+    for energy in (disc_energy, marginal_energy):
+        # the deficit is of first order in length/a or less, with a factor below 2
+        assert_allclose(energy(spectrum, 1e6, 1.6e6, nu), plane, rtol=1e-6, atol=0)
+        assert_allclose(energy(spectrum, np.inf, 1.6e6, nu), plane, rtol=1e-14, atol=0)
+        assert energy(spectrum, 0.0, 1.6e6, nu) == 0.0
+
+
+@pytest.mark.parametrize("spectrum", SPECTRA, ids=name)
+@pytest.mark.parametrize("nu", RATIOS)
+def test_on_a_disc_below_every_wavelength_the_stress_is_uniform(spectrum, nu):
+    a = 1e-7
+    uniform = halfspace.disc_tangential_energy(a, math.sqrt(spectrum.variance), 1.0, nu) / (np.pi * a * a)
+    # a correlation that falls like s^(2H) is the slowest: 1.1 (a/xi)^0.6 at H = 0.3
+    rtol = 2e-4 if spectrum.model == "von_karman" else 2e-5
+    assert_allclose(disc_energy(spectrum, a, 1.0, nu), uniform, rtol=rtol, atol=0)
+    assert_allclose(marginal_energy(spectrum, a, 1.0, nu), 1.5 * uniform, rtol=rtol, atol=0)
+
+
+def test_one_long_wave_stores_half_of_a_uniform_stress():
+    # E* = 4 G: half of 4 tau^2 a^3 / E*
+    energy = np.pi * disc_energy(Ripple(3.0, 1e5), 1.0, 0.25)
+    assert_allclose(energy, 0.5 * 4.0 * 9.0, rtol=1e-8, atol=0)
+
+
+@pytest.mark.parametrize("spectrum", SPECTRA, ids=name)
+def test_marginal_energy_is_the_derivative_of_the_energy(spectrum):
+    # d(a^2 e)/d(a^2), six-point central difference: error h^6, rounding 1e-15/h
+    a = np.array([0.05, 0.37, 2.0])
+    h = 4e-3
+    step = np.array([-3, -2, -1, 1, 2, 3])
+    weight = np.array([-1, 9, -45, 45, -9, 1]) / 60
+    radius = a[:, None] * (1 + h * step)
+    total = radius**2 * disc_energy(spectrum, radius, 1.0, 0.3)
+    slope = np.sum(weight * total, axis=1) / (2 * h * a**2)
+    # x = 2qa reaches 1200 for the largest disc; the part of E there is a millionth and its h^6 term stays below 1e-7
+    assert_allclose(slope, marginal_energy(spectrum, a, 1.0, 0.3), rtol=2e-7, atol=0)
+
+
+@pytest.mark.parametrize("spectrum", SPECTRA, ids=name)
+def test_energies_broadcast_and_scale_with_the_modulus(spectrum):
+    radius, modulus, nu = np.array([[0.1], [1.0]]), np.array([1.0, 2.0, 4.0]), 0.2
+    energy = disc_energy(spectrum, radius, modulus, nu)
+    assert energy.shape == (2, 3)
+    assert_allclose(energy[1], disc_energy(spectrum, 1.0, 1.0, nu) / modulus, rtol=1e-14, atol=0)
+    # linear in the Poisson ratio
+    one, two, three = (marginal_energy(spectrum, 1.0, 1.0, nu) for nu in (0.1, 0.25, 0.4))
+    assert_allclose(two, (one + three) / 2, rtol=1e-13, atol=0)
+
+
+def test_a_radius_that_is_no_length_is_refused():
+    for radius in (-1.0, np.nan):
+        for spectrum in (Gaussian(1.0, 1.0), Ripple(1.0, 1.0)):
+            with pytest.raises(ValueError, match="at least zero"):
+                disc_energy(spectrum, radius, 1.0)
+
+
+def test_samples_weigh_the_whole_disc_and_its_second_moment():
+    for points, r in [(16, 8.0), (17, 5.27), (9, 0.18)]:
+        _, _, weight = disc._coverage(points, r)
+        assert_allclose(weight.sum(), np.pi * r**2, rtol=1e-12, atol=0)
+    # shares alone are a disc smoothed over a pixel: on the mean of all radii their second moment is 1/(3 r^2) too
+    # large; the differences take that away, up to terms that fall with r
+    excess = []
+    for r in 20.0 + np.arange(200) / 200:
+        _, position, weight = disc._coverage(64, r)
+        excess.append((weight * position**2).sum() / (np.pi * r**4 / 4) - 1)
+    assert abs(np.mean(excess)) < 0.01 / (3 * 20.0**2)
+
+
+@pytest.mark.parametrize("nu", RATIOS)
+def test_a_uniform_map_stores_the_energy_of_a_uniform_disc(nu):
+    points, a = 96, 0.83
+    exact = halfspace.disc_tangential_energy(a, 3.0, 2.0, nu) / (np.pi * a**2)
+    field = np.full((points, points), 3.0)
+    # the edge is blurred over a pixel: 0.1 (pixel/a)^2 relative
+    rtol = 0.1 * (2.0 / points / a) ** 2
+    assert_allclose(disc.disc_energy_of_map(field, 2.0, a, 2.0, nu), exact, rtol=rtol, atol=0)
+    assert_allclose(disc.cross_energy_of_map(field, 2.0, a, 3.0, 2.0, nu), 2 * exact, rtol=rtol, atol=0)
+
+
+def wave_maps(points, k, angle, cell=2.0):
+    """A wave and the same a quarter period on, whose energies average to the mean over all phases."""
+    x = (np.arange(points) - points / 2) * cell / points
+    phase = np.pi * k * (x[:, None] * math.cos(angle) + x * math.sin(angle))
+    return np.stack([np.cos(phase), np.sin(phase)])
+
+
+@pytest.mark.parametrize("k, along, across, _", TABLE[:4])
+def test_the_map_of_a_wave_converges_to_the_table(k, along, across, _):
+    for angle, ratio in ((0.0, along), (math.pi / 2, across)):
+        exact = ratio * PLANE[angle] / (np.pi * k)
+        coarse, fine = (np.mean(disc.disc_energy_of_map(wave_maps(n, k, angle), 2.0, 1.0, 1.0)) for n in (128, 256))
+        # second order in the pixel: a quarter of the error, 0.24 k (pixel/a)^2 at most
+        assert abs(coarse / exact - 1) < 0.3 * k * (2 / 128) ** 2
+        assert 3.5 < (coarse - exact) / (fine - exact) < 4.8
+        assert_allclose((4 * fine - coarse) / 3, exact, rtol=1e-5, atol=0)
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3])
+def test_an_oblique_wave_on_a_map_stores_its_energy_at_any_poisson_ratio(nu):
+    exact = disc.ripple_energy(1.0, 3 * np.pi, 0.5, 0.77, 1.0, nu)
+    energy = np.mean(disc.disc_energy_of_map(wave_maps(160, 3, 0.5), 2.0, 0.77, 1.0, nu))
+    assert_allclose(energy, exact, rtol=0.3 * 3 * (2 / 160 / 0.77) ** 2, atol=0)
+
+
+def test_a_disc_has_no_images_of_itself():
+    # the cell around the disc does not matter
+    small = disc.disc_energy_of_map(np.ones((40, 40)), 1.0, 0.5, 1.0)
+    large = disc.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0)
+    assert_allclose(small, large, rtol=1e-13, atol=0)
+
+
+def test_energies_of_a_sum_are_a_square_with_the_cross_energy_in_it():
+    # (tau0 + tau1): E = E0 + cross + E1; the cross term by displacement and by convolution differ at the edge only
+    field = gaussian_maps(1, 96, 2.0, 0.3, seed=5)[0]
+    a, tau0 = 0.9, 0.7
+    own = disc.disc_energy_of_map(field, 2.0, a, 1.0)
+    mean = disc.disc_energy_of_map(np.full_like(field, tau0), 2.0, a, 1.0)
+    cross = disc.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - own - mean
+    direct = disc.cross_energy_of_map(field, 2.0, a, tau0, 1.0)
+    assert abs(cross - direct) < 0.3 * (2 / 96 / a) ** 2 * 2 * math.sqrt(own * mean)
+
+
+def gaussian_maps(members, points, cell, xi, seed):
+    """Gaussian fields of correlation exp(-r^2/xi^2) on a periodic cell, the mean of the cell included."""
+    rng = np.random.default_rng(seed)
+    q = 2 * np.pi * np.fft.fftfreq(points, cell / points)
+    density = np.pi * xi**2 * np.exp(-(xi**2) / 4 * (q[:, None] ** 2 + q**2))
+    white = np.fft.fft2(rng.standard_normal((members, points, points)))
+    return np.fft.ifft2(white * np.sqrt(density)).real * points / cell
+
+
+def five_sigma_of_spread(sample):
+    """Five standard errors of the standard deviation of a sample."""
+    deviation = sample - sample.mean()
+    fourth = np.mean(deviation**4) / np.mean(deviation**2) ** 2
+    return 5 * sample.std() * math.sqrt((fourth - 1) / (4 * len(sample)))
+
+
+@pytest.mark.parametrize("points", [60, 120])
+def test_the_expected_energy_of_sampled_discs_is_the_overlap_integral(points):
+    # the sum that the maps' energy is on the mean: kernel x correlation x overlap of the sampled disc with itself
+    pixel, xi = 3.0 / points, 0.15
+    _, _, weight = disc._coverage(points, 1.0 / pixel)
+    grid, kernel = disc._free_kernel(disc._padded_size(1.0 / pixel), 0.5)
+    overlap = np.fft.irfft2(np.abs(np.fft.rfft2(weight, s=(grid.points,) * 2)) ** 2, s=(grid.points,) * 2)
+    shift = np.fft.fftfreq(grid.points, 1 / grid.points) * pixel
+    correlation = np.exp(-(shift[:, None] ** 2 + shift**2) / xi**2)
+    energy = 0.5 * pixel**3 / np.pi * np.sum(np.fft.irfft2(kernel, s=(grid.points,) * 2) * correlation * overlap)
+    # the edge: as of waves of length 4 xi, three to a diameter, 0.2 k (pixel/a)^2
+    assert_allclose(energy, disc_energy(Gaussian(1.0, xi), 1.0, 1.0), rtol=0.6 * pixel**2, atol=0)
+
+
+def test_discs_of_random_maps_average_to_the_overlap_integral():
+    # a cell of 3 a: the ends of the disc are 1 a apart through the border, correlated by e^-44
+    xi, members, pixel = 0.15, 2000, 0.05
+    energy = disc.disc_energy_of_map(gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, 1.0)
+    exact, plane = disc_energy(Gaussian(1.0, xi), 1.0, 1.0), Gaussian(1.0, xi).surface_energy(1.0)
+    error = 5 * energy.std() / math.sqrt(members)
+    assert abs(energy.mean() - exact) < error + 0.6 * pixel**2 * exact
+    # known from another simulation to three digits: mean over the plane's 0.939, coefficient of variation 0.265
+    assert abs(energy.mean() / plane - 0.939) < error / plane + 0.6 * pixel**2 + 0.0005
+    assert abs(energy.std() / energy.mean() - 0.265) < five_sigma_of_spread(energy) / energy.mean() + 0.0005
+    # and exactly, to the same two digits
+    assert_allclose(exact / plane, 0.939, rtol=0.01, atol=0)
+
+
+def test_the_cross_energy_has_zero_mean_and_the_size_of_the_energy():
+    xi, members, cell = 0.1, 2000, 2.4
+    cross = disc.cross_energy_of_map(gaussian_maps(members, 48, cell, xi, seed=12), cell, 1.0, 2.0, 1.0)
+    assert abs(cross.mean()) < 5 * cross.std() / math.sqrt(members)
+    # its variance is integral of C(q) |w0(q)|^2, here from samples of w0 on a fine lattice
+    points, step = 480, cell / 480
+    x = (np.arange(points) - 239.5) * step
+    w0 = halfspace.disc_displacement(x[:, None], x, 1.0, 2.0, 1.0) * (np.hypot(x[:, None], x) < 1.0)
+    q = 2 * np.pi * np.fft.fftfreq(points, step)
+    density = np.pi * xi**2 * np.exp(-(xi**2) / 4 * (q[:, None] ** 2 + q**2))
+    power = np.abs(np.fft.fft2(w0) * step**2) ** 2
+    spread = math.sqrt(np.sum(power * density)) / cell / np.pi
+    # the edge of either lattice: less than (pixel/a)^2
+    assert abs(cross.std() - spread) < 5 * spread / math.sqrt(2 * members) + 0.05**2 * spread
+    # on vanishing patches C is flat: 1.93 tau0/sigma times the energy
+    flat = math.sqrt(np.pi * xi**2 * np.sum(w0**2) * step**2) / np.pi
+    assert_allclose(flat / Gaussian(1.0, xi).surface_energy(1.0) / 2.0, 1.93, rtol=0.005 / 1.93, atol=0)
+    # the rim, where patches stick out of the disc, takes some of it
+    assert 0.9 * flat < spread < flat
+
+
+def test_a_map_has_the_same_energy_alone_and_in_a_batch():
+    maps = gaussian_maps(5, 40, 2.0, 0.3, seed=3)
+    radius = np.array([0.4, 1.0, 0.0, 0.77, 0.4])
+    for energy in (
+        lambda field, a: disc.disc_energy_of_map(field, 2.0, a, 1.6e6),
+        lambda field, a: disc.cross_energy_of_map(field, 2.0, a, 3e5, 1.6e6),
+    ):
+        batch = energy(maps, radius)
+        assert batch.shape == (5,)
+        assert_array_equal(batch, [energy(one, a) for one, a in zip(maps, radius, strict=True)])
+        assert_array_equal(batch[3:], energy(maps[3:], radius[3:]))
+        assert batch[2] == 0.0
+        assert energy(maps[:, None], radius[:2]).shape == (5, 2)
+        assert np.isnan(energy(maps[0], np.nan))
+
+
+def test_a_disc_larger_than_the_cell_is_refused():
+    for radius in (0.51, np.array([0.1, np.inf])):
+        with pytest.raises(ValueError, match="at least twice the radius"):
+            disc.disc_energy_of_map(np.ones((2, 8, 8)), 1.0, radius, 1.0)

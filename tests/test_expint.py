@@ -1,0 +1,85 @@
+"""Exponential integrals and Lambert's W against fifty digits."""
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.special import exp1
+
+from sim.expint import lambert_w, reduced_exponential_integral, scaled_exponential_integral
+
+ORDERS = [0, 1, 2]
+
+
+def by_residues(z, order):
+    """e^z E(z) from the poles of Gamma(s)/s^(j + 1) z^-s: z up to some 40."""
+    with mp.workdps(80):
+        z = mp.mpf(z)
+        at_zero = mp.taylor(lambda s: mp.gamma(1 + s) * z**-s, 0, order + 1)[order + 1]
+        poles = (z**n * (-1) ** n / mp.factorial(n) / mp.mpf(-n) ** (order + 1) for n in range(1, 250))
+        return mp.exp(z) * (at_zero + mp.fsum(poles))
+
+
+def by_quadrature(z, order):
+    """e^z E(z) from int (ln(1 + w/z))^j e^-w/(z + w) dw/j!, scaled to 1 for the absolute tolerance of mpmath."""
+    with mp.workdps(50):
+        z, edges = mp.mpf(z), [0, 1, 4, 12, 30, 70, 150]
+        integral = mp.quad(lambda w: (z * mp.log1p(w / z)) ** order * mp.exp(-w) / (1 + w / z), edges)
+        return integral / mp.factorial(order) / z ** (order + 1)
+
+
+def test_the_two_references_agree():
+    for order in ORDERS:
+        assert abs(by_residues(5, order) / by_quadrature(5, order) - 1) < 1e-30
+    assert abs(by_residues(0.3, 0) / (mp.exp(0.3) * mp.expint(1, 0.3)) - 1) < 1e-14
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_the_integrals_to_fifty_digits(order):
+    # rounding: 1e-15 / E(1/2) in the series, 2e-14 in the weights of the quadrature
+    small = np.array([1e-300, 1e-100, 1e-9, 1e-6, 1e-3, 0.07, 0.3, 0.4999, 0.5001, 0.9, 2.0, 6.0, 20.0])
+    large = np.array([50.0, 700.0, 1e6, 1e9, 1e16, 1e18, 1e100])
+    exact = [by_residues(z, order) for z in small] + [by_quadrature(z, order) for z in large]
+    for z, value in zip([*small, *large], exact, strict=True):
+        with mp.workdps(50):
+            whole = float(value * mp.mpf(z) ** (order + 1))
+        assert_allclose(scaled_exponential_integral(z, order), float(value), rtol=5e-14, atol=0)
+        assert_allclose(reduced_exponential_integral(z, order), whole, rtol=5e-14, atol=1e-300)
+
+
+def test_order_zero_is_e1():
+    z = np.geomspace(1e-9, 600.0, 60)
+    assert_allclose(scaled_exponential_integral(z, 0), np.exp(z) * exp1(z), rtol=2e-13, atol=0)  # e^z rounds to 600 ulp
+
+
+def test_the_ends_are_exact():
+    for order in ORDERS:
+        assert_array_equal(reduced_exponential_integral([0.0, math.inf], order), [0.0, 1.0])
+        assert_array_equal(scaled_exponential_integral([0.0, math.inf], order), [math.inf, 0.0])
+        large = 1.0 - reduced_exponential_integral(1e5, order)  # the next term is 3e-4 of this one at order 2
+        assert_allclose(large, (order + 1) * (order + 2) / 2e5, rtol=3e-4, atol=0)
+
+
+def test_arguments_without_an_answer_are_nan():
+    for function in (reduced_exponential_integral, scaled_exponential_integral):
+        assert np.isnan(function([-1.0, math.nan, 1.0, 1.0], [0.0, 0.0, 3.0, 0.5])).all()
+    assert np.isnan(lambert_w([-1e-9, -math.inf, math.nan])).all()
+
+
+def test_the_derivative_of_each_integral_is_the_one_below():
+    # d/dz (e^z E_j) = e^z E_j - e^z E_(j-1)/z, by a central difference of error h^2/6 f''' ~ 1e-10 at h = 1e-5
+    z, h = np.array([0.1, 1.0, 3.0, 30.0]), 1e-5
+    for order in (1, 2):
+        here, below = scaled_exponential_integral(z, order), scaled_exponential_integral(z, order - 1)
+        up, down = (scaled_exponential_integral(z * (1 + s), order) for s in (h, -h))
+        assert_allclose((up - down) / (2 * h * z), here - below / z, rtol=1e-7, atol=0)
+
+
+def test_lambert_w_to_fifty_digits():
+    x = np.array([1e-300, 1e-12, 1e-6, 1e-3, 0.1, 0.5, 1.0, math.e, 4.0, 30.0, 1e3, 1e8, 1e16, 1e100, 1e300])
+    with mp.workdps(50):
+        exact = [float(mp.lambertw(mp.mpf(value)).real) for value in x]
+    assert_allclose(lambert_w(x), exact, rtol=1e-15, atol=0)
+    assert_array_equal(lambert_w([0.0, math.inf]), [0.0, math.inf])

@@ -1,0 +1,432 @@
+"""The step of number and mean stretch: exact where it is linear, controlled under Bell's rate."""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import solve_ivp
+from scipy.special import lambertw
+
+from sim.first_moment import LOCAL_ERROR, _rosenbrock, advance, resting, steady
+from sim.hazards import Hazard
+
+BELL = Hazard(1.0, 1.0, math.inf)
+ULP = 2.0**-52
+# an error of a stretch comes back in ln N multiplied by the fall of ln N, thirty at most here, and the errors of
+# three sub-steps at a time are in memory
+TRANSIENT = 100.0 * LOCAL_ERROR
+
+
+def slide(state, speed, duration, hazard, rebinding, pieces=1):
+    """Population after a time at constant speed, in equal steps."""
+    part = duration / pieces
+    for _ in range(pieces):
+        state = advance(*state, speed * part, np.abs(speed) * part, part, hazard, rebinding)
+    return state
+
+
+# --- linear: constant rate and cut-off
+
+
+def exact_linear(bound, moment, slip, binding, breaking, travel):
+    """The matrix exponential of d(N, M, 1)/dt over a step as the unit of time, with 60 digits."""
+    with mpmath.workdps(60):
+        binding, breaking, travel = mpmath.mpf(binding), mpmath.mpf(breaking), mpmath.mpf(travel)
+        matrix = mpmath.matrix(
+            [
+                [-(binding + breaking + travel), 0, binding],
+                [mpmath.mpf(slip), -(breaking + 2 * travel), 0],
+                [0, 0, 0],
+            ]
+        )
+        after = mpmath.expm(matrix) * mpmath.matrix([mpmath.mpf(bound), mpmath.mpf(moment), 1])
+        return float(after[0]), float(after[1])
+
+
+LINEAR = [
+    (rate, rebinding, travel)
+    for rate in (0.0, 1e-9, 1e-3, 30.0, 1e9)
+    for rebinding in (0.0, 1e-9, 1e-3, 0.02, 0.7, 1e9)
+    for travel in (0.0, 1e-9, 0.7, 1e9)
+]
+
+
+@pytest.mark.parametrize("start", [(0.0, 0.0), (0.6, 0.3), (1.0, 0.0), (1e-12, 1e-13)])
+def test_a_linear_step_is_the_matrix_exponential(start):
+    for rate, rebinding, travel in LINEAR:
+        slip = 0.37
+        limit = slip / travel if travel else math.inf
+        found = advance(*start, slip, slip, 1.0, Hazard(rate, 0.0, limit), rebinding)
+        exact = exact_linear(*start, slip, rebinding, rate, slip / limit)
+        # an exponential of x knows x to one rounding of each term; more than 745 leaves nothing of it
+        exponent = min(745.0, rebinding + rate + 2.0 * travel)
+        for value, truth in zip(found, exact, strict=True):
+            if truth > 1e-290 or truth == 0.0:
+                assert_allclose(value[0], truth, rtol=ULP * (16.0 + 2.0 * exponent), atol=0)
+            else:
+                assert 0.0 <= value[0] < 1e-289
+
+
+@pytest.mark.parametrize("limit", [math.inf, 2e-9])
+@pytest.mark.parametrize("duration", [1e-9, 1e-4, 0.5, 7.0, 90.0])
+def test_seven_linear_steps_are_one(limit, duration):
+    hazard, speed = Hazard(2.0, 0.0, limit), np.array([0.0, 1e-12, 1e-9, 3e-8, 1e-6])
+    start = np.full(5, 0.3), np.full(5, 4e-10)
+    once = slide(start, speed, duration, hazard, 5.0)
+    often = slide(start, speed, duration, hazard, 5.0, pieces=7)
+    assert_allclose(often, once, rtol=1e-12, atol=0)
+
+
+def test_a_linear_step_is_even_in_speed_but_for_the_sign_of_the_stretch():
+    hazard = Hazard(2.0, 0.0, 3e-9)
+    bound, moment = advance(0.3, 4e-10, 5e-9, 5e-9, 0.1, hazard, 5.0)
+    other, back = advance(0.3, -4e-10, -5e-9, 5e-9, 0.1, hazard, 5.0)
+    assert other == bound
+    assert back == -moment
+
+
+def test_no_more_than_all_sites_are_bound():
+    for exponent in np.linspace(0.01, 40.0, 3000):
+        assert advance(1.0, 0.0, 0.1, 0.1, 1.0, Hazard(0.0, 0.0, math.inf), exponent)[0] <= 1.0
+
+
+def test_path_that_leads_back_breaks_bonds_of_a_cut_off_but_stretches_none():
+    bound, moment = advance(1.0, 1e-9, 0.0, 4e-9, 0.0, Hazard(0.0, 0.0, 2e-9), 5.0)
+    assert_allclose([bound[0], moment[0]], [math.exp(-2.0), 1e-9 * math.exp(-4.0)], rtol=4 * ULP, atol=0)
+
+
+def test_steady_stress_of_a_cut_off_is_that_of_its_renewal():
+    # each bond lives l/V and carries l/2 on average, each free site waits 1/k_on
+    limit, rebinding, speed = 2e-9, 50.0, np.array([1e-15, 1e-9, 1e-7, 1e-5])
+    bound, moment = steady(speed, Hazard(0.0, 0.0, limit), rebinding)
+    share = (limit / speed) / (limit / speed + 1.0 / rebinding)
+    assert_allclose(bound, share, rtol=4 * ULP, atol=0)
+    assert_allclose(moment, 0.5 * limit * share, rtol=4 * ULP, atol=0)
+
+
+def test_friction_of_a_cut_off_does_not_end_at_rest():
+    hazard, speed = Hazard(0.0, 0.0, 2e-9), 1e-7
+    state = slide(resting(hazard, 50.0), speed, 1.0, hazard, 50.0)
+    held = slide(state, 0.0, 1e6, hazard, 50.0)
+    assert_array_equal(held[1], state[1])
+    assert_allclose(held[0], 1.0, rtol=ULP, atol=0)
+    assert_allclose(slide(held, -1e-15, 1e9, hazard, 50.0)[1], -1e-9, rtol=1e-7, atol=0)
+    assert steady(0.0, hazard, 50.0)[1] == 0.0
+
+
+# --- Bell: steady states
+
+# eps = softness × speed / rate, beta = k_on / rate, N, softness × M, from Lambert's W
+MEAN_FIELD = [
+    (0.01, 0.1, 0.09009409516824295, 0.0008920643267707173),
+    (1.0, 0.1, 0.05367044572249673, 0.030438833184816508),
+    (1000.0, 0.1, 0.0005246848465334622, 0.002754387066973957),
+    (0.01, 1.0, 0.4975246517624951, 0.004926227325970063),
+    (1.0, 1.0, 0.3618962566348892, 0.20524703377489464),
+    (3.0, 1.0, 0.2592425958691504, 0.2721811073565889),
+    (10.0, 1.0, 0.14861213581317062, 0.25940664460899326),
+    (1000.0, 1.0, 0.005222188437086488, 0.027414415315107857),
+    (0.1, 10.0, 0.9012604373359236, 0.08226392278750304),
+    (10.0, 10.0, 0.635771334693451, 1.1097566680472484),
+    (1000.0, 10.0, 0.04987764998755822, 0.261837853645774),
+]
+
+
+@pytest.mark.parametrize(("eps", "beta", "bound", "moment"), MEAN_FIELD)
+def test_steady_sliding_under_bell_s_rate_is_lambert_s_w(eps, beta, bound, moment):
+    rate, softness = 3.0, 2e9
+    found = steady(eps * rate / softness, Hazard(rate, softness, math.inf), beta * rate)
+    assert_allclose([found[0][0], softness * found[1][0]], [bound, moment], rtol=1e-13, atol=0)
+
+
+@pytest.mark.parametrize(("eps", "beta", "bound", "moment"), MEAN_FIELD)
+@pytest.mark.parametrize("start", ["empty", "resting", "reversed"])
+def test_marching_comes_to_the_steady_state(eps, beta, bound, moment, start):
+    first = {
+        "empty": (np.zeros(1), np.zeros(1)),
+        "resting": resting(BELL, beta),
+        "reversed": (np.full(1, bound), np.full(1, -moment)),
+    }
+    for duration, pieces in ((100.0, 1), (60.0, 300), (1e9, 1)):
+        found = slide(first[start], eps, duration, BELL, beta, pieces)
+        assert_allclose([found[0][0], found[1][0]], [bound, moment], rtol=1e-10, atol=0)
+
+
+@pytest.mark.parametrize("beta", [1e-9, 1.0, 1e9])
+def test_steady_states_hold_over_twenty_four_decades_of_speed(beta):
+    eps = np.concatenate([[0.0], 10.0 ** np.arange(-12.0, 13.0)])
+    bound, moment = steady(eps, BELL, beta)
+    with mpmath.workdps(40):
+        for i, value in enumerate(eps):
+            stretch = mpmath.lambertw(mpmath.mpf(float(value))).real
+            share = beta / (beta + mpmath.exp(stretch))
+            assert_allclose(bound[i], float(share), rtol=1e-14, atol=0)
+            assert_allclose(moment[i], float(share * stretch), rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("duration", [1e-9, 1e-3, 1.0, 1e3, 1e9])
+@pytest.mark.parametrize("beta", [1e-6, 1.0, 1e6])
+def test_a_steady_state_is_a_fixed_point_of_any_step(beta, duration):
+    eps = np.array([0.0, 1e-12, 9e-11, 1.1e-10, 1e-6, 0.1, 4.0, 1e3, 1e8, -1e-3, -30.0])
+    state = steady(eps, BELL, beta)
+    # a stretch W known to one ulp leaves the rate e^W an error of W ulp
+    stretch = np.max(lambertw(np.abs(eps)).real)
+    assert_allclose(slide(state, eps, duration, BELL, beta), state, rtol=8.0 * ULP * (1.0 + stretch), atol=0)
+
+
+@pytest.mark.parametrize(
+    ("beta", "largest", "eps"),
+    [
+        (0.1, 0.035504713848791766, 2.9165274173418823),
+        (1.0, 0.2784645427610738, 4.591121476668623),
+        (10.0, 1.1568683966150044, 18.644025568733642),
+        (100.0, 2.635932990553525, 137.93723146922673),
+    ],
+)
+def test_the_largest_mean_field_friction(beta, largest, eps):
+    around = steady(eps * np.array([0.999, 1.0, 1.001]), BELL, beta)[1]
+    assert_allclose(around[1], largest, rtol=1e-13, atol=0)
+    assert around[1] > max(around[0], around[2])
+
+
+def test_no_bonds_without_rebinding():
+    for hazard in (BELL, Hazard(1.0, 0.0, math.inf), Hazard(0.0, 0.0, 1.0)):
+        assert_array_equal(steady([0.0, 1.0, -2.0], hazard, 0.0), np.zeros((2, 3)))
+        assert_array_equal(slide((np.zeros(1), np.zeros(1)), 2.0, 5.0, hazard, 0.0), np.zeros((2, 1)))
+
+
+# --- Bell: transients
+
+
+def reference(bound, moment, speed, duration, beta):
+    """ln N and the mean stretch by scipy, stopped where the stretch passes zero; another form of the equations."""
+
+    def slope(time, state):
+        fresh = beta * math.expm1(-state[0])
+        return [fresh - math.exp(abs(state[1])), speed - state[1] * fresh]
+
+    def through_zero(time, state):
+        return state[1]
+
+    through_zero.terminal = True
+    state, time = [math.log(bound), moment / bound], 0.0
+    while time < duration:
+        watch = through_zero if state[1] * speed < 0.0 else None
+        run = solve_ivp(slope, (time, duration), state, "LSODA", rtol=1e-11, atol=1e-12, events=watch)
+        time, state = run.t[-1], list(run.y[:, -1])
+        if run.status == 1:
+            state[1] = 0.0
+    return math.exp(state[0]), math.exp(state[0]) * state[1]
+
+
+TRANSIENTS = [
+    ("resting", 0.0, 10.0, 1.0, 1.0),
+    ("resting", 0.0, 1e3, 1.0, 0.01),
+    ("resting", 0.0, 1e6, 0.1, 2e-5),
+    ("steady", 1e-3, 1e3, 1.0, 0.02),
+    ("steady", 1e3, 1e-3, 1.0, 0.5),
+    ("steady", 1e3, 0.0, 10.0, 2.0),
+    ("steady", 30.0, -30.0, 3.0, 0.5),
+    ("steady", 1e4, -0.01, 1.0, 3.0),
+    ("steady", 0.1, -1e4, 1.0, 1e-3),
+]
+
+
+@pytest.mark.parametrize(("start", "before", "speed", "beta", "duration"), TRANSIENTS)
+def test_transients_are_those_of_an_integrator_of_another_form(start, before, speed, beta, duration):
+    first = steady(before, BELL, beta) if start == "steady" else resting(BELL, beta)
+    for share in (0.1, 1.0):
+        exact = reference(first[0][0], first[1][0], speed, share * duration, beta)
+        found = slide(first, speed, share * duration, BELL, beta)
+        assert_allclose([found[0][0], found[1][0]], exact, rtol=TRANSIENT, atol=0)
+
+
+@pytest.mark.parametrize("eps", [1e-3, 1.0, 1e4])
+def test_the_first_bonds_of_an_empty_contact(eps):
+    beta = 2.0
+    first = 1e-6 / math.sqrt(1.0 + eps)  # both series to a relative error of (1 + eps) first²
+    bound = beta * first * (1.0 - 0.5 * (beta + 1.0) * first)
+    moment = eps * beta * first**2 * (0.5 - (beta + 2.0) * first / 6.0)
+    duration = 3.0 / (1.0 + eps)
+    exact = reference(bound, moment, eps, duration - first, beta)
+    empty = np.zeros(1), np.zeros(1)
+    found = slide(empty, eps, duration, BELL, beta)
+    assert_allclose([found[0][0], found[1][0]], exact, rtol=TRANSIENT, atol=0)
+    begun = slide(empty, eps, first, BELL, beta)
+    assert_allclose([begun[0][0], begun[1][0]], [bound, moment], rtol=2.0 * (beta + 2.0) ** 2 * 1e-12, atol=0)
+
+
+def test_the_start_without_rebinding_has_a_closed_form_peak():
+    # N = exp(-(e^{eps t} - 1)/eps) N0: the peak of the force is W exp(1/eps - 1/W) at t = W/eps
+    for eps, peak in ((1.0, 0.26438044734963434), (10.0, 1.0878078601534826), (1e4, 6.298534919025461)):
+        time = float(lambertw(eps).real) / eps
+        moment = slide((np.ones(1), np.zeros(1)), eps, time, BELL, 0.0)[1]
+        assert_allclose(moment, peak, rtol=TRANSIENT, atol=0)
+        assert slide((np.ones(1), np.zeros(1)), eps, 0.99 * time, BELL, 0.0)[1] < moment
+        assert slide((np.ones(1), np.zeros(1)), eps, 1.01 * time, BELL, 0.0)[1] < moment
+
+
+def test_all_bonds_go_where_none_come():
+    assert_array_equal(slide((np.ones(1), np.zeros(1)), 10.0, 1e3, BELL, 0.0), np.zeros((2, 1)))
+
+
+def test_rest_relaxes_the_stretch_to_nothing_and_the_share_to_that_of_rest():
+    state = slide(steady(1e6, BELL, 3.0), 0.0, 40.0, BELL, 3.0)
+    assert_allclose(state[0], 0.75, rtol=1e-10, atol=0)
+    # the late stretch of a bond fades by rebinding, at k_on (1 - N)/N = k0
+    later = slide(state, 0.0, 10.0, BELL, 3.0)
+    assert_allclose(later[1] / state[1], math.exp(-10.0), rtol=TRANSIENT, atol=0)
+    assert_array_equal(slide(state, 0.0, 1e9, BELL, 3.0)[1], [0.0])
+
+
+def hard_cases(count):
+    random = np.random.default_rng(4)
+    for _ in range(count):
+        before, speed = 10.0 ** random.uniform(-12, 8, 2) * random.choice([-1.0, 1.0], 2)
+        beta, duration = 10.0 ** random.uniform(-9, 9, 2)
+        kind = random.integers(4)
+        yield kind, before, speed if random.random() > 0.1 else 0.0, beta, duration
+
+
+def test_a_step_in_two_unequal_parts_is_the_step_whatever_the_numbers():
+    for kind, before, speed, beta, duration in hard_cases(400):
+        first = resting(BELL, beta) if kind == 0 else steady(before, BELL, beta)
+        if kind == 1:
+            first = np.zeros(1), np.zeros(1)
+        whole = slide(first, speed, duration, BELL, beta)
+        parts = slide(slide(first, speed, 0.3 * duration, BELL, beta), speed, 0.7 * duration, BELL, beta)
+        assert 0.0 <= whole[0][0] <= 1.0
+        assert_allclose(parts, whole, rtol=TRANSIENT, atol=0, err_msg=f"{kind} {before} {speed} {beta} {duration}")
+
+
+def test_jumps_over_six_decades_end_where_the_new_speed_leads():
+    for beta in (1e-3, 1.0, 1e3):
+        state = steady(1e-3, BELL, beta)
+        for speed in (1e3, 1e-3, -1e3, 1e-3, -1e8, 1e2, 0.0, 1e8):
+            state = slide(state, speed, 1e5 * (1.0 + 1.0 / beta), BELL, beta)
+            assert_allclose(state, steady(speed, BELL, beta), rtol=1e-10, atol=0)
+
+
+def test_a_reversal_is_seen_at_its_time_by_small_steps_and_by_large_ones():
+    first = steady(50.0, BELL, 2.0)
+    once = slide(first, -50.0, 0.2, BELL, 2.0)
+    often = slide(first, -50.0, 0.2, BELL, 2.0, pieces=1000)
+    assert once[1][0] < 0.0 < first[1][0]
+    assert_allclose(often, once, rtol=TRANSIENT, atol=0)
+
+
+def test_bell_s_rate_with_little_softness_is_the_constant_rate():
+    first, speed = (np.full(1, 0.2), np.full(1, -0.3)), 2.0
+    constant = slide(first, speed, 1.5, Hazard(1.0, 0.0, math.inf), 0.7)
+    distance = []
+    for softness in (1e-4, 1e-5, 1e-7):
+        soft = slide(first, speed, 1.5, Hazard(1.0, softness, math.inf), 0.7)
+        distance.append((np.array(soft) / constant - 1.0)[:, 0])
+    # of first order: a term of 1e-4 is next, and a few LOCAL_ERROR of 1e-7 come in
+    assert_allclose(distance[1] / distance[0], 0.1, rtol=1e-3, atol=0)
+    assert_allclose(distance[2] / distance[0], 1e-3, rtol=0.05, atol=0)
+    for softness in (1e-14, 1e-300):
+        near = slide(first, speed, 1.5, Hazard(1.0, softness, math.inf), 0.7)
+        assert_allclose(near, constant, rtol=1e-13, atol=0)
+
+
+# --- the method
+
+
+def fixed_steps(count, duration=0.4):
+    work, state, error = np.empty((8, 2)), (0.5, 0.2), 0.0
+    for _ in range(count):
+        after = _rosenbrock(*state, duration / count, 10.0, 1.0, 2.0, work)
+        state, error = after[:2], error or after[2]
+    return np.array(state), error
+
+
+def test_the_method_is_of_fifth_order_and_its_error_estimate_of_fourth():
+    bound, moment = reference(0.5, 0.2, 10.0, 0.4, 2.0)
+    count = np.array([8, 16, 32])
+    found = [fixed_steps(n) for n in count]
+    errors = np.array([np.abs(state / (bound, moment) - 1.0) for state, _ in found])
+    # slopes approach 5 with the step; the next term changes them by a part that halves each time
+    slopes = np.log2(errors[:-1] / errors[1:])
+    assert_allclose(slopes[-1], 5.0, rtol=0.08, atol=0)
+    estimates = np.array([error for _, error in found])
+    assert_allclose(np.log2(estimates[:-1] / estimates[1:])[-1], 5.0, rtol=0.08, atol=0)
+
+
+def test_the_method_forgets_the_start_in_an_endless_step():
+    # N' = k_on (1 - N) - k N with a stretch too small to matter: what is left of the start goes as 1/step
+    found = [_rosenbrock(0.9, 1e-30, step, 0.0, 1.0, 3.0, np.empty((8, 2)))[:2] for step in (1e4, 1e7)]
+    left = np.array(found) - [0.75, 0.0]
+    assert_allclose(left[1] / left[0], 1e-3, rtol=0.01, atol=0)
+    assert np.max(np.abs(left[1] / [0.15, 1e-30])) < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("speed", "beta", "stiffness", "frequency"),
+    [
+        (10.0, 1.0, 0.039021284893256576, 4.691568649114221),
+        (20.0, 1.0, 0.05151582324138105, 9.999753023890788),
+        (50.0, 10.0, 0.18234100868019587, 24.876979035847494),
+        (100.0, 1.0, 0.037866452711789754, 46.05622676281749),
+    ],
+)
+def test_a_slider_on_the_critical_spring_neither_grows_nor_fades(speed, beta, stiffness, frequency):
+    # K (V t - x) = M without inertia: the slider moves at (K V + M k)/(K + N)
+    def drift(state):
+        bound, moment = state
+        k = math.exp(moment / bound)
+        own = (stiffness * speed + moment * k) / (stiffness + bound)
+        step = 1e-6 / (k + own)
+        return (np.ravel(slide((bound, moment), own, step, BELL, beta)) - state) / step
+
+    state = np.ravel(steady(speed, BELL, beta))
+    change = 1e-4 * np.diag(state)
+    jacobian = np.array([(drift(state + d) - drift(state - d)) / (2.0 * d.sum()) for d in change]).T
+    roots = np.linalg.eigvals(jacobian)
+    # a slope over 1e-6 of the time constant errs by that part of a rate; rates are several frequencies
+    assert_allclose(np.abs(roots.imag), frequency, rtol=1e-4, atol=0)
+    assert np.max(np.abs(roots.real)) < 1e-4 * frequency
+
+
+# --- rows and bad numbers
+
+
+def test_a_row_alone_is_the_row_in_a_batch():
+    random = np.random.default_rng(2)
+    bound, moment = random.uniform(0, 1, 40), random.normal(0, 0.3, 40)
+    slip = 10.0 ** random.uniform(-12, 4, 40) * random.choice([-1, 1], 40)
+    bound[:3], moment[:3] = 0.0, 0.0
+    for hazard in (BELL, Hazard(1.0, 0.0, math.inf), Hazard(0.5, 0.0, 0.1)):
+        batch = advance(bound, moment, slip, np.abs(slip), 0.3, hazard, 2.0)
+        for i in range(40):
+            row = slice(i, i + 1)
+            alone = advance(bound[row], moment[row], slip[row], np.abs(slip[row]), 0.3, hazard, 2.0)
+            assert_array_equal(alone, np.array(batch)[:, row])
+
+
+def test_one_entry_serves_all_rows():
+    slip = np.array([0.1, 0.2, -5.0])
+    spread = advance(np.full(3, 0.4), np.full(3, 0.1), slip, np.abs(slip), 0.3, BELL, 2.0)
+    assert_array_equal(advance(0.4, 0.1, slip, np.abs(slip), 0.3, BELL, 2.0), spread)
+    assert advance(0.4, 0.1, 0.2, 0.2, 0.3, BELL, 2.0)[0].shape == (1,)
+    with pytest.raises(ValueError, match="one entry"):
+        advance(np.ones(2), np.zeros(3), 0.1, 0.1, 0.3, BELL, 2.0)
+
+
+def test_a_step_of_no_duration_stretches_and_breaks_nothing():
+    assert_array_equal(advance(0.5, 0.1, 0.2, 0.2, 0.0, BELL, 2.0), [[0.5], [0.2]])
+
+
+def test_what_has_no_answer_is_nan_and_does_not_hang():
+    for bound, moment, slip in ((math.nan, 0.0, 1.0), (0.5, math.nan, 1.0), (0.5, 0.1, math.inf), (0.5, 500.0, 1.0)):
+        assert np.all(np.isnan(advance(bound, moment, slip, 1.0, 1.0, BELL, 1.0)))
+
+
+def test_softness_and_a_limit_together_are_refused():
+    both = Hazard(1.0, 1.0, 1.0)
+    with pytest.raises(ValueError, match="use one of them"):
+        advance(0.5, 0.1, 0.1, 0.1, 1.0, both, 1.0)
+    with pytest.raises(ValueError, match="use one of them"):
+        steady(1.0, both, 1.0)

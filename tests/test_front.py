@@ -1,0 +1,381 @@
+"""Crack-front kinetics: trajectories, limits, energy, Hertz's floor, and any input at all.
+
+Maugis units throughout: work 1/pi, R = 1, E* = 3/4, so that K = 4E*/3 = 1, loads are in pi w R and
+P(a) = a^3 - sqrt(6 a^3) in equilibrium. The inner step keeps its local error, as its embedded
+method of order 3 sees it, below 1e-8 of the radius; the method itself is of order 5, and a stable
+edge forgets errors, so that whole trajectories are good to some 1e-8.
+"""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.integrate import quad, solve_ivp
+
+from sim import front
+from sim.front import Hold, Kinetics, advance
+from sim.laws import jkr
+
+W = 1.0 / math.pi
+REST = 6.0 ** (1.0 / 3.0)
+EDGE = Kinetics(W, 1.0, 0.6, 1.0, 0.6)
+SPHERE = {"sphere_radius": 1.0, "modulus": 0.75}
+ONE = np.ones(1)
+
+
+def at_load(load):
+    return Hold(load, load)
+
+
+def at_indentation(indentation):
+    return Hold(0.0, 0.0, indentation, indentation, math.inf)
+
+
+def marched(hold_at, end, steps, radius=REST, edge=EDGE, work=W, below=0.05):
+    """Radius, time of detachment, dissipated energy after clock steps; ``hold_at(t0, t1)`` and ``work`` may vary."""
+    times = np.linspace(0.0, end, steps + 1)
+    work_at = work if callable(work) else (lambda t: work)
+    a, energy = radius * ONE, 0.0
+    for t0, t1 in itertools.pairwise(times):
+        out = advance(a, (work_at(t0), work_at(t1)), hold_at(t0, t1), edge, t1 - t0, **SPHERE, detached_below=below)
+        assert out.dissipated[0] >= 0.0
+        a, energy = out.radius, energy + out.dissipated[0]
+        if np.isnan(a[0]):
+            return math.nan, t0 + out.detached_at[0], energy
+    return a[0], math.nan, energy
+
+
+def potential(a, load=0.0, travel=0.0, stiffness=0.0, work=W):
+    """Elastic energy of solid and machine, minus the load's work, minus adhesion; P = load + k (travel - delta)."""
+    if stiffness == math.inf:
+        delta = travel
+    else:
+        delta = (load + stiffness * travel + 0.5 * a**3) / (stiffness + 1.5 * a)
+    machine = 0.0 if stiffness in (0.0, math.inf) else 0.5 * stiffness * (travel - delta) ** 2
+    solid = 0.75 * (a * delta**2 - 2.0 / 3.0 * a**3 * delta + 0.2 * a**5)
+    return solid + machine - load * delta - math.pi * work * a * a
+
+
+TRAJECTORIES = [
+    (at_load(-1.0), {0.1: 1.79996899, 1.0: 1.70729309, 5.0: 1.60463305, 20.0: 1.56279349}),
+    (at_load(-1.4), {0.1: 1.78597666, 1.0: 1.62916029, 5.0: 1.45834539, 20.0: 1.37157915}),
+    (at_load(-1.6), {0.1: 1.77748512, 1.0: 1.58172066, 5.0: 1.35110303, 20.0: 1.13646592}),
+    (at_load(-3.0), {0.1: 1.68626020}),
+    (at_indentation(0.0), {0.1: 1.70976842, 1.0: 1.48254026, 5.0: 1.40413397, 20.0: 1.38943947}),
+    (at_indentation(-0.9), {0.1: 1.50715306, 1.0: 1.00795738, 5.0: 0.78059726, 20.0: 0.68436062}),
+    (at_indentation(-1.2), {0.1: 1.4160565, 1.0: 0.7276701}),
+]
+
+
+@pytest.mark.parametrize("density", [0, 1, 40])
+def test_radius_follows_the_reference_trajectories_in_few_or_many_steps(density):
+    for hold, radii in TRAJECTORIES:
+        for end, radius in radii.items():
+            steps = max(1, int(density * end))
+            assert_allclose(marched(lambda *_, h=hold: h, end, steps)[0], radius, rtol=1e-7, atol=0)
+
+
+@pytest.mark.parametrize("clock", [50.0, 0.5, 0.01])
+@pytest.mark.parametrize(
+    ("hold", "time"),
+    [(at_load(-1.6), 31.04428727), (at_load(-3.0), 0.75322748), (at_indentation(-1.2), 2.06972015)],
+)
+def test_detachment_comes_at_its_time(hold, time, clock):
+    steps = math.ceil(1.1 * time / clock)
+    radius, detached, _ = marched(lambda *_: hold, steps * clock, steps)
+    assert math.isnan(radius)
+    assert_allclose(detached, time, rtol=2e-8, atol=0)
+
+
+def release(a, hold):
+    """G of the textbook formula, written another way than the module's."""
+    load, travel, stiffness = hold.load_before, hold.travel_before, hold.stiffness
+    delta = travel if stiffness == math.inf else (load + stiffness * travel + 0.5 * a**3) / (stiffness + 1.5 * a)
+    return 0.75 * (delta - a * a) ** 2 / (2.0 * math.pi * a)
+
+
+@pytest.mark.parametrize(
+    ("hold", "low"),
+    [
+        (at_load(-1.2), 1.5),
+        (at_load(-2.0), 1e-6),
+        (Hold(0.0, 0.0, -1.0, -1.0, 0.3), 1.75),
+        (Hold(0.0, 0.0, -4.0, -4.0, 3.0), 1e-6),
+        (Hold(-0.5, -0.5, -1.0, -1.0, 1e3), 1.0),
+        (at_indentation(-2.0), 1e-6),
+    ],
+)
+@pytest.mark.parametrize("exponent", [0.2, 0.6, 1.0])
+def test_a_fixed_control_takes_the_time_of_its_quadrature(hold, low, exponent):
+    def pace(x):
+        a = math.exp(x)
+        return a / (release(a, hold) / W - 1.0) ** (1.0 / exponent)
+
+    cuts = np.linspace(math.log(low), math.log(REST), 60)
+    time = sum(quad(pace, *cut, epsrel=1e-13, epsabs=0.0)[0] for cut in itertools.pairwise(cuts))
+    edge = EDGE._replace(exponent=exponent)
+    out = advance(REST * ONE, (W, W), hold, edge, 2.0 * time, **SPHERE, detached_below=low)
+    assert_allclose(out.detached_at, time, rtol=1e-7, atol=0)
+    out = advance(REST * ONE, (W, W), hold, edge, time, **SPHERE, detached_below=0.5 * low)
+    assert_allclose(out.radius if low > 1e-3 else low, low, rtol=1e-7, atol=0)
+
+
+def test_ramps_of_load_travel_and_work_agree_with_another_integrator():
+    def hold(t0, t1):
+        return Hold(0.3 * t0, 0.3 * t1, 0.2 - 0.5 * t0, 0.2 - 0.5 * t1, 0.7)
+
+    def rate(t, y):
+        at = Hold(0.3 * t, 0.0, 0.2 - 0.5 * t, 0.0, 0.7)
+        s = release(y[0], at) * math.pi - (1.0 - 0.4 * t)
+        return [-math.copysign(abs(s) ** (1.0 / (0.6 if s > 0 else 0.4)), s) * (1.0 if s > 0 else 0.3)]
+
+    edge = Kinetics(W, 1.0, 0.6, 0.3, 0.4)
+    for start in (0.8, REST, 3.0):
+        exact = solve_ivp(rate, (0.0, 1.0), [start], method="DOP853", rtol=1e-12, atol=1e-13).y[0, -1]
+        for steps in (1, 7, 100):
+            radius, _, _ = marched(hold, 1.0, steps, start, edge, lambda t: W * (1.0 - 0.4 * t))
+            assert_allclose(radius, exact, rtol=1e-7, atol=0)
+
+
+@pytest.mark.parametrize(
+    ("speed", "path", "lowest"),
+    [
+        (1e-3, 2.0, -1.518359274),
+        (1e-2, 2.1, -1.572138651),
+        (0.1, 2.3, -1.775354520),
+        (1.0, 2.8, -2.489167417),
+        (10.0, 3.9, -4.560522114),
+    ],
+)
+def test_pull_off_force_grows_with_the_speed_of_a_hard_machine(speed, path, lowest):
+    # the lowest loads are those of LSODA at 1e-11; its printed four digits agree with two other integrators
+    rest, count = jkr.indentation_at_radius(REST, W, **SPHERE), 2000
+    travel = rest - path * np.arange(count + 1) / count
+    a, loads = REST * ONE, []
+    for before, after in itertools.pairwise(travel):
+        hold = Hold(0.0, 0.0, before, after, math.inf)
+        a = advance(a, (W, W), hold, EDGE, path / count / speed, **SPHERE, detached_below=1e-3).radius
+        if np.isnan(a[0]):
+            break
+        loads.append(jkr.load_under_indentation(a[0], after, **SPHERE))
+    # the lowest of samples is at most 1/8 of their second difference above the least value
+    low = int(np.argmin(loads))
+    bend = np.diff(loads[low - 1 : low + 2], 2)[0]
+    assert lowest - 1e-6 < loads[low] < lowest + bend / 8.0 + 1e-6
+
+
+def test_one_inner_step_is_of_order_five_per_unit_time():
+    scene = (0.75, 1.0, 0.0, -1.0, -0.5, 0.0, 0.0, W, 0.1, W)
+    law = (1.0, 1.0 / 0.6, 1.0, 1.0 / 0.6)
+
+    def end(count):
+        t, a, h = 0.0, REST, 1.0 / count
+        for i in range(count):
+            t = i * h
+            rate, slope, drift, _ = front._slope(False, t, a, a, scene, law)
+            a += front._radau(False, t, a, h, a, (rate, slope, drift), a, scene, law)[0]
+        return a
+
+    exact = end(64)
+    errors = [abs(end(count) - exact) for count in (2, 4, 8)]
+    orders = [math.log2(coarse / fine) for coarse, fine in itertools.pairwise(errors)]
+    assert min(orders) > 4.5, orders
+
+
+@pytest.mark.parametrize("stiffness", [0.0, 0.02, 1.0, 50.0, math.inf])
+def test_what_the_potential_loses_at_a_fixed_control_is_dissipated(stiffness):
+    for load, travel, start in ((-0.8, -0.6, 2.5), (0.5, 0.7, 0.9), (-0.1, 0.1, REST)):
+        load = 0.0 if stiffness == math.inf else load
+        hold = Hold(load, load, travel, travel, stiffness)
+        for duration in (1e-3, 0.3, 30.0):
+            radius, _, energy = marched(lambda *_, h=hold: h, duration, 1, start)
+            lost = potential(start, load, travel, stiffness) - potential(radius, load, travel, stiffness)
+            assert_allclose(energy, lost, rtol=1e-7, atol=1e-14)
+
+
+def test_energy_is_balanced_along_ramps_of_travel_and_work():
+    def travel(t):
+        return 0.5 - 1.2 * t
+
+    def work(t):
+        return W * (1.0 + 0.5 * t)
+
+    def hold(t0, t1):
+        return Hold(0.0, 0.0, travel(t0), travel(t1), 2.0)
+
+    nodes, weights = np.polynomial.legendre.leggauss(3)
+    a, energy, supplied = REST, 0.0, 0.0
+    for t0, t1 in itertools.pairwise(np.linspace(0.0, 1.0, 41)):
+        for node, weight in zip(nodes, weights, strict=True):
+            t = 0.5 * (t0 + t1) + 0.5 * node * (t1 - t0)
+            b = advance(a * ONE, (work(t0), work(t)), hold(t0, t), EDGE, t - t0, **SPHERE).radius[0]
+            delta = (2.0 * travel(t) + 0.5 * b**3) / (2.0 + 1.5 * b)
+            supplied += 0.5 * (t1 - t0) * weight * (2.0 * (travel(t) - delta) * -1.2 - math.pi * b * b * 0.5 * W)
+        out = advance(a * ONE, (work(t0), work(t1)), hold(t0, t1), EDGE, t1 - t0, **SPHERE)
+        a, energy = out.radius[0], energy + out.dissipated[0]
+    gained = potential(a, 0.0, travel(1.0), 2.0, work(1.0)) - potential(REST, 0.0, travel(0.0), 2.0, work(0.0))
+    assert_allclose(energy, supplied - gained, rtol=1e-7, atol=0)
+
+
+@pytest.mark.parametrize("speed", [1e12, math.inf])
+def test_an_infinitely_fast_edge_is_the_jkr_equilibrium(speed):
+    rng = np.random.default_rng(51)
+    work = W * 10.0 ** rng.uniform(-1.0, 1.0, 300)
+    edge = Kinetics(W, speed, 0.6, speed, 0.6)
+    start = 4.0  # wider than any of the stable branch below, so that the path ends on it
+    load = rng.uniform(-0.99, 4.0, 300) * 1.5 * math.pi * work
+    out = advance(np.full(300, start), (work, work), Hold(load, load), edge, 1.0, **SPHERE)
+    assert_allclose(out.radius, jkr.radius_at_load(load, work, **SPHERE), rtol=1e-9, atol=0)
+    travel = rng.uniform(-3.0, 0.99, 300) * jkr.pull_off_indentation(work, **SPHERE)
+    out = advance(np.full(300, start), (work, work), Hold(0.0, 0.0, travel, travel, math.inf), edge, 1.0, **SPHERE)
+    assert_allclose(out.radius, jkr.radius_at_indentation(travel, work, **SPHERE), rtol=1e-9, atol=0)
+
+
+def test_an_infinitely_fast_edge_lets_go_beyond_the_fold():
+    edge = Kinetics(W, math.inf, 0.6, math.inf, 0.6)
+    gone = advance(REST * ONE, (W, W), at_load(-1.5001), edge, 1.0, **SPHERE)
+    assert np.isnan(gone.radius[0])
+    assert gone.detached_at[0] < 1e-9
+    ramp = advance(REST * ONE, (W, W), Hold(0.0, -3.0), edge, 1.0, **SPHERE, detached_below=0.05)
+    assert_allclose(ramp.detached_at, 0.5, rtol=1e-9, atol=0)
+
+
+@pytest.mark.parametrize("stiffness", [0.1, 5.0, 100.0])
+def test_behind_a_machine_a_fast_edge_ends_where_load_and_indentation_agree(stiffness):
+    edge = Kinetics(W, 1e12, 0.6, 1e12, 0.6)
+    a = advance(REST * ONE, (W, W), Hold(0.0, 0.0, -0.3, -0.3, stiffness), edge, 1.0, **SPHERE).radius[0]
+    delta = jkr.indentation_at_radius(a, W, **SPHERE)
+    assert_allclose(jkr.load_at_radius(a, W, **SPHERE), stiffness * (-0.3 - delta), rtol=1e-8, atol=0)
+
+
+def test_a_frozen_edge_stays():
+    for speed in (0.0, 1e-30):
+        out = advance(REST * ONE, (W, 0.5 * W), Hold(0.0, -9.0), Kinetics(W, speed, 0.6, speed, 0.6), 1.0, **SPHERE)
+        assert_array_equal(out.radius, REST)
+        assert np.isnan(out.detached_at[0])
+
+
+def test_lag_fades_as_the_edge_speeds_up():
+    lags = []
+    for speed in 10.0 ** np.arange(0.0, 9.0):
+        edge = Kinetics(W, speed, 0.6, speed, 0.6)
+        radius, _, _ = marched(lambda t0, t1: Hold(-t0, -t1), 1.0, 10, REST, edge)
+        lags.append(radius - jkr.radius_at_load(-1.0, W, **SPHERE))
+    ratios = np.array(lags[:-1]) / lags[1:]
+    # a steady lag grows like (ramp/speed)^exponent
+    assert_allclose(ratios[3:], 10.0**0.6, rtol=0.03, atol=0)
+
+
+def test_opening_lags_behind_healing_in_a_loop():
+    edge = Kinetics(W, 0.05, 0.6, 5.0, 0.6)
+    down, _, lost_down = marched(lambda t0, t1: Hold(2.0 - t0, 2.0 - t1), 2.5, 50, 2.6, edge)
+    open_, _, _ = marched(lambda t0, t1: Hold(2.0 - t0, 2.0 - t1), 2.5, 50, 2.6, edge._replace(speed=5.0))
+    up, _, lost_up = marched(lambda t0, t1: Hold(-0.5 + t0, -0.5 + t1), 0.5, 10, down, edge)
+    rest = jkr.radius_at_load(-0.5, W, **SPHERE)
+    assert down > open_ > rest
+    assert lost_down > 0.0 and lost_up > 0.0
+    assert up > REST
+
+
+def test_without_adhesion_an_edge_opens_down_to_hertz_and_stops_there():
+    edge = Kinetics(W, 1.0, 0.6, 1.0, 0.6)
+    for work in (-W, -1e-3 * W):
+        for hold, hertz in ((at_load(0.7), 0.7 ** (1 / 3)), (at_indentation(0.7), 0.7**0.5)):
+            out = advance(REST * ONE, (work, work), hold, edge, 1e4, **SPHERE)
+            assert_allclose(out.radius, hertz, rtol=1e-14, atol=0)
+            assert np.isnan(out.detached_at[0])
+    gone = advance(REST * ONE, (-W, -W), at_load(-0.1), edge, 1e4, **SPHERE)
+    assert np.isnan(gone.radius[0]) and gone.detached_at[0] > 0.0
+
+
+def test_the_stop_at_hertz_comes_when_the_edge_arrives():
+    hold = at_indentation(0.7)
+    pace = quad(lambda a: 1.0 / (release(a, hold) / W + 0.5) ** (1 / 0.6), 0.7**0.5, REST, epsrel=1e-12)[0]
+    before = advance(REST * ONE, (-0.5 * W, -0.5 * W), hold, EDGE, 0.999 * pace, **SPHERE).radius[0]
+    after = advance(REST * ONE, (-0.5 * W, -0.5 * W), hold, EDGE, 1.001 * pace, **SPHERE)
+    speed = 0.5 ** (1 / 0.6)
+    assert_allclose(before - 0.7**0.5, 0.001 * pace * speed, rtol=0.01, atol=0)
+    assert_allclose(after.radius, 0.7**0.5, rtol=1e-14, atol=0)
+    lost = potential(REST, 0.0, 0.7, math.inf, -0.5 * W) - potential(after.radius[0], 0.0, 0.7, math.inf, -0.5 * W)
+    assert_allclose(after.dissipated, lost, rtol=1e-7, atol=0)
+
+
+def test_pressing_carries_a_slow_edge_along_with_hertz():
+    slow = Kinetics(W, 1e-9, 0.6, 1e-9, 0.6)
+    out = advance(np.full(1, 0.2), (W, W), Hold(0.1, 8.0), slow, 1.0, **SPHERE)
+    assert_allclose(out.radius, 2.0, rtol=1e-12, atol=0)
+    assert_allclose(out.dissipated, math.pi * W * (4.0 - 0.1 ** (2 / 3)), rtol=1e-12, atol=0)
+    masked = advance(np.full(1, 0.2), (-W, -W), Hold(0.1, 8.0), slow, 1.0, **SPHERE)
+    assert_allclose(masked.radius, 2.0, rtol=1e-12, atol=0)
+    assert_array_equal(masked.dissipated, 0.0)
+    back = advance(masked.radius, (-W, -W), Hold(8.0, 0.1), slow, 1.0, **SPHERE)
+    assert_allclose(back.radius, 2.0, rtol=1e-6, atol=0)
+
+
+def test_a_narrow_contact_closes_to_the_equilibrium():
+    for hold in (at_load(0.0), at_load(1.0), Hold(0.0, 0.0, 0.4, 0.4, 1.0), at_indentation(0.3)):
+        narrow, wide = (marched(lambda *_, h=hold: h, 1e6, 1, start)[0] for start in (0.3, 4.0))
+        assert_allclose(narrow, wide, rtol=1e-7, atol=0)
+    # a neck narrower than the unstable equilibrium cannot be saved
+    neck = advance(np.full(1, 0.1), (W, W), at_indentation(-0.6), EDGE, 1e3, **SPHERE)
+    assert np.isnan(neck.radius[0])
+
+
+def awkward(rng, size):
+    """Rows of all arguments over many decades, with zeros, infinities and nan strewn in."""
+    ten = lambda low, high: 10.0 ** rng.uniform(low, high, size)  # noqa: E731
+    sign = lambda: rng.choice([-1.0, 0.0, 1.0], size)  # noqa: E731
+    rows = [ten(-2, 1), sign() * ten(-3, 1) * W, sign() * ten(-3, 1) * W, sign() * ten(-3, 1), sign() * ten(-3, 1)]
+    rows += [sign() * ten(-3, 1), sign() * ten(-3, 1), rng.choice([0.0, 1e-3, 1.0, 1e3, math.inf], size)]
+    rows += [np.ones(size), W * ten(-1, 1), ten(-12, 12), rng.uniform(0.1, 1.0, size), ten(-12, 12)]
+    rows += [rng.uniform(0.1, 1.0, size), np.ones(size), np.full(size, 0.75), np.full(size, 1e-3)]
+    rows = np.array(rows).T
+    strange = rng.random(rows.shape) < 0.01
+    rows[strange] = rng.choice([0.0, -1.0, math.inf, -math.inf, math.nan, 5e-324, 1e300], strange.sum())
+    return rows
+
+
+def run(rows):
+    c = rows.T
+    return advance(c[0], c[1:3], Hold(*c[3:8]), Kinetics(*c[9:14]), c[8], c[14], c[15], c[16])
+
+
+def check_any(rows):
+    out = run(rows)
+    assert not (out.dissipated < 0.0).any()
+    assert not (out.radius <= 0.0).any() and not np.isinf(out.radius).any()
+    gone = ~np.isnan(out.detached_at)
+    assert np.isnan(out.radius[gone]).all()
+    assert ((out.detached_at[gone] >= 0.0) & (out.detached_at[gone] <= rows[gone, 8])).all()
+    good = np.isfinite(np.delete(rows, 7, axis=1)).all(axis=1) & (rows[:, [0, 8, 9, 11, 13, 14, 15]] > 0.0).all(axis=1)
+    good &= (rows[:, [7, 10, 12, 16]] >= 0.0).all(axis=1) & (np.abs(rows[:, :7]) < 1e9).all(axis=1)
+    good &= ((rows[:, [0, 8, 9, 11, 13, 14, 15]] > 1e-20) & (rows[:, [0, 8, 9, 11, 13, 14, 15]] < 1e20)).all(axis=1)
+    assert (np.isnan(out.radius[good]) == gone[good]).all()
+    assert np.isfinite(out.dissipated[good]).all()
+    return out
+
+
+def test_any_numbers_end_in_a_radius_an_opening_or_nan():
+    rows = awkward(np.random.default_rng(52), 3000)
+    out = check_any(rows)
+    for part in (slice(0, 1), slice(7, 8), slice(100, 160)):
+        for whole, some in zip(out, run(rows[part]), strict=True):
+            assert_array_equal(whole[part], some)
+
+
+@pytest.mark.verify
+def test_a_million_numbers_end_in_a_radius_an_opening_or_nan():
+    rng = np.random.default_rng(53)
+    for _ in range(50):
+        check_any(awkward(rng, 20000))
+
+
+def test_an_open_contact_stays_open_and_others_do_not_mind():
+    a = np.array([math.nan, REST, 0.0])
+    out = advance(a, (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE)
+    assert_array_equal(np.isnan(out.radius), [True, False, True])
+    assert np.isnan(out.detached_at).all()
+    assert_array_equal(out.dissipated[[0, 2]], 0.0)
+    assert_array_equal(out.radius[1], advance(REST * ONE, (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE).radius[0])

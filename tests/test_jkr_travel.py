@@ -1,0 +1,404 @@
+"""The contact behind a machine: closed states, thirty decades of stiffness, the fold, any input.
+
+Tolerances: u = 2^-53. The travel of the fold carries some ten roundings (products, pi, a cube root, the
+two terms of F), at most 16 u. At a relative distance d from the fold, t = sqrt(|F_f| d/f_2), so that a
+relative error e of it moves the radius by e sqrt(|F_f|/f_2)/(x_f sqrt(d)) <= 0.71 e/sqrt(d): 12 u/sqrt(d).
+Elsewhere some ten roundings remain, 20 u. Wider arithmetic here is numpy's longdouble where it is wider, and
+fifty digits of mpmath.
+"""
+
+import math
+
+import mpmath
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sim.laws import jkr
+
+U = 2.0**-53
+MAUGIS = {"work": 1.0 / math.pi, "sphere_radius": 1.0, "modulus": 0.75}
+LENS = {"work": 0.042, "sphere_radius": 2e-3, "modulus": 6.4e6}
+WIDE = np.longdouble
+PI = WIDE("3.14159265358979323846264338327950288")
+
+PULL_OFF = [  # stiffness, radius, load, indentation in Maugis units
+    (0.1, 1.1158490441960518, -1.4978810906181386, -0.4798729253858034),
+    (0.5, 1.0152257696186848, -1.4592688884925777, -0.6146946233614938),
+    (1.0, 0.9193831489469452, -1.3822142978356529, -0.7205214554932008),
+    (2.0, 0.7989951485601753, -1.2393378348348336, -0.8212826513623044),
+    (5.0, 2.0 / 3.0, -28.0 / 27.0, -8.0 / 9.0),
+    (10.0, 0.6102522645568352, -0.9404599858644457, -0.9032642992497937),
+    (100.0, 0.5563776200249634, -0.8443231195694288, -0.9085053764583243),
+    (0.0, 1.5 ** (1 / 3), -1.5, -(1.5 ** (2 / 3)) / 3.0),
+    (math.inf, 6.0 ** (-1 / 3), -5.0 / 6.0, -3.0 * 6.0 ** (-2 / 3)),
+]
+STATES = [  # radius, load, indentation in Maugis units
+    (6.0 ** (1 / 3), 0.0, 6.0 ** (2 / 3) / 3.0),
+    ((8.0 / 3.0) ** (1 / 3), -4.0 / 3.0, 0.0),
+    (1.5, -9.0 / 8.0, 0.25),
+    (8.0 / 3.0, 224.0 / 27.0, 40.0 / 9.0),
+    (6.0, 180.0, 32.0),
+]
+
+decades = st.floats(-10.0, 10.0).map(lambda power: 10.0**power)
+stiffer = st.floats(-15.0, 15.0).map(lambda power: 10.0**power)
+distances = st.floats(-12.0, 12.0).map(lambda power: 10.0**power)
+
+
+def contact_stiffness(work, sphere_radius, modulus):
+    """Of the contact where fixed grips end, 4 E* a/3: the unit of the dimensionless stiffness."""
+    return 4.0 / 3.0 * modulus * np.cbrt(math.pi * work * sphere_radius * (sphere_radius / (8.0 * modulus)))
+
+
+def exact(travel, stiffness, work, sphere_radius, modulus):
+    """Radius and travel of the fold in fifty digits, bisected to forty; no radius beyond the fold."""
+    with mpmath.workdps(50):
+        travel, stiffness, work, sphere_radius, modulus = map(
+            mpmath.mpf, (travel, stiffness, work, sphere_radius, modulus)
+        )
+
+        def needed(x):  # the travel of the equilibrium of radius x^2
+            indentation = x**4 / sphere_radius - mpmath.sqrt(2 * mpmath.pi * work / modulus) * x
+            load = 4 * modulus * x**6 / (3 * sphere_radius) - mpmath.sqrt(8 * mpmath.pi * work * modulus) * x**3
+            return indentation + load / stiffness
+
+        def slope(x):
+            indentation = 4 * x**3 / sphere_radius - mpmath.sqrt(2 * mpmath.pi * work / modulus)
+            load = 8 * modulus * x**5 / sphere_radius - 3 * mpmath.sqrt(8 * mpmath.pi * work * modulus) * x**2
+            return indentation + load / stiffness
+
+        unit = mpmath.sqrt(mpmath.cbrt(mpmath.pi * work * sphere_radius**2 / (8 * modulus)))
+        last = bisected(slope, 0.9 * unit, 1.5 * unit, 0)
+        if needed(last) > travel:
+            return None, needed(last)
+        high = 2 * last
+        while needed(high) < travel:
+            high *= 4
+        return bisected(needed, last, high, travel) ** 2, needed(last)
+
+
+def bisected(function, low, high, target):
+    while high - low > mpmath.mpf(10) ** -40 * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if function(middle) < target else (low, middle)
+    return high
+
+
+def random_states(count, seed):
+    """Adhesive contacts behind machines, stiffnesses over thirty decades, travels around and far from the fold."""
+    random = np.random.default_rng(seed)
+    work, sphere_radius, modulus = 10.0 ** random.uniform(-10, 10, (3, count))
+    stiffness = contact_stiffness(work, sphere_radius, modulus) * 10.0 ** random.uniform(-15, 15, count)
+    distance = 10.0 ** random.uniform(-12, 12, count) * random.choice([-1.0, 1.0, 1.0, 1.0], count)
+    travel = jkr.pull_off_travel(stiffness, work, sphere_radius, modulus) * (1.0 - distance)
+    return travel, stiffness, work, sphere_radius, modulus
+
+
+class Wide:
+    """The sextic of a batch of contacts in wider arithmetic, and where it folds."""
+
+    def __init__(self, travel, stiffness, work, sphere_radius, modulus):
+        travel, k, work, sphere_radius, modulus = (
+            value.astype(WIDE) for value in (travel, stiffness, work, sphere_radius, modulus)
+        )
+        self.unit = np.cbrt(PI * work * sphere_radius * sphere_radius / (8 * modulus))
+        self.depth = self.unit * self.unit / sphere_radius
+        self.contact = 4 * modulus * self.unit / 3
+        self.grips, self.load = 1 / (1 + self.contact / k), 1 / (1 + k / self.contact)
+        self.level = self.grips * travel / self.depth
+        x = np.full(travel.shape, 1.45, WIDE)
+        for _ in range(9):  # from 3^(1/3) at most, quadratically
+            slope = 4 * self.grips * (x**3 - 1) + 6 * self.load * x * x * (x**3 - 3)
+            x = x - slope / (12 * self.grips * x * x + self.load * x * (30 * x**3 - 36))
+        self.fold = x
+        self.distance = 1 - self.level / self.of(x)
+
+    def of(self, x):
+        return self.grips * x * (x**3 - 4) + self.load * x**3 * (x**3 - 6)
+
+    def check(self, radius, some):
+        """Where ``some``: nan beyond the fold, and else the stable root, enclosed within the tolerance."""
+        x = np.sqrt(radius.astype(WIDE) / self.unit)
+        room = 10 * U + 6 * U / np.sqrt(np.abs(self.distance))  # of the square root of the radius
+        pulled, held = some & (self.distance < -16 * U), some & (self.distance > 16 * U)
+        assert np.all(np.isnan(radius[pulled]))
+        assert np.all(x[held] >= (self.fold * (1 - room))[held])
+        assert np.all((self.of(x * (1 + room)) >= self.level)[held])
+        assert np.all((self.of(np.maximum(x * (1 - room), self.fold)) <= self.level)[held])
+        return np.count_nonzero(pulled), np.count_nonzero(held)
+
+
+@pytest.mark.parametrize(("stiffness", "radius", "load", "indentation"), PULL_OFF)
+def test_the_last_contact_of_every_machine(stiffness, radius, load, indentation):
+    last = jkr.pull_off_at_stiffness(stiffness, **MAUGIS)
+    assert_allclose(last, (radius, load, indentation), rtol=1e-12, atol=0)
+    if stiffness > 0.0:
+        travel = jkr.pull_off_travel(stiffness, **MAUGIS)
+        assert_allclose(travel, indentation + load / stiffness, rtol=1e-12, atol=0)
+        assert_allclose(jkr.radius_at_travel(travel, stiffness, **MAUGIS), radius, rtol=1e-12, atol=0)
+        assert np.isnan(jkr.radius_at_travel(np.nextafter(travel, -9e9), stiffness, **MAUGIS))
+
+
+@pytest.mark.parametrize(("radius", "load", "indentation"), STATES)
+@pytest.mark.parametrize("stiffness", [1e-3, 0.1, 1.0, 5.0, 100.0, 1e6, math.inf])
+def test_radius_of_the_known_states_behind_every_machine(radius, load, indentation, stiffness):
+    computed = jkr.radius_at_travel(indentation + load / stiffness, stiffness, **MAUGIS)
+    assert_allclose(computed, radius, rtol=1e-12, atol=0)
+
+
+def test_a_neck_that_no_load_holds_stands_behind_a_stiff_machine():
+    # the rational point (2/3, -28/27, -8/9) is the fold at stiffness 5: stable for stiffer machines only
+    for stiffness in (5.5, 10.0, 1e3, math.inf):
+        travel = -8.0 / 9.0 - 28.0 / 27.0 / stiffness
+        assert_allclose(jkr.radius_at_travel(travel, stiffness, **MAUGIS), 2.0 / 3.0, rtol=1e-12, atol=0)
+    travel = -8.0 / 9.0 - 28.0 / 27.0 / 4.0
+    assert jkr.radius_at_travel(travel, 4.0, **MAUGIS) > 0.7
+
+
+def test_an_infinite_stiffness_is_an_indentation():
+    random = np.random.default_rng(4)
+    work, sphere_radius, modulus = 10.0 ** random.uniform(-10, 10, (3, 10_000))
+    last = jkr.pull_off_indentation(work, sphere_radius, modulus)
+    indentation = last * (1.0 - random.choice([-1.0, 1.0], 10_000) * 10.0 ** random.uniform(-6, 6, 10_000))
+    computed = jkr.radius_at_travel(indentation, math.inf, work, sphere_radius, modulus)
+    wanted = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+    assert_allclose(computed, wanted, rtol=40 * U + 24 * U * 1e3, atol=0)
+    far = indentation > 0.5 * last
+    assert_allclose(computed[far], wanted[far], rtol=40 * U + 24 * U / math.sqrt(0.5), atol=0)
+    assert_allclose(jkr.pull_off_travel(math.inf, work, sphere_radius, modulus), last, rtol=20 * U, atol=0)
+
+
+def test_a_soft_machine_is_a_load():
+    # kΔ kept, the indentation adds k δ/P to the load: 1e-15 of it where the machine is that soft
+    load, stiffness = np.array([-3.9e-4, -1e-4, 1e-4, 4e-3, 10.0]), 1e-16 * contact_stiffness(**LENS)
+    computed = jkr.radius_at_travel(load / stiffness, stiffness, **LENS)
+    assert_allclose(computed, jkr.radius_at_load(load, **LENS), rtol=1e-13, atol=0)
+
+
+def test_without_stiffness_no_travel_loads_the_sphere():
+    rest = jkr.radius_at_load(0.0, **LENS)
+    travel = np.array([-1e3, -1e-6, 0.0, 1e-6, 1e3])
+    assert_allclose(jkr.radius_at_travel(travel, 0.0, **LENS), rest, rtol=20 * U, atol=0)
+    assert_array_equal(jkr.radius_at_travel(travel, -0.0, **LENS), jkr.radius_at_travel(travel, 0.0, **LENS))
+    assert_array_equal(jkr.radius_at_travel(travel, 0.0, 0.0, 2e-3, 6.4e6), 0.0)
+    assert np.isnan(jkr.radius_at_travel(math.inf, 0.0, **LENS))
+    assert jkr.pull_off_travel(0.0, **LENS) == -math.inf
+    assert_allclose(jkr.pull_off_at_stiffness(0.0, **LENS).load, jkr.pull_off_load(0.042, 2e-3), rtol=20 * U, atol=0)
+
+
+@settings(max_examples=100, deadline=None)
+@given(distance=distances, soft=stiffer, work=decades, sphere_radius=decades, modulus=decades)
+@example(distance=1e-12, soft=1e-15, work=0.05, sphere_radius=1e-8, modulus=1e10)
+@example(distance=1e12, soft=1e15, work=0.042, sphere_radius=2e-3, modulus=6.4e6)
+@example(distance=1.0, soft=1.0, work=1e-10, sphere_radius=1e10, modulus=1e10)
+def test_radius_to_fifty_digits_with_half_of_them_lost_towards_the_fold(distance, soft, work, sphere_radius, modulus):
+    rest = {"work": work, "sphere_radius": sphere_radius, "modulus": modulus}
+    stiffness = float(soft * contact_stiffness(**rest))
+    last = float(jkr.pull_off_travel(stiffness, **rest))
+    travel = last * (1.0 - distance)
+    wanted, fold = exact(travel, stiffness, **rest)
+    assert abs(last / fold - 1) < 16 * U
+    nearness = float((fold - travel) / fold)
+    if nearness < 1e-13:  # 1 - distance is rounded, too
+        return
+    error = float(abs(jkr.radius_at_travel(travel, stiffness, **rest) / wanted - 1))
+    assert error < 20 * U + 12 * U / math.sqrt(nearness)
+    assert error < 1e-12 or nearness < 1e-5
+
+
+@pytest.mark.parametrize("stiffness", [0.1, 5.0, 100.0])
+@pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
+def test_the_contact_leaves_the_fold_as_a_square_root(stiffness, distance):
+    last = jkr.pull_off_travel(stiffness, **MAUGIS)
+    radius = jkr.pull_off_at_stiffness(stiffness, **MAUGIS).radius
+    wider = jkr.radius_at_travel(last * (1.0 - distance), stiffness, **MAUGIS) - radius
+    # Δ'' of Δ(a) = a^2 - 2/3 sqrt(6a) + (a^3 - sqrt(6 a^3))/k at the fold
+    bend = 2.0 + math.sqrt(6.0) / 6.0 * radius**-1.5 + (6.0 * radius - 0.75 * math.sqrt(6.0 / radius)) / stiffness
+    # the next term is smaller by about wider/radius; the rounding of the fold by 16 U/distance
+    room = 2.0 * wider / radius + 20.0 * U / distance
+    assert_allclose(wider, math.sqrt(-2.0 * last * distance / bend), rtol=room, atol=0)
+
+
+def test_a_million_random_states_are_on_the_stable_branch():
+    count = 1_000_000
+    states = random_states(count, seed=6)
+    wide = Wide(*states)
+    pulled, held = wide.check(jkr.radius_at_travel(*states), np.ones(count, bool))
+    assert pulled > count // 5 and held > count // 2
+    assert pulled + held > 0.999 * count
+
+
+def test_newton_from_the_right_never_passes_the_root():
+    random, count = np.random.default_rng(7), 1_000_000
+    unit, soft = 6.0 ** (-1 / 3), 10.0 ** random.uniform(-15, 15, count)
+    fold = np.sqrt(jkr.pull_off_at_stiffness(soft * contact_stiffness(**MAUGIS), **MAUGIS).radius / unit)
+    grips, load = soft / (1 + soft), 1 / (1 + soft)
+
+    def sextic(x):
+        cube = x * x * x
+        return grips * x * (cube - 4) + load * cube * (cube - 6)
+
+    x = fold * 10.0 ** random.uniform(0.0, 3.0, count)
+    root = fold + (x - fold) * random.uniform(0.0, 1.0, count)
+    target = sextic(root)
+    for _ in range(6):
+        cube = x * x * x
+        lower = x - (sextic(x) - target) / (4 * grips * (cube - 1) + 6 * load * x * x * (cube - 3))
+        away = x > root * (1 + 1e-6)  # nearer, or where the slope is smaller still, rounding decides
+        assert np.all(lower[away] < x[away])
+        # so far from the fold the slope is 1e-5 of the sextic's terms and more: their 10 u move x by less than 1e-9
+        assert np.all(lower[away] > root[away] * (1 - 1e-9))
+        x = np.where(away, lower, x)
+
+
+@pytest.mark.parametrize("work", [0.0, -0.0, -1e-12, -3.0, -1e10])
+def test_radius_at_no_or_negative_work_is_hertz_behind_the_machine(work):
+    radius = np.logspace(-9, -2, 60)
+    for stiffness in 10.0 ** np.arange(-12, 19, 3):
+        travel = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
+        assert_allclose(jkr.radius_at_travel(travel, stiffness, work, 2e-3, 6.4e6), radius, rtol=1e-14, atol=0)
+        assert np.isnan(jkr.radius_at_travel(-1e-300, stiffness, work, 2e-3, 6.4e6))
+        assert jkr.radius_at_travel(0.0, stiffness, work, 2e-3, 6.4e6) == 0.0
+    hertz = jkr.hertz_radius_at_indentation(travel, 2e-3)
+    assert_allclose(jkr.radius_at_travel(travel, math.inf, work, 2e-3, 6.4e6), hertz, rtol=20 * U, atol=0)
+    assert_array_equal(jkr.pull_off_at_stiffness(1e3, work, 2e-3, 6.4e6), 0.0)
+    assert jkr.pull_off_travel(1e3, work, 2e-3, 6.4e6) == 0.0
+
+
+def test_hertz_is_the_limit_of_vanishing_work_behind_a_machine():
+    travel = np.array([1e-9, 5e-6, 1e-3])
+    hertz = jkr.radius_at_travel(travel, 1e3, 0.0, 2e-3, 6.4e6)
+    for work in (1e-40, 1e-100, 1e-300, 5e-324):
+        assert_allclose(jkr.radius_at_travel(travel, 1e3, work, 2e-3, 6.4e6), hertz, rtol=1e-12, atol=0)
+        assert np.isnan(jkr.radius_at_travel(-1e-6, 1e3, work, 2e-3, 6.4e6))
+
+
+def test_a_contact_of_any_radius_shares_the_travel_with_the_machine():
+    random = np.random.default_rng(10)
+    radius, travel = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, 1e-5, 1000)
+    stiffness = 10.0 ** random.uniform(-8, 18, 1000)
+    load = jkr.load_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
+    indentation = jkr.indentation_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
+    scale = np.abs(travel) + radius**2 / 2e-3
+    assert np.max(np.abs(indentation + load / stiffness - travel) / scale) < 10 * U
+    again = jkr.load_under_indentation(radius, indentation, 2e-3, 6.4e6)
+    # load and indentation are both known to some u of their terms, the load at worst of p times the depths
+    assert np.max(np.abs(again - load) / (2 * 6.4e6 * radius * scale)) < 10 * U
+
+
+def test_the_energy_release_rate_is_that_at_the_load_and_at_the_indentation():
+    random = np.random.default_rng(11)
+    radius, travel = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, -1e-8, 1000)
+    stiffness = 10.0 ** random.uniform(-8, 18, 1000)  # a lifting travel: no differences of equal numbers
+    rest = radius, 2e-3, 6.4e6
+    computed = jkr.energy_release_rate_at_travel(radius, travel, stiffness, 2e-3, 6.4e6)
+    indentation = jkr.indentation_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
+    at_grips = jkr.energy_release_rate_at_indentation(radius, indentation, 2e-3, 6.4e6)
+    load = jkr.load_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
+    assert_allclose(computed, jkr.energy_release_rate(radius, load, 2e-3, 6.4e6), rtol=30 * U, atol=0)
+    assert_allclose(computed, at_grips, rtol=1e-14, atol=0)
+    hard = jkr.energy_release_rate_at_travel(radius, travel, math.inf, 2e-3, 6.4e6)
+    assert_array_equal(hard, jkr.energy_release_rate_at_indentation(radius, travel, 2e-3, 6.4e6))
+    free = jkr.energy_release_rate_at_travel(radius, travel, 0.0, 2e-3, 6.4e6)
+    assert_allclose(free, jkr.energy_release_rate(rest[0], 0.0, *rest[1:]), rtol=20 * U, atol=0)
+    assert_array_equal(
+        jkr.load_under_travel(radius, travel, math.inf, 2e-3, 6.4e6),
+        jkr.load_under_indentation(radius, travel, 2e-3, 6.4e6),
+    )
+    assert_array_equal(jkr.load_under_travel(np.append(radius, 0.0), -1e-6, 0.0, 2e-3, 6.4e6), 0.0)
+    assert_array_equal(jkr.indentation_under_travel(radius, travel, math.inf, 2e-3, 6.4e6), travel)
+
+
+def test_the_solution_releases_the_work_and_is_stable_at_its_travel():
+    random = np.random.default_rng(12)
+    work, sphere_radius, modulus = 10.0 ** random.uniform(-10, 10, (3, 1000))
+    stiffness = contact_stiffness(work, sphere_radius, modulus) * 10.0 ** random.uniform(-15, 15, 1000)
+    travel = jkr.pull_off_travel(stiffness, work, sphere_radius, modulus) * random.uniform(-3.0, 0.9, 1000)
+    radius = jkr.radius_at_travel(travel, stiffness, work, sphere_radius, modulus)
+    rest = travel, stiffness, sphere_radius, modulus
+    assert_allclose(jkr.energy_release_rate_at_travel(radius, *rest), work, rtol=1e-12, atol=0)
+    assert np.all(jkr.energy_release_rate_at_travel(radius * 1.0001, *rest) > work)
+    assert np.all(jkr.energy_release_rate_at_travel(radius * 0.9999, *rest) < work)
+
+
+def wild_inputs(count, seed):
+    """Numbers of a laboratory, of the whole range of doubles and of its edges, of either sign."""
+    random = np.random.default_rng(seed)
+    edges = [0.0, -0.0, math.inf, math.nan, 5e-324, 1e-310, 2.3e-308, 1.7e308, 1.0]
+    inputs = []
+    for low, high in ((-9, -4), (-3, 9), (-6, 2), (-9, 1), (3, 11)):
+        usual, any_size = 10.0 ** random.uniform(low, high, count), 10.0 ** random.uniform(-323, 308, count)
+        kinds = random.choice(3, count, p=[0.6, 0.25, 0.15])
+        value = np.choose(kinds, [usual, any_size, random.choice(edges, count)])
+        inputs.append(np.where(random.random(count) < 0.15, -value, value))
+    return inputs
+
+
+def within_range(*values):
+    return np.all([(np.abs(value) > 1e-280) & (np.abs(value) < 1e280) | (value == 0) for value in values], axis=0)
+
+
+def check_wild(count, seed):
+    """Nothing raises, what has no meaning is nan, and where no scale leaves the range of doubles all is right."""
+    inputs = travel, stiffness, work, sphere_radius, modulus = wild_inputs(count, seed)
+    radius = jkr.radius_at_travel(*inputs)
+    assert not np.any(radius < 0.0)
+    proper = (stiffness >= 0.0) & (sphere_radius > 0.0) & (modulus > 0.0) & ~np.isnan(travel) & (work < math.inf)
+    assert np.all(np.isnan(radius[~proper]))
+    bare = proper & (work <= 0.0) & (stiffness > 0.0)
+    assert np.all(np.isnan(radius[bare & (travel < 0.0)]))
+    with np.errstate(all="ignore"):
+        wide = Wide(*inputs)
+        reach, hard = sphere_radius / modulus.astype(WIDE), sphere_radius * modulus.astype(WIDE)
+        sized = within_range(travel, work, modulus, reach, wide.unit**3, wide.depth, wide.contact)
+        sized &= within_range(wide.grips, wide.level, travel / wide.depth, wide.depth / wide.grips)
+        sized &= within_range(work * sphere_radius.astype(WIDE))
+        pulled, held = wide.check(radius, proper & sized & (work > 0.0))
+        share, size = 1 / (1 + hard / stiffness), sphere_radius.astype(WIDE)
+        bare &= within_range(travel, modulus, sphere_radius, hard, share, share / size, share * travel / size)
+        needed = radius * (radius / size) + 4 * hard / (3 * stiffness.astype(WIDE)) * radius * (radius / size) ** 2
+    pressed = bare & (travel > 0.0) & ~(radius < 1e-300)
+    assert_allclose((needed[pressed] / travel[pressed]).astype(float), 1.0, rtol=1e-13, atol=0)
+    assert np.all(radius[bare & (travel == 0.0)] == 0.0)
+    assert min(pulled, held, np.count_nonzero(bare)) > count // 100
+
+
+def test_no_input_raises_or_hangs_or_gives_a_wrong_branch():
+    check_wild(100_000, seed=13)
+
+
+@pytest.mark.verify
+def test_no_input_of_ten_million_raises_or_hangs_or_gives_a_wrong_branch():
+    for seed in range(20):
+        check_wild(500_000, seed=100 + seed)
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 8, 9, 255, 4095, 4096, 4097, 9000])
+def test_a_radius_does_not_depend_on_the_batch(size):
+    states = random_states(9000, seed=14)
+    whole = jkr.radius_at_travel(*states)
+    part = jkr.radius_at_travel(*[value[-size:] for value in states])
+    assert_array_equal(part, whole[-size:])
+    some = np.random.default_rng(15).integers(0, 9000, 20)
+    assert_array_equal(whole[some], [jkr.radius_at_travel(*[value[i] for value in states]) for i in some])
+
+
+def test_radius_at_travel_broadcasts():
+    travel, stiffness = np.linspace(-1e-6, 5e-6, 30).reshape(5, 1, 6), np.logspace(1, 4, 40).reshape(40, 1)
+    radius = jkr.radius_at_travel(travel, stiffness, **LENS)
+    assert radius.shape == (5, 40, 6)
+    assert radius[4, 39, 5] == jkr.radius_at_travel(travel[4, 0, 5], stiffness[39, 0], **LENS)
+    square = np.linspace(0, 5e-6, 90_000).reshape(300, 300)
+    assert_array_equal(
+        jkr.radius_at_travel(square.T, 1e3, **LENS), jkr.radius_at_travel(square, stiffness=1e3, **LENS).T
+    )
+    frozen = np.broadcast_to(1e-6, (3,))
+    assert jkr.radius_at_travel(frozen, 1e3, **LENS).shape == (3,)
+    assert jkr.radius_at_travel(np.empty(0), 1e3, **LENS).shape == (0,)
+    assert jkr.radius_at_travel([[1e-6]], 1e3, **LENS).shape == (1, 1)
+    assert isinstance(jkr.radius_at_travel(1e-6, 1e3, **LENS), float)
+    with pytest.raises(ValueError, match="shape"):
+        jkr.radius_at_travel(np.zeros(2), np.zeros(3), **LENS)

@@ -1,0 +1,110 @@
+"""The field that bonds make: its spectrum, its energy, what of it is frozen and what is forgotten."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+from sim.footprint import BondMade
+from sim.memory import Constant, Time
+from sim.modes import modes
+from sim.motion import Motion
+from sim.noise import Noise
+from sim.site_field import MappedSiteModes, SiteMean, SiteModes
+from sim.traction import Traction
+
+B, G, CELL, POINTS, MEMBERS = 1e-6, 1.6e6, 24e-6, 32, 4000
+SPECTRUM = BondMade(footprint=B)
+
+
+def moved(step, duration=0.0):
+    still = np.zeros(1)
+    return Motion(step, 0.0, duration, still, still, still, still)
+
+
+def traction(mean, spread):
+    """Bonds of 1 site per m², mean force and its standard deviation [N]."""
+    return Traction(np.array([mean]), np.array([mean**2]), np.array([spread**2]))
+
+
+def process(kind=SiteModes, poisson_ratio=0.5):
+    energy = SPECTRUM.surface_energy(G, poisson_ratio)
+    lattice = modes(SPECTRUM, CELL, POINTS)
+    return kind(lattice, G, poisson_ratio, energy, SPECTRUM.variance, Time(time=1.0), Constant())
+
+
+@pytest.mark.parametrize("poisson_ratio", [0.5, 0.3])
+def test_the_energy_of_discs_is_the_published_closed_form(poisson_ratio):
+    # the half-space's compliance under each bond: twice the energy of one disc of unit force
+    exact = (2.0 - poisson_ratio) / (1.5 * math.pi**2 * G * B)
+    assert_allclose(SPECTRUM.surface_energy(G, poisson_ratio), exact, rtol=1e-14)
+    if poisson_ratio == 0.5:
+        assert_allclose(exact, 1.0 / (math.pi**2 * G * B), rtol=1e-15)
+    # work of a unit force on its own mean displacement, ½ f u = ½ f²/stiffest
+    assert_allclose(0.5 / SPECTRUM.stiffest(G, poisson_ratio), exact, rtol=1e-14)
+
+
+def test_the_stiffest_bond_is_half_pi_squared_g_b():
+    assert_allclose(BondMade(footprint=1e-9).stiffest(1.6e6), 7.8957e-3, rtol=1e-4)
+
+
+def test_variance_and_energy_are_the_integrals_of_the_density():
+    edges = np.linspace(0.0, 400.0, 801) / B
+    radial = sum(quad(lambda q: q * SPECTRUM.radial_density(q), a, b)[0] for a, b in itertools.pairwise(edges))
+    assert_allclose(radial / (2 * math.pi), SPECTRUM.cumulative(edges[-1]), rtol=1e-9)
+    line = sum(quad(SPECTRUM.radial_density, a, b)[0] for a, b in itertools.pairwise(edges))
+    assert_allclose(line, SPECTRUM.line_integral, rtol=1e-4)  # the tail beyond falls as 1/q²: 4/(pi x²) / 2 at x = 400
+    q = np.geomspace(1e-6, 1e3, 200) / B
+    assert_allclose(SPECTRUM.cumulative(q) + SPECTRUM.beyond(q), SPECTRUM.variance, rtol=1e-14)
+    slope = (SPECTRUM.cumulative(q * 1.0001) - SPECTRUM.cumulative(q / 1.0001)) / (q * (1.0001 - 1 / 1.0001))
+    low = q * B < 1.0
+    assert_allclose(slope[low], (q * SPECTRUM.radial_density(q) / (2 * math.pi))[low], rtol=1e-6)
+
+
+def test_the_mean_follows_both_moments_of_the_force():
+    mean = SiteMean(SPECTRUM.surface_energy(G), Constant())
+    state = mean.start(moved(0), traction(3.0, 2.0), None)
+    assert_allclose(state.energy, 13.0 / (math.pi**2 * G * B), rtol=1e-14)
+
+
+@pytest.mark.parametrize(("mean", "spread"), [(1.0, 0.0), (0.0, 1.0), (-0.8, 0.6)])
+def test_the_modes_hold_the_energy_of_frozen_and_varying_forces(mean, spread):
+    field = process()
+    noise = Noise(1, "shear", np.arange(MEMBERS))
+    state = field.start(moved(0), traction(mean, spread), noise)
+    for step in range(1, 4):
+        state = field.advance(state, moved(step, 0.7), traction(mean, spread), noise)
+    expected = 2.0 * np.sum(field.weights)
+    spread_of_mean = 2.0 * math.sqrt(np.sum(field.weights**2) / MEMBERS)
+    assert abs(state.energy.mean() - expected) < 5.0 * spread_of_mean
+
+
+def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_not():
+    # correlation of the amplitudes over one memory time: (f² + Var e^-1)/(f² + Var), f² = 0.64, Var = 0.36
+    field, noise = process(), Noise(2, "shear", np.arange(MEMBERS))
+    carried = traction(-0.8, 0.6)
+    first = field.start(moved(0), carried, noise)
+    then = field.advance(first, moved(1, 1.0), carried, noise)
+    before, after = (field.complex_amplitudes(state) for state in (first, then))
+    kept = np.real(np.mean(before * after.conj())) / np.mean(np.abs(before) ** 2)
+    count = before.size
+    assert abs(kept - (0.64 + 0.36 * math.exp(-1.0))) < 5.0 / math.sqrt(count)
+
+
+def test_the_sign_of_the_mean_force_turns_the_frozen_pattern():
+    field, noise = process(), Noise(2, "shear", np.arange(3))
+    first = field.start(moved(0), traction(0.8, 0.0), noise)
+    back = field.advance(first, moved(1, 1.0), traction(-0.8, 0.0), noise)
+    assert_allclose(field.complex_amplitudes(back), -field.complex_amplitudes(first), rtol=1e-14)
+
+
+def test_a_map_of_the_bonds_field_has_the_energy_of_its_modes():
+    from sim.laws.halfspace import surface_energy
+
+    field, noise = process(MappedSiteModes), Noise(3, "shear", np.arange(2))
+    state = field.start(moved(0), traction(0.8, 0.6), noise)
+    maps = field.maps(state, np.zeros(1), 2)
+    assert_allclose([surface_energy(one, CELL, G) for one in maps], state.energy, rtol=1e-12)

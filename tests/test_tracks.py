@@ -1,0 +1,415 @@
+"""Bonds followed one by one. In units of 1/k0 and of the Bell force's stretch, so that ε = V and β = k_on."""
+
+import copy
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.integrate import cumulative_trapezoid, quad
+from scipy.stats import kstwo
+
+from sim.following import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS
+from sim.hazards import Hazard
+from sim.noise import PARTS
+from sim.tracks import advance, bound, mean_life, mean_square_stretch, mean_stretch, start
+
+BELL, CONSTANT, CUT = Hazard(1.0, 1.0, math.inf), Hazard(1.0, 0.0, math.inf), Hazard(0.3, 0.0, 2.0)
+BOTH = Hazard(1.0, 1.0, 3.0)
+LAWS = {"bell": BELL, "constant": CONSTANT, "cut_off": CUT, "both": BOTH}
+UNBREAKING = Hazard(0.0, 1.0, math.inf)
+
+
+def begin(law, sites, members=1, speed=0.0, how="steady", rebinding=1.0, seed=5):
+    return start(law, rebinding, sites, np.array([speed]), how, seed, np.arange(members))
+
+
+def go(tracks, slip, duration, law, rebinding=1.0, seed=5, members=None):
+    members = np.arange(len(tracks.stamp)) if members is None else members
+    return advance(tracks, np.atleast_1d(slip), duration, law, rebinding, seed, members)
+
+
+def copied(tracks):
+    return copy.deepcopy(tracks)
+
+
+def stretches(tracks):
+    """Stretch of every site, with sign, nan where it is free."""
+    frame = tracks.frame[:, :, np.newaxis]
+    return np.where(np.signbit(tracks.due), np.nan, frame[:, SENSE] * (frame[:, SLIDER] - tracks.birth))
+
+
+def moments(law, speed, rebinding):
+    """Steady fraction bound and ⟨x^n⟩ per site, n = 1, 2, 4, by quadrature of the survival."""
+
+    def survival(t):
+        spent, _ = quad(lambda u: law.rate * math.exp(law.softness * speed * u), 0.0, t)
+        return math.exp(-spent)
+
+    end = min(law.limit / speed, 60.0 / law.rate, (math.log1p(60.0 * speed) / speed) if law.softness else 60.0)
+    cycle = quad(survival, 0, end)[0] + 1.0 / rebinding
+    return [quad(lambda t, n=n: (speed * t) ** n * survival(t), 0, end)[0] / cycle for n in (0, 1, 2, 4)]
+
+
+def has_the_law(tracks, exact):
+    """The three moments, each within five of its standard errors over all sites."""
+    fraction, _, second, fourth = exact
+    count = tracks.due.size
+    found = bound(tracks).sum() / count, mean_stretch(tracks).mean(), mean_square_stretch(tracks).mean()
+    for value, mean, square in zip(found, exact, (fraction, second, fourth), strict=False):
+        assert abs(value - mean) < 5.0 * math.sqrt((square - mean**2) / count)
+
+
+TABLE = [
+    (0.01, 1.0, 0.49753647880558, 0.004879184964336791, 9.479376643225906e-05),
+    (1.0, 0.1, 0.05627857807338321, 0.02509972313460454, 0.018266733210913415),
+    (3.0, 1.0, 0.27829204111941863, 0.21430206271425223, 0.2540755187586568),
+    (10.0, 1.0, 0.16768227079679127, 0.20348523014324285, 0.3631207366130619),
+    (100.0, 10.0, 0.2896976331508459, 0.6402937534956319, 1.9821514161329326),
+    (1000.0, 10.0, 0.059601286237244096, 0.19635715881929017, 0.8865625766270377),
+]
+
+
+@pytest.mark.parametrize(("speed", "rebinding", "fraction", "force", "square"), TABLE)
+def test_steady_sliding_has_the_exact_moments_at_once_and_later(speed, rebinding, fraction, force, square):
+    exact = moments(BELL, speed, rebinding)
+    assert_allclose(exact[:3], [fraction, force, square], rtol=1e-7, atol=0)
+    tracks = begin(BELL, 10_000, 20, speed, rebinding=rebinding)
+    has_the_law(tracks, exact)
+    for _ in range(40):
+        tracks = go(tracks, speed * 0.05, 0.05, BELL, rebinding)
+    has_the_law(tracks, exact)
+    assert np.all(tracks.frame[:, STEPS] == 41)
+
+
+@pytest.mark.parametrize("name", ["constant", "cut_off", "both"])
+def test_every_hazard_keeps_its_steady_law(name):
+    law, speed = LAWS[name], 1.3
+    exact = moments(law, speed, 1.0)
+    tracks = begin(law, 10_000, 10, speed)
+    has_the_law(tracks, exact)
+    for _ in range(30):
+        tracks = go(tracks, speed * 0.1, 0.1, law)
+    has_the_law(tracks, exact)
+
+
+def test_bonds_that_only_a_stretch_breaks_give_the_steady_law_of_the_shallow_depth():
+    law, speed, rebinding = Hazard(0.0, 0.0, 2.0), 3.0, 0.5
+    fraction = 1.0 / (1.0 + speed / (2.0 * rebinding))
+    tracks = begin(law, 10_000, 10, speed, rebinding=rebinding)
+    for _ in range(50):
+        tracks = go(tracks, 0.3, 0.1, law, rebinding)
+    has_the_law(tracks, [fraction, fraction, fraction * 4 / 3, fraction * 16 / 5])
+
+
+def test_the_number_bound_is_binomial_and_the_force_has_the_sum_of_the_sites_variances():
+    sites, members = 25, 20_000
+    fraction, first, second, _ = moments(BELL, 3.0, 1.0)
+    tracks = begin(BELL, sites, members, 3.0)
+    for _ in range(10):
+        tracks = go(tracks, 0.9, 0.3, BELL)
+    number, force = bound(tracks), mean_stretch(tracks) * sites
+    for found, variance in ((number, sites * fraction * (1 - fraction)), (force, sites * (second - first**2))):
+        # the variance of a sample variance is (kurtosis - 1)/members; the kurtosis of a sum of 25 stays below 3.5
+        assert abs(found.var() / variance - 1.0) < 5.0 * math.sqrt(2.5 / members)
+    assert abs(number.mean() - sites * fraction) < 5.0 * math.sqrt(sites * fraction * (1 - fraction) / members)
+
+
+@pytest.mark.parametrize("speed", [0.5, 10.0, 1000.0])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_loaded_bonds_break_by_the_law_of_bell_and_evans(speed, sense):
+    sites = 40_000
+    tracks = begin(UNBREAKING, sites, how="bonded")
+    assert bound(tracks)[0] == sites
+    worst, slid, pull = 0.0, 0.0, math.log1p(3.0 * speed) / 60
+    for _ in range(70):
+        tracks = go(tracks, sense * pull, pull / speed, BELL, 0.0)
+        slid += pull
+        worst = max(worst, abs(bound(tracks)[0] / sites - math.exp(-math.expm1(slid) / speed)))
+    assert worst < kstwo.isf(5.7e-7, sites)
+    assert bound(tracks)[0] < 0.1 * sites
+
+
+@pytest.mark.parametrize(("how", "first"), [("bonded", 1 / 1.25), ("empty", 0.0)])
+def test_constant_rates_relax_exponentially(how, first):
+    rebinding, sites = 4.0, 200_000
+    tracks = begin(CONSTANT, sites, how=how, rebinding=rebinding)
+    law, total = Hazard(6.0, 0.0, math.inf), 10.0
+    before, steady = bound(tracks)[0] / sites, 0.4
+    assert abs(before - first) <= 5.0 * math.sqrt(first * (1 - first) / sites)
+    for step in range(1, 31):
+        tracks = go(tracks, 0.02, 0.01, law, rebinding)
+        exact = steady + (before - steady) * math.exp(-total * 0.01 * step)
+        # conditional on the start: the variance of the sites' two-state process is below a quarter
+        assert abs(bound(tracks)[0] / sites - exact) < 5.0 * math.sqrt(0.25 / sites)
+
+
+def ramp(law, pieces, speeds, sites=600, rebinding=1.0, coarse=0.16, speed=1.0, members=3):
+    """States after each coarse step of constant speed, each made of so many pieces."""
+    tracks, states = begin(law, sites, members, speed, rebinding=rebinding), []
+    for v in speeds:
+        for _ in range(pieces):
+            tracks = go(tracks, v * coarse / pieces, coarse / pieces, law, rebinding)
+        states.append((bound(tracks), stretches(tracks), tracks.life.copy(), mean_stretch(tracks)))
+    return states
+
+
+def same_lives(one, other, scale):
+    """Same sites bound, the same number of lives, stretches equal but for rounding."""
+    for a, b in zip(one, other, strict=True):
+        assert np.array_equal(a[0], b[0])
+        assert np.array_equal(np.isnan(a[1]), np.isnan(b[1]))
+        assert np.array_equal(a[2], b[2])
+        assert_allclose(a[1], b[1], rtol=0, atol=1e-9 * scale)
+        assert_allclose(a[3], b[3], rtol=0, atol=1e-9 * scale)
+
+
+FORWARD = 10.0 ** np.linspace(-1, 1.5, 30)
+BACK_AND_FORTH = 6.0 * np.sin(np.arange(40)) * (np.arange(40) % 7 > 0)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("speeds", [FORWARD, BACK_AND_FORTH], ids=["forward", "reversing"])
+def test_the_same_motion_in_other_steps_gives_the_same_lives(name, speeds):
+    coarse = ramp(LAWS[name], 1, speeds)
+    assert coarse[-1][2].mean() > 2.5  # sites have lived on
+    for pieces in (2, 8, 16):
+        same_lives(coarse, ramp(LAWS[name], pieces, speeds), scale=1.0)
+
+
+def test_bonds_asked_singly_live_as_bonds_that_follow():
+    """A slip of 32 Bell forces asks each bond singly; its sixteenth does not."""
+    speeds = np.full(12, 200.0)
+    alone, following = ramp(BELL, 1, speeds, rebinding=9.0), ramp(BELL, 16, speeds, rebinding=9.0)
+    assert alone[-1][2].mean() > 5
+    same_lives(alone, following, scale=1.0)
+
+
+def test_rows_ask_singly_after_a_reversal_until_all_bonds_follow():
+    tracks = go(begin(BELL, 500, speed=1.0), -1e-3, 1e-3, BELL)
+    assert tracks.frame[0, SINGLY] == 1.0
+    for _ in range(400):
+        tracks = go(tracks, -0.1, 0.1, BELL)
+    assert tracks.frame[0, SINGLY] == 0.0
+    assert np.nanmax(stretches(tracks)) <= 0.0
+
+
+def volterra(law, rebinding, position, step):
+    """Fraction, mean and mean square stretch in time from all-empty sites, by the renewal equation on a grid."""
+    count = len(position)
+    hazard = law.rate * np.exp(law.softness * np.abs(position[np.newaxis, :] - position[:, np.newaxis]))
+    spent = cumulative_trapezoid(hazard, dx=step, axis=1, initial=0.0)
+    survival = np.triu(np.exp(np.minimum(np.diagonal(spent)[:, np.newaxis] - spent, 0.0)))
+    free = np.ones(count)
+    for n in range(1, count):
+        weights = np.full(n + 1, step)
+        weights[[0, n]] *= 0.5
+        known = rebinding * np.sum(weights[:n] * free[:n] * survival[:n, n])
+        free[n] = (1.0 - known) / (1.0 + rebinding * weights[n])
+    born = rebinding * free * step
+    born[0] *= 0.5
+    stretch = position[np.newaxis, :] - position[:, np.newaxis]
+    return [np.sum(born[:, np.newaxis] * survival * stretch**n, axis=0) - 0.5 * (n == 0) * born for n in (0, 1, 2)]
+
+
+def test_reversals_and_rests_have_the_law_of_the_renewal_equation():
+    """Forth, rest, back through zero: against a trapezoid rule, whose error of some h² (k/2)² is below 2e-4."""
+    step, rebinding, sites = 2.5e-3, 2.0, 100_000
+    speeds = np.repeat([3.0, 0.0, -4.0, 0.5], 160)
+    position = np.concatenate([[0.0], np.cumsum(speeds * step)])
+    exact = volterra(BELL, rebinding, position, step)
+    tracks = begin(BELL, sites, how="empty", rebinding=rebinding)
+    for n in range(0, len(speeds), 40):
+        tracks = go(tracks, speeds[n] * 40 * step, 40 * step, BELL, rebinding)
+        at = n + 40
+        found = bound(tracks)[0] / sites, mean_stretch(tracks)[0], mean_square_stretch(tracks)[0]
+        # no site's stretch exceeds 3 by much: moments per site vary by less than these
+        for value, moment, error in zip(found, exact, (0.5, 1.2, 3.0), strict=True):
+            assert abs(value - moment[at]) < 5.0 * error / math.sqrt(sites) + 2e-4
+
+
+@pytest.mark.parametrize(("sites", "force"), [(5, 0.0), (5, 2.0), (10, 5.0)])
+def test_a_cluster_that_shares_a_force_lives_as_erdmann_and_schwarz_say(sites, force):
+    rates = [i * math.exp(force / i) for i in range(1, sites + 1)]
+    exact, variance, members = sum(1 / r for r in rates), sum(1 / r**2 for r in rates), 1500
+    if (sites, force) == (5, 0.0):
+        assert_allclose(exact, 2.283333, rtol=1e-6, atol=0)
+    lives = []
+    for member in range(members):
+        number = np.array([member])
+        tracks = start(UNBREAKING, 1.0, sites, np.zeros(1), "bonded", 8, number)
+        time = 0.0
+        for left in range(sites, 0, -1):
+            rate = math.exp(force / left)
+            # as long as it takes to the next rupture, and the least bit more
+            wait = (tracks.soonest[0, 0].min() - tracks.frame[0, CLOCK]) / rate * (1.0 + 1e-12)
+            tracks = go(tracks, 0.0, wait, Hazard(rate, 1.0, math.inf), 0.0, 8, number)
+            assert bound(tracks)[0] == left - 1
+            time += wait
+        lives.append(time)
+    assert abs(np.mean(lives) - exact) < 5.0 * math.sqrt(variance / members)
+
+
+def many_steps(tracks, count, members):
+    for n in range(count):
+        speeds = 5.0 * np.sin(0.3 * n + np.asarray(members)) + 4.0
+        tracks = go(tracks, speeds * 0.1, 0.1, BELL, members=members)
+    return tracks
+
+
+def equal(one, other):
+    return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in vars(one))
+
+
+def test_a_run_taken_up_from_copies_is_the_same_to_the_bit():
+    members = np.arange(4)
+    first = many_steps(begin(BELL, 700, 4, 1.0), 30, members)
+    kept = copied(first)
+    assert equal(many_steps(first, 30, members), many_steps(kept, 30, members))
+
+
+def test_a_member_alone_is_the_member_of_a_batch_to_the_bit():
+    batch = many_steps(begin(BELL, 300, 6, 1.0), 40, np.arange(6))
+    alone = start(BELL, 1.0, 300, np.ones(1), "steady", 5, np.array([3]))
+    alone = many_steps(alone, 40, np.array([3]))
+    for name in vars(alone):
+        assert np.array_equal(getattr(alone, name)[0], getattr(batch, name)[3])
+    assert len(set(mean_stretch(batch))) == 6
+
+
+def test_a_state_that_has_been_advanced_is_spent_but_keeps_its_moments():
+    before = begin(BELL, 1000, 2, 1.0)
+    kept = copied(before)
+    after = go(before, 0.5, 0.5, BELL)
+    for moment in (bound, mean_stretch, mean_square_stretch):
+        assert np.array_equal(moment(before), moment(kept))
+    with pytest.raises(RuntimeError, match="advanced already"):
+        go(before, 0.5, 0.5, BELL)
+    with pytest.raises(RuntimeError, match="advanced already"):
+        go(copied(before), 0.5, 0.5, BELL)
+    go(after, 0.5, 0.5, BELL)
+
+
+def test_the_words_of_a_life_are_philoxs_at_its_address():
+    seed, member, site = 2**63 + 9, 2**40 + 1, 37
+    tracks = start(BELL, 2.0, 50, np.zeros(1), "empty", seed, np.array([member]))
+    key = np.array([seed, PARTS["bonds"]], dtype=np.uint64)
+    counter = np.array([site, 1, member, 1], dtype=np.uint64)  # numpy counts on before it draws
+    words = np.random.Philox(key=key, counter=counter).random_raw(4)
+    threshold, wait = -np.log1p(-((words[1:3] >> np.uint64(12)) * 2.0**-52))
+    assert_allclose([tracks.birth[0, site], -tracks.due[0, site]], [threshold, wait / 2.0], rtol=1e-14, atol=0)
+
+
+def test_a_bell_force_beyond_all_stretches_makes_the_hazard_constant():
+    soft = ramp(Hazard(1.0, 1e-12, math.inf), 1, FORWARD)
+    same_lives(soft, ramp(CONSTANT, 1, FORWARD), scale=1.0)
+
+
+@pytest.mark.parametrize("duration", [500.0, 1e6, 1e300])
+def test_a_step_of_very_many_lives_ends_in_the_steady_law_of_its_speed(duration):
+    tracks = begin(BELL, 10_000, 10, 1.0)
+    lives = tracks.life.copy()
+    speed = -3.0
+    after = go(tracks, speed * duration, duration, BELL)
+    fraction, first, second, fourth = moments(BELL, 3.0, 1.0)
+    assert np.all(after.life == lives + 1)
+    assert np.nanmax(stretches(after)) <= 0.0
+    has_the_law(go(after, speed * 1e-9, 1e-9, BELL), [fraction, -first, second, fourth])
+
+
+def test_a_step_below_that_rule_has_many_lives_and_the_steady_law_too():
+    tracks = begin(BELL, 2000, 10, how="empty")
+    cycle = mean_life(np.array([3.0]), BELL)[0] + 1.0
+    after = go(tracks, 3.0 * 250 * cycle, 250 * cycle, BELL)
+    assert 200 < after.life.mean() < 300
+    has_the_law(after, moments(BELL, 3.0, 1.0))
+
+
+def test_only_the_members_whose_step_is_long_are_drawn_anew():
+    tracks = begin(BELL, 500, 2, 1.0)
+    kept = copied(tracks)
+    mixed = advance(tracks, np.array([1.0, 1e9]), 5.0, BELL, 1e3, 5, np.arange(2))
+    plain = advance(kept, np.ones(1), 5.0, BELL, 1e3, 5, np.arange(2))
+    assert np.array_equal(mixed.birth[0], plain.birth[0])
+    assert not np.array_equal(mixed.birth[1], plain.birth[1])
+    advance(mixed, np.ones(1), 1.0, BELL, 1e3, 5, np.arange(2))
+
+
+@pytest.mark.parametrize("slip", [0.0, 5e-324, 1e-300, -1e-12, 1e3, -1e300, 1.7e308])
+@pytest.mark.parametrize("duration", [5e-324, 1e-300, 1.0, 1e300])
+@pytest.mark.parametrize("law", [*LAWS.values(), UNBREAKING, Hazard(1e308, 1e300, 1e-300), Hazard(5e-324, 1.0, 5e-324)])
+def test_no_numbers_make_a_step_endless(law, slip, duration):
+    for rebinding in (0.0, 5e-324, 1.0, 1e300):
+        tracks = begin(law, 33, how="bonded", rebinding=rebinding)
+        try:
+            tracks = go(tracks, slip, duration, law, rebinding)
+        except ValueError as refusal:
+            assert "stationary" in str(refusal) or "finite" in str(refusal)
+            continue
+        assert 0.0 <= bound(tracks)[0] <= 33.0
+
+
+@pytest.mark.parametrize(("slip", "duration"), [(math.nan, 1.0), (math.inf, 1.0), (1.0, 0.0), (1.0, math.inf)])
+def test_steps_that_are_not_finite_are_refused(slip, duration):
+    tracks = begin(BELL, 10)
+    with pytest.raises(ValueError, match="finite"):
+        go(tracks, slip, duration, BELL)
+    go(tracks, 1.0, 1.0, BELL)
+
+
+def test_bonds_that_never_break_have_no_steady_sliding():
+    with pytest.raises(ValueError, match="never break"):
+        begin(UNBREAKING, 10, speed=1.0)
+    assert bound(begin(UNBREAKING, 10))[0] == 10
+
+
+@pytest.mark.parametrize("speed", [1e-12, 1e-3, 0.0199, 0.0201, 0.5, 10.0, 1e4, 1e8, 1e200])
+def test_the_mean_life_is_the_integral_of_the_survival(speed):
+    import mpmath
+
+    with mpmath.workdps(40):
+        z = mpmath.mpf(1) / mpmath.mpf(speed)
+        exact = float(z * mpmath.quad(lambda u: mpmath.exp(-z * u) / (1 + u), [0, 1 / z, 50 / z, mpmath.inf]))
+        exact = float(z * mpmath.exp(z) * mpmath.e1(z)) if speed > 1e-2 else exact
+    assert_allclose(mean_life(np.array([-speed]), BELL), exact, rtol=1e-12, atol=0)
+
+
+def test_the_mean_life_ends_at_the_limit():
+    law = Hazard(0.7, 0.0, 2.0)
+    assert_allclose(mean_life(np.array([3.0]), law), -math.expm1(-1.4 / 3.0) / 0.7, rtol=1e-14, atol=0)
+    assert_allclose(mean_life(np.array([3.0]), Hazard(0.0, 1.0, 2.0)), 2.0 / 3.0, rtol=1e-15, atol=0)
+    assert_allclose(mean_life(np.array([3.0]), Hazard(1.0, 1.0, 1e9)), mean_life(np.array([3.0]), BELL), rtol=1e-12)
+    nearly = mean_life(np.array([3.0]), Hazard(0.7, 1e-9, 2.0))
+    assert_allclose(nearly, mean_life(np.array([3.0]), law), rtol=1e-8, atol=0)
+
+
+@pytest.mark.parametrize("sites", [1, 15, 16, 17, 1000])
+def test_the_kept_sums_are_those_of_the_sites(sites):
+    tracks = begin(BELL, sites, 3, 2.0)
+    for _ in range(300):
+        tracks = go(tracks, 0.04, 0.02, BELL)
+        stretch = stretches(tracks)
+        assert np.array_equal(bound(tracks), np.sum(~np.isnan(stretch), axis=1))
+        assert_allclose(mean_stretch(tracks), np.nansum(stretch, axis=1) / sites, rtol=0, atol=1e-12)
+        assert_allclose(mean_square_stretch(tracks), np.nansum(stretch**2, axis=1) / sites, rtol=0, atol=1e-11)
+
+
+def test_the_state_takes_less_than_25_bytes_a_site():
+    tracks = begin(BELL, 10**6)
+    assert sum(getattr(tracks, name).nbytes for name in vars(tracks)) < 25e6
+    assert tracks.frame[0, BOUND] == bound(tracks)[0]
+    assert BLOCK <= 62
+
+
+@pytest.mark.verify
+def test_ten_million_steps_gather_no_error():
+    """Steps of 1e-5 lives of a few sites: the sums and the law after 100 lives."""
+    tracks, members = begin(BELL, 16, 1, 3.0), np.zeros(1, np.uint64)
+    slip = np.array([3e-5])
+    for _ in range(10**7):
+        tracks = advance(tracks, slip, 1e-5, BELL, 1.0, 5, members)
+    coarse = begin(BELL, 16, 1, 3.0)
+    for _ in range(10**3):
+        coarse = advance(coarse, np.array([0.3]), 0.1, BELL, 1.0, 5, members)
+    assert np.array_equal(tracks.life, coarse.life)
+    assert_allclose(stretches(tracks), stretches(coarse), rtol=0, atol=1e-8)
