@@ -114,7 +114,7 @@ def at_load(compare: Callable) -> list:
         ours = lambda known=known: jkr.radius_at_load(*known)  # noqa: E731
         plain = lambda known=known: radius_at_load(*known)  # noqa: E731
         errors = [error(program, exact_radius_at_load, *states) for program in (ours, plain)]
-        names = [f"at a load, {count:,} ({errors[0]:.0e})", f"numpy closed form ({errors[1]:.0e})"]
+        names = [f"laws.jkr at a load, {count:,} radii ({errors[0]:.0e})", f"numpy closed form ({errors[1]:.0e})"]
         rows.append(compare(names[0], ours, names[1], plain, "1.5 or more", repeats))
     return rows
 
@@ -122,7 +122,7 @@ def at_load(compare: Callable) -> list:
 def behind_machine(compare: Callable) -> list:
     """A travel behind machines from a tenth of the contact's stiffness to a hundred times."""
     rows = []
-    for count, repeats in ((1000, 40), (1_000_000, 1)):
+    for count, repeats in ((1000, 40), (100_000, 1)):
         random = np.random.default_rng(2)
         states = (
             random.uniform(-1e-6, 8e-6, count), 10 ** random.uniform(1, 4, count), random.uniform(-1e-3, 42e-3, count),
@@ -132,7 +132,7 @@ def behind_machine(compare: Callable) -> list:
         ours = lambda known=known: jkr.radius_at_travel(*known)  # noqa: E731
         newton = lambda known=known: radius_by_newton(*known)  # noqa: E731
         scipys = lambda known=known, fold=fold: radius_by_find_root(*known, fold)  # noqa: E731
-        mine = f"behind a machine, {count:,} ({error(ours, exact_radius, *states):.0e})"
+        mine = f"laws.jkr behind a machine, {count:,} radii ({error(ours, exact_radius, *states):.0e})"
         for name, program, promise in (
             ("numpy Newton", newton, "4 or more"),
             ("scipy find_root", scipys, "10 or more"),

@@ -67,12 +67,3 @@ class HalfSpectrumModes:
     def step(self, exponent):
         self.modes = np.exp(-exponent) * self.modes + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
         return np.sum(self.weight * (self.modes.real**2 + self.modes.imag**2))
-
-
-def jkr_radius_at_load(load, work, sphere_radius, modulus):
-    """The JKR radius in closed form, with Hertz where no work is left and nan without equilibrium."""
-    pull = 3 * np.pi * np.maximum(work, 0.0) * sphere_radius
-    with np.errstate(invalid="ignore"):
-        root = np.sqrt(pull * (2 * load + pull))
-    cube = 0.75 * sphere_radius / modulus * (load + pull + root)
-    return np.cbrt(np.where(cube >= 0, cube, np.nan))

@@ -7,8 +7,10 @@ the middle half of the turns; absolute times are only as seen. Machines are nois
 import itertools
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import bonds_plain
+import contact_plain
 import numpy as np
 import plain
 from rich.console import Console
@@ -17,7 +19,7 @@ from scipy import fft
 
 from sim.bodies import Adhesion, Solid, Sphere
 from sim.engine import Dice, advance, march, start
-from sim.laws import jkr
+from sim.hazards import Bell
 from sim.memory import Slip
 from sim.noise import Noise
 from sim.parts import bonds, drive, shear
@@ -137,25 +139,6 @@ def modal() -> list[Row]:
     return rows
 
 
-def radius() -> list[Row]:
-    """The closed form at a load, for an ensemble and for many."""
-    rows = []
-    for count, repeats in ((1000, 200), (1_000_000, 1)):
-        random = np.random.default_rng(1)
-        load, work = random.uniform(-1e-4, 4e-3, count), random.uniform(-1e-3, 42e-3, count)
-        rows.append(
-            compare(
-                f"laws.jkr at a load, {count:,} radii",
-                lambda load=load, work=work: jkr.radius_at_load(load, work, 2e-3, 6.4e6),
-                "numpy closed form",
-                lambda load=load, work=work: plain.jkr_radius_at_load(load, work, 2e-3, 6.4e6),
-                "1.5 or more",
-                repeats,
-            )
-        )
-    return rows
-
-
 def step() -> list[Row]:
     """What a step of the whole engine costs beside its modes."""
     recipe = shear.Modal(spectrum=SPECTRUM, cell=0.24e-3, points=256, memory=Slip(length=5e-6))
@@ -182,7 +165,11 @@ LENS = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=1
 def lens(exponent: float, points: int, members: int, recipe: shear.Modal | shear.Banded) -> Callable:
     """A program that advances ΔΓ of a lens's cell by one step, for a batch of members."""
     process, noise = recipe.process(1.6e6, 0.5, 0.24e-3), Noise(1, "shear", np.arange(members))
-    rest, stress, counter = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), Traction.of_stress(np.zeros(1)), itertools.count(1)
+    rest, stress, counter = (
+        drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0),
+        Traction.of_stress(np.zeros(1)),
+        itertools.count(1),
+    )
     state = [process.start(rest, stress, noise)]
 
     def program() -> None:
@@ -276,10 +263,149 @@ def sizes() -> list[Row]:
     return rows
 
 
+#: Bonds with a rate at rest, a Bell force and a stiffness of 1; at a speed of 10 friction is near its maximum.
+BELL = {"hazard": Bell(zero_force_rate=1.0, bell_force=1.0), "bond_stiffness": 1.0, "rebinding_rate": 1.0}
+BELL_SPEED, BELL_STEP = 10.0, 0.01
+
+
+def population(part, members: int, motion) -> Callable:
+    """A program that advances a population of bonds by one step and tells its moments, for a batch of members."""
+    noise, state = Noise(1, "bonds", np.arange(members)), []
+    state.append(part.start(motion, noise))
+    motions = itertools.cycle([replace(motion, step=step) for step in range(1, 4097)])
+
+    def program() -> None:
+        state[0] = part.advance(state[0], next(motions), noise)
+        part.traction(state[0])
+
+    return program
+
+
+def stretched(part, members: int = 1, step: float = BELL_STEP) -> Callable:
+    """The same for bonds of ``BELL`` in steady sliding, their moments told."""
+    return population(part, members, drive.Steady(speed=BELL_SPEED).motion(1, 0.0, step, 1.0))
+
+
+def stepped(shape: tuple[int, ...], step: float = BELL_STEP, count: int = 1) -> Callable:
+    """The same population in some fixed steps, by numpy, once it is stationary."""
+    theirs = bonds_plain.TrackedNumpy(shape, 1.0, 1.0, 1.0, np.random.default_rng(1))
+
+    def program(count: int = count) -> None:
+        for _ in range(count):
+            theirs.step(BELL_SPEED * step, step)
+
+    program(round(1.0 / step))
+    return program
+
+
+def tracked() -> list[Row]:
+    """Bonds one by one, k0 dt = 0.01, Bell's hazard at eps = 10 and beta = 1, beside numpy's stepper of as many."""
+    rows = []
+    for sites, members, repeats, promise in (
+        (100, 64, 40, ""),
+        (1000, 1, 200, "20 or more"),
+        (1000, 64, 20, "20 or more"),
+        (10_000, 1, 100, "20 or more"),
+        (100_000, 1, 20, ""),
+        (1_000_000, 1, 3, "20 or more"),
+    ):
+        part = bonds.Tracked(sites=sites, site_density=1.0, **BELL)
+        name = f"tracked, {sites:,} bonds" + (f", {members} members" if members > 1 else "")
+        other, others = stepped((members, sites)), max(1, 10**5 // (members * sites))
+        rows.append(
+            compare(
+                name,
+                stretched(part, members),
+                "numpy in fixed steps",
+                other,
+                promise,
+                repeats,
+                others,
+                members,
+                members,
+            )
+        )
+    return rows
+
+
+def tracked_as_exactly() -> list[Row]:
+    """The same over a tenth of a bond's life at rest: one step, exact, beside as many of numpy's as 0.5 % need.
+
+    In steps of k0 dt = 0.01 numpy's friction is 4 to 5 % high, of first order in the step.
+    """
+    rows = []
+    for sites, members in ((1000, 1), (1000, 64), (10_000, 1), (100_000, 1), (1_000_000, 1)):
+        part = bonds.Tracked(sites=sites, site_density=1.0, **BELL)
+        name = f"tracked, {sites:,} bonds" + (f", {members} members" if members > 1 else "") + ", one step of 0.1"
+        other, repeats = stepped((members, sites), 1e-3, 100), max(1, 10**6 // (members * sites) // 5)
+        rows.append(
+            compare(
+                name, stretched(part, members, 0.1), "numpy, 100 steps of 0.001: 0.5 % high", other, "20 or more",
+                repeats, 1, members, members,
+            )
+        )  # fmt: skip
+    return rows
+
+
+def counted() -> list[Row]:
+    """Two-state bonds at V = Vc in steps of h dt = 1/2, beside numpy's Gillespie of all members at once."""
+    rows, random = [], np.random.default_rng(1)
+    motion = drive.Steady(speed=1e-2).motion(1, 0.0, 1e-3, 1.0)
+    for sites, members, others, promise in (
+        (100, 64, 64, ""),
+        (10_000, 64, 64, "500 or more"),
+        (10_000, 1000, 1000, "500 or more"),
+        (100_000, 1000, 200, "500 or more"),
+    ):
+        part = bonds.Counted(critical_speed=1e-2, healing=500.0, sites=sites)
+        first = np.full(others, sites // 2)
+        rows.append(
+            compare(
+                f"counted, {sites:,} bonds, {members} members",
+                population(part, members, motion),
+                "numpy, Gillespie",
+                lambda first=first, sites=sites: bonds_plain.counted_gillespie_numpy(
+                    first, sites, 1.0, 500.0, 1e-3, random
+                ),
+                promise,
+                20,
+                1,
+                members,
+                others,
+            )
+        )
+    return rows
+
+
+def cohorts() -> list[Row]:
+    """The density of stretches: by tolerance, one population or one for each member, beside bonds of that noise."""
+    rows, usual = [], stretched(bonds.Cohort(site_density=1.0, tolerance=1e-3, **BELL))
+    for tolerance, sites in ((1e-2, 10_000), (1e-3, 1_000_000)):
+        part = bonds.Cohort(site_density=1.0, tolerance=tolerance, **BELL)
+        other, name = stepped((sites,)), f"numpy, {sites:,} bonds"
+        promise = "a few µs" if tolerance == 1e-3 else ""
+        rows.append(
+            compare(f"cohort at {tolerance:g}", stretched(part), name, other, promise, 200, max(1, 10**5 // sites))
+        )
+    for tolerance in (1e-2, 1e-4, 1e-5, 1e-6):
+        part = bonds.Cohort(site_density=1.0, tolerance=tolerance, **BELL)
+        rows.append(compare(f"cohort at {tolerance:g}", stretched(part), "cohort at 0.001", usual, "", 200))
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        part = bonds.Cohort(site_density=1.0, tolerance=tolerance, area="carried", **BELL)
+        name = f"cohort at {tolerance:g}, 64 populations"
+        rows.append(compare(name, stretched(part, 64), "cohort at 0.001", usual, "a few µs", 10, 200, 64))
+    return rows
+
+
+def contact() -> list[Row]:
+    """Radii at a load and behind a machine, each with its largest relative error."""
+    return contact_plain.rows(compare)
+
+
 def main() -> None:
     """Print all rows."""
     table = Table("ours", "beside", "ratio", "middle half", "promised", "ours, as seen", box=None)
-    for rows in (mean_field, modal, radius, step, depths, maps, sizes):
+    for rows in (mean_field, modal, step, depths, maps, sizes, tracked, tracked_as_exactly, counted, cohorts, contact):
         for row in rows():
             table.add_row(*row.texts)
     Console(width=140).print(table)

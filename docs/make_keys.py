@@ -6,8 +6,7 @@ from pathlib import Path
 
 from pydantic_core import PydanticUndefined
 
-from sim.quantity import Quantity
-from sim.scenario import Scenario
+from sim.scenario import Scenario, declaration
 
 TARGET = Path(__file__).with_name("keys.md")
 HEAD = """# Every key of a scenario file
@@ -50,11 +49,15 @@ _DONE: dict[str, list[type]] = {}
 def _rows(title: str, part: type, skip: typing.Collection[str] = ()) -> list[str]:
     rows = []
     for name, field in part.__pydantic_fields__.items():
-        if name == "model" or name in skip or list(_classes(field.annotation)):
+        quantity = declaration(field)
+        tables = list(_classes(field.annotation))
+        if name == "model" or name in skip or (tables and quantity is None):
             continue
-        quantity = _quantity(field)
         unit = quantity.unit if quantity else ""
         meaning = quantity.meaning if quantity else (field.description or name.replace("_", " "))
+        words = _words(field.annotation)
+        meaning += f": {', '.join(words)}" if words else ""
+        meaning += "; or a table, see below" if tables else ""
         rows.append(f"| `{field.alias or name}` | {unit} | {meaning} | {_default(field)} |")
     return ["| key | unit | meaning | default |", "| --- | --- | --- | --- |", *rows] if rows else []
 
@@ -69,11 +72,11 @@ def _default(field: typing.Any) -> str:
     return f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
 
 
-def _quantity(field: typing.Any) -> Quantity | None:
-    found = [item for item in field.metadata if isinstance(item, Quantity)]
-    for option in (field.annotation, *typing.get_args(field.annotation)):
-        found += [item for item in getattr(option, "__metadata__", ()) if isinstance(item, Quantity)]
-    return found[0] if found else None
+def _words(annotation: typing.Any) -> list[str]:
+    """The words that a key may take."""
+    if typing.get_origin(annotation) is typing.Literal:
+        return [f"`{word}`" for word in typing.get_args(annotation)]
+    return [word for option in typing.get_args(annotation) for word in _words(option)]
 
 
 def _classes(annotation: typing.Any) -> typing.Iterator[type]:

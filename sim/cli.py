@@ -209,7 +209,10 @@ def stats(output: Path, csv: Path | None) -> None:
 @click.argument("kind", required=False)
 @click.option("-o", "--picture", type=click.Path(path_type=Path), help="The picture; default beside the dataset.")
 def plot(output: Path, kind: str | None, picture: Path | None) -> None:
-    """Draw a figure: curve, time, sweep, map or spectrum; without a KIND the one that fits."""
+    """Draw a figure; without a KIND the one that fits.
+
+    KIND is curve, time, sweep, map, spectrum, friction, rivals or profile.
+    """
     from sim import plots
     from sim.durable import explained
 
@@ -273,6 +276,10 @@ def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[st
     found = convergence.converge(scene, seconds)
     _print_rows(convergence.table(found))
     click.echo(convergence.recommendation(found))
+    if "bonds_error" in found:
+        _print_rows(convergence.bond_table(found))
+        click.echo(f"{found.attrs['bonds_comment']}; against {found.attrs['bonds_reference']}; * is the scene's own")
+        click.echo(convergence.bond_advice(found))
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
         found.to_netcdf(target)

@@ -14,6 +14,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sim.alternatives import Setting, settings
+from sim.converge_bonds import converge_bonds, has_bond_depths
+from sim.converge_bonds_table import bond_advice, bond_table
 from sim.converge_data import QUANTITIES, Laws, Run, assembled, filled
 from sim.converge_figure import figure
 from sim.converge_table import recommendation, table
@@ -39,6 +41,9 @@ _FEWEST, _MOST_VALUES = 16, 2**21
 #: Share of the budget left to pilots and statistics, and how long a pilot takes [s].
 _ASIDE, _PILOT = 0.2, 0.1
 
+#: Share of the budget for the depths of the bonds, where they have some to compare.
+_FOR_BONDS = 1.0 / 3.0
+
 
 def converge(scenario: Scenario, budget_seconds: float, progress: Progress | None = None) -> xr.Dataset:
     """Run a scene at every admissible setting and say how far each is from the truth.
@@ -59,7 +64,8 @@ def converge(scenario: Scenario, budget_seconds: float, progress: Progress | Non
         ``reference``, ``error``, ``standard_error``, ``known_error`` in units of a yardstick: the
         reference's own value for mean, standard deviation and correlation time, its mean for
         quantiles, and the skewness of ΔΓ for both skewnesses (1 where ΔΓ has none). Along ``row`` also
-        the costs, members and TOML lines, and the measured statistics in SI.
+        the costs, members and TOML lines, and the measured statistics in SI. Where the bonds have a
+        hazard or are counted, also what ``sim.converge_bonds.converge_bonds`` gives.
 
     Notes
     -----
@@ -78,10 +84,17 @@ def converge(scenario: Scenario, budget_seconds: float, progress: Progress | Non
     coarsest = round(max([1.0, *(setting.ratio for setting in chosen)]))
     moments = stated_times(base, truth, coarsest)
     runs, order = _distinct(chosen)
-    _spend(runs, moments, budget_seconds, progress)
+    with_bonds = has_bond_depths(base)
+    _spend(runs, moments, budget_seconds * (1.0 - _FOR_BONDS * with_bonds), progress)
     laws = Laws(base, truth, moments, chosen)
     numbers = filled(chosen, [runs[k] for k in order], moments, laws)
-    return assembled(scenario, chosen, [runs[k] for k in order], moments, numbers, left_out)
+    found = assembled(scenario, chosen, [runs[k] for k in order], moments, numbers, left_out)
+    return joined(found, converge_bonds(scenario, _FOR_BONDS * budget_seconds)) if with_bonds else found
+
+
+def joined(found: xr.Dataset, of_bonds: xr.Dataset) -> xr.Dataset:
+    """Both comparisons in one dataset; they share no name."""
+    return found.assign_coords(of_bonds.coords).assign(of_bonds.data_vars).assign_attrs(of_bonds.attrs)
 
 
 def _distinct(chosen: Sequence[Setting]) -> tuple[list[Run], list[int]]:
@@ -228,4 +241,4 @@ def _columns(moment: Moment, stride: int, places: dict[int, int], step: float) -
     return shown, Lags(earlier, later, stride * step, moment.pooled)
 
 
-__all__ = ["converge", "figure", "plan_members", "recommendation", "table"]
+__all__ = ["bond_advice", "bond_table", "converge", "figure", "plan_members", "recommendation", "table"]

@@ -11,16 +11,19 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from sim.converge_table import cost
-from sim.plots import _LINES, _REFERENCE, _STYLE, _legend, _plain_ticks, _rows
+from sim.pictures import LINES, REFERENCE, STYLE, legend, plain_ticks, rows
 
 #: Errors below this are drawn at it, with an arrow: the closed forms are not exact to more.
 _FLOOR = 1e-4
+
+#: The same for bonds.
+_LEAST = 1e-8
 
 #: Decades between two labels.
 _GAP = 0.22
 
 _COLOURS = dict(zip(("mean", "banded", "modal", "mapped", "clock step", "grid"), (
-    _REFERENCE, _LINES[1], _LINES[0], _LINES[6], _LINES[2], _LINES[3]), strict=True))  # fmt: skip
+    REFERENCE, LINES[1], LINES[0], LINES[6], LINES[2], LINES[3]), strict=True))  # fmt: skip
 _MARKERS = {"mean": "D", "banded": "o", "modal": "s", "mapped": "v", "clock step": "^", "grid": "P"}
 _PANELS = ((r"error of $\Delta\Gamma$", 0), ("error of the radius $a$", 1))
 
@@ -50,25 +53,56 @@ def figure(dataset: xr.Dataset) -> Figure:
         cannot tell it from zero, an arrow hangs from two standard errors above it. Numbers are the
         tolerances of bands and the multiples of the clock step.
     """
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         panels = [panel for panel in _PANELS if _tells(dataset, panel[1])]
-        drawn, axes = _rows([1.9] * max(len(panels), 1))
+        bonds = [1.9] * ("bonds_error" in dataset)
+        drawn, axes = rows([1.9] * max(len(panels), 1) + bonds)
+        if bonds:
+            _draw_bonds(axes.pop(), dataset)
         lines = [str(line) for line in dict.fromkeys(dataset["line"].to_numpy())]
         for panel, (words, quantity) in zip(axes, panels or _PANELS[1:], strict=True):
             panel.set_xscale("log")
             panel.set_yscale("log")
             for line in lines:
                 _draw_line(panel, dataset, line, quantity)
-            panel.axhline(float(dataset.attrs["asked_tolerance"]), color=_REFERENCE, linestyle="--", linewidth=0.8)
+            panel.axhline(float(dataset.attrs["asked_tolerance"]), color=REFERENCE, linestyle="--", linewidth=0.8)
             panel.set_ylim(0.6 * _FLOOR, max(3.0, 1.5 * panel.get_ylim()[1]))
             panel.margins(x=0.12)
             if np.ptp(np.log10(panel.get_xlim())) < 1.5:
-                _plain_ticks(panel.xaxis)
+                plain_ticks(panel.xaxis)
             panel.yaxis.set_major_formatter(FuncFormatter(_decade))
             panel.set_ylabel(words)
-        axes[-1].set_xlabel("CPU time per member-step of the scene (µs)")
-        _legend(axes[0], _handles(lines))
+        drawn.axes[-1].set_xlabel("CPU time per member-step of the scene (µs)")
+        legend(axes[0], _handles(lines))
     return drawn
+
+
+_BOND_DEPTHS = {"steady": ("D", 4), "rate": ("s", 0), "cohort": ("o", 1), "counted": ("v", 2), "tracked": ("v", 2)}
+
+
+def _draw_bonds(panel: Axes, dataset: xr.Dataset) -> None:
+    """Errors of the bonds' stress, or of their fraction: of the mean without sites, else the noise of a member.
+
+    Those below 1e-8 are drawn at it.
+    """
+    which = 0 if np.any(np.isfinite(dataset["bonds_error"].to_numpy()[:, 0])) else 1
+    paid, sites = 1e6 * dataset["bonds_cpu_time"].to_numpy(), dataset["bonds_sites"].to_numpy()
+    error = np.abs(dataset["bonds_error"].to_numpy()[:, which])
+    error = np.where(sites > 0, dataset["bonds_noise"].to_numpy()[:, which], error)
+    model, step = dataset["bonds_model"].to_numpy(), dataset["bonds_finer"].to_numpy() > 1
+    panel.set_xscale("log")
+    panel.set_yscale("log")
+    for name in dict.fromkeys(model):
+        marker, colour = _BOND_DEPTHS[name]
+        told = (model == name) & ~step & np.isfinite(error) & np.isfinite(paid)
+        words = f"{name}, noise of a member" if np.any(sites[told]) else name
+        panel.plot(
+            paid[told], np.maximum(error[told], _LEAST), marker, linestyle="-", linewidth=0.8, markersize=3.6,
+            color=LINES[colour], label=words,
+        )  # fmt: skip
+    panel.axhline(float(dataset.attrs["bonds_tolerance_asked"]), color=REFERENCE, linestyle="--", linewidth=0.8)
+    panel.set_ylabel("error of the bonds' " + ("stress" if which == 0 else "fraction"))
+    legend(panel, panel.get_legend_handles_labels()[0])
 
 
 def _tells(dataset: xr.Dataset, quantity: int) -> bool:
@@ -84,7 +118,7 @@ def _decade(value: float, _: int) -> str:
 
 
 def _draw_line(panel: Axes, dataset: xr.Dataset, line: str, quantity: int) -> None:
-    colour, marker = _COLOURS.get(line, _LINES[4]), _MARKERS.get(line, "o")
+    colour, marker = _COLOURS.get(line, LINES[4]), _MARKERS.get(line, "o")
     rows = np.flatnonzero(dataset["line"].to_numpy() == line)
     points = [_point(dataset, int(row), quantity) for row in rows]
     known = [p for p in points if np.isfinite(p.known)]
@@ -169,12 +203,12 @@ def _point(dataset: xr.Dataset, row: int, quantity: int) -> _Point:
 
 def _handles(lines: list[str]) -> list[Line2D]:
     handles = [
-        Line2D([], [], color=_COLOURS.get(line, _LINES[4]), marker=_MARKERS.get(line, "o"), markersize=3.6, label=line)
+        Line2D([], [], color=_COLOURS.get(line, LINES[4]), marker=_MARKERS.get(line, "o"), markersize=3.6, label=line)
         for line in lines
     ]
     black: Any = {"color": "black", "linestyle": "none", "marker": "o", "markersize": 4.0}
     handles.append(Line2D([], [], **black, markerfacecolor="white", label="known before"))
     handles.append(Line2D([], [], **black, label="measured"))
     handles.append(Line2D([], [], color="black", linestyle="none", marker=r"$\downarrow$", label="not separated"))
-    handles.append(Line2D([], [], color=_REFERENCE, linestyle="--", linewidth=0.8, label="tolerance"))
+    handles.append(Line2D([], [], color=REFERENCE, linestyle="--", linewidth=0.8, label="tolerance"))
     return handles

@@ -12,7 +12,7 @@ import numpy as np
 from sim.motion import Motion
 from sim.noise import Noise
 from sim.parts.bonds import STATES
-from sim.parts.contact import Touch
+from sim.parts.contact import Balance, Touch
 from sim.processes import Fluctuation
 from sim.scenario import Scenario
 from sim.tracks import Tracks
@@ -48,21 +48,22 @@ class Dice:
 def start(scenario: Scenario, dice: Dice) -> State:
     """The state at t = 0."""
     motion = scenario.drive.motion(0, 0.0, 0.0, scenario.clock.duration)
-    bonds = scenario.population.start(motion, dice.bonds)
-    shear = scenario.process.start(motion, scenario.population.traction(bonds), dice.shear)
-    work = _work_left(scenario, bonds, shear)
-    contact = scenario.contact.start(work, scenario.sphere.radius, scenario.solid.contact_modulus)
+    population: Any = scenario.population  # each depth knows its own state
+    bonds = population.start(motion, dice.bonds)
+    shear = scenario.process.start(motion, population.traction(bonds), dice.shear)
+    contact = scenario.contact.start(motion, scenario.clock.duration, _balance(scenario, bonds, shear))
     return State(0, np.zeros(1), motion.speed, bonds, shear, contact)
 
 
 def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     """The state one clock step later."""
     motion = _motion(scenario, state.step + 1)
-    over = scenario.population.over(state.bonds, state.contact.radius)
-    bonds = scenario.population.advance(over, motion, dice.bonds)
-    shear = scenario.process.advance(state.shear, motion, scenario.population.traction(bonds), dice.shear)
-    work = _work_left(scenario, bonds, shear)
-    contact = scenario.contact.advance(state.contact, work, scenario.sphere.radius, scenario.solid.contact_modulus)
+    population: Any = scenario.population
+    over = population.over(state.bonds, state.contact.radius)
+    bonds = population.advance(over, motion, dice.bonds)
+    shear = scenario.process.advance(state.shear, motion, population.traction(bonds), dice.shear)
+    balance = _balance(scenario, bonds, shear)
+    contact = scenario.contact.advance(state.contact, motion, scenario.clock.duration, balance)
     return State(motion.step, state.position + motion.slip, motion.speed, bonds, shear, contact)
 
 
@@ -107,10 +108,13 @@ def _motion(scenario: Scenario, step: int) -> Motion:
     return scenario.drive.motion(step, clock.time(step - 1), clock.time(step), clock.duration)
 
 
-def _work_left(scenario: Scenario, bonds: Any, shear: Fluctuation) -> np.ndarray:
-    """w = Δγ(bond fraction) − χ ΔΓ [J/m^2]."""
-    bonded = scenario.adhesion.work_of_bonds(scenario.population.fraction(bonds))
-    return np.asarray(bonded - scenario.fluctuations.paid_by_adhesion * shear.energy)
+def _balance(scenario: Scenario, bonds: Any, shear: Fluctuation) -> Balance:
+    """What w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*) is made of."""
+    population = scenario.population
+    bonded = scenario.adhesion.work_of_bonds(population.fraction(bonds))
+    fluctuating = scenario.fluctuations.paid_by_adhesion * shear.energy
+    stress, reference = population.shear_stress(bonds), scenario.adhesion.work
+    return Balance(bonded, fluctuating, stress, scenario.margin, scenario.bodies, reference)
 
 
 def pack(state: Any, prefix: str = "") -> dict[str, np.ndarray]:

@@ -20,6 +20,7 @@ import numpy as np
 from sim.durable import StoreTrouble, explained, sync_folder
 from sim.engine import State, march, pack
 from sim.gauges import GAUGES
+from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.processes import MappedProcess
 from sim.scenario import Scenario
 from sim.store import (
@@ -130,14 +131,30 @@ def _record(
         for gauge in GAUGES:
             rows[gauge.name][:, column] = gauge.read(point, state)
         if state.step in snapshots and drawn:
-            maps[f"map.{snapshots[state.step]}"] = cast(MappedProcess, point.process).maps(
-                state.shear, np.broadcast_to(state.position, drawn), drawn
-            )
+            number, process = snapshots[state.step], cast(MappedProcess, point.process)
+            maps[f"map.{number}"] = process.maps(state.shear, np.broadcast_to(state.position, drawn), drawn)
+            if point.margin is not None:
+                maps[f"disc.{number}"] = _on_the_disc(point, state, maps[f"map.{number}"])
         if progress is not None:
             progress(len(members) * (point.clock.stride if record else 1))
     if not plan.scenario.record.per_member:
         rows = {g.name: moments(rows[g.name]) if plan.varies(g) else rows[g.name] for g in GAUGES}
     return rows | maps | {f"state.{name}": array for name, array in pack(state).items()}
+
+
+def _on_the_disc(point: Scenario, state: State, maps: np.ndarray) -> np.ndarray:
+    """Energies per area that the maps store on the contact's own disc, shape (2, maps) [J/m²].
+
+    ½⟨τ1 w1⟩, and ⟨τ1 w0⟩ with the displacement w0 of the mean stress.
+    """
+    cell, solid = cast(MappedProcess, point.process).modes.cell, point.solid.effective
+    radius, stress = (
+        np.broadcast_to(values, max(len(values), len(maps)))[: len(maps)]
+        for values in (state.contact.radius, point.population.shear_stress(state.bonds))
+    )
+    radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
+    own = disc_energy_of_map(maps, cell, radius, *solid)
+    return np.stack([own, cross_energy_of_map(maps, cell, radius, stress, *solid)])
 
 
 def _in_memory(plan: Plan, progress: Progress | None) -> Any:

@@ -19,6 +19,7 @@ from sim.memory import Constant
 from sim.parts.bonds import Cohort, Counted, Rate, Steady, Tracked, Unbroken
 from sim.processes import BandedProcess, FixedProcess, ModalProcess, SmoothProcess
 from sim.scenario import Scenario
+from sim.spectrum import BondMade
 
 Array = NDArray[np.float64]
 Steps = NDArray[np.int64]
@@ -170,8 +171,8 @@ def _mean_bonds(bonds: Any) -> Any:
         shared = ("critical_speed", "healing", "stress", "start_from")
         return Rate(**{name: getattr(bonds, name) for name in shared})
     if isinstance(bonds, Tracked):
-        shared = ("hazard", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
-        return Cohort(**{name: getattr(bonds, name) for name in shared})
+        stretched = ("hazard", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
+        return Cohort(**{name: getattr(bonds, name) for name in stretched})
     return bonds
 
 
@@ -202,13 +203,16 @@ class Expectation:
     @cached_property
     def tells_energy(self) -> bool:
         """Whether ΔΓ has this law: not where its growth follows bonds that differ between members."""
-        return not (self.scenario.fluctuations.reads_stress and self.scenario.population.per_member)
+        follows = isinstance(getattr(self.scenario.fluctuations, "spectrum", None), BondMade)
+        return not follows and not (self.scenario.fluctuations.reads_stress and self.scenario.population.per_member)
 
     @cached_property
     def tells_radius(self) -> bool:
         """Whether the radius is a function of ΔΓ and the bonds at one time: not where a contact may open for good."""
         known = not self.scenario.population.per_member or isinstance(self.scenario.population, Counted)
-        return self.tells_energy and known and never_opens(self.scenario)
+        contact = self.scenario.contact
+        plain = not contact.changes and contact.reversible == 0.0 and self.scenario.margin is None
+        return self.tells_energy and known and plain and never_opens(self.scenario)
 
     def energy(self, step: int) -> GammaSum:
         """The law of ΔΓ at a step [J/m^2]."""

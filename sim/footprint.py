@@ -38,7 +38,7 @@ class BondMade(Isotropic):
     0.63 mJ/m^2
     """
 
-    footprint: Annotated[float, Quantity("m", "radius of the disc that a bond pulls on", "b", above=0)]
+    footprint: Annotated[float, Quantity("m", "radius of the disc that a bond pulls on", "b", above=0, typical="1 nm")]
     model: Literal["bonds"] = "bonds"
 
     support: ClassVar[tuple[float, float]] = (0.0, math.inf)

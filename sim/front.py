@@ -177,8 +177,9 @@ def _radau(running, x, y, h, size, first, start, scene, front):
     """One step of Radau IIA: change of y, error over tolerance (nan: no solution), and energy/(2 pi work).
 
     Newton's steps are halved while they do not lower the residual. The error is that of the embedded
-    method, filtered by the stiffest slope met, so that a fast layer narrower than the tolerance is
-    stepped over. The energy is the method's own quadrature, of positive weights and signs.
+    method, filtered by the slope at the end: a fast layer narrower than the tolerance is stepped
+    over, but not a turn from a fast edge to a slow one. The energy is the method's own quadrature,
+    of positive weights and signs.
     """
     f, j, f_x = first
     g1, g2, g3 = _C1 * h, _C2 * h, h
@@ -197,7 +198,7 @@ def _radau(running, x, y, h, size, first, start, scene, front):
         change = max(abs(d1), abs(d2), abs(d3))
         if change <= 1e-3 * TOLERANCE * size:
             z1, z2, z3 = z1 - d1, z2 - d2, z3 - d3
-            error = (h * f + _E1 * z1 + _E2 * z2 + _E3 * z3) / (_REAL - h * min(0.0, j, j1, j2, j3))
+            error = (h * f + _E1 * z1 + _E2 * z2 + _E3 * z3) / (_REAL - h * min(0.0, j3))
             v1 = _I11 * z1 + _I12 * z2 + _I13 * z3
             v2 = _I21 * z1 + _I22 * z2 + _I23 * z3
             v3 = _I31 * z1 + _I32 * z2 + _I33 * z3

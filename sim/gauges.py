@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.engine import State
+from sim.grips import Grip
 from sim.scenario import Scenario
 
 
@@ -26,7 +27,8 @@ class Gauge:
 
 
 def _radius(scene: Scenario, state: State) -> np.ndarray:
-    return np.nan_to_num(state.contact.radius, nan=0.0)
+    stopped = scene.contact.on_detach == "stop"  # the trajectory ends there
+    return state.contact.radius if stopped else np.nan_to_num(state.contact.radius, nan=0.0)
 
 
 def _area(scene: Scenario, state: State) -> np.ndarray:
@@ -37,12 +39,20 @@ def _stress(scene: Scenario, state: State) -> np.ndarray:
     return scene.population.shear_stress(state.bonds)
 
 
+def _grip(scene: Scenario, state: State) -> Grip:
+    return scene.contact.grip(scene.clock.time(state.step), scene.clock.duration)
+
+
 def _load(scene: Scenario, state: State) -> np.ndarray:
-    return scene.contact.normal_load(state.contact.radius, scene.sphere.radius, scene.solid.contact_modulus)
+    return _grip(scene, state).normal_load(state.contact.radius, scene.bodies)
 
 
 def _indentation(scene: Scenario, state: State) -> np.ndarray:
-    return scene.contact.depth(state.contact.radius, scene.sphere.radius, scene.solid.contact_modulus)
+    return _grip(scene, state).depth(state.contact.radius, scene.bodies)
+
+
+def _travel(scene: Scenario, state: State) -> np.ndarray:
+    return _grip(scene, state).travel(state.contact.radius, scene.bodies)
 
 
 GAUGES = (
@@ -59,8 +69,15 @@ GAUGES = (
     Gauge("contact_area", "m^2", "contact area", "A", "contact", _area),
     Gauge("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact", _load),
     Gauge("indentation", "m", "indentation of the sphere", "delta", "contact", _indentation),
+    Gauge("travel", "m", "travel of what holds the sphere", "Delta", "contact", _travel),
     Gauge("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
           lambda scene, state: _stress(scene, state) * _area(scene, state)),
     Gauge("in_contact", "1", "whether the contact is closed", "", "contact",
           lambda scene, state: (state.contact.radius > 0.0).astype(float)),
+    Gauge("masked", "1", "whether no work of adhesion is left, so that the contact is Hertz's", "", "contact",
+          lambda scene, state: (state.contact.work <= 0.0).astype(float)),
+    Gauge("detachment_time", "s", "time of the last detachment", "t_d", "contact",
+          lambda scene, state: state.contact.detached),
+    Gauge("dissipated_energy", "J", "energy dissipated by the opening and closing of the contact", "W", "contact",
+          lambda scene, state: state.contact.dissipated),
 )  # fmt: skip

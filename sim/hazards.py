@@ -38,8 +38,12 @@ class Constant:
 class Bell:
     """Force helps heat to open a bond: k = k0 exp(f/f_b) (Bell 1978). Limit: ``Constant`` as f_b -> infinity."""
 
-    zero_force_rate: Annotated[float, Quantity("1/s", "rupture rate of an unstretched bond", "k_0", above=0)]
-    bell_force: Annotated[float, Quantity("N", "force that multiplies the rupture rate by e", "f_b", above=0)]
+    zero_force_rate: Annotated[
+        float, Quantity("1/s", "rupture rate of an unstretched bond", "k_0", above=0, typical="1e4 1/s")
+    ]
+    bell_force: Annotated[
+        float, Quantity("N", "force that multiplies the rupture rate by e", "f_b", above=0, typical="4 pN")
+    ]
     model: Literal["bell"] = "bell"
 
     def law(self, bond_stiffness: float) -> Hazard:
@@ -50,7 +54,7 @@ class Bell:
 class CutOff:
     """A bond opens by itself at one rate and breaks at a stretch for certain (after Chernyak & Leonov)."""
 
-    stretch: Annotated[float, Quantity("m", "stretch at which a bond breaks", "l", above=0)]
+    stretch: Annotated[float, Quantity("m", "stretch at which a bond breaks", "l", above=0, typical="30 nm")]
     rate: Annotated[float, Quantity("1/s", "rupture rate of a bond below that stretch", "1/t_0", at_least=0)] = 0.0
     model: Literal["cut_off"] = "cut_off"
 

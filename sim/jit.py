@@ -105,6 +105,15 @@ def law(function: Callable) -> Callable:
     return call
 
 
+@functools.lru_cache(maxsize=64)  # constants of a scene are asked for again and again
+def _filled(shape: tuple[int, ...], value: float) -> np.ndarray:
+    """An array of one number, which nobody may write to."""
+    array = np.empty(shape)
+    array.fill(value)
+    array.flags.writeable = False
+    return array
+
+
 def _in_blocks(ufunc: Callable, arguments: tuple) -> Any:
     """Call a ufunc; with large arrays beside single numbers in blocks in which the numbers are arrays, too.
 
@@ -115,13 +124,13 @@ def _in_blocks(ufunc: Callable, arguments: tuple) -> Any:
     size = max([array.size for array in arrays])
     if size < _BLOCK // 16:
         return ufunc(*arrays)
-    shapes = {array.shape for array in arrays if array.size != 1}
-    if len(shapes) != 1:
+    shapes = [array.shape for array in arrays if array.size != 1]
+    shape = shapes[0]
+    if shapes.count(shape) != len(shapes):
         return ufunc(*arrays)
-    (shape,) = shapes
     if size <= _BLOCK:
-        return ufunc(*[np.full(shape, array) if array.size == 1 else array for array in arrays])
-    flat = [np.full(_BLOCK, a) if a.size == 1 else np.ascontiguousarray(a).ravel() for a in arrays]
+        return ufunc(*[_filled(shape, array.item()) if array.size == 1 else array for array in arrays])
+    flat = [_filled((_BLOCK,), a.item()) if a.size == 1 else np.ascontiguousarray(a).ravel() for a in arrays]
     out = np.empty(size)
     for first in range(0, size, _BLOCK):
         block = slice(first, min(first + _BLOCK, size))

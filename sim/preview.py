@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.disc import marginal_energy
 from sim.gauges import GAUGES
 from sim.hazards import Bell
 from sim.laws import jkr
@@ -26,6 +27,7 @@ _TOLERANCE = 0.05
 #: Share of the mean stress above which the rms of the fluctuations is warned of: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5
 _LARGEST_SHARE = 0.3
+_BANDED = 0.01
 _SETTLED = "in steady sliding at the last speed"
 _MOST_LATTICES = 8
 _PARTS = ("drive", "bonds", "shear", "contact")
@@ -275,20 +277,22 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             )
         if isinstance(point.population, FirstMoment) and isinstance(point.population.hazard, Bell):
             said.append(_overprediction(point.population))
-        if fluctuating and isinstance(point.shear.spectrum, BondMade) and point.shear.paid_by_adhesion > 0.0:
+        made = isinstance(getattr(point.shear, "spectrum", None), BondMade)
+        if made and point.shear.paid_by_adhesion > 0.0:
             said.append("friction has paid for the energy under each bond: with paid_by_adhesion it counts twice")
+        if getattr(point.drive, "rest", 0.0) >= point.clock.duration:
+            said.append("the slider rests for the whole run: shorten drive.rest or lengthen clock.duration")
         if point.solid.poisson_ratio != 0.5:
             said.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         if fluctuating and point.shear.paid_by_adhesion > 0.0:
             said.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
-        if fluctuating and _longest_wave(point) > 2.0 * radius:
-            said.append("the longest waves exceed the contact, but the stored energy is that of many waves")
+        if fluctuating and point.margin is None:
+            said += _on_a_disc(point)
         if fluctuating and _reversed_friction(point) > _MOST_REVERSED:
             said.append(
                 f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
             )
-        pulled = min(value for value in (point.contact.load, point.contact.indentation) if value is not None) < 0.0
-        if pulled and point.varies["shear"]:
+        if point.contact.lowest < 0.0 and point.varies["shear"]:
             said.append("under tension detachment is a first passage: take clock steps well below the memory")
         smallest = getattr(getattr(point.fluctuations, "spectrum", None), "support", (0.0,))[0]
         if hasattr(point.fluctuations, "cell") and 2.0 * math.pi > _cell(point) * smallest > 0.0:
@@ -297,6 +301,21 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
         if max(off, default=0.0) > _TOLERANCE:
             said.append(f"the cell is off by more than {_TOLERANCE:.0%}: a larger cell or more points bring it closer")
     return [(text,) for text in dict.fromkeys(said)]
+
+
+def _on_a_disc(point: Scenario) -> list[str]:
+    """By how much the plane's energy is off for a contact of this size, if that is more than the tolerance."""
+    plane = float(np.asarray(point.shear.spectrum.surface_energy(*point.solid.effective)))  # type: ignore[union-attr]
+    if not (plane > 0.0 and point.rest_radius > 0.0):
+        return []
+    spectrum, tolerance = point.shear.spectrum, getattr(point.shear, "tolerance", _BANDED)  # type: ignore[union-attr]
+    paid = float(np.asarray(marginal_energy(spectrum, point.rest_radius, *point.solid.effective)))
+    if abs(paid / plane - 1.0) <= tolerance:
+        return []
+    long = _longest_wave(point) > 2.0 * point.rest_radius
+    what = "the longest waves exceed the contact, which" if long else "a contact of this size"
+    off = f"{what} pays {paid / plane:.1%} of the plane's fluctuation energy when it grows"
+    return [f'{off}: shear.contact = "disc" takes that into account']
 
 
 def _overprediction(bonds: FirstMoment) -> str:

@@ -119,7 +119,8 @@ class Quantity:
     """Declaration of a number: its SI ``unit``, ``meaning``, ``symbol`` and bounds.
 
     ``above`` and ``below`` exclude the bound, ``at_least`` and ``at_most`` include it. Beside its
-    own bounds no number may exceed 1e60, nor one that excludes zero fall below 1e-60.
+    own bounds no number may exceed 1e60, nor one that excludes zero fall below 1e-60. Messages show
+    ``typical`` as an example, without it a usual value of the unit.
 
     Examples
     --------
@@ -135,6 +136,7 @@ class Quantity:
     at_least: float = -math.inf
     below: float = math.inf
     at_most: float = math.inf
+    typical: str = ""
 
     def read(self, value: Any) -> float:
         """The value in SI from a number or a string such as ``"42 mJ/m^2"``.
@@ -236,6 +238,8 @@ class Quantity:
     @property
     def example(self) -> str:
         """An admissible value as it is written in a scenario file."""
+        if self.typical:
+            return f'"{self.typical}"'
         if self.unit in _TYPICAL and self._holds(1e-6) and self._holds(1e6):
             return f'"{_TYPICAL[self.unit]}"'
         usual = (0.5, 1.0) if math.isfinite(min(self.below, self.at_most)) else (1.0, 0.5)

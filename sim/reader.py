@@ -190,7 +190,8 @@ def scenario_schema() -> dict[str, Any]:
             table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
     for name in _in_unions(schema):  # there the model tells the tables apart, so it cannot be left out
         table = schema["$defs"][name]
-        table["required"] = ["model", *table.get("required", ())]
+        if "model" in table["properties"] and name != "Equilibrium":  # which a contact without a model is
+            table["required"] = ["model", *table.get("required", ())]
     schema["properties"].pop("source", None)
     schema["properties"]["sweep"] = {
         "description": "keys with lists of values (outer product), or a list of tables (zipped)",

@@ -2,6 +2,7 @@
 
 import errno
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass as plain_dataclass
 from dataclasses import field, fields, is_dataclass
 from functools import cached_property
@@ -14,10 +15,12 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from sim.bodies import Adhesion, Solid, Sphere
+from sim.grips import Bodies
+from sim.margin import Margin
 from sim.parts.bonds import Auto as AutoBonds
 from sim.parts.bonds import Bonds, Unbroken
 from sim.parts.bonds import Depth as BondDepth
-from sim.parts.contact import Contact
+from sim.parts.contact import Contact, Lagging
 from sim.parts.drive import Drive, Table
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.shear import Auto, Depth, Mean, Modal, Shear, Uniform
@@ -224,6 +227,18 @@ class Scenario:
         cell = math.sqrt(math.pi) * self.rest_radius
         return self.fluctuations.process(shear_modulus, poisson_ratio, cell)
 
+    @cached_property
+    def bodies(self) -> Bodies:
+        """What touches."""
+        return Bodies(self.sphere.radius, self.solid.contact_modulus, self.solid.effective[1])
+
+    @cached_property
+    def margin(self) -> Margin | None:
+        """Share of ΔΓ that a contact of finite radius pays when it grows; None where waves are taken as short."""
+        if getattr(self.fluctuations, "contact", "plane") == "plane":
+            return None
+        return Margin(self.fluctuations.spectrum, *self.solid.effective, self.sphere.radius)  # type: ignore[union-attr]
+
     def release(self) -> None:
         """Let go of the process, whose arrays may be large; it is made again when it is asked for."""
         self.__dict__.pop("process", None)
@@ -330,13 +345,20 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
     return []
 
 
+def _no_adhesion(contact: Contact, adhesion: Adhesion) -> Faults:
+    if isinstance(contact, Lagging) and not adhesion.work > 0.0:
+        said = "a lagging edge measures its drive by the work of adhesion at rest; give a work above zero"
+        return [(("adhesion", "work"), said)]
+    return []
+
+
 def _reads_forces(shear: Any) -> bool:
     """Whether the shear part follows the forces of the single bonds."""
     return isinstance(getattr(shear, "spectrum", None), BondMade)
 
 
 def _no_stress(shear: Depth, bonds: BondDepth) -> Faults:
-    if shear.reads_stress and not bonds.carries_stress:
+    if shear.reads_stress and not bonds.carries_stress and not _reads_forces(shear):
         said = 'growth model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
         return [(("shear", "growth"), said)]
     return []
@@ -386,6 +408,10 @@ def _shear_faults(shear: Depth, solid: Solid, sphere: Sphere, adhesion: Adhesion
     cell = shear.cell or math.sqrt(math.pi) * _rest_radius(solid, sphere, adhesion, contact)
     if not cell > 0.0:
         return [(("shear",), 'there is no contact at rest to set the cell by; give a cell such as cell = "0.2 mm"')]
+    radius = _rest_radius(solid, sphere, adhesion, contact)
+    if shear.contact == "disc" and shear.draws_maps and not 2.0 * radius <= cell:
+        said = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * radius:g} m wide at rest"
+        return [(("shear", "cell"), f"{said}; give a larger cell")]
     too_many = _too_many_modes(shear, cell)
     if too_many:
         return [(("shear",), f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
@@ -414,6 +440,7 @@ _CHECKS: tuple[tuple[tuple[str, ...], Any], ...] = (
     (("drive", "clock"), _table_too_short),
     (("shear", "bonds"), _no_stress),
     (("shear", "bonds", "solid"), _no_forces),
+    (("contact", "adhesion"), _no_adhesion),
     (("record", "shear"), _no_maps),
     (("record", "clock"), _unrecorded_maps),
     (("record", "ensemble"), _too_many_map_members),
@@ -434,12 +461,19 @@ def quantities(part: Any, prefix: str = "") -> dict[str, tuple[Quantity, float]]
             found |= quantities(value, f"{key}.")
         elif isinstance(value, int | float) and not isinstance(value, bool) and declared is not None:
             meaning = declared.description or item.name.replace("_", " ")
-            found[key] = (_declaration(declared) or Quantity("1", meaning), value)
+            found[key] = (declaration(declared) or Quantity("1", meaning), value)
     return found
 
 
-def _declaration(declared: Any) -> Quantity | None:
-    candidates = [*declared.metadata]
-    for option in getattr(declared.annotation, "__args__", ()):
-        candidates += getattr(option, "__metadata__", ())
-    return next((item for item in candidates if isinstance(item, Quantity)), None)
+def declaration(declared: Any) -> Quantity | None:
+    """What a field of a part is declared to be, None where it is no quantity."""
+    notes = (*declared.metadata, *_noted(declared.annotation))
+    return next((item for item in notes if isinstance(item, Quantity)), None)
+
+
+def _noted(annotation: Any) -> Iterator[Any]:
+    """What the alternatives of an annotation are annotated with; a number comes before the tables it may be."""
+    yield from getattr(annotation, "__metadata__", ())
+    for option in getattr(annotation, "__args__", ()):
+        if not is_dataclass(option):
+            yield from _noted(option)

@@ -27,6 +27,10 @@ from sim.scenario import Scenario, quantities
 _GROUP = 64
 _PART_NUMBERS = 2**22
 _STATE_NUMBERS = 2**25
+_DISC_ENERGIES = (
+    ("disc_energy", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
+    ("cross_energy", "energy of the map in the field of the mean stress, per area of the disc", "DeltaGamma_x"),
+)
 _STATISTICS = {
     "mean": "ensemble mean of",
     "std": "standard deviation over the ensemble of",
@@ -363,12 +367,20 @@ def _maps(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
         variable[:] = np.arange(points) * (cell / points)
     names = (*_sweep_names(plan), "map_realization", "snapshot", "x", "y")
     variable = _variable(file, "shear_map", "f8", names, "Pa", "shear-stress fluctuation", "tau_1")
+    energies = [
+        _variable(file, name, "f8", names[:-2], "J/m^2", text, symbol)
+        for name, text, symbol in _DISC_ENERGIES
+        if all(point.margin is not None for point in plan.points)
+    ]
     for number, point in enumerate(plan.points):
         where = np.unravel_index(number, _sweep_shape(plan)) if plan.scenario.sweep else ()
         for index in range(len(plan.stretches(point))):
             for group, members in enumerate(plan.groups()):
                 part = parts.load(part_name(number, group, index), "map.")
-                for name in part:
-                    snapshot, mapped = int(name.removeprefix("map.")), part[name]
-                    rows = slice(members[0], members[0] + len(mapped))
-                    variable[(*where, rows, snapshot)] = mapped
+                part |= parts.load(part_name(number, group, index), "disc.") if energies else {}
+                for name, values in part.items():
+                    kind, _, snapshot = name.partition(".")
+                    rows = slice(members[0], members[0] + values.shape[0 if kind == "map" else 1])
+                    kept = [(variable, values)] if kind == "map" else zip(energies, values, strict=True)
+                    for target, array in kept:
+                        target[(*where, rows, int(snapshot))] = array

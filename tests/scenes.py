@@ -5,7 +5,7 @@ from sim.hazards import Bell, Constant, CutOff
 from sim.memory import Constant as Ungrowing
 from sim.memory import Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.parts import bonds, drive, shear
-from sim.parts.contact import Equilibrium
+from sim.parts.contact import Equilibrium, Lagging
 from sim.scenario import Clock, Ensemble, Scenario
 from sim.spectrum import Band, Gaussian, Ripple, SelfAffine
 
@@ -73,6 +73,8 @@ SHEARS = {
         growth=Stress(reference=2e5, relaxing=True),
     ),
     "banded, fixed": shear.Banded(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), amplitudes="fixed"),
+    "modal on a disc": shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), contact="disc"),
+    "mean on a disc": shear.Mean(spectrum=Gaussian(rms=1e5, length=2e-5), contact="disc", paid_by_adhesion=0.5),
     "auto with memory": shear.Auto(spectrum=SPECTRUM, cell=CELL, memory=Diffusion(diffusivity=1e-9)),
     "auto without memory": shear.Auto(spectrum=SPECTRUM),
     "modal ripple": shear.Modal(
@@ -90,6 +92,17 @@ CONTACTS = {
     "tension": Equilibrium(load=-0.3e-3),
     "indentation": Equilibrium(indentation=2e-6),
     "lifted": Equilibrium(indentation=-0.5e-6),
+    "machine": Equilibrium(travel=1e-6, stiffness=2e3, on_detach="reattach"),
+    "load there and back": Equilibrium(load={"from": 4e-3, "to": -1e-3, "trips": 1}, on_detach="reattach"),
+    "travel there and back": Equilibrium(
+        travel={"from": 1e-6, "to": -3e-6, "trips": 2}, stiffness=500.0, on_detach="stop", reversible=0.05
+    ),
+    "indentation in a table": Equilibrium(indentation={"time": [0.0, 5e-3, 1.0], "value": [2e-6, -2e-6, -2e-6]}),
+    "lagging": Lagging(load=4e-3, front_speed=1e-2),
+    "lagging cycle": Lagging(
+        indentation={"from": 1e-6, "to": -2e-6, "trips": 1}, front_speed=1e-2, heal_speed=1e-3, on_detach="reattach"
+    ),
+    "partly reversible": Equilibrium(load=4e-3, reversible=0.02),
 }
 
 

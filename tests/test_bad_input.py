@@ -136,7 +136,8 @@ def test_a_key_in_the_wrong_table_is_told_with_the_right_one(refusal, line, adde
 def test_a_key_of_another_model_is_told_with_the_models_that_have_it(refusal):
     at = line_of('healing = "500 1/s"')
     assert refusal(**edited(('model = "rate"', 'model = "steady"'))) == [
-        f'x:{at}: bonds.healing: is not a key of model = "steady"; remove it, or choose model = "rate", "counted" or "auto"'
+        f'x:{at}: bonds.healing: is not a key of model = "steady";'
+        ' remove it, or choose model = "rate", "counted" or "auto"'
     ]
 
 
@@ -175,7 +176,8 @@ def test_missing_keys_and_tables_are_told_with_an_example(refusal):
 
 def test_a_missing_model_is_told_with_the_choices(refusal):
     assert refusal(**edited(('[bonds]\nmodel = "rate"', "[bonds]"))) == [
-        f'x:{line_of("[bonds]")}: bonds.model: is missing; choose "none", "steady", "rate", "cohort", "counted", "tracked" or "auto"'
+        f"x:{line_of('[bonds]')}: bonds.model: is missing;"
+        ' choose "none", "steady", "rate", "cohort", "counted", "tracked" or "auto"'
     ]
 
 
@@ -385,6 +387,175 @@ def test_all_faults_come_in_one_pass_in_the_order_of_the_file(refusal):
     assert keys == [*wanted, "contact", "ensemble.members"]
     numbers = [int(problem.split(":")[1]) for problem in found]
     assert numbers == sorted(numbers)
+
+
+# --- bonds with a stretch ---
+
+HAZARD = 'hazard = { model = "bell", zero_force_rate = "200 1/s", bell_force = "4 pN" }'
+STRETCHED = [HAZARD, 'bond_stiffness = "0.4 uN/m"', 'rebinding_rate = "400 1/s"', 'site_density = "1e17 1/m^2"']
+LINEAR = ['critical_speed = "10 mm/s"', 'healing = "500 1/s"']
+BONDS = line_of("[bonds]")
+NEEDS = "give either critical_speed and healing, or hazard, bond_stiffness, rebinding_rate and site_density"
+
+
+def bonded(model, *lines, shear=None):
+    """The lens with other bonds, whose lines begin two below their table, and another shear part."""
+    text = LENS.replace("\n".join(['model = "rate"', *LINEAR]), "\n".join([f'model = "{model}"', *lines]))
+    if shear is not None:
+        text = re.sub(r"(?s)\[shear\].*?(?=\[contact\])", "[shear]\n" + "\n".join(shear) + "\n\n", text)
+    return text
+
+
+@pytest.mark.parametrize("model", ["rate", "cohort", "tracked"])
+def test_bonds_with_a_stretch_are_told_which_keys_they_lack(refusal, model):
+    sites = ["sites = 50"] if model == "tracked" else []
+    tables = 'the table [bonds.hazard] with model = "constant", "bell" or "cut_off"'
+    assert refusal(bonded(model, *STRETCHED[1:], *sites)) == [f"x:{BONDS}: bonds.hazard: is missing; add {tables}"]
+    lacking = [problem.split(" for example")[0] for problem in refusal(bonded(model, HAZARD, *sites))]
+    assert lacking == [
+        f"x:{BONDS}: bonds.{key}: is missing; add" for key in ("bond_stiffness", "rebinding_rate", "site_density")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("hazard", "key", "said"),
+    [
+        ('{ model = "bel", bell_force = 1 }', "hazard.model", 'must not be "bel"; did you mean "bell"?'),
+        ('{ model = "arrhenius" }', "hazard.model", 'must be "constant", "bell" or "cut_off", not "arrhenius"'),
+        ("{ rate = 1 }", "hazard.model", 'is missing; choose "constant", "bell" or "cut_off"'),
+        ('"bell"', "hazard", 'must be a table, not text; write hazard = { model = "bell" }'),
+        ('{ model = "bell", zero_force_rate = 1 }', "hazard.bell_force", "is missing; add for example bell_force = "),
+        ('{ model = "constant" }', "hazard.rate", "is missing; add for example rate = "),
+        ('{ model = "cut_off" }', "hazard.stretch", "is missing; add for example stretch = "),
+        ('{ model = "bell", zero_force_rate = 1, bell_force = "4 pN/m" }', "hazard.bell_force",
+         'has the unit "pN/m", which is not a unit of N; write for example "'),
+        ('{ model = "bell", zero_force_rate = 0, bell_force = 1 }', "hazard.zero_force_rate", "must be above 0 1/s"),
+        ('{ model = "cut_off", stretch = "-1 nm" }', "hazard.stretch", "must be above 0 m, not -1e-09 m"),
+        ('{ model = "cut_off", stretch = 1, rate = -1 }', "hazard.rate", "must be at least 0 1/s, not -1 1/s"),
+        ('{ model = "bell", zero_force_rate = 1, bell_force = 1, stretch = 1 }', "hazard.stretch",
+         'is not a key of model = "bell"; remove it, or choose model = "cut_off"'),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("model", ["rate", "cohort", "auto"])
+def test_a_bad_hazard_is_told_with_its_key_and_the_cure(refusal, model, hazard, key, said):
+    (problem,) = refusal(bonded(model, f"hazard = {hazard}", *STRETCHED[1:]))
+    assert problem.startswith(f"x:{BONDS + 2}: bonds.{key}: {said}")
+
+
+@pytest.mark.parametrize(
+    ("model", "added", "said"),
+    [
+        ("rate", 'critical_speed = "1 mm/s"', "critical_speed: does not go with hazard; leave one of them out"),
+        ("rate", 'stress = "1 MPa"', "stress: does not go with hazard; leave one of them out"),
+        ("rate", "tolerance = 0.1", 'tolerance: is not a key of model = "rate"; remove it, or choose model = "cohort"'),
+        ("cohort", 'critical_speed = "1 mm/s"', 'critical_speed: is not a key of model = "cohort"; remove it, or'),
+        ("cohort", 'stress = "1 MPa"', 'stress: is not a key of model = "cohort"; remove it, or choose model = "n'),
+        ("cohort", "sites = 5", 'sites: is not a key of model = "cohort"; remove it, or choose model = "counted", "t'),
+        ("cohort", "tolerance = 0", "tolerance: must be at least 1e-12, not 0"),
+        ("cohort", "tolerance = 0.1", "tolerance: must be below 0.1, not 0.1"),
+        ("cohort", "tolerance = -1e-3", "tolerance: must be at least 1e-12, not -0.001"),
+        ("cohort", 'area = "carry"', 'area: must not be "carry"; did you mean "carried"?'),
+        ("cohort", 'area = "old"', 'area: must be "present" or "carried", not "old"'),
+        ("cohort", 'start = "resting"', 'start: must be "steady", "bonded" or "empty", not "resting"'),
+        ("tracked", "sites = 0", "sites: must be at least 1, not 0"),
+        ("tracked", "sites = 10_000_000", "sites: must be at most 1000000, not 10000000"),
+        ("tracked", "sites = 2.5", "sites: must be a whole number such as 64, not 2.5"),
+        ("tracked", "sites = true", "sites: must be a whole number such as 64, not true"),
+        ("auto", "sites = 0", "sites: must be at least 1, not 0"),
+        ("auto", "tolerance = 0", "tolerance: must be above 0, not 0"),
+        ("auto", "tolerance = 1", "tolerance: must be below 1, not 1"),
+    ],
+)  # fmt: skip
+def test_a_bad_key_of_bonds_with_a_stretch_is_told_with_the_cure(refusal, model, added, said):
+    (problem,) = refusal(bonded(model, *STRETCHED, added))
+    assert problem.startswith(f"x:{BONDS + 6}: bonds.{said}")
+
+
+def test_tracked_bonds_without_a_number_or_with_an_area_are_told(refusal):
+    assert refusal(bonded("tracked", *STRETCHED)) == [f"x:{BONDS}: bonds.sites: is missing; add for example sites = 64"]
+    (problem,) = refusal(bonded("tracked", *STRETCHED, "sites = 5", 'area = "carried"'))
+    assert problem.startswith(f'x:{BONDS + 7}: bonds.area: is not a key of model = "tracked"; remove it, or choose')
+
+
+@pytest.mark.parametrize(
+    ("lines", "said"),
+    [
+        ([], NEEDS),
+        (["sites = 3"], NEEDS),
+        ([*LINEAR, *STRETCHED], NEEDS),
+        ([LINEAR[0], STRETCHED[1]], NEEDS),
+        (LINEAR[:1], "healing is missing, which bonds like these need"),
+        (LINEAR[1:], "critical_speed is missing, which bonds like these need"),
+        (STRETCHED[:3], "site_density is missing, which bonds like these need"),
+        ([*STRETCHED, 'stress = "1 MPa"'], "bonds with a hazard make their own stress; leave stress out"),
+    ],
+)
+def test_bonds_left_open_take_the_keys_of_one_kind(refusal, lines, said):
+    assert refusal(bonded("auto", *lines)) == [f"x:{BONDS}: bonds: {said}"]
+
+
+MADE = ['model = "mean"', 'spectrum = { model = "bonds", footprint = "10 um" }']
+CELLED = [MADE[1], 'memory = { model = "time", time = "1 ms" }', 'cell = "0.24 mm"']
+
+
+@pytest.mark.parametrize(
+    ("shear", "key", "said"),
+    [
+        ([MADE[0], 'spectrum = { model = "bonds" }'], "shear.spectrum.footprint", "is missing; add for example foot"),
+        ([MADE[0], 'spectrum = { model = "bonds", footprint = 0 }'], "shear.spectrum.footprint", "must be above 0 m"),
+        ([MADE[0], 'spectrum = { model = "bonds", footprint = "1 um", rms = 1 }'], "shear.spectrum.rms",
+         'is not a key of model = "bonds"; remove it, or choose model = "band", '),
+        ([*MADE, 'growth = { model = "onset", speed = 1, width = 0.1 }'], "shear",
+         "the bonds set the size of the field they make; leave growth out"),
+        (['model = "banded"', *CELLED], "shear", "the frozen part of a field that bonds make has no bands; use mod"),
+        (['model = "modal"', *CELLED, "points = 32", 'amplitudes = "fixed"'], "shear",
+         'bonds at random places make amplitudes = "gaussian"; leave it out'),
+        (['model = "modal"', *CELLED], "shear", "the spectrum has no shortest wavelength; give points (such as points"),
+        ([MADE[0], 'spectrum = { model = "bonds", footprint = "10 fm" }'], "bonds.bond_stiffness",
+         "the half-space under a bond of this footprint yields with 7.9e-08 N/m, in series with the bond: give at mo"),
+    ],
+)  # fmt: skip
+def test_a_field_that_bonds_cannot_make_is_told(refusal, shear, key, said):
+    (problem,) = refusal(bonded("cohort", *STRETCHED, shear=shear))
+    assert re.match(r"x:\d+: ", problem)
+    assert problem.split(": ", 1)[1].startswith(f"{key}: {said}")
+
+
+@pytest.mark.parametrize(
+    ("model", "lines"),
+    [
+        ("none", ['stress = "1 MPa"']),
+        ("rate", [*LINEAR, 'stress = "1 MPa"']),
+        ("counted", [*LINEAR, 'stress = "1 MPa"', "sites = 5"]),
+        ("auto", [*LINEAR, 'stress = "1 MPa"']),
+        ("rate", LINEAR),
+        ("auto", LINEAR),
+        ("rate", STRETCHED),
+    ],
+)
+def test_a_field_of_bonds_whose_forces_are_not_known_is_told_with_the_depths_that_know(refusal, model, lines):
+    (problem,) = refusal(bonded(model, *lines, shear=MADE))
+    assert problem.endswith(
+        ": shear.spectrum: the spectrum that bonds make needs the force of each bond;"
+        ' use bonds.model = "cohort" or "tracked"'
+    )
+
+
+@pytest.mark.parametrize(
+    ("lines", "at", "said"),
+    [
+        (['rest = "-1 s"', "speed = 1"], 2, "rest: must be at least 0 s, not -1 s"),
+        (['rest = "1 m"', "speed = 1"], 2, 'rest: has the unit "m", which is not a unit of s; write for example'),
+        (["rest = 1", 'speed = "1 N"'], 3, 'speed: has the unit "N", which is not a unit of m/s; write for example'),
+        (["speed = 1"], 0, "rest: is missing; add for example rest = "),
+        (["rest = 1"], 0, "speed: is missing; add for example speed = "),
+        (["rest = 1", "speed = 1", "to = 3"], 4, 'to: is not a key of model = "start"; remove it, or choose model'),
+    ],
+)  # fmt: skip
+def test_a_bad_start_is_told(refusal, lines, at, said):
+    drive = "\n".join(["[drive]", 'model = "start"', *lines, "", ""])
+    (problem,) = refusal(re.sub(r"(?s)\[drive\].*?(?=\[bonds\])", drive, LENS))
+    assert problem.startswith(f"x:{line_of('[drive]') + at}: drive.{said}")
 
 
 # --- files that a scenario names ---

@@ -314,9 +314,7 @@ def test_relaxing_growth_follows_the_law_of_all_modes_after_a_jump():
         state = process.start(motion.motion(8 * run, 0.0, 0.0, 1.0), UNLOADED, noise)
         energies = [state.energy]
         for i in range(4):
-            state = process.advance(
-                state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), UNLOADED, noise
-            )
+            state = process.advance(state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), UNLOADED, noise)
             energies.append(state.energy)
         found.append(energies)
     law = law_of(weights)

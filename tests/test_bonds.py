@@ -1,13 +1,17 @@
 """Bond populations against their exact laws."""
 
+import math
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scenes import scene
+from scenes import BELL, CUT_OFF, STRETCHED, scene
 from scipy.stats import binom, chi2
 
 from sim.engine import march
-from sim.parts import bonds, drive
+from sim.footprint import BondMade
+from sim.hazards import Constant
+from sim.parts import bonds, drive, shear
 from sim.scenario import Clock
 
 STEPPED = drive.Table(time=(0.0, 0.7, 0.7, 1.4, 1.4, 2.1), speed=(1e-5, 1e-5, 8e-2, 8e-2, 2e-3, 2e-3))
@@ -89,3 +93,64 @@ def test_counted_bonds_serve_one_bond_and_a_hundred_million(sites):
 def test_the_steady_law_follows_the_speed_at_once():
     law = bonds.Steady(critical_speed=1e-2)
     assert_allclose(fractions(law, STEPPED, 21)[[1, 10, 20], 0], [1 / 1.001, 1 / 9, 1 / 1.2], rtol=1e-12)
+
+
+# --- the choice of the depth
+
+LINEAR = {"critical_speed": 1e-2, "healing": 3.0}
+FIELD = shear.Mean(spectrum=BondMade(footprint=1e-5))
+
+
+@pytest.mark.parametrize(
+    ("auto", "depth", "why"),
+    [
+        (bonds.Auto(**LINEAR), bonds.Rate, "no number of sites is given; the rupture rate does not depend on the str"),
+        (bonds.Auto(**LINEAR, sites=9_999), bonds.Counted, "1/√N of 9,999 sites is 0.01, above the tolerance of 0.01"),
+        (bonds.Auto(**LINEAR, sites=10_000), bonds.Rate, "1/√N of 10,000 sites is 0.01, within the tolerance of 0.01"),
+        (bonds.Auto(**LINEAR, sites=10_000, tolerance=5e-3), bonds.Counted, "is 0.01, above the tolerance of 0.005"),
+        (bonds.Auto(**LINEAR, sites=1, tolerance=0.999), bonds.Counted, "1/√N of 1 site is 1, above the tolerance"),
+        (bonds.Auto(hazard=BELL, **STRETCHED), bonds.Cohort, "within the tolerance of 0.01; the hazard depends on"),
+        (bonds.Auto(hazard=CUT_OFF, **STRETCHED), bonds.Cohort, "the hazard depends on the stretch"),
+        (bonds.Auto(hazard=BELL, **STRETCHED, sites=64), bonds.Tracked, "1/√N of 64 sites is 0.125, above the toler"),
+        (bonds.Auto(hazard=BELL, **STRETCHED | {"site_density": 1e11}), bonds.Tracked, "4,547 sites is 0.0148, above"),
+        (bonds.Auto(hazard=BELL, **STRETCHED, sites=10_000), bonds.Cohort, "10,000 sites is 0.01, within the to"),
+        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED, sites=64), bonds.Tracked, "above the tolerance of 0.01"),
+        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), bonds.FirstMoment, "rate does not depend on the stretch"),
+    ],
+)  # fmt: skip
+def test_the_depth_left_open_is_chosen_by_noise_and_hazard(auto, depth, why):
+    scenario = scene(bonds=auto)
+    assert type(scenario.population) is depth
+    assert why in scenario.why["bonds"]
+    assert scenario.varies["bonds"] == (depth in (bonds.Counted, bonds.Tracked))
+
+
+def test_bonds_whose_forces_are_read_are_resolved_even_at_a_constant_rate():
+    auto = bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED)
+    scenario = scene(bonds=auto, shear=FIELD)
+    assert type(scenario.population) is bonds.Cohort
+    assert scenario.why["bonds"].endswith("the forces of the bonds are read")
+
+
+def test_the_number_of_sites_is_given_or_that_of_the_contact_at_rest():
+    area = math.pi * scene().rest_radius ** 2
+    by_density = bonds.Auto(hazard=BELL, **STRETCHED | {"site_density": 1e11})
+    assert by_density.number(area) == scene(bonds=by_density).population.sites == round(1e11 * area)
+    assert bonds.Auto(hazard=BELL, **STRETCHED, sites=12).number(area) == 12
+    assert by_density.number(1e-15) == 1.0  # the smallest contact holds one
+    assert by_density.number(0.0) == by_density.number(math.nan) == bonds.Auto(**LINEAR).number(area) == math.inf
+
+
+@pytest.mark.parametrize(("tolerance", "cohorts"), [(0.5, 1e-4), (1e-2, 1e-4), (1e-4, 1e-5)])
+def test_cohorts_chosen_are_finer_than_the_noise_left_out(tolerance, cohorts):
+    auto = bonds.Auto(hazard=BELL, **STRETCHED, tolerance=tolerance)
+    assert_allclose(scene(bonds=auto).population.tolerance, cohorts, rtol=1e-15)
+
+
+def test_the_choice_keeps_what_the_depth_is_given():
+    shared = {"start_from": "empty", "area": "carried"}
+    assert scene(bonds=bonds.Auto(**LINEAR, **shared, stress=2e5)).population == bonds.Rate(
+        **LINEAR, **shared, stress=2e5
+    )
+    chosen = scene(bonds=bonds.Auto(hazard=BELL, **STRETCHED, **shared)).population
+    assert chosen == bonds.Cohort(hazard=BELL, **STRETCHED, **shared)

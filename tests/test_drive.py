@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from scenes import DRIVES
 from scipy.integrate import quad
 
-from sim.parts.drive import Ramp, Steady, Table
+from sim.parts.drive import Ramp, Start, Steady, Table
 
 DURATION = 0.02
 
@@ -63,6 +63,41 @@ def test_a_jump_of_the_table_lies_between_two_steps():
     assert_allclose([before.speed[0], after.speed[0]], [1.0, 5.0], rtol=1e-15)
 
 
+def test_a_start_rests_and_slides_at_once():
+    start = Start(rest=0.5, speed=-3.0)
+    before, within, after = (start.motion(1, a, b, 2.0) for a, b in ((0.1, 0.4), (0.3, 1.0), (1.0, 2.0)))
+    assert [part.slip[0] for part in (before, within, after)] == [0.0, -1.5, -3.0]
+    assert [part.path[0] for part in (before, within, after)] == [0.0, 1.5, 3.0]
+    assert [(part.first[0], part.speed[0]) for part in (before, within, after)] == [
+        (0.0, 0.0),
+        (0.0, -3.0),
+        (-3.0, -3.0),
+    ]
+
+
+def test_a_start_is_still_up_to_its_rest_and_moves_from_there_on():
+    start = Start(rest=1.0, speed=5.0)
+    before, after = start.motion(1, 0.5, 1.0, 2.0), start.motion(2, 1.0, 1.5, 2.0)
+    assert [before.slip[0], before.speed[0], after.slip[0], after.first[0]] == [0.0, 0.0, 2.5, 5.0]
+
+
+def test_a_clock_time_meant_to_be_the_end_of_the_rest_is_it():
+    # 0.3 of a run is 3 of 10 steps but for rounding: not a bit of sliding comes before it
+    start, times = Start(rest=0.3, speed=1.0), [k * 0.1 for k in range(11)]
+    assert times[3] != 0.3
+    steps = [start.motion(k + 1, times[k], times[k + 1], 1.0) for k in range(10)]
+    assert [step.speed[0] for step in steps] == [0.0] * 3 + [1.0] * 7
+    assert steps[2].slip[0] == 0.0 and steps[3].first[0] == 1.0
+    assert_allclose(steps[3].slip, 0.1, rtol=1e-14)
+
+
+def test_a_start_without_rest_is_steady_and_one_that_outlasts_the_run_stays_at_rest():
+    moving, still = (Start(rest=rest, speed=2e-3).motion(1, 0.0, 5.0, 10.0) for rest in (0.0, 20.0))
+    steady = Steady(speed=2e-3).motion(1, 0.0, 5.0, 10.0)
+    assert [moving.slip[0], moving.first[0]] == [steady.slip[0], steady.first[0]]
+    assert [still.slip[0], still.path[0], still.first[0], still.speed[0]] == [0.0] * 4
+
+
 @pytest.mark.parametrize(
     ("wrong", "word"),
     [
@@ -72,6 +107,7 @@ def test_a_jump_of_the_table_lies_between_two_steps():
         (lambda: Table(time=(0.0, 2.0, 1.0), speed=(1.0, 1.0, 1.0)), "never decrease"),
         (lambda: Table(time=(0.5, 2.0), speed=(1.0, 1.0)), "start at 0 s"),
         (lambda: Steady(speed=float("inf")), "finite"),
+        (lambda: Start(rest=-1.0, speed=1.0), "at least 0"),
     ],
 )
 def test_impossible_drives_are_refused(wrong, word):

@@ -12,7 +12,7 @@ ROOT = Path(sim.__file__).parent
 #: Every module, lowest floor first.
 FLOORS = (
     ("jit", "quantity", "motion", "traction", "durable", "lines", "grid", "radial", "pixels"),
-    ("noise", "roots", "table", "sweep", "faults", "expint", "hazards", "footprint"),
+    ("noise", "roots", "table", "sweep", "faults", "expint", "hazards", "footprint", "binomial"),
     ("laws.schallamach.linear", "laws.schallamach.renewal"),
     tuple(f"laws.schallamach.{name}" for name in ("bell", "loading", "cut_off", "first_moment", "cluster")),
     ("laws.halfspace", "laws.schallamach", "laws.jkr.scales"),
@@ -24,7 +24,8 @@ FLOORS = (
     ("laws", "bodies", "modes", "memory", "measured", "document"),
     ("spectrum", "bands"),
     ("disc", "grips"),
-    ("cohort_merging", "cohort_steady", "following"),
+    ("margin",),
+    ("cohort_merging", "cohort_steady", "following", "front"),
     ("cohort_steps", "lives"),
     ("cohorts", "tracks", "first_moment"),
     ("processes",),
@@ -42,12 +43,14 @@ FLOORS = (
     ("cli",),
     ("__main__",),
 )
-WING = ("analysis", "plots", "paper")
+WING = ("analysis", "paper", "pictures", "curves", "panels", "field_figures", "bond_laws", "friction_figures")
+WING += ("start_figure", "rival_figures", "profile_figures", "plots")
 #: The study of speed against error: it runs scenes, so it stands on the engine, beside the commands.
 STUDY = ("gammasum", "estimates", "expected", "moments", "alternatives")
-STUDY += ("converge_data", "converge_table", "converge_figure", "converge")
+STUDY += ("converge_data", "converge_table", "converge_bonds_march", "converge_bonds", "converge_bonds_table")
+STUDY += ("converge_figure", "converge")
 #: What the wing may read: laws and the spectra with what they stand on, never parts or engine.
-WING_READS = {name for floor in FLOORS[: FLOORS.index(("disc", "grips")) + 1] for name in floor}
+WING_READS = {name for floor in FLOORS[: FLOORS.index(("margin",)) + 1] for name in floor}
 
 
 def module_name(path):

@@ -323,6 +323,33 @@ def test_a_narrow_contact_closes_to_the_equilibrium():
     assert np.isnan(neck.radius[0])
 
 
+def test_one_clock_step_does_the_work_of_many():
+    # each of some tens of inner steps may err by 1e-8 of the radius, or 1e-11 of the clock step in time
+    rng, size = np.random.default_rng(54), 600
+    ten = lambda low, high: 10.0 ** rng.uniform(low, high, size)  # noqa: E731
+    between = lambda low, high: rng.uniform(low, high, (2, size))  # noqa: E731
+    start, stiffness = ten(-0.3, 0.5), rng.choice([0.0, 0.1, 1.0, 10.0, math.inf], size)
+    work, load, travel = W * between(-0.5, 2.0), between(-2.0, 3.0), between(-0.8, 1.0)
+    edge = Kinetics(W, ten(-2, 6), rng.uniform(0.1, 1.0, size), ten(-2, 6), rng.uniform(0.1, 1.0, size))
+
+    def end(steps):
+        a, time, energy = start, np.full(size, math.nan), np.zeros(size)
+        for i in range(steps):
+            at = [[(1.0 - s) * x[0] + s * x[1] for s in (i / steps, (i + 1) / steps)] for x in (work, load, travel)]
+            hold = Hold(*at[1], *at[2], stiffness)
+            out = advance(a, at[0], hold, edge, 1.0 / steps, **SPHERE, detached_below=0.01)
+            assert (out.dissipated >= 0.0).all()
+            time = np.where(np.isnan(out.detached_at), time, i / steps + out.detached_at)
+            a, energy = out.radius, energy + out.dissipated
+        return a, time, energy
+
+    (a, time, energy), (a_many, time_many, energy_many) = end(1), end(23)
+    assert 50 < np.isnan(a).sum() < 250
+    assert_allclose(a, a_many, rtol=1e-6, atol=0)
+    assert_allclose(time, time_many, rtol=1e-6, atol=1e-10)
+    assert (np.abs(energy - energy_many) < 1e-4 * (energy_many + W)).all()
+
+
 def awkward(rng, size):
     """Rows of all arguments over many decades, with zeros, infinities and nan strewn in."""
     ten = lambda low, high: 10.0 ** rng.uniform(low, high, size)  # noqa: E731

@@ -3,10 +3,12 @@
 import math
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
-from scenes import CELL, SPECTRUM, scene
+from scenes import BELL, BONDS, CELL, CUT_OFF, SPECTRUM, STRETCHED, scene
 
 from sim.engine import march
+from sim.hazards import Bell, Constant, CutOff
 from sim.laws import jkr
 from sim.memory import Onset, Slip, Wave
 from sim.parts import bonds, drive, shear
@@ -17,8 +19,8 @@ from sim.spectrum import Gaussian
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
 
 
-def last(members=1, **parts):
-    *_, state = march(scene(members, **({"drive": RAMP} | parts)), np.arange(members))
+def last(members=1, steps=8, **parts):
+    *_, state = march(scene(members, steps, **({"drive": RAMP} | parts)), np.arange(members))
     return state
 
 
@@ -46,6 +48,105 @@ def test_counted_bonds_become_the_rate_equation_as_their_number_grows():
         spread = np.sqrt(exact * (1.0 - exact) / sites)
         assert abs(fraction.mean() - exact) < 5.0 * spread / np.sqrt(400)
         assert abs(fraction.std() / spread - 1.0) < 5.0 / np.sqrt(2 * 400)
+
+
+STARTED = drive.Start(rest=2e-3, speed=4e-3)
+
+
+@pytest.mark.parametrize("hazard", [BELL, CUT_OFF], ids=["bell", "cut-off"])
+def test_tracked_bonds_become_cohorts_as_their_number_grows(hazard):
+    # sites are independent at all times: the spread of number and stress is that of one site over root N
+    members, recipe = 400, {"hazard": hazard, **STRETCHED, "start_from": "bonded"}
+    dense = bonds.Cohort(**recipe)
+    exact = last(bonds=dense, drive=STARTED).bonds
+    share, stress = dense.moments(exact)[0][0], dense.shear_stress(exact)[0]
+    varying = dense.traction(exact).varying[0]
+    for sites in (10**2, 10**3, 10**4):
+        few = bonds.Tracked(**recipe, sites=sites)
+        found = last(members, bonds=few, drive=STARTED).bonds
+        for values, mean, spread in (
+            (few.moments(found)[0], share, math.sqrt(share * (1.0 - share) / sites)),
+            (few.shear_stress(found), stress, math.sqrt(STRETCHED["site_density"] * varying / sites)),
+        ):
+            # cohorts are good to 1e-4 themselves; one site's excess kurtosis is below 10, that of N below 10/N
+            assert abs(values.mean() - mean) < 5.0 * spread / math.sqrt(members) + 1e-4 * abs(mean)
+            assert abs(values.std() / spread - 1.0) < 5.0 * math.sqrt((2.0 + 10.0 / sites) / (4.0 * members))
+
+
+@pytest.mark.parametrize("depth", [bonds.Cohort, bonds.FirstMoment])
+def test_bell_bonds_become_those_of_a_constant_rate_to_first_order_as_the_bell_force_grows(depth):
+    fine = {"tolerance": 1e-8} if depth is bonds.Cohort else {}
+    slid = {"drive": drive.Steady(speed=2e-3)}
+
+    def found(hazard):
+        part = depth(hazard=hazard, **STRETCHED, start_from="bonded", **fine)
+        state = last(bonds=part, **slid).bonds
+        return np.array([part.fraction(state)[0], part.shear_stress(state)[0]])
+
+    limit = found(Constant(rate=200.0))
+    errors = [found(Bell(zero_force_rate=200.0, bell_force=factor * 4e-12)) / limit - 1.0 for factor in (1e2, 1e3, 1e4)]
+    assert np.all(np.array(errors) < 0.0)  # force opens bonds
+    # error = a/F + b/F^2 with b/a of order ten: from 1e2 to 1e3 the ratio is ten but for ten percent, then one
+    assert_allclose(errors[0] / errors[1], 10.0, rtol=0.1)
+    assert_allclose(errors[1] / errors[2], 10.0, rtol=0.01)
+
+
+def test_the_first_moment_is_exact_where_the_rate_is_constant():
+    # cohorts resolve what the first moment closes: the same number and stress, also past a reversal
+    turns = drive.Table(time=(0.0, 3e-3, 3e-3, 6e-3, 6e-3, 9e-3), speed=(2e-3, 2e-3, -8e-3, -8e-3, 0.0, 0.0))
+    recipe = {"hazard": Constant(rate=200.0), **STRETCHED, "start_from": "empty"}
+    for tolerance in (1e-2, 1e-4, 1e-6):
+        closed, resolved = bonds.FirstMoment(**recipe), bonds.Cohort(**recipe, tolerance=tolerance)
+        for one, other in zip(marched(closed, turns), marched(resolved, turns), strict=True):
+            assert_allclose(other[0], one[0], rtol=tolerance, atol=1e-15)
+            assert_allclose(other[1], one[1], rtol=tolerance, atol=tolerance * 4e4)  # stress passes zero; its scale
+    assert abs(one[1]) > 0.0
+
+
+def marched(part, motion):
+    """Bond fraction and stress after each step."""
+    states = march(scene(bonds=part, drive=motion), np.arange(1))
+    return [(part.fraction(state.bonds)[0], part.shear_stress(state.bonds)[0]) for state in states]
+
+
+@pytest.mark.parametrize("speed", [1e-4, 8e-3, 1.0])
+def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
+    # N0/(1 + V/Vc) with Vc = l k_on, at once from the steady start and for ever; each bond half stretched on average
+    recipe = {"hazard": CutOff(stretch=20e-6), **STRETCHED}
+    steady = last(
+        bonds=bonds.Steady(critical_speed=20e-6 * STRETCHED["rebinding_rate"]), drive=drive.Steady(speed=speed)
+    )
+    full = 0.5 * STRETCHED["site_density"] * STRETCHED["bond_stiffness"] * 20e-6
+    for start, steps in (("steady", 8), ("empty", 100))[: 1 if speed < 1e-3 else 2]:  # the slowest live for 0.2 s
+        part = bonds.Cohort(**recipe, start_from=start)
+        state = last(steps=steps, bonds=part, drive=drive.Steady(speed=speed)).bonds
+        assert_allclose(part.fraction(state), steady.bonds.bound, rtol=1e-4)
+        assert_allclose(part.shear_stress(state), full * steady.bonds.bound, rtol=1e-4)
+    tracked = bonds.Tracked(**recipe, sites=400)
+    state = last(400, bonds=tracked, drive=drive.Steady(speed=speed)).bonds
+    share = steady.bonds.bound[0]
+    error = math.sqrt(share * (1.0 - share) / 400 / 400)
+    assert abs(tracked.fraction(state).mean() - share) < 5.0 * error
+
+
+@pytest.mark.parametrize(
+    ("left_open", "chosen"),
+    [
+        (BONDS["auto, few sites"], bonds.Tracked(hazard=CUT_OFF, **STRETCHED, sites=20)),
+        (BONDS["auto, many sites"], bonds.Rate(critical_speed=1e-2, healing=500.0, stress=2e5)),
+        (
+            bonds.Auto(critical_speed=1e-2, healing=5.0, sites=30),
+            bonds.Counted(critical_speed=1e-2, healing=5.0, sites=30),
+        ),
+        (bonds.Auto(hazard=BELL, **STRETCHED), bonds.Cohort(hazard=BELL, **STRETCHED)),
+        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), bonds.FirstMoment(hazard=Constant(rate=9.0), **STRETCHED)),
+    ],
+    ids=["tracked", "rate", "counted", "cohort", "first moment"],
+)
+def test_bonds_left_open_are_the_depth_that_is_chosen(left_open, chosen):
+    assert scene(bonds=left_open).population == chosen
+    one, other = (last(3, bonds=part).contact.radius for part in (left_open, chosen))
+    assert np.array_equal(one, other)
 
 
 def test_mean_fluctuations_become_uniform_as_their_rms_vanishes():
@@ -132,11 +233,10 @@ def test_a_uniform_stress_of_any_size_changes_nothing():
 def test_a_contact_at_the_indentation_of_a_load_is_the_contact_at_that_load():
     for load in (-0.35e-3, 0.0, 4e-3):
         at_load = last(contact=Equilibrium(load=load)).contact.radius
-        depth = Equilibrium(load=load).depth(at_load, 2e-3, 6.4e6)[0]
-        at_depth = Equilibrium(indentation=depth)
-        radius = last(contact=at_depth).contact.radius
+        depth = jkr.indentation_at_radius(at_load, 42e-3, 2e-3, 6.4e6)[0]
+        radius = last(contact=Equilibrium(indentation=depth)).contact.radius
         assert_allclose(radius, at_load, rtol=1e-11)
-        assert_allclose(at_depth.normal_load(radius, 2e-3, 6.4e6), load, rtol=1e-10, atol=1e-14)
+        assert_allclose(jkr.load_at_radius(radius, 42e-3, 2e-3, 6.4e6), load, rtol=1e-10, atol=1e-14)
 
 
 def test_a_masked_contact_is_hertz():

@@ -140,7 +140,11 @@ def test_the_mean_depth_knows_its_energy():
         ("soft_lens", {}, "adhesion pays for the stored energy: the paper's assumption"),
         ("afm_tip", {}, "poisson_ratio is not 0.5: the normal-tangential coupling is neglected"),
         ("uniform_stress", {"sphere.radius": "10 um"}, "the contact exceeds 0.3 of the sphere's radius"),
-        ("soft_lens", {"shear.spectrum.longest": "9 mm", "shear.cell": "9 mm"}, "the longest waves exceed the contact"),
+        (
+            "soft_lens",
+            {"shear.spectrum": WIDE, "shear.points": 32, "sweep": {}},
+            "the longest waves exceed the contact",
+        ),
         ("soft_lens", {"shear.spectrum": WIDE, "shear.points": 32, "sweep": {}}, "the cell is off by more than 5%"),
     ],
 )
@@ -212,3 +216,66 @@ def test_waves_longer_than_the_cell_are_told():
         part = shear.Banded(spectrum=SPECTRUM, cell=cell, memory=Slip(length=1e-6))
         assert ("longer than the cell" in preview(scene(shear=part))) == told_of
     assert "longer than the cell" not in preview(scene(shear=SHEARS["modal ripple"]))
+
+
+def test_the_mean_field_of_bell_bonds_is_told_by_how_much_it_overpredicts():
+    from scenes import BELL, CUT_OFF, STRETCHED, scene
+
+    from sim.hazards import Constant
+    from sim.parts import bonds
+
+    for rebinding, percent in ((1.0, 27), (10.0, 37), (100.0, 47)):
+        recipe = STRETCHED | {"rebinding_rate": rebinding * BELL.zero_force_rate}
+        said = preview(scene(bonds=bonds.FirstMoment(hazard=BELL, **recipe)))
+        (line,) = (line.strip() for line in said.splitlines() if "overpredicts" in line)
+        assert line.startswith("the mean stretch") and f" overpredicts the friction maximum by {percent}%" in line
+        assert line.endswith('bonds.model = "cohort" does not')
+    for silent in (
+        bonds.FirstMoment(hazard=Constant(rate=9.0), **STRETCHED),
+        bonds.FirstMoment(hazard=CUT_OFF, **STRETCHED),
+        bonds.Cohort(hazard=BELL, **STRETCHED),
+        bonds.Rate(critical_speed=1.0, healing=1.0),
+    ):
+        assert "overpredicts" not in preview(scene(bonds=silent))
+
+
+def test_bonds_left_open_are_told_with_their_depth_and_the_reason():
+    from scenes import BELL, STRETCHED, scene
+
+    from sim.hazards import Constant
+    from sim.parts import bonds
+
+    for auto, depth, reason in (
+        (bonds.Auto(critical_speed=1.0, healing=1.0), "rate", "no number of sites is given; the rupture rate does not"),
+        (bonds.Auto(critical_speed=1.0, healing=1.0, sites=64), "counted", "1/√N of 64 sites is 0.12, above the toler"),
+        (bonds.Auto(hazard=BELL, **STRETCHED, sites=64), "tracked", "1/√N of 64 sites is 0.12, above the tolerance of"),
+        (bonds.Auto(hazard=BELL, **STRETCHED), "cohort", "1/√N of 4,547,221,756 sites is 1.5e-05, within the"),
+        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), "rate", "1/√N of 4,547,221,756 sites is 1.5e-05, within"),
+    ):  # fmt: skip
+        lines = preview(scene(bonds=auto)).split("\n\n")[1].splitlines()
+        place = next(k for k, line in enumerate(lines) if line.startswith("  bonds "))
+        assert re.split(r" {2,}", lines[place])[2:4] == ["auto", "in the file"]
+        mark, chosen, why = re.split(r" {2,}", lines[place + 1].strip())
+        assert (mark, chosen) == (f"→ {depth}", "chosen")
+        assert why.startswith(reason)
+
+
+def test_energy_under_bonds_that_friction_has_paid_for_is_told_where_adhesion_pays_again():
+    def twice(**overrides):
+        lines = told("bond_noise", **overrides).get("to know before the run", [])
+        return sum(line.startswith("friction has paid for the energy under each bond") for line in lines)
+
+    assert twice() == twice(sweep={}) == 1
+    assert twice(**{"sweep": {}, "shear.paid_by_adhesion": 0.0}) == twice(sweep={}, shear={"model": "uniform"}) == 0
+    assert not any("friction has paid" in line for line in told("masking")["to know before the run"])
+
+
+def test_the_size_of_the_bonds_field_is_that_of_steady_sliding_at_the_last_speed():
+    from sim.laws.schallamach import bell_moments
+
+    lines = told("bond_noise")["fluctuations"]
+    square = 9e16 * float(bell_moments(0.1, 1e4, 4e-12, 4e-4, 1e5).force_square)
+    energy, unit, *when = row(lines, "stored energy")[1].split(" ", 2)
+    assert_allclose(float(energy), square / (math.pi**2 * 1.6e6 * 1e-9), rtol=1e-3)
+    assert (unit, when) == ("J/m^2", ["in steady sliding at the last speed, on the infinite plane"])
+    assert_allclose(float(row(lines, "rms of the stress")[1].split()[0]), math.sqrt(square / math.pi) / 1e-9, rtol=1e-3)

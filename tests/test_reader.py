@@ -291,7 +291,7 @@ def test_the_starter_shows_every_table_key_and_model():
     schema = scenario_schema()
     for name in schema["properties"]:
         assert re.search(rf"(?m)^(# )?(\[{name}\]|{name} = )", text), name
-    columns = {"time", "speed", "wavenumbers", "densities", "variable"}  # of files, not written by hand
+    columns = {"time", "speed", "wavenumbers", "densities", "variable", "value"}  # of files, not written by hand
     for definition in schema["$defs"].values():
         for key in set(definition["properties"]) - columns:
             assert re.search(rf"\b{key}( = |\])", text), key
@@ -321,6 +321,7 @@ COHORT = next(
 def test_every_alternative_of_the_starter_is_a_scene(table, text, tmp_path):
     (tmp_path / "x.toml").write_text(STARTER.read_text(encoding="utf-8"), encoding="utf-8")
     (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n2, 5\n")
+    (tmp_path / "loads.csv").write_text("time [s], load [mN]\n0, 4\n2, -1\n")
     (tmp_path / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 1\n3e5, 1\n")
     waves = np.cos(np.arange(16)[:, None] * 1.7) + np.sin(np.arange(16) * 2.1)
     (tmp_path / "map.csv").write_text("\n".join(",".join(f"{v:.3e}" for v in row) for row in 1e5 * waves))

@@ -75,7 +75,8 @@ class Auto:
             )
         missing = [name for name in (_WITH if with_ else _WITHOUT) if getattr(self, name) is None]
         if missing:
-            raise PydanticCustomError("one_kind", f"{' and '.join(missing)} is missing: bonds like these need it")
+            are = "is" if len(missing) == 1 else "are"
+            raise PydanticCustomError("one_kind", f"{' and '.join(missing)} {are} missing, which bonds like these need")
         if with_ and self.stress:
             raise PydanticCustomError("one_kind", "bonds with a hazard make their own stress; leave stress out")
         return self
@@ -89,7 +90,7 @@ class Auto:
     def chosen(self, area: float, forces: bool) -> Depth:
         """The depth for a contact of this ``area`` [m²] whose shear part reads the bonds' ``forces`` or not."""
         number = self.number(area)
-        noisy = self.tolerance**2 * number < 1.0
+        noisy = self.tolerance**2 * number < 1.0 and self.area == "present"
         common: dict[str, Any] = {"start_from": self.start_from}
         if self.hazard is None:
             common |= {"critical_speed": self.critical_speed, "healing": self.healing, "stress": self.stress}
@@ -99,7 +100,7 @@ class Auto:
             return Tracked(**common, sites=int(number))
         if isinstance(self.hazard, Constant) and not forces:
             return FirstMoment(**common, area=self.area)
-        return Cohort(**common, area=self.area, tolerance=min(1e-4, 0.1 * self.tolerance))
+        return Cohort(**common, area=self.area, tolerance=max(1e-12, min(1e-4, 0.1 * self.tolerance)))
 
     def why(self, area: float, forces: bool) -> str:
         """The reason for the choice, in words."""
@@ -108,10 +109,14 @@ class Auto:
             size = "no number of sites is given"
         else:
             noise = 1.0 / math.sqrt(number)
-            size = f"1/√N of {number:,.0f} sites is {noise:.2g}, {'above' if noise > self.tolerance else 'within'}"
-            size += f" the tolerance of {self.tolerance:g}"
+            size = f"1/√N of {number:,.0f} site{'' if number == 1 else 's'} is {noise:.3g}, "
+            size += f"{'above' if noise > self.tolerance else 'within'} the tolerance of {self.tolerance:g}"
         if isinstance(depth, Counted | Tracked):
             return size
+        if self.area == "carried":
+            size += "; a number of sites cannot be carried with the area"
+        elif self.tolerance**2 * number < 1.0:
+            size += f"; more than {_MOST_TRACKED:,} bonds are not followed one by one"
         if isinstance(depth, Cohort):
             return f"{size}; {'the forces of the bonds are read' if forces else 'the hazard depends on the stretch'}"
         return f"{size}; the rupture rate does not depend on the stretch"

@@ -1,84 +1,279 @@
-"""The contact: which radius follows from the work of adhesion that is left. Here: equilibrium.
+"""The contact: which radius follows from the work of adhesion that is left. Shallow to deep: equilibrium, lagging.
 
-Every depth of this part can be held at a load or at an indentation; ``_Held`` is where the other
-controls belong.
+Every depth is held at a load, at an indentation or at a travel behind a machine, each a number, a course
+or a table; ``sim.grips`` says what a contact is under each.
 """
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass as plain_dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.laws import jkr
+from sim.front import Hold, Kinetics
+from sim.front import advance as advance_front
+from sim.grips import AtLoad, AtTravel, Bodies, Grip
+from sim.motion import Motion
+from sim.parts.control import held, lowest, value_at
 from sim.quantity import Quantity
+
+_MOST_TURNS = 200
+#: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
+_SPOT = 1e-3
+
+_Load = held(Quantity("N", "normal load, compression positive", "P"), "load")
+_Indentation = held(Quantity("m", "indentation of the sphere", "delta"), "indentation")
+_Travel = held(Quantity("m", "travel of the machine that holds the sphere", "Delta"), "travel")
+_Stiffness = Annotated[float, Quantity("N/m", "stiffness of the machine", "k", above=0)]
+_Reversible = Annotated[
+    float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)
+]
+_Policy = Literal["stay_open", "reattach", "stop"]
+
+
+@plain_dataclass(frozen=True)
+class Balance:
+    """What the contact is told at a step.
+
+    Attributes
+    ----------
+    bonded : array
+        Work of adhesion of the bonds left, Δγ(fraction) [J/m²].
+    fluctuating : array
+        What fluctuations of the shear stress take of it where waves are short beside the contact, χ ΔΓ [J/m²].
+    stress : array
+        Mean shear stress τ0 [Pa].
+    margin : callable, optional
+        Share of ``fluctuating`` that a contact of finite radius [m] pays when it grows [1].
+    bodies : Bodies
+        What touches.
+    reference : float
+        Work of adhesion at rest [J/m²], by which crack fronts measure their drive.
+    """
+
+    bonded: np.ndarray
+    fluctuating: np.ndarray
+    stress: np.ndarray
+    margin: Callable[[np.ndarray], np.ndarray] | None
+    bodies: Bodies
+    reference: float
+
+    def work(self, radius: np.ndarray) -> np.ndarray:
+        """Work of adhesion left at a radius but for what the mean stress takes [J/m²]."""
+        if self.margin is None:
+            return self.bonded - self.fluctuating
+        return self.bonded - self.fluctuating * self.margin(radius)
+
+    def reversible(self, radius: np.ndarray) -> np.ndarray:
+        """Energy per area that the mean stress would give back if the contact shrank [J/m²].
+
+        ``2 (2 − ν)/(1 − ν) τ0² a/(π E*)``, 6 τ0² a/(π E*) for an incompressible half-space.
+        """
+        _, modulus, poisson_ratio = self.bodies
+        coefficient = 2.0 * (2.0 - poisson_ratio) / (1.0 - poisson_ratio) / math.pi
+        return coefficient * self.stress**2 * radius / modulus
 
 
 @plain_dataclass(frozen=True)
 class Touch:
-    """State of the contact: work of adhesion left [J/m^2] and radius [m], nan where it is open."""
+    """State of the contact.
+
+    Attributes
+    ----------
+    work : array
+        Work of adhesion left at this radius [J/m²].
+    radius : array
+        Contact radius [m], nan where it is open.
+    detached : array
+        When it last opened [s], nan if never.
+    dissipated : array
+        Energy dissipated so far by the opening and closing of the contact [J].
+    """
 
     work: np.ndarray
     radius: np.ndarray
+    detached: np.ndarray
+    dissipated: np.ndarray
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class _Held:
-    """What holds the sphere: a load, or an indentation; exactly one."""
+    """What holds the sphere: a load, an indentation, or a travel with a stiffness."""
 
-    load: Annotated[float, Quantity("N", "normal load, compression positive", "P")] | None = None
-    indentation: Annotated[float, Quantity("m", "indentation of the sphere", "delta")] | None = None
+    load: _Load | None = None  # type: ignore[valid-type]
+    indentation: _Indentation | None = None  # type: ignore[valid-type]
+    travel: _Travel | None = None  # type: ignore[valid-type]
+    stiffness: _Stiffness | None = None
+    reversible: _Reversible = 0.0
+    on_detach: _Policy = "stay_open"
 
     @model_validator(mode="after")
     def _one_control(self) -> "_Held":
-        if self.load is None and self.indentation is None:
+        given = [name for name in ("load", "indentation", "travel") if getattr(self, name) is not None]
+        if not given:
             raise PydanticCustomError(
-                "control", 'nothing holds the sphere; give a load such as "4 mN", or an indentation such as "2 um"'
+                "control",
+                'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", or a travel'
+                " with a stiffness",
             )
-        if self.load is not None and self.indentation is not None:
-            raise PydanticCustomError(
-                "control", "a load and an indentation cannot both hold the sphere; leave one of them out"
-            )
+        if len(given) > 1:
+            names = " and ".join(("a load", "an indentation", "a travel")[("load", "indentation", "travel").index(n)]
+                                 for n in given)  # fmt: skip
+            raise PydanticCustomError("control", f"{names} cannot both hold the sphere; leave one of them out")
+        if (self.travel is None) != (self.stiffness is None):
+            said = 'a travel needs the stiffness of the machine, such as "1 kN/m"'
+            other = "a stiffness belongs to a travel; give contact.travel, or leave it out"
+            raise PydanticCustomError("control", said if self.stiffness is None else other)
         return self
 
-    def equilibrium_radius(self, work: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
-        """JKR radius for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
+    def grip(self, time: float, duration: float) -> Grip:
+        """How the sphere is held at a time of a run of ``duration`` [s]."""
         if self.load is not None:
-            return np.asarray(jkr.radius_at_load(self.load, work, sphere_radius, modulus))
-        return np.asarray(jkr.radius_at_indentation(self.indentation, work, sphere_radius, modulus))
-
-    def normal_load(self, radius: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
-        """Load on the sphere, compression positive [N]; 0 where the contact is open."""
-        if self.load is not None:
-            return np.where(np.isnan(radius), 0.0, self.load)
-        load = jkr.load_under_indentation(radius, self.indentation, sphere_radius, modulus)
-        return np.where(np.isnan(radius), 0.0, load)
-
-    def depth(self, radius: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
-        """Indentation [m]; nan where an open contact leaves the sphere without a place."""
+            return AtLoad(value_at(self.load, time, duration))
         if self.indentation is not None:
-            return np.full(radius.shape, self.indentation)
-        return np.asarray(jkr.indentation_under_load(radius, self.load, sphere_radius, modulus))
+            return AtTravel(value_at(self.indentation, time, duration))
+        return AtTravel(value_at(self.travel, time, duration), self.stiffness or math.inf)
+
+    @property
+    def changes(self) -> bool:
+        """Whether what holds the sphere changes in time."""
+        return any(hasattr(control, "at") for control in (self.load, self.indentation, self.travel))
+
+    @property
+    def lowest(self) -> float:
+        """The least load, indentation or travel of the run."""
+        return min(lowest(control) for control in (self.load, self.indentation, self.travel))
+
+    def equilibrium_radius(self, work: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
+        """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
+        return self.grip(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
+
+    def start(self, motion: Motion, duration: float, balance: Balance) -> Touch:
+        """The contact at the start, in equilibrium."""
+        grip = self.grip(motion.time, duration)
+        radius = self._equilibrium(grip, balance)
+        return Touch(self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape))
+
+    def _equilibrium(self, grip: Grip, balance: Balance) -> np.ndarray:
+        """Largest stable radius, each element until it no longer changes where the work depends on it."""
+        bodies, alpha = balance.bodies, self.reversible
+        if balance.margin is None:
+            return grip.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
+        radius = grip.radius(balance.bonded - 0.0 * balance.fluctuating, balance.stress, alpha, bodies)
+        moving = ~np.isnan(radius)
+        for _ in range(_MOST_TURNS):
+            if not moving.any():
+                break
+            found = grip.radius(balance.work(radius), balance.stress, alpha, bodies)
+            still = np.isnan(found) | (np.abs(found - radius) <= 1e-14 * radius)
+            radius = np.where(moving, found, radius)
+            moving &= ~still
+        return radius
+
+    def _left(self, radius: np.ndarray, balance: Balance) -> np.ndarray:
+        """Work of adhesion left at a radius; of an open contact that of a vanishing one."""
+        size = np.nan_to_num(radius, nan=0.0)
+        work = balance.work(size)
+        return work - self.reversible * balance.reversible(size) if self.reversible else work
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Equilibrium(_Held):
     """The contact is in JKR equilibrium with the work of adhesion at every step, on its stable branch.
 
-    Where no equilibrium is left the contact detaches and stays open: nothing brings a sphere back
-    that tension has pulled off.
+    Where no equilibrium is left it detaches. ``on_detach`` says what follows: it stays open; it reattaches as
+    soon as the free sphere would touch (at a load that is not negative, at a travel of zero or more), where it
+    jumps into equilibrium; or the member's trajectory stops there.
     """
 
     model: Literal["equilibrium"] = "equilibrium"
 
-    def start(self, work: np.ndarray, sphere_radius: float, modulus: float) -> Touch:
-        return Touch(work, self.equilibrium_radius(work, sphere_radius, modulus))
+    def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
+        grip = self.grip(motion.time, duration)
+        radius = self._equilibrium(grip, balance)
+        opened = np.isnan(touch.radius)
+        if self.on_detach != "reattach" or not grip.closes:
+            radius = np.where(opened, np.nan, radius)
+        return _after(touch, radius, self._left(radius, balance), motion.time, grip, balance.bodies)
 
-    def advance(self, touch: Touch, work: np.ndarray, sphere_radius: float, modulus: float) -> Touch:
-        radius = self.equilibrium_radius(work, sphere_radius, modulus)
-        return Touch(work, np.where(np.isnan(touch.radius), np.nan, radius))
+
+def _after(
+    touch: Touch, radius: np.ndarray, work: np.ndarray, time: float, grip: Grip, bodies: Bodies, lost: Any = 0.0
+) -> Touch:
+    """The state after a step, with what an opening or a closing at this step has dissipated."""
+    opens, closes = ~np.isnan(touch.radius) & np.isnan(radius), np.isnan(touch.radius) & ~np.isnan(radius)
+    dissipated = touch.dissipated + lost
+    if opens.any():
+        dissipated = dissipated + np.where(opens, np.maximum(grip.released(touch.radius, work, bodies), 0.0), 0.0)
+    if closes.any():
+        dissipated = dissipated + np.where(closes, np.maximum(-grip.released(radius, work, bodies), 0.0), 0.0)
+    return Touch(work, radius, np.where(opens, time, touch.detached), dissipated)
 
 
-Contact = Equilibrium
+@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+class Lagging(_Held):
+    """The edge of the contact runs with a finite speed: G − w = work (v/v0)ⁿ. Limit: equilibrium as v0 -> infinity.
+
+    It opens where the energy release rate G exceeds the work of adhesion w that is left, and heals, with a
+    speed and an exponent of its own, where it falls short; within a clock step as exactly as 1e-8. What the
+    work loses with the radius itself (a disc, ``reversible``) is taken at the radius of the step's start.
+    """
+
+    front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G = 2 w", "v_0", above=0)]
+    front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
+    heal_speed: Annotated[float, Quantity("m/s", "speed of a healing edge", "v_h", above=0)] | None = None
+    heal_exponent: Annotated[float, Quantity("1", "exponent of healing", "n_h", above=0, at_most=1)] | None = None
+    model: Literal["lagging"] = "lagging"
+
+    def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
+        before, grip = self.grip(motion.time - motion.duration, duration), self.grip(motion.time, duration)
+        after, bodies = self._left(touch.radius, balance), balance.bodies
+        seeded = self._seeded(touch.radius, after, grip, balance)
+        radius = np.broadcast_to(seeded, np.broadcast(seeded, after).shape)
+        moved = advance_front(
+            radius, (np.where(np.isnan(touch.radius), after, touch.work), after), _hold(before, grip),
+            self._kinetics(balance), motion.duration, bodies.sphere_radius, bodies.modulus, 0.5 * _spot(balance),
+        )  # fmt: skip
+        opens = ~np.isnan(radius) & np.isnan(moved.radius)
+        detached = np.where(opens, motion.time - motion.duration + moved.detached_at, touch.detached)
+        left = self._left(moved.radius, balance)
+        return Touch(left, moved.radius, detached, touch.dissipated + moved.dissipated)
+
+    def _kinetics(self, balance: Balance) -> Kinetics:
+        heals = self.front_speed if self.heal_speed is None else self.heal_speed
+        exponent = self.front_exponent if self.heal_exponent is None else self.heal_exponent
+        return Kinetics(balance.reference, self.front_speed, self.front_exponent, heals, exponent)
+
+    def _seeded(self, radius: np.ndarray, work: np.ndarray, grip: Grip, balance: Balance) -> np.ndarray:
+        """The radius from which an edge starts: where a free sphere touches again, a spot that heals on."""
+        if self.on_detach != "reattach" or not grip.closes:
+            return radius
+        return np.where(np.isnan(radius), _spot(balance), radius)
+
+
+def _spot(balance: Balance) -> float:
+    """Radius [m] from which an edge heals when the sphere touches; at half of it a shrinking contact counts as open."""
+    size, modulus, _ = balance.bodies
+    return _SPOT * math.cbrt(balance.reference * size**2 / modulus)
+
+
+def _hold(before: Grip, after: Grip) -> Hold:
+    """What presses during a step."""
+    if isinstance(before, AtLoad) and isinstance(after, AtLoad):
+        return Hold(load_before=before.load, load_after=after.load)
+    assert isinstance(before, AtTravel) and isinstance(after, AtTravel)  # one control holds for the whole run
+    return Hold(travel_before=before.place, travel_after=after.place, stiffness=after.stiffness)
+
+
+def _model(value: Any) -> Any:
+    """The model of a contact; equilibrium where none is named."""
+    return value.get("model", "equilibrium") if isinstance(value, dict) else getattr(value, "model", None)
+
+
+Contact = Annotated[
+    Annotated[Equilibrium, Tag("equilibrium")] | Annotated[Lagging, Tag("lagging")], Discriminator(_model)
+]

@@ -26,6 +26,10 @@ _Paid = Annotated[
 ]
 _Cell = Annotated[float, Quantity("m", "side of the periodic cell", "L", above=0)]
 _Tolerance = Annotated[float, Quantity("1", "tolerance of the errors of banding", "", above=0, below=1)]
+_Contact = Annotated[
+    Literal["plane", "disc"],
+    Field(description='"disc": the energy that a contact of finite size pays when it grows, instead of the plane\'s'),
+]
 _Points = Annotated[int, Field(ge=2, le=2**14, description="grid points along a side of the cell")]
 
 
@@ -65,6 +69,7 @@ class Mean:
     spectrum: Spectrum
     growth: Growth = Field(default_factory=Constant)
     paid_by_adhesion: _Paid = 1.0
+    contact: _Contact = "plane"
     model: Literal["mean"] = "mean"
 
     @property
@@ -104,6 +109,7 @@ class _Fluctuating:
     points: _Points | None = None
     amplitudes: Literal["gaussian", "fixed"] = "gaussian"
     paid_by_adhesion: _Paid = 1.0
+    contact: _Contact = "plane"
 
     @property
     def per_member(self) -> bool:
@@ -255,6 +261,7 @@ class Auto:
     amplitudes: Literal["gaussian", "fixed"] = "gaussian"
     tolerance: _Tolerance = 0.01
     paid_by_adhesion: _Paid = 1.0
+    contact: _Contact = "plane"
     model: Literal["auto"] = "auto"
 
     def chosen(self, maps: bool) -> "Mean | Banded | Modal":
@@ -269,6 +276,7 @@ class Auto:
             "spectrum": self.spectrum,
             "growth": self.growth,
             "paid_by_adhesion": self.paid_by_adhesion,
+            "contact": self.contact,
         }
         if self.memory is None and maps:
             raise PydanticCustomError("maps_need_memory", "maps change in time: give shear.memory")

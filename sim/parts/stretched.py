@@ -27,10 +27,10 @@ from sim.quantity import Quantity
 from sim.tracks import Tracks
 from sim.traction import Traction
 
-Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0)]
-Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", above=0)]
-Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0)]
-CohortTolerance = Annotated[float, Quantity("1", "tolerance of the cohorts", "", above=0, below=0.1)]
+Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
+Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", above=0, typical="1e5 1/s")]
+Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0, typical="1e17 1/m^2")]
+CohortTolerance = Annotated[float, Quantity("1", "tolerance of the cohorts", "", at_least=1e-12, below=0.1)]
 
 
 class _Stretched:

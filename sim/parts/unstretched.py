@@ -5,7 +5,7 @@
 
 from dataclasses import dataclass as plain_dataclass
 from dataclasses import field, replace
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -40,7 +40,7 @@ class Population:
 class _WithoutStretch:
     """What all depths without a stretch share: the stress follows the fraction."""
 
-    per_member: ClassVar[bool] = False
+    per_member: ClassVar[Any] = False
     knows_forces: ClassVar[bool] = False
     numbers: ClassVar[int] = 1
     stress: float

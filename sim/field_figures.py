@@ -1,0 +1,200 @@
+"""Figures of stress maps: the map and its displacement, and its spectrum."""
+
+import contextlib
+import json
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
+from pydantic import TypeAdapter
+from scipy.signal import resample
+
+from sim.analysis import engineering, setting, sweep_dims
+from sim.curves import swept_whole
+from sim.grid import Grid
+from sim.laws.halfspace import displacement
+from sim.measured import periodogram, radial_average
+from sim.memory import Growth
+from sim.modes import Modes, modes
+from sim.pictures import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
+from sim.spectrum import Spectrum
+
+#: Pixels that a cell has at least in a picture.
+PIXELS = 384
+
+
+def maps_of(dataset: xr.Dataset) -> xr.DataArray:
+    if "shear_map" not in dataset:
+        raise ValueError('there are no stress maps; record some: [shear] model = "mapped" and [record] maps = ["1 s"]')
+    return dataset["shear_map"].transpose(..., "x", "y")
+
+
+def map_figure(dataset: xr.Dataset) -> Figure:
+    """The last stress map of the first member and its displacement, around the contact circle."""
+    stress = maps_of(dataset)
+    at = dict.fromkeys(sweep_dims(dataset), 0)
+    stress = stress.isel(at).isel(map_realization=0, snapshot=-1)
+    cell = _cell_of(stress)
+    modulus, ratio = (float(dataset[f"effective_{n}"].isel(at)) for n in ("shear_modulus", "poisson_ratio"))
+    moved = displacement(stress.to_numpy(), cell, modulus, ratio)
+    radius = _radius_of(dataset, at, stress)
+    figure = picture(WIDE, 3.1)
+    axes = figure.subplots(1, 2, sharey=True)
+    length = Unit.of(np.array([cell]), "m")
+    shown = (
+        (stress.to_numpy(), "Pa", r"shear stress $\tau_1$", "RdBu_r"),
+        (moved, "m", "displacement $w_1$", "PuOr_r"),
+    )
+    speed = dataset["speed"].isel(at, missing_dims="ignore")
+    speed_then = float(speed.sel(t=stress["snapshot"], method="nearest"))
+    arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
+    for panel, (field, si, words, colours) in zip(axes, shown, strict=True):
+        _draw_map(figure, panel, field, cell, radius, length, (si, words, colours))
+        panel.text(
+            0.04, 0.05, arrow[float(np.sign(speed_then))], transform=panel.transAxes, fontsize=7,
+            bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0},
+        )  # fmt: skip
+    axes[0].set_ylabel(label("$y$", length.name))
+    letter(list(axes))
+    then = f"$t$ = {engineering(float(stress['snapshot']), 's')}, $V$ = {engineering(speed_then, 'm/s')}"
+    axes[0].set_title(then.replace("-", "−"))
+    return figure
+
+
+def _radius_of(dataset: xr.Dataset, at: dict[str, int], stress: xr.DataArray) -> float:
+    """Contact radius of the map's member at the map's time [m]."""
+    radius = dataset["contact_radius" if "contact_radius" in dataset else "contact_radius_mean"].isel(at)
+    if "realization" in radius.dims:
+        radius = radius.sel(realization=stress["map_realization"])
+    return float(radius.sel(t=stress["snapshot"], method="nearest"))
+
+
+def _draw_map(
+    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: Unit, about: tuple
+) -> None:
+    """One field around the contact, continued periodically where the contact is wider than the cell."""
+    si, words, colours = about
+    field = _refined(field)
+    points = field.shape[0]
+    side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
+    half = int(np.ceil(0.5 * side / cell * points))
+    index = np.arange(-half, half + 1) % points
+    unit = Unit.of(field, si)
+    most = unit.factor * float(np.max(np.abs(field))) or 1.0
+    reach = (half + 0.5) * cell / points * length.factor
+    image = panel.imshow(
+        unit.factor * field[np.ix_(index, index)].T, cmap=colours, vmin=-most, vmax=most, origin="lower",
+        extent=(-reach, reach, -reach, reach), interpolation="nearest",
+    )  # fmt: skip
+    bar = figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)))
+    bar.set_label(label(words, unit.name))
+    if 0.0 < radius < 1.5 * cell:
+        circle = Circle((0.0, 0.0), radius * length.factor, fill=False, linewidth=1.0, color=BOTH)
+        circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
+        panel.add_patch(circle)
+    limit = 0.5 * side * length.factor
+    panel.set_xlim(-limit, limit)
+    panel.set_ylim(-limit, limit)
+    panel.set_xlabel(label("$x$", length.name))
+
+
+def _refined(field: np.ndarray) -> np.ndarray:
+    """A periodic field between its samples, by its own Fourier series: nothing is smoothed."""
+    fine = field.shape[0] * -(-PIXELS // field.shape[0])
+    return resample(resample(field, fine, axis=0), fine, axis=1)
+
+
+class _Asked(NamedTuple):
+    """The spectrum of a map as the scenario wants it, with the factor by which the speed raises its density."""
+
+    spectrum: Any
+    raised: float
+    words: str
+
+
+def _asked_for(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _Asked:
+    """Spectrum and growth at a point of the sweep, rebuilt from the scenario that the dataset carries."""
+    shear = json.loads(dataset.attrs["scenario_resolved"])["shear"]
+    if swept_whole(dataset, "shear"):
+        raise ValueError("the spectrum is swept as a whole table; run the one of interest on its own")
+    for table in ("spectrum", "growth"):
+        for key in shear[table]:
+            with contextlib.suppress(KeyError):
+                shear[table][key] = float(setting(dataset, f"shear.{table}.{key}").isel(at, missing_dims="ignore"))
+    spectrum = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
+    if hasattr(spectrum, "wavevector"):
+        raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
+    if shear["growth"].get("relaxing"):  # the field lags behind its growth: only the shape can be compared
+        cells = modes(spectrum, _cell_of(stress), stress.sizes["x"])
+        return _Asked(spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "asked, scaled")
+    growth = TypeAdapter(Growth).validate_python(shear["growth"])
+    time = {"t": float(stress["snapshot"])}
+    names = ("speed", "shear_stress" if "shear_stress" in dataset else "shear_stress_mean")
+    now = [dataset[name].isel(at, missing_dims="ignore").sel(time, method="nearest").to_numpy() for name in names]
+    return _Asked(spectrum, float(np.mean(growth.factor(*now) ** 2)), "asked for")
+
+
+def _cell_of(stress: xr.DataArray) -> float:
+    return float(stress["x"][1] - stress["x"][0]) * stress.sizes["x"]
+
+
+def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
+    """Density of the cell's modes on the half spectrum of its grid [Pa^2 m^2]."""
+    density = np.zeros((grid.points, grid.points // 2 + 1))
+    each = 0.5 * cells.variance * grid.cell**2
+    density[cells.ix % grid.points, cells.iy] = each
+    edge = cells.iy == 0  # this column holds both of a pair
+    density[-cells.ix[edge] % grid.points, 0] = each[edge]
+    return density
+
+
+def spectrum_figure(dataset: xr.Dataset) -> Figure:
+    """The radially averaged spectrum of the last maps against the one asked for, and their ratio."""
+    stress = maps_of(dataset)
+    at = dict.fromkeys(sweep_dims(dataset), 0)
+    stress = stress.isel(at).isel(snapshot=-1).transpose("map_realization", "x", "y")
+    if not np.any(stress.to_numpy()):
+        raise ValueError("the last map holds no stress; record one where fluctuations have grown")
+    asked = _asked_for(dataset, stress, at)
+    grid = Grid(_cell_of(stress), stress.sizes["x"])
+    wanted = mode_density(modes(asked.spectrum, grid.cell, grid.points), grid)
+    expected = asked.raised * radial_average(wanted, grid).density
+    rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
+    fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)
+    density = asked.raised * _radial_density(asked.spectrum, fine)
+    least = np.min(density[density > 0.0], initial=np.max(expected))
+    held = expected > max(0.2 * least, 1e-12 * np.max(expected))  # not where a ring only touches the spectrum
+    q, expected = rings[0].q[held], expected[held]
+    measured = np.mean([ring.density for ring in rings], axis=0)[held]
+    error = np.sqrt(np.sum([ring.standard_error**2 for ring in rings], axis=0))[held] / len(rings)
+
+    length = Unit.of(2 * np.pi / q, "m")
+    figure, (panel, below) = rows([1.9, 1.1])
+    dots: Any = {"fmt": "o", "color": BOTH, "markersize": 2.2, "elinewidth": 0.7}
+    ring: Any = {"marker": "o", "linestyle": "none", "markersize": 4.5, "markerfacecolor": "none"}
+    ring |= {"color": FLUCTUATIONS, "markeredgewidth": 0.7}
+    panel.loglog(fine / length.factor, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS)
+    panel.plot(q / length.factor, expected, **ring)
+    panel.errorbar(q / length.factor, measured, error, **dots)
+    panel.set_ylabel("spectral density $C$ (Pa² m²)")
+    if np.max(measured) < 100.0 * np.min(measured):
+        plain_ticks(panel.yaxis)
+    handles = [Line2D([], [], color=FLUCTUATIONS, label=asked.words), Line2D([], [], **ring, label="on the cell")]
+    count = f"{len(rings)} map" + ("s" if len(rings) > 1 else "")
+    legend(panel, [*handles, Line2D([], [], color=BOTH, marker="o", markersize=2.2, linewidth=0.7, label=count)])
+    below.axhline(1.0, color=FLUCTUATIONS, linewidth=1.2)
+    below.errorbar(q / length.factor, measured / expected, error / expected, **dots)
+    below.set_ylabel("measured/asked")
+    across(below, q / length.factor, "log", "wavenumber $q$", f"rad/{length.name}", room=0.03)
+    return figure
+
+
+def _radial_density(spectrum: Any, q: np.ndarray) -> np.ndarray:
+    """Density averaged over directions."""
+    angle = np.pi * (np.arange(64) + 0.5) / 64
+    return np.mean(spectrum.density(q[:, None] * np.cos(angle), q[:, None] * np.sin(angle)), axis=1)

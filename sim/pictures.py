@@ -1,0 +1,200 @@
+"""How pictures look: style, colours, units on axes, symbols, letters and legends.
+
+One colour means one thing throughout: blue what broken bonds do, vermilion what shear fluctuations
+do, black the contact with both; grey lines are closed forms, such as JKR's and Hertz's contacts.
+"""
+
+import itertools
+import re
+import textwrap
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from sim.analysis import engineering, scaled
+
+COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
+
+BONDS, FLUCTUATIONS, BOTH, REFERENCE = "#0072B2", "#D55E00", "#000000", "#777777"
+
+#: Colours of several curves.
+LINES = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+
+STYLE: Any = {
+    "font.family": "STIXGeneral",
+    "mathtext.fontset": "stix",
+    "font.size": 8.0,
+    "axes.labelsize": 8.0,
+    "axes.titlesize": 8.0,
+    "legend.fontsize": 7.0,
+    "xtick.labelsize": 7.5,
+    "ytick.labelsize": 7.5,
+    "axes.linewidth": 0.6,
+    "lines.linewidth": 1.2,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+    "xtick.top": True,
+    "ytick.right": True,
+    "xtick.major.width": 0.6,
+    "ytick.major.width": 0.6,
+    "xtick.minor.width": 0.4,
+    "ytick.minor.width": 0.4,
+    "legend.frameon": False,
+    "legend.handlelength": 1.6,
+    "legend.columnspacing": 1.2,
+    "axes.formatter.use_mathtext": True,
+    "figure.constrained_layout.h_pad": 0.03,
+    "figure.constrained_layout.w_pad": 0.03,
+    "pdf.fonttype": 42,
+    "svg.hashsalt": "sim",
+}
+
+
+class Picture(Figure):
+    """A figure that is saved in the style in which it was drawn; equal pictures give equal bytes."""
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Save as PNG (200 dpi), PDF or SVG, by the extension; see ``matplotlib.figure.Figure.savefig``."""
+        undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(str(fname).rpartition(".")[2].lower())
+        with mpl.rc_context(STYLE):
+            super().savefig(fname, **({"metadata": undated} | options))
+
+
+def picture(width: float, height: float) -> Picture:
+    """An empty picture [in] with a canvas of its own."""
+    empty = Picture(figsize=(width, height), dpi=200, layout="constrained")
+    FigureCanvasAgg(empty)
+    return empty
+
+
+def told(dataset: xr.Dataset, name: str, at: int) -> str:
+    """A swept value in words, in the unit of the whole axis: ``P = 4 mN``."""
+    coordinate = dataset[name]
+    value = coordinate[at].item()
+    if isinstance(value, str):
+        return value
+    unit = Unit.of(coordinate.to_numpy(), coordinate.attrs.get("units", "1"))
+    number = f"{value * unit.factor:.4g} {unit.name}".strip().replace("-", "−")
+    return f"{symbol(coordinate) or name.replace('_', ' ')} = {number}"
+
+
+def rounded(value: float, unit: str) -> str:
+    """A number with its unit in three digits: ``305 kPa``."""
+    return engineering(float(f"{value:.3g}"), unit).replace("-", "−")
+
+
+_GREEK = re.compile(r"(?<![A-Za-z])(tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma)(?![A-Za-z])")
+
+
+def symbol(variable: xr.DataArray) -> str:
+    """The variable's symbol as mathematics."""
+    text = variable.attrs.get("symbol", "")
+    text = re.sub(r"(?<=[^\W\d_])(\d+)$", r"_\1", text)
+    text = _GREEK.sub(lambda m: r"\Delta\Gamma" if m[1] == "DeltaGamma" else rf"\{m[1]}", text)
+    text = re.sub(r"_(\w+)", r"_{\1}", text).replace("*", "^*")
+    return f"${text}$" if text else ""
+
+
+def label(words: str, unit: str) -> str:
+    """Words with their unit in brackets, if there is one."""
+    return f"{words} ({unit})" if unit else words
+
+
+class Unit(NamedTuple):
+    """A factor from SI and the unit it leads to."""
+
+    factor: float
+    name: str
+
+    @classmethod
+    def of(cls, values: np.ndarray, unit: str, logarithmic: bool = False) -> "Unit":
+        """The unit that suits the largest of some values, on a logarithmic axis the middle of them."""
+        sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])
+        if not sizes.size:
+            return cls(*scaled(0.0, unit))
+        return cls(*scaled(float(np.sqrt(sizes.min() * sizes.max()) if logarithmic else sizes.max()), unit))
+
+
+def axis_scale(values: np.ndarray) -> str:
+    """``log`` where values above zero span a decade or more, ``symlog`` where zero is among them, else ``linear``."""
+    above = values[values > 0.0]
+    if np.any(values < 0.0) or above.size < 2 or above.max() < 10.0 * above.min():
+        return "linear"
+    if above.size == values.size:
+        return "log"
+    return "symlog" if above.max() >= 100.0 * above.min() else "linear"
+
+
+def letter(axes: list[Axes]) -> None:
+    """Panels (a), (b), ... in the order given."""
+    for mark, panel in zip("abcdefg", axes, strict=False):
+        panel.annotate(
+            f"({mark})", (0.0, 1.0), (-2, 4), xycoords="axes fraction", textcoords="offset points",
+            ha="right", va="bottom", fontweight="bold",
+        )  # fmt: skip
+
+
+def legend(panel: Axes, handles: list[Any], title: str = "") -> None:
+    """A legend above the panel, where no data are, under a line in words."""
+    longest = max(len(handle.get_label().replace("$", "")) for handle in handles)
+    panel.legend(
+        handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3 if longest <= 16 else 2,
+        borderaxespad=0.2, handletextpad=0.5, labelspacing=0.25, title=title or None, title_fontsize=7.0,
+        alignment="left",
+    )  # fmt: skip
+
+
+def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str, alpha: float) -> None:
+    """A shaded band; there and back one for each way, as a polygon that turns back hides itself."""
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
+    for first, last in itertools.pairwise([0, *turns, len(x) - 1]):
+        part = slice(first, last + 1)
+        panel.fill_between(x[part], low[part], high[part], color=colour, alpha=alpha, linewidth=0)
+
+
+def rows(heights: list[float]) -> tuple[Figure, list[Axes]]:
+    """A picture of one column: panels of given heights [in] above each other that share their x axis, lettered."""
+    figure = picture(COLUMN, 0.45 + sum(heights))
+    axes = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
+    if len(axes) > 1:
+        letter(axes)
+    figure.align_ylabels(axes)
+    return figure, axes
+
+
+def across(panel: Axes, x: np.ndarray, scale: str, words: str, unit: str, room: float = 0.0) -> None:
+    """The x axis that the panels share, with some ``room`` for markers at its ends."""
+    known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
+    if scale == "symlog":
+        panel.set_xscale(scale, linthresh=float(np.min(x[x > 0.0])))
+    else:
+        panel.set_xscale(scale)
+    if scale == "log" and known.max() < 100.0 * known.min():
+        plain_ticks(panel.xaxis)
+    if scale != "symlog" and known.max() > known.min():
+        ends = np.log([known.min(), known.max()]) if scale == "log" else np.array([known.min(), known.max()])
+        ends = ends + np.array([-room, room]) * (ends[1] - ends[0])
+        panel.set_xlim(*(np.exp(ends) if scale == "log" else ends))
+    panel.set_xlabel("\n".join(textwrap.wrap(label(words, unit), 64)))
+
+
+def span(panel: Axes, low: float, high: float) -> None:
+    """A logarithmic x axis from one value to another."""
+    panel.set_xscale("log")
+    panel.set_xlim(low, high)
+    if high < 100.0 * low:
+        plain_ticks(panel.xaxis)
+
+
+def plain_ticks(axis: Axis) -> None:
+    """Numbers such as 0.1, 0.2, 0.5 on a logarithmic axis of few decades."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())

@@ -1,0 +1,249 @@
+"""The figure of the competing theories: contact area under shear by each of them, and what was simulated."""
+
+import json
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from sim.analysis import engineering, is_steady, setting, settled, sweep_dims
+from sim.laws.rivals import compare_at_indentation, compare_at_load
+from sim.pictures import BOTH, LINES, REFERENCE, WIDE, Unit, label, letter, picture, span
+
+#: Name of each theory, its colour and line style.
+_THEORIES: dict[str, tuple[str, str, Any]] = {
+    "jkr": ("JKR; Menga, Carbone & Dini 2019", REFERENCE, "--"),
+    "hertz": ("Hertz", REFERENCE, ":"),
+    "uncorrected": ("Menga et al. 2018, uncorrected", LINES[4], "-"),
+    "savkoor_briggs": ("Savkoor & Briggs, full stick", LINES[1], "-"),
+    "reversible_force": ("reversible, force held", LINES[5], "--"),
+    "reversible_stress": ("reversible, stress held", LINES[2], "-"),
+    "fraction": ("a fraction {share:.3g} reversible", LINES[3], "-."),
+}
+
+#: Reversible fraction that is drawn where the dataset has none of its own.
+_FRACTION = 0.1
+
+#: Stresses at which theories are evaluated, and the widest area drawn, in JKR's.
+_FINE, _WIDEST = 1500, 1.6
+
+#: Points of a dataset that are drawn at most.
+_POINTS = 40
+
+
+class Case(NamedTuple):
+    """What the theories need of a scene: ``held`` is "load" [N] or "indentation" [m], rest as in ``laws.rivals``."""
+
+    at: dict[str, int]
+    held: str
+    value: float
+    work: float
+    sphere_radius: float
+    modulus: float
+    poisson_ratio: float
+    reversible: float
+
+    def radii(self, stress: np.ndarray) -> dict[str, np.ndarray]:
+        """Contact radius at shear stresses [Pa] by theory [m]."""
+        law = compare_at_load if self.held == "load" else compare_at_indentation
+        numbers = (self.value, self.work, self.sphere_radius, self.modulus, self.poisson_ratio, self.reversible)
+        return {name: a for name, a in law(stress, *numbers).items() if name in _THEORIES}
+
+    @property
+    def scale(self) -> float:
+        """Stress whose energy, all of it, is the work of adhesion at JKR's radius: sqrt(pi E* w/(6 a)) [Pa]."""
+        radius = float(self.radii(np.zeros(1))["jkr"][0])
+        return float(np.sqrt(np.pi * self.modulus * self.work / (6.0 * radius)))
+
+
+def needs_control(dataset: xr.Dataset) -> str:
+    """What holds the sphere at a number, "load" or "indentation"; refuse a dataset without.
+
+    Raises
+    ------
+    ValueError
+        For a sphere behind a machine stiffness, or held at a value that varies or is swept as a table.
+    """
+    contact = _scenario(dataset).get("contact", {})
+    why = "the sphere is not held at one number"
+    if contact.get("travel") is not None:
+        why = "the sphere is behind a machine stiffness"
+    elif is_moved(dataset):
+        why = "what holds the sphere varies in time"
+    else:
+        for held in ("load", "indentation"):
+            if _number(dataset, f"contact.{held}") is not None:
+                return _with_contact(dataset, held)
+    cure = 'run it with [contact] load = "4 mN", or with an indentation'
+    raise ValueError(f"{why}, and the theories need a load or an indentation that stays; {cure}")
+
+
+def _scenario(dataset: xr.Dataset) -> dict[str, Any]:
+    """The scenario of the dataset with all defaults."""
+    return json.loads(dataset.attrs.get("scenario_resolved", "{}"))
+
+
+def is_moved(dataset: xr.Dataset) -> bool:
+    """Whether what holds the sphere varies in time."""
+    contact = _scenario(dataset).get("contact", {})
+    return any(isinstance(contact.get(key), dict) for key in ("load", "indentation", "travel"))
+
+
+def _with_contact(dataset: xr.Dataset, held: str) -> str:
+    if not float(setting(dataset, "adhesion.work").max()) > 0.0:
+        raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
+    if not bool((dataset["radius_at_rest"] > 0.0).any()):
+        raise ValueError("there is no contact at rest; raise the load or the indentation")
+    return held
+
+
+def _number(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
+    try:
+        return setting(dataset, key)
+    except KeyError:
+        return None
+
+
+def case_of(dataset: xr.Dataset) -> Case:
+    """The scene of the theories; of swept loads, works or bodies the one that the scenario itself names."""
+    held = needs_control(dataset)
+    wanted = {
+        "value": setting(dataset, f"contact.{held}"),
+        "work": setting(dataset, "adhesion.work"),
+        "sphere_radius": setting(dataset, "sphere.radius"),
+        "modulus": dataset["contact_modulus"],
+        "poisson_ratio": dataset["effective_poisson_ratio"],
+    }
+    own = _scenario(dataset)
+    at = {name: _chosen(dataset, name, own) for name in _theory_dims(dataset, wanted)}
+    point = dict.fromkeys(sweep_dims(dataset), 0) | at
+    numbers = {key: float(found.isel(point, missing_dims="ignore")) for key, found in wanted.items()}
+    return Case(at, held, reversible=_fraction(dataset), **numbers)
+
+
+def _fraction(dataset: xr.Dataset) -> float:
+    """The reversible fraction to draw: the first of the dataset's own that no other theory stands for."""
+    own = _number(dataset, "contact.reversible")
+    shares = [] if own is None else [float(share) for share in own.to_numpy().ravel() if 0.0 < share != 1.0]
+    return shares[0] if shares else _FRACTION
+
+
+def _theory_dims(dataset: xr.Dataset, wanted: dict[str, xr.DataArray]) -> list[str]:
+    """Dimensions of the sweep along which the theories change."""
+    named = [name for name in sweep_dims(dataset) if any(name in found.dims for found in wanted.values())]
+    changes = {
+        name: any(name in v.dims and bool((v != v.isel({name: 0})).any()) for v in wanted.values()) for name in named
+    }
+    return [name for name in named if changes[name]]
+
+
+def _chosen(dataset: xr.Dataset, name: str, own: dict[str, Any]) -> int:
+    """Index along a dimension: the scenario's own value where it is among them, else the first with a contact."""
+    keys = (("contact", "load"), ("contact", "indentation"), ("adhesion", "work"), ("sphere", "radius"))
+    for table, key in keys:
+        swept, value = _number(dataset, f"{table}.{key}"), own.get(table, {}).get(key)
+        if swept is not None and swept.dims == (name,) and isinstance(value, float):
+            near = np.abs(swept.to_numpy() - value)
+            if near.min() <= 1e-9 * abs(value):
+                return int(near.argmin())
+    others = [dim for dim in dataset["radius_at_rest"].dims if dim != name]
+    return int((dataset["radius_at_rest"] > 0.0).any(others).to_numpy().argmax())
+
+
+def points_of(dataset: xr.Dataset, at: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Shear stress [Pa] and contact area [m^2] of closed contacts, means over the members.
+
+    Of steady sliding the mean over the second half of the run at each point of the sweep, else records
+    spread evenly over the run.
+    """
+    names = [name if name in dataset else f"{name}_mean" for name in ("shear_stress", "contact_area")]
+    found = dataset[names].isel({n: k for n, k in at.items() if n in dataset[names].dims})
+    if is_steady(dataset):
+        found = settled(found)
+    else:
+        chosen = np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int))
+        found = found.isel(t=chosen)
+    if "realization" in found.dims:
+        found = found.mean("realization")
+    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(*(found[name] for name in names)))
+    closed = area > 0.0
+    return np.abs(stress[closed]), area[closed]
+
+
+def rivals_figure(dataset: xr.Dataset) -> Figure:
+    """Contact area by every theory, over the shear stress and over the tangential force that it makes."""
+    case = case_of(dataset)
+    stress, area = points_of(dataset, case.at)
+    sheared = stress[stress > 0.0]
+    low, high = 0.1 * case.scale, max(3.0 * case.scale, 1.3 * float(np.max(sheared, initial=0.0)))
+    low = max(0.01 * case.scale, 0.7 * float(np.min(sheared, initial=low / 0.7)))
+    fine = np.geomspace(low, high, _FINE)
+    areas = {name: np.pi * radius**2 for name, radius in case.radii(fine).items()}
+    figure = picture(WIDE, 3.3)
+    axes = list(figure.subplots(1, 2, sharey=True))
+    letter(axes)
+    unit, pace = Unit.of(areas["jkr"], "m^2"), Unit.of(fine, "Pa", logarithmic=True)
+    force = Unit.of(areas["jkr"] * fine, "N", logarithmic=True)
+    _panel(axes[0], dict.fromkeys(areas, pace.factor * fine), areas, (pace.factor * stress, area), unit)
+    forces = {name: force.factor * values * fine for name, values in areas.items()}
+    _panel(axes[1], forces, areas, (force.factor * stress * area, area), unit)
+    axes[0].set_ylabel(label("contact area $A$", unit.name))
+    axes[0].set_xlabel(label(r"shear stress $\tau$", pace.name))
+    axes[1].set_xlabel(label(r"tangential force $T = \tau A$", force.name))
+    span(axes[0], pace.factor * low, pace.factor * high)
+    span(axes[1], *(force.factor * stress * areas["jkr"][0] for stress in (low, high)))
+    _limit(axes[0], areas, area, unit)
+    held = {"load": "$P$", "indentation": r"$\delta$"}[case.held]
+    amount = engineering(case.value, {"load": "N", "indentation": "m"}[case.held]).replace("-", "−")
+    axes[1].set_title(f"{held} = {amount}, $w$ = {engineering(case.work, 'J/m^2')}", loc="right")
+    figure.legend(handles=_handles(case), loc="outside upper left", ncols=3, handletextpad=0.5, labelspacing=0.25)
+    return figure
+
+
+def _panel(
+    panel: Axes, across: dict[str, np.ndarray], areas: dict[str, np.ndarray],
+    points: tuple[np.ndarray, np.ndarray], unit: Unit,
+) -> None:  # fmt: skip
+    """Every theory along its own x, as far as its adhesive branch goes, and the dataset's points."""
+    for name, values in areas.items():
+        _, colour, style = _THEORIES[name]
+        if name in ("jkr", "hertz"):  # whatever the shear
+            panel.axhline(unit.factor * values[0], linestyle=style, color=colour, linewidth=0.9, zorder=1.5)
+            continue
+        branch = adhesive(values, areas["hertz"])
+        panel.plot(across[name], unit.factor * branch, linestyle=style, color=colour)
+        held = np.flatnonzero(np.isfinite(branch))
+        if held.size and held[-1] < len(branch) - 1:  # it ends: at a fold with a dot
+            panel.plot(across[name][held[-1]], unit.factor * branch[held[-1]], "o", markersize=3, color=colour)
+    panel.plot(points[0], unit.factor * points[1], "o", markersize=3.5, mfc="white", color=BOTH, zorder=4)
+
+
+def adhesive(areas: np.ndarray, hertz: np.ndarray) -> np.ndarray:
+    """Areas of a theory while adhesion still holds the contact; nan from where it has Hertz's on.
+
+    >>> adhesive(np.array([3.0, 2.0, 1.0]), np.array([1.0, 1.0, 1.0]))
+    array([ 3.,  2., nan])
+    """
+    return np.where(areas > np.nan_to_num(hertz) * (1.0 + 1e-9), areas, np.nan)
+
+
+def _limit(panel: Axes, areas: dict[str, np.ndarray], area: np.ndarray, unit: Unit) -> None:
+    """Heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond."""
+    full, least = float(areas["jkr"][0]), float(np.nan_to_num(areas["hertz"][0]))
+    top = max(_WIDEST * full, 1.05 * float(np.max(area, initial=0.0)))
+    bottom = min(least - 0.3 * (full - least), float(np.min(area, initial=least)))
+    panel.set_ylim(unit.factor * max(bottom, 0.0), unit.factor * top)
+
+
+def _handles(case: Case) -> list[Line2D]:
+    """Legend entries: the theories by name, and the dataset."""
+    handles = []
+    for words, colour, style in _THEORIES.values():
+        width = 0.9 if colour == REFERENCE else 1.2
+        text = words.format(share=case.reversible)
+        handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=width, label=text))
+    points: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "none"}
+    return [*handles, Line2D([], [], color=BOTH, label="simulated", **points)]

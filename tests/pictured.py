@@ -1,0 +1,54 @@
+"""What the tests of figures share: small runs, and what was drawn of them."""
+
+from sim.bodies import Adhesion, Solid, Sphere
+from sim.ensemble import run
+from sim.memory import Onset, Time
+from sim.parts import bonds, drive, shear
+from sim.parts.contact import Equilibrium
+from sim.scenario import Clock, Ensemble, Record, Scenario
+from sim.spectrum import Band
+
+CELL = 0.24e-3
+RAMP = drive.Ramp(start=1e-5, stop=1e-1, scale="log")
+STEADY = drive.Steady(speed=4e-3)
+
+
+def field(kind=shear.Modal, spectrum=None, **changes):
+    spectrum = spectrum or Band(rms=150e3, longest=60e-6, shortest=16e-6)
+    options = {"memory": Time(time=0.01), "growth": Onset(speed=2.5e-3, width=0.3), "cell": CELL, "points": 32}
+    return kind(spectrum=spectrum, **(options | changes))
+
+
+def simulated(**changes):
+    parts = {
+        "clock": Clock(duration=0.4, step=0.02),
+        "solid": Solid(shear_modulus=1.6e6),
+        "sphere": Sphere(radius=2e-3),
+        "adhesion": Adhesion(work=42e-3),
+        "contact": Equilibrium(load=4e-3),
+        "drive": RAMP,
+        "bonds": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=3e5),
+        "shear": field(),
+        "ensemble": Ensemble(members=6),
+        "seed": 2003,
+    }
+    return run(Scenario(**{**parts, **changes}))
+
+
+def mapped(members=1, spectrum=None, **changes):
+    record = Record(maps=(0.4,), map_members=members)
+    options = {"drive": STEADY, "record": record, "ensemble": Ensemble(members=members)}
+    return simulated(shear=field(shear.Mapped, spectrum, **changes), **options)
+
+
+def drawn(panel, colour, style="-"):
+    """Data of the line of a colour and a style."""
+    (line,) = (line for line in panel.lines if line.get_color() == colour and line.get_linestyle() == style)
+    return line.get_data()
+
+
+def rendered(figure):
+    """The figure went through its whole layout without a warning, and its panels have labels with units."""
+    figure.draw_without_rendering()
+    assert figure.axes[0].get_ylabel() and figure.axes[-1].get_xlabel() + figure.axes[-1].get_ylabel()
+    return figure

@@ -1,0 +1,128 @@
+"""Figures of stress maps show the map, its displacement and its spectrum."""
+
+import numpy as np
+import pytest
+from matplotlib.patches import Circle
+from pictured import CELL, STEADY, field, mapped, rendered, simulated
+
+from sim import field_figures, plots
+from sim.grid import Grid
+from sim.memory import Onset, Stress
+from sim.modes import modes
+from sim.parts import drive, shear
+from sim.scenario import Ensemble, Record
+from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple
+
+
+@pytest.mark.parametrize("points", [32, 33])
+def test_map_passes_through_every_sample(points):
+    dataset = mapped(points=points)
+    panels = plots.draw(dataset, "map").axes
+    stress = dataset["shear_map"][0, 0].to_numpy()
+    shown = panels[0].images[0].get_array().T / 1e-3  # kPa
+    fine = points * -(-field_figures.PIXELS // points) // points
+    half = shown.shape[0] // 2
+    # the middle of the picture is the corner of the cell's array; rounding of the transform of |stress|
+    at = half + fine * np.arange(points // 2)
+    rounding = 1e-13 * np.max(np.abs(stress))
+    np.testing.assert_allclose(shown[np.ix_(at, at)], stress[: points // 2, : points // 2], rtol=0, atol=rounding)
+
+
+def test_map_of_a_ripple_and_its_displacement_have_the_closed_amplitudes():
+    ripple = Ripple(amplitude=3e5, wavelength=24e-6)
+    dataset = mapped(spectrum=ripple, amplitudes="fixed", growth=Onset(speed=1e-9, width=0.1))
+    shown = [panel.images[0] for panel in plots.draw(dataset, "map").axes]
+    # 384 pixels to ten waves: the highest pixel is at most half a pixel's phase from the crest
+    near = 1.0 - np.cos(np.pi * 10 / field_figures.PIXELS)
+    np.testing.assert_allclose(shown[0].get_array().max(), 300.0, rtol=near)
+    compliance = 1.0 / (2.0 * 1.6e6 * 2.0 * np.pi / 24e-6)
+    np.testing.assert_allclose(shown[1].get_array().max(), 1e9 * 3e5 * compliance, rtol=near)
+    along, across = (np.ptp(shown[0].get_array(), axis=axis).max() for axis in (1, 0))
+    assert along > 500.0 and across < 1e-6  # x to the right
+
+
+def test_contact_circle_has_the_members_radius():
+    dataset = mapped(members=2)
+    (circle,) = (patch for patch in plots.draw(dataset, "map").axes[0].patches if isinstance(patch, Circle))
+    np.testing.assert_allclose(circle.radius, 1e6 * dataset["contact_radius"][0, -1], rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("speed", "text"), [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]
+)
+def test_arrow_points_where_the_slider_goes(speed, text):
+    growth = Stress(reference=3e5)
+    dataset = simulated(
+        drive=drive.Steady(speed=speed),
+        shear=field(shear.Mapped, growth=growth),
+        record=Record(maps=(0.4,)),
+        ensemble=Ensemble(members=1),
+    )
+    panel = plots.draw(dataset, "map").axes[0]
+    assert text in [label.get_text() for label in panel.texts]
+
+
+@pytest.mark.parametrize(
+    ("spectrum", "growth"),
+    [
+        (Band(rms=150e3, longest=60e-6, shortest=16e-6), Onset(speed=2.5e-3, width=0.3)),
+        (Gaussian(rms=1e5, length=20e-6), Stress(reference=1e5)),
+        (AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), Onset(speed=2.5e-3, width=0.3)),
+    ],
+    ids=["band", "gaussian", "anisotropic"],
+)
+def test_measured_spectrum_is_the_one_asked_for(spectrum, growth):
+    """Each ring within five of the standard errors that Gaussian modes have, whatever the growth."""
+    members = 24
+    dataset = mapped(members, spectrum, growth=growth)
+    above, below = rendered(plots.draw(dataset, "spectrum")).axes
+    q, ratio = below.containers[0].lines[0].get_data()
+    cells = modes(spectrum, CELL, 32)
+    ring = np.floor(np.hypot(cells.ix, cells.iy) + 0.5)
+    shown = [cells.variance[ring == k] for k in np.rint(q * 1e6 * CELL / (2 * np.pi))]
+    # a mode's periodogram is exponentially distributed: its standard deviation is its mean
+    error = np.array([np.sqrt(np.sum(v**2)) / np.sum(v) for v in shown]) / np.sqrt(members)
+    assert len(q) > 5 and np.all(np.abs(ratio - 1.0) < 5.0 * error)
+    fine, asked = above.lines[0].get_data()
+    angle = 2 * np.pi * np.arange(360) / 360
+    density = np.mean(
+        spectrum.density(1e6 * fine[:, None] * np.cos(angle), 1e6 * fine[:, None] * np.sin(angle)), axis=1
+    )
+    raised = growth.factor(np.array([4e-3]), dataset["shear_stress"].to_numpy()[-1:])[0] ** 2
+    np.testing.assert_allclose(np.nan_to_num(asked), raised * density, rtol=1e-9)
+
+
+@pytest.mark.parametrize("points", [32, 33])
+def test_modes_laid_out_on_the_grid_hold_their_variance_both_ways(points):
+    cells = modes(AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), CELL, points)
+    grid = Grid(CELL, points)
+    density = field_figures.mode_density(cells, grid)
+    np.testing.assert_allclose(grid.mode_sum(density) / CELL**2, np.sum(cells.variance), rtol=1e-13)
+    np.testing.assert_array_equal(density[1:, 0], density[:0:-1, 0])  # q and -q alike
+
+
+def test_spectrum_of_a_sweep_takes_the_swept_number():
+    record = Record(maps=(0.4,))
+    dataset = simulated(
+        drive=STEADY, shear=field(shear.Mapped), record=record, ensemble=Ensemble(members=1),
+        sweep={"shear.spectrum.rms": [50e3, 100e3]},
+    )  # fmt: skip
+    base, swept = (plots.draw(d, "spectrum").axes[0].lines[0].get_ydata() for d in (mapped(), dataset))
+    np.testing.assert_allclose(np.nanmax(swept), np.nanmax(base) / 9.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["map", "spectrum"])
+def test_a_dataset_without_maps_says_how_to_record_them(kind):
+    with pytest.raises(ValueError, match=r'\[record\] maps = \["1 s"\]'):
+        plots.draw(simulated(), kind)
+
+
+def test_a_spectrum_that_cannot_be_compared_says_why():
+    with pytest.raises(ValueError, match="single wave"):
+        plots.draw(mapped(spectrum=Ripple(amplitude=3e5, wavelength=24e-6)), "spectrum")
+    resting = simulated(
+        drive=drive.Steady(), shear=field(shear.Mapped), record=Record(maps=(0.4,)), ensemble=Ensemble(members=1)
+    )
+    with pytest.raises(ValueError, match="holds no stress"):
+        plots.draw(resting, "spectrum")
+    assert plots.draw(resting, "map").axes

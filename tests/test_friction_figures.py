@@ -1,0 +1,239 @@
+"""Figures of friction show the stress of the bonds, its maximum, its peaks, and the closed forms beside them."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pictured import drawn, rendered, simulated
+
+from sim import bond_laws, pictures, plots, start_figure
+from sim.friction_figures import maximum_of
+from sim.hazards import Bell, Constant, CutOff
+from sim.laws import schallamach
+from sim.parts import bonds, drive, shear
+from sim.scenario import Clock, Ensemble, Record
+
+#: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.
+BELL = {"zero_force_rate": 1e4, "bell_force": 4e-12}
+SITES = {"bond_stiffness": 4e-4, "rebinding_rate": 1e5, "site_density": 9e16}
+LAW = (1e4, 4e-12, 4e-4, 1e5)
+COHORT = bonds.Cohort(hazard=Bell(**BELL), **SITES)
+PALE = "#BBBBBB"
+PLAIN = {"shear": shear.Uniform(), "ensemble": Ensemble(members=1)}
+
+
+def ramped(population=COHORT, **changes):
+    ramp = drive.Ramp(start=1e-6, stop=1e-1, scale="log")
+    parts = {"bonds": population, "drive": ramp, "clock": Clock(duration=10.0, step=0.1)} | PLAIN
+    return simulated(**(parts | changes))
+
+
+def started(**changes):
+    """Slow bonds, 1/s, at rest and then slid; the speeds that are drawn by default are 0.1 and 1 µm/s."""
+    population = bonds.Cohort(
+        hazard=Bell(zero_force_rate=1.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=1.0,
+        site_density=9e16, start_from="empty",
+    )  # fmt: skip
+    parts = {"bonds": population, "clock": Clock(duration=2.0, step=5e-3), "drive": drive.Start(rest=1.0, speed=1e-6)}
+    return simulated(**(parts | PLAIN | changes))
+
+
+@pytest.fixture(scope="module")
+def ramp():
+    return ramped()
+
+
+@pytest.fixture(scope="module")
+def starts():
+    return started(sweep={"drive.rest": [0.5, 1.0], "drive.speed": [1e-7, 3e-7, 1e-6]})
+
+
+# -- over the speed ---------------------------------------------------------------------------
+
+
+def test_stress_and_bonds_are_drawn_over_the_speed(ramp):
+    stress, fraction = rendered(plots.draw(ramp, "friction")).axes
+    (speed, values), _ = (line.get_data() for line in stress.lines if line.get_color() == pictures.BOTH)
+    assert_allclose(speed, 1e6 * ramp["speed"], rtol=1e-14)
+    assert_allclose(values, 1e-3 * ramp["shear_stress"], rtol=1e-14)
+    assert_allclose(drawn(fraction, pictures.BOTH)[1], ramp["bond_fraction"], rtol=1e-14)
+    assert stress.get_ylabel() == r"shear stress $\tau_0$ (kPa)"
+    assert (fraction.get_xlabel(), fraction.get_xscale()) == ("sliding speed $V$ (µm/s)", "log")
+
+
+def test_the_exact_law_and_the_mean_field_are_beside_the_simulated(ramp):
+    stress, fraction = plots.draw(ramp, "friction").axes
+    speed, exact = drawn(stress, PALE)
+    assert_allclose(exact, 1e-3 * schallamach.bell_stress(1e-6 * speed, *LAW, 9e16), rtol=1e-12)
+    speed, field = drawn(stress, pictures.REFERENCE, "--")
+    assert_allclose(field, 1e-3 * schallamach.first_moment_stress(1e-6 * speed, *LAW, 9e16), rtol=1e-12)
+    speed, exact = drawn(fraction, PALE)
+    assert_allclose(exact, schallamach.bell_fraction(1e-6 * speed, *LAW), rtol=1e-12)
+    assert_allclose(speed[[0, -1]], [1.0, 1e5], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("hazard", "law"),
+    [
+        (CutOff(stretch=2e-8, rate=1e4), lambda v: schallamach.cut_off_stress(v, 1e4, 2e-8, 4e-4, 1e5, 9e16)),
+        (CutOff(stretch=2e-8), lambda v: schallamach.cut_off_stress(v, 0.0, 2e-8, 4e-4, 1e5, 9e16)),
+        (Constant(rate=1e4), lambda v: 9e16 * schallamach.constant_moments(v, 1e4, 4e-4, 1e5).force),
+    ],
+    ids=["cut off", "cut off without heat", "constant"],
+)
+def test_every_hazard_has_its_own_law(hazard, law):
+    dataset = ramped(bonds.FirstMoment(hazard=hazard, **SITES), clock=Clock(duration=1.0, step=0.1))
+    speed = np.array([1e-5, 1e-3])
+    (found,) = bond_laws.steady_laws(dataset, {}, speed)
+    assert_allclose(found.stress, law(speed), rtol=1e-12)
+    rendered(plots.draw(dataset, "friction"))
+
+
+def test_a_swept_hazard_has_a_law_at_each_point():
+    dataset = ramped(
+        sweep={"bonds.hazard.bell_force": [4e-12, 8e-12]}, clock=Clock(duration=1.0, step=0.1)
+    )  # fmt: skip
+    speed = np.array([1e-3])
+    for k, force in enumerate((4e-12, 8e-12)):
+        exact = schallamach.bell_stress(speed, 1e4, force, 4e-4, 1e5, 9e16)
+        assert_allclose(bond_laws.steady_laws(dataset, {"bell_force": k}, speed)[0].stress, exact, rtol=1e-12)
+
+
+def test_the_maximum_is_marked_and_told(ramp):
+    panel = plots.draw(ramp, "friction").axes[0]
+    (ring,) = (line for line in panel.lines if line.get_markerfacecolor() == "none")
+    at = int(np.argmax(ramp["shear_stress"].to_numpy()))
+    assert_allclose(np.ravel(ring.get_data()), [1e6 * ramp["speed"][at], 1e-3 * ramp["shear_stress"][at]], rtol=1e-14)
+    # a record every tenth of a decade and more: the largest record is within half a step of the maximum
+    speed, stress = schallamach.bell_peak(*LAW, 9e16)
+    assert abs(np.log(1e-6 * ring.get_xdata()[0] / speed)) <= 0.5 * np.log(1e5) / 100
+    told = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert told[1] == f"maximum: {pictures.rounded(float(ramp['shear_stress'][at]), 'Pa')} at 2 mm/s"
+    assert_allclose(float(ramp["shear_stress"][at]), stress, rtol=5e-3)
+
+
+def test_stress_that_only_rises_has_no_maximum():
+    speed = np.array([1.0, 2.0, 3.0])
+    assert maximum_of(speed, speed) is None
+    assert maximum_of(speed, speed[::-1]) is None
+    assert maximum_of(speed, np.full(3, np.nan)) is None
+    assert maximum_of(-speed, np.array([-1.0, -4.0, -2.0])) == 1
+    dataset = ramped(drive=drive.Ramp(start=1e-6, stop=1e-4, scale="log"), clock=Clock(duration=1.0, step=0.1))
+    told = [text.get_text() for text in plots.draw(dataset, "friction").axes[0].get_legend().get_texts()]
+    assert told == ["simulated", "steady sliding, exact", "mean field"]
+
+
+def test_depths_side_by_side_each_tell_their_maximum():
+    hazard = {"model": "bell", "zero_force_rate": "1e4 1/s", "bell_force": "4 pN"}
+    table = {"hazard": hazard, "bond_stiffness": "0.4 mN/m", "rebinding_rate": "1e5 1/s", "site_density": "9e16 1/m^2"}
+    tables = [{"model": model, **table} for model in ("rate", "cohort")]
+    dataset = ramped(sweep={"bonds": tables})
+    told = [text.get_text() for text in plots.draw(dataset, "friction").axes[0].get_legend().get_texts()]
+    most = [pictures.rounded(float(value), "Pa") for value in dataset["shear_stress"].max("t")]
+    assert told == [f"rate: {most[0]} at 2 mm/s", f"cohort: {most[1]} at 2 mm/s", "steady sliding, exact", "mean field"]
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"drive": drive.Ramp(start=-1e-3, stop=2e-3)},
+        {"drive": drive.Ramp(start=0.0, stop=1e-2)},
+        {"drive": drive.Table(time=(0.0, 0.5, 1.0), speed=(0.0, 0.02, 0.0))},
+        {"drive": drive.Steady(speed=1e-3), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}},
+        {"bonds": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=3e5)},
+        {"bonds": bonds.Unbroken(stress=3e5)},
+        {"bonds": bonds.Tracked(hazard=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3)},
+        {"bonds": bonds.Tracked(hazard=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3),
+         "record": Record(per_member=False)},
+    ],
+    ids=["through zero", "from zero", "there and back", "steady speeds", "no stretch", "unbroken", "members",
+         "statistics only"],
+)  # fmt: skip
+def test_every_kind_of_sliding_can_be_drawn(changes):
+    rendered(plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "friction"))
+
+
+# -- rest and start ---------------------------------------------------------------------------
+
+
+def test_stress_is_drawn_since_the_start_at_the_longest_rest(starts):
+    panel, _ = rendered(plots.draw(starts, "friction")).axes
+    slides = starts["t"].to_numpy() > 1.0 + 1e-9
+    curves = [line.get_data() for line in panel.lines if line.get_linestyle() == "-"]
+    for k, (time, stress) in enumerate(curves):
+        assert_allclose(time, 1e3 * (starts["t"].to_numpy()[slides] - 1.0), rtol=1e-12)
+        assert_allclose(stress, 1e-3 * starts["shear_stress"][1, k].to_numpy()[slides], rtol=1e-14)
+    labels = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert labels == ["100 nm/s", "300 nm/s", "1 µm/s"]
+    assert panel.get_legend().get_title().get_text() == "after 1 s at rest, sliding at"
+
+
+def test_peaks_are_drawn_over_the_speed_one_line_a_rest(starts):
+    panel = plots.draw(starts, "friction").axes[1]
+    lines = [line.get_data() for line in panel.lines if line.get_linestyle() == "-" and line.get_marker() != "None"]
+    assert len(lines) == 2 and panel.get_xscale() == "log"
+    for k, rest in enumerate((0.5, 1.0)):
+        peaks = starts["shear_stress"][k].where(starts["t"] > rest).max("t")
+        assert_allclose(lines[k][0], [100.0, 300.0, 1000.0], rtol=1e-12)
+        assert_allclose(lines[k][1], 1e-3 * peaks, rtol=1e-14)
+    labels = [text.get_text() for text in panel.get_legend().get_texts()]
+    assert labels == ["500 ms at rest", "1 s at rest", "none rebinds", "steady sliding"]
+
+
+def test_bonds_that_do_not_rebind_have_the_peak_of_the_closed_form(starts):
+    panel = plots.draw(starts, "friction").axes[1]
+    dotted = [line.get_data() for line in panel.lines if line.get_linestyle() == ":"]
+    for rest, (speed, peak) in zip((0.5, 1.0), dotted, strict=True):
+        bound = 0.5 * -np.expm1(-2.0 * rest)  # sites bind and open with 1/s each
+        force = schallamach.start_up_peak(1e-9 * speed, 1.0, 4e-12, 4e-4).force
+        # the number of bonds is exact for a constant rate; the population holds it to its tolerance of 1e-4
+        assert_allclose(peak, 1e-3 * 9e16 * bound * force, rtol=2e-4)
+    (steady,) = (line for line in panel.lines if line.get_linestyle() == "-" and line.get_marker() == "None")
+    exact = schallamach.bell_stress(1e-9 * steady.get_xdata(), 1.0, 4e-12, 4e-4, 1.0, 9e16)
+    assert_allclose(steady.get_ydata(), 1e-3 * exact, rtol=1e-12)
+
+
+def test_peaks_that_records_do_not_show_are_hollow():
+    def begun(*stress):
+        return start_figure.Start({}, 1.0, 1e-6, 1.0, np.arange(len(stress)), np.array(stress))
+
+    assert begun(1.0, 2.0, 3.0, 4.0, 3.9).seen
+    assert not begun(1.0, 2.0, 3.0, 4.0, 5.0).seen  # still rising at the end
+    assert not begun(1.0, 2.0, 3.0, 4.0, 0.1).seen  # gone from one record to the next
+    assert not begun(3.0, 4.0, 3.9, 3.5).seen  # risen between two records
+    coarse = started(clock=Clock(duration=2.0, step=5e-3, record=0.02), sweep={"drive.speed": [1e-7, 1e-6]})
+    panel = plots.draw(coarse, "friction").axes[1]
+    (hollow,) = (line.get_xdata() for line in panel.lines if line.get_markerfacecolor() == "white")
+    assert_allclose(hollow, [1000.0], rtol=1e-12)
+    assert "not resolved" in [text.get_text() for text in panel.get_legend().get_texts()]
+
+
+@pytest.mark.parametrize(
+    ("sweep", "words"),
+    [
+        ({}, ["time since the start (s)"]),
+        ({"drive.rest": [0.2, 0.5]}, ["time since the start (s)", "time at rest (ms)"]),
+        ({"contact.load": [1e-3, 4e-3]}, ["time since the start (s)"]),
+    ],
+)
+def test_what_is_not_swept_is_not_an_axis(sweep, words):
+    figure = rendered(plots.draw(started(sweep=sweep, clock=Clock(duration=2.0, step=0.02))))
+    assert [panel.get_xlabel() for panel in figure.axes] == words
+    if "contact.load" in sweep:
+        assert figure.axes[0].get_legend().get_title().get_text().startswith("$P$ = 1 mN, after 1 s")
+
+
+# -- what cannot be drawn ---------------------------------------------------------------------
+
+
+def test_what_lacks_stress_or_speeds_is_told_with_what_can_be_drawn():
+    frictionless = ramped(bonds.Unbroken(), clock=Clock(duration=0.1, step=0.1))
+    with pytest.raises(ValueError, match=r"no shear stress; .*stress = .*drawn as: curve, time, rivals, profile$"):
+        plots.draw(frictionless, "friction")
+    steady = ramped(drive=drive.Steady(speed=1e-3), clock=Clock(duration=0.1, step=0.1))
+    with pytest.raises(ValueError, match=r'neither changes nor is swept; .*model = "start".*time, rivals, profile$'):
+        plots.draw(steady, "friction")
+    resting = ramped(
+        bonds.Unbroken(stress=3e5), drive=drive.Start(rest=5.0, speed=1e-3), clock=Clock(duration=0.1, step=0.1)
+    )
+    with pytest.raises(ValueError, match="ends before the slider starts"):
+        plots.draw(resting, "friction")

@@ -1,0 +1,272 @@
+"""What a contact is under each grip: energies along any path, limits of a machine, never below Hertz, any number."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from sim.disc import disc_energy
+from sim.grips import AtLoad, AtTravel, Bodies, elastic_energy
+from sim.laws import jkr
+from sim.margin import Margin
+from sim.parts.contact import Balance, Equilibrium
+from sim.spectrum import Gaussian
+
+#: Maugis's units: K = 4 E*/3, R and pi w are 1, so that radii, loads and travels are those of the textbooks.
+MAUGIS = Bodies(1.0, 0.75, 0.5)
+WORK = 1.0 / math.pi
+PATCHES = Gaussian(rms=1.0, length=0.4)
+SHEAR_MODULUS = 0.1875
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(60)
+
+
+def drift(part):
+    """A number that changes smoothly along a path, and its derivative."""
+    return math.sin(2.0 * part + 0.3), 2.0 * math.cos(2.0 * part + 0.3)
+
+
+class Path:
+    """A slow path of part 0 to 1 along which the control moves from one value to another and the work changes."""
+
+    def __init__(self, control, ends, reversible=0.0, fluctuating=0.0, changing=0.0):
+        self.control, self.ends, self.reversible = control, ends, reversible
+        self.fluctuating, self.changing = fluctuating, changing
+        self.margin = Margin(PATCHES, SHEAR_MODULUS, 0.5, 1.0 * 4.0) if fluctuating else None
+        self.stress = np.array([0.25])
+
+    def state(self, part):
+        """Grip, balance and radius on the way, in equilibrium."""
+        low, high = self.ends
+        value = low + (high - low) * part
+        bonded = np.array([WORK * (1.0 + self.changing * drift(part)[0])])
+        balance = Balance(bonded, np.array([self.fluctuating * WORK]), self.stress, self.margin, MAUGIS, WORK)
+        contact = Equilibrium(**self.control(value), reversible=self.reversible)
+        grip = contact.grip(0.0, 1.0)
+        return grip, balance, contact._equilibrium(grip, balance)
+
+    def stored(self, part):
+        """Energy of the contact and its machine, adhesion included: int w dA in closed form."""
+        grip, balance, a = self.state(part)
+        depth = grip.depth(a, MAUGIS)
+        machine = 0.0
+        if isinstance(grip, AtTravel) and math.isfinite(grip.stiffness):
+            machine = 0.5 * grip.stiffness * (grip.place - depth) ** 2
+        area = math.pi * a**2
+        plane = float(PATCHES.surface_energy(SHEAR_MODULUS))
+        share = disc_energy(PATCHES, a, SHEAR_MODULUS) / plane if self.fluctuating else 0.0
+        adhesive = area * (balance.bonded - balance.fluctuating * share)
+        mean = self.reversible * 4.0 * self.stress**2 * a**3 / MAUGIS.modulus
+        return (elastic_energy(a, depth, MAUGIS) + machine - adhesive + mean)[0]
+
+    def spent(self):
+        """int P d(travel) - int A dw over the path, by Gauss's nodes; at a load by parts."""
+        total = 0.0
+        for node, weight in zip(0.5 * (1.0 + NODES), 0.5 * WEIGHTS, strict=True):
+            grip, _, a = self.state(node)
+            rate = (self.ends[1] - self.ends[0]) * (
+                -grip.travel(a, MAUGIS) if isinstance(grip, AtLoad) else grip.normal_load(a, MAUGIS)
+            )
+            rate = rate - math.pi * a**2 * WORK * self.changing * drift(node)[1]
+            total += weight * rate[0]
+        if "load" in self.control(1.0):
+            for part, sign in ((1.0, 1.0), (0.0, -1.0)):
+                grip, _, a = self.state(part)
+                total += sign * (grip.load * grip.travel(a, MAUGIS))[0]
+        return total
+
+
+CONTROLS = {
+    "load": (lambda value: {"load": value}, (3.0, -1.0)),
+    "indentation": (lambda value: {"indentation": value}, (2.0, -0.5)),
+    "soft machine": (lambda value: {"travel": value, "stiffness": 0.1}, (9.0, -10.0)),
+    "machine": (lambda value: {"travel": value, "stiffness": 5.0}, (3.0, -0.8)),
+}
+PAID = {
+    "constant work": {},
+    "work that changes in time": {"changing": 0.1},
+    "reversible": {"reversible": 0.3},
+    "reversible, changing": {"reversible": 0.3, "changing": -0.1},
+    "on a disc": {"fluctuating": 0.2},
+    "on a disc, reversible, changing": {"fluctuating": 0.1, "reversible": 0.2, "changing": 0.05},
+}
+
+
+@pytest.mark.parametrize("paid", PAID)
+@pytest.mark.parametrize("control", CONTROLS)
+def test_the_work_done_on_a_contact_is_what_it_stores(control, paid):
+    # the sum converges like exp(-60 x): to rounding, but for the spline of the disc's share, good to 1e-9
+    path = Path(*CONTROLS[control], **PAID[paid])
+    gained = path.stored(1.0) - path.stored(0.0)
+    assert abs(gained) > 0.01
+    assert_allclose(path.spent(), gained, rtol=0.0, atol=1e-8 if "disc" in paid else 1e-10)
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+def test_energies_slope_to_the_load_and_to_the_energy_release_rate(control):
+    make, (low, _) = CONTROLS[control]
+    grip = Equilibrium(**make(low)).grip(0.0, 1.0)
+    a = np.array([1.3])
+    depth = grip.depth(a, MAUGIS)
+    # a complex step has no rounding of differences
+    slope = elastic_energy(a, depth + 1e-30j, MAUGIS).imag / 1e-30
+    assert_allclose(slope, grip.normal_load(a, MAUGIS), rtol=1e-13)
+    rate = elastic_energy(a + 1e-30j, depth, MAUGIS).imag / 1e-30 / (2.0 * math.pi * a)
+    assert_allclose(-rate, -jkr.energy_release_rate_at_indentation(a, depth, 1.0, 0.75), rtol=1e-13)
+
+
+@pytest.mark.parametrize("load", [4.0, 0.1, -1.0, -1.49])
+def test_a_soft_machine_far_away_is_a_load(load):
+    # the load changes by k delta: a relative change of 1e-12 delta, magnified by 1/sqrt(distance from the fold)
+    k = 1e-12
+    soft = AtTravel(load / k, k).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+    held = AtLoad(load).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+    assert_allclose(soft, held, rtol=1e-10)
+    assert_allclose(AtTravel(load / k, k).normal_load(soft, MAUGIS), load, rtol=1e-10)
+
+
+@pytest.mark.parametrize("place", [3.0, 0.0, -0.5, -0.9])
+def test_a_stiff_machine_is_an_indentation(place):
+    for stiffness in (1e13, 1e30, math.inf):
+        found = AtTravel(place, stiffness)
+        radius = found.radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+        held = AtTravel(place).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+        assert_allclose(radius, held, rtol=1e-11)
+        assert_allclose(found.depth(radius, MAUGIS), place, rtol=0.0, atol=1e-11)
+
+
+def test_load_indentation_and_travel_of_any_radius_go_together():
+    rng = np.random.default_rng(7)
+    a = rng.uniform(0.1, 3.0, 200)
+    for grip in (AtLoad(-0.7), AtTravel(0.4), AtTravel(0.4, 3.0)):
+        load, depth = grip.normal_load(a, MAUGIS), grip.depth(a, MAUGIS)
+        assert_allclose(load, 2.0 * 0.75 * a * (depth - a**2 / 3.0), rtol=0.0, atol=1e-13)
+        yielded = load / 3.0 if getattr(grip, "stiffness", math.inf) == 3.0 else 0.0
+        assert_allclose(grip.travel(a, MAUGIS), depth + yielded, rtol=0.0, atol=1e-14)
+
+
+def test_an_open_contact_bears_no_load():
+    gone = np.array([math.nan])
+    for grip in (AtLoad(-3.0), AtTravel(-2.0), AtTravel(-2.0, 5.0)):
+        assert_array_equal(grip.normal_load(gone, MAUGIS), 0.0)
+        assert not grip.closes
+    assert math.isnan(AtLoad(-3.0).depth(gone, MAUGIS)[0])  # a free sphere is anywhere
+    assert_array_equal(AtTravel(-2.0, 5.0).depth(gone, MAUGIS), -2.0)
+
+
+@pytest.mark.parametrize("grip", [AtLoad(0.0), AtTravel(0.0), AtTravel(0.0, 5.0)])
+def test_a_free_sphere_closes_from_zero_on(grip):
+    assert grip.closes
+
+
+def random_balance(rng, size, margin):
+    """Works from masked to strong, and stresses over decades."""
+    bonded = WORK * rng.uniform(0.0, 1.0, size)
+    fluctuating = WORK * rng.uniform(0.0, 2.0, size)
+    return Balance(bonded, fluctuating, 10.0 ** rng.uniform(-3.0, 1.0, size), margin, MAUGIS, WORK)
+
+
+def random_contact(rng, kind, reversible):
+    value = rng.uniform(-2.0, 3.0)
+    if kind == "travel":
+        return Equilibrium(travel=value, stiffness=10.0 ** rng.uniform(-3.0, 3.0), reversible=reversible)
+    return Equilibrium(**{kind: value}, reversible=reversible)
+
+
+@pytest.mark.parametrize("reversible", [0.0, 0.3])
+@pytest.mark.parametrize("margin", [None, Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)], ids=["plane", "disc"])
+@pytest.mark.parametrize("kind", ["load", "indentation", "travel"])
+def test_no_contact_is_smaller_than_hertz_and_each_balances(kind, margin, reversible):
+    rng = np.random.default_rng(11)
+    for _ in range(60):
+        contact, balance = random_contact(rng, kind, reversible), random_balance(rng, 40, margin)
+        grip = contact.grip(0.0, 1.0)
+        a = contact._equilibrium(grip, balance)
+        left = contact._left(a, balance)
+        hertz = grip.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)
+        closed = np.isfinite(a)
+        if grip.closes:
+            assert closed.all()
+            assert np.all(a >= hertz * (1.0 - 4e-16))
+        pulled = closed & (a > hertz * (1.0 + 1e-9)) if grip.closes else closed
+        rate = jkr.energy_release_rate_at_indentation(a, grip.depth(a, MAUGIS), 1.0, 0.75)
+        # G is a square whose root has lost digits to the difference of a^2 and delta; the scale is w at rest
+        assert_allclose(rate[pulled], left[pulled], rtol=1e-9, atol=1e-12 * WORK)
+        masked = closed & ~pulled
+        assert np.all(left[masked] <= 1e-8 * WORK)
+
+
+@pytest.mark.parametrize("kind", ["load", "indentation", "travel"])
+def test_the_contact_on_a_disc_is_the_widest_that_balances(kind):
+    # a walk from the right over 4000 places of the surplus G - w(a), G below Hertz's radius counted negative
+    rng = np.random.default_rng(13)
+    margin = Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)
+    places = np.geomspace(4.0, 1e-3, 4000)[:, None]
+    wrong = 0
+    for _ in range(20):
+        contact, balance = random_contact(rng, kind, 0.0), random_balance(rng, 30, margin)
+        grip = contact.grip(0.0, 1.0)
+        a = contact._equilibrium(grip, balance)
+        depth = grip.depth(places, MAUGIS)
+        rate = jkr.energy_release_rate_at_indentation(places, depth, 1.0, 0.75)
+        pull = np.where(places**2 > depth, rate, -rate)
+        below = pull <= balance.bonded - balance.fluctuating * margin(places)
+        crossed = below.any(0)
+        widest = places[np.argmax(below, 0), 0]
+        hertz = np.nan_to_num(grip.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS))
+        expected = np.where(crossed, np.maximum(widest, hertz), hertz if grip.closes else math.nan)
+        step = places[0, 0] / places[1, 0]
+        off = np.isnan(a) != np.isnan(expected)
+        off |= ~np.isnan(a + expected) & ((a < expected / step) | (a > expected * step * (1.0 + 1e-12)))
+        # two crossings between neighbouring places are a contact that the walk does not see
+        wrong += np.count_nonzero(off & ~(np.isnan(expected) & ~np.isnan(a) & balances(grip, a, balance)))
+    assert wrong == 0
+
+
+def balances(grip, a, balance):
+    rate = jkr.energy_release_rate_at_indentation(a, grip.depth(a, MAUGIS), 1.0, 0.75)
+    return np.abs(rate - balance.work(a)) <= 1e-9 * WORK
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("reversible", [0.0, 1e-300, 1.0])
+def test_no_number_raises_or_hangs_or_makes_a_contact_smaller_than_hertz(reversible):
+    numbers = [0.0, 5e-324, 1e-300, 1e-150, 1e-30, 1e-6, 1.0, 1e6, 1e30, 1e150, 1e300, 1.7e308]
+    works = np.array([0.0, -1.0, *numbers, math.inf, -math.inf, math.nan])
+    for size in numbers:
+        for value in (size, -size):
+            for grip in (
+                AtLoad(value),
+                AtTravel(value),
+                *(AtTravel(value, k) for k in (5e-324, 1e-30, 1.0, 1e30, 1e308)),
+            ):
+                for stress in (0.0, 1.0, 1e150):
+                    a = grip.radius(works, np.full(works.shape, stress), reversible, MAUGIS)
+                    hertz = grip.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)[0]
+                    closed = np.isfinite(a) & (a > 0.0)
+                    if value >= 0.0 and math.isfinite(hertz):
+                        assert np.all(a[closed] >= hertz * (1.0 - 1e-13))
+                    if value < 0.0:
+                        assert np.all(np.isnan(a[:2]))
+                    for read in (grip.normal_load, grip.depth, grip.travel):
+                        assert read(a, MAUGIS).shape == a.shape
+
+
+def test_without_work_a_contact_is_hertz_to_the_bit():
+    for work in (0.0, -0.0, -1e-300, -WORK, -math.inf):
+        one = np.full(1, work)
+        for load in (0.0, 5e-324, 0.3, 7.0):
+            assert AtLoad(load).radius(one, np.ones(1), 0.5, MAUGIS) == jkr.hertz_radius_at_load(load, 1.0, 0.75)
+            assert AtTravel(load).radius(one, np.ones(1), 0.5, MAUGIS) == math.sqrt(load)
+            a = AtTravel(load, 5.0).radius(one, np.ones(1), 0.5, MAUGIS)[0]
+            assert_allclose(a**2 + a**3 / 5.0, load, rtol=1e-14, atol=0.0)
+
+
+def test_nothing_reversible_is_jkr_to_the_bit_at_any_stress():
+    rng = np.random.default_rng(17)
+    works = WORK * rng.uniform(-0.2, 1.0, 100)
+    for value in rng.uniform(-1.5, 3.0, 20):
+        for grip in (AtLoad(value), AtTravel(value), AtTravel(value, 0.7)):
+            plain = grip.radius(works, np.zeros(1), 0.0, MAUGIS)
+            assert_array_equal(grip.radius(works, 10.0 ** rng.uniform(-9, 9, 100), 0.0, MAUGIS), plain)
+            assert_array_equal(grip.radius(works, np.zeros(1), 0.5, MAUGIS), plain)

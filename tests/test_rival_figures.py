@@ -1,0 +1,242 @@
+"""The figure of the rivals shows what each theory says, and the figure of profiles the fields of the contact."""
+
+import json
+
+import numpy as np
+import pytest
+from matplotlib.patches import Circle
+from numpy.testing import assert_allclose
+from pictured import RAMP, STEADY, rendered, simulated
+
+from sim import pictures, plots, rival_figures
+from sim.bodies import Adhesion
+from sim.laws import jkr, profiles, rivals
+from sim.parts import bonds, drive, shear
+from sim.parts.contact import Equilibrium
+from sim.profile_figures import shapes_of
+from sim.scenario import Clock, Ensemble, Record
+
+NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)
+
+
+def plain(**changes):
+    parts = {
+        "bonds": bonds.Unbroken(stress=3e5), "shear": shear.Uniform(), "drive": STEADY,
+        "clock": Clock(duration=0.04, step=0.02), "ensemble": Ensemble(members=1),
+    }  # fmt: skip
+    return simulated(**(parts | changes))
+
+
+def curve_of(panel, name):
+    _, colour, style = rival_figures._THEORIES[name]
+    (line,) = (
+        x for x in panel.lines if (x.get_color(), x.get_linestyle()) == (colour, style) and len(x.get_xdata()) > 2
+    )
+    return line.get_data()
+
+
+# -- rivals -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("contact", "law", "value"),
+    [
+        (Equilibrium(load=4e-3), rivals.compare_at_load, 4e-3),
+        (Equilibrium(indentation=2e-6), rivals.compare_at_indentation, 2e-6),
+        (Equilibrium(load=-3e-4), rivals.compare_at_load, -3e-4),
+    ],
+    ids=["load", "indentation", "pulled"],
+)
+def test_every_theory_is_drawn_as_far_as_adhesion_holds(contact, law, value):
+    stresses, forces = rendered(plots.draw(plain(contact=contact), "rivals")).axes
+    for name in ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction"):
+        stress, area = curve_of(stresses, name)
+        factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
+        radii = law(factor * stress, value, *NUMBERS)
+        held = np.isfinite(area)
+        assert held[0] and np.all(radii[name][held] > np.nan_to_num(radii["hertz"][held]))
+        per_area = {"mm²": 1e6, "µm²": 1e12}[stresses.get_ylabel()[-4:-1].strip("(")]
+        # rounding of the axis's unit, which a fold has the square root of
+        assert_allclose(area[held], per_area * np.pi * radii[name][held] ** 2, rtol=1e-6)
+        force, again = curve_of(forces, name)
+        assert_allclose(again, area, rtol=1e-14)
+        newton = {"mN": 1e3, "µN": 1e6}[forces.get_xlabel()[-3:-1]]
+        assert_allclose(force[held], newton * factor * stress[held] * area[held] / per_area, rtol=1e-12)
+
+
+def test_a_branch_ends_with_a_dot_where_its_force_is_largest():
+    panel = plots.draw(plain(), "rivals").axes[1]
+    _, colour, _ = rival_figures._THEORIES["savkoor_briggs"]
+    (dot,) = (line for line in panel.lines if line.get_color() == colour and line.get_marker() == "o")
+    limit = 1e3 * float(rivals.savkoor_briggs_limit(4e-3, 42e-3, 2e-3))
+    # 1500 stresses over the axis's decades; the force is flat at its largest, so a step costs its square
+    assert limit * 0.999 < dot.get_xdata()[0] <= limit * (1.0 + 1e-12)
+
+
+def test_jkr_and_hertz_stand_whatever_the_shear():
+    panel = plots.draw(plain(), "rivals").axes[0]
+    lines = {
+        line.get_linestyle(): line.get_ydata()[0] for line in panel.lines if line.get_color() == pictures.REFERENCE
+    }
+    at = {"--": jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6), ":": jkr.hertz_radius_at_load(4e-3, 2e-3, 6.4e6)}
+    for style, radius in at.items():
+        assert_allclose(lines[style], 1e6 * np.pi * radius**2, rtol=1e-14)
+
+
+def test_the_datasets_points_are_means_over_members_and_the_second_half():
+    dataset = plain(sweep={"bonds.stress": [0.0, 1e5, 1e6], "contact.load": [1e-3, 4e-3]})
+    stress, area = rival_figures.points_of(dataset, {"load": 1})
+    assert_allclose(stress, [0.0, 1e5, 1e6], rtol=1e-14)
+    assert_allclose(area, dataset["contact_area"].isel(load=1, t=-1), rtol=1e-14)
+    members = simulated(drive=STEADY, ensemble=Ensemble(members=5))
+    late = members["contact_area"].isel(t=slice(members.sizes["t"] // 2, None))
+    assert_allclose(rival_figures.points_of(members, {})[1], [late.mean()], rtol=1e-13)
+
+
+def test_of_swept_loads_the_scenarios_own_is_drawn():
+    dataset = plain(sweep={"contact.load": [-3e-4, 1e-3, 4e-3]})
+    case = rival_figures.case_of(dataset)
+    assert (case.at, case.value) == ({"load": 2}, 4e-3)
+    assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in [
+        text for p in plots.draw(dataset, "rivals").axes for text in [p.get_title("right")]
+    ]
+    others = plain(sweep={"contact.load": [-1.0, 1e-3]})
+    assert rival_figures.case_of(others).value == 1e-3  # the first with a contact
+
+
+def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
+    contact = Equilibrium(load=4e-3, reversible=0.02)
+    dataset = plain(contact=contact, sweep={"contact.reversible": [0.0, 0.02, 1.0], "bonds.stress": [1e4, 3e4]})
+    case = rival_figures.case_of(dataset)
+    assert case.reversible == 0.02 and rival_figures.case_of(plain()).reversible == 0.1
+    stress, area = rival_figures.points_of(dataset, case.at)
+    theories = case.radii(np.array([1e4, 3e4]))
+    exact = np.concatenate([np.pi * theories[name] ** 2 for name in ("jkr", "fraction", "reversible_stress")])
+    assert_allclose(np.sort(area), np.sort(exact), rtol=1e-9)
+    assert len(stress) == 6
+
+
+def test_theories_are_named():
+    (legend,) = plots.draw(plain(), "rivals").legends
+    names = [text.get_text() for text in legend.get_texts()]
+    assert len(names) == len(set(names)) == 8
+    assert names[-1] == "simulated" and "a fraction 0.1 reversible" in names
+
+
+@pytest.mark.parametrize(
+    ("contact", "why"),
+    [
+        ({"travel": 1e-6, "stiffness": 100.0, "load": None}, "behind a machine stiffness"),
+        ({"load": {"start": 0.0, "stop": 4e-3}}, "varies in time"),
+        ({"load": None}, "not held at one number"),
+    ],
+)
+def test_a_sphere_that_is_not_held_at_a_number_is_refused_with_the_cure(contact, why):
+    dataset = plain().drop_vars("contact_load")
+    told = json.loads(dataset.attrs["scenario_resolved"])
+    dataset.attrs["scenario_resolved"] = json.dumps(told | {"contact": told["contact"] | contact})
+    with pytest.raises(ValueError, match=rf"{why}.*load = .4 mN., or with an indentation; .*drawn as: time, profile"):
+        plots.draw(dataset, "rivals")
+
+
+def test_without_adhesion_or_contact_there_is_nothing_to_compare():
+    with pytest.raises(ValueError, match="no adhesion"):
+        plots.draw(plain(adhesion=Adhesion(work=0.0)), "rivals")
+    with pytest.raises(ValueError, match=r"no contact at rest.*drawn as: time$"):
+        plots.draw(plain(contact=Equilibrium(load=-1.0)), "rivals")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"drive": RAMP},
+        {"bonds": bonds.Unbroken()},
+        {"drive": RAMP, "record": Record(per_member=False)},
+        {"sweep": {"solid.shear_modulus": [1e6, 2e6], "sphere.radius": [1e-3, 2e-3]}},
+    ],
+    ids=["ramp", "no stress", "statistics only", "swept bodies"],
+)
+def test_every_scene_at_a_load_can_be_compared(changes):
+    rendered(plots.draw(plain(**changes), "rivals"))
+
+
+# -- profiles ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def slid():
+    return simulated(ensemble=Ensemble(members=2))
+
+
+def lines_of(panel, colour, style="-"):
+    return [line.get_data() for line in panel.lines if (line.get_color(), line.get_linestyle()) == (colour, style)]
+
+
+def test_pressure_is_that_of_the_first_member_at_the_last_time_and_at_rest(slid):
+    panel = rendered(plots.draw(slid, "profile")).axes[0]
+    radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
+    (x, p), (_, rest) = lines_of(panel, pictures.BOTH)[0], lines_of(panel, pictures.REFERENCE, "--")[0]
+    inside = np.abs(1e-6 * x) < 0.999 * radius
+    exact = profiles.pressure(np.abs(1e-6 * x[inside]), radius, depth, 2e-3, 6.4e6)
+    assert_allclose(p[inside], 1e-3 * exact, rtol=1e-9)
+    assert np.all(np.nan_to_num(p[np.abs(1e-6 * x) > 1.001 * radius]) == 0.0)
+    full = jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
+    depth = jkr.indentation_at_radius(full, 42e-3, 2e-3, 6.4e6)
+    assert_allclose(rest[len(rest) // 2], 1e-3 * profiles.pressure(0.0, full, depth, 2e-3, 6.4e6), rtol=1e-12)
+
+
+def test_surfaces_touch_inside_and_are_the_gap_apart_outside(slid):
+    panel = plots.draw(slid, "profile").axes[1]
+    (x, low), (_, high) = lines_of(panel, pictures.BOTH)
+    radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
+    r = np.abs(1e-6 * x)
+    assert np.all(high[r < radius] == low[r < radius])
+    assert_allclose(low, -1e6 * profiles.normal_displacement(r, radius, depth, 2e-3), rtol=1e-9, atol=1e-12)
+    # outside the upper surface is the sphere's own; heights are some micrometres
+    out = r > radius
+    assert_allclose(high[out], 1e6 * (r[out] ** 2 / 4e-3 - depth), rtol=0, atol=1e-11)
+
+
+def test_tangential_displacement_is_that_of_the_uniform_stress(slid):
+    panels = plots.draw(slid, "profile").axes
+    radius, stress = float(slid["contact_radius"][0, -1]), float(slid["shear_stress"][-1])
+    (x, along), (_, across) = (lines_of(panels[2], pictures.BOTH, style)[0] for style in ("-", "--"))
+    exact = profiles.tangential_profiles(1e-6 * x, radius, stress, 1.6e6)
+    assert_allclose([along, across], 1e6 * np.array(exact), rtol=1e-9)
+    shown = panels[3].images[0].get_array()
+    assert_allclose(shown.max(), along.max(), rtol=1e-9)
+    assert shown[100, 0] > shown[0, 100]  # x to the right: farther along the sliding than across
+    (circle,) = (patch for patch in panels[3].patches if isinstance(patch, Circle))
+    assert_allclose(circle.radius, 1e6 * radius, rtol=1e-14)
+
+
+def test_without_shear_stress_only_the_normal_fields_are_drawn():
+    figure = rendered(plots.draw(plain(bonds=bonds.Unbroken()), "profile"))
+    assert [panel.get_ylabel() for panel in figure.axes] == ["normal pressure $p$ (kPa)", "height $z$ (µm)"]
+
+
+def test_a_contact_that_came_off_is_drawn_as_it_last_was():
+    ramp = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
+    closed = np.flatnonzero(ramp["in_contact"].to_numpy())
+    assert closed[-1] < ramp.sizes["t"] - 1
+    drawn = shapes_of(ramp)
+    assert drawn.time == float(ramp["t"][closed[-1]])
+    assert drawn.last.radius == float(ramp["contact_radius"][closed[-1]])
+    rendered(plots.draw(ramp, "profile"))
+    with pytest.raises(ValueError, match=r"never closed; raise the load.*drawn as: curve, time"):
+        plots.draw(simulated(contact=Equilibrium(load=-1.0), shear=shear.Uniform()), "profile")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"contact": Equilibrium(indentation=-4e-7)},
+        {"adhesion": Adhesion(work=0.0)},
+        {"drive": drive.Ramp(start=-1e-3, stop=2e-3)},
+        {"record": Record(per_member=False), "ensemble": Ensemble(members=3)},
+        {"sweep": {"contact.load": [1e-3, 4e-3]}},
+    ],
+    ids=["lifted", "Hertz", "backwards", "statistics only", "sweep"],
+)
+def test_every_contact_has_profiles(changes):
+    rendered(plots.draw(plain(**changes), "profile"))
