@@ -152,10 +152,18 @@ def _progress(total: int, quiet: bool) -> Any:
 def _show_table(path: Path) -> None:
     import xarray
 
+    with xarray.open_dataset(path) as dataset:
+        _print_tables(dataset)
+
+
+def _print_tables(dataset: Any) -> None:
+    """The statistics of a dataset, and what stands out in it."""
     from sim import analysis
 
-    with xarray.open_dataset(path) as dataset:
-        _print_rows(analysis.table(dataset))
+    _print_rows(analysis.table(dataset))
+    if told := analysis.highlights(dataset):
+        click.echo()
+        _print_rows(told)
 
 
 def _print_rows(rows: list[dict[str, str]]) -> None:
@@ -196,7 +204,7 @@ def stats(output: Path, csv: Path | None) -> None:
     from sim.durable import explained
 
     with _opened(output) as dataset:
-        _print_rows(analysis.table(dataset))
+        _print_tables(dataset)
         if csv is not None:
             with explained(csv.parent):
                 csv.parent.mkdir(parents=True, exist_ok=True)

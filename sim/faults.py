@@ -78,7 +78,7 @@ class Shape:
     ) -> Fault:
         key = str(path[-1])
         if key in self._keys(options):
-            having = [option for option in options if key in option["properties"]]
+            having = [option for option in options if key in option.get("properties", {})]
             model, others = _tag(chosen[0]), _either(list(map(_tag, having)))
             if model in map(_tag, having):
                 other = next((name for name in given if name in known and name not in having[0]["properties"]), "model")
@@ -89,7 +89,7 @@ class Shape:
         if len(closest) == 1:
             meant = (*closest[0], key)
             return Fault(path, f'is not a key here; did you mean "{dotted(meant)}"?', "unknown", meant)
-        near = difflib.get_close_matches(key, known, 1, 0.6)
+        near = difflib.get_close_matches(key, self._keys(options) if _tag(chosen[0]) is None else known, 1, 0.6)
         if near:
             return Fault(path, f'is not a key; did you mean "{near[0]}"?', "unknown", (*path[:-1], near[0]))
         return Fault(path, f"is not a key; known: {', '.join(known)}", "unknown")
@@ -158,10 +158,14 @@ class Shape:
 
     def _chosen(self, options: list[Node], value: dict[str, Any]) -> list[Node]:
         """The alternative that a table's model names, all of them where it names none."""
-        named = [option for option in options if _tag(option) == value.get("model", "")] or options
+        named = [option for option in options if _tag(option) == value.get("model", "")]
+        if not named and "model" not in value:  # the model that a table without one is
+            named = [option for option in options if _tag(option) and "model" not in option.get("required", ())]
+        named = named or options
         if len({_tag(option) for option in named}) > 1:
             return named
         # several tables of one name: the one that takes most of the keys
+        named = [option for option in named if "properties" in option] or named
         return [max(named, key=lambda option: len(option.get("properties", {}).keys() & value.keys()))]
 
     def _keys(self, options: list[Node]) -> dict[str, list[Node]]:
@@ -176,7 +180,8 @@ class Shape:
         kind, context, given = error["type"], error.get("ctx", {}), error.get("input")
         path, options, around = self._place(error["loc"])
         if kind in ("missing", "missing_argument"):
-            if path[-1] != "file" and "file" in self._keys(around):
+            tables = [option["properties"] for option in around if "properties" in option]
+            if path[-1] != "file" and any("file" in table and path[-1] in table for table in tables):
                 said = 'is missing; name a CSV file such as file = "data.csv"'
                 return Fault((*path[:-1], "file"), said, "missing")
             return Fault(path, f"is missing; add {self._example(path, options)}", "missing")

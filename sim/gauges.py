@@ -26,9 +26,18 @@ class Gauge:
     read: Callable[[Scenario, State], np.ndarray]
 
 
+def _until_stopped(read: Callable[[Scenario, State], np.ndarray]) -> Callable[[Scenario, State], np.ndarray]:
+    """A reading that is nan once a member's trajectory has stopped at its detachment."""
+
+    def told(scene: Scenario, state: State) -> np.ndarray:
+        values = read(scene, state)
+        return np.where(np.isnan(state.contact.radius), np.nan, values) if scene.contact.on_detach == "stop" else values
+
+    return told
+
+
 def _radius(scene: Scenario, state: State) -> np.ndarray:
-    stopped = scene.contact.on_detach == "stop"  # the trajectory ends there
-    return state.contact.radius if stopped else np.nan_to_num(state.contact.radius, nan=0.0)
+    return np.nan_to_num(state.contact.radius, nan=0.0)
 
 
 def _area(scene: Scenario, state: State) -> np.ndarray:
@@ -64,18 +73,18 @@ GAUGES = (
     Gauge("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
           "DeltaGamma", "shear", lambda scene, state: state.shear.energy),
     Gauge("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
-          lambda scene, state: state.contact.work),
-    Gauge("contact_radius", "m", "contact radius", "a", "contact", _radius),
-    Gauge("contact_area", "m^2", "contact area", "A", "contact", _area),
-    Gauge("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact", _load),
-    Gauge("indentation", "m", "indentation of the sphere", "delta", "contact", _indentation),
-    Gauge("travel", "m", "travel of what holds the sphere", "Delta", "contact", _travel),
+          _until_stopped(lambda scene, state: state.contact.work)),
+    Gauge("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),
+    Gauge("contact_area", "m^2", "contact area", "A", "contact", _until_stopped(_area)),
+    Gauge("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact", _until_stopped(_load)),
+    Gauge("indentation", "m", "indentation of the sphere", "delta", "contact", _until_stopped(_indentation)),
+    Gauge("travel", "m", "travel of what holds the sphere", "Delta", "contact", _until_stopped(_travel)),
     Gauge("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
-          lambda scene, state: _stress(scene, state) * _area(scene, state)),
+          _until_stopped(lambda scene, state: _stress(scene, state) * _area(scene, state))),
     Gauge("in_contact", "1", "whether the contact is closed", "", "contact",
           lambda scene, state: (state.contact.radius > 0.0).astype(float)),
     Gauge("masked", "1", "whether no work of adhesion is left, so that the contact is Hertz's", "", "contact",
-          lambda scene, state: (state.contact.work <= 0.0).astype(float)),
+          lambda scene, state: ((state.contact.work <= 0.0) & (state.contact.radius > 0.0)).astype(float)),
     Gauge("detachment_time", "s", "time of the last detachment", "t_d", "contact",
           lambda scene, state: state.contact.detached),
     Gauge("dissipated_energy", "J", "energy dissipated by the opening and closing of the contact", "W", "contact",

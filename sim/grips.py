@@ -52,6 +52,12 @@ class AtLoad:
             rivals.radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio)
         )
 
+    def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
+        size, modulus, _ = bodies
+        missing = 4.0 / 3.0 * modulus * radius**3 / size - self.load
+        return np.copysign(jkr.energy_release_rate(radius, self.load, size, modulus), missing)
+
     def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Load on the sphere [N]; 0 where the contact is open."""
         return np.where(np.isnan(radius), 0.0, self.load)
@@ -64,9 +70,13 @@ class AtLoad:
         """Travel of what holds the sphere [m]: its indentation, as nothing yields between."""
         return self.depth(radius, bodies)
 
-    def released(self, radius: np.ndarray, work: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Energy given off between an open contact and this one: none that is known, as a free sphere flies away."""
-        return np.zeros(radius.shape)
+    def released(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy of this contact over that of a free sphere that just touches [J]: elastic, of the load, of adhesion.
+
+        Not known under a pull: the free sphere flies away.
+        """
+        depth = self.depth(radius, bodies)
+        return elastic_energy(radius, depth, bodies) - self.load * depth - gained if self.closes else 0.0 * radius
 
 
 @dataclass(frozen=True)
@@ -99,6 +109,13 @@ class AtTravel:
             )
         )
 
+    def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
+        size, modulus, _ = bodies
+        missing = radius**2 / size - jkr.indentation_under_travel(radius, self.place, self.stiffness, size, modulus)
+        rate = jkr.energy_release_rate_at_travel(radius, self.place, self.stiffness, size, modulus)
+        return np.copysign(rate, missing)
+
     def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Load on the sphere [N]; 0 where the contact is open."""
         size, modulus, _ = bodies
@@ -119,11 +136,11 @@ class AtTravel:
         """Travel of the machine [m]."""
         return np.full(radius.shape, self.place)
 
-    def released(self, radius: np.ndarray, work: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Energy of this contact over that of an open one [J]: elastic, of the machine, and −w π a²."""
+    def released(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy of this contact over that of an open one [J]: elastic, of the machine, and of adhesion."""
         depth = self.depth(radius, bodies)
         machine = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.place - depth) ** 2
-        return elastic_energy(radius, depth, bodies) + machine - work * math.pi * radius**2
+        return elastic_energy(radius, depth, bodies) + machine - gained
 
 
 Grip = AtLoad | AtTravel

@@ -357,6 +357,15 @@ def _reads_forces(shear: Any) -> bool:
     return isinstance(getattr(shear, "spectrum", None), BondMade)
 
 
+def _control_too_short(contact: Contact, clock: Clock) -> Faults:
+    for name in ("load", "indentation", "travel"):
+        times = getattr(getattr(contact, name), "time", None)
+        if times and times[-1] < clock.duration * (1 - 1e-9):
+            said = f"the table ends at {times[-1]:g} s, before clock.duration ({clock.duration:g} s)"
+            return [(("contact", name), f"{said}; add rows or shorten the run")]
+    return []
+
+
 def _no_stress(shear: Depth, bonds: BondDepth) -> Faults:
     if shear.reads_stress and not bonds.carries_stress and not _reads_forces(shear):
         said = 'growth model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
@@ -438,6 +447,7 @@ def _too_many_modes(shear: Any, cell: float) -> str | None:
 
 _CHECKS: tuple[tuple[tuple[str, ...], Any], ...] = (
     (("drive", "clock"), _table_too_short),
+    (("contact", "clock"), _control_too_short),
     (("shear", "bonds"), _no_stress),
     (("shear", "bonds", "solid"), _no_forces),
     (("contact", "adhesion"), _no_adhesion),

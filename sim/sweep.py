@@ -13,7 +13,8 @@ from sim.quantity import number_and_unit
 RESERVED = frozenset(
     ["t", "time", "realization", "snapshot", "x", "y", "map_realization", "shear_map", "name", "seed"]
     + ["speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion"]
-    + ["contact_radius", "contact_area", "normal_load", "indentation", "friction_force", "in_contact"]
+    + ["contact_radius", "contact_area", "normal_load", "indentation", "travel", "friction_force", "in_contact"]
+    + ["masked", "detachment_time", "dissipated_energy", "disc_energy", "cross_energy"]
 )
 _SHARED = ("clock", "clock.duration", "clock.record", "name", "ensemble", "record")
 _RANGE = ("from", "to", "count", "scale")

@@ -131,7 +131,7 @@ def test_bad_input_ends_with_2_one_line_a_fault_and_nothing_written(here):
 
 
 def test_an_interrupt_ends_with_130_and_without_traceback(here):
-    long = ["run", "scene.toml", "--set", 'clock.duration="2000 s"', "--set", 'clock.record="1 s"', "--members", "64"]
+    long = ["run", "scene.toml", "--set", 'clock.duration="20000 s"', "--set", 'clock.record="10 s"', "--members", "64"]
     run = subprocess.Popen(
         [sys.executable, "-m", "sim", *long],
         stderr=subprocess.PIPE,

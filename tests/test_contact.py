@@ -1,4 +1,4 @@
-"""The contact in scenes: what holds it in time, pull-off and return, what it dissipates, masking, discs, shares paid."""
+"""The contact in scenes: what holds it in time, pull-off and return, dissipation, masking, discs, shares paid."""
 
 import math
 from dataclasses import replace
@@ -89,7 +89,7 @@ def test_a_logarithmic_course_may_pull():
 @pytest.mark.parametrize("control", HELD)
 def test_a_table_is_linear_between_its_rows_and_jumps_where_two_share_a_time(control):
     more, gauge = HELD[control]
-    table = {"time": [-1.0, 0.0, 0.4, 0.4, 0.8], "value": [9.0, 1.0, 2.0, 0.5, 1.5]}
+    table = {"time": [-1.0, 0.0, 0.4, 0.4, 0.8, 1.0], "value": [9.0, 1.0, 2.0, 0.5, 1.5, 1.5]}
     scenario = maugis(Equilibrium(**{control: table}, **more), 5)
     (values,) = course(scenario, gauge)
     assert_allclose(values, [1.0, 1.5, 0.5, 1.0, 1.5, 1.5], rtol=1e-15)

@@ -12,7 +12,7 @@ ROOT = Path(sim.__file__).parent
 #: Every module, lowest floor first.
 FLOORS = (
     ("jit", "quantity", "motion", "traction", "durable", "lines", "grid", "radial", "pixels"),
-    ("noise", "roots", "table", "sweep", "faults", "expint", "hazards", "footprint", "binomial"),
+    ("noise", "roots", "table", "sweep", "faults", "expint", "hazards", "footprint", "binomial", "widest"),
     ("laws.schallamach.linear", "laws.schallamach.renewal"),
     tuple(f"laws.schallamach.{name}" for name in ("bell", "loading", "cut_off", "first_moment", "cluster")),
     ("laws.halfspace", "laws.schallamach", "laws.jkr.scales"),
@@ -43,7 +43,8 @@ FLOORS = (
     ("cli",),
     ("__main__",),
 )
-WING = ("analysis", "paper", "pictures", "curves", "panels", "field_figures", "bond_laws", "friction_figures")
+WING = ("settings", "wording", "observables", "correlation", "energies", "events", "members", "rows")
+WING += ("analysis", "paper", "pictures", "curves", "panels", "field_figures", "bond_laws", "friction_figures")
 WING += ("start_figure", "rival_figures", "profile_figures", "plots")
 #: The study of speed against error: it runs scenes, so it stands on the engine, beside the commands.
 STUDY = ("gammasum", "estimates", "expected", "moments", "alternatives")

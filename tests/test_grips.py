@@ -1,4 +1,4 @@
-"""What a contact is under each grip: energies along any path, limits of a machine, never below Hertz, any number."""
+"""What a contact is under each grip: energies along a path, limits of a machine, never below Hertz, any number."""
 
 import math
 

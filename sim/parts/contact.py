@@ -5,7 +5,6 @@ or a table; ``sim.grips`` says what a contact is under each.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass as plain_dataclass
 from typing import Annotated, Any, Literal
 
@@ -17,11 +16,12 @@ from pydantic_core import PydanticCustomError
 from sim.front import Hold, Kinetics
 from sim.front import advance as advance_front
 from sim.grips import AtLoad, AtTravel, Bodies, Grip
+from sim.margin import Margin
 from sim.motion import Motion
 from sim.parts.control import held, lowest, value_at
 from sim.quantity import Quantity
+from sim.widest import widest_crossing
 
-_MOST_TURNS = 200
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
 _SPOT = 1e-3
 
@@ -47,7 +47,7 @@ class Balance:
         What fluctuations of the shear stress take of it where waves are short beside the contact, χ ΔΓ [J/m²].
     stress : array
         Mean shear stress τ0 [Pa].
-    margin : callable, optional
+    margin : Margin, optional
         Share of ``fluctuating`` that a contact of finite radius [m] pays when it grows [1].
     bodies : Bodies
         What touches.
@@ -58,7 +58,7 @@ class Balance:
     bonded: np.ndarray
     fluctuating: np.ndarray
     stress: np.ndarray
-    margin: Callable[[np.ndarray], np.ndarray] | None
+    margin: Margin | None
     bodies: Bodies
     reference: float
 
@@ -76,6 +76,12 @@ class Balance:
         _, modulus, poisson_ratio = self.bodies
         coefficient = 2.0 * (2.0 - poisson_ratio) / (1.0 - poisson_ratio) / math.pi
         return coefficient * self.stress**2 * radius / modulus
+
+    def gained(self, radius: np.ndarray, reversible: float) -> np.ndarray:
+        """What adhesion has given for the area of a contact, the work left at each radius over it [J]."""
+        share = 1.0 if self.margin is None else self.margin.mean(radius)
+        mean = 2.0 / 3.0 * reversible * self.reversible(radius)
+        return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
 
 
 @plain_dataclass(frozen=True)
@@ -163,16 +169,29 @@ class _Held:
         bodies, alpha = balance.bodies, self.reversible
         if balance.margin is None:
             return grip.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
-        radius = grip.radius(balance.bonded - 0.0 * balance.fluctuating, balance.stress, alpha, bodies)
-        moving = ~np.isnan(radius)
-        for _ in range(_MOST_TURNS):
-            if not moving.any():
-                break
-            found = grip.radius(balance.work(radius), balance.stress, alpha, bodies)
-            still = np.isnan(found) | (np.abs(found - radius) <= 1e-14 * radius)
-            radius = np.where(moving, found, radius)
-            moving &= ~still
-        return radius
+        return self._on_disc(grip, balance)
+
+    def _on_disc(self, grip: Grip, balance: Balance) -> np.ndarray:
+        """Widest radius at which the pull on the edge falls to the work left: a walk inwards, then halving.
+
+        What a disc pays is no convex function of its radius, so neither Newton's method nor going back and forth
+        between radius and work is safe. The walk starts where the fluctuations take nothing.
+        """
+        bodies = balance.bodies
+        wide = grip.radius(balance.bonded + 0.0 * balance.fluctuating, balance.stress, self.reversible, bodies)
+        hertz = np.nan_to_num(grip.radius(np.zeros(1), np.zeros(1), 0.0, bodies))[:, None]
+
+        def surplus(radius: np.ndarray) -> np.ndarray:
+            column = Balance(
+                balance.bonded[:, None], balance.fluctuating[:, None], balance.stress[:, None], balance.margin,
+                bodies, balance.reference,
+            )  # fmt: skip
+            return grip.pull(radius, bodies) - self._left(radius, column)
+
+        found, closed, at_once = widest_crossing(surplus, wide[:, None], hertz)
+        edge = np.where(closed, np.maximum(found, hertz), hertz if grip.closes else np.nan)
+        edge = np.where(at_once | (balance.fluctuating[:, None] == 0.0), wide[:, None], edge)  # nothing is taken
+        return np.where(np.isnan(wide), np.nan, edge[:, 0])
 
     def _left(self, radius: np.ndarray, balance: Balance) -> np.ndarray:
         """Work of adhesion left at a radius; of an open contact that of a vanishing one."""
@@ -194,23 +213,27 @@ class Equilibrium(_Held):
 
     def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
         grip = self.grip(motion.time, duration)
-        radius = self._equilibrium(grip, balance)
         opened = np.isnan(touch.radius)
+        if opened.all() and (self.on_detach != "reattach" or not grip.closes):
+            shape = np.broadcast(touch.radius, balance.bonded, balance.fluctuating).shape
+            radius = np.full(shape, np.nan)
+        else:
+            radius = self._equilibrium(grip, balance)
         if self.on_detach != "reattach" or not grip.closes:
             radius = np.where(opened, np.nan, radius)
-        return _after(touch, radius, self._left(radius, balance), motion.time, grip, balance.bodies)
+        return _after(touch, radius, self._left(radius, balance), motion.time, grip, balance, self.reversible)
 
 
 def _after(
-    touch: Touch, radius: np.ndarray, work: np.ndarray, time: float, grip: Grip, bodies: Bodies, lost: Any = 0.0
+    touch: Touch, radius: np.ndarray, work: np.ndarray, time: float, grip: Grip, balance: Balance, reversible: float
 ) -> Touch:
     """The state after a step, with what an opening or a closing at this step has dissipated."""
     opens, closes = ~np.isnan(touch.radius) & np.isnan(radius), np.isnan(touch.radius) & ~np.isnan(radius)
-    dissipated = touch.dissipated + lost
-    if opens.any():
-        dissipated = dissipated + np.where(opens, np.maximum(grip.released(touch.radius, work, bodies), 0.0), 0.0)
-    if closes.any():
-        dissipated = dissipated + np.where(closes, np.maximum(-grip.released(radius, work, bodies), 0.0), 0.0)
+    dissipated = touch.dissipated
+    for happens, size, sign in ((opens, touch.radius, 1.0), (closes, radius, -1.0)):
+        if happens.any():
+            over = grip.released(size, balance.gained(size, reversible), balance.bodies)
+            dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
     return Touch(work, radius, np.where(opens, time, touch.detached), dissipated)
 
 
@@ -232,7 +255,7 @@ class Lagging(_Held):
     def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
         before, grip = self.grip(motion.time - motion.duration, duration), self.grip(motion.time, duration)
         after, bodies = self._left(touch.radius, balance), balance.bodies
-        seeded = self._seeded(touch.radius, after, grip, balance)
+        seeded = self._seeded(touch.radius, before, balance)
         radius = np.broadcast_to(seeded, np.broadcast(seeded, after).shape)
         moved = advance_front(
             radius, (np.where(np.isnan(touch.radius), after, touch.work), after), _hold(before, grip),
@@ -248,7 +271,7 @@ class Lagging(_Held):
         exponent = self.front_exponent if self.heal_exponent is None else self.heal_exponent
         return Kinetics(balance.reference, self.front_speed, self.front_exponent, heals, exponent)
 
-    def _seeded(self, radius: np.ndarray, work: np.ndarray, grip: Grip, balance: Balance) -> np.ndarray:
+    def _seeded(self, radius: np.ndarray, grip: Grip, balance: Balance) -> np.ndarray:
         """The radius from which an edge starts: where a free sphere touches again, a spot that heals on."""
         if self.on_detach != "reattach" or not grip.closes:
             return radius

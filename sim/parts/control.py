@@ -42,9 +42,11 @@ def _course(quantity: Quantity) -> type:
             if self.trips:
                 turn = 2.0 * self.trips * part % 2.0
                 part = turn if turn <= 1.0 else 2.0 - turn
-            if self.scale == "linear":
-                return self.start + (self.stop - self.start) * part
-            return self.start * (self.stop / self.start) ** part
+            if self.scale == "log":
+                return self.start * (self.stop / self.start) ** part
+            value = self.start + (self.stop - self.start) * part
+            # a course that reaches zero but for rounding reaches it: there a free sphere touches
+            return value if abs(value) > 1e-13 * max(abs(self.start), abs(self.stop)) else 0.0
 
         @property
         def lowest(self) -> float:
@@ -79,7 +81,9 @@ def _table(quantity: Quantity, name: str) -> type:
 
         @model_validator(mode="after")
         def _rows_in_order(self) -> "Values":
-            if len(self.time) != len(self.value) or len(self.time) < 2:
+            if len(self.time) != len(self.value):
+                raise PydanticCustomError("short_table", "a table needs as many values as times")
+            if len(self.time) < 2:
                 raise PydanticCustomError("short_table", "a table needs two rows or more")
             if np.any(np.diff(self.time) < 0.0) or self.time[0] > 0.0:
                 raise PydanticCustomError("time_order", "times must start at 0 s or before and never decrease")

@@ -1,0 +1,176 @@
+"""What a whole run says of a member once: when it opened, how long it was masked, its friction peak, its losses."""
+
+import contextlib
+
+import numpy as np
+import xarray as xr
+
+from sim.energies import loop_energy
+from sim.observables import masks, ordered, pure
+from sim.settings import MEMBERS, setting, word
+
+#: A maximum is one if it stands above the ends of the run by more than rounding.
+_ROUNDING = 1e-9
+#: And, in an ensemble, if its mean does so by more than this many standard errors.
+_ERRORS = 5.0
+
+
+def events(dataset: xr.Dataset) -> xr.Dataset:
+    """What is told once of each member, or once of all where they agree.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+
+    Returns
+    -------
+    xarray.Dataset
+        Without the dimension ``t``; what a scene cannot have is left out.
+
+        - ``ever_detached``: 1 where the contact opened; ``first_detachment`` [s], nan where it never did.
+        - ``time_masked``: share of the time in which adhesion was masked.
+        - ``total_dissipated`` [J]: by opening and closing, to the end of the run.
+        - ``loop_energy``, ``loop_dissipation`` [J]: means over the trips there and back; see ``loop_energy``.
+        - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
+          ``peak_friction_time``, ``peak_friction_speed``: of a start or a ramp; see ``peaks``.
+
+        Where only statistics were recorded, those of them that follow, as ``…_mean``.
+    """
+    found = _openings(dataset).merge(_masks(dataset)).merge(peaks(dataset))
+    for suffix in ("", "_mean", "_std", "_sem"):
+        if f"dissipated_energy{suffix}" in dataset:
+            lost = dataset[f"dissipated_energy{suffix}"].astype(float).isel(t=-1, drop=True)
+            found[f"total_dissipated{suffix}"] = lost.assign_attrs(
+                units="J", long_name="energy dissipated by opening and closing, in all", symbol="W"
+            )
+    with contextlib.suppress(ValueError):
+        cycles = loop_energy(dataset)
+        found = found.merge(cycles.mean("cycle", keep_attrs=True))
+    return found
+
+
+def _openings(dataset: xr.Dataset) -> xr.Dataset:
+    if "detachment_time" not in dataset:
+        return xr.Dataset()
+    latest = dataset["detachment_time"].astype(float)
+    first = latest.fillna(np.inf).min("t")  # the latest opening so far never falls
+    ever = first < np.inf
+    text = "time of the first detachment, of the contacts that detached"
+    return xr.Dataset(
+        {
+            "ever_detached": pure(ever.astype(float), "contacts that detached"),
+            "first_detachment": first.where(ever).assign_attrs(units="s", long_name=text, symbol="t_d"),
+        }
+    )
+
+
+def _masks(dataset: xr.Dataset) -> xr.Dataset:
+    """Each record stands for the time since the one before; a trajectory that stopped counts up to its end."""
+    text, found = "share of the time in which adhesion was masked", masks(dataset)
+    after = {"t": slice(1, None)} if dataset.sizes["t"] > 1 else {}
+    if "fraction_masked" in found:
+        masked = found["fraction_masked"].where(dataset["contact_area"].notnull())
+        return xr.Dataset({"time_masked": pure(masked.isel(after).mean("t"), text)})
+    if "fraction_masked_mean" in found:
+        masked = found["fraction_masked_mean"].isel(after)
+        return xr.Dataset({"time_masked_mean": pure(masked.mean("t", skipna=False), text)})
+    return xr.Dataset()
+
+
+def peaks(dataset: xr.Dataset) -> xr.Dataset:
+    """The friction peak after a start from rest, and the friction maximum of a ramp of the speed.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``peak_stress`` [Pa], the largest magnitude of the shear stress while sliding; ``peak_time`` [s], from
+        where sliding starts; ``peak_speed`` [m/s]; and ``peak_friction`` [N], ``peak_friction_time`` and
+        ``peak_friction_speed``, the same of the friction force. Empty under any other drive.
+
+    Notes
+    -----
+    Peaks are read off the records, not between them. nan where there is none: the stress is largest at the last
+    record, or on a ramp at the first, or the members fall from the peak of their mean to those by less than
+    five standard errors. A start may peak at once, when the stress falls from what it was at rest. In members
+    with noise the largest value lies above the peak of their mean. Where only statistics were recorded it is
+    the peak of the ensemble mean, ``peak_stress_mean``, with the standard error at that time.
+    """
+    drive = word(dataset, "drive.model", "")
+    ramp, start = drive == "ramp", drive == "start"
+    if not bool((ramp | start).any()):
+        return xr.Dataset()
+    found = {}
+    for name, source, unit in (("peak_stress", "shear_stress", "Pa"), ("peak_friction", "friction_force", "N")):
+        suffix = "" if source in dataset else "_mean"
+        if source + suffix not in dataset:
+            continue
+        size = abs(dataset[source + suffix].astype(float)).where((ramp | start) & _sliding(dataset))
+        at, known = _highest(size, ramp)
+        known &= _stands_out(size, ramp)
+        text = f"largest {dataset[source + suffix].attrs.get('long_name', source)} while sliding"
+        found[name + suffix] = _picked(size, at, known).assign_attrs(units=unit, long_name=text)
+        if suffix:
+            found[f"{name}_sem"] = _picked(dataset[f"{source}_sem"], at, known).assign_attrs(units=unit)
+        prefix = "peak" if name == "peak_stress" else name
+        since = _picked(dataset["t"] - _beginning(dataset), at, known)
+        found[f"{prefix}_time"] = since.assign_attrs(
+            units="s", long_name=f"time from the start of sliding to the {text}"
+        )
+        speed = _picked(dataset["speed"], at, known)
+        found[f"{prefix}_speed"] = speed.assign_attrs(units="m/s", long_name=f"sliding speed at the {text}")
+    return xr.Dataset({name: ordered(values) for name, values in found.items()})
+
+
+def _beginning(dataset: xr.Dataset) -> xr.DataArray:
+    """When sliding starts [s]: where the scenario does not tell, at the last record before the slider moves."""
+    with contextlib.suppress(KeyError):
+        return setting(dataset, "drive.rest")
+    first = (dataset["speed"] != 0.0).argmax("t")
+    return dataset["t"].isel(t=(first - 1).clip(0)).drop_vars("t")
+
+
+def _sliding(dataset: xr.Dataset) -> xr.DataArray:
+    """Records from where sliding starts on; that of the start itself counts."""
+    between = float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
+    return dataset["t"] >= _beginning(dataset) - 1e-6 * between
+
+
+def _highest(values: xr.DataArray, ramp: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    """Record of the largest value, and whether it is a maximum that stands above the ends by more than rounding."""
+    at = values.fillna(-1.0).argmax("t")
+    level = values.isel(t=at) / (1.0 + _ROUNDING)
+    first, last = _ends(values)
+    return at, (level > last) & (~ramp | (level > first))
+
+
+def _stands_out(values: xr.DataArray, ramp: xr.DataArray) -> xr.DataArray:
+    """Whether members fall from where their mean is largest to the ends, in parts of it, by more than noise may."""
+    if MEMBERS not in values.dims or values.sizes[MEMBERS] == 1:
+        return xr.DataArray(True)
+    mean = values.mean(MEMBERS)
+    peak = values.isel(t=mean.fillna(-1.0).argmax("t"))
+    above = []
+    for end in _ends(values):
+        drop = 1.0 - end / peak.where(peak > 0.0)
+        error = drop.std(MEMBERS, ddof=1) / np.sqrt(values.sizes[MEMBERS])
+        above.append(drop.mean(MEMBERS) > _ERRORS * error)
+    return above[1] & (~ramp | above[0])
+
+
+def _ends(values: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    """The first and the last value that is there."""
+    count = values.sizes["t"]
+    number, there = xr.DataArray(np.arange(count), dims="t"), values.notnull()
+    first, last = number.where(there, count).min("t"), number.where(there, -1).max("t")
+    return values.isel(t=first.clip(0, count - 1)), values.isel(t=last.clip(0, count - 1))
+
+
+def _picked(values: xr.DataArray, at: xr.DataArray, known: xr.DataArray) -> xr.DataArray:
+    """Values at one record each; nan where it is not known."""
+    return values.isel(t=at).where(known).drop_vars("t", errors="ignore")

@@ -1,0 +1,113 @@
+"""Statistics over the members of an ensemble, at each time and sweep value."""
+
+import warnings
+
+import xarray as xr
+
+from sim.correlation import correlation_time
+from sim.events import events
+from sim.observables import KEPT, observables, reference_radii, share_observables
+from sim.settings import MEMBERS
+
+QUANTILES = (0.05, 0.5, 0.95)
+
+
+def summary(trajectories: xr.Dataset) -> xr.Dataset:
+    """Mean, standard deviation, standard error and quantiles over the members.
+
+    Parameters
+    ----------
+    trajectories : xarray.Dataset
+        Observables. One without the dimension ``realization`` is the same for all members: its
+        spread is 0. Variables that are statistics already (``…_mean``, ``…_std``, ``…_sem``) pass.
+
+    Returns
+    -------
+    xarray.Dataset
+        For each observable ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` (with the dimension
+        ``quantile``: 5, 50, 95 %). The standard error and deviation of a single member are nan. A
+        member that has no value (the indentation of an open contact) is left out.
+    """
+    found: dict[str, xr.DataArray] = {}
+    for key, variable in trajectories.data_vars.items():
+        name = str(key)
+        if name.rpartition("_")[2] in KEPT:
+            found[name] = variable
+            continue
+        for kind, values in _statistics_of(variable.astype(float)).items():
+            text = {"mean": "ensemble mean", "std": "standard deviation", "sem": "standard error of the ensemble mean"}
+            found[f"{name}_{kind}"] = values.assign_attrs(
+                variable.attrs, long_name=f"{text.get(kind, 'quantiles')} of {variable.attrs.get('long_name', name)}"
+            )
+    return xr.Dataset(found)
+
+
+def _statistics_of(variable: xr.DataArray) -> dict[str, xr.DataArray]:
+    if MEMBERS not in variable.dims:
+        none = xr.zeros_like(variable).where(variable.notnull())
+        levels = variable.expand_dims(quantile=list(QUANTILES))
+        return {"mean": variable, "std": none, "sem": none, "quantile": levels}
+    count = variable.notnull().sum(MEMBERS)
+    mean = variable.mean(MEMBERS)
+    free = (count - 1.0).where(count > 1)
+    deviation = (((variable - mean) ** 2).sum(MEMBERS) / free) ** 0.5
+    gaps = bool((count < variable.sizes[MEMBERS]).any())
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)  # nan is the answer there
+        levels = variable.quantile(list(QUANTILES), MEMBERS, skipna=gaps)
+    return {"mean": mean, "std": deviation, "sem": deviation / count.where(count > 0) ** 0.5, "quantile": levels}
+
+
+def statistics(dataset: xr.Dataset) -> xr.Dataset:
+    """Statistics over the members of everything recorded, at each sweep value and time.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, with each member or with statistics only.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` of every trajectory (see ``summary``), the
+        same of ``area_ratio`` (A/A_JKR), ``fraction_detached`` and ``fraction_masked`` (the latter is
+        known of statistics alone only while all contacts are closed), of what is told once of a whole run (see
+        ``sim.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
+        has stopped is left out from there on; ``fraction_detached`` counts it.
+    """
+    return summary(observables(dataset)).merge(summary(events(dataset))).merge(correlation_time(dataset))
+
+
+def shares(dataset: xr.Dataset) -> xr.Dataset:
+    """Which share of the lost contact area comes from which mechanism.
+
+    Returns
+    -------
+    xarray.Dataset
+        Statistics (``…_mean``, ``…_std``, ``…_sem``, ``…_quantile``) over the members of
+        ``lost_to_bonds`` and ``lost_to_fluctuations``, with ``contact.reversible`` above zero
+        ``lost_to_mean_stress``, in a lagging contact ``lost_to_lag``; and ``radius_jkr``, ``radius_hertz``
+        [m] and ``area_ratio_hertz`` at each sweep value, and time where what holds the sphere changes.
+        nan where the contact with the full work of adhesion is open.
+
+    Raises
+    ------
+    ValueError
+        See ``share_observables``.
+
+    Notes
+    -----
+    With A_JKR the area at the full work of adhesion, A_bonds the area at what the bonds left would give
+    and A_fluct that at what the fluctuations leave of it, all held as the sphere is at that time,
+    ``lost_to_bonds = (A_JKR - A_bonds)/A_JKR``, ``lost_to_fluctuations = (A_bonds - A_fluct)/A_JKR`` and
+    ``lost_to_mean_stress = (A_fluct - A)/A_JKR``: in each member they and ``area_ratio`` add up to one. Where
+    adhesion does not pay for the mean stress, A_fluct is the contact area A. The order is a choice: the
+    area is not linear in the work, so what is taken off later weighs more.
+    """
+    found = summary(share_observables(dataset))
+    radii = reference_radii(dataset)
+    rest, hertz = radii["radius_jkr"], radii["radius_hertz"]
+    found["radius_jkr"], found["radius_hertz"] = rest, hertz
+    ratio = (hertz / rest.where(rest > 0.0)) ** 2
+    found["area_ratio_hertz"] = ratio.assign_attrs(units="1", long_name="Hertz's contact area over JKR's", symbol="")
+    return found

@@ -1,0 +1,299 @@
+"""Statistics as rows: a dozen for the terminal, all of them as CSV."""
+
+import contextlib
+import csv
+import io
+import math
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from sim.correlation import correlation_time
+from sim.durable import write_whole
+from sim.events import events
+from sim.members import QUANTILES, shares, statistics, summary
+from sim.observables import observables, settled, share_observables
+from sim.settings import control, is_stationary, stays_held, sweep_dims, word
+from sim.wording import concise, scaled
+
+Columns = dict[str, list[str]]
+
+
+class _Column(NamedTuple):
+    """An observable's column; it is left out where all of its values are the ``dull`` one."""
+
+    name: str
+    heading: str
+    dull: float = 0.0
+    changing: bool = False  # only in rows over time of a contact whose control changes
+
+
+_COLUMNS = (
+    _Column("speed", "V", math.nan),
+    _Column("normal_load", "P", changing=True),
+    _Column("travel", "Δ", changing=True),
+    _Column("bond_fraction", "N/N0", 1.0),
+    _Column("fluctuation_energy", "ΔΓ"),
+    _Column("work_of_adhesion", "w", math.nan),
+    _Column("contact_radius", "a", math.nan),
+    _Column("area_ratio", "A/A_JKR"),
+    _Column("lost_to_bonds", "lost to\nbonds"),
+    _Column("lost_to_fluctuations", "lost to\nfluct."),
+    _Column("lost_to_mean_stress", "lost to\nstress"),
+    _Column("lost_to_lag", "lost to\nlag"),
+    _Column("friction_force", "F"),
+    _Column("fraction_detached", "open"),
+    _Column("fraction_masked", "masked"),
+    _Column("dissipated_energy", "W", changing=True),
+)
+
+_EVENTS = (
+    _Column("time_masked", "masked,\nof the time"),
+    _Column("ever_detached", "detached,\nof members"),
+    _Column("first_detachment", "first\ndetached"),
+    _Column("loop_energy", "∮P dΔ,\na trip"),
+    _Column("loop_dissipation", "jumps,\na trip"),
+    _Column("total_dissipated", "jumps,\nin all"),
+    _Column("peak_stress", "peak of\nstress"),
+    _Column("peak_speed", "at V", math.nan),
+    _Column("peak_time", "after", math.nan),
+    _Column("peak_friction", "peak of\nfriction"),
+    _Column("peak_friction_speed", "at V ", math.nan),
+    _Column("peak_friction_time", "after ", math.nan),
+)
+
+#: Shares below it are nothing.
+_ROUNDING = 1e-13
+
+#: Observables shown in percent.
+_PERCENT = (
+    ("area_ratio", "lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress", "lost_to_lag")
+    + ("fraction_detached", "fraction_masked", "time_masked", "ever_detached")
+)  # fmt: skip
+
+
+def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+    """The statistics in about a dozen rows for the terminal.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    rows : int
+        How many rows at most (at least one). Where speed and control are steady each point of a sweep has
+        one row, its mean over the second half of the run; else rows are spread evenly over time.
+
+    Returns
+    -------
+    list of dict
+        Cells by heading (of two lines, with the unit of the column). A number in brackets is the standard error in the
+        last digits; columns that tell nothing (a friction of zero, no open contacts) are left out.
+        "lost to bonds" and "lost to fluct." are the shares of JKR's area that each mechanism takes.
+    """
+    found, points = _tabulated(dataset, rows)
+    whole = is_stationary(dataset) and bool(sweep_dims(dataset))
+    changing = not bool(stays_held(dataset).all())
+    cells: Columns = {}
+    for name, index in points.items():
+        if name != "t" or not whole:
+            heading, texts = _cells(name, found[name].attrs.get("units", "1"), found[name][index].to_numpy())
+            cells[heading] = texts
+    cells |= _told(found, points, [column for column in _COLUMNS if changing or not column.changing])
+    where = {name: index for name, index in points.items() if name != "t"}
+    known = (found[name].isel(where).to_numpy() for name in ("correlation_time", "correlation_time_sem"))
+    times, errors, _ = np.broadcast_arrays(*known, points["t"])
+    if np.any(np.isfinite(times)):
+        heading, texts = _cells("t_c", "s", times, errors)
+        cells[heading] = texts
+    return _rows(cells)
+
+
+def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+    """What each point of the sweep tells once of its whole run, in a dozen rows at most; none where it tells nothing.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    rows : int
+        How many rows at most (at least one).
+
+    Returns
+    -------
+    list of dict
+        Cells by heading, as those of ``table``: how long adhesion was masked, how many members detached and when
+        (the mean, and the 5 and 95 % quantiles of those that did), what a trip there and back took and
+        what jumps dissipated, and the friction peak of a start or a ramp.
+    """
+    found = summary(events(dataset))
+    counts = _thinned({name: dataset.sizes[name] for name in sweep_dims(dataset)}, rows)
+    points = _points(dataset.sizes, counts)
+    told = _told(found, points, [column for column in _EVENTS if _of_drive(dataset, column.name)])
+    if not told:
+        return []
+    cells: Columns = {}
+    for name, index in points.items():
+        heading, texts = _cells(name, dataset[name].attrs.get("units", "1"), dataset[name][index].to_numpy())
+        cells[heading] = texts
+    for heading, texts in told.items():
+        cells[heading] = texts
+        if heading.startswith("first\n") and "first_detachment_quantile" in found:
+            cells |= _range(found["first_detachment_quantile"], points, len(texts))
+    return _rows(cells)
+
+
+def _of_drive(dataset: xr.Dataset, name: str) -> bool:
+    """Whether an event is told under this drive: the speed of a peak on a ramp, its time after a start."""
+    if not name.startswith("peak_"):
+        return True
+    drives = {"speed": "ramp", "time": "start"}
+    wanted = drives.get(name.rpartition("_")[2])
+    return wanted is None or bool((word(dataset, "drive.model", "") == wanted).any())
+
+
+def _range(quantiles: xr.DataArray, points: dict[str, xr.DataArray], count: int) -> Columns:
+    """The 5 and 95 % quantiles of a time, where there is a spread."""
+    ends = [np.broadcast_to(quantiles.isel(points).isel(quantile=end).to_numpy(), count) for end in (0, -1)]
+    if not np.any(ends[0] < ends[1]):
+        return {}
+    largest = np.nanmax(ends[1])
+    factor, shown = scaled(float(largest), "s")
+    texts = [f"{concise(factor * low, 0.0)} to {concise(factor * high, 0.0)}" for low, high in zip(*ends, strict=True)]
+    return {f"5 to 95 %\n({shown})": texts}
+
+
+def _told(found: xr.Dataset, points: dict[str, xr.DataArray], columns: Iterable[_Column]) -> Columns:
+    """The columns that tell something at these points."""
+    cells: Columns = {}
+    count = next(iter(points.values())).size if points else 1
+    for name, heading, dull, _ in columns:
+        if f"{name}_mean" not in found:
+            continue
+        mean, sem = (_at(found, f"{name}_{kind}", points, count) for kind in ("mean", "sem"))
+        if name in _PERCENT:  # differences of areas leave rounding behind
+            mean = np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
+        if not np.all((mean == dull) | np.isnan(mean)):
+            unit = "%" if name in _PERCENT else found[f"{name}_mean"].attrs.get("units", "1")
+            heading, texts = _cells(heading, unit, mean, sem)
+            cells[heading] = texts
+    return cells
+
+
+def _at(found: xr.Dataset, name: str, points: dict[str, xr.DataArray], count: int) -> np.ndarray:
+    """Values of a variable at each row; nan if there is no such variable."""
+    if name not in found:
+        return np.full(count, np.nan)
+    values = found[name].isel({dim: index for dim, index in points.items() if dim in found[name].dims})
+    return np.broadcast_to(values.to_numpy(), count)
+
+
+def _rows(cells: Columns) -> list[dict[str, str]]:
+    return [dict(zip(cells, row, strict=True)) for row in zip(*cells.values(), strict=True)]
+
+
+def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, dict[str, xr.DataArray]]:
+    """Statistics to tabulate, and the index of each row in every dimension of sweep and time."""
+    trajectories = observables(dataset)
+    with contextlib.suppress(ValueError):  # where the shares cannot be told the rest can
+        trajectories = trajectories.merge(share_observables(dataset))
+    dims = sweep_dims(dataset)
+    if is_stationary(dataset) and dims:
+        trajectories = settled(trajectories)
+    found = summary(trajectories).merge(correlation_time(dataset))
+    with contextlib.suppress(KeyError):  # a load that changes is told of open contacts too
+        held = control(dataset)
+        if held.kind == "load" and held.changes:
+            found["normal_load_mean"] = held.value.assign_attrs(units="N")
+            found["normal_load_sem"] = xr.zeros_like(held.value)
+    counts = _thinned({name: dataset.sizes[name] for name in dims}, rows)
+    counts["t"] = max(1, rows // math.prod(counts.values()))
+    return found, _points(found.sizes, counts)
+
+
+def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> dict[str, xr.DataArray]:
+    """The index of each row in every dimension."""
+    chosen = [_spread(sizes[name], count) for name, count in counts.items()]
+    rowwise = (np.ravel(index) for index in np.meshgrid(*chosen, indexing="ij"))
+    return {name: xr.DataArray(index, dims="row") for name, index in zip(counts, rowwise, strict=True)}
+
+
+def _thinned(sizes: dict[str, int], rows: int) -> dict[str, int]:
+    """How many values of each dimension make at most ``rows`` points, two of each at least."""
+    counts = dict(sizes)
+    while math.prod(counts.values()) > rows and max(counts.values()) > 2:
+        longest = max(counts, key=lambda name: counts[name])
+        counts[longest] -= 1
+    return counts
+
+
+def _spread(size: int, count: int) -> np.ndarray:
+    """At most ``count`` indices evenly over ``size``, the last included."""
+    count = min(size, max(count, 1))
+    return np.rint(np.linspace(0 if count > 1 else size - 1, size - 1, count)).astype(int)
+
+
+def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | None = None) -> tuple[str, list[str]]:
+    """Heading with its unit, and the column's cells in that unit."""
+    if values.dtype.kind not in "fi":
+        return heading, [str(value) for value in values]
+    finite = np.abs(values[np.isfinite(values)])
+    factor, shown = (100.0, "%") if unit == "%" else scaled(finite.max(initial=0.0), unit)
+    errors = np.zeros(len(values)) if errors is None else errors
+    texts = [concise(factor * value, factor * error) for value, error in zip(values, errors, strict=True)]
+    gap = " " if "\n" in heading else "\n"
+    return f"{heading}{gap}({shown})" if shown else heading, texts
+
+
+def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
+    """Write all statistics at all times and sweep values as one long table.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    path : path
+        The file: a comment line of provenance, a header with SI units in brackets, one row for each
+        sweep value and time; what is told once of a run stands in all of its rows. A file is there whole or,
+        in trouble, as it was before.
+    """
+    found = statistics(dataset)
+    with contextlib.suppress(ValueError):  # where the shares cannot be told the rest can
+        found = found.merge(shares(dataset))
+    long = _flat(found)
+    units = {str(name): variable.attrs.get("units", "1") for name, variable in long.variables.items()}
+    frame = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
+    about = dataset.attrs
+    told = (about.get("title", ""), f"sliding-sim {about.get('sim_version', '')}", about.get("history", ""))
+    text = io.StringIO()
+    text.write("# " + " ".join("; ".join([*told, f"seed {about.get('seed', '')}"]).split()) + "\n")
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([name if units[name] == "1" else f"{name} [{units[name]}]" for name in frame])
+    writer.writerows(frame.itertuples(index=False, name=None))
+    _write(Path(path), text.getvalue().encode())
+
+
+def _flat(found: xr.Dataset) -> xr.Dataset:
+    """Statistics with each quantile as a variable of its own."""
+    flat: dict[str, xr.DataArray] = {}
+    for key, variable in found.data_vars.items():
+        name = str(key)
+        if "quantile" not in variable.dims:
+            flat[name] = variable
+            continue
+        for level in QUANTILES:
+            column = f"{name.removesuffix('_quantile')}_q{100 * level:02.0f}"
+            flat[column] = variable.sel(quantile=level, drop=True)
+    return xr.Dataset(flat)
+
+
+def _write(path: Path, content: bytes) -> None:
+    """A file whole or not at all; what is no plain file, such as /dev/stdout or a pipe, is written as it is."""
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        with open(path, "wb") as file:
+            file.write(content)
+    else:
+        write_whole(path, content)

@@ -1,0 +1,64 @@
+"""Numbers as a reader writes them: with the prefix that suits, and with their error in the last digits."""
+
+import math
+import re
+
+#: Of a mean that is told with its error.
+_MOST_DIGITS = 7
+
+_PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
+_PREFIXABLE = re.compile(r"(?P<base>m|s|N|Pa|J)(?:\^(?P<power>\d))?(?P<rest>|[/ ].*)")
+
+
+def scaled(magnitude: float, unit: str) -> tuple[float, str]:
+    """Factor from SI to a unit with a prefix that suits a magnitude, and that unit as a reader writes it.
+
+    >>> scaled(0.042, "J/m^2")
+    (1000.0, 'mJ/m²')
+    """
+    match = _PREFIXABLE.fullmatch(unit)
+    shown = unit.replace("^2", "²").replace("^3", "³")
+    size = abs(float(f"{magnitude:.3e}"))
+    if match is None or not (0.0 < size < math.inf):
+        return 1.0, "" if unit == "1" else shown
+    power = int(match["power"] or 1)
+    # squares step by a million: 0.05 mm² reads better than 50 000 µm²
+    exponent = 3 * math.floor((math.log10(size) + 2.0 * (power - 1) + 1e-12) / (3 * power))
+    exponent = min(max(exponent, -15), 12)
+    return 10.0 ** (-exponent * power), _PREFIXES[exponent] + shown
+
+
+def engineering(value: float, unit: str) -> str:
+    """A number with its unit, four digits at most, in the SI prefix that suits it.
+
+    >>> print(engineering(1.203e-4, "m"), engineering(42e-3, "J/m^2"), engineering(4.55e-8, "m^2"))
+    120.3 µm 42 mJ/m² 0.0455 mm²
+    """
+    factor, shown = scaled(value, unit)
+    return f"{value * factor:.4g} {shown}".rstrip()
+
+
+def concise(mean: float, sem: float) -> str:
+    """A mean with its standard error in the last digits, as metrologists write it.
+
+    Seven digits of the mean at most: a smaller error stays untold and leaves five. So without brackets
+    there is no error, it is not known, or it is below half of the seventh digit.
+
+    >>> print(concise(118.2312, 0.0423), concise(0.5, 0.013), concise(1234.0, 56.0), concise(12.5, 0.0))
+    118.23(4) 0.500(13) 1230(60) 12.5
+    >>> print(concise(118.2312, 0.0004), concise(118.2312, 0.000004))
+    118.2312(4) 118.23
+    """
+    if math.isnan(mean):
+        return "–"
+    if not sem > 1e-9 * abs(mean) or not math.isfinite(sem):
+        return f"{mean:.4g}"
+    decade = math.floor(math.log10(sem))
+    places = -decade + (1 if sem < 2.0 * 10.0**decade else 0)
+    if mean != 0.0:
+        last = _MOST_DIGITS - 1 - math.floor(math.log10(abs(mean)))
+        if sem < 0.5 * 10.0**-last:
+            return f"{mean:.5g}"
+        places = min(places, last)
+    digits = max(places, 0)
+    return f"{round(mean, places) + 0.0:.{digits}f}({round(round(sem, places) * 10**digits)})"

@@ -1,0 +1,104 @@
+"""Correlation times: within their standard errors of exact ones, and unknown where nothing tells them."""
+
+import math
+
+import lens
+import numpy as np
+import pytest
+from lens import FIELD, scene
+
+from sim import analysis
+from sim.ensemble import run
+from sim.memory import Time
+from sim.parts import drive, shear
+from sim.scenario import Clock, Ensemble
+
+
+def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):
+    """Energies of modes whose amplitudes keep a share from record to record: correlation keep^(2 lag)."""
+    weights = 1.0 / np.arange(1.0, pairs + 1.0)
+    state, energy = rng.normal(size=(members, pairs, 2)), np.empty((members, records))
+    for k in range(records):
+        if k:
+            state = keep * state + math.sqrt(1.0 - keep**2) * rng.normal(size=state.shape)
+        energy[:, k] = np.einsum("mpc,p->m", state**2, weights)
+    return energy
+
+
+def exact_time(keep, step):
+    """Trapezoidal integral of keep^(2 lag)."""
+    return step * 0.5 * (1.0 + keep**2) / (1.0 - keep**2)
+
+
+@pytest.mark.parametrize(
+    ("members", "records", "keep"), [(1, 8000, 0.9), (2, 4000, 0.9), (64, 400, 0.8), (16384, 60, 0.8)]
+)
+def test_correlation_time_is_within_five_of_its_standard_errors(members, records, keep):
+    energy = squared_ornstein_uhlenbeck(np.random.default_rng(7), members, records, keep)
+    time, sem = analysis.integral_time(energy, step=0.01)
+    assert abs(time - exact_time(keep, 0.01)) < 5.0 * sem
+    assert sem < 0.3 * time
+
+
+def test_two_members_tell_as_much_as_their_difference():
+    difference = squared_ornstein_uhlenbeck(np.random.default_rng(9), 1, 2000, 0.8)[0]
+    difference -= difference.mean()
+    shared = np.random.default_rng(10).normal(size=2000)
+    pair = np.stack([shared + difference / 2.0, shared - difference / 2.0])
+    alone = analysis.integral_time(difference[np.newaxis], 1.0)
+    np.testing.assert_allclose(analysis.integral_time(pair, 1.0), alone, rtol=1e-9)
+
+
+def test_correlation_time_does_not_see_a_drift_that_members_share():
+    energy = squared_ornstein_uhlenbeck(np.random.default_rng(8), 64, 400, 0.8)
+    drift = np.linspace(0.0, 100.0, 400)
+    np.testing.assert_allclose(
+        analysis.integral_time(energy + drift, 1.0), analysis.integral_time(energy, 1.0), rtol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    "energy",
+    [
+        np.ones((4, 100)),
+        np.full((4, 100), 0.1) * (1.0 + 1e-14 * np.random.default_rng(1).normal(size=(4, 100))),
+        np.ones((4, 100)) * np.arange(1.0, 5.0)[:, None],
+        np.random.default_rng(2).normal(size=(64, 1000)),
+        np.ones((4, 1)),
+        np.full((4, 100), math.nan),
+    ],
+    ids=["constant", "rounding", "frozen", "white", "one record", "nan"],
+)
+def test_there_is_no_correlation_time_where_nothing_decays_visibly(energy):
+    assert all(math.isnan(number) for number in analysis.integral_time(energy, 0.1))
+
+
+def test_a_run_shorter_than_its_memory_has_no_correlation_time():
+    energy = squared_ornstein_uhlenbeck(np.random.default_rng(3), 256, 20, 0.99)
+    assert math.isnan(analysis.integral_time(energy, 1.0).time)
+
+
+def test_energy_forgets_twice_as_fast_as_its_amplitudes():
+    """Amplitudes forget over the memory time, energies over half of it."""
+    field = shear.Modal(memory=Time(time=0.02), **FIELD)
+    steady = scene(drive=drive.Steady(speed=1e-3), shear=field, clock=Clock(duration=0.4, step=0.001),
+                   ensemble=Ensemble(members=128))  # fmt: skip
+    found = analysis.statistics(run(steady))
+    # the trapezoidal sum over steps of a tenth of the time adds 1/1200, far below the error
+    assert abs(float(found["correlation_time"]) - 0.01) < 5.0 * float(found["correlation_time_sem"])
+    assert float(found["correlation_time_sem"]) < 1e-3
+
+
+def test_a_ramp_has_no_correlation_time():
+    assert math.isnan(analysis.correlation_time(lens.ramp())["correlation_time"])
+
+
+@pytest.mark.verify
+def test_scores_of_the_correlation_time_are_standard_normal():
+    scores = []
+    for seed in range(300):
+        energy = squared_ornstein_uhlenbeck(np.random.default_rng(seed), 16, 500, 0.9)
+        time, sem = analysis.integral_time(energy, 1.0)
+        scores.append((time - exact_time(0.9, 1.0)) / sem)
+    # the window cuts e^-6 off and the error is Gaussian theory: mean and spread to a third of a unit
+    assert abs(np.mean(scores)) < 0.33 and 0.67 < np.std(scores) < 1.33

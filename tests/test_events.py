@@ -1,0 +1,268 @@
+"""What is told once of a run: detachment, masking, loops and friction peaks."""
+
+import math
+
+import lens
+import numpy as np
+import pytest
+from lens import scene
+
+from sim import analysis
+from sim.ensemble import run
+from sim.hazards import Bell
+from sim.parts import bonds, drive, shear
+from sim.parts.contact import Equilibrium
+from sim.scenario import Clock, Ensemble, Record
+
+NAN = math.nan
+
+
+@pytest.fixture(scope="module", name="ramp")
+def _ramp():
+    return lens.ramp()
+
+
+def per_member(dataset, **values):
+    """The dataset with these numbers per member and time."""
+    shape = (dataset.sizes["realization"], dataset.sizes["t"])
+    return dataset.assign({name: (("realization", "t"), np.broadcast_to(v, shape)) for name, v in values.items()})
+
+
+# -- detachment and masking ------------------------------------------------------------------------
+
+
+def test_first_detachment_is_told_of_those_members_that_detached(ramp):
+    """One of six opens twice, two once, three never."""
+    times = np.full((6, 21), NAN)
+    times[0, 4:], times[0, 9:] = 0.07, 0.18  # the last one so far is what is recorded
+    times[1, 10:], times[2, 15:] = 0.19, 0.3
+    found = analysis.statistics(per_member(ramp, detachment_time=times))
+    np.testing.assert_allclose(found["ever_detached_mean"], 0.5, rtol=1e-14)
+    np.testing.assert_allclose(found["ever_detached_sem"], math.sqrt(0.25 / 5.0), rtol=1e-13)
+    np.testing.assert_allclose(found["first_detachment_mean"], (0.07 + 0.19 + 0.3) / 3.0, rtol=1e-13)
+    deviation = np.std([0.07, 0.19, 0.3], ddof=1)
+    np.testing.assert_allclose(found["first_detachment_sem"], deviation / math.sqrt(3.0), rtol=1e-13)
+    np.testing.assert_allclose(found["first_detachment_quantile"], [0.082, 0.19, 0.289], rtol=1e-13)
+
+
+def test_detachment_of_none_is_unknown_and_not_shown(ramp):
+    found = analysis.statistics(ramp)
+    assert float(found["ever_detached_mean"]) == 0.0 and math.isnan(found["first_detachment_mean"])
+    assert not any("detached" in heading for row in analysis.highlights(ramp) for heading in row)
+
+
+def test_time_masked_is_the_share_of_the_records_after_the_first(ramp):
+    masked = np.zeros((6, 21))
+    masked[:, 0] = 1.0  # no time has passed
+    masked[1, 11:] = 1.0
+    found = analysis.events(per_member(ramp, masked=masked, in_contact=1))["time_masked"]
+    np.testing.assert_allclose(found, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0], rtol=1e-14)
+    area = ramp["contact_area"].copy()
+    area[1, 16:] = NAN
+    found = analysis.events(per_member(ramp, masked=masked, in_contact=1).assign(contact_area=area))["time_masked"]
+    np.testing.assert_allclose(found[1], 5.0 / 15.0, rtol=1e-14)
+
+
+def test_times_of_a_pulled_ensemble_are_within_its_run():
+    """Fluctuations open a lifted contact at random times; the file and the statistics agree."""
+    lifted = Equilibrium(indentation=-0.4e-6)
+    dataset = run(scene(contact=lifted, drive=drive.Steady(speed=3e-3), ensemble=Ensemble(members=24)))
+    found, opened = analysis.statistics(dataset), dataset["in_contact"] == 0
+    np.testing.assert_allclose(found["ever_detached_mean"], float(opened.any("t").mean()), rtol=1e-14)
+    first = dataset["t"].to_numpy()[opened.argmax("t")][opened.any("t").to_numpy()]
+    np.testing.assert_allclose(found["first_detachment_mean"], first.mean(), rtol=1e-12)
+    assert 2 <= len(first) < 24
+    (row,) = analysis.highlights(dataset)
+    share = 100.0 * len(first) / 24.0
+    assert row["detached,\nof members (%)"].startswith(f"{share:.0f}(") and "5 to 95 %\n(ms)" in row
+
+
+# -- loops -----------------------------------------------------------------------------------------
+
+
+def cycled(trips=2, steps=400, **held):
+    kind = next(iter(held))
+    at_rest = {"drive": drive.Steady(speed=0.0), "bonds": bonds.Unbroken(), "shear": shear.Uniform()}
+    course = {kind: {**held[kind], "trips": trips}} | {name: value for name, value in held.items() if name != kind}
+    part = Equilibrium(**course, on_detach="reattach")
+    return run(scene(contact=part, clock=Clock(duration=1.0, step=1.0 / steps), **at_rest))
+
+
+def test_loop_of_a_circle_is_its_area():
+    dataset = cycled(steps=800, indentation={"from": 1e-6, "to": 2e-6})
+    angle = 2.0 * math.pi * 2.0 * dataset["t"]
+    drawn = dataset.assign(normal_load=np.cos(angle), travel=np.sin(angle))
+    # a polygon of 400 corners
+    found = analysis.loop_energy(drawn)["loop_energy"]
+    np.testing.assert_allclose(found, 200.0 * math.sin(2.0 * math.pi / 400.0), rtol=1e-12)
+    assert found["cycle"].to_numpy().tolist() == [1, 2] and found.attrs["units"] == "J"
+
+
+@pytest.mark.parametrize(
+    "held",
+    [
+        {"indentation": {"from": 2e-6, "to": -0.3e-6}},
+        {"load": {"from": 4e-3, "to": -0.2e-3}},
+        {"travel": {"from": 3e-6, "to": -0.3e-6}, "stiffness": 2e3},
+    ],
+    ids=["indentation", "load", "travel"],
+)
+def test_a_contact_that_never_opens_gives_all_back(held):
+    dataset = cycled(**held)
+    stored = np.trapezoid(dataset["normal_load"][:101], dataset["travel"][:101])
+    found = analysis.loop_energy(dataset)
+    assert abs(stored) > 1e-12  # J, given back on the way up
+    np.testing.assert_array_equal(found["loop_energy"], 0.0)
+    np.testing.assert_array_equal(found["loop_dissipation"], 0.0)
+    assert not any("trip" in heading for row in analysis.highlights(dataset) for heading in row)
+
+
+@pytest.mark.parametrize("held", [{"indentation": {"from": 1e-6, "to": -2e-6}},
+                                  {"travel": {"from": 1e-6, "to": -3e-6}, "stiffness": 500.0}],
+                         ids=["indentation", "travel"])  # fmt: skip
+def test_the_loop_is_what_its_jumps_dissipate(held):
+    """Up to the two jumps, each drawn over one record: half of their loads times the travel of a record."""
+    errors = []
+    for steps in (1000, 4000):
+        dataset = cycled(steps=steps, **held)
+        found = analysis.loop_energy(dataset)
+        step = 2.0 * abs(held[next(iter(held))]["to"] - 1e-6) * 2 / steps
+        most = 1.5 * 2 * np.abs(dataset["normal_load"].where(dataset["travel"] < 0.2e-6)).max() * step
+        lost = found["loop_dissipation"]
+        assert float(lost.min()) > 10.0 * float(most) and bool((found["loop_energy"] > 0.0).all())
+        assert bool((np.abs(found["loop_energy"] - lost) < most).all())
+        errors.append(float(np.abs(found["loop_energy"] - lost).max()))
+        np.testing.assert_allclose(lost.sum(), dataset["dissipated_energy"][-1], rtol=1e-12)
+    assert errors[1] < 0.5 * errors[0]
+    headings = set(analysis.highlights(dataset)[0])
+    assert {heading.partition("\n")[0] for heading in headings} >= {"∮P dΔ,", "jumps,", "detached,"}
+
+
+def test_a_sphere_that_flies_off_has_no_loop():
+    dataset = cycled(trips=2, load={"from": 4e-3, "to": -1e-3})
+    assert bool(analysis.loop_energy(dataset)["loop_energy"].isnull().all())
+
+
+def test_a_stopped_trajectory_has_the_loops_before_its_end():
+    dataset = cycled(trips=4, indentation={"from": 2e-6, "to": 1e-6})
+    stopped = dataset["contact_radius"].where(dataset["t"] < 0.6)
+    found = analysis.loop_energy(dataset.assign(contact_radius=stopped))
+    assert found["loop_energy"].isnull().to_numpy().tolist() == [False, False, True, True]
+
+
+def test_loops_of_a_swept_course_are_those_of_its_points():
+    course = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "trips": 1}, on_detach="reattach")
+    sweep = {"contact.indentation.trips": [1, 2], "adhesion.work": [2e-2, 4e-2]}
+    swept = scene(contact=course, sweep=sweep, bonds=bonds.Unbroken(), shear=shear.Uniform())
+    together = analysis.loop_energy(run(swept))
+    for k, point in enumerate(swept.points()):
+        alone, where = analysis.loop_energy(run(point)), dict(zip(("trips", "work"), divmod(k, 2), strict=True))
+        for name in alone:
+            values = together[name].isel(where)
+            np.testing.assert_array_equal(values[: alone.sizes["cycle"]], alone[name])
+            assert bool(values[alone.sizes["cycle"] :].isnull().all())
+
+
+def test_loops_of_statistics_alone_are_the_members_mean():
+    held = {"contact": Equilibrium(indentation={"from": 2e-6, "to": 0.5e-6, "trips": 2})}
+    few, members = run(scene(record=Record(per_member=False), **held)), run(scene(**held))
+    found = analysis.statistics(few)["loop_energy_mean"]
+    # the loop is a small difference of what is put in and given back
+    stored = float(np.abs(members["normal_load"]).max() * np.ptp(members["travel"].to_numpy()))
+    expected = analysis.loop_energy(members)["loop_energy"].mean()
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13 * stored)
+
+
+def test_without_trips_there_is_no_loop(ramp):
+    with pytest.raises(ValueError, match="trips = 2"):
+        analysis.loop_energy(ramp)
+    assert "loop_energy_mean" not in analysis.statistics(ramp)
+
+
+# -- friction peaks --------------------------------------------------------------------------------
+
+
+def test_friction_maximum_of_a_ramp_has_its_speed(ramp):
+    heights = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])[:, None]
+    shape = 1e5 * (1.0 - (np.arange(21) - 12.0) ** 2 / 400.0)
+    found = analysis.statistics(per_member(ramp, shear_stress=heights * shape, friction_force=-heights * shape))
+    np.testing.assert_allclose(found["peak_stress_mean"], 3.5e5, rtol=1e-14)
+    np.testing.assert_allclose(found["peak_stress_sem"], 1e5 * math.sqrt(3.5 / 6.0), rtol=1e-13)
+    np.testing.assert_allclose(found["peak_friction_mean"], 3.5e5, rtol=1e-14)  # its size: sliding back it is negative
+    for name in ("peak_speed_mean", "peak_friction_speed_mean"):
+        np.testing.assert_allclose(found[name], ramp["speed"][12], rtol=1e-14)
+    np.testing.assert_allclose(found["peak_time_mean"], ramp["t"][12], rtol=1e-14)
+
+
+@pytest.mark.parametrize("shape", ["level", "rising", "falling", "rounding"])
+def test_a_ramp_without_a_maximum_inside_has_no_peak(ramp, shape):
+    n = np.arange(21.0)
+    shape = {"level": 0 * n + 1, "rising": n, "falling": n[::-1], "rounding": 1 + 1e-14 * np.sin(n)}[shape]
+    found = analysis.events(per_member(ramp, shear_stress=shape, friction_force=shape))
+    assert all(bool(found[name].isnull().all()) for name in found if str(name).startswith("peak"))
+
+
+def test_noise_makes_no_maximum(ramp):
+    noise = np.random.default_rng(3).normal(1e5, 1e3, size=(6, 21))
+    found = analysis.events(per_member(ramp, shear_stress=noise))
+    assert bool(found["peak_stress"].isnull().all())
+    hump = noise + 1e5 * np.exp(-((np.arange(21) - 12.0) ** 2) / 8.0)
+    assert bool(analysis.events(per_member(ramp, shear_stress=hump))["peak_stress"].notnull().all())
+
+
+@pytest.fixture(scope="module")
+def started():
+    """Bonds that are stretched together after a rest of a tenth of a second; the rest is swept."""
+    stretched = bonds.Cohort(
+        hazard=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
+        start_from="empty", tolerance=1e-3,
+    )  # fmt: skip
+    part = drive.Start(rest=0.1, speed=5e-6)
+    return run(scene(drive=part, bonds=stretched, shear=shear.Uniform(), clock=Clock(duration=0.5, step=2e-3),
+                     sweep={"drive.rest": [0.1, 0.2]}))  # fmt: skip
+
+
+def test_static_peak_is_timed_from_the_start_of_sliding(started):
+    found = analysis.events(started)
+    for k, rest in enumerate((0.1, 0.2)):
+        stress, t = started["shear_stress"][k].to_numpy(), started["t"].to_numpy()
+        at = int(np.argmax(stress))
+        assert stress[at] > 1.5 * stress[-1] and t[at] > rest
+        assert float(found["peak_stress"][k]) == stress[at]
+        np.testing.assert_allclose(found["peak_time"][k], t[at] - rest, rtol=1e-12)
+    assert float(found["peak_stress"][1]) > float(found["peak_stress"][0])  # more bonds after a longer rest
+    rows = analysis.highlights(started)
+    assert [row["rest\n(ms)"] for row in rows] == ["100", "200"]
+    assert {"peak of\nstress (kPa)", "peak of\nfriction (mN)", "after\n(ms)"} < set(rows[0])
+    assert not any(heading.startswith("at V") for heading in rows[0])
+
+
+def test_a_start_may_peak_at_once():
+    """Bonds without a stretch bear most at rest."""
+    part = drive.Start(rest=0.1, speed=1e-2)
+    dataset = run(
+        scene(drive=part, bonds=bonds.Rate(critical_speed=1e-2, healing=50.0, stress=3e5), shear=shear.Uniform())
+    )
+    found = analysis.events(dataset)
+    np.testing.assert_allclose(found["peak_stress"], 3e5, rtol=1e-12)
+    np.testing.assert_allclose(found["peak_time"], 0.0, rtol=0, atol=1e-12)
+
+
+def test_peaks_of_statistics_alone_are_those_of_the_mean():
+    stretched = bonds.Tracked(
+        hazard=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
+        sites=200,
+    )  # fmt: skip
+    parts = {"bonds": stretched, "shear": shear.Uniform(), "drive": drive.Start(rest=0.1, speed=5e-6)}
+    few, members = run(scene(record=Record(per_member=False), **parts)), run(scene(**parts))
+    found, mean = analysis.statistics(few), members["shear_stress"].mean("realization")
+    np.testing.assert_allclose(found["peak_stress_mean"], mean.max(), rtol=1e-12)
+    at = int(np.argmax(mean.to_numpy()))
+    error = members["shear_stress"][:, at].std(ddof=1) / math.sqrt(6.0)
+    np.testing.assert_allclose(found["peak_stress_sem"], error, rtol=1e-10)
+    np.testing.assert_allclose(found["peak_time_mean"], members["t"][at] - 0.1, rtol=1e-12)
+
+
+def test_other_drives_have_no_peak():
+    dataset = run(scene(drive=drive.Steady(speed=1e-3)))
+    assert not any(str(name).startswith("peak") for name in analysis.events(dataset))

@@ -1,0 +1,147 @@
+"""Rows for the terminal and the CSV: what tells something, and nothing else."""
+
+import itertools
+import re
+
+import lens
+import numpy as np
+import pytest
+from lens import scene
+
+from sim import analysis
+from sim.ensemble import run
+from sim.parts import bonds, drive, shear
+from sim.parts.contact import Equilibrium
+from sim.quantity import Quantity
+from sim.table import columns
+
+
+@pytest.fixture(scope="module", name="ramp")
+def _ramp():
+    return lens.ramp()
+
+
+def test_table_of_a_ramp_has_a_dozen_rows_from_start_to_end(ramp):
+    rows, found = analysis.table(ramp), analysis.statistics(ramp)
+    assert len(rows) == 12 and all(set(row) == set(rows[0]) for row in rows)
+    assert [rows[0]["t\n(ms)"], rows[-1]["t\n(ms)"]] == ["0", "400"]
+    for row, at in ((rows[0], 0), (rows[-1], -1)):
+        mean = float(re.match(r"[\d.]+", row["a\n(µm)"])[0])
+        # half a unit of the fourth digit, the least that is shown
+        np.testing.assert_allclose(mean, 1e6 * float(found["contact_radius_mean"][at]), rtol=5e-4)
+    assert "masked\n(%)" in rows[0] and "open\n(%)" not in rows[0]
+    assert "lost to\nbonds (%)" in rows[0] and "lost to\nfluct. (%)" in rows[0]
+
+
+def test_table_leaves_out_what_tells_nothing():
+    rows = analysis.table(run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform())), rows=5)
+    assert len(rows) == 5
+    assert list(rows[0]) == ["t\n(ms)", "V\n(mm/s)", "w\n(mJ/m²)", "a\n(µm)", "A/A_JKR\n(%)"]
+
+
+@pytest.mark.parametrize(("loads", "shares", "rows"), [(2, 1, 2), (5, 1, 5), (30, 1, 12), (3, 2, 6), (6, 5, 12)])
+def test_table_of_a_steady_sweep_has_a_row_for_each_point(loads, shares, rows):
+    sweep = {
+        "contact.load": list(np.linspace(1e-3, 9e-3, loads)),
+        "adhesion.bond_share": list(np.linspace(0, 1, shares)),
+    }
+    dataset = run(scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep))
+    table = analysis.table(dataset)
+    assert len(table) == rows
+    assert [row["load\n(mN)"] for row in (table[0], table[-1])] == ["1", "9"]
+    assert not any(heading.startswith("t\n") for heading in table[0])
+
+
+def test_table_of_a_swept_ramp_shows_each_point_in_time():
+    rows = analysis.table(run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform())))
+    points = [(row["load\n(mN)"], row["t\n(ms)"]) for row in rows]
+    assert points == list(itertools.product(["1", "4"], ["0", "80", "160", "240", "320", "400"]))
+
+
+def test_table_tells_a_swept_table_by_its_name():
+    ripple = {"model": "ripple", "amplitude": 1e5, "wavelength": 24e-6}
+    fields = {"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": ripple}]}
+    rows = analysis.table(run(scene(drive=drive.Steady(speed=1e-2), sweep=fields)))
+    assert [row["shear"] for row in rows] == ["uniform", "mean"]
+
+
+def test_csv_reads_back_as_the_statistics(ramp, tmp_path):
+    analysis.to_csv(ramp, tmp_path / "out.csv")
+    text = (tmp_path / "out.csv").read_text(encoding="utf-8")
+    wanted = {
+        "t": Quantity("s", "time"),
+        "contact_radius_mean": Quantity("m", "radius"),
+        "contact_radius_sem": Quantity("m", "its error"),
+        "contact_radius_q95": Quantity("m", "95 % quantile"),
+        "lost_to_fluctuations_mean": Quantity("1", "share"),
+    }
+    read, found = columns(text, wanted), analysis.statistics(ramp)
+    np.testing.assert_array_equal(read["t"], ramp["t"])
+    np.testing.assert_array_equal(read["contact_radius_mean"], found["contact_radius_mean"])
+    np.testing.assert_array_equal(read["contact_radius_sem"], found["contact_radius_sem"])
+    np.testing.assert_array_equal(read["contact_radius_q95"], found["contact_radius_quantile"].sel(quantile=0.95))
+    np.testing.assert_array_equal(read["lost_to_fluctuations_mean"], analysis.shares(ramp)["lost_to_fluctuations_mean"])
+    first = text.splitlines()[0]
+    assert first.startswith("# sliding contact; sliding-sim ") and first.endswith("seed 2003")
+
+
+def test_csv_has_a_row_for_each_point_and_time(tmp_path):
+    sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
+    dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
+    analysis.to_csv(dataset, tmp_path / "out.csv")
+    text = (tmp_path / "out.csv").read_text(encoding="utf-8")
+    wanted = {"load": Quantity("N", "load"), "bond_share": Quantity("1", "share"), "t": Quantity("s", "time")}
+    read = columns(text, {**wanted, "contact_area_mean": Quantity("m^2", "area")})
+    expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
+    assert list(zip(*(read[name].tolist() for name in wanted), strict=True)) == list(expected)
+    np.testing.assert_array_equal(read["contact_area_mean"], dataset["contact_area"].to_numpy().ravel())
+
+
+def test_table_of_a_cycle_tells_what_holds_the_sphere():
+    cycle = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "trips": 1}, on_detach="reattach")
+    still = {"bonds": bonds.Unbroken(), "shear": shear.Uniform(), "drive": drive.Steady(speed=0.0)}
+    rows = analysis.table(run(scene(contact=cycle, **still)), rows=5)
+    assert [row["Δ\n(µm)"] for row in rows] == ["1", "-0.5", "-2", "-0.5", "1"]
+    assert {heading.partition("\n")[0] for heading in rows[0]} >= {"t", "P", "W", "open"}
+    pulled = Equilibrium(load={"from": 1e-3, "to": -1e-3})
+    rows = analysis.table(run(scene(contact=pulled, **still)), rows=3)
+    assert [row["P\n(mN)"] for row in rows] == ["1", "0", "-1"]  # of the free sphere too
+
+
+def test_table_of_a_swept_course_at_one_speed_shows_it_in_time():
+    cycle = Equilibrium(load={"from": 4e-3, "to": 1e-3})
+    dataset = run(scene(contact=cycle, drive=drive.Steady(speed=1e-3), sweep={"contact.load.to": [1e-3, 2e-3]}))
+    assert [row["t\n(ms)"] for row in analysis.table(dataset, rows=6)] == ["0", "200", "400"] * 2
+
+
+def test_highlights_tell_nothing_where_there_is_nothing():
+    dataset = run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform()))
+    assert analysis.highlights(dataset) == []
+
+
+def test_csv_holds_what_is_told_once_of_a_run(ramp, tmp_path):
+    analysis.to_csv(ramp, tmp_path / "out.csv")
+    wanted = {"time_masked_mean": Quantity("1", "share"), "total_dissipated_q95": Quantity("J", "energy")}
+    read = columns((tmp_path / "out.csv").read_text(encoding="utf-8"), wanted)
+    np.testing.assert_array_equal(read["time_masked_mean"], np.full(21, analysis.statistics(ramp)["time_masked_mean"]))
+    np.testing.assert_array_equal(read["total_dissipated_q95"], 0.0)
+
+
+def test_csv_in_trouble_leaves_an_older_file_as_it_was(ramp, tmp_path, monkeypatch):
+    path = tmp_path / "out.csv"
+    path.write_text("older")
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("os.replace", full)
+    with pytest.raises(OSError, match="No space"):
+        analysis.to_csv(ramp, path)
+    assert path.read_text() == "older" and [item.name for item in tmp_path.iterdir()] == ["out.csv"]
+
+
+def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
+    (tmp_path / "far.csv").write_text("older")
+    (tmp_path / "out.csv").symlink_to(tmp_path / "far.csv")
+    analysis.to_csv(ramp, tmp_path / "out.csv")
+    assert (tmp_path / "out.csv").is_symlink() and (tmp_path / "far.csv").read_text().startswith("# sliding contact")

@@ -1,0 +1,294 @@
+"""Shares: what each mechanism takes of JKR's area adds up, whatever holds the sphere."""
+
+import math
+
+import lens
+import numpy as np
+import pytest
+from lens import LOAD, MODULUS, RADIUS, WORK, scene
+
+from sim import analysis
+from sim.bodies import Adhesion
+from sim.ensemble import run
+from sim.laws import jkr, rivals
+from sim.parts import bonds, drive, shear
+from sim.parts.contact import Equilibrium, Lagging
+from sim.scenario import Clock, Record
+from sim.spectrum import Band
+
+
+@pytest.fixture(scope="module", name="ramp")
+def _ramp():
+    return lens.ramp()
+
+
+def test_shares_and_what_is_left_add_up_to_one_in_every_member(ramp):
+    lost, left = analysis.share_observables(ramp), analysis.observables(ramp)["area_ratio"]
+    total = lost["lost_to_bonds"] + lost["lost_to_fluctuations"] + left
+    np.testing.assert_allclose(total, 1.0, rtol=1e-15)
+    assert lost["lost_to_fluctuations"].dims == ("realization", "t")
+
+
+def test_bonds_alone_take_what_their_work_takes():
+    found = analysis.shares(run(scene(shear=shear.Uniform(), bonds=bonds.Steady(critical_speed=1e-2))))
+    speed = np.geomspace(1e-5, 1e-1, 21)
+    area = [jkr.radius_at_load(LOAD, w, RADIUS, MODULUS) ** 2 for w in (WORK, WORK / (1.0 + speed / 1e-2))]
+    # the loss is a difference of areas: its rounding is that of one
+    np.testing.assert_allclose(found["lost_to_bonds_mean"], 1.0 - area[1] / area[0], rtol=1e-12, atol=1e-15)
+    np.testing.assert_array_equal(found["lost_to_fluctuations_mean"], 0.0)
+
+
+def test_fluctuations_alone_take_all_of_adhesion_when_they_mask_it():
+    masking = shear.Mean(spectrum=Band(rms=1e6, longest=60e-6, shortest=24e-6))
+    found = analysis.shares(run(scene(adhesion=Adhesion(work=WORK, bond_share=0.0), shear=masking)))
+    hertz, full = jkr.hertz_radius_at_load(LOAD, RADIUS, MODULUS), jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
+    np.testing.assert_allclose(found["lost_to_bonds_mean"], 0.0, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(found["lost_to_fluctuations_mean"], 1.0 - (hertz / full) ** 2, rtol=1e-13)
+    np.testing.assert_allclose(found["area_ratio_hertz"], (hertz / full) ** 2, rtol=1e-13)
+    np.testing.assert_allclose([found["radius_jkr"], found["radius_hertz"]], [full, hertz], rtol=1e-13)
+
+
+def test_standard_error_of_a_share_is_that_of_its_members(ramp):
+    found, lost = analysis.shares(ramp), analysis.share_observables(ramp)["lost_to_fluctuations"].to_numpy()
+    np.testing.assert_allclose(found["lost_to_fluctuations_sem"], lost.std(axis=0, ddof=1) / math.sqrt(6), rtol=1e-10)
+    # a mean-field population does not fluctuate: nothing but rounding is left
+    np.testing.assert_allclose(found["lost_to_bonds_sem"], 0.0, rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("contact", "sweep"),
+    [
+        (Equilibrium(load=LOAD), {"contact.load": [1e-3, 1.6e-2]}),
+        (Equilibrium(indentation=1e-6), {"contact.indentation": [1e-6, 4e-6]}),
+        (Equilibrium(load=LOAD), [{"sphere.radius": 1e-3, "contact.load": 1e-3},
+                                  {"sphere.radius": 4e-3, "contact.load": 8e-3}]),
+        (Equilibrium(load=LOAD), {"adhesion.work": [2e-2, 8e-2], "adhesion.bond_share": [0.3, 1.0]}),
+    ],
+    ids=["load", "indentation", "zipped", "product"],
+)  # fmt: skip
+def test_shares_of_a_sweep_are_those_of_its_points(contact, sweep):
+    swept = scene(contact=contact, sweep=sweep)
+    together = analysis.shares(run(swept))
+    for k, point in enumerate(swept.points()):
+        alone, dims = analysis.shares(run(point)), together["radius_jkr"].dims
+        where = dict(zip(dims, np.unravel_index(k, [together.sizes[name] for name in dims]), strict=True))
+        for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "lost_to_fluctuations_sem", "radius_jkr"):
+            np.testing.assert_array_equal(together[name].isel(where), alone[name])
+
+
+def test_a_contact_that_its_bonds_let_go_stays_their_loss():
+    """Pulled at half of its pull-off load, run up and stopped: it stays open though its bonds heal."""
+    there_and_back = drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.1, 0.0))
+    lifted = Equilibrium(load=0.5 * float(jkr.pull_off_load(WORK, RADIUS)))
+    dataset = run(scene(contact=lifted, drive=there_and_back, shear=shear.Uniform()))
+    assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
+    assert float(dataset["bond_fraction"].min()) < 0.5 < float(dataset["bond_fraction"][-1])
+    found = analysis.shares(dataset)
+    np.testing.assert_array_equal(found["lost_to_fluctuations_mean"], 0.0)
+    assert float(found["lost_to_bonds_mean"][-1]) == 1.0
+    assert float(analysis.statistics(dataset)["fraction_detached_mean"][-1]) == 1.0
+
+
+def test_shares_are_unknown_where_there_is_no_contact_at_rest():
+    lifted = Equilibrium(load=1.5 * float(jkr.pull_off_load(WORK, RADIUS)))
+    found = analysis.shares(run(scene(contact=lifted, shear=shear.Uniform())))
+    assert bool(found["lost_to_bonds_mean"].isnull().all()) and math.isnan(found["area_ratio_hertz"])
+
+
+def test_shares_that_cannot_be_told_name_the_cure():
+    few = scene(bonds=bonds.Counted(critical_speed=1e-2, healing=500.0, sites=100), record=Record(per_member=False))
+    with pytest.raises(ValueError, match="per_member = true"):
+        analysis.shares(run(few))
+    controls = {"contact": [{"model": "equilibrium", "load": 1e-3}, {"model": "equilibrium", "indentation": 1e-6}]}
+    dataset = run(scene(sweep=controls))
+    with pytest.raises(ValueError, match=r"what holds the sphere.*sweep its number"):
+        analysis.shares(dataset)
+    assert len(analysis.table(dataset)) == 12  # the rest can be told
+
+
+# -- what the mean stress takes -------------------------------------------------------------------
+
+HELD = {
+    "load": (Equilibrium, {"load": LOAD}, lambda w: jkr.radius_at_load(LOAD, w, RADIUS, MODULUS)),
+    "indentation": (Equilibrium, {"indentation": 2e-6}, lambda w: jkr.radius_at_indentation(2e-6, w, RADIUS, MODULUS)),
+    "machine": (
+        Equilibrium,
+        {"travel": 3e-6, "stiffness": 2e3},
+        lambda w: jkr.radius_at_travel(3e-6, 2e3, w, RADIUS, MODULUS),
+    ),
+}
+
+
+@pytest.mark.parametrize("control", HELD)
+def test_mean_stress_is_charged_after_bonds_and_fluctuations(control):
+    part, held, law = HELD[control]
+    field = shear.Mean(spectrum=Band(rms=80e3, longest=60e-6, shortest=24e-6))
+    population = bonds.Steady(critical_speed=1e-2, stress=1e5)
+    dataset = run(scene(contact=part(**held, reversible=0.03), bonds=population, shear=field))
+    found = analysis.shares(dataset)
+    bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
+    areas = [law(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
+    areas.append((dataset["contact_radius"].to_numpy()) ** 2)
+    names = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
+    for name, before, after in zip(names, areas[:-1], areas[1:], strict=True):
+        # the work is put together again from its parts, near the fluctuations' onset of masking to 1e-12 of itself
+        np.testing.assert_allclose(found[f"{name}_mean"], (before - after) / areas[0], rtol=1e-9, atol=1e-12)
+    assert 0.01 < float(found["lost_to_mean_stress_mean"].max()) < 0.5
+
+
+def test_mean_stress_alone_takes_what_the_reversible_law_says():
+    part = Equilibrium(load=LOAD, reversible=0.02)
+    found = analysis.shares(run(scene(contact=part, bonds=bonds.Unbroken(stress=3e5), shear=shear.Uniform())))
+    full = jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
+    left = rivals.radius_at_load_reversible(LOAD, WORK, 3e5, 0.02, RADIUS, MODULUS)
+    np.testing.assert_allclose(found["lost_to_mean_stress_mean"], 1.0 - (left / full) ** 2, rtol=1e-11)
+    for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
+        np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
+
+
+def test_what_a_lagging_edge_has_still_to_lose_is_no_ones_loss():
+    """A jump of the speed breaks half of the bonds at once; the edge follows within a few records."""
+    jump = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(0.0, 0.0, 1e-2, 1e-2))
+    part = Lagging(load=LOAD, front_speed=1e-4)
+    population = bonds.Steady(critical_speed=1e-2)
+    found = analysis.shares(run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform())))
+    np.testing.assert_allclose(found["lost_to_fluctuations_mean"], 0.0, rtol=0, atol=1e-13)
+    lag, lost = found["lost_to_lag_mean"].to_numpy(), found["lost_to_bonds_mean"].to_numpy()
+    np.testing.assert_allclose(lag[:5], 0.0, rtol=0, atol=1e-13)
+    assert lag.min() < -0.3 * lost[-1]  # the area is still there that the bonds no longer pay for
+    assert np.all(np.diff(lag[6:]) > 0.0)
+    assert "lost_to_lag_mean" not in analysis.shares(run(scene(shear=shear.Uniform())))
+
+
+@pytest.mark.parametrize("contact", [Equilibrium(load=LOAD, reversible=0.02), Lagging(load=LOAD, front_speed=1e-3)])
+def test_shares_of_a_contact_that_lags_or_pays_for_its_stress_need_its_members(contact):
+    few = scene(contact=contact, record=Record(per_member=False))
+    with pytest.raises(ValueError, match="per_member = true"):
+        analysis.shares(run(few))
+
+
+# -- a sphere that is moved -----------------------------------------------------------------------
+
+MOVED = {
+    "load": {"load": {"from": 4e-3, "to": -0.3e-3}},
+    "load, log": {"load": {"from": 1e-3, "to": 8e-3, "scale": "log", "trips": 2}},
+    "load in a table": {"load": {"time": [0.0, 0.1, 0.4], "value": [1e-3, 8e-3, -0.2e-3]}},
+    "indentation": {"indentation": {"from": 2e-6, "to": -0.4e-6, "trips": 1}},
+    "travel": {"travel": {"from": 3e-6, "to": -0.5e-6, "trips": 3}, "stiffness": 2e3},
+}
+
+
+@pytest.mark.parametrize("control", MOVED)
+def test_a_moved_sphere_with_all_its_adhesion_loses_nothing(control):
+    dataset = run(scene(contact=Equilibrium(**MOVED[control]), bonds=bonds.Unbroken(), shear=shear.Uniform()))
+    assert np.ptp(dataset["contact_area"].to_numpy()) > 0.5 * float(dataset["contact_area"].max())
+    np.testing.assert_allclose(analysis.observables(dataset)["area_ratio"], 1.0, rtol=1e-13)
+    found = analysis.shares(dataset)
+    for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
+        np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
+    np.testing.assert_allclose(found["radius_jkr"], dataset["contact_radius"], rtol=1e-13)
+
+
+@pytest.mark.parametrize("control", MOVED)
+def test_shares_of_a_moved_sphere_are_those_at_its_present_place(control):
+    """Each record of a course is the same as a run at its value: the parts react at once."""
+    parts = {"bonds": bonds.Steady(critical_speed=1e-2), "drive": drive.Steady(speed=3e-3)}
+    parts["shear"] = shear.Mean(spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6))
+    dataset = run(scene(contact=Equilibrium(**MOVED[control]), **parts))
+    moved = analysis.share_observables(dataset)
+    kind = next(name for name in ("load", "indentation", "travel") if name in MOVED[control])
+    held = MOVED[control] | {kind: analysis.control(dataset).value.to_numpy()}
+    for at in (0, 3, 10, 17, 20):
+        still = run(scene(contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts))
+        lost = analysis.share_observables(still)
+        for name in ("lost_to_bonds", "lost_to_fluctuations"):
+            np.testing.assert_allclose(moved[name][at], lost[name][0], rtol=1e-11, atol=1e-14)
+        np.testing.assert_allclose(
+            analysis.observables(dataset)["area_ratio"][at], analysis.observables(still)["area_ratio"][0], rtol=1e-12
+        )
+
+
+def test_jkrs_contact_comes_off_and_closes_by_the_same_policy():
+    course = {"from": 2e-6, "to": -3e-6, "trips": 1}
+    for policy, closes in (("stay_open", False), ("reattach", True), ("stop", False)):
+        part = Equilibrium(indentation=course, on_detach=policy)
+        dataset = run(scene(contact=part, bonds=bonds.Unbroken(), shear=shear.Uniform()))
+        reference = analysis.reference_radii(dataset)["radius_jkr"].to_numpy()
+        recorded = dataset["contact_radius"].to_numpy()
+        np.testing.assert_array_equal(np.isnan(reference), ~(recorded > 0.0))
+        assert (reference[-1] > 0.0) == closes and np.isnan(reference[10])
+        np.testing.assert_allclose(reference[reference > 0.0], recorded[recorded > 0.0], rtol=1e-13)
+
+
+def test_a_sphere_that_its_bonds_let_go_under_a_changing_load_stays_their_loss():
+    """Where no member is in contact nothing records the load; the scenario tells it."""
+    pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.3e-3})
+    dataset = run(scene(contact=pulled, bonds=bonds.Steady(critical_speed=1e-2), shear=shear.Uniform()))
+    assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
+    found = analysis.shares(dataset)
+    np.testing.assert_allclose(analysis.control(dataset).value, np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12)
+    assert float(found["lost_to_bonds_mean"][-1]) == 1.0
+    assert float(analysis.observables(dataset)["area_ratio"][-1]) == 0.0
+
+
+def test_a_swept_course_has_the_shares_of_its_points():
+    swept = scene(contact=Equilibrium(load={"from": 4e-3, "to": 1e-3}), sweep={"contact.load.to": [1e-3, 8e-3]})
+    together = analysis.shares(run(swept))
+    for k, point in enumerate(swept.points()):
+        alone = analysis.shares(run(point))
+        for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "radius_jkr"):
+            np.testing.assert_array_equal(together[name][k], alone[name])
+    whole = scene(sweep={"contact.load": [{"from": 4e-3, "to": 1e-3}, {"from": 4e-3, "to": 8e-3}]})
+    np.testing.assert_allclose(analysis.shares(run(whole))["radius_jkr"], together["radius_jkr"], rtol=1e-12)
+
+
+def test_shares_of_a_moved_sphere_follow_from_its_statistics():
+    moved = {"contact": Equilibrium(load={"from": 4e-3, "to": 1e-3, "trips": 1})}
+    few, all_of_them = run(scene(record=Record(per_member=False), **moved)), run(scene(**moved))
+    for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "lost_to_fluctuations_sem"):
+        np.testing.assert_allclose(
+            analysis.shares(few)[name], analysis.shares(all_of_them)[name], rtol=1e-9, atol=1e-13
+        )
+
+
+def test_a_load_is_read_off_statistics_where_some_contacts_are_open():
+    """An open contact counts with a load of zero."""
+    dataset = run(scene(record=Record(per_member=False), contact=Equilibrium(load={"from": 4e-3, "to": 1e-3})))
+    loads, share = dataset["normal_load_mean"], np.linspace(1.0, 0.5, 21)
+    partly = dataset.assign(in_contact_mean=("t", share), normal_load_mean=loads * share)
+    np.testing.assert_allclose(analysis.control(partly).value, np.linspace(4e-3, 1e-3, 21), rtol=1e-13)
+
+
+def test_shares_end_where_a_trajectory_stops():
+    part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, on_detach="stop")
+    dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
+    gone = dataset["contact_area"].isnull()
+    assert 0 < int(gone.sum()) < gone.size
+    lost = analysis.share_observables(dataset)
+    for name in lost:
+        np.testing.assert_array_equal(
+            lost[name].isnull(), gone | analysis.reference_radii(dataset)["radius_jkr"].isnull()
+        )
+
+
+def test_a_swept_table_of_courses_has_no_area_ratio():
+    """The dataset cannot tell what held the sphere, so the area at rest is no reference."""
+    controls = {"contact": [{"model": "equilibrium", "load": {"from": 4e-3, "to": 1e-3}},
+                            {"model": "equilibrium", "indentation": 1e-6}]}  # fmt: skip
+    ratio = analysis.observables(run(scene(sweep=controls, shear=shear.Uniform())))["area_ratio"]
+    assert bool(ratio[0].isnull().all()) and bool(ratio[1].notnull().all())
+
+
+@pytest.mark.parametrize("trips", [0, 2])
+@pytest.mark.parametrize("control", ["load", "indentation", "travel"])
+def test_control_is_that_of_the_scene(control, trips):
+    held = {control: {"from": 1e-6, "to": 3e-6, "scale": "log", "trips": trips}}
+    part = Equilibrium(**held, **({"stiffness": 2e3} if control == "travel" else {}))
+    dataset = run(scene(contact=part, clock=Clock(duration=0.4, step=0.02)))
+    found = analysis.control(dataset)
+    exact = [
+        getattr(grip, "load", getattr(grip, "place", None)) for grip in (part.grip(t, 0.4) for t in dataset["t"].values)
+    ]
+    assert found.kind == control and found.changes
+    np.testing.assert_allclose(found.value, exact, rtol=1e-12)
+    assert not analysis.is_stationary(dataset) and math.isinf(found.stiffness) == (control != "travel")
