@@ -219,7 +219,7 @@ def stats(output: Path, csv: Path | None) -> None:
 def plot(output: Path, kind: str | None, picture: Path | None) -> None:
     """Draw a figure; without a KIND the one that fits.
 
-    KIND is curve, time, sweep, map, spectrum, friction, rivals or profile.
+    KIND is curve, time, sweep, map, spectrum, friction, rivals, profile or loop.
     """
     from sim import plots
     from sim.durable import explained

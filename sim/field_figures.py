@@ -22,6 +22,7 @@ from sim.measured import periodogram, radial_average
 from sim.memory import Growth
 from sim.modes import Modes, modes
 from sim.pictures import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
+from sim.settings import word
 from sim.spectrum import Spectrum
 
 #: Pixels that a cell has at least in a picture.
@@ -160,6 +161,8 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     stress = stress.isel(at).isel(snapshot=-1).transpose("map_realization", "x", "y")
     if not np.any(stress.to_numpy()):
         raise ValueError("the last map holds no stress; record one where fluctuations have grown")
+    if word(dataset, "shear.spectrum.model", "") == "bonds":
+        raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
     asked = _asked_for(dataset, stress, at)
     grid = Grid(_cell_of(stress), stress.sizes["x"])
     wanted = mode_density(modes(asked.spectrum, grid.cell, grid.points), grid)

@@ -87,6 +87,6 @@ GAUGES = (
           lambda scene, state: ((state.contact.work <= 0.0) & (state.contact.radius > 0.0)).astype(float)),
     Gauge("detachment_time", "s", "time of the last detachment", "t_d", "contact",
           lambda scene, state: state.contact.detached),
-    Gauge("dissipated_energy", "J", "energy dissipated by the opening and closing of the contact", "W", "contact",
+    Gauge("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
           lambda scene, state: state.contact.dissipated),
 )  # fmt: skip

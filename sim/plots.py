@@ -13,16 +13,20 @@ from matplotlib.figure import Figure
 
 from sim.analysis import engineering, is_steady, sweep_dims
 from sim.bond_laws import rest_of
-from sim.curves import line_handles, opening_handles, room_of, scene_along, speed_dim, spread_handles
+from sim.curves import Scene, line_handles, opening_handles, room_of, scene_along, speed_dim, spread_handles
 from sim.field_figures import map_figure, maps_of, spectrum_figure
 from sim.friction_figures import friction_figure, needs_stress
+from sim.loop_figure import loop_figure, needs_course
 from sim.panels import area_panel, energy_panel, further_panels, radius_panel, reference_handles, share_panel, stacked
 from sim.pictures import STYLE, Unit, across, axis_scale, legend, symbol
 from sim.profile_figures import needs_contact, profile_figure
-from sim.rival_figures import is_moved, needs_control, rivals_figure
+from sim.rival_figures import needs_control, rivals_figure
+from sim.settings import stays_held
 
 
 def _needs_speeds(dataset: xr.Dataset) -> None:
+    if rest_of(dataset) is not None:
+        raise ValueError("a rest and a start have two speeds only; draw the kind friction")
     if is_steady(dataset) and speed_dim(dataset) is None:
         raise ValueError('the speed neither changes in time nor is swept; ramp it: [drive] model = "ramp"')
 
@@ -40,14 +44,29 @@ def _curve_figure(dataset: xr.Dataset) -> Figure:
 
 
 def _time_figure(dataset: xr.Dataset) -> Figure:
-    """Radius, area and energies over time."""
+    """Radius, area and energies over time; JKR's and Hertz's contacts only where what holds the sphere stays."""
     unit = Unit.of(dataset["t"].to_numpy(), "s")
-    scene = scene_along(dataset, "t").placed(unit.factor * dataset["t"].to_numpy())
+    stays = stays_held(dataset)
+    scene = _without_rest(scene_along(dataset, "t"), stays)
+    scene = scene.placed(unit.factor * dataset["t"].to_numpy())
     figure = stacked(scene, [(1.5, radius_panel), (1.3, area_panel), (1.6, energy_panel)])
-    closing = [*spread_handles(scene, "contact_radius"), *opening_handles(scene), *reference_handles()]
+    closing = [*spread_handles(scene, "contact_radius"), *opening_handles(scene)]
+    closing += reference_handles() if bool(stays.any()) else []
     legend(figure.axes[0], [*line_handles(scene), *closing])
     across(figure.axes[-1], scene.x, "linear", "time $t$", unit.name)
     return figure
+
+
+def _without_rest(scene: Scene, stays: xr.DataArray) -> Scene:
+    """Without the radii at rest of spheres that are moved: they are those at the start only.
+
+    One record of them stays, at the largest radius reached: a point alone draws no line, and tells the panels
+    the size of their unit.
+    """
+    largest = scene.found["contact_radius_mean"].max("t")
+    first = xr.DataArray(np.arange(scene.found.sizes["t"]) == 0, dims="t")
+    moved = {name: xr.where(stays, scene.found[name], largest.where(first)) for name in ("radius_jkr", "radius_hertz")}
+    return scene._replace(found=scene.found.assign(moved)) if not bool(stays.all()) else scene
 
 
 def _needs_sweep(dataset: xr.Dataset) -> None:
@@ -97,6 +116,7 @@ KINDS: dict[str, Callable[[xr.Dataset], Figure]] = {
     "friction": friction_figure,
     "rivals": rivals_figure,
     "profile": profile_figure,
+    "loop": loop_figure,
 }
 
 #: What a kind needs of a dataset: each raises ValueError with the cure where it is not there.
@@ -108,6 +128,7 @@ _NEEDS: dict[str, Callable[[xr.Dataset], object]] = {
     "friction": needs_stress,
     "rivals": needs_control,
     "profile": needs_contact,
+    "loop": needs_course,
 }
 
 
@@ -128,11 +149,13 @@ def _missing(dataset: xr.Dataset, kind: str) -> str:
 
 def _fitting(dataset: xr.Dataset) -> str:
     """The kind of figure that fits a dataset best."""
+    if not _missing(dataset, "loop"):
+        return "loop"
     if rest_of(dataset) is not None and not _missing(dataset, "friction"):
         return "friction"
     if not _missing(dataset, "curve"):
         return "curve"
-    return "sweep" if sweep_dims(dataset) and not is_moved(dataset) else "time"
+    return "sweep" if sweep_dims(dataset) else "time"
 
 
 def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
@@ -144,13 +167,14 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
         As ``sim run`` writes it.
     kind : str, optional
         One of ``KINDS``: "curve" (area with what each mechanism takes, energies and friction over
-        speed), "time" (radius, area and energies over time), "sweep" (radius, energies and friction
+        speed), "time" (radius, area and energies over time), "loop" (load and radius over the travel of
+        what holds the sphere, where that moves), "sweep" (radius, energies and friction
         against the swept key), "map" (a stress map and its displacement), "spectrum" (measured
         against asked-for spectral density), "friction" (shear stress over speed with its maximum, or
         the static peak of a slider that rests and starts), "rivals" (contact area by every theory over
         the shear stress), "profile" (pressure, surfaces and displacement across the contact). Without
-        it "friction" for a slider that rests and starts, "curve" where the speed changes or is swept,
-        "time" where what holds the sphere does, else "sweep" where something is, else "time".
+        it "loop" where what holds the sphere moves, "friction" for a slider that rests and starts, "curve" where
+        the speed changes or is swept, else "sweep" where something is, else "time".
 
     Returns
     -------

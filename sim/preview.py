@@ -14,10 +14,11 @@ from sim.gauges import GAUGES
 from sim.hazards import Bell
 from sim.laws import jkr
 from sim.laws.schallamach import bell_peak, first_moment_peak
-from sim.parts.bonds import FirstMoment
+from sim.parts.bonds import FirstMoment, Tracked
 from sim.scenario import Record, Scenario, Source, quantities
 from sim.spectrum import BondMade
 from sim.store import Plan, work
+from sim.tracks import mean_life
 
 # Rough costs of one core, for the estimate only [s]: starting up, a step of a batch, and for each member of it
 # a mode pair and a counted population; a part file.
@@ -28,6 +29,7 @@ _TOLERANCE = 0.05
 _MOST_REVERSED = 0.5
 _LARGEST_SHARE = 0.3
 _BANDED = 0.01
+_EVENT = 1e-7
 _SETTLED = "in steady sliding at the last speed"
 _MOST_LATTICES = 8
 _PARTS = ("drive", "bonds", "shear", "contact")
@@ -280,6 +282,12 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
         made = isinstance(getattr(point.shear, "spectrum", None), BondMade)
         if made and point.shear.paid_by_adhesion > 0.0:
             said.append("friction has paid for the energy under each bond: with paid_by_adhesion it counts twice")
+        jitters = point.varies["shear"] and point.contact.model == "equilibrium"
+        if jitters and getattr(point.population, "area", "present") == "carried":
+            said.append('carried area in a contact that fluctuates has no limit of fine steps: take model = "lagging"')
+        goes_on = getattr(point.population, "area", "present") == "present" and hasattr(point.population, "hazard")
+        if point.contact.on_detach == "reattach" and goes_on:
+            said.append('bonds go on sliding while the contact is open: bonds.area = "carried" starts without them')
         if getattr(point.drive, "rest", 0.0) >= point.clock.duration:
             said.append("the slider rests for the whole run: shorten drive.rest or lengthen clock.duration")
         if point.solid.poisson_ratio != 0.5:
@@ -346,6 +354,17 @@ def _longest_wave(point: Scenario) -> float:
     return min(longest, _cell(point)) if hasattr(point.shear, "cell") else longest
 
 
+def _tracked_seconds(point: Scenario) -> float:
+    """Time that one member's tracked bonds take: their ruptures and bindings, at most 300 lives in a step."""
+    bonds = point.population
+    if not isinstance(bonds, Tracked):
+        return 0.0
+    times = np.linspace(0.0, point.clock.duration, 21)
+    speeds = np.array([point.drive.motion(0, t, t, point.clock.duration).speed[0] for t in times.tolist()])
+    lives = point.clock.step / (mean_life(speeds, bonds.law) + 1.0 / bonds.rebinding_rate)
+    return float(_EVENT * bonds.sites * point.clock.steps * np.mean(np.minimum(lives, 300.0)))
+
+
 def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     """How much there is to compute and to keep."""
     scene, clock = plan.scenario, plan.points[0].clock
@@ -355,10 +374,12 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     batches = math.ceil(plan.members / sample.group) * len(plan.points)
     counted = _COUNTED if any(point.population.per_member for point in plan.points) else 0.0
     seconds = _START + batches * (clock.steps * _STEP + _PART) + work(plan) * (pairs * _PAIR + counted)
+    seconds += plan.members * len(plan.points) / len(some) * sum(map(_tracked_seconds, some))
     held = _PROGRAM_BYTES + 8.0 * sample.group * (8.0 * pairs + bonds + 2.0 * len(GAUGES) * sample.stretch)
+    alike = ", all alike, so one is computed" if scene.ensemble.members > plan.members else ""
     rows: Rows = [
         ("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records"),
-        ("members", f"{scene.ensemble.members:,}" + ("" if plan.members > 1 else ", all alike, so one is computed")),
+        ("members", f"{scene.ensemble.members:,}{alike}"),
     ]
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.name}" for axis in scene.sweep)

@@ -31,6 +31,7 @@ from sim.sweep import read_sweep, set_key
 
 _Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
 _MOST_RECORDS = 10_000_000
+_STEPS_A_TRIP = 2
 _MOST_STEPS = 10**9
 _MOST_BYTES = 2**28
 #: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
@@ -363,6 +364,9 @@ def _control_too_short(contact: Contact, clock: Clock) -> Faults:
         if times and times[-1] < clock.duration * (1 - 1e-9):
             said = f"the table ends at {times[-1]:g} s, before clock.duration ({clock.duration:g} s)"
             return [(("contact", name), f"{said}; add rows or shorten the run")]
+        if clock.steps < _STEPS_A_TRIP * getattr(getattr(contact, name), "trips", 0):
+            said = f"fewer than {_STEPS_A_TRIP} of the {clock.steps} clock steps for a trip"
+            return [(("contact", name, "trips"), f"{said}; make fewer trips or shorter steps")]
     return []
 
 
@@ -420,7 +424,7 @@ def _shear_faults(shear: Depth, solid: Solid, sphere: Sphere, adhesion: Adhesion
     radius = _rest_radius(solid, sphere, adhesion, contact)
     if shear.contact == "disc" and shear.draws_maps and not 2.0 * radius <= cell:
         said = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * radius:g} m wide at rest"
-        return [(("shear", "cell"), f"{said}; give a larger cell")]
+        return [(("shear", "cell"), f'{said}; give shear.cell = "{2.2e6 * radius:.3g} um" or more')]
     too_many = _too_many_modes(shear, cell)
     if too_many:
         return [(("shear",), f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]

@@ -2,7 +2,8 @@
 
 Sites are fixed on the slider. Their mean force f̄ makes a pattern that never changes but in size, with
 the power n f̄²; what forces differ from the mean, n Var f, is forgotten as bonds break and rebind. Both
-follow the moments of the population in time, so no rms is put in by hand.
+follow the moments of the population in time, so no rms is put in by hand. Amplitudes are Gaussian, as for
+many sites in the cell: the spread of ΔΓ lacks the shot noise of few.
 """
 
 from dataclasses import dataclass

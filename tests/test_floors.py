@@ -45,7 +45,7 @@ FLOORS = (
 )
 WING = ("settings", "wording", "observables", "correlation", "energies", "events", "members", "rows")
 WING += ("analysis", "paper", "pictures", "curves", "panels", "field_figures", "bond_laws", "friction_figures")
-WING += ("start_figure", "rival_figures", "profile_figures", "plots")
+WING += ("start_figure", "rival_figures", "profile_figures", "loop_figure", "plots")
 #: The study of speed against error: it runs scenes, so it stands on the engine, beside the commands.
 STUDY = ("gammasum", "estimates", "expected", "moments", "alternatives")
 STUDY += ("converge_data", "converge_table", "converge_bonds_march", "converge_bonds", "converge_bonds_table")

@@ -202,10 +202,10 @@ def test_a_fluctuation_energy_too_small_to_see_has_a_panel_of_its_own(ramp):
                 "contact": Equilibrium(load={"from": 0.0, "to": 4e-3}),
                 "sweep": {"sphere.radius": [1e-3, 2e-3]},
             },
-            "time",
+            "loop",
         ),
         ({"drive": drive.Start(rest=0.1, speed=1e-3)}, "friction"),
-        ({"drive": drive.Start(rest=0.1, speed=1e-3), "bonds": bonds.Unbroken()}, "curve"),
+        ({"drive": drive.Start(rest=0.1, speed=1e-3), "bonds": bonds.Unbroken()}, "time"),
     ],
 )
 def test_default_figure_fits_the_dataset(changes, kind):

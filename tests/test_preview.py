@@ -247,10 +247,10 @@ def test_bonds_left_open_are_told_with_their_depth_and_the_reason():
 
     for auto, depth, reason in (
         (bonds.Auto(critical_speed=1.0, healing=1.0), "rate", "no number of sites is given; the rupture rate does not"),
-        (bonds.Auto(critical_speed=1.0, healing=1.0, sites=64), "counted", "1/√N of 64 sites is 0.12, above the toler"),
-        (bonds.Auto(hazard=BELL, **STRETCHED, sites=64), "tracked", "1/√N of 64 sites is 0.12, above the tolerance of"),
-        (bonds.Auto(hazard=BELL, **STRETCHED), "cohort", "1/√N of 4,547,221,756 sites is 1.5e-05, within the"),
-        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), "rate", "1/√N of 4,547,221,756 sites is 1.5e-05, within"),
+        (bonds.Auto(critical_speed=1.0, healing=1.0, sites=64), "counted", "1/√N of 64 sites is 0.125, above the"),
+        (bonds.Auto(hazard=BELL, **STRETCHED, sites=64), "tracked", "1/√N of 64 sites is 0.125, above the"),
+        (bonds.Auto(hazard=BELL, **STRETCHED), "cohort", "1/√N of 4,547,221,756 sites is 1.48e-05, within the"),
+        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), "rate", "1/√N of 4,547,221,756 sites is 1.48e-05, within"),
     ):  # fmt: skip
         lines = preview(scene(bonds=auto)).split("\n\n")[1].splitlines()
         place = next(k for k, line in enumerate(lines) if line.startswith("  bonds "))

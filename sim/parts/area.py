@@ -35,7 +35,9 @@ class OverArea:
     """What depths share whose population may be carried with the area: ``diluted`` is the depth's own.
 
     The area of a step is that at its start, so dilution follows the contact by one clock step and no
-    bond is lost in between.
+    bond is lost in between. A contact in equilibrium with an energy that fluctuates moves the more, the
+    finer the clock: each way out dilutes its bonds and none comes back on the way in, so there is no limit
+    of fine steps. A ``lagging`` edge has one.
     """
 
     area: Area
@@ -50,7 +52,8 @@ class OverArea:
         if self.area == "present":
             return population
         now = np.nan_to_num(radius, nan=0.0)
-        return replace(self.diluted(population, share_kept(population.seen, now)), seen=now)
+        share = np.where(now > 0.0, share_kept(population.seen, now), 0.0)  # an open contact has no bonds to fill
+        return replace(self.diluted(population, share), seen=now)
 
     def rows(self, noise: Noise) -> np.ndarray:
         """Ones, one for each population: all members share one unless each has its own area."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass as plain_dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Discriminator, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
@@ -32,7 +32,11 @@ _Stiffness = Annotated[float, Quantity("N/m", "stiffness of the machine", "k", a
 _Reversible = Annotated[
     float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)
 ]
-_Policy = Literal["stay_open", "reattach", "stop"]
+_Healing = Annotated[float, Quantity("m/s", "speed of a healing edge, left out that of opening", "v_h", above=0)]
+_HealingExponent = Annotated[
+    float, Quantity("1", "exponent of healing, left out that of opening", "n_h", above=0, at_most=1)
+]
+_Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description="what follows a detachment")]
 
 
 @plain_dataclass(frozen=True)
@@ -244,12 +248,13 @@ class Lagging(_Held):
     It opens where the energy release rate G exceeds the work of adhesion w that is left, and heals, with a
     speed and an exponent of its own, where it falls short; within a clock step as exactly as 1e-8. What the
     work loses with the radius itself (a disc, ``reversible``) is taken at the radius of the step's start.
+    Under a dead load nothing is counted as dissipated below the radius at pull-off, where the load falls.
     """
 
     front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G = 2 w", "v_0", above=0)]
     front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
-    heal_speed: Annotated[float, Quantity("m/s", "speed of a healing edge", "v_h", above=0)] | None = None
-    heal_exponent: Annotated[float, Quantity("1", "exponent of healing", "n_h", above=0, at_most=1)] | None = None
+    heal_speed: _Healing | None = None
+    heal_exponent: _HealingExponent | None = None
     model: Literal["lagging"] = "lagging"
 
     def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
@@ -264,7 +269,19 @@ class Lagging(_Held):
         opens = ~np.isnan(radius) & np.isnan(moved.radius)
         detached = np.where(opens, motion.time - motion.duration + moved.detached_at, touch.detached)
         left = self._left(moved.radius, balance)
-        return Touch(left, moved.radius, detached, touch.dissipated + moved.dissipated)
+        lost = np.where(self._held(touch.radius, after, grip, bodies) & ~opens, moved.dissipated, 0.0)
+        if isinstance(grip, AtTravel):
+            lost = moved.dissipated
+        return Touch(left, moved.radius, detached, touch.dissipated + lost)
+
+    def _held(self, radius: np.ndarray, work: np.ndarray, grip: Grip, bodies: Bodies) -> np.ndarray:
+        """Whether a load still holds the contact: below the radius at pull-off a pulled sphere falls away.
+
+        What the falling load does there grows without end as the radius vanishes; it is not counted.
+        """
+        size, modulus, _ = bodies
+        fold = np.cbrt(9.0 * math.pi * np.maximum(work, 0.0) * size**2 / (8.0 * modulus))
+        return np.asarray(grip.closes | np.isnan(radius) | (radius >= fold))
 
     def _kinetics(self, balance: Balance) -> Kinetics:
         heals = self.front_speed if self.heal_speed is None else self.heal_speed

@@ -205,7 +205,7 @@ class Tracked(_Stretched):
     """A finite number of sites, every bond's stretch and exact rupture time. Limit: ``Cohort`` as sites -> infinity.
 
     ``sites`` are followed for each member, whatever the area: the area scales the stress, not the number.
-    A member's bonds are the same for any clock step.
+    At speeds that are constant within each step a member's bonds are the same for any clock step.
     """
 
     per_member: ClassVar[bool] = True

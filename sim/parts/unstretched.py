@@ -22,7 +22,10 @@ from sim.traction import Traction
 Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
 CriticalSpeed = Annotated[float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)]
 Healing = Annotated[float, Quantity("1/s", "healing rate of broken bonds", "h", above=0)]
-Start = Annotated[Literal["steady", "bonded", "empty"], Field(alias="start")]
+Start = Annotated[
+    Literal["steady", "bonded", "empty"],
+    Field(alias="start", description="bonds at the start, bonded being those of rest"),
+]
 Sites = Annotated[int, Field(ge=1, le=10**9, description="number of bond sites of the contact")]
 
 

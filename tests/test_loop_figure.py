@@ -1,0 +1,218 @@
+"""The figure of a loop shows load and radius over travel, JKR's equilibria, and the energy lost."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from pictured import STEADY, drawn, rendered, simulated
+
+from sim import pictures, plots
+from sim.analysis import loop_energy
+from sim.laws import jkr
+from sim.loop_figure import lost_energy
+from sim.parts import bonds, shear
+from sim.parts.contact import Equilibrium
+from sim.scenario import Clock, Ensemble, Record
+
+JKR = (42e-3, 2e-3, 6.4e6)
+BACK = {"from": 2e-6, "to": -4e-6, "trips": 2}
+RECORD = 2.0 * 2.0 * 6e-6 * 2e-3  # travel of one record [m]: trips of 12 um in 1 s, 2 ms
+GRIPS = Equilibrium(indentation=BACK, on_detach="reattach")
+MACHINE = Equilibrium(travel=BACK, stiffness=340.0, on_detach="reattach")
+
+
+def moved(contact=GRIPS, **changes):
+    parts = {
+        "contact": contact, "drive": STEADY, "bonds": bonds.Unbroken(), "shear": shear.Uniform(),
+        "ensemble": Ensemble(members=1), "clock": Clock(duration=1.0, step=2e-3),
+    }  # fmt: skip
+    return simulated(**(parts | changes))
+
+
+@pytest.fixture(scope="module")
+def grips():
+    return moved()
+
+
+@pytest.fixture(scope="module")
+def machine():
+    return moved(MACHINE)
+
+
+def marks(panel, marker):
+    return [line.get_data() for line in panel.lines if line.get_marker() == marker and len(line.get_xdata())]
+
+
+def thick(panel):
+    (line,) = (
+        x
+        for x in panel.lines
+        if x.get_color() == pictures.BOTH and x.get_linewidth() > 1.0 and x.get_linestyle() == "-"
+    )
+    return line.get_data()
+
+
+# -- what is drawn ----------------------------------------------------------------------------
+
+
+def test_load_and_radius_stand_over_the_indentation_and_break_where_the_contact_is_open(grips):
+    loads, radii = rendered(plots.draw(grips, "loop")).axes
+    closed = grips["in_contact"].to_numpy() == 1
+    assert radii.get_xlabel() == r"indentation $\delta$ (µm)" and not closed.all()
+    for panel, name, factor in ((loads, "normal_load", 1e6), (radii, "contact_radius", 1e6)):
+        x, y = thick(panel)
+        assert_allclose(x, 1e6 * grips["indentation"], rtol=1e-14)
+        assert_allclose(y, np.where(closed, factor * grips[name], np.nan), rtol=1e-14)
+    (thin,) = (line for line in loads.lines if line.get_linewidth() == 0.4)
+    np.testing.assert_array_equal(thin.get_ydata(), np.where(closed, np.nan, 0.0))
+
+
+def test_behind_a_machine_the_axis_is_its_travel(machine):
+    loads, radii = rendered(plots.draw(machine, "loop")).axes
+    assert radii.get_xlabel() == r"travel $\Delta$ (µm)"
+    assert_allclose(thick(loads)[0], 1e6 * machine["travel"], rtol=1e-14)
+
+
+@pytest.mark.parametrize(("which", "stiffness"), [("grips", np.inf), ("machine", 340.0)])
+def test_grey_are_all_equilibria_of_jkr_stable_or_not(which, stiffness, request):
+    dataset = request.getfixturevalue(which)
+    loads, radii = plots.draw(dataset, "loop").axes
+    x, radius = drawn(radii, pictures.REFERENCE, "--")
+    again, load = drawn(loads, pictures.REFERENCE, "--")
+    a = 1e-6 * radius
+    exact = jkr.load_at_radius(a, *JKR)
+    assert_allclose(load, 1e6 * exact, rtol=1e-12, atol=1e-12)
+    # load and indentation cancel near their zeros: compared with what the contact has at most
+    assert_allclose(x, 1e6 * (jkr.indentation_at_radius(a, *JKR) + exact / stiffness), rtol=1e-12, atol=1e-14)
+    np.testing.assert_array_equal(x, again)
+    # down to no contact at all, up to the largest that was simulated
+    assert a[0] == 0.0
+    assert_allclose(a[-1], dataset["contact_radius"].max(), rtol=1e-14)
+    # every equilibrium that was simulated lies on it: the stable branch is that beyond the fold
+    stable = a >= a[np.argmin(x)]
+    simulated = dataset["contact_radius"].to_numpy()
+    closed = simulated > 0.0
+    between = np.interp(1e6 * dataset["travel"].to_numpy()[closed], x[stable], radius[stable])
+    # a chord under the square root of a fold, over 600 points of which those next to it are 2/600 of a radius apart
+    assert_allclose(1e6 * simulated[closed], between, rtol=4e-3)
+
+
+def test_thin_lines_are_the_folds_of_a_dead_load_and_of_fixed_grips(grips):
+    panel = plots.draw(grips, "loop").axes[0]
+    levels = sorted(line.get_ydata()[0] for line in panel.lines if line.get_linewidth() == 0.5)
+    pull = np.pi * 42e-3 * 2e-3
+    assert_allclose(levels, [-1.5e6 * pull, -5.0 / 6.0 * 1e6 * pull], rtol=1e-14)
+    assert [text.get_text() for text in panel.texts if "pi wR" in text.get_text()] == [
+        r"$-\frac{3}{2}\pi wR$", r"$-\frac{5}{6}\pi wR$",
+    ]  # fmt: skip
+    # under fixed grips the loop reaches below the one, and an equilibrium never beyond the other
+    assert -1.5 * pull * (1.0 + 1e-12) <= float(grips["normal_load"].min()) < -5.0 / 6.0 * pull
+
+
+def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine):
+    loads, radii = plots.draw(machine, "loop").axes
+    closed = machine["in_contact"].to_numpy().astype(int)
+    off, on = np.flatnonzero(np.diff(closed) == -1), np.flatnonzero(np.diff(closed) == 1) + 1
+    assert len(off) == len(on) == 2
+    x, load = 1e6 * machine["travel"].to_numpy(), 1e6 * machine["normal_load"].to_numpy()
+    for marker, at in (("x", off), ("o", on)):
+        ((place, value),) = marks(loads, marker)
+        assert_allclose(place, x[at], rtol=1e-14)
+        assert_allclose(value, load[at], rtol=1e-14)
+    # the sphere comes off before the fold and touches at a travel of zero, at most one record beyond
+    step = 1e6 * RECORD
+    fold = 1e6 * float(jkr.pull_off_travel(340.0, *JKR))
+    assert np.all((marks(loads, "x")[0][0] >= fold) & (marks(loads, "x")[0][0] <= fold + step))
+    assert np.all((marks(loads, "o")[0][0] >= 0.0) & (marks(loads, "o")[0][0] <= step))
+    (verticals,) = loads.collections
+    ends = sorted((path[0, 0], path[1, 1]) for path in verticals.get_segments())
+    assert_allclose(ends, sorted(zip(x[[*off, *on]], load[[*off, *on]], strict=True)), rtol=1e-14)
+    assert len(radii.collections[0].get_segments()) == 4
+
+
+def test_a_dead_load_has_no_jump_to_draw_but_a_cross():
+    dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "trips": 1}))
+    loads, radii = rendered(plots.draw(dataset, "loop")).axes
+    assert radii.get_xlabel() == r"indentation $\delta$ (µm)"
+    assert not loads.collections and len(marks(loads, "x")) == 1 and not marks(loads, "o")
+
+
+def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
+    spent, loop = lost_energy(machine)
+    assert_allclose(spent, machine["dissipated_energy"].isel(t=-1) / 2.0, rtol=1e-14)
+    assert_allclose(loop, loop_energy(machine)["loop_energy"].mean(), rtol=1e-14)
+    # P dDelta by hand; the two trips leave the contact as it was
+    P, travel = machine["normal_load"].to_numpy(), machine["travel"].to_numpy()
+    assert_allclose(loop, 0.5 * np.trapezoid(P, travel), rtol=1e-9)
+    # a jump drawn as a straight line between two records costs half its load times their distance, twice a trip
+    assert_allclose(loop, spent, rtol=0, atol=2 * 0.5 * 1.5 * np.pi * 42e-3 * 2e-3 * RECORD)
+    (entry,) = plots.draw(machine, "loop").axes[0].get_legend().get_texts()
+    assert entry.get_text() == (
+        rf"simulated: $W$ = {1e12 * float(spent):.3g} pJ, $\oint\,P\,\mathrm{{d}}\Delta$ = {1e12 * float(loop):.3g} pJ"
+    )
+
+
+def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
+    for contact in (
+        Equilibrium(indentation={"from": 2e-6, "to": -2e-6}),
+        Equilibrium(indentation=BACK, on_detach="stop"),
+        Equilibrium(indentation={"time": [0.0, 0.5, 1.0], "value": [2e-6, -2e-6, 1e-6]}),
+    ):
+        dataset = moved(contact)
+        spent, loop = lost_energy(dataset)
+        assert loop is None and float(spent) > 0.0
+        assert_allclose(spent, dataset["dissipated_energy"].max(), rtol=1e-14)
+        legend = rendered(plots.draw(dataset, "loop")).axes[0].get_legend()
+        assert legend.get_title().get_text() == "dissipated in all: $W$"
+
+
+def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
+    dataset = moved(MACHINE, sweep={"contact.stiffness": [100.0, 1e3]})
+    loads, radii = rendered(plots.draw(dataset)).axes
+    assert [line.get_color() for line in radii.lines if line.get_linestyle() == "--"] == [pictures.REFERENCE] * 2
+    words = [text.get_text() for text in loads.get_legend().get_texts()]
+    assert [text.split(":")[0] for text in words] == ["$k$ = 0.1 kN/m", "$k$ = 1 kN/m"]
+    # of works of adhesion each has its folds, which then no name fits
+    panel = rendered(plots.draw(moved(sweep={"adhesion.work": [0.0, 21e-3, 42e-3]}))).axes[0]
+    assert sum(line.get_linewidth() == 0.5 for line in panel.lines) == 4
+    assert not any("pi" in text.get_text() for text in panel.texts)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=50)},
+        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=50),
+         "record": Record(per_member=False)},
+        {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})},
+        {"sweep": {"contact": [{"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}},
+                               {"model": "equilibrium", "load": "1 mN"}]}},
+    ],
+    ids=["members", "statistics only", "never closed", "whole tables"],
+)  # fmt: skip
+def test_every_shape_of_dataset_can_be_drawn(changes):
+    dataset = moved(**changes)
+    for kind in ("loop", "time"):
+        rendered(plots.draw(dataset, kind))
+
+
+# -- which figure -----------------------------------------------------------------------------
+
+
+def test_loop_is_what_fits_where_the_sphere_is_moved_and_refused_where_it_stays(grips):
+    default, named = plots.draw(grips), plots.draw(grips, "loop")
+    assert [p.get_xlabel() for p in default.axes] == [p.get_xlabel() for p in named.axes]
+    stays = moved(Equilibrium(load=4e-3))
+    assert "loop" not in plots.drawable(stays) and "loop" in plots.drawable(grips)
+    cure = r'no loop; move it: \[contact\] indentation = \{ from = "2 um", .*drawn as: time'
+    with pytest.raises(ValueError, match=cure):
+        plots.draw(stays, "loop")
+
+
+def test_over_time_no_contact_at_rest_is_drawn_for_a_sphere_that_moves(grips):
+    figure = rendered(plots.draw(grips, "time"))
+    for panel in figure.axes[:2]:
+        for style in ("--", ":"):
+            _, values = drawn(panel, pictures.REFERENCE, style)
+            assert np.count_nonzero(np.isfinite(values)) <= 1  # a point alone is not seen
+    assert figure.axes[1].get_ylabel() == "contact area $A$ (mm²)"
+    assert "JKR" not in [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
