@@ -522,3 +522,34 @@ def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
     held = elastic_energy(a, depth[first], scenario.bodies)
     assert plane > 1e-3
     assert_allclose(lost[-1], held - math.pi * a**2 * (WORK - disc_energy(spectrum, a, 0.1875)), rtol=1e-7)
+
+
+def test_what_a_lagging_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch):
+    # below the radius at pull-off the falling load gains energy like 1/radius; that is not the edge's
+    from sim.parts import contact as part
+
+    pulled = Lagging(load={"from": 1e-3, "to": -1e-3}, front_speed=1e-3)
+    found = []
+    for spot in (1e-3, 1e-2):
+        monkeypatch.setattr(part, "_SPOT", spot)
+        scenario = scene(1, 2000, contact=pulled)
+        *_, last = march(scenario, np.arange(1))
+        assert np.isnan(last.contact.radius[0])
+        found.append(last.contact.dissipated[0])
+    assert_allclose(found[0], found[1], rtol=1e-12)
+    adhesive = 42e-3 * np.pi * 1.2e-4**2
+    assert 0.0 < found[0] < 10.0 * adhesive
+
+
+def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
+    held = Equilibrium(travel={"from": 1e-6, "to": -1.6e-5, "trips": 2}, stiffness=340.0, on_detach="reattach")
+    sites = bonds.Rate(critical_speed=1e-2, healing=2.0, area="carried")
+    scenario = scene(1, 2000, contact=held, bonds=sites)
+    states = list(march(scenario, np.arange(1)))
+    radius = np.array([state.contact.radius[0] for state in states])
+    fraction = np.array([scenario.population.fraction(state.bonds)[0] for state in states])
+    closing = np.flatnonzero(np.isnan(radius[:-1]) & ~np.isnan(radius[1:])) + 1
+    assert closing.size == 2
+    # one step of healing from nothing, and nothing again once the area is seen
+    assert np.all(fraction[closing] <= 2.0 * 1e-3 * (1.0 + 1e-9))
+    assert np.all(radius[closing] < 0.5 * np.nanmax(radius))
