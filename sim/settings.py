@@ -179,11 +179,11 @@ def _course(dataset: xr.Dataset, key: str) -> xr.DataArray:
     times, unknown = dataset["t"], xr.full_like(dataset["t"], np.nan, dtype=float)
     try:
         said = told(dataset, key)
+        if isinstance(said, dict) and "time" in said:
+            return unknown.copy(data=np.interp(times, said["time"], said["value"]))
+        start, stop, trips = (setting(dataset, f"{key}.{name}") for name in ("from", "to", "trips"))
     except KeyError:
         return unknown
-    if "time" in said:
-        return unknown.copy(data=np.interp(times, said["time"], said["value"]))
-    start, stop, trips = (setting(dataset, f"{key}.{name}") for name in ("from", "to", "trips"))
     part = times / setting(dataset, "clock.duration")
     turn = 2.0 * trips * part % 2.0
     part = xr.where(trips > 0.0, xr.where(turn <= 1.0, turn, 2.0 - turn), part)

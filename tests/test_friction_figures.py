@@ -149,7 +149,9 @@ def test_depths_side_by_side_each_tell_their_maximum():
          "statistics only"],
 )  # fmt: skip
 def test_every_kind_of_sliding_can_be_drawn(changes):
-    rendered(plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "friction"))
+    figure = rendered(plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "friction"))
+    stress = [line for line in figure.axes[0].lines if np.size(line.get_ydata()) > 2]
+    assert stress and all(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in stress)
 
 
 # -- rest and start ---------------------------------------------------------------------------
