@@ -199,6 +199,8 @@ class _Held:
 
     def _left(self, radius: np.ndarray, balance: Balance) -> np.ndarray:
         """Work of adhesion left at a radius; of an open contact that of a vanishing one."""
+        if balance.margin is None and self.reversible == 0.0:
+            return balance.work(radius)
         size = np.nan_to_num(radius, nan=0.0)
         work = balance.work(size)
         return work - self.reversible * balance.reversible(size) if self.reversible else work
