@@ -169,7 +169,7 @@ class _Held:
         return Touch(self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape))
 
     def _equilibrium(self, grip: Grip, balance: Balance) -> np.ndarray:
-        """Largest stable radius, each element until it no longer changes where the work depends on it."""
+        """Largest stable radius [m], nan without one."""
         bodies, alpha = balance.bodies, self.reversible
         if balance.margin is None:
             return grip.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
@@ -271,9 +271,8 @@ class Lagging(_Held):
         opens = ~np.isnan(radius) & np.isnan(moved.radius)
         detached = np.where(opens, motion.time - motion.duration + moved.detached_at, touch.detached)
         left = self._left(moved.radius, balance)
-        lost = np.where(self._held(touch.radius, after, grip, bodies) & ~opens, moved.dissipated, 0.0)
-        if isinstance(grip, AtTravel):
-            lost = moved.dissipated
+        counts = isinstance(grip, AtTravel) | (self._held(touch.radius, after, grip, bodies) & ~opens)
+        lost = np.where(counts, moved.dissipated, 0.0)
         return Touch(left, moved.radius, detached, touch.dissipated + lost)
 
     def _held(self, radius: np.ndarray, work: np.ndarray, grip: Grip, bodies: Bodies) -> np.ndarray:
