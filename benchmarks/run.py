@@ -21,7 +21,7 @@ from sim.bodies import Adhesion, Solid, Sphere
 from sim.engine import Dice, advance, march, start
 from sim.hazards import Bell
 from sim.memory import Slip
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Clock, Ensemble, Scenario

@@ -20,7 +20,7 @@ from sim.observables import (
 )
 from sim.rows import highlights, table, to_csv
 from sim.settings import Control, control, is_stationary, is_steady, setting, sweep_dims
-from sim.wording import concise, engineering, scaled
+from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
     "QUANTILES",

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.quantity import Quantity
+from sim.units.quantity import Quantity
 
 _SHEAR = Quantity("Pa", "shear modulus", "G", above=0)
 _YOUNG = Quantity("Pa", "Young's modulus", "E", above=0)

@@ -201,7 +201,7 @@ def check(scenario: Path, changes: tuple[str, ...]) -> None:
 def stats(output: Path, csv: Path | None) -> None:
     """Ensemble statistics over time and sweep."""
     from sim import analysis
-    from sim.durable import explained
+    from sim.numerics.files import explained
 
     with _opened(output) as dataset:
         _print_tables(dataset)
@@ -222,7 +222,7 @@ def plot(output: Path, kind: str | None, picture: Path | None) -> None:
     KIND is curve, time, sweep, map, spectrum, friction, rivals, profile or loop.
     """
     from sim import plots
-    from sim.durable import explained
+    from sim.numerics.files import explained
 
     with _opened(output) as dataset:
         target = picture or output.with_name(f"{output.stem}{'-' + kind if kind else ''}.png")
@@ -269,8 +269,8 @@ def _opened(path: Path) -> Iterator[Any]:
 def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[str, ...]) -> None:
     """Speed against error for this scene: every admissible depth, tolerance and clock step against the exact answer."""
     from sim.document import BadInput
-    from sim.quantity import Quantity
     from sim.reader import load
+    from sim.units.quantity import Quantity
 
     try:
         seconds = Quantity("s", "budget", above=0).read(budget)
@@ -278,7 +278,7 @@ def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[st
         raise BadInput([f"--budget {budget}: {fault}"]) from None
     scene = load(scenario, _overrides(changes))
     from sim import converge as convergence
-    from sim.durable import explained
+    from sim.numerics.files import explained
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
     found = convergence.converge(scene, seconds)

@@ -6,7 +6,7 @@ what is merged twice is merged within the same cell, and errors do not add up.
 
 import math
 
-from sim.jit import device
+from sim.numerics.jit import device
 
 
 @device

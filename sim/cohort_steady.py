@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from sim.hazards import hazard_integral, time_to_rupture
-from sim.jit import device
+from sim.numerics.jit import device
 
 _POINTS = np.polynomial.legendre.leggauss(5)
 _NODES = tuple((0.5 + 0.5 * _POINTS[0]).tolist())

@@ -8,7 +8,7 @@ import numpy as np
 from sim.cohort_merging import settle
 from sim.cohort_steady import fill_steady
 from sim.hazards import hazard_integral, time_to_rupture
-from sim.jit import device, kernel
+from sim.numerics.jit import device, kernel
 
 
 class Rules(NamedTuple):

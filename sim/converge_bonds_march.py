@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.motion import Motion
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 from sim.parts import bonds as depths
 from sim.parts.drive import Start, Steady
 from sim.scenario import Scenario

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sim.motion import Motion
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 from sim.parts.bonds import STATES
 from sim.parts.contact import Balance, Touch
 from sim.processes import Fluctuation

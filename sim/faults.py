@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, get_args
 
 from pydantic_core import core_schema
 
-from sim.quantity import in_words
+from sim.units.quantity import in_words
 
 Path = tuple[str | int, ...]
 Node = dict[str, Any]

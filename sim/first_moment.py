@@ -24,7 +24,7 @@ import numpy as np
 from scipy.special import lambertw
 
 from sim.hazards import Hazard
-from sim.jit import device, kernel
+from sim.numerics.jit import device, kernel
 
 #: Largest error of N and of M that a sub-step under Bell's rate may make, by its embedded lower order, over N and M.
 #: The fifth-order result that is kept is better; errors of sub-steps fade with the bonds that carry them.

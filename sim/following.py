@@ -19,8 +19,8 @@ import math
 
 import numpy as np
 
-from sim.jit import device
-from sim.noise import PARTS, _logarithm, exponential, fill_words
+from sim.numerics.jit import device
+from sim.numerics.noise import PARTS, _logarithm, exponential, fill_words
 
 #: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), whether bonds
 #: are asked singly, bound sites, sum of their births, of the births squared, steps done.

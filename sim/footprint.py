@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic.dataclasses import dataclass
 from scipy import special
 
-from sim.quantity import Quantity
 from sim.radial import Isotropic
+from sim.units.quantity import Quantity
 
 Array = NDArray[np.float64]
 

@@ -29,7 +29,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.jit import device, kernel
+from sim.numerics.jit import device, kernel
 
 _S6 = math.sqrt(6.0)
 _C1, _C2 = (4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0

@@ -10,8 +10,8 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.jit import device
-from sim.quantity import Quantity
+from sim.numerics.jit import device
+from sim.units.quantity import Quantity
 
 
 class Hazard(NamedTuple):

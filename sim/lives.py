@@ -27,8 +27,8 @@ from sim.following import (
     least,
 )
 from sim.hazards import hazard_integral, time_to_rupture
-from sim.jit import device, kernel
-from sim.noise import exponential, unit_at, words_at
+from sim.numerics.jit import device, kernel
+from sim.numerics.noise import exponential, unit_at, words_at
 
 #: What ``live`` has to say: all done, some rows need a draw of the steady law, the state is spent, endless numbers.
 DONE, LONG, SPENT, ENDLESS = range(4)

@@ -15,10 +15,10 @@ from pydantic import ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs, PydanticCustomError
 
-from sim.grid import Grid
-from sim.quantity import Quantity
+from sim.numerics.grid import Grid
 from sim.radial import PowerLaws, Rowed
-from sim.table import TableError, columns, file_path, file_text, matrix
+from sim.units.quantity import Quantity
+from sim.units.table import TableError, columns, file_path, file_text, matrix
 
 Array = NDArray[np.float64]
 

@@ -12,7 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.motion import Motion
-from sim.quantity import Quantity
+from sim.units.quantity import Quantity
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

@@ -31,8 +31,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 
-from sim.grid import Grid
 from sim.laws import halfspace, jkr, schallamach
+from sim.numerics.grid import Grid
 from sim.spectrum import Gaussian, Ripple
 
 # the PDMS lens of the paper's example, on an assumed sphere of 2 mm, under an assumed mean stress

@@ -11,12 +11,12 @@ from typing import Any, ClassVar
 import numpy as np
 
 from sim.bands import Bands
-from sim.grid import Grid
-from sim.jit import kernel
 from sim.memory import Growth, Memory
 from sim.modes import Modes
 from sim.motion import Motion
-from sim.noise import Noise
+from sim.numerics.grid import Grid
+from sim.numerics.jit import kernel
+from sim.numerics.noise import Noise
 from sim.traction import Traction
 
 

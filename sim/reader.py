@@ -10,9 +10,9 @@ from pydantic_core import PydanticCustomError
 
 from sim.document import BadInput, Place, Words, monsters, parse, put, read_text, words_of
 from sim.faults import Fault, Shape, dotted, shown
-from sim.quantity import number_and_unit
 from sim.scenario import CHECKED, Files, Scenario, Source, faults_across
 from sim.sweep import Axis, set_key, sweep_axes
+from sim.units.quantity import number_and_unit
 
 _DECLARED: dict[str, Any] = getattr(Scenario, "__pydantic_fields__", {})
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")

@@ -13,12 +13,12 @@ import numpy as np
 import xarray as xr
 
 from sim.correlation import correlation_time
-from sim.durable import write_whole
 from sim.events import events
 from sim.members import QUANTILES, shares, statistics, summary
+from sim.numerics.files import write_whole
 from sim.observables import observables, settled, share_observables
 from sim.settings import control, is_stationary, stays_held, sweep_dims, word
-from sim.wording import concise, scaled
+from sim.units.notation import concise, scaled
 
 Columns = dict[str, list[str]]
 

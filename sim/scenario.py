@@ -25,9 +25,9 @@ from sim.parts.drive import Drive, Table
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.shear import Auto, Depth, Mean, Modal, Shear, Uniform
 from sim.processes import BandedProcess, ModalProcess, SmoothProcess
-from sim.quantity import Quantity
 from sim.spectrum import BondMade
 from sim.sweep import read_sweep, set_key
+from sim.units.quantity import Quantity
 
 _Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
 _MOST_RECORDS = 10_000_000

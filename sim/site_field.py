@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.motion import Motion
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 from sim.processes import DrawsMaps, Fluctuation, ModalProcess, SmoothProcess
 from sim.traction import Traction
 

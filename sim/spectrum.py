@@ -24,8 +24,8 @@ from scipy import special
 from sim.footprint import BondMade
 from sim.measured import Measured, Tabulated
 from sim.pixels import gaussian_boxes
-from sim.quantity import Quantity
 from sim.radial import Isotropic, PowerLaws, Rowed
+from sim.units.quantity import Quantity
 
 Array = NDArray[np.float64]
 

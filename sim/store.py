@@ -18,9 +18,9 @@ import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
-from sim.durable import explained, write_whole
 from sim.gauges import GAUGES, Gauge
 from sim.laws import jkr
+from sim.numerics.files import explained, write_whole
 from sim.processes import MappedProcess
 from sim.scenario import Scenario, quantities
 

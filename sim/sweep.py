@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from sim.quantity import number_and_unit
+from sim.units.quantity import number_and_unit
 
 #: Names that the dataset gives away itself, so that no axis may take them.
 RESERVED = frozenset(

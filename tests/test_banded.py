@@ -20,7 +20,7 @@ from sim.bands import Bands
 from sim.engine import march, pack, unpack
 from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.modes import modes
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 from sim.parts import bonds, drive, shear
 from sim.processes import BandedProcess, Fluctuation
 from sim.scenario import Clock

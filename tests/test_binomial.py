@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2
 
-from sim.binomial import binomial_numbers, binomial_tails
+from sim.numerics.binomial import binomial_numbers, binomial_tails
 
 # Rounding of what the parts of a probability are made of: eleven terms in its logarithm, of 40 at the most, each
 # good to two units of 2^-53; likewise the exponent of the integral.

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import exp1
 
-from sim.expint import lambert_w, reduced_exponential_integral, scaled_exponential_integral
+from sim.numerics.special import lambert_w, reduced_exponential_integral, scaled_exponential_integral
 
 ORDERS = [0, 1, 2]
 

@@ -6,9 +6,9 @@ from matplotlib.patches import Circle
 from pictured import CELL, STEADY, field, mapped, rendered, simulated
 
 from sim import field_figures, plots
-from sim.grid import Grid
 from sim.memory import Onset, Stress
 from sim.modes import modes
+from sim.numerics.grid import Grid
 from sim.parts import drive, shear
 from sim.scenario import Ensemble, Record
 from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple

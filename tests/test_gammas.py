@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import gamma, kstest
 
-from sim.noise import PARTS, Noise, steps_per_block
+from sim.numerics.noise import PARTS, Noise, steps_per_block
 
 SHAPES = [0.5, 0.7, 1.0, 3.0, 50.0, 1e4, 1e8]
 #: Two-sided probability of five standard deviations.

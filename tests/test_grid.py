@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.grid import Grid
+from sim.numerics.grid import Grid
 
 SIZES = [1, 2, 3, 4, 7, 16, 33, 64]
 

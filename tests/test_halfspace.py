@@ -8,8 +8,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
-from sim.grid import Grid
 from sim.laws import halfspace
+from sim.numerics.grid import Grid
 
 RATIOS = [0.0, 0.3, 0.5]
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(60)

@@ -8,8 +8,8 @@ import xarray as xr
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.grid import Grid
 from sim.measured import Measured, Tabulated, periodogram, radial_average
+from sim.numerics.grid import Grid
 from sim.spectrum import Band, SelfAffine, Spectrum
 
 TURN = 2 * math.pi

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import kstest, norm
 
-from sim.noise import BLOCK_NUMBERS, PARTS, Noise, steps_per_block
+from sim.numerics.noise import BLOCK_NUMBERS, PARTS, Noise, steps_per_block
 
 
 def numbers(members, step, count, seed=7, part="shear"):

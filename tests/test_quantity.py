@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from sim import quantity
-from sim.quantity import Quantity, number_and_unit
+from sim.units import quantity
+from sim.units.quantity import Quantity, number_and_unit
 
 LENGTH = Quantity("m", "length", "l", above=0)
 STRESS = Quantity("Pa", "stress", "tau", at_least=0)

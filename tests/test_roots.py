@@ -4,8 +4,8 @@ import mpmath
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from sim.jit import law
-from sim.roots import cube_root
+from sim.numerics.jit import law
+from sim.numerics.special import cube_root
 
 
 @law

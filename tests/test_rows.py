@@ -12,8 +12,8 @@ from sim import analysis
 from sim.ensemble import run
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
-from sim.quantity import Quantity
-from sim.table import columns
+from sim.units.quantity import Quantity
+from sim.units.table import columns
 
 
 @pytest.fixture(scope="module", name="ramp")

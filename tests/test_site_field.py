@@ -12,7 +12,7 @@ from sim.footprint import BondMade
 from sim.memory import Constant, Time
 from sim.modes import modes
 from sim.motion import Motion
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 from sim.site_field import MappedSiteModes, SiteMean, SiteModes
 from sim.traction import Traction
 

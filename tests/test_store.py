@@ -13,10 +13,10 @@ from numpy.testing import assert_allclose
 from scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
 
 from sim import ensemble, store
-from sim.durable import StoreTrouble
 from sim.engine import march
 from sim.gauges import GAUGES
 from sim.memory import Slip
+from sim.numerics.files import StoreTrouble
 from sim.parts import shear
 from sim.scenario import Clock, Record, read_sweep
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim.quantity import Quantity
-from sim.table import TableError, columns, file_path, file_text, matrix
+from sim.units.quantity import Quantity
+from sim.units.table import TableError, columns, file_path, file_text, matrix
 
 TIME = Quantity("s", "time", at_least=0)
 SPEED = Quantity("m/s", "speed")

@@ -11,7 +11,7 @@ from scipy.stats import kstwo
 
 from sim.following import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS
 from sim.hazards import Hazard
-from sim.noise import PARTS
+from sim.numerics.noise import PARTS
 from sim.tracks import advance, bound, mean_life, mean_square_stretch, mean_stretch, start
 
 BELL, CONSTANT, CUT = Hazard(1.0, 1.0, math.inf), Hazard(1.0, 0.0, math.inf), Hazard(0.3, 0.0, 2.0)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim import analysis
-from sim.quantity import Quantity
+from sim.units.quantity import Quantity
 
 
 @pytest.mark.parametrize(

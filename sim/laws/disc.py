@@ -17,8 +17,8 @@ import numpy as np
 import scipy.fft
 import scipy.special
 
-from sim.grid import Grid
 from sim.laws.halfspace import disc_displacement
+from sim.numerics.grid import Grid
 
 # Below this argument the closed forms cancel, above it their power series do; 16 terms are exact there.
 _SERIES_END = 3.0

@@ -18,8 +18,8 @@ import math
 import numpy as np
 import scipy.special
 
-from sim.grid import Grid
-from sim.jit import law
+from sim.numerics.grid import Grid
+from sim.numerics.jit import law
 
 
 @law

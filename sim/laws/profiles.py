@@ -15,8 +15,8 @@ import math
 
 import numpy as np
 
-from sim.jit import device, law
 from sim.laws.halfspace import disc_displacement
+from sim.numerics.jit import device, law
 
 
 @device

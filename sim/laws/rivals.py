@@ -35,14 +35,14 @@ import math
 
 import numpy as np
 
-from sim.jit import device, law
 from sim.laws.jkr import (
     hertz_radius_at_indentation,
     hertz_radius_at_load,
     radius_at_indentation,
     radius_at_load,
 )
-from sim.roots import cube_root
+from sim.numerics.jit import device, law
+from sim.numerics.special import cube_root
 
 _STICK = 1.5  # of T^2 in the energy balance at a load: full stick,
 _UNIFORM = 16.0 / math.pi**2  # and uniform stress

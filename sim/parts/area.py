@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 
 Area = Annotated[
     Literal["present", "carried"],

@@ -26,8 +26,8 @@ from sim.parts.unstretched import (
     Stress,
     Unbroken,
 )
-from sim.quantity import Quantity
 from sim.tracks import Tracks
+from sim.units.quantity import Quantity
 
 __all__ = ["STATES", "Auto", "Bonds", "Cohort", "Counted", "Depth", "FirstMoment"]
 __all__ += ["Rate", "Steady", "Tracked", "Unbroken"]

@@ -19,7 +19,7 @@ from sim.grips import AtLoad, AtTravel, Bodies, Grip
 from sim.margin import Margin
 from sim.motion import Motion
 from sim.parts.control import held, lowest, value_at
-from sim.quantity import Quantity
+from sim.units.quantity import Quantity
 from sim.widest import widest_crossing
 
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.

@@ -9,8 +9,8 @@ from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.quantity import Quantity
-from sim.table import TableError, columns, file_text
+from sim.units.quantity import Quantity
+from sim.units.table import TableError, columns, file_text
 
 _TIME = Quantity("s", "time", "t")
 

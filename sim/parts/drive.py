@@ -15,8 +15,8 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.motion import Motion
-from sim.quantity import Quantity
-from sim.table import TableError, columns, file_text
+from sim.units.quantity import Quantity
+from sim.units.table import TableError, columns, file_text
 
 _SPEED = Quantity("m/s", "sliding speed", "V")
 _TIME = Quantity("s", "time", "t")

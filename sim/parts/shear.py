@@ -17,9 +17,9 @@ from sim.bands import Bands, cell_pairs, group
 from sim.memory import Constant, Growth, Memory
 from sim.modes import cell_variance, modes
 from sim.processes import BandedProcess, FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
-from sim.quantity import Quantity
 from sim.site_field import MappedSiteModes, SiteMean, SiteModes
 from sim.spectrum import BondMade, Spectrum
+from sim.units.quantity import Quantity
 
 _Paid = Annotated[
     float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)

@@ -20,12 +20,12 @@ import sim.tracks as tracks
 from sim.cohorts import Cohorts
 from sim.hazards import AnyHazard, Hazard
 from sim.motion import Motion
-from sim.noise import Noise
+from sim.numerics.noise import Noise
 from sim.parts.area import Area, OverArea
 from sim.parts.unstretched import Start
-from sim.quantity import Quantity
 from sim.tracks import Tracks
 from sim.traction import Traction
+from sim.units.quantity import Quantity
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
 Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "k_on", above=0, typical="1e5 1/s")]

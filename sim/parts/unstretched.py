@@ -11,13 +11,13 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.binomial import binomial_numbers
 from sim.laws.schallamach import relax_fraction, steady_fraction, transition_probabilities
 from sim.motion import Motion
-from sim.noise import Noise
+from sim.numerics.binomial import binomial_numbers
+from sim.numerics.noise import Noise
 from sim.parts.area import Area, OverArea
-from sim.quantity import Quantity
 from sim.traction import Traction
+from sim.units.quantity import Quantity
 
 Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
 CriticalSpeed = Annotated[float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)]

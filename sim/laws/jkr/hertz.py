@@ -2,8 +2,8 @@
 
 import math
 
-from sim.jit import law
-from sim.roots import cube_root
+from sim.numerics.jit import law
+from sim.numerics.special import cube_root
 
 
 @law

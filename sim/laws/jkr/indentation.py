@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
-from sim.jit import device, law
 from sim.laws.jkr.scales import fold_indentation, fold_radius
+from sim.numerics.jit import device, law
 
 
 @device

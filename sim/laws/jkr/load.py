@@ -2,9 +2,9 @@
 
 import math
 
-from sim.jit import law
 from sim.laws.jkr.scales import twice_pull_off
-from sim.roots import cube_root
+from sim.numerics.jit import law
+from sim.numerics.special import cube_root
 
 
 @law

@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.jit import device, law
 from sim.laws.jkr.scales import adhesive_unit, grips_share
+from sim.numerics.jit import device, law
 
 
 class PullOff(NamedTuple):

@@ -7,8 +7,8 @@ import math
 
 import numpy as np
 
-from sim.jit import device
-from sim.roots import cube_root
+from sim.numerics.jit import device
+from sim.numerics.special import cube_root
 
 
 @device

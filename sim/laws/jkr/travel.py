@@ -4,10 +4,10 @@ import math
 
 import numpy as np
 
-from sim.jit import device, kernel
 from sim.laws.jkr.machine import fold_level, fold_root
 from sim.laws.jkr.scales import adhesive_unit, grips_share
-from sim.roots import cube_root
+from sim.numerics.jit import device, kernel
+from sim.numerics.special import cube_root
 
 _BLOCK = 4096
 

@@ -6,7 +6,7 @@ themselves before the sliding pulls on them, below 1 the sliding tears them off.
 at z = 0.38 if sites rebind slowly, near z = k_0/k_on if they rebind fast, and falls like (ln V)^2/V
 after it.
 
-All that is needed are the integrals ``R_j`` of ``sim.expint`` at z, which run from 0 at z = 0
+All that is needed are the integrals ``R_j`` of ``sim.numerics.special`` at z, which run from 0 at z = 0
 (infinite speed) to 1 at z = infinity (rest, or an infinite Bell force: a constant rate).
 """
 
@@ -14,9 +14,9 @@ import math
 
 import numpy as np
 
-from sim.expint import reduced
-from sim.jit import device, law
 from sim.laws.schallamach.renewal import Lives, Peak, SiteMoments
+from sim.numerics.jit import device, law
+from sim.numerics.special import reduced
 
 
 @device

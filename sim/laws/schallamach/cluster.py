@@ -2,7 +2,7 @@
 
 import math
 
-from sim.jit import law
+from sim.numerics.jit import law
 
 
 @law

@@ -9,8 +9,8 @@ import math
 
 import numpy as np
 
-from sim.jit import device, law
 from sim.laws.schallamach.renewal import SiteMoments
+from sim.numerics.jit import device, law
 
 #: Where the moments pass from the series in a = k_0 l/|V| to the closed form: neither cancels there.
 _SWITCH = 3.0

@@ -13,9 +13,9 @@ import math
 
 import numpy as np
 
-from sim.expint import lambert
-from sim.jit import device, law
 from sim.laws.schallamach.renewal import Peak
+from sim.numerics.jit import device, law
+from sim.numerics.special import lambert
 
 
 @device

@@ -17,7 +17,7 @@ any length at a mean speed is known exactly, for the mean and for the chances of
 
 import math
 
-from sim.jit import law
+from sim.numerics.jit import law
 
 
 @law

@@ -7,8 +7,8 @@ such bonds pulled together, as long as the sites that broke do not matter.
 import math
 from typing import Any, NamedTuple
 
-from sim.expint import lambert, reduced
-from sim.jit import device, law
+from sim.numerics.jit import device, law
+from sim.numerics.special import lambert, reduced
 
 
 class StartUpPeak(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.jit import law
+from sim.numerics.jit import law
 
 
 class SiteMoments(NamedTuple):

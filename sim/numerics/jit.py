@@ -29,11 +29,11 @@ _BLOCK = 4096
 @functools.cache
 def _cache_folder() -> str:
     """A folder of compiled code that belongs to exactly these sources."""
-    package = Path(__file__).parent
+    package = Path(__file__).parents[1]
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(package.rglob("*.py")):
         text = source.read_bytes()
-        if b"sim.jit" in text or source.name == "jit.py":
+        if b"sim.numerics.jit" in text or source.name == "jit.py":
             digest.update(text)
     base = os.environ.get("SIM_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     return str(Path(base).expanduser() / "sliding-sim" / digest.hexdigest()[:16])

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from sim.jit import device, kernel
+from sim.numerics.jit import device, kernel
 
 _LARGE = 200.0  # variance from which a tail is an integral instead of a sum
 #: Gauss's rule of 24 points over (0, 1); the second half of the weights mirrors the first.

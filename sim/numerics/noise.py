@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim.jit import device, kernel
+from sim.numerics.jit import device, kernel
 
 #: Fixed integer of each part that draws; part of the address, so never renumbered.
 PARTS = {"bonds": 1, "shear": 2, "drive": 3, "contact": 4}

@@ -1,0 +1,1 @@
+"""Numbers with units: quantities, tables of them, their course in time, their notation."""
