@@ -25,7 +25,7 @@ from sim.numerics.noise import Noise
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Clock, Ensemble, Scenario
-from sim.spectrum import Gaussian, SelfAffine, VonKarman
+from sim.spectrum.families import Gaussian, SelfAffine, VonKarman
 from sim.traction import Traction
 
 TURNS = 31

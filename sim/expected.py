@@ -19,7 +19,7 @@ from sim.memory import Constant
 from sim.parts.bonds import Cohort, Counted, Rate, Steady, Tracked, Unbroken
 from sim.processes import BandedProcess, FixedProcess, ModalProcess, SmoothProcess
 from sim.scenario import Scenario
-from sim.spectrum import BondMade
+from sim.spectrum.families import BondMade
 
 Array = NDArray[np.float64]
 Steps = NDArray[np.int64]

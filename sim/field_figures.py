@@ -17,13 +17,13 @@ from scipy.signal import resample
 from sim.analysis import engineering, setting, sweep_dims
 from sim.curves import swept_whole
 from sim.laws.halfspace import displacement
-from sim.measured import periodogram, radial_average
 from sim.memory import Growth
 from sim.modes import Modes, modes
 from sim.numerics.grid import Grid
 from sim.pictures import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
 from sim.settings import word
-from sim.spectrum import Spectrum
+from sim.spectrum.families import Spectrum
+from sim.spectrum.periodogram import periodogram, radial_average
 
 #: Pixels that a cell has at least in a picture.
 PIXELS = 384

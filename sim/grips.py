@@ -10,7 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.laws import jkr, rivals
+from sim.laws import jkr
+from sim.laws.reversible import radius_at_indentation_reversible, radius_at_load_reversible, shrunk_at_travel
 
 
 class Bodies(NamedTuple):
@@ -49,7 +50,7 @@ class AtLoad:
         if reversible == 0.0:
             return np.asarray(jkr.radius_at_load(self.load, work, size, modulus))
         return np.asarray(
-            rivals.radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio)
+            radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio)
         )
 
     def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
@@ -97,14 +98,14 @@ class AtTravel:
         if math.isinf(self.stiffness):
             if reversible == 0.0:
                 return np.asarray(jkr.radius_at_indentation(self.place, work, size, modulus))
-            law = rivals.radius_at_indentation_reversible
+            law = radius_at_indentation_reversible
             return np.asarray(law(self.place, work, stress, reversible, size, modulus, poisson_ratio))
         found = jkr.radius_at_travel(self.place, self.stiffness, work, size, modulus)
         if reversible == 0.0:
             return np.asarray(found)
         hertz = jkr.radius_at_travel(self.place, self.stiffness, 0.0, size, modulus)
         return np.asarray(
-            rivals.shrunk_at_travel(
+            shrunk_at_travel(
                 found, hertz, self.place, self.stiffness, work, stress, reversible, 0.0, size, modulus, poisson_ratio
             )
         )

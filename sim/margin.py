@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from sim.disc import disc_energy, marginal_energy
-from sim.spectrum import Ripple
+from sim.spectrum.families import Ripple
+from sim.spectrum.finite_contact import disc_energy, marginal_energy
 
 #: Points of the splines over ln a, from 1e-4 to 1 sphere radii. Good to 1e-8 for smooth spectra, 1e-5 for a broad
 #: power law, 3e-5 for a band and 3e-3 for one a few per cent wide: its share oscillates with the waves in the contact.
@@ -18,7 +18,7 @@ _POINTS, _DECADES = 513, 4
 class Margin:
     """dE/dA of a disc over ΔΓ of the plane [1]: 1 for many waves in the contact, 0 for a vanishing one.
 
-    E is the ensemble mean of the energy that fluctuations confined to a disc of radius a store (``sim.disc``);
+    E is the ensemble mean of the energy that fluctuations confined to a disc of radius a store (``finite_contact``);
     a contact that grows pays dE/dA. A spline over ln a, made once for a scene; a ripple's is in closed form.
     """
 

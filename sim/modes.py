@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
-from sim.pixels import radial_quadrant
+from sim.spectrum.pixels import radial_quadrant
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -33,7 +33,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from sim.laws import halfspace, jkr, schallamach
 from sim.numerics.grid import Grid
-from sim.spectrum import Gaussian, Ripple
+from sim.spectrum.families import Gaussian, Ripple
 
 # the PDMS lens of the paper's example, on an assumed sphere of 2 mm, under an assumed mean stress
 SHEAR, WORK, WIDTH, WAVES = 1.6e6, 0.042, 0.24e-3, 10

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from sim.disc import marginal_energy
 from sim.gauges import GAUGES
 from sim.hazards import Bell
 from sim.laws import jkr
 from sim.laws.schallamach import bell_peak, first_moment_peak
 from sim.parts.bonds import FirstMoment, Tracked
 from sim.scenario import Record, Scenario, Source, quantities
-from sim.spectrum import BondMade
+from sim.spectrum.families import BondMade
+from sim.spectrum.finite_contact import marginal_energy
 from sim.store import Plan, work
 from sim.tracks import mean_life
 

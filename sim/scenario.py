@@ -25,7 +25,7 @@ from sim.parts.drive import Drive, Table
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.shear import Auto, Depth, Mean, Modal, Shear, Uniform
 from sim.processes import BandedProcess, ModalProcess, SmoothProcess
-from sim.spectrum import BondMade
+from sim.spectrum.families import BondMade
 from sim.sweep import read_sweep, set_key
 from sim.units.quantity import Quantity
 

@@ -8,7 +8,7 @@ from sim.memory import Onset, Time
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Clock, Ensemble, Scenario
-from sim.spectrum import Band
+from sim.spectrum.families import Band
 
 RADIUS, WORK, MODULUS, LOAD = 2e-3, 42e-3, 6.4e6, 4e-3
 FIELD = {"spectrum": Band(rms=150e3, longest=60e-6, shortest=24e-6), "cell": 0.24e-3, "points": 32}

@@ -6,7 +6,7 @@ from sim.memory import Onset, Time
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Clock, Ensemble, Record, Scenario
-from sim.spectrum import Band
+from sim.spectrum.families import Band
 
 CELL = 0.24e-3
 RAMP = drive.Ramp(start=1e-5, stop=1e-1, scale="log")

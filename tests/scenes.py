@@ -7,7 +7,7 @@ from sim.memory import Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium, Lagging
 from sim.scenario import Clock, Ensemble, Scenario
-from sim.spectrum import Band, Gaussian, Ripple, SelfAffine
+from sim.spectrum.families import Band, Gaussian, Ripple, SelfAffine
 
 SPECTRUM = Band(rms=120e3, longest=120e-6, shortest=60e-6)
 CELL = 0.24e-3

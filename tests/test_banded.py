@@ -24,7 +24,7 @@ from sim.numerics.noise import Noise
 from sim.parts import bonds, drive, shear
 from sim.processes import BandedProcess, Fluctuation
 from sim.scenario import Clock
-from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
+from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 from sim.traction import Traction
 
 G, MEMBERS = 1.6e6, 400

@@ -17,7 +17,7 @@ from sim.bands import Pairs, cell_pairs, group
 from sim.memory import Diffusion, Slip, Time, Wave
 from sim.modes import modes
 from sim.parts import shear
-from sim.spectrum import (
+from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,
     Gaussian,

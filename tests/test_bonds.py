@@ -9,10 +9,10 @@ from scenes import BELL, CUT_OFF, STRETCHED, scene
 from scipy.stats import binom, chi2
 
 from sim.engine import march
-from sim.footprint import BondMade
 from sim.hazards import Constant
 from sim.parts import bonds, drive, shear
 from sim.scenario import Clock
+from sim.spectrum.bond_made import BondMade
 
 STEPPED = drive.Table(time=(0.0, 0.7, 0.7, 1.4, 1.4, 2.1), speed=(1e-5, 1e-5, 8e-2, 8e-2, 2e-3, 2e-3))
 

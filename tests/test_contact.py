@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import SHEARS, scene
 
 from sim.bodies import Adhesion, Solid, Sphere
-from sim.disc import marginal_energy
 from sim.engine import march, pack
 from sim.gauges import GAUGES
 from sim.grips import elastic_energy
@@ -20,7 +19,8 @@ from sim.memory import Onset
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium, Lagging
 from sim.scenario import Clock, Scenario
-from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
+from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
+from sim.spectrum.finite_contact import marginal_energy
 
 WORK = 1.0 / math.pi
 GAUGE = {gauge.name: gauge for gauge in GAUGES}
@@ -510,7 +510,7 @@ def test_a_pulled_contact_on_a_disc_keeps_a_neck_that_the_plane_would_not_bear()
 
 def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
     """-int w dA = -w0 A + DeltaGamma int dE: the mean over the disc, not its edge, enters the energy."""
-    from sim.disc import disc_energy
+    from sim.spectrum.finite_contact import disc_energy
 
     spectrum = Gaussian(rms=0.05, length=0.3)
     plane = float(spectrum.surface_energy(0.1875))

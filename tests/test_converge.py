@@ -24,7 +24,7 @@ from sim.moments import stated_times
 from sim.parts import bonds, drive, shear
 from sim.processes import BandedProcess
 from sim.scenario import Clock, Record
-from sim.spectrum import Gaussian, Ripple, SelfAffine
+from sim.spectrum.families import Gaussian, Ripple, SelfAffine
 
 ROUGH = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=8e-6)
 STEADY = {

@@ -8,11 +8,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import special
 
-from sim.disc import disc_energy, marginal_energy
-from sim.footprint import BondMade
 from sim.laws import disc, halfspace
-from sim.measured import Tabulated
-from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
+from sim.spectrum.bond_made import BondMade
+from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
+from sim.spectrum.finite_contact import disc_energy, marginal_energy
+from sim.spectrum.tabulated import Tabulated
 
 RATIOS = [0.0, 0.3, 0.5]
 SPECTRA = [

@@ -132,7 +132,7 @@ def test_a_detached_contact_stays_open():
     # a ripple that grows past what tension allows and falls back again
     from sim.memory import Onset, Time
     from sim.parts import drive, shear
-    from sim.spectrum import Ripple
+    from sim.spectrum.families import Ripple
 
     part = shear.Modal(
         spectrum=Ripple(amplitude=4e5, wavelength=24e-6),

@@ -11,7 +11,7 @@ from sim.modes import modes
 from sim.numerics.grid import Grid
 from sim.parts import drive, shear
 from sim.scenario import Ensemble, Record
-from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple
+from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
 
 
 @pytest.mark.parametrize("points", [32, 33])

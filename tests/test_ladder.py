@@ -14,7 +14,7 @@ from sim.memory import Onset, Slip, Wave
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Record
-from sim.spectrum import Gaussian
+from sim.spectrum.families import Gaussian
 
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")
 

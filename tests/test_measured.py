@@ -8,9 +8,11 @@ import xarray as xr
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.measured import Measured, Tabulated, periodogram, radial_average
 from sim.numerics.grid import Grid
-from sim.spectrum import Band, SelfAffine, Spectrum
+from sim.spectrum.families import Band, SelfAffine, Spectrum
+from sim.spectrum.measured import Measured
+from sim.spectrum.periodogram import periodogram, radial_average
+from sim.spectrum.tabulated import Tabulated
 
 TURN = 2 * math.pi
 

@@ -11,7 +11,7 @@ from scipy import integrate, special
 
 from sim.modes import Modes, modes, pixel_variances
 from sim.numerics.grid import Grid
-from sim.spectrum import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
+from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 
 TURN = 2 * math.pi
 

@@ -12,7 +12,7 @@ from sim import analysis, pictures, plots
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.scenario import Clock, Ensemble, Record
-from sim.spectrum import Band
+from sim.spectrum.families import Band
 
 
 @pytest.fixture(scope="module")

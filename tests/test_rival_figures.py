@@ -10,7 +10,7 @@ from pictured import RAMP, STEADY, rendered, simulated
 
 from sim import pictures, plots, rival_figures
 from sim.bodies import Adhesion
-from sim.laws import jkr, profiles, rivals
+from sim.laws import jkr, profiles, theories
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium
 from sim.profile_figures import shapes_of
@@ -41,9 +41,9 @@ def curve_of(panel, name):
 @pytest.mark.parametrize(
     ("contact", "law", "value"),
     [
-        (Equilibrium(load=4e-3), rivals.compare_at_load, 4e-3),
-        (Equilibrium(indentation=2e-6), rivals.compare_at_indentation, 2e-6),
-        (Equilibrium(load=-3e-4), rivals.compare_at_load, -3e-4),
+        (Equilibrium(load=4e-3), theories.compare_at_load, 4e-3),
+        (Equilibrium(indentation=2e-6), theories.compare_at_indentation, 2e-6),
+        (Equilibrium(load=-3e-4), theories.compare_at_load, -3e-4),
     ],
     ids=["load", "indentation", "pulled"],
 )
@@ -68,7 +68,7 @@ def test_a_branch_ends_with_a_dot_where_its_force_is_largest():
     panel = plots.draw(plain(), "rivals").axes[1]
     _, colour, _ = rival_figures._THEORIES["savkoor_briggs"]
     (dot,) = (line for line in panel.lines if line.get_color() == colour and line.get_marker() == "o")
-    limit = 1e3 * float(rivals.savkoor_briggs_limit(4e-3, 42e-3, 2e-3))
+    limit = 1e3 * float(theories.savkoor_briggs_limit(4e-3, 42e-3, 2e-3))
     # 1500 stresses over the axis's decades; the force is flat at its largest, so a step costs its square
     assert limit * 0.999 < dot.get_xdata()[0] <= limit * (1.0 + 1e-12)
 

@@ -10,11 +10,11 @@ from lens import LOAD, MODULUS, RADIUS, WORK, scene
 from sim import analysis
 from sim.bodies import Adhesion
 from sim.ensemble import run
-from sim.laws import jkr, rivals
+from sim.laws import jkr, reversible
 from sim.parts import bonds, drive, shear
 from sim.parts.contact import Equilibrium, Lagging
 from sim.scenario import Clock, Record
-from sim.spectrum import Band
+from sim.spectrum.families import Band
 
 
 @pytest.fixture(scope="module", name="ramp")
@@ -140,7 +140,7 @@ def test_mean_stress_alone_takes_what_the_reversible_law_says():
     part = Equilibrium(load=LOAD, reversible=0.02)
     found = analysis.shares(run(scene(contact=part, bonds=bonds.Unbroken(stress=3e5), shear=shear.Uniform())))
     full = jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
-    left = rivals.radius_at_load_reversible(LOAD, WORK, 3e5, 0.02, RADIUS, MODULUS)
+    left = reversible.radius_at_load_reversible(LOAD, WORK, 3e5, 0.02, RADIUS, MODULUS)
     np.testing.assert_allclose(found["lost_to_mean_stress_mean"], 1.0 - (left / full) ** 2, rtol=1e-11)
     for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
         np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)

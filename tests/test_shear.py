@@ -13,7 +13,7 @@ from sim.laws import halfspace
 from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.parts import bonds, drive, shear
 from sim.scenario import Clock
-from sim.spectrum import Gaussian, Ripple, VonKarman
+from sim.spectrum.families import Gaussian, Ripple, VonKarman
 
 G = 1.6e6
 MEMORIES = {

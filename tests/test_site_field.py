@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from sim.footprint import BondMade
 from sim.memory import Constant, Time
 from sim.modes import modes
 from sim.motion import Motion
 from sim.numerics.noise import Noise
 from sim.site_field import MappedSiteModes, SiteMean, SiteModes
+from sim.spectrum.bond_made import BondMade
 from sim.traction import Traction
 
 B, G, CELL, POINTS, MEMBERS = 1e-6, 1.6e6, 24e-6, 32, 4000

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 from scipy import integrate
 
-from sim.spectrum import (
+from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,
     Gaussian,

@@ -10,7 +10,6 @@ from pydantic import ValidationError
 from scenes import BELL, BONDS, CELL, STRETCHED, scene
 
 from sim.engine import march
-from sim.footprint import BondMade
 from sim.gauges import GAUGES
 from sim.hazards import Constant
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
@@ -18,7 +17,8 @@ from sim.memory import Time
 from sim.parts import bonds, drive, shear
 from sim.parts.area import share_kept
 from sim.scenario import Clock
-from sim.spectrum import Band
+from sim.spectrum.bond_made import BondMade
+from sim.spectrum.families import Band
 
 READ = {gauge.name: gauge.read for gauge in GAUGES}
 RATES = BELL.zero_force_rate, BELL.bell_force, STRETCHED["bond_stiffness"]

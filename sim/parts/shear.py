@@ -18,7 +18,7 @@ from sim.memory import Constant, Growth, Memory
 from sim.modes import cell_variance, modes
 from sim.processes import BandedProcess, FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
 from sim.site_field import MappedSiteModes, SiteMean, SiteModes
-from sim.spectrum import BondMade, Spectrum
+from sim.spectrum.families import BondMade, Spectrum
 from sim.units.quantity import Quantity
 
 _Paid = Annotated[

@@ -21,10 +21,11 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 from scipy import special
 
-from sim.footprint import BondMade
-from sim.measured import Measured, Tabulated
-from sim.pixels import gaussian_boxes
-from sim.radial import Isotropic, PowerLaws, Rowed
+from sim.spectrum.bond_made import BondMade
+from sim.spectrum.measured import Measured
+from sim.spectrum.pixels import gaussian_boxes
+from sim.spectrum.radial import Isotropic, PowerLaws, Rowed
+from sim.spectrum.tabulated import Tabulated
 from sim.units.quantity import Quantity
 
 Array = NDArray[np.float64]

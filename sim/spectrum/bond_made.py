@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic.dataclasses import dataclass
 from scipy import special
 
-from sim.radial import Isotropic
+from sim.spectrum.radial import Isotropic
 from sim.units.quantity import Quantity
 
 Array = NDArray[np.float64]

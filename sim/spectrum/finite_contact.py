@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 
-from sim.footprint import BondMade
 from sim.laws.disc import energy_factors, marginal_factors, ripple_energy, ripple_marginal_energy
-from sim.spectrum import AnisotropicGaussian, Gaussian, Ripple, Spectrum, VonKarman
+from sim.spectrum.bond_made import BondMade
+from sim.spectrum.families import AnisotropicGaussian, Gaussian, Ripple, Spectrum, VonKarman
 
 Array = NDArray[np.float64]
 Factors = Callable[[Array], tuple[Array, Array]]

@@ -1,0 +1,166 @@
+"""Spectra from data: a table of a radial density, or an estimate from measured stress maps.
+
+Convention: ``C(q) = ∫ d²x <τ1(x) τ1(0)> e^{-iq·x}`` in Pa² m², q in rad/m (2π over the wavelength),
+``<τ1²> = (1/2π) ∫ q C dq``. Of a map of side L it is ``|∫ τ1 e^{-iq·x} d²x|² / L²``. A table in
+Persson's convention, C / 4π², says so.
+"""
+
+import functools
+import math
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationInfo, model_validator
+from pydantic.dataclasses import dataclass
+
+from sim.numerics.grid import Grid
+from sim.spectrum.periodogram import periodogram, radial_average
+from sim.spectrum.radial import PowerLaws, Rowed
+from sim.spectrum.tabulated import Densities, Wavenumbers, _by_name, _check_rows, _file_fault, _plain
+from sim.units.quantity import Quantity
+from sim.units.table import TableError, file_path, file_text, matrix
+
+Array = NDArray[np.float64]
+
+_STRESS = Quantity("Pa", "shear stress", "τ1")
+_SPACING = Quantity("m", "distance between neighbouring points of the map", "h", above=0)
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Measured(Rowed):
+    """The radially averaged spectrum of measured stress maps, used as a table.
+
+    Parameters
+    ----------
+    file : str
+        A CSV with nothing but the stresses [Pa], one row of the map per line, or a netCDF file (.nc).
+    spacing : float, optional
+        Distance of neighbouring points [m], the same in x and y; for netCDF taken from the
+        coordinates ``x`` and ``y`` where they exist.
+    window : {"none", "hann"}
+        "hann" unless the map is periodic: the jump at its borders would leak into all wavenumbers.
+    variable : str
+        Name in a netCDF file; dimensions before the last two (or beside x, y) are averaged over.
+    wavenumbers, densities : tuple of float
+        The estimate, filled in on reading and not meant to be given.
+
+    Notes
+    -----
+    A map that is not square is cropped to the leading square. The mean is removed. Rings of one
+    lattice step 2π/L are averaged; the rows reach from π/L to the outer edge of the last ring below
+    Nyquist, level in the innermost and the outermost half ring, so that waves longer than twice the
+    map and the corners beyond Nyquist are not part of the spectrum.
+    """
+
+    file: str
+    spacing: Annotated[float, _SPACING] | None = None
+    window: Literal["none", "hann"] = "none"
+    variable: str = "shear_map"
+    wavenumbers: Wavenumbers = ()
+    densities: Densities = ()
+    model: Literal["measured"] = "measured"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
+        values = _by_name(values, ("file", "spacing", "window", "variable", "wavenumbers", "densities"))
+        if not isinstance(values, dict):
+            return values
+        values = _plain(values)
+        name, window = values.get("file"), values.get("window", "none")
+        if values.get("wavenumbers") or not isinstance(name, str) or window not in ("none", "hann"):
+            return values
+        try:
+            spacing = None if values.get("spacing") is None else _SPACING.read(values["spacing"])
+        except ValueError:
+            return values  # the field's own check says what is wrong
+        if name.lower().endswith((".nc", ".nc4", ".cdf")):
+            maps, spacing = _read_netcdf(name, str(values.get("variable", "shear_map")), spacing, info.context)
+        else:
+            maps = _read_matrix(name, info.context)
+        q, density = _estimate(name, maps, spacing, window)
+        return {**values, "spacing": spacing, "wavenumbers": q.tolist(), "densities": density.tolist()}
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_rows(self.wavenumbers, self.densities)
+        return self
+
+    @functools.cached_property
+    def rows(self) -> PowerLaws:
+        """The estimate as a chain of power laws."""
+        return PowerLaws(np.array(self.wavenumbers), np.array(self.densities))
+
+
+def _read_matrix(name: str, context: Any) -> Array:
+    try:
+        return matrix(file_text(name, context), _STRESS)
+    except TableError as fault:
+        raise _file_fault(name, fault) from None
+
+
+def _read_netcdf(name: str, variable: str, spacing: float | None, context: Any) -> tuple[Array, float | None]:
+    """Maps (..., x, y) [Pa] and their spacing [m]."""
+    import xarray as xr  # heavy: only where a map is read
+
+    path = file_path(name, context)
+    try:
+        with xr.open_dataset(path, decode_times=False) as dataset:
+            if variable not in dataset:
+                found = ", ".join(map(str, dataset.data_vars))[:80]
+                raise ValueError(f'there is no variable "{variable}" (found: {found}); name it by variable = "..."')
+            data = dataset[variable].load()
+    except (OSError, ValueError, RuntimeError) as fault:
+        raise _file_fault(name, ValueError(str(fault).splitlines()[0])) from None
+    if data.ndim < 2:
+        raise _file_fault(name, ValueError(f'"{variable}" has no two dimensions; name a map by variable = "..."'))
+    try:
+        if {"x", "y"} <= set(data.dims):
+            data = data.transpose(..., "x", "y")
+            spacing = _coordinate_spacing(data, spacing)
+        return np.asarray(data, float) * _factor(data, _STRESS), spacing
+    except ValueError as fault:
+        raise _file_fault(name, fault) from None
+
+
+def _factor(data: Any, quantity: Quantity) -> float:
+    """Factor to SI from a netCDF variable's ``units``; without the attribute it is SI."""
+    unit = data.attrs.get("units", quantity.unit)
+    return Quantity(quantity.unit, quantity.meaning).read(f"1 {unit}")
+
+
+def _coordinate_spacing(data: Any, spacing: float | None) -> float | None:
+    """The spacing that the coordinates tell, held against the one given."""
+    for axis in ("x", "y"):
+        if axis not in data.coords or data.sizes[axis] < 2:
+            continue
+        steps = np.diff(np.asarray(data[axis], float)) * _factor(data[axis], _SPACING)
+        step = float(np.mean(steps))
+        uneven = not np.allclose(steps, step, rtol=1e-4, atol=0.0)
+        if uneven or (spacing is not None and not math.isclose(abs(step), spacing, rel_tol=1e-4)):
+            raise ValueError(
+                f"the coordinate {axis} is not spaced by one step, equal in x and y and to the key spacing; "
+                "interpolate the map onto a square lattice"
+            )
+        spacing = abs(step) if spacing is None else spacing
+    return spacing
+
+
+def _estimate(name: str, maps: Array, spacing: float | None, window: str) -> tuple[Array, Array]:
+    """Rows of the radial spectrum of maps (..., x, y), averaged over the leading axes."""
+    points = min(maps.shape[-2:])
+    if spacing is None:
+        raise _file_fault(name, ValueError('the map has no coordinates; give spacing, such as "0.5 um"'))
+    if points < 8:
+        raise _file_fault(name, ValueError(f"a map of {points} points along a side is too small; give at least 8"))
+    if not np.all(np.isfinite(maps)):
+        raise _file_fault(name, ValueError("the map has gaps (nan or infinite); fill them or crop the map"))
+    field = maps[..., :points, :points].reshape(-1, points, points)
+    grid = Grid(points * spacing, points)
+    density = np.mean(periodogram(field, grid.cell, window), axis=0)
+    ring = radial_average(density, grid)
+    # the innermost ring begins at half its wavenumber and the outermost ends half a ring beyond: there they stay level
+    first, last = (np.pi / grid.cell, (2 * len(ring.q) + 1) * np.pi / grid.cell)
+    q = np.concatenate([[first], ring.q, [last]])
+    return q, np.concatenate([ring.density[:1], ring.density, ring.density[-1:]])

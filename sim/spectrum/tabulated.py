@@ -1,0 +1,119 @@
+"""Stress spectra given by a table of wavenumbers and densities."""
+
+import functools
+import math
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import ValidationInfo, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs, PydanticCustomError
+
+from sim.spectrum.radial import PowerLaws, Rowed
+from sim.units.quantity import Quantity
+from sim.units.table import TableError, columns, file_text
+
+_WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
+_DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0)
+Wavenumbers = tuple[Annotated[float, _WAVENUMBER], ...]
+Densities = tuple[Annotated[float, _DENSITY], ...]
+#: Factor from a density in the named convention to C.
+CONVENTIONS = {"menga": 1.0, "persson": 4 * math.pi**2}
+
+
+def _check_rows(wavenumbers: tuple[float, ...], densities: tuple[float, ...]) -> None:
+    if len(wavenumbers) != len(densities) or len(wavenumbers) < 2:
+        raise PydanticCustomError(
+            "table_too_short",
+            "a spectrum needs at least two rows and as many densities as wavenumbers, not {q} and {c}",
+            {"q": len(wavenumbers), "c": len(densities)},
+        )
+    falls = np.flatnonzero(np.diff(wavenumbers) <= 0.0)
+    if len(falls):
+        raise PydanticCustomError(
+            "table_not_increasing",
+            "the wavenumbers must increase from row to row, but row {row} does not exceed the one before; "
+            "sort the rows and merge equal ones",
+            {"row": int(falls[0]) + 2},
+        )
+    if not any(densities):
+        raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
+
+
+def _by_name(values: Any, names: tuple[str, ...]) -> Any:
+    """Arguments of a direct construction as the dictionary a scenario would give."""
+    if not isinstance(values, ArgsKwargs):
+        return values
+    if len(values.args) > len(names):
+        raise TypeError(f"at most {len(names)} positional arguments: {', '.join(names)}")
+    return dict(zip(names, values.args, strict=False)) | dict(values.kwargs or {})
+
+
+def _file_fault(name: str, fault: ValueError) -> PydanticCustomError:
+    return PydanticCustomError("bad_table", "{file}: {reason}", {"file": name, "reason": str(fault)})
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Tabulated(Rowed):
+    """A radial density given by rows: power laws between them, zero outside.
+
+    Parameters
+    ----------
+    wavenumbers : tuple of float
+        q [rad/m], increasing.
+    densities : tuple of float
+        Density at each q [Pa² m²]; next to a zero the interpolation is linear.
+    convention : {"menga", "persson"}
+        Convention of ``densities``: C itself, or Persson's C / 4π².
+    file : str
+        In a scenario instead of the rows: a CSV with the columns ``q [rad/m], C [Pa^2 m^2]``. It is
+        not read where the rows are given too.
+
+    Examples
+    --------
+    Two rows of equal density are a band:
+
+    >>> table = Tabulated((1e5, 3e5), (2.0, 2.0))
+    >>> print(f"{table.variance:.6e} {2.0 * (9e10 - 1e10) / (4 * np.pi):.6e}")
+    1.273240e+10 1.273240e+10
+    """
+
+    wavenumbers: Wavenumbers
+    densities: Densities
+    convention: Literal["menga", "persson"] = "menga"
+    file: str = ""
+    model: Literal["tabulated"] = "tabulated"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
+        values = _by_name(values, ("wavenumbers", "densities", "convention", "file"))
+        if not isinstance(values, dict):
+            return values
+        values = _plain(values)
+        name = values.get("file")
+        if "wavenumbers" in values or "densities" in values:
+            return values
+        if not name or not isinstance(name, str):
+            raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
+        try:
+            table = columns(file_text(name, info.context), {"q": _WAVENUMBER, "C": _DENSITY})
+        except TableError as fault:
+            raise _file_fault(name, fault) from None
+        return {**values, "wavenumbers": table["q"].tolist(), "densities": table["C"].tolist()}
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        _check_rows(self.wavenumbers, self.densities)
+        return self
+
+    @functools.cached_property
+    def rows(self) -> PowerLaws:
+        """The table as a chain of power laws, in this project's convention."""
+        density = CONVENTIONS[self.convention] * np.array(self.densities)
+        return PowerLaws(np.array(self.wavenumbers), density)
+
+
+def _plain(values: dict) -> dict:
+    """Arrays as lists, which is what the field types accept."""
+    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}
