@@ -17,16 +17,18 @@ from rich.console import Console
 from rich.table import Table
 from scipy import fft
 
-from sim.bodies import Adhesion, Solid, Sphere
 from sim.engine import Dice, advance, march, start
-from sim.hazards import Bell
-from sim.memory import Slip
 from sim.numerics.noise import Noise
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
+from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.drive import prescribed as drive
+from sim.parts.exchange import Traction
+from sim.parts.shear import models as shear
+from sim.parts.shear.correlation import Slip
 from sim.scenario import Clock, Ensemble, Scenario
 from sim.spectrum.families import Gaussian, SelfAffine, VonKarman
-from sim.traction import Traction
 
 TURNS = 31
 SPECTRUM = VonKarman(rms=150e3, length=5e-6, hurst=0.8)

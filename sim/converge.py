@@ -24,7 +24,7 @@ from sim.estimates import Lags, estimates
 from sim.expected import Terms
 from sim.gauges import GAUGES
 from sim.moments import Moment, stated_times
-from sim.processes import ModalProcess
+from sim.parts.shear.modal import ModalProcess
 from sim.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from sim.alternatives import tolerance_of
 from sim.analysis import engineering
 from sim.converge_bonds_march import REFERENCE, BondRow, Course, bond_rows, march, march_all
-from sim.hazards import Bell, Constant
 from sim.laws.schallamach import bell_moments, constant_moments, cut_off_moments
-from sim.parts import bonds as depths
+from sim.parts.bonds import models as depths
+from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.drive import Steady
 from sim.scenario import Scenario
 

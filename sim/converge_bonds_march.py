@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.motion import Motion
 from sim.numerics.noise import Noise
-from sim.parts import bonds as depths
+from sim.parts.bonds import models as depths
 from sim.parts.drive import Start, Steady
+from sim.parts.exchange import Motion
 from sim.scenario import Scenario
 
 Array = NDArray[np.float64]

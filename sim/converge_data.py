@@ -14,7 +14,8 @@ from sim.alternatives import Setting, tolerance_of
 from sim.estimates import STATISTICS, Estimate
 from sim.expected import Expectation, Terms, course
 from sim.moments import MOST_WALKED, Moment
-from sim.processes import BandedProcess, ModalProcess
+from sim.parts.shear.banded import BandedProcess
+from sim.parts.shear.modal import ModalProcess
 from sim.scenario import Scenario
 
 Array = NDArray[np.float64]

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from sim.motion import Motion
 from sim.numerics.noise import Noise
 from sim.parts.bonds import STATES
-from sim.parts.contact import Balance, Touch
-from sim.processes import Fluctuation
+from sim.parts.bonds.tracked import Tracks
+from sim.parts.contact.balance import Balance, Touch
+from sim.parts.exchange import Motion
+from sim.parts.shear.process import Fluctuation
 from sim.scenario import Scenario
-from sim.tracks import Tracks
 
 
 @dataclass(frozen=True)

@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.bands import cell_pairs
 from sim.estimates import RARE
 from sim.gammasum import GammaSum
-from sim.memory import Constant
 from sim.parts.bonds import Cohort, Counted, Rate, Steady, Tracked, Unbroken
-from sim.processes import BandedProcess, FixedProcess, ModalProcess, SmoothProcess
+from sim.parts.shear.amplitude import Constant
+from sim.parts.shear.banded import BandedProcess
+from sim.parts.shear.modal import FixedProcess, ModalProcess
+from sim.parts.shear.mode_pairs import cell_pairs
+from sim.parts.shear.process import SmoothProcess
 from sim.scenario import Scenario
 from sim.spectrum.families import BondMade
 

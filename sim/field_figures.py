@@ -17,9 +17,9 @@ from scipy.signal import resample
 from sim.analysis import engineering, setting, sweep_dims
 from sim.curves import swept_whole
 from sim.laws.halfspace import displacement
-from sim.memory import Growth
-from sim.modes import Modes, modes
 from sim.numerics.grid import Grid
+from sim.parts.shear.amplitude import Growth
+from sim.parts.shear.modes import Modes, modes
 from sim.pictures import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
 from sim.settings import word
 from sim.spectrum.families import Spectrum

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.engine import State
-from sim.grips import Grip
+from sim.parts.contact.control import Grip
 from sim.scenario import Scenario
 
 

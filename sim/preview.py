@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from sim.gauges import GAUGES
-from sim.hazards import Bell
 from sim.laws import jkr
 from sim.laws.schallamach import bell_peak, first_moment_peak
 from sim.parts.bonds import FirstMoment, Tracked
+from sim.parts.bonds.rupture import Bell
+from sim.parts.bonds.tracked import mean_life
 from sim.scenario import Record, Scenario, Source, quantities
 from sim.spectrum.families import BondMade
 from sim.spectrum.finite_contact import marginal_energy
 from sim.store import Plan, work
-from sim.tracks import mean_life
 
 # Rough costs of one core, for the estimate only [s]: starting up, a step of a batch, and for each member of it
 # a mode pair and a counted population; a part file.

@@ -14,18 +14,20 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, model
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from sim.bodies import Adhesion, Solid, Sphere
-from sim.grips import Bodies
-from sim.margin import Margin
 from sim.parts.bonds import Auto as AutoBonds
 from sim.parts.bonds import Bonds, Unbroken
 from sim.parts.bonds import Depth as BondDepth
 from sim.parts.contact import Contact, Lagging
+from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.contact.control import Bodies
 from sim.parts.drive import Drive, Table
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.shear import Auto, Depth, Mean, Modal, Shear, Uniform
-from sim.processes import BandedProcess, ModalProcess, SmoothProcess
+from sim.parts.shear.banded import BandedProcess
+from sim.parts.shear.modal import ModalProcess
+from sim.parts.shear.process import SmoothProcess
 from sim.spectrum.families import BondMade
+from sim.spectrum.finite_contact import Margin
 from sim.sweep import read_sweep, set_key
 from sim.units.quantity import Quantity
 

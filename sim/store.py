@@ -21,7 +21,7 @@ from pydantic import TypeAdapter
 from sim.gauges import GAUGES, Gauge
 from sim.laws import jkr
 from sim.numerics.files import explained, write_whole
-from sim.processes import MappedProcess
+from sim.parts.shear.modal import MappedProcess
 from sim.scenario import Scenario, quantities
 
 _GROUP = 64

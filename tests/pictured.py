@@ -1,10 +1,13 @@
 """What the tests of figures share: small runs, and what was drawn of them."""
 
-from sim.bodies import Adhesion, Solid, Sphere
 from sim.ensemble import run
-from sim.memory import Onset, Time
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
+from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Onset
+from sim.parts.shear.correlation import Time
 from sim.scenario import Clock, Ensemble, Record, Scenario
 from sim.spectrum.families import Band
 

@@ -1,11 +1,14 @@
 """Small scenes for the tests: one builder and the depths of every part."""
 
-from sim.bodies import Adhesion, Solid, Sphere
-from sim.hazards import Bell, Constant, CutOff
-from sim.memory import Constant as Ungrowing
-from sim.memory import Diffusion, Onset, Slip, Stress, Time, Wave
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium, Lagging
+from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Constant as Ungrowing
+from sim.parts.shear.amplitude import Onset, Stress
+from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
 from sim.scenario import Clock, Ensemble, Scenario
 from sim.spectrum.families import Band, Gaussian, Ripple, SelfAffine
 

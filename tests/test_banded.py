@@ -16,16 +16,20 @@ from scipy.interpolate import CubicSpline
 from scipy.stats import expon, kstest, ncx2
 
 from sim import ensemble
-from sim.bands import Bands
 from sim.engine import march, pack, unpack
-from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
-from sim.modes import modes
 from sim.numerics.noise import Noise
-from sim.parts import bonds, drive, shear
-from sim.processes import BandedProcess, Fluctuation
+from sim.parts.bonds import models as bonds
+from sim.parts.drive import prescribed as drive
+from sim.parts.exchange import Traction
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Constant, Onset, Stress
+from sim.parts.shear.banded import BandedProcess
+from sim.parts.shear.bands import Bands
+from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
+from sim.parts.shear.modes import modes
+from sim.parts.shear.process import Fluctuation
 from sim.scenario import Clock
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
-from sim.traction import Traction
 
 G, MEMBERS = 1.6e6, 400
 UNLOADED = Traction.of_stress(np.zeros(1))

@@ -13,10 +13,11 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic_core import PydanticCustomError
 
-from sim.bands import Pairs, cell_pairs, group
-from sim.memory import Diffusion, Slip, Time, Wave
-from sim.modes import modes
-from sim.parts import shear
+from sim.parts.shear import models as shear
+from sim.parts.shear.bands import group
+from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
+from sim.parts.shear.mode_pairs import Pairs, cell_pairs
+from sim.parts.shear.modes import modes
 from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,

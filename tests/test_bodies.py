@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.bodies import Adhesion, Body, Solid, Sphere
 from sim.laws import halfspace
+from sim.parts.contact.bodies import Adhesion, Body, Solid, Sphere
 
 
 def test_strings_with_units_become_si():

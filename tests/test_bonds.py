@@ -9,8 +9,10 @@ from scenes import BELL, CUT_OFF, STRETCHED, scene
 from scipy.stats import binom, chi2
 
 from sim.engine import march
-from sim.hazards import Constant
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Constant
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.scenario import Clock
 from sim.spectrum.bond_made import BondMade
 

@@ -11,8 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.special import lambertw
 
-from sim.cohorts import advance, bound, diluted, empty, first_moment, resting, second_moment, steady
-from sim.hazards import Hazard
+from sim.parts.bonds.cohorts import advance, bound, diluted, empty, first_moment, resting, second_moment, steady
+from sim.parts.bonds.rupture import Hazard
 
 BELL = Hazard(rate=1.0, softness=1.0, limit=math.inf)
 CONSTANT = Hazard(rate=1.0, softness=0.0, limit=math.inf)

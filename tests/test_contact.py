@@ -9,18 +9,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scenes import SHEARS, scene
 
-from sim.bodies import Adhesion, Solid, Sphere
 from sim.engine import march, pack
 from sim.gauges import GAUGES
-from sim.grips import elastic_energy
 from sim.laws import jkr
-from sim.margin import Margin
-from sim.memory import Onset
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium, Lagging
+from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.contact.control import elastic_energy
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Onset
 from sim.scenario import Clock, Scenario
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
-from sim.spectrum.finite_contact import marginal_energy
+from sim.spectrum.finite_contact import Margin, marginal_energy
 
 WORK = 1.0 / math.pi
 GAUGE = {gauge.name: gauge for gauge in GAUGES}
@@ -526,7 +527,7 @@ def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
 
 def test_what_a_lagging_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch):
     # below the radius at pull-off the falling load gains energy like 1/radius; that is not the edge's
-    from sim.parts import contact as part
+    from sim.parts.contact import models as part
 
     pulled = Lagging(load={"from": 1e-3, "to": -1e-3}, front_speed=1e-3)
     found = []

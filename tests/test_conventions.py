@@ -9,8 +9,8 @@ import pytest
 from scenes import BONDS, CELL, SPECTRUM, scene
 
 from sim.ensemble import run
-from sim.memory import Slip
-from sim.parts import shear
+from sim.parts.shear import models as shear
+from sim.parts.shear.correlation import Slip
 from sim.reader import load
 from sim.scenario import Record, read_sweep
 

@@ -19,10 +19,13 @@ from sim.estimates import STATISTICS, Lags, estimates
 from sim.expected import Expectation, Terms, course
 from sim.gammasum import GammaSum
 from sim.gauges import GAUGES
-from sim.memory import Onset, Slip, Time, Wave
 from sim.moments import stated_times
-from sim.parts import bonds, drive, shear
-from sim.processes import BandedProcess
+from sim.parts.bonds import models as bonds
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Onset
+from sim.parts.shear.banded import BandedProcess
+from sim.parts.shear.correlation import Slip, Time, Wave
 from sim.scenario import Clock, Record
 from sim.spectrum.families import Gaussian, Ripple, SelfAffine
 

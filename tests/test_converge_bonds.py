@@ -14,9 +14,10 @@ from sim.converge import converge, figure
 from sim.converge_bonds import converge_bonds, has_bond_depths
 from sim.converge_bonds_march import REFERENCE, Course, bond_rows
 from sim.converge_bonds_table import bond_advice, bond_table
-from sim.hazards import Bell, Constant
 from sim.laws.schallamach import bell_stress, first_moment_stress
-from sim.parts import bonds, drive
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Bell, Constant
+from sim.parts.drive import prescribed as drive
 from sim.scenario import Clock
 
 COHORT = bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=3e-3)

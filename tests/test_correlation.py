@@ -9,8 +9,9 @@ from lens import FIELD, scene
 
 from sim import analysis
 from sim.ensemble import run
-from sim.memory import Time
-from sim.parts import drive, shear
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.correlation import Time
 from sim.scenario import Clock, Ensemble
 
 

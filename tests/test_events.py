@@ -9,9 +9,11 @@ from lens import scene
 
 from sim import analysis
 from sim.ensemble import run
-from sim.hazards import Bell
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.scenario import Clock, Ensemble, Record
 
 NAN = math.nan

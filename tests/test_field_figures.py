@@ -6,10 +6,11 @@ from matplotlib.patches import Circle
 from pictured import CELL, STEADY, field, mapped, rendered, simulated
 
 from sim import field_figures, plots
-from sim.memory import Onset, Stress
-from sim.modes import modes
 from sim.numerics.grid import Grid
-from sim.parts import drive, shear
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Onset, Stress
+from sim.parts.shear.modes import modes
 from sim.scenario import Ensemble, Record
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
 

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
-from sim.first_moment import LOCAL_ERROR, _rosenbrock, advance, resting, steady
-from sim.hazards import Hazard
+from sim.parts.bonds.first_moment import LOCAL_ERROR, _rosenbrock, advance, resting, steady
+from sim.parts.bonds.rupture import Hazard
 
 BELL = Hazard(1.0, 1.0, math.inf)
 ULP = 2.0**-52

@@ -7,9 +7,11 @@ from pictured import drawn, rendered, simulated
 
 from sim import bond_laws, pictures, plots, start_figure
 from sim.friction_figures import maximum_of
-from sim.hazards import Bell, Constant, CutOff
 from sim.laws import schallamach
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Bell, Constant, CutOff
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.scenario import Clock, Ensemble, Record
 
 #: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.

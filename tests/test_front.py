@@ -14,9 +14,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 
-from sim import front
-from sim.front import Hold, Kinetics, advance
 from sim.laws import jkr
+from sim.parts.contact import crack_front as front
+from sim.parts.contact.crack_front import Hold, Kinetics, advance
 
 W = 1.0 / math.pi
 REST = 6.0 ** (1.0 / 3.0)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.grips import AtLoad, AtTravel, Bodies, elastic_energy
 from sim.laws import jkr
-from sim.margin import Margin
-from sim.parts.contact import Balance, Equilibrium
+from sim.parts.contact import Equilibrium
+from sim.parts.contact.balance import Balance
+from sim.parts.contact.control import AtLoad, AtTravel, Bodies, elastic_energy
 from sim.spectrum.families import Gaussian
-from sim.spectrum.finite_contact import disc_energy
+from sim.spectrum.finite_contact import Margin, disc_energy
 
 #: Maugis's units: K = 4 E*/3, R and pi w are 1, so that radii, loads and travels are those of the textbooks.
 MAUGIS = Bodies(1.0, 0.75, 0.5)

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from sim.hazards import Bell, Constant, CutOff, Hazard, hazard_integral, time_to_rupture
+from sim.parts.bonds.rupture import Bell, Constant, CutOff, Hazard, hazard_integral, time_to_rupture
 
 #: Stretch and speed: along, against, through zero, from zero, at rest; softness from nothing to steep.
 WAYS = list(product([-1.7, -0.3, 0.0, 0.2, 2.1], [-3.0, -0.4, 0.0, 0.7, 2.5], [0.0, 1e-9, 0.8, 4.0]))

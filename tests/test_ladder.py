@@ -8,11 +8,14 @@ from numpy.testing import assert_allclose
 from scenes import BELL, BONDS, CELL, CUT_OFF, SPECTRUM, STRETCHED, scene
 
 from sim.engine import march
-from sim.hazards import Bell, Constant, CutOff
 from sim.laws import jkr
-from sim.memory import Onset, Slip, Wave
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Onset
+from sim.parts.shear.correlation import Slip, Wave
 from sim.scenario import Record
 from sim.spectrum.families import Gaussian
 

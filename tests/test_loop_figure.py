@@ -9,8 +9,9 @@ from sim import pictures, plots
 from sim.analysis import loop_energy
 from sim.laws import jkr
 from sim.loop_figure import lost_energy
-from sim.parts import bonds, shear
+from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
+from sim.parts.shear import models as shear
 from sim.scenario import Clock, Ensemble, Record
 
 JKR = (42e-3, 2e-3, 6.4e6)

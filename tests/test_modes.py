@@ -9,8 +9,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy import integrate, special
 
-from sim.modes import Modes, modes, pixel_variances
 from sim.numerics.grid import Grid
+from sim.parts.shear.modes import Modes, modes, pixel_variances
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 
 TURN = 2 * math.pi

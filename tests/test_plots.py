@@ -9,8 +9,10 @@ import pytest
 from pictured import STEADY, drawn, field, mapped, rendered, simulated
 
 from sim import analysis, pictures, plots
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.scenario import Clock, Ensemble, Record
 from sim.spectrum.families import Band
 

@@ -209,8 +209,8 @@ def test_a_depth_chosen_by_the_scene_is_named_with_its_reason():
 def test_waves_longer_than_the_cell_are_told():
     from scenes import CELL, SHEARS, SPECTRUM, scene
 
-    from sim.memory import Slip
-    from sim.parts import shear
+    from sim.parts.shear import models as shear
+    from sim.parts.shear.correlation import Slip
 
     for cell, told_of in ((CELL, False), (0.4 * CELL, True)):
         part = shear.Banded(spectrum=SPECTRUM, cell=cell, memory=Slip(length=1e-6))
@@ -221,8 +221,8 @@ def test_waves_longer_than_the_cell_are_told():
 def test_the_mean_field_of_bell_bonds_is_told_by_how_much_it_overpredicts():
     from scenes import BELL, CUT_OFF, STRETCHED, scene
 
-    from sim.hazards import Constant
-    from sim.parts import bonds
+    from sim.parts.bonds import models as bonds
+    from sim.parts.bonds.rupture import Constant
 
     for rebinding, percent in ((1.0, 27), (10.0, 37), (100.0, 47)):
         recipe = STRETCHED | {"rebinding_rate": rebinding * BELL.zero_force_rate}
@@ -242,8 +242,8 @@ def test_the_mean_field_of_bell_bonds_is_told_by_how_much_it_overpredicts():
 def test_bonds_left_open_are_told_with_their_depth_and_the_reason():
     from scenes import BELL, STRETCHED, scene
 
-    from sim.hazards import Constant
-    from sim.parts import bonds
+    from sim.parts.bonds import models as bonds
+    from sim.parts.bonds.rupture import Constant
 
     for auto, depth, reason in (
         (bonds.Auto(critical_speed=1.0, healing=1.0), "rate", "no number of sites is given; the rupture rate does not"),

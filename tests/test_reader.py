@@ -13,7 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.lines import key_lines
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.reader import BadInput, load, scenario_schema
 from sim.scenario import Scenario, quantities
 

@@ -9,10 +9,12 @@ from numpy.testing import assert_allclose
 from pictured import RAMP, STEADY, rendered, simulated
 
 from sim import pictures, plots, rival_figures
-from sim.bodies import Adhesion
 from sim.laws import jkr, profiles, theories
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
+from sim.parts.contact.bodies import Adhesion
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.profile_figures import shapes_of
 from sim.scenario import Clock, Ensemble, Record
 

@@ -10,8 +10,10 @@ from lens import scene
 
 from sim import analysis
 from sim.ensemble import run
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.units.quantity import Quantity
 from sim.units.table import columns
 

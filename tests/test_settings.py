@@ -5,8 +5,9 @@ from lens import RADIUS, scene
 
 from sim import analysis
 from sim.ensemble import run
-from sim.parts import drive, shear
 from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.settings import told, word
 
 

@@ -8,11 +8,13 @@ import pytest
 from lens import LOAD, MODULUS, RADIUS, WORK, scene
 
 from sim import analysis
-from sim.bodies import Adhesion
 from sim.ensemble import run
 from sim.laws import jkr, reversible
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium, Lagging
+from sim.parts.contact.bodies import Adhesion
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
 from sim.scenario import Clock, Record
 from sim.spectrum.families import Band
 

@@ -10,8 +10,11 @@ from scenes import CELL, SPECTRUM, scene
 
 from sim.engine import march
 from sim.laws import halfspace
-from sim.memory import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
-from sim.parts import bonds, drive, shear
+from sim.parts.bonds import models as bonds
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.amplitude import Constant, Onset, Stress
+from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
 from sim.scenario import Clock
 from sim.spectrum.families import Gaussian, Ripple, VonKarman
 

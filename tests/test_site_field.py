@@ -8,13 +8,13 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from sim.memory import Constant, Time
-from sim.modes import modes
-from sim.motion import Motion
 from sim.numerics.noise import Noise
-from sim.site_field import MappedSiteModes, SiteMean, SiteModes
+from sim.parts.exchange import Motion, Traction
+from sim.parts.shear.amplitude import Constant
+from sim.parts.shear.bond_field import MappedSiteModes, SiteMean, SiteModes
+from sim.parts.shear.correlation import Time
+from sim.parts.shear.modes import modes
 from sim.spectrum.bond_made import BondMade
-from sim.traction import Traction
 
 B, G, CELL, POINTS, MEMBERS = 1e-6, 1.6e6, 24e-6, 32, 4000
 SPECTRUM = BondMade(footprint=B)

@@ -15,9 +15,9 @@ from scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
 from sim import ensemble, store
 from sim.engine import march
 from sim.gauges import GAUGES
-from sim.memory import Slip
 from sim.numerics.files import StoreTrouble
-from sim.parts import shear
+from sim.parts.shear import models as shear
+from sim.parts.shear.correlation import Slip
 from sim.scenario import Clock, Record, read_sweep
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, memory=Slip(length=3e-6))

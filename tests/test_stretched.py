@@ -11,11 +11,13 @@ from scenes import BELL, BONDS, CELL, STRETCHED, scene
 
 from sim.engine import march
 from sim.gauges import GAUGES
-from sim.hazards import Constant
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
-from sim.memory import Time
-from sim.parts import bonds, drive, shear
-from sim.parts.area import share_kept
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.area import share_kept
+from sim.parts.bonds.rupture import Constant
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.parts.shear.correlation import Time
 from sim.scenario import Clock
 from sim.spectrum.bond_made import BondMade
 from sim.spectrum.families import Band

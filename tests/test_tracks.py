@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 from scipy.integrate import cumulative_trapezoid, quad
 from scipy.stats import kstwo
 
-from sim.following import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS
-from sim.hazards import Hazard
 from sim.numerics.noise import PARTS
-from sim.tracks import advance, bound, mean_life, mean_square_stretch, mean_stretch, start
+from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.tracked import advance, bound, mean_life, mean_square_stretch, mean_stretch, start
+from sim.parts.bonds.tracked_events import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS
 
 BELL, CONSTANT, CUT = Hazard(1.0, 1.0, math.inf), Hazard(1.0, 0.0, math.inf), Hazard(0.3, 0.0, 2.0)
 BOTH = Hazard(1.0, 1.0, 3.0)

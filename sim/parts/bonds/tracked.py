@@ -13,10 +13,10 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from sim.following import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
-from sim.hazards import Hazard
-from sim.lives import ENDLESS, LONG, SPENT, draw, live
 from sim.numerics.special import reduced_exponential_integral, scaled_exponential_integral
+from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
+from sim.parts.bonds.tracked_step import ENDLESS, LONG, SPENT, draw, live
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from pydantic import Field, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.motion import Motion
+from sim.parts.exchange import Motion
 from sim.units.quantity import Quantity
 from sim.units.table import TableError, columns, file_text
 

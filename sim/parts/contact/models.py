@@ -1,11 +1,10 @@
 """The contact: which radius follows from the work of adhesion that is left. Shallow to deep: equilibrium, lagging.
 
 Every depth is held at a load, at an indentation or at a travel behind a machine, each a number, a course
-or a table; ``sim.grips`` says what a contact is under each.
+or a table; ``sim.parts.contact.control`` says what a contact is under each.
 """
 
 import math
-from dataclasses import dataclass as plain_dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,14 +12,14 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.front import Hold, Kinetics
-from sim.front import advance as advance_front
-from sim.grips import AtLoad, AtTravel, Bodies, Grip
-from sim.margin import Margin
-from sim.motion import Motion
-from sim.parts.control import held, lowest, value_at
+from sim.parts.contact.balance import Balance, Touch
+from sim.parts.contact.control import AtLoad, AtTravel, Bodies, Grip
+from sim.parts.contact.crack_front import Hold, Kinetics
+from sim.parts.contact.crack_front import advance as advance_front
+from sim.parts.contact.crossing import widest_crossing
+from sim.parts.exchange import Motion
+from sim.units.course import held, lowest, value_at
 from sim.units.quantity import Quantity
-from sim.widest import widest_crossing
 
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
 _SPOT = 1e-3
@@ -37,77 +36,6 @@ _HealingExponent = Annotated[
     float, Quantity("1", "exponent of healing, left out that of opening", "n_h", above=0, at_most=1)
 ]
 _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description="what follows a detachment")]
-
-
-@plain_dataclass(frozen=True)
-class Balance:
-    """What the contact is told at a step.
-
-    Attributes
-    ----------
-    bonded : array
-        Work of adhesion of the bonds left, Δγ(fraction) [J/m²].
-    fluctuating : array
-        What fluctuations of the shear stress take of it where waves are short beside the contact, χ ΔΓ [J/m²].
-    stress : array
-        Mean shear stress τ0 [Pa].
-    margin : Margin, optional
-        Share of ``fluctuating`` that a contact of finite radius [m] pays when it grows [1].
-    bodies : Bodies
-        What touches.
-    reference : float
-        Work of adhesion at rest [J/m²], by which crack fronts measure their drive.
-    """
-
-    bonded: np.ndarray
-    fluctuating: np.ndarray
-    stress: np.ndarray
-    margin: Margin | None
-    bodies: Bodies
-    reference: float
-
-    def work(self, radius: np.ndarray) -> np.ndarray:
-        """Work of adhesion left at a radius but for what the mean stress takes [J/m²]."""
-        if self.margin is None:
-            return self.bonded - self.fluctuating
-        return self.bonded - self.fluctuating * self.margin(radius)
-
-    def reversible(self, radius: np.ndarray) -> np.ndarray:
-        """Energy per area that the mean stress would give back if the contact shrank [J/m²].
-
-        ``2 (2 − ν)/(1 − ν) τ0² a/(π E*)``, 6 τ0² a/(π E*) for an incompressible half-space.
-        """
-        _, modulus, poisson_ratio = self.bodies
-        coefficient = 2.0 * (2.0 - poisson_ratio) / (1.0 - poisson_ratio) / math.pi
-        return coefficient * self.stress**2 * radius / modulus
-
-    def gained(self, radius: np.ndarray, reversible: float) -> np.ndarray:
-        """What adhesion has given for the area of a contact, the work left at each radius over it [J]."""
-        share = 1.0 if self.margin is None else self.margin.mean(radius)
-        mean = 2.0 / 3.0 * reversible * self.reversible(radius)
-        return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
-
-
-@plain_dataclass(frozen=True)
-class Touch:
-    """State of the contact.
-
-    Attributes
-    ----------
-    work : array
-        Work of adhesion left at this radius [J/m²].
-    radius : array
-        Contact radius [m], nan where it is open.
-    detached : array
-        When it last opened [s], nan if never.
-    dissipated : array
-        Energy dissipated so far by the opening and closing of the contact [J].
-    """
-
-    work: np.ndarray
-    radius: np.ndarray
-    detached: np.ndarray
-    dissipated: np.ndarray
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

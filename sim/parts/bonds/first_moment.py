@@ -23,8 +23,8 @@ import math
 import numpy as np
 from scipy.special import lambertw
 
-from sim.hazards import Hazard
 from sim.numerics.jit import device, kernel
+from sim.parts.bonds.rupture import Hazard
 
 #: Largest error of N and of M that a sub-step under Bell's rate may make, by its embedded lower order, over N and M.
 #: The fifth-order result that is kept is better; errors of sub-steps fade with the bonds that carry them.

@@ -9,7 +9,10 @@ import math
 
 import numpy as np
 
-from sim.following import (
+from sim.numerics.jit import device, kernel
+from sim.numerics.noise import exponential, unit_at, words_at
+from sim.parts.bonds.rupture import hazard_integral, time_to_rupture
+from sim.parts.bonds.tracked_events import (
     BOUND,
     CLOCK,
     HANDS,
@@ -26,9 +29,6 @@ from sim.following import (
     follow,
     least,
 )
-from sim.hazards import hazard_integral, time_to_rupture
-from sim.numerics.jit import device, kernel
-from sim.numerics.noise import exponential, unit_at, words_at
 
 #: What ``live`` has to say: all done, some rows need a draw of the steady law, the state is spent, endless numbers.
 DONE, LONG, SPENT, ENDLESS = range(4)

@@ -49,9 +49,7 @@ class AtLoad:
         size, modulus, poisson_ratio = bodies
         if reversible == 0.0:
             return np.asarray(jkr.radius_at_load(self.load, work, size, modulus))
-        return np.asarray(
-            radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio)
-        )
+        return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio))
 
     def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Energy release rate at a radius [J/m²], negative below Hertz's radius."""

@@ -1,85 +1,18 @@
-"""Fluctuations in time: each process starts and advances the energy that a shear-stress field stores.
+"""Every Fourier mode of the stress field as an Ornstein-Uhlenbeck process, and maps of the field."""
 
-A process is a depth of ``parts.shear`` on a given solid and cell.
-"""
-
-import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, ClassVar
 
 import numpy as np
 
-from sim.bands import Bands
-from sim.memory import Growth, Memory
-from sim.modes import Modes
-from sim.motion import Motion
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
-from sim.traction import Traction
-
-
-@dataclass(frozen=True)
-class Fluctuation:
-    """State of the fluctuations.
-
-    Attributes
-    ----------
-    energy : array, shape (1,) or (members,)
-        Elastic energy per area ΔΓ [J/m^2].
-    growth : array, shape (1,) or (members,)
-        Growth factor g [1] at this time.
-    amplitude : array
-        Own numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
-        standard deviation, or phases (members, pairs) [rad]; empty where there are none.
-    """
-
-    energy: np.ndarray
-    growth: np.ndarray
-    amplitude: np.ndarray
-
-
-@dataclass(frozen=True)
-class SmoothProcess:
-    """ΔΓ = g² × a given energy, without noise: the ensemble mean, or nothing at all."""
-
-    energy: float
-    growth: Growth
-    pairs: ClassVar[int] = 0
-
-    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
-        return Fluctuation(growth**2 * self.energy, growth, np.empty(0))
-
-    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        return self.start(motion, traction, noise)
-
-    def known_errors(self) -> dict[str, float]:
-        """Errors and spreads known before the run."""
-        return {}
-
-
-class _Renewing:
-    """What processes share that renew part of themselves at each step: the start is a whole renewal."""
-
-    memory: Memory
-    growth: Growth
-    wavenumber: Any
-    _empty: Any
-    _renewed: Any
-
-    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
-        size = growth if self.growth.relaxing else np.ones(1)
-        return self._renewed(self._empty(len(noise.members)), np.zeros(1), np.ones(1), size, growth, motion.step, noise)
-
-    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
-        size = _renewed_size(self.growth, state, motion, growth)
-        exponents = self.memory.exponents(self.wavenumber, motion)
-        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
+from sim.parts.exchange import Motion, Traction
+from sim.parts.shear.amplitude import Growth
+from sim.parts.shear.correlation import Memory
+from sim.parts.shear.modes import Modes
+from sim.parts.shear.process import Fluctuation, _Renewing
 
 
 @dataclass(frozen=True)
@@ -229,109 +162,6 @@ def _renew(before, normals, keep, renew, size, weights, after, energy):
         for lane in range(8):
             total += lanes[lane]
         energy[m] = total
-
-
-@dataclass(frozen=True)
-class BandedProcess(_Renewing):
-    """ΔΓ as a sum of squared Ornstein-Uhlenbeck processes, one for each band of modes.
-
-    Notes
-    -----
-    A band's X is chi-square distributed with k degrees of freedom, k >= 2 and not whole. With
-    e = exp(−∫λdt) and c = 1 − e² one step is exact for any dt:
-    X' = (√c Z + e √X)² + 2c Γ((k − 1)/2), Z normal and Γ a standard gamma number; ΔΓ = ½ Σ weight X.
-    Where growth relaxes, c is that of the renewed part times its g².
-    """
-
-    bands: Bands
-    cell_errors: dict[str, float]
-    memory: Memory
-    growth: Growth
-
-    @property
-    def pairs(self) -> int:
-        """Numbers that a state holds, half as many as for a mode pair."""
-        return (self.bands.weight.size + 1) // 2
-
-    @cached_property
-    def half_weight(self) -> np.ndarray:
-        """Energy of a band for X = 1, shape (bands,) [J/m^2]."""
-        return 0.5 * self.bands.weight
-
-    @cached_property
-    def shapes(self) -> np.ndarray:
-        """Shapes of the gamma numbers, shape (bands,)."""
-        return 0.5 * (self.bands.freedom - 1.0)
-
-    @property
-    def wavenumber(self) -> np.ndarray:
-        """Where a mode has each band's rate [rad/m]."""
-        return self.bands.wavenumber
-
-    def _empty(self, members: int) -> np.ndarray:
-        return np.zeros((members, self.bands.weight.size))
-
-    def _renewed(
-        self,
-        amplitude: np.ndarray,
-        keep: np.ndarray,
-        renew: np.ndarray,
-        size: np.ndarray,
-        growth: np.ndarray,
-        step: int,
-        noise: Noise,
-    ) -> Fluctuation:
-        members, bands = amplitude.shape
-        after, energy = np.empty_like(amplitude), np.empty(members)
-        _renew_bands(
-            amplitude,
-            noise.normals(step, bands),
-            noise.gammas(step, self.shapes),
-            np.full(bands, keep),
-            np.full(bands, renew),
-            np.full(members, size),
-            self.half_weight,
-            after,
-            energy,
-        )
-        scale = np.ones(1) if self.growth.relaxing else growth
-        return Fluctuation(scale**2 * energy, growth, after)
-
-    def known_errors(self) -> dict[str, float]:
-        """What banding adds to the cell's own mode sum, and the cell's own errors beside it."""
-        return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
-
-
-@kernel(
-    "void(float64[:,::1], float64[:,:], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
-    " float64[:,::1], float64[::1])"
-)
-def _renew_bands(before, normals, gammas, keep, renew, size, half_weight, after, energy):
-    """One exact step of all bands of all members, and their energy."""
-    members, bands = before.shape
-    for m in range(members):
-        total = 0.0
-        for k in range(bands):
-            kick = renew[k] * size[m]
-            moved = kick * normals[m, k] + keep[k] * math.sqrt(before[m, k])
-            x = moved * moved + 2.0 * kick * kick * gammas[m, k]
-            if renew[k] == 0.0:  # nothing has passed: not even a rounding
-                x = before[m, k]
-            after[m, k] = x
-            total += half_weight[k] * x
-        energy[m] = total
-
-
-def _renewed_size(law: Growth, state: Fluctuation, motion: Motion, growth: np.ndarray) -> np.ndarray:
-    """Growth of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
-
-    Second order in the step. Its beginning is seen after a jump of the speed; stress has no jumps
-    but under bonds that follow the speed at once.
-    """
-    if not law.relaxing:
-        return np.ones(1)
-    before = state.growth if law.reads_stress else law.factor(motion.first, np.zeros(1))
-    return np.sqrt(0.5 * (growth**2 + before**2))
 
 
 class DrawsMaps:

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.motion import Motion
 from sim.numerics.noise import Noise
-from sim.processes import DrawsMaps, Fluctuation, ModalProcess, SmoothProcess
-from sim.traction import Traction
+from sim.parts.exchange import Motion, Traction
+from sim.parts.shear.modal import DrawsMaps, ModalProcess
+from sim.parts.shear.process import Fluctuation, SmoothProcess
 
 
 @dataclass(frozen=True)

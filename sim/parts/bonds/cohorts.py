@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.cohort_steps import settle_steady, step_rows
-from sim.hazards import Hazard
+from sim.parts.bonds.cohort_step import settle_steady, step_rows
+from sim.parts.bonds.rupture import Hazard
 
 
 @dataclass(frozen=True)

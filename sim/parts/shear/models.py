@@ -13,11 +13,15 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.bands import Bands, cell_pairs, group
-from sim.memory import Constant, Growth, Memory
-from sim.modes import cell_variance, modes
-from sim.processes import BandedProcess, FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess, SmoothProcess
-from sim.site_field import MappedSiteModes, SiteMean, SiteModes
+from sim.parts.shear.amplitude import Constant, Growth
+from sim.parts.shear.banded import BandedProcess
+from sim.parts.shear.bands import Bands, group
+from sim.parts.shear.bond_field import MappedSiteModes, SiteMean, SiteModes
+from sim.parts.shear.correlation import Memory
+from sim.parts.shear.modal import FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess
+from sim.parts.shear.mode_pairs import cell_pairs
+from sim.parts.shear.modes import cell_variance, modes
+from sim.parts.shear.process import SmoothProcess
 from sim.spectrum.families import BondMade, Spectrum
 from sim.units.quantity import Quantity
 

@@ -12,11 +12,10 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.laws.schallamach import relax_fraction, steady_fraction, transition_probabilities
-from sim.motion import Motion
 from sim.numerics.binomial import binomial_numbers
 from sim.numerics.noise import Noise
-from sim.parts.area import Area, OverArea
-from sim.traction import Traction
+from sim.parts.bonds.area import Area, OverArea
+from sim.parts.exchange import Motion, Traction
 from sim.units.quantity import Quantity
 
 Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]

@@ -14,17 +14,16 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-import sim.cohorts as cohorts
-import sim.first_moment as first_moment
-import sim.tracks as tracks
-from sim.cohorts import Cohorts
-from sim.hazards import AnyHazard, Hazard
-from sim.motion import Motion
+import sim.parts.bonds.cohorts as cohorts
+import sim.parts.bonds.first_moment as first_moment
+import sim.parts.bonds.tracked as tracks
 from sim.numerics.noise import Noise
-from sim.parts.area import Area, OverArea
-from sim.parts.unstretched import Start
-from sim.tracks import Tracks
-from sim.traction import Traction
+from sim.parts.bonds.area import Area, OverArea
+from sim.parts.bonds.cohorts import Cohorts
+from sim.parts.bonds.rupture import AnyHazard, Hazard
+from sim.parts.bonds.tracked import Tracks
+from sim.parts.bonds.two_state import Start
+from sim.parts.exchange import Motion, Traction
 from sim.units.quantity import Quantity
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]

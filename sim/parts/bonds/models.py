@@ -11,10 +11,11 @@ from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.hazards import AnyHazard, Constant
-from sim.parts.area import Area
-from sim.parts.stretched import Ages, Cohort, Density, FirstMoment, Rebinding, Stiffness, Stretches, Tracked
-from sim.parts.unstretched import (
+from sim.parts.bonds.area import Area
+from sim.parts.bonds.rupture import AnyHazard, Constant
+from sim.parts.bonds.stretched import Ages, Cohort, Density, FirstMoment, Rebinding, Stiffness, Stretches, Tracked
+from sim.parts.bonds.tracked import Tracks
+from sim.parts.bonds.two_state import (
     Counted,
     CriticalSpeed,
     Healing,
@@ -26,7 +27,6 @@ from sim.parts.unstretched import (
     Stress,
     Unbroken,
 )
-from sim.tracks import Tracks
 from sim.units.quantity import Quantity
 
 __all__ = ["STATES", "Auto", "Bonds", "Cohort", "Counted", "Depth", "FirstMoment"]

@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.motion import Motion
+from sim.parts.exchange import Motion
 from sim.units.quantity import Quantity
 
 
@@ -73,59 +73,3 @@ class Diffusion:
 
 
 Memory = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]
-
-
-@dataclass(frozen=True, config={"extra": "forbid"})
-class Constant:
-    """The fluctuations have the spectrum's rms at every speed: g = 1."""
-
-    reads_stress: ClassVar[bool] = False
-    relaxing: ClassVar[bool] = False
-
-    model: Literal["constant"] = "constant"
-
-    def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
-        """g [1] at the speed [m/s] and mean shear stress [Pa], shape of the argument it reads."""
-        return np.ones(1)
-
-
-@dataclass(frozen=True, config={"extra": "forbid"})
-class Onset:
-    """A prescribed growth around the onset of stick-slip: g = floor + (1 − floor)/(1 + (V/V0)^(−1/width)).
-
-    A stand-in: it says *that* fluctuations set in near ``speed``, as the paper supposes, not why.
-    With ``relaxing`` only what the memory renews has the new size; otherwise the whole field scales
-    at once.
-    """
-
-    reads_stress: ClassVar[bool] = False
-
-    speed: Annotated[float, Quantity("m/s", "speed at the onset of the fluctuations", "V_0", above=0)]
-    width: Annotated[float, Quantity("1", "width of the onset in the logarithm of speed", "b", above=0)]
-    floor: Annotated[float, Quantity("1", "share of the rms far below the onset", "g_0", at_least=0, at_most=1)] = 0.0
-    relaxing: bool = False
-    model: Literal["onset"] = "onset"
-
-    def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
-        with np.errstate(divide="ignore", over="ignore"):
-            rise = 1.0 / (1.0 + (np.abs(speed) / self.speed) ** (-1.0 / self.width))
-        return self.floor + (1.0 - self.floor) * rise
-
-
-@dataclass(frozen=True, config={"extra": "forbid"})
-class Stress:
-    """The fluctuations grow with the mean shear stress: g = tau_0/reference."""
-
-    reads_stress: ClassVar[bool] = True
-
-    reference: Annotated[
-        float, Quantity("Pa", "mean shear stress at which the rms is the spectrum's", "tau_ref", above=0)
-    ]
-    relaxing: bool = False
-    model: Literal["stress"] = "stress"
-
-    def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
-        return np.abs(stress) / self.reference
-
-
-Growth = Annotated[Constant | Onset | Stress, Field(discriminator="model")]

@@ -1,0 +1,80 @@
+"""Terms of the effective work of adhesion, and the state of a contact."""
+
+import math
+from dataclasses import dataclass as plain_dataclass
+
+import numpy as np
+
+from sim.parts.contact.control import Bodies
+from sim.spectrum.finite_contact import Margin
+
+
+@plain_dataclass(frozen=True)
+class Balance:
+    """What the contact is told at a step.
+
+    Attributes
+    ----------
+    bonded : array
+        Work of adhesion of the bonds left, Δγ(fraction) [J/m²].
+    fluctuating : array
+        What fluctuations of the shear stress take of it where waves are short beside the contact, χ ΔΓ [J/m²].
+    stress : array
+        Mean shear stress τ0 [Pa].
+    margin : Margin, optional
+        Share of ``fluctuating`` that a contact of finite radius [m] pays when it grows [1].
+    bodies : Bodies
+        What touches.
+    reference : float
+        Work of adhesion at rest [J/m²], by which crack fronts measure their drive.
+    """
+
+    bonded: np.ndarray
+    fluctuating: np.ndarray
+    stress: np.ndarray
+    margin: Margin | None
+    bodies: Bodies
+    reference: float
+
+    def work(self, radius: np.ndarray) -> np.ndarray:
+        """Work of adhesion left at a radius but for what the mean stress takes [J/m²]."""
+        if self.margin is None:
+            return self.bonded - self.fluctuating
+        return self.bonded - self.fluctuating * self.margin(radius)
+
+    def reversible(self, radius: np.ndarray) -> np.ndarray:
+        """Energy per area that the mean stress would give back if the contact shrank [J/m²].
+
+        ``2 (2 − ν)/(1 − ν) τ0² a/(π E*)``, 6 τ0² a/(π E*) for an incompressible half-space.
+        """
+        _, modulus, poisson_ratio = self.bodies
+        coefficient = 2.0 * (2.0 - poisson_ratio) / (1.0 - poisson_ratio) / math.pi
+        return coefficient * self.stress**2 * radius / modulus
+
+    def gained(self, radius: np.ndarray, reversible: float) -> np.ndarray:
+        """What adhesion has given for the area of a contact, the work left at each radius over it [J]."""
+        share = 1.0 if self.margin is None else self.margin.mean(radius)
+        mean = 2.0 / 3.0 * reversible * self.reversible(radius)
+        return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
+
+
+@plain_dataclass(frozen=True)
+class Touch:
+    """State of the contact.
+
+    Attributes
+    ----------
+    work : array
+        Work of adhesion left at this radius [J/m²].
+    radius : array
+        Contact radius [m], nan where it is open.
+    detached : array
+        When it last opened [s], nan if never.
+    dissipated : array
+        Energy dissipated so far by the opening and closing of the contact [J].
+    """
+
+    work: np.ndarray
+    radius: np.ndarray
+    detached: np.ndarray
+    dissipated: np.ndarray

@@ -1,0 +1,20 @@
+"""Fluctuations of the shear stress: the energy ΔΓ that they store, and their maps."""
+
+from sim.parts.shear.banded import BandedProcess
+from sim.parts.shear.modal import FixedProcess, MappedProcess, ModalProcess
+from sim.parts.shear.models import Auto, Banded, Depth, Mapped, Mean, Modal, Shear, Uniform
+
+__all__ = [
+    "Auto",
+    "Banded",
+    "BandedProcess",
+    "Depth",
+    "FixedProcess",
+    "Mapped",
+    "MappedProcess",
+    "Mean",
+    "Modal",
+    "ModalProcess",
+    "Shear",
+    "Uniform",
+]

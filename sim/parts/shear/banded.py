@@ -1,0 +1,105 @@
+"""Surface energy as a sum over bands of modes, one squared Ornstein-Uhlenbeck process each."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sim.numerics.jit import kernel
+from sim.numerics.noise import Noise
+from sim.parts.shear.amplitude import Growth
+from sim.parts.shear.bands import Bands
+from sim.parts.shear.correlation import Memory
+from sim.parts.shear.process import Fluctuation, _Renewing
+
+
+@dataclass(frozen=True)
+class BandedProcess(_Renewing):
+    """ΔΓ as a sum of squared Ornstein-Uhlenbeck processes, one for each band of modes.
+
+    Notes
+    -----
+    A band's X is chi-square distributed with k degrees of freedom, k >= 2 and not whole. With
+    e = exp(−∫λdt) and c = 1 − e² one step is exact for any dt:
+    X' = (√c Z + e √X)² + 2c Γ((k − 1)/2), Z normal and Γ a standard gamma number; ΔΓ = ½ Σ weight X.
+    Where growth relaxes, c is that of the renewed part times its g².
+    """
+
+    bands: Bands
+    cell_errors: dict[str, float]
+    memory: Memory
+    growth: Growth
+
+    @property
+    def pairs(self) -> int:
+        """Numbers that a state holds, half as many as for a mode pair."""
+        return (self.bands.weight.size + 1) // 2
+
+    @cached_property
+    def half_weight(self) -> np.ndarray:
+        """Energy of a band for X = 1, shape (bands,) [J/m^2]."""
+        return 0.5 * self.bands.weight
+
+    @cached_property
+    def shapes(self) -> np.ndarray:
+        """Shapes of the gamma numbers, shape (bands,)."""
+        return 0.5 * (self.bands.freedom - 1.0)
+
+    @property
+    def wavenumber(self) -> np.ndarray:
+        """Where a mode has each band's rate [rad/m]."""
+        return self.bands.wavenumber
+
+    def _empty(self, members: int) -> np.ndarray:
+        return np.zeros((members, self.bands.weight.size))
+
+    def _renewed(
+        self,
+        amplitude: np.ndarray,
+        keep: np.ndarray,
+        renew: np.ndarray,
+        size: np.ndarray,
+        growth: np.ndarray,
+        step: int,
+        noise: Noise,
+    ) -> Fluctuation:
+        members, bands = amplitude.shape
+        after, energy = np.empty_like(amplitude), np.empty(members)
+        _renew_bands(
+            amplitude,
+            noise.normals(step, bands),
+            noise.gammas(step, self.shapes),
+            np.full(bands, keep),
+            np.full(bands, renew),
+            np.full(members, size),
+            self.half_weight,
+            after,
+            energy,
+        )
+        scale = np.ones(1) if self.growth.relaxing else growth
+        return Fluctuation(scale**2 * energy, growth, after)
+
+    def known_errors(self) -> dict[str, float]:
+        """What banding adds to the cell's own mode sum, and the cell's own errors beside it."""
+        return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,:], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
+    " float64[:,::1], float64[::1])"
+)
+def _renew_bands(before, normals, gammas, keep, renew, size, half_weight, after, energy):
+    """One exact step of all bands of all members, and their energy."""
+    members, bands = before.shape
+    for m in range(members):
+        total = 0.0
+        for k in range(bands):
+            kick = renew[k] * size[m]
+            moved = kick * normals[m, k] + keep[k] * math.sqrt(before[m, k])
+            x = moved * moved + 2.0 * kick * kick * gammas[m, k]
+            if renew[k] == 0.0:  # nothing has passed: not even a rounding
+                x = before[m, k]
+            after[m, k] = x
+            total += half_weight[k] * x
+        energy[m] = total
