@@ -27,7 +27,8 @@ from sim.parts.drive import prescribed as drive
 from sim.parts.exchange import Traction
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
-from sim.scenario import Clock, Ensemble, Scenario
+from sim.scenario.clock import Clock, Ensemble
+from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Gaussian, SelfAffine, VonKarman
 
 TURNS = 31

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from pydantic_core import PydanticUndefined
 
-from sim.scenario import Scenario, declaration
+from sim.scenario.declared import declaration
+from sim.scenario.scenario import Scenario
 
 TARGET = Path(__file__).with_name("keys.md")
 HEAD = """# Every key of a scenario file

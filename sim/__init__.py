@@ -9,11 +9,11 @@ import importlib
 from typing import Any
 
 _PUBLIC = {
-    "load": "sim.reader",
-    "BadInput": "sim.reader",
+    "load": "sim.scenario.reader",
+    "BadInput": "sim.scenario.reader",
     "run": "sim.ensemble",
     "open": "sim.ensemble",
-    "Scenario": "sim.scenario",
+    "Scenario": "sim.scenario.scenario",
     "laws": "",
     "spectrum": "",
     "analysis": "",

@@ -15,7 +15,7 @@ from sim.analysis import engineering
 from sim.parts.shear import Banded, Mapped, Mean, Modal
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.process import SmoothProcess
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 
 TOLERANCES = (0.3, 0.1, 0.03, 0.01, 0.003)
 

@@ -77,7 +77,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
-    from sim.reader import load
+    from sim.scenario.reader import load
 
     scene = load(scenario, _overrides(changes, seed, members))
     if target.is_dir() or (target.exists() and target.samefile(scenario)):
@@ -190,7 +190,7 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
 def check(scenario: Path, changes: tuple[str, ...]) -> None:
     """Say what a scenario would run: quantities in SI, depths, errors known beforehand, time, memory, file size."""
     from sim.preview import preview
-    from sim.reader import load
+    from sim.scenario.reader import load
 
     click.echo(preview(load(scenario, _overrides(changes))))
 
@@ -268,8 +268,8 @@ def _opened(path: Path) -> Iterator[Any]:
 @_SET
 def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[str, ...]) -> None:
     """Speed against error for this scene: every admissible depth, tolerance and clock step against the exact answer."""
-    from sim.document import BadInput
-    from sim.reader import load
+    from sim.scenario.reader import load
+    from sim.scenario.toml_text import BadInput
     from sim.units.quantity import Quantity
 
     try:
@@ -341,6 +341,6 @@ def schema() -> None:
     """Print the JSON schema of scenario files."""
     import json
 
-    from sim.reader import scenario_schema
+    from sim.scenario.schema import scenario_schema
 
     click.echo(json.dumps(scenario_schema(), indent=2))

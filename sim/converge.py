@@ -25,7 +25,7 @@ from sim.expected import Terms
 from sim.gauges import GAUGES
 from sim.moments import Moment, stated_times
 from sim.parts.shear.modal import ModalProcess
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]

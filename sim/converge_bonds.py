@@ -21,7 +21,7 @@ from sim.laws.schallamach import bell_moments, constant_moments, cut_off_moments
 from sim.parts.bonds import models as depths
 from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.drive import Steady
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 

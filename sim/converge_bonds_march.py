@@ -13,7 +13,7 @@ from sim.numerics.noise import Noise
 from sim.parts.bonds import models as depths
 from sim.parts.drive import Start, Steady
 from sim.parts.exchange import Motion
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 

@@ -16,7 +16,7 @@ from sim.expected import Expectation, Terms, course
 from sim.moments import MOST_WALKED, Moment
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.modal import ModalProcess
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 
 Array = NDArray[np.float64]
 

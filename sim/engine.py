@@ -15,7 +15,7 @@ from sim.parts.bonds.tracked import Tracks
 from sim.parts.contact.balance import Balance, Touch
 from sim.parts.exchange import Motion
 from sim.parts.shear.process import Fluctuation
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)

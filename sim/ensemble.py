@@ -22,7 +22,7 @@ from sim.gauges import GAUGES
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, explained, sync_folder
 from sim.parts.shear.modal import MappedProcess
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 from sim.store import (
     MemoryParts,
     PartFiles,

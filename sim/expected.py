@@ -20,7 +20,7 @@ from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.modal import FixedProcess, ModalProcess
 from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.process import SmoothProcess
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 from sim.spectrum.families import BondMade
 
 Array = NDArray[np.float64]

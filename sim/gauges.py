@@ -7,7 +7,7 @@ import numpy as np
 
 from sim.engine import State
 from sim.parts.contact.control import Grip
-from sim.scenario import Scenario
+from sim.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,10 @@ from sim.laws.schallamach import bell_peak, first_moment_peak
 from sim.parts.bonds import FirstMoment, Tracked
 from sim.parts.bonds.rupture import Bell
 from sim.parts.bonds.tracked import mean_life
-from sim.scenario import Record, Scenario, Source, quantities
+from sim.scenario.clock import Record
+from sim.scenario.declared import quantities
+from sim.scenario.scenario import Scenario
+from sim.scenario.source import Source
 from sim.spectrum.families import BondMade
 from sim.spectrum.finite_contact import marginal_energy
 from sim.store import Plan, work

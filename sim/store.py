@@ -22,7 +22,8 @@ from sim.gauges import GAUGES, Gauge
 from sim.laws import jkr
 from sim.numerics.files import explained, write_whole
 from sim.parts.shear.modal import MappedProcess
-from sim.scenario import Scenario, quantities
+from sim.scenario.declared import quantities
+from sim.scenario.scenario import Scenario
 
 _GROUP = 64
 _PART_NUMBERS = 2**22

@@ -10,7 +10,8 @@ from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset
 from sim.parts.shear.correlation import Time
-from sim.scenario import Clock, Ensemble, Scenario
+from sim.scenario.clock import Clock, Ensemble
+from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band
 
 RADIUS, WORK, MODULUS, LOAD = 2e-3, 42e-3, 6.4e6, 4e-3

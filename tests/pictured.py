@@ -8,7 +8,8 @@ from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset
 from sim.parts.shear.correlation import Time
-from sim.scenario import Clock, Ensemble, Record, Scenario
+from sim.scenario.clock import Clock, Ensemble, Record
+from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band
 
 CELL = 0.24e-3

@@ -9,7 +9,8 @@ from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Constant as Ungrowing
 from sim.parts.shear.amplitude import Onset, Stress
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
-from sim.scenario import Clock, Ensemble, Scenario
+from sim.scenario.clock import Clock, Ensemble
+from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band, Gaussian, Ripple, SelfAffine
 
 SPECTRUM = Band(rms=120e3, longest=120e-6, shortest=60e-6)

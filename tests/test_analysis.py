@@ -10,7 +10,7 @@ from lens import scene
 
 from sim import analysis
 from sim.ensemble import run
-from sim.scenario import Record
+from sim.scenario.clock import Record
 
 
 @pytest.fixture(scope="module", name="ramp")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.reader import BadInput, load
+from sim.scenario.reader import BadInput, load
 
 LENS = """\
 name = "lens"

@@ -28,7 +28,7 @@ from sim.parts.shear.bands import Bands
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
 from sim.parts.shear.modes import modes
 from sim.parts.shear.process import Fluctuation
-from sim.scenario import Clock
+from sim.scenario.clock import Clock
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 
 G, MEMBERS = 1.6e6, 400

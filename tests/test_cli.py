@@ -15,7 +15,7 @@ import xarray as xr
 from click.testing import CliRunner
 
 from sim import cli, paper
-from sim.reader import BadInput, load
+from sim.scenario.reader import BadInput, load
 
 LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
 SCENE = """\

@@ -19,7 +19,8 @@ from sim.parts.contact.control import elastic_energy
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset
-from sim.scenario import Clock, Scenario
+from sim.scenario.clock import Clock
+from sim.scenario.scenario import Scenario
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
 from sim.spectrum.finite_contact import Margin, marginal_energy
 

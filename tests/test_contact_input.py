@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.reader import BadInput, load
+from sim.scenario.reader import BadInput, load
 
 HEAD = """\
 [clock]

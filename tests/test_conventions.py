@@ -11,8 +11,9 @@ from scenes import BONDS, CELL, SPECTRUM, scene
 from sim.ensemble import run
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
-from sim.reader import load
-from sim.scenario import Record, read_sweep
+from sim.scenario.clock import Record
+from sim.scenario.reader import load
+from sim.scenario.scenario import read_sweep
 
 SCENARIOS = sorted((Path(__file__).parent.parent / "scenarios").glob("*.toml"))
 

@@ -26,7 +26,7 @@ from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.correlation import Slip, Time, Wave
-from sim.scenario import Clock, Record
+from sim.scenario.clock import Clock, Record
 from sim.spectrum.families import Gaussian, Ripple, SelfAffine
 
 ROUGH = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=8e-6)

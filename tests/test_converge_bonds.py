@@ -18,7 +18,7 @@ from sim.laws.schallamach import bell_stress, first_moment_stress
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.drive import prescribed as drive
-from sim.scenario import Clock
+from sim.scenario.clock import Clock
 
 COHORT = bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=3e-3)
 STEADY = {"bonds": COHORT, "drive": drive.Steady(speed=5e-3), "clock": Clock(duration=0.05, step=1e-3)}

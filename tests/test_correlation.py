@@ -12,7 +12,7 @@ from sim.ensemble import run
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Time
-from sim.scenario import Clock, Ensemble
+from sim.scenario.clock import Clock, Ensemble
 
 
 def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):

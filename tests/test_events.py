@@ -14,7 +14,7 @@ from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.scenario import Clock, Ensemble, Record
+from sim.scenario.clock import Clock, Ensemble, Record
 
 NAN = math.nan
 

@@ -11,7 +11,7 @@ from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset, Stress
 from sim.parts.shear.modes import modes
-from sim.scenario import Ensemble, Record
+from sim.scenario.clock import Ensemble, Record
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
 
 

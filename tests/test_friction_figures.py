@@ -12,7 +12,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.scenario import Clock, Ensemble, Record
+from sim.scenario.clock import Clock, Ensemble, Record
 
 #: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.
 BELL = {"zero_force_rate": 1e4, "bell_force": 4e-12}

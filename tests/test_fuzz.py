@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.reader import BadInput, load
-from sim.scenario import Scenario
+from sim.scenario.reader import BadInput, load
+from sim.scenario.scenario import Scenario
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 FILES = b"""

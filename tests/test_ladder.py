@@ -16,7 +16,7 @@ from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset
 from sim.parts.shear.correlation import Slip, Wave
-from sim.scenario import Record
+from sim.scenario.clock import Record
 from sim.spectrum.families import Gaussian
 
 RAMP = drive.Ramp(start=1e-4, stop=3e-2, scale="log")

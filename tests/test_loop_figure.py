@@ -12,7 +12,7 @@ from sim.loop_figure import lost_energy
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
-from sim.scenario import Clock, Ensemble, Record
+from sim.scenario.clock import Clock, Ensemble, Record
 
 JKR = (42e-3, 2e-3, 6.4e6)
 BACK = {"from": 2e-6, "to": -4e-6, "trips": 2}

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from sim.ensemble import run
 from sim.preview import preview
-from sim.reader import load
-from sim.scenario import quantities
+from sim.scenario.declared import quantities
+from sim.scenario.reader import load
 from sim.store import Plan
 
 FOLDER = Path(__file__).parent.parent / "scenarios"

@@ -12,12 +12,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.lines import key_lines
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.reader import BadInput, load, scenario_schema
-from sim.scenario import Scenario, quantities
+from sim.scenario.declared import quantities
+from sim.scenario.reader import BadInput, load
+from sim.scenario.scenario import Scenario
+from sim.scenario.schema import scenario_schema
+from sim.scenario.toml_lines import key_lines
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 STARTER = Path(__file__).parent.parent / "sim" / "starter.toml"

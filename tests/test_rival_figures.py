@@ -16,7 +16,7 @@ from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.profile_figures import shapes_of
-from sim.scenario import Clock, Ensemble, Record
+from sim.scenario.clock import Clock, Ensemble, Record
 
 NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)
 

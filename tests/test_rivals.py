@@ -328,21 +328,21 @@ def test_the_reversible_contact_sits_in_a_minimum_of_the_energy():
 
 def test_pulling_a_reversible_contact_spends_what_its_energies_gain():
     # from the radius without load to just before the fold, at a held stress
-    stress, reversible, e = 1.0, 0.3, 4.0
+    stress, share, e = 1.0, 0.3, 4.0
     nodes, weights = np.polynomial.legendre.leggauss(60)
-    top = float(reversible.radius_at_load_reversible(0.0, 1.0, stress, reversible, 1.0, e))
+    top = float(reversible.radius_at_load_reversible(0.0, 1.0, stress, share, 1.0, e))
     low = 0.75 * top
 
     def branch(a):
-        work = 1.0 - reversible * 6.0 * stress**2 * a / (math.pi * e)
+        work = 1.0 - share * 6.0 * stress**2 * a / (math.pi * e)
         return jkr.load_at_radius(a, work, 1.0, e), jkr.indentation_at_radius(a, work, 1.0, e)
 
     def energy(a):
         indentation = branch(a)[1]
-        return jkr.potential_at_indentation(-indentation, 0.0, a, 1.0, 1.0, e) + reversible * 4.0 * stress**2 * a**3 / e
+        return jkr.potential_at_indentation(-indentation, 0.0, a, 1.0, 1.0, e) + share * 4.0 * stress**2 * a**3 / e
 
     a = low + 0.5 * (top - low) * (nodes + 1.0)
-    b = reversible * 6.0 * stress**2 / (math.pi * e)
+    b = share * 6.0 * stress**2 / (math.pi * e)
     growth = 2.0 * a - 0.5 * np.sqrt(2.0 * math.pi / e) * (1.0 - 2.0 * b * a) / np.sqrt(a * (1.0 - b * a))
     work = 0.5 * (top - low) * np.sum(weights * branch(a)[0] * growth)
     assert_allclose(work, energy(top) - energy(low), rtol=1e-12, atol=0)
@@ -380,7 +380,7 @@ def assert_sound(at_load, law, states):
     assert np.all(a[pressed] >= hertz[pressed])
     assert np.all(a[on] <= widest[on])
     release = jkr.energy_release_rate if at_load else jkr.energy_release_rate_at_indentation
-    line = reversible * shear_coefficient(poisson_ratio) * stress**2 / modulus
+    line = share * shear_coefficient(poisson_ratio) * stress**2 / modulus
     left = work - line * a
     free = on & (a > hertz) | on & ~pressed
     assert np.all(left[free] > -1e-9 * work[free])

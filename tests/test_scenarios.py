@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from sim.ensemble import run
 from sim.laws import jkr
 from sim.laws.schallamach import bell_fraction, bell_lives, bell_moments, bell_peak, bell_stress, start_up_force
-from sim.reader import load
+from sim.scenario.reader import load
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))

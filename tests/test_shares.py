@@ -15,7 +15,7 @@ from sim.parts.contact import Equilibrium, Lagging
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.scenario import Clock, Record
+from sim.scenario.clock import Clock, Record
 from sim.spectrum.families import Band
 
 

@@ -15,7 +15,7 @@ from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Constant, Onset, Stress
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
-from sim.scenario import Clock
+from sim.scenario.clock import Clock
 from sim.spectrum.families import Gaussian, Ripple, VonKarman
 
 G = 1.6e6

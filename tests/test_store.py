@@ -18,7 +18,8 @@ from sim.gauges import GAUGES
 from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
-from sim.scenario import Clock, Record, read_sweep
+from sim.scenario.clock import Clock, Record
+from sim.scenario.scenario import read_sweep
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, memory=Slip(length=3e-6))
 
@@ -146,7 +147,7 @@ def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
 def test_the_scenario_can_be_run_again_from_its_dataset():
     from pydantic import TypeAdapter
 
-    from sim.scenario import Scenario
+    from sim.scenario.scenario import Scenario
 
     scenario = sample()
     dataset = ensemble.run(scenario)

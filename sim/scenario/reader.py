@@ -8,10 +8,13 @@ from typing import Annotated, Any
 from pydantic import Field, TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
-from sim.document import BadInput, Place, Words, monsters, parse, put, read_text, words_of
-from sim.faults import Fault, Shape, dotted, shown
-from sim.scenario import CHECKED, Files, Scenario, Source, faults_across
-from sim.sweep import Axis, set_key, sweep_axes
+from sim.scenario.checks import CHECKED, faults_across
+from sim.scenario.messages import Fault, dotted, shown
+from sim.scenario.scenario import Scenario
+from sim.scenario.schema import scenario_shape
+from sim.scenario.source import Files, Source
+from sim.scenario.sweep import Axis, set_key, sweep_axes
+from sim.scenario.toml_text import BadInput, Place, Words, monsters, parse, put, read_text, words_of
 from sim.units.quantity import number_and_unit
 
 _DECLARED: dict[str, Any] = getattr(Scenario, "__pydantic_fields__", {})
@@ -174,38 +177,3 @@ def _part_type(name: str) -> TypeAdapter:
     declared = _DECLARED[name]
     kind: Any = declared.annotation
     return TypeAdapter(Annotated[kind, Field(discriminator=declared.discriminator)] if declared.discriminator else kind)
-
-
-@functools.cache
-def scenario_shape() -> Shape:
-    """The keys that a scenario file may have."""
-    return Shape(scenario_schema())
-
-
-def scenario_schema() -> dict[str, Any]:
-    """The JSON schema of a scenario file."""
-    schema = TypeAdapter(Scenario).json_schema(by_alias=True, mode="validation")
-    for table in schema["$defs"].values():
-        if "file" in table["properties"] and "file" not in table.get("required", ()):
-            table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
-    for name in _in_unions(schema):  # there the model tells the tables apart, so it cannot be left out
-        table = schema["$defs"][name]
-        if "model" in table["properties"] and name != "Equilibrium":  # which a contact without a model is
-            table["required"] = ["model", *table.get("required", ())]
-    schema["properties"].pop("source", None)
-    schema["properties"]["sweep"] = {
-        "description": "keys with lists of values (outer product), or a list of tables (zipped)",
-        "anyOf": [{"type": "object"}, {"type": "array", "items": {"type": "object"}}],
-    }
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "sim scenario"}
-
-
-def _in_unions(node: Any) -> set[str]:
-    """Names of the tables that a schema tells apart by their model."""
-    if isinstance(node, list):
-        return set().union(*map(_in_unions, node))
-    if not isinstance(node, dict):
-        return set()
-    found = set().union(*map(_in_unions, node.values()))
-    options = [option["$ref"] for option in node.get("oneOf", ()) if "$ref" in option]
-    return found | {reference.rsplit("/", 1)[-1] for reference in options}

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim.faults import Fault, dotted, shown
-from sim.lines import deep_line, key_lines
+from sim.scenario.messages import Fault, dotted, shown
+from sim.scenario.toml_lines import deep_line, key_lines
 
 _MOST_BYTES = 2**20
 _DEEPEST = 16

@@ -1,0 +1,90 @@
+"""Clock, ensemble and records of a scenario."""
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
+
+from sim.units.quantity import Quantity
+
+_Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
+_MOST_RECORDS = 10_000_000
+_MOST_STEPS = 10**9
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Clock:
+    """How long, in which steps, and how often a step is recorded; the first record is t = 0."""
+
+    duration: _Duration
+    step: Annotated[float, Quantity("s", "clock step", "dt", above=0)]
+    record: Annotated[float, Quantity("s", "time between records", "", above=0)] | None = None
+
+    @model_validator(mode="after")
+    def _whole_multiples(self) -> "Clock":
+        if self.record is not None:
+            _require_multiple("record", self.record, "step", self.step)
+        word = "step" if self.record is None else "record"
+        _require_multiple("duration", self.duration, word, self.record or self.step)
+        if self.steps > _MOST_STEPS:
+            raise PydanticCustomError("clock", f"asks for more than {_MOST_STEPS:,} steps; make step longer")
+        if self.records > _MOST_RECORDS:
+            raise PydanticCustomError("clock", f"asks for more than {_MOST_RECORDS:,} records; give a longer record")
+        return self
+
+    @property
+    def steps(self) -> int:
+        """Number of clock steps."""
+        return round(self.duration / self.step)
+
+    @property
+    def stride(self) -> int:
+        """Clock steps from one record to the next."""
+        return round((self.record or self.step) / self.step)
+
+    @property
+    def records(self) -> int:
+        """Number of records, the one at t = 0 included."""
+        return self.steps // self.stride + 1
+
+    def time(self, step: int) -> float:
+        """Time at the end of a step [s]; never accumulated."""
+        return self.duration * (step / self.steps)
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times of the records, shape (records,) [s]."""
+        return np.array([self.time(k * self.stride) for k in range(self.records)])
+
+
+def _require_multiple(name: str, long: float, other: str, short: float) -> None:
+    """Refuse a time that is no whole multiple of another."""
+    ratio = long / short
+    if round(ratio) >= 1 and abs(ratio - round(ratio)) <= 1e-9 * ratio:
+        return
+    below, above = max(math.floor(ratio), 1) * short, (math.floor(ratio) + 1) * short
+    cure = f"{above:g} s" if ratio < 1.0 else f"{below:g} s or {above:g} s"
+    raise PydanticCustomError(
+        "clock",
+        f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s), such as {cure}",
+    )
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Ensemble:
+    """Independent members of the ensemble, which share everything but their noise."""
+
+    members: Annotated[int, Field(ge=1, le=10**7, description="members of the ensemble")] = 1
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Record:
+    """What is kept: each member or the ensemble's mean, spread and standard error; maps at given times."""
+
+    per_member: bool = True
+    maps: tuple[Annotated[float, Quantity("s", "time of a stress map", "t", at_least=0)], ...] = ()
+    map_members: Annotated[int, Field(ge=1, le=10**4, description="members whose maps are kept")] = 1
+    precision: Literal["float64", "float32"] = "float64"

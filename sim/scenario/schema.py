@@ -1,0 +1,44 @@
+"""JSON schema of scenario files."""
+
+import functools
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from sim.scenario.messages import Shape
+from sim.scenario.scenario import Scenario
+
+
+@functools.cache
+def scenario_shape() -> Shape:
+    """The keys that a scenario file may have."""
+    return Shape(scenario_schema())
+
+
+def scenario_schema() -> dict[str, Any]:
+    """The JSON schema of a scenario file."""
+    schema = TypeAdapter(Scenario).json_schema(by_alias=True, mode="validation")
+    for table in schema["$defs"].values():
+        if "file" in table["properties"] and "file" not in table.get("required", ()):
+            table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
+    for name in _in_unions(schema):  # there the model tells the tables apart, so it cannot be left out
+        table = schema["$defs"][name]
+        if "model" in table["properties"] and name != "Equilibrium":  # which a contact without a model is
+            table["required"] = ["model", *table.get("required", ())]
+    schema["properties"].pop("source", None)
+    schema["properties"]["sweep"] = {
+        "description": "keys with lists of values (outer product), or a list of tables (zipped)",
+        "anyOf": [{"type": "object"}, {"type": "array", "items": {"type": "object"}}],
+    }
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema, "title": "sim scenario"}
+
+
+def _in_unions(node: Any) -> set[str]:
+    """Names of the tables that a schema tells apart by their model."""
+    if isinstance(node, list):
+        return set().union(*map(_in_unions, node))
+    if not isinstance(node, dict):
+        return set()
+    found = set().union(*map(_in_unions, node.values()))
+    options = [option["$ref"] for option in node.get("oneOf", ()) if "$ref" in option]
+    return found | {reference.rsplit("/", 1)[-1] for reference in options}

@@ -1,0 +1,42 @@
+"""Where a scenario was read from: its text and the files it names."""
+
+import errno
+from dataclasses import dataclass as plain_dataclass
+from dataclasses import field
+from pathlib import Path
+from typing import Any
+
+_MOST_BYTES = 2**28
+
+
+@plain_dataclass(frozen=True)
+class Source:
+    """Where a scenario came from: the file's text, what was changed on top, and every file it names."""
+
+    path: str = ""
+    text: str = ""
+    overrides: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+
+
+@plain_dataclass(frozen=True)
+class Files:
+    """The files that a scenario names, relative to its own folder; remembers the text of each."""
+
+    folder: Path
+    texts: dict[str, str] = field(default_factory=dict)
+
+    def path(self, name: str) -> Path:
+        """Where the file is."""
+        return self.folder / name
+
+    def text(self, name: str) -> str:
+        """The file's text, kept for the dataset's provenance."""
+        if name not in self.texts:
+            path = self.path(name)
+            if path.exists() and not path.is_file():
+                raise OSError(errno.EINVAL, "it is no plain file")
+            if path.stat().st_size > _MOST_BYTES:
+                raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
+            self.texts[name] = path.read_text(encoding="utf-8")
+        return self.texts[name]
