@@ -11,8 +11,8 @@ from typing import Any
 _PUBLIC = {
     "load": "sim.scenario.reader",
     "BadInput": "sim.scenario.reader",
-    "run": "sim.ensemble",
-    "open": "sim.ensemble",
+    "run": "sim.ensemble.simulate",
+    "open": "sim.ensemble.simulate",
     "Scenario": "sim.scenario.scenario",
     "laws": "",
     "spectrum": "",

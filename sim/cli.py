@@ -85,15 +85,16 @@ def run(
     if target.exists() and not force:
         _fail(f"{target} exists; replace it with --force or name another output with -o", EXISTS)
 
-    from sim import ensemble, preview, store
+    from sim.ensemble import plan as plans
+    from sim.ensemble import preview, simulate
 
     began = time.time()
-    plan = store.Plan.of(scene)
+    plan = plans.Plan.of(scene)
     for remark in [] if quiet else preview.remarks(plan):
         click.echo(f"note: {remark}", err=True)
-    with _progress(ensemble.work(plan), quiet) as advance:
-        ensemble.run(scene, target, replace=force, progress=advance)
-    ensemble.write_log(target, began, sys.argv[1:])
+    with _progress(plans.work(plan), quiet) as advance:
+        simulate.run(scene, target, replace=force, progress=advance)
+    simulate.write_log(target, began, sys.argv[1:])
     if not quiet:
         _show_table(target)
         click.echo(str(target))
@@ -189,7 +190,7 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
 @_SET
 def check(scenario: Path, changes: tuple[str, ...]) -> None:
     """Say what a scenario would run: quantities in SI, depths, errors known beforehand, time, memory, file size."""
-    from sim.preview import preview
+    from sim.ensemble.preview import preview
     from sim.scenario.reader import load
 
     click.echo(preview(load(scenario, _overrides(changes))))

@@ -20,9 +20,9 @@ from sim.converge_data import QUANTITIES, Laws, Run, assembled, filled
 from sim.converge_figure import figure
 from sim.converge_table import recommendation, table
 from sim.engine import march
+from sim.ensemble.recorded import GAUGES
 from sim.estimates import Lags, estimates
 from sim.expected import Terms
-from sim.gauges import GAUGES
 from sim.moments import Moment, stated_times
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.scenario import Scenario

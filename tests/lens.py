@@ -2,7 +2,7 @@
 
 import functools
 
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere

@@ -1,6 +1,6 @@
 """What the tests of figures share: small runs, and what was drawn of them."""
 
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere

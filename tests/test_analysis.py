@@ -9,7 +9,7 @@ import xarray as xr
 from lens import scene
 
 from sim import analysis
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.scenario.clock import Record
 
 

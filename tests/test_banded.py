@@ -15,8 +15,8 @@ from scenes import CELL, SPECTRUM, scene
 from scipy.interpolate import CubicSpline
 from scipy.stats import expon, kstest, ncx2
 
-from sim import ensemble
 from sim.engine import march, pack, unpack
+from sim.ensemble import simulate as ensemble
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive

@@ -184,7 +184,7 @@ def test_an_output_that_exists_is_refused_before_anything_is_computed(here, monk
     content = Path("x.nc").read_bytes()
     other = ["run", "scene.toml", "-o", "x.nc", "--set", 'contact.load="1 mN"']
     with monkeypatch.context() as patched:
-        patched.setattr("sim.ensemble.run", None)  # computing would fail
+        patched.setattr("sim.ensemble.simulate.run", None)  # computing would fail
         done = sim(*other)
     assert done.exit_code == 73
     assert done.stderr.splitlines() == ["x.nc exists; replace it with --force or name another output with -o"]
@@ -241,7 +241,7 @@ def test_a_full_disk_ends_with_74_and_its_reason(here, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("sim.store.write_whole", full)
+    monkeypatch.setattr("sim.ensemble.part_files.write_whole", full)
     done = sim("run", "scene.toml")
     assert done.exit_code == 74
     assert done.stderr.strip().endswith("No space left on device")
@@ -252,7 +252,7 @@ def test_too_little_memory_is_told(here, monkeypatch):
     def greedy(*_, **__):
         raise MemoryError
 
-    monkeypatch.setattr("sim.ensemble.run", greedy)
+    monkeypatch.setattr("sim.ensemble.simulate.run", greedy)
     done = sim("run", "scene.toml")
     assert done.exit_code == 1
     assert done.stderr.startswith("there is not enough memory; ")
@@ -262,7 +262,7 @@ def test_a_fault_of_our_own_is_not_hidden(here, monkeypatch):
     def broken(*_, **__):
         raise RuntimeError("ours")
 
-    monkeypatch.setattr("sim.ensemble.run", broken)
+    monkeypatch.setattr("sim.ensemble.simulate.run", broken)
     assert isinstance(sim("run", "scene.toml").exception, RuntimeError)
 
 

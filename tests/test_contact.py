@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scenes import SHEARS, scene
 
 from sim.engine import march, pack
-from sim.gauges import GAUGES
+from sim.ensemble.recorded import GAUGES
 from sim.laws import jkr
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium, Lagging

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from scenes import BONDS, CELL, SPECTRUM, scene
 
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Record

@@ -15,10 +15,10 @@ from sim.alternatives import settings
 from sim.converge import converge, figure, plan_members, recommendation, table
 from sim.converge_table import contradicted, real, within
 from sim.engine import march
+from sim.ensemble.recorded import GAUGES
 from sim.estimates import STATISTICS, Lags, estimates
 from sim.expected import Expectation, Terms, course
 from sim.gammasum import GammaSum
-from sim.gauges import GAUGES
 from sim.moments import stated_times
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive

@@ -8,7 +8,7 @@ import pytest
 from lens import FIELD, scene
 
 from sim import analysis
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Time

@@ -8,7 +8,7 @@ import pytest
 from lens import scene
 
 from sim import analysis
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_allclose
 
-from sim.ensemble import run
-from sim.preview import preview
+from sim.ensemble.plan import Plan
+from sim.ensemble.preview import preview
+from sim.ensemble.simulate import run
 from sim.scenario.declared import quantities
 from sim.scenario.reader import load
-from sim.store import Plan
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
 WIDE = {"model": "gaussian", "rms": "10 kPa", "length": "4 mm"}

@@ -346,8 +346,8 @@ def test_pulling_a_reversible_contact_spends_what_its_energies_gain():
     growth = 2.0 * a - 0.5 * np.sqrt(2.0 * math.pi / e) * (1.0 - 2.0 * b * a) / np.sqrt(a * (1.0 - b * a))
     work = 0.5 * (top - low) * np.sum(weights * branch(a)[0] * growth)
     assert_allclose(work, energy(top) - energy(low), rtol=1e-12, atol=0)
-    assert_allclose(reversible.radius_at_load_reversible(branch(a)[0], 1.0, stress, reversible, 1.0, e), a, rtol=1e-13)
-    lifted = reversible.radius_at_indentation_reversible(branch(a)[1], 1.0, stress, reversible, 1.0, e)
+    assert_allclose(reversible.radius_at_load_reversible(branch(a)[0], 1.0, stress, share, 1.0, e), a, rtol=1e-13)
+    lifted = reversible.radius_at_indentation_reversible(branch(a)[1], 1.0, stress, share, 1.0, e)
     assert_allclose(lifted, a, rtol=1e-13, atol=0)
 
 
@@ -365,7 +365,7 @@ def test_nothing_reversible_is_jkr_bit_for_bit(at_load, law):
 
 def assert_sound(at_load, law, states):
     """Between Hertz and JKR, on the rising branch, and off only where no wider state balances."""
-    level, work, stress, reversible, sphere_radius, modulus, poisson_ratio = states
+    level, work, stress, share, sphere_radius, modulus, poisson_ratio = states
     a = law(*states)
     plain = jkr.radius_at_load if at_load else jkr.radius_at_indentation
     widest = plain(level, work, sphere_radius, modulus)
@@ -387,8 +387,8 @@ def assert_sound(at_load, law, states):
     clamped = on & (a == hertz)
     assert np.all(left[clamped] <= 1e-9 * work[clamped])
     # wider states open: G is above the line, on any radius up to JKR's; so is it everywhere where it is off
-    for share in (0.01, 0.1, 0.5, 0.9):
-        wider = np.where(on, a, 0.0) * (1.0 - share) + share * widest
+    for inward in (0.01, 0.1, 0.5, 0.9):
+        wider = np.where(on, a, 0.0) * (1.0 - inward) + inward * widest
         known = (wider > a * (1.0 + 1e-7)) | (~on & np.isfinite(widest))
         rate = release(wider, level, sphere_radius, modulus)
         # rounding: G is a squared difference of terms of up to this much more

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.laws import jkr
 from sim.laws.schallamach import bell_fraction, bell_lives, bell_moments, bell_peak, bell_stress, start_up_force
 from sim.scenario.reader import load

@@ -4,7 +4,7 @@ import pytest
 from lens import RADIUS, scene
 
 from sim import analysis
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear

@@ -8,7 +8,7 @@ import pytest
 from lens import LOAD, MODULUS, RADIUS, WORK, scene
 
 from sim import analysis
-from sim.ensemble import run
+from sim.ensemble.simulate import run
 from sim.laws import jkr, reversible
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium, Lagging

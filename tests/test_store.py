@@ -12,9 +12,10 @@ import xarray as xr
 from numpy.testing import assert_allclose
 from scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
 
-from sim import ensemble, store
 from sim.engine import march
-from sim.gauges import GAUGES
+from sim.ensemble import plan as plans
+from sim.ensemble import simulate as ensemble
+from sim.ensemble.recorded import GAUGES
 from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
@@ -63,8 +64,8 @@ def test_equal_runs_are_equal_bytes(tmp_path):
 
 def test_parts_of_any_shape_give_the_same_numbers(monkeypatch):
     whole = ensemble.run(sample())
-    monkeypatch.setattr(store, "_GROUP", 2)
-    monkeypatch.setattr(store, "_PART_NUMBERS", 60)
+    monkeypatch.setattr(plans, "_GROUP", 2)
+    monkeypatch.setattr(plans, "_PART_NUMBERS", 60)
     pieces = ensemble.run(sample())
     xr.testing.assert_identical(whole, pieces)
 
@@ -78,7 +79,7 @@ def test_recording_seldom_gives_the_same_numbers():
 
 def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
     each = ensemble.run(sample())
-    monkeypatch.setattr(store, "_GROUP", 2)
+    monkeypatch.setattr(plans, "_GROUP", 2)
     pooled = ensemble.run(sample(record=Record(per_member=False)))
     assert "realization" not in pooled.dims
     for name in ("contact_radius", "fluctuation_energy", "friction_force"):

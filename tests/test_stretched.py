@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from scenes import BELL, BONDS, CELL, STRETCHED, scene
 
 from sim.engine import march
-from sim.gauges import GAUGES
+from sim.ensemble.recorded import GAUGES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.area import share_kept

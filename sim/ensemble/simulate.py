@@ -18,21 +18,14 @@ import netCDF4
 import numpy as np
 
 from sim.engine import State, march, pack
-from sim.gauges import GAUGES
+from sim.ensemble.netcdf import moments, write_dataset
+from sim.ensemble.part_files import MemoryParts, PartFiles, Parts
+from sim.ensemble.plan import Plan, part_name, work
+from sim.ensemble.recorded import GAUGES
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, explained, sync_folder
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.scenario import Scenario
-from sim.store import (
-    MemoryParts,
-    PartFiles,
-    Parts,
-    Plan,
-    moments,
-    part_name,
-    work,
-    write_dataset,
-)
 
 Progress = Callable[[int], None]
 

@@ -8,26 +8,21 @@ lost when the run is killed, a renamed part is not.
 
 import hashlib
 import importlib.metadata
-import io
 import json
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Protocol, cast
+from typing import Any, cast
 
 import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
-from sim.gauges import GAUGES, Gauge
+from sim.ensemble.part_files import Parts
+from sim.ensemble.plan import Plan, part_name
+from sim.ensemble.recorded import GAUGES, Gauge
 from sim.laws import jkr
-from sim.numerics.files import explained, write_whole
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
 
-_GROUP = 64
-_PART_NUMBERS = 2**22
-_STATE_NUMBERS = 2**25
 _DISC_ENERGIES = (
     ("disc_energy", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
     ("cross_energy", "energy of the map in the field of the mean stress, per area of the disc", "DeltaGamma_x"),
@@ -37,98 +32,6 @@ _STATISTICS = {
     "std": "standard deviation over the ensemble of",
     "sem": "standard error of the ensemble mean of",
 }
-
-
-@dataclass(frozen=True)
-class Plan:
-    """Which parts a scenario's dataset is made of."""
-
-    scenario: Scenario
-    points: tuple[Scenario, ...]
-
-    @classmethod
-    def of(cls, scenario: Scenario) -> "Plan":
-        return cls(scenario, tuple(scenario.points()))
-
-    @property
-    def members(self) -> int:
-        """Members that are advanced: one where no part differs between members."""
-        varies = any(any(point.varies.values()) for point in self.points)
-        return self.scenario.ensemble.members if varies else 1
-
-    @property
-    def group(self) -> int:
-        """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
-        some = self.points[:: max(1, len(self.points) // 4)]
-        numbers = max(2 * point.process.pairs + point.population.numbers for point in some)
-        for point in some:
-            point.release()
-        return min(_GROUP, self.members, max(1, _STATE_NUMBERS // numbers))
-
-    @property
-    def stretch(self) -> int:
-        """Records of one part."""
-        most = max(1, _PART_NUMBERS // (self.group * len(GAUGES)))
-        return min(self.points[0].clock.records, most)
-
-    def groups(self) -> list[np.ndarray]:
-        """The members of each group."""
-        return [np.arange(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
-
-    def stretches(self, point: Scenario) -> list[range]:
-        """The records of each stretch."""
-        records = point.clock.records
-        return [range(first, min(first + self.stretch, records)) for first in range(0, records, self.stretch)]
-
-    def varies(self, gauge: Gauge) -> bool:
-        """Whether the gauge's variable has the member dimension."""
-        return any(point.varies[gauge.part] for point in self.points)
-
-
-def work(plan: Plan) -> int:
-    """Member-steps that a plan takes."""
-    return sum(plan.members * (point.clock.steps + 1) for point in plan.points)
-
-
-def part_name(point: int, group: int, stretch: int) -> str:
-    """Name of a part, the same in every run of a scenario."""
-    return f"point{point:06d}-group{group:06d}-stretch{stretch:06d}"
-
-
-class Parts(Protocol):
-    """Where parts are kept until the dataset is made."""
-
-    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None: ...
-
-    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]: ...
-
-
-class MemoryParts(dict):
-    """Parts kept in memory."""
-
-    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None:
-        self[name] = arrays
-
-    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]:
-        return {key: array for key, array in self[name].items() if key.startswith(beginning)}
-
-
-@dataclass(frozen=True)
-class PartFiles:
-    """Parts kept as files of a folder: built in memory, written, synced, then renamed into place."""
-
-    folder: Path
-
-    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None:
-        buffer = io.BytesIO()
-        np.savez(buffer, allow_pickle=False, **arrays)
-        with explained(self.folder):
-            write_whole(self.folder / f"{name}.npz", buffer.getbuffer())
-
-    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]:
-        """The arrays whose names begin so, without reading the others."""
-        with explained(self.folder), np.load(self.folder / f"{name}.npz", allow_pickle=False) as arrays:
-            return {key: arrays[key] for key in arrays.files if key.startswith(beginning)}
 
 
 def write_dataset(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:

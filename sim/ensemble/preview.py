@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from sim.gauges import GAUGES
+from sim.ensemble.plan import Plan, work
+from sim.ensemble.recorded import GAUGES
 from sim.laws import jkr
 from sim.laws.schallamach import bell_peak, first_moment_peak
 from sim.parts.bonds import FirstMoment, Tracked
@@ -21,7 +22,6 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.source import Source
 from sim.spectrum.families import BondMade
 from sim.spectrum.finite_contact import marginal_energy
-from sim.store import Plan, work
 
 # Rough costs of one core, for the estimate only [s]: starting up, a step of a batch, and for each member of it
 # a mode pair and a counted population; a part file.

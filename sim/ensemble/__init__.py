@@ -1,0 +1,1 @@
+"""Ensembles of members over a sweep, and the netCDF file they become."""

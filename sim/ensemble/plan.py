@@ -1,0 +1,68 @@
+"""Division of a run into points, groups of members and stretches of time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sim.ensemble.recorded import GAUGES, Gauge
+from sim.scenario.scenario import Scenario
+
+_GROUP = 64
+_PART_NUMBERS = 2**22
+_STATE_NUMBERS = 2**25
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which parts a scenario's dataset is made of."""
+
+    scenario: Scenario
+    points: tuple[Scenario, ...]
+
+    @classmethod
+    def of(cls, scenario: Scenario) -> "Plan":
+        return cls(scenario, tuple(scenario.points()))
+
+    @property
+    def members(self) -> int:
+        """Members that are advanced: one where no part differs between members."""
+        varies = any(any(point.varies.values()) for point in self.points)
+        return self.scenario.ensemble.members if varies else 1
+
+    @property
+    def group(self) -> int:
+        """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
+        some = self.points[:: max(1, len(self.points) // 4)]
+        numbers = max(2 * point.process.pairs + point.population.numbers for point in some)
+        for point in some:
+            point.release()
+        return min(_GROUP, self.members, max(1, _STATE_NUMBERS // numbers))
+
+    @property
+    def stretch(self) -> int:
+        """Records of one part."""
+        most = max(1, _PART_NUMBERS // (self.group * len(GAUGES)))
+        return min(self.points[0].clock.records, most)
+
+    def groups(self) -> list[np.ndarray]:
+        """The members of each group."""
+        return [np.arange(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
+
+    def stretches(self, point: Scenario) -> list[range]:
+        """The records of each stretch."""
+        records = point.clock.records
+        return [range(first, min(first + self.stretch, records)) for first in range(0, records, self.stretch)]
+
+    def varies(self, gauge: Gauge) -> bool:
+        """Whether the gauge's variable has the member dimension."""
+        return any(point.varies[gauge.part] for point in self.points)
+
+
+def work(plan: Plan) -> int:
+    """Member-steps that a plan takes."""
+    return sum(plan.members * (point.clock.steps + 1) for point in plan.points)
+
+
+def part_name(point: int, group: int, stretch: int) -> str:
+    """Name of a part, the same in every run of a scenario."""
+    return f"point{point:06d}-group{group:06d}-stretch{stretch:06d}"
