@@ -222,8 +222,8 @@ def plot(output: Path, kind: str | None, picture: Path | None) -> None:
 
     KIND is curve, time, sweep, map, spectrum, friction, rivals, profile or loop.
     """
-    from sim import plots
     from sim.numerics.files import explained
+    from sim.plots import kinds as plots
 
     with _opened(output) as dataset:
         target = picture or output.with_name(f"{output.stem}{'-' + kind if kind else ''}.png")

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
 from sim.converge_table import cost
-from sim.pictures import LINES, REFERENCE, STYLE, legend, plain_ticks, rows
+from sim.plots.style import LINES, REFERENCE, STYLE, legend, plain_ticks, rows
 
 #: Errors below this are drawn at it, with an arrow: the closed forms are not exact to more.
 _FLOOR = 1e-4

@@ -5,12 +5,13 @@ import pytest
 from matplotlib.patches import Circle
 from pictured import CELL, STEADY, field, mapped, rendered, simulated
 
-from sim import field_figures, plots
 from sim.numerics.grid import Grid
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset, Stress
 from sim.parts.shear.modes import modes
+from sim.plots import field as field_figures
+from sim.plots import kinds as plots
 from sim.scenario.clock import Ensemble, Record
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
 

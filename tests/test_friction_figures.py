@@ -5,13 +5,16 @@ import pytest
 from numpy.testing import assert_allclose
 from pictured import drawn, rendered, simulated
 
-from sim import bond_laws, pictures, plots, start_figure
-from sim.friction_figures import maximum_of
 from sim.laws import schallamach
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
+from sim.plots import bond_laws
+from sim.plots import kinds as plots
+from sim.plots import static_friction as start_figure
+from sim.plots import style as pictures
+from sim.plots.friction import maximum_of
 from sim.scenario.clock import Clock, Ensemble, Record
 
 #: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.

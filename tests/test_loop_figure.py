@@ -5,13 +5,14 @@ import pytest
 from numpy.testing import assert_allclose
 from pictured import STEADY, drawn, rendered, simulated
 
-from sim import pictures, plots
 from sim.analysis import loop_energy
 from sim.laws import jkr
-from sim.loop_figure import lost_energy
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
+from sim.plots import kinds as plots
+from sim.plots import style as pictures
+from sim.plots.loop import lost_energy
 from sim.scenario.clock import Clock, Ensemble, Record
 
 JKR = (42e-3, 2e-3, 6.4e6)

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from pictured import STEADY, drawn, field, mapped, rendered, simulated
 
-from sim import analysis, pictures, plots
+from sim import analysis
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
+from sim.plots import kinds as plots
+from sim.plots import style as pictures
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.spectrum.families import Band
 

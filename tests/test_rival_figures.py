@@ -8,14 +8,16 @@ from matplotlib.patches import Circle
 from numpy.testing import assert_allclose
 from pictured import RAMP, STEADY, rendered, simulated
 
-from sim import pictures, plots, rival_figures
 from sim.laws import jkr, profiles, theories
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.profile_figures import shapes_of
+from sim.plots import kinds as plots
+from sim.plots import style as pictures
+from sim.plots import theories as rival_figures
+from sim.plots.profile import shapes_of
 from sim.scenario.clock import Clock, Ensemble, Record
 
 NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)

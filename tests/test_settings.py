@@ -4,11 +4,11 @@ import pytest
 from lens import RADIUS, scene
 
 from sim import analysis
+from sim.analysis.scene import told, word
 from sim.ensemble.simulate import run
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.settings import told, word
 
 
 def test_a_setting_is_found_whether_it_is_swept_or_not():

@@ -12,16 +12,24 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sim.analysis import engineering, is_steady, sweep_dims
-from sim.bond_laws import rest_of
-from sim.curves import Scene, line_handles, opening_handles, room_of, scene_along, speed_dim, spread_handles
-from sim.field_figures import map_figure, maps_of, spectrum_figure
-from sim.friction_figures import friction_figure, needs_stress
-from sim.loop_figure import loop_figure, needs_course
-from sim.panels import area_panel, energy_panel, further_panels, radius_panel, reference_handles, share_panel, stacked
-from sim.pictures import STYLE, Unit, across, axis_scale, legend, symbol
-from sim.profile_figures import needs_contact, profile_figure
-from sim.rival_figures import needs_control, rivals_figure
-from sim.settings import stays_held
+from sim.analysis.scene import stays_held
+from sim.plots.bond_laws import rest_of
+from sim.plots.curves import Scene, line_handles, opening_handles, room_of, scene_along, speed_dim, spread_handles
+from sim.plots.field import map_figure, maps_of, spectrum_figure
+from sim.plots.friction import friction_figure, needs_stress
+from sim.plots.loop import loop_figure, needs_course
+from sim.plots.panels import (
+    area_panel,
+    energy_panel,
+    further_panels,
+    radius_panel,
+    reference_handles,
+    share_panel,
+    stacked,
+)
+from sim.plots.profile import needs_contact, profile_figure
+from sim.plots.style import STYLE, Unit, across, axis_scale, legend, symbol
+from sim.plots.theories import needs_control, rivals_figure
 
 
 def _needs_speeds(dataset: xr.Dataset) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import xarray as xr
 
-from sim.settings import MEMBERS, control, setting
+from sim.analysis.scene import MEMBERS, control, setting
 
 #: A loop below this share of what is put in and given back is nothing.
 _ROUNDING = 1e-12

@@ -6,11 +6,10 @@ broken bonds, whether adhesion is masked); *events* are told once of a run (when
 peak); ``summary`` turns both into statistics over the members.
 """
 
-from sim.correlation import IntegralTime, correlation_time, integral_time
-from sim.energies import loop_energy
-from sim.events import events, peaks
-from sim.members import QUANTILES, shares, statistics, summary
-from sim.observables import (
+from sim.analysis.correlation import IntegralTime, correlation_time, integral_time
+from sim.analysis.events import events, peaks
+from sim.analysis.loops import loop_energy
+from sim.analysis.observables import (
     bond_work,
     equilibrium_radius,
     observables,
@@ -18,8 +17,9 @@ from sim.observables import (
     settled,
     share_observables,
 )
-from sim.rows import highlights, table, to_csv
-from sim.settings import Control, control, is_stationary, is_steady, setting, sweep_dims
+from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, sweep_dims
+from sim.analysis.statistics import QUANTILES, shares, statistics, summary
+from sim.analysis.tables import highlights, table, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [

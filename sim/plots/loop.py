@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sim.analysis import control, loop_energy, setting
-from sim.curves import Line, Scene, last_closed, line_handles, scene_along, spread_handles
+from sim.analysis.scene import stays_held
 from sim.laws import jkr
-from sim.pictures import BOTH, REFERENCE, Unit, across, fill, label, legend, rows
-from sim.settings import stays_held
+from sim.plots.curves import Line, Scene, last_closed, line_handles, scene_along, spread_handles
+from sim.plots.style import BOTH, REFERENCE, Unit, across, fill, label, legend, rows
 
 #: Radii at which the equilibrium curve is evaluated.
 _FINE = 600

@@ -12,7 +12,7 @@ from matplotlib.patheffects import withStroke
 
 from sim.analysis import engineering, setting, sweep_dims
 from sim.laws import jkr, profiles
-from sim.pictures import BOTH, LINES, REFERENCE, WIDE, Unit, label, legend, letter, picture, told
+from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, label, legend, letter, picture, told
 
 #: Points of a profile on one side, and how far it goes in contact radii.
 _POINTS, _REACH = 1500, 2.0

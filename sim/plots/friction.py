@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sim.analysis import is_steady
-from sim.bond_laws import Steady, rest_of, steady_laws
-from sim.curves import Line, Scene, covered, curve, line_handles, room_of, scene_along, speed_dim, spread_handles
-from sim.panels import stacked
-from sim.pictures import BOTH, REFERENCE, Unit, across, axis_scale, label, legend, rounded
-from sim.start_figure import start_figure
+from sim.plots.bond_laws import Steady, rest_of, steady_laws
+from sim.plots.curves import Line, Scene, covered, curve, line_handles, room_of, scene_along, speed_dim, spread_handles
+from sim.plots.panels import stacked
+from sim.plots.static_friction import start_figure
+from sim.plots.style import BOTH, REFERENCE, Unit, across, axis_scale, label, legend, rounded
 
 #: Speeds at which a closed form is drawn.
 _FINE = 600

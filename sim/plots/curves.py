@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from sim.analysis import bond_work, is_steady, observables, settled, share_observables, summary, sweep_dims
-from sim.pictures import BOTH, LINES, REFERENCE, fill, told
+from sim.plots.style import BOTH, LINES, REFERENCE, fill, told
 
 #: Points up to which each carries a marker.
 MARKED = 25

@@ -10,8 +10,21 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sim.analysis import engineering, setting, sweep_dims
-from sim.bond_laws import start_peak, steady_laws
-from sim.pictures import COLUMN, REFERENCE, WIDE, Unit, label, legend, letter, picture, plain_ticks, rounded, span, told
+from sim.plots.bond_laws import start_peak, steady_laws
+from sim.plots.style import (
+    COLUMN,
+    REFERENCE,
+    WIDE,
+    Unit,
+    label,
+    legend,
+    letter,
+    picture,
+    plain_ticks,
+    rounded,
+    span,
+    told,
+)
 
 _MARKERS = "osD^vP"
 _FINE = 300

@@ -9,8 +9,18 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from sim.curves import Line, Scene, covered, curve, handle, last_closed, line_handles, opening_handles, spread_handles
-from sim.pictures import BONDS, BOTH, FLUCTUATIONS, REFERENCE, Unit, fill, label, legend, rows
+from sim.plots.curves import (
+    Line,
+    Scene,
+    covered,
+    curve,
+    handle,
+    last_closed,
+    line_handles,
+    opening_handles,
+    spread_handles,
+)
+from sim.plots.style import BONDS, BOTH, FLUCTUATIONS, REFERENCE, Unit, fill, label, legend, rows
 
 #: Share of the largest energy below which the fluctuations' own is told in a panel of its own.
 _SMALL = 0.02

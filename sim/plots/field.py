@@ -15,13 +15,13 @@ from pydantic import TypeAdapter
 from scipy.signal import resample
 
 from sim.analysis import engineering, setting, sweep_dims
-from sim.curves import swept_whole
+from sim.analysis.scene import word
 from sim.laws.halfspace import displacement
 from sim.numerics.grid import Grid
 from sim.parts.shear.amplitude import Growth
 from sim.parts.shear.modes import Modes, modes
-from sim.pictures import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
-from sim.settings import word
+from sim.plots.curves import swept_whole
+from sim.plots.style import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
 from sim.spectrum.families import Spectrum
 from sim.spectrum.periodogram import periodogram, radial_average
 

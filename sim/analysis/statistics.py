@@ -4,10 +4,10 @@ import warnings
 
 import xarray as xr
 
-from sim.correlation import correlation_time
-from sim.events import events
-from sim.observables import KEPT, observables, reference_radii, share_observables
-from sim.settings import MEMBERS
+from sim.analysis.correlation import correlation_time
+from sim.analysis.events import events
+from sim.analysis.observables import KEPT, observables, reference_radii, share_observables
+from sim.analysis.scene import MEMBERS
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -72,7 +72,7 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
         ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` of every trajectory (see ``summary``), the
         same of ``area_ratio`` (A/A_JKR), ``fraction_detached`` and ``fraction_masked`` (the latter is
         known of statistics alone only while all contacts are closed), of what is told once of a whole run (see
-        ``sim.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
+        ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
         has stopped is left out from there on; ``fraction_detached`` counts it.
     """
     return summary(observables(dataset)).merge(summary(events(dataset))).merge(correlation_time(dataset))

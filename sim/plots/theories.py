@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 
 from sim.analysis import engineering, is_steady, setting, settled, sweep_dims
 from sim.laws.theories import compare_at_indentation, compare_at_load
-from sim.pictures import BOTH, LINES, REFERENCE, WIDE, Unit, label, letter, picture, span
+from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, label, letter, picture, span
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {

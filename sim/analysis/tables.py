@@ -12,12 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.correlation import correlation_time
-from sim.events import events
-from sim.members import QUANTILES, shares, statistics, summary
+from sim.analysis.correlation import correlation_time
+from sim.analysis.events import events
+from sim.analysis.observables import observables, settled, share_observables
+from sim.analysis.scene import control, is_stationary, stays_held, sweep_dims, word
+from sim.analysis.statistics import QUANTILES, shares, statistics, summary
 from sim.numerics.files import write_whole
-from sim.observables import observables, settled, share_observables
-from sim.settings import control, is_stationary, stays_held, sweep_dims, word
 from sim.units.notation import concise, scaled
 
 Columns = dict[str, list[str]]

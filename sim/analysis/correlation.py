@@ -7,7 +7,7 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from sim.settings import MEMBERS, sweep_dims
+from sim.analysis.scene import MEMBERS, sweep_dims
 
 #: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
 _WINDOW = 6.0

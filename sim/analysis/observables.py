@@ -9,8 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
+from sim.analysis.scene import MEMBERS, control, setting, stays_held, word
 from sim.laws import jkr
-from sim.settings import MEMBERS, control, setting, stays_held, word
 
 KEPT = ("mean", "std", "sem")
 

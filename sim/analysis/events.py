@@ -5,9 +5,9 @@ import contextlib
 import numpy as np
 import xarray as xr
 
-from sim.energies import loop_energy
-from sim.observables import masks, ordered, pure
-from sim.settings import MEMBERS, setting, word
+from sim.analysis.loops import loop_energy
+from sim.analysis.observables import masks, ordered, pure
+from sim.analysis.scene import MEMBERS, setting, word
 
 #: A maximum is one if it stands above the ends of the run by more than rounding.
 _ROUNDING = 1e-9

@@ -1,0 +1,5 @@
+"""Figures of datasets."""
+
+from sim.plots.kinds import KINDS, draw
+
+__all__ = ["KINDS", "draw"]
