@@ -278,8 +278,8 @@ def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[st
     except ValueError as fault:
         raise BadInput([f"--budget {budget}: {fault}"]) from None
     scene = load(scenario, _overrides(changes))
-    from sim import converge as convergence
     from sim.numerics.files import explained
+    from sim.study import converge as convergence
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
     found = convergence.converge(scene, seconds)
@@ -299,7 +299,7 @@ def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[st
 @cli.command()
 def paper() -> None:
     """Reproduce every equation and number of the paper, one line each with its error; exit 1 if any fails."""
-    from sim.paper import checks
+    from sim.study.paper import checks
 
     results = checks()
     _print_rows(

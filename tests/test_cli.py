@@ -14,8 +14,9 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 
-from sim import cli, paper
+from sim import cli
 from sim.scenario.reader import BadInput, load
+from sim.study import paper
 
 LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
 SCENE = """\

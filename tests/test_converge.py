@@ -10,16 +10,9 @@ from numpy.testing import assert_allclose
 from scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
 from scipy import stats
 
-import sim.converge as converge_module
-from sim.alternatives import settings
-from sim.converge import converge, figure, plan_members, recommendation, table
-from sim.converge_table import contradicted, real, within
+import sim.study.converge as converge_module
 from sim.engine import march
 from sim.ensemble.recorded import GAUGES
-from sim.estimates import STATISTICS, Lags, estimates
-from sim.expected import Expectation, Terms, course
-from sim.gammasum import GammaSum
-from sim.moments import stated_times
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
@@ -28,6 +21,13 @@ from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.correlation import Slip, Time, Wave
 from sim.scenario.clock import Clock, Record
 from sim.spectrum.families import Gaussian, Ripple, SelfAffine
+from sim.study.converge import converge, figure, plan_members, recommendation, table
+from sim.study.estimates import STATISTICS, Lags, estimates
+from sim.study.exact_law import Expectation, Terms, course
+from sim.study.gamma_sum import GammaSum
+from sim.study.settings import settings
+from sim.study.stated_times import stated_times
+from sim.study.verdicts import contradicted, real, within
 
 ROUGH = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=8e-6)
 STEADY = {

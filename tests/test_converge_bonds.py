@@ -8,17 +8,17 @@ import xarray as xr
 from numpy.testing import assert_allclose
 from scenes import BELL, CUT_OFF, STRETCHED, scene
 
-import sim.converge_bonds as converge_bonds_module
-import sim.converge_bonds_march as march_module
-from sim.converge import converge, figure
-from sim.converge_bonds import converge_bonds, has_bond_depths
-from sim.converge_bonds_march import REFERENCE, Course, bond_rows
-from sim.converge_bonds_table import bond_advice, bond_table
+import sim.study.bond_models as march_module
+import sim.study.bonds as converge_bonds_module
 from sim.laws.schallamach import bell_stress, first_moment_stress
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.drive import prescribed as drive
 from sim.scenario.clock import Clock
+from sim.study.bond_models import REFERENCE, Course, bond_rows
+from sim.study.bond_verdicts import bond_advice, bond_table
+from sim.study.bonds import converge_bonds, has_bond_depths
+from sim.study.converge import converge, figure
 
 COHORT = bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=3e-3)
 STEADY = {"bonds": COHORT, "drive": drive.Steady(speed=5e-3), "clock": Clock(duration=0.05, step=1e-3)}

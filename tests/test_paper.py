@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from sim import paper
 from sim.laws import halfspace, jkr, schallamach
-from sim.paper import Check, checks
+from sim.study import paper
+from sim.study.paper import Check, checks
 
 
 def test_every_line_of_the_paper_holds():

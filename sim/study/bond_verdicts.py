@@ -32,7 +32,7 @@ def bond_table(dataset: xr.Dataset) -> list[dict[str, str]]:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim.converge_bonds.converge_bonds`` gives it.
+        As ``sim.study.bonds.converge_bonds`` gives it.
 
     Returns
     -------

@@ -1,6 +1,6 @@
 """Speed against error for one scene: ``sim converge``.
 
-Every admissible setting (``sim.alternatives``) is run within a shared budget and set against the
+Every admissible setting (``sim.study.settings``) is run within a shared budget and set against the
 closed form where there is one, else against the best of its own kind. Three errors stand side by
 side: what was known before the run, what was measured, and the standard error of the measurement.
 """
@@ -13,19 +13,19 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sim.alternatives import Setting, settings
-from sim.converge_bonds import converge_bonds, has_bond_depths
-from sim.converge_bonds_table import bond_advice, bond_table
-from sim.converge_data import QUANTITIES, Laws, Run, assembled, filled
-from sim.converge_figure import figure
-from sim.converge_table import recommendation, table
 from sim.engine import march
 from sim.ensemble.recorded import GAUGES
-from sim.estimates import Lags, estimates
-from sim.expected import Terms
-from sim.moments import Moment, stated_times
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.scenario import Scenario
+from sim.study.bond_verdicts import bond_advice, bond_table
+from sim.study.bonds import converge_bonds, has_bond_depths
+from sim.study.errors import QUANTITIES, Laws, Run, assembled, filled
+from sim.study.estimates import Lags, estimates
+from sim.study.exact_law import Terms
+from sim.study.figure import figure
+from sim.study.settings import Setting, settings
+from sim.study.stated_times import Moment, stated_times
+from sim.study.verdicts import recommendation, table
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -65,7 +65,7 @@ def converge(scenario: Scenario, budget_seconds: float, progress: Progress | Non
         reference's own value for mean, standard deviation and correlation time, its mean for
         quantiles, and the skewness of ΔΓ for both skewnesses (1 where ΔΓ has none). Along ``row`` also
         the costs, members and TOML lines, and the measured statistics in SI. Where the bonds have a
-        hazard or are counted, also what ``sim.converge_bonds.converge_bonds`` gives.
+        hazard or are counted, also what ``sim.study.bonds.converge_bonds`` gives.
 
     Notes
     -----

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.expected import Expectation, Terms, course, never_opens
 from sim.parts.bonds import Counted
 from sim.parts.drive import Steady
 from sim.scenario.scenario import Scenario
+from sim.study.exact_law import Expectation, Terms, course, never_opens
 
 #: The correlation time is summed until the correlation has fallen to this, over about so many lags.
 _FORGOTTEN, _LAGS = 0.02, 24

@@ -10,13 +10,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sim.alternatives import Setting, tolerance_of
-from sim.estimates import STATISTICS, Estimate
-from sim.expected import Expectation, Terms, course
-from sim.moments import MOST_WALKED, Moment
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.scenario import Scenario
+from sim.study.estimates import STATISTICS, Estimate
+from sim.study.exact_law import Expectation, Terms, course
+from sim.study.settings import Setting, tolerance_of
+from sim.study.stated_times import MOST_WALKED, Moment
 
 Array = NDArray[np.float64]
 

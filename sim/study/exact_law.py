@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from sim.estimates import RARE
-from sim.gammasum import GammaSum
 from sim.parts.bonds import Cohort, Counted, Rate, Steady, Tracked, Unbroken
 from sim.parts.shear.amplitude import Constant
 from sim.parts.shear.banded import BandedProcess
@@ -22,6 +20,8 @@ from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.process import SmoothProcess
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import BondMade
+from sim.study.estimates import RARE
+from sim.study.gamma_sum import GammaSum
 
 Array = NDArray[np.float64]
 Steps = NDArray[np.int64]

@@ -14,14 +14,14 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sim.alternatives import tolerance_of
 from sim.analysis import engineering
-from sim.converge_bonds_march import REFERENCE, BondRow, Course, bond_rows, march, march_all
 from sim.laws.schallamach import bell_moments, constant_moments, cut_off_moments
 from sim.parts.bonds import models as depths
 from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.drive import Steady
 from sim.scenario.scenario import Scenario
+from sim.study.bond_models import REFERENCE, BondRow, Course, bond_rows, march, march_all
+from sim.study.settings import tolerance_of
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""The depths that the bonds of a scene admit, and their march without anything else, for ``sim.converge_bonds``."""
+"""The depths that the bonds of a scene admit, and their march without anything else, for ``sim.study.bonds``."""
 
 import math
 import time

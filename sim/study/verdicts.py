@@ -87,7 +87,7 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim.converge.converge`` gives it.
+        As ``sim.study.converge.converge`` gives it.
 
     Returns
     -------
@@ -202,7 +202,7 @@ def recommendation(dataset: xr.Dataset) -> str:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim.converge.converge`` gives it.
+        As ``sim.study.converge.converge`` gives it.
     """
     tolerance, line = float(dataset.attrs["asked_tolerance"]), dataset["line"].to_numpy()
     paid, kept = cost(dataset), within(dataset, tolerance)

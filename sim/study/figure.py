@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter
 
-from sim.converge_table import cost
 from sim.plots.style import LINES, REFERENCE, STYLE, legend, plain_ticks, rows
+from sim.study.verdicts import cost
 
 #: Errors below this are drawn at it, with an arrow: the closed forms are not exact to more.
 _FLOOR = 1e-4
@@ -43,7 +43,7 @@ def figure(dataset: xr.Dataset) -> Figure:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim.converge.converge`` gives it.
+        As ``sim.study.converge.converge`` gives it.
 
     Returns
     -------

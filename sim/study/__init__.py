@@ -1,0 +1,1 @@
+"""Studies: the numbers of the paper; speed against error."""
