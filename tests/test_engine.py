@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, scene
 from numpy.testing import assert_allclose
-from scenes import BONDS, CONTACTS, DRIVES, SHEARS, scene
 
 from sim.engine import march, pack, unpack
 

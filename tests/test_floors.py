@@ -49,14 +49,31 @@ def floor(name):
 
 @pytest.mark.parametrize("name", sorted(MODULES))
 def test_a_module_imports_only_from_floors_below_its_own(name):
-    if floor(name) not in FLOORS:
-        return
     for other in imported(MODULES[name]):
         assert other, f"{name} imports the package root"
-        if floor(other) not in FLOORS or floor(other) == floor(name):
+        if floor(other) == floor(name):
             continue
         assert FLOORS.index(floor(other)) < FLOORS.index(floor(name)), f"{name} imports {other}, which is not below it"
         assert floor(other) not in FORBIDDEN.get(floor(name), ()), f"{name} imports {other}"
+
+
+def test_every_module_stands_on_a_floor():
+    assert {floor(name) for name in MODULES} == set(FLOORS)
+    assert {path.name for path in ROOT.iterdir() if path.is_file()} == {
+        "__init__.py",
+        "__main__.py",
+        "cli.py",
+        "engine.py",
+        "starter.toml",
+    }
+
+
+@pytest.mark.parametrize("name", sorted(name for name in MODULES if name.count(".") > 1 and floor(name) == "parts"))
+def test_a_part_reads_no_other_part(name):
+    part = name.split(".")[1]
+    for other in imported(MODULES[name]):
+        if floor(other) == "parts":
+            assert other == "parts.exchange" or other.split(".")[1] == part, f"{name} imports {other}"
 
 
 def test_nothing_imports_in_a_circle():

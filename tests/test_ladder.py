@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from helpers.scenes import BELL, BONDS, CELL, CUT_OFF, SPECTRUM, STRETCHED, scene
 from numpy.testing import assert_allclose
-from scenes import BELL, BONDS, CELL, CUT_OFF, SPECTRUM, STRETCHED, scene
 
 from sim.engine import march
 from sim.laws import jkr

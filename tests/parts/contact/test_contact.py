@@ -6,8 +6,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
+from helpers.scenes import SHEARS, scene
 from numpy.testing import assert_allclose, assert_array_equal
-from scenes import SHEARS, scene
 
 from sim.engine import march, pack
 from sim.ensemble.recorded import GAUGES

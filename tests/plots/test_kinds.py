@@ -6,7 +6,7 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
-from pictured import STEADY, drawn, field, mapped, rendered, simulated
+from helpers.pictured import STEADY, drawn, field, mapped, rendered, simulated
 
 from sim import analysis
 from sim.parts.bonds import models as bonds

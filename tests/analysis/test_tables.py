@@ -3,10 +3,10 @@
 import itertools
 import re
 
-import lens
 import numpy as np
 import pytest
-from lens import scene
+from helpers import lens
+from helpers.lens import scene
 
 from sim import analysis
 from sim.ensemble.simulate import run

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
+from helpers.scenes import BELL, BONDS, CELL, STRETCHED, scene
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
-from scenes import BELL, BONDS, CELL, STRETCHED, scene
 
 from sim.engine import march
 from sim.ensemble.recorded import GAUGES

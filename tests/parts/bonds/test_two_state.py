@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 import pytest
+from helpers.scenes import BELL, CUT_OFF, STRETCHED, scene
 from numpy.testing import assert_allclose
-from scenes import BELL, CUT_OFF, STRETCHED, scene
 from scipy.stats import binom, chi2
 
 from sim.engine import march

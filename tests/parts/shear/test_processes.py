@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.scenes import CELL, SPECTRUM, scene
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
-from scenes import CELL, SPECTRUM, scene
 
 from sim.engine import march
 from sim.laws import halfspace

@@ -1,7 +1,7 @@
 """What a dataset says about its scenario, swept or not."""
 
 import pytest
-from lens import RADIUS, scene
+from helpers.lens import RADIUS, scene
 
 from sim import analysis
 from sim.analysis.scene import told, word

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
 from numpy.testing import assert_allclose
-from scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
 
 from sim.engine import march
 from sim.ensemble import plan as plans

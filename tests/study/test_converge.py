@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
 from numpy.testing import assert_allclose
-from scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
 from scipy import stats
 
 import sim.study.converge as converge_module

@@ -21,8 +21,8 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.schema import scenario_schema
 from sim.scenario.toml_lines import key_lines
 
-FOLDER = Path(__file__).parent.parent / "scenarios"
-STARTER = Path(__file__).parent.parent / "sim" / "starter.toml"
+FOLDER = Path(__file__).parents[2] / "scenarios"
+STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 SCENE = """\

@@ -13,7 +13,7 @@ from sim.ensemble.simulate import run
 from sim.scenario.declared import quantities
 from sim.scenario.reader import load
 
-FOLDER = Path(__file__).parent.parent / "scenarios"
+FOLDER = Path(__file__).parents[2] / "scenarios"
 WIDE = {"model": "gaussian", "rms": "10 kPa", "length": "4 mm"}
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
@@ -199,7 +199,7 @@ def test_more_members_take_longer_and_more_memory():
 
 
 def test_a_depth_chosen_by_the_scene_is_named_with_its_reason():
-    from scenes import SHEARS, scene
+    from helpers.scenes import SHEARS, scene
 
     with_memory, without = (preview(scene(shear=SHEARS[f"auto {name} memory"])) for name in ("with", "without"))
     assert "→ banded" in with_memory and "a memory is given" in with_memory
@@ -207,7 +207,7 @@ def test_a_depth_chosen_by_the_scene_is_named_with_its_reason():
 
 
 def test_waves_longer_than_the_cell_are_told():
-    from scenes import CELL, SHEARS, SPECTRUM, scene
+    from helpers.scenes import CELL, SHEARS, SPECTRUM, scene
 
     from sim.parts.shear import models as shear
     from sim.parts.shear.correlation import Slip
@@ -219,7 +219,7 @@ def test_waves_longer_than_the_cell_are_told():
 
 
 def test_the_mean_field_of_bell_bonds_is_told_by_how_much_it_overpredicts():
-    from scenes import BELL, CUT_OFF, STRETCHED, scene
+    from helpers.scenes import BELL, CUT_OFF, STRETCHED, scene
 
     from sim.parts.bonds import models as bonds
     from sim.parts.bonds.rupture import Constant
@@ -240,7 +240,7 @@ def test_the_mean_field_of_bell_bonds_is_told_by_how_much_it_overpredicts():
 
 
 def test_bonds_left_open_are_told_with_their_depth_and_the_reason():
-    from scenes import BELL, STRETCHED, scene
+    from helpers.scenes import BELL, STRETCHED, scene
 
     from sim.parts.bonds import models as bonds
     from sim.parts.bonds.rupture import Constant

@@ -4,9 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from helpers.pictured import RAMP, STEADY, rendered, simulated
 from matplotlib.patches import Circle
 from numpy.testing import assert_allclose
-from pictured import RAMP, STEADY, rendered, simulated
 
 from sim.laws import jkr, profiles, theories
 from sim.parts.bonds import models as bonds

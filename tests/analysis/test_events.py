@@ -2,10 +2,10 @@
 
 import math
 
-import lens
 import numpy as np
 import pytest
-from lens import scene
+from helpers import lens
+from helpers.lens import scene
 
 from sim import analysis
 from sim.ensemble.simulate import run

@@ -9,7 +9,7 @@ import pytest
 from sim.scenario.reader import BadInput, load
 from sim.scenario.scenario import Scenario
 
-FOLDER = Path(__file__).parent.parent / "scenarios"
+FOLDER = Path(__file__).parents[2] / "scenarios"
 FILES = b"""
 [clock]
 duration = "1 s"

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.pictured import STEADY, drawn, rendered, simulated
 from numpy.testing import assert_allclose
-from pictured import STEADY, drawn, rendered, simulated
 
 from sim.analysis import loop_energy
 from sim.laws import jkr

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 import pytest
+from helpers.scenes import CELL, SPECTRUM, scene
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
-from scenes import CELL, SPECTRUM, scene
 from scipy.interpolate import CubicSpline
 from scipy.stats import expon, kstest, ncx2
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.pictured import CELL, STEADY, field, mapped, rendered, simulated
 from matplotlib.patches import Circle
-from pictured import CELL, STEADY, field, mapped, rendered, simulated
 
 from sim.numerics.grid import Grid
 from sim.parts.drive import prescribed as drive

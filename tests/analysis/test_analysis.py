@@ -2,11 +2,11 @@
 
 import math
 
-import lens
 import numpy as np
 import pytest
 import xarray as xr
-from lens import scene
+from helpers import lens
+from helpers.lens import scene
 
 from sim import analysis
 from sim.ensemble.simulate import run

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from helpers.pictured import drawn, rendered, simulated
 from numpy.testing import assert_allclose
-from pictured import drawn, rendered, simulated
 
 from sim.laws import schallamach
 from sim.parts.bonds import models as bonds

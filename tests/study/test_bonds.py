@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.scenes import BELL, CUT_OFF, STRETCHED, scene
 from numpy.testing import assert_allclose
-from scenes import BELL, CUT_OFF, STRETCHED, scene
 
 import sim.study.bond_models as march_module
 import sim.study.bonds as converge_bonds_module

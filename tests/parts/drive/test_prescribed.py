@@ -4,9 +4,9 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.scenes import DRIVES
 from numpy.testing import assert_allclose
 from pydantic import ValidationError
-from scenes import DRIVES
 from scipy.integrate import quad
 
 from sim.parts.drive import Ramp, Start, Steady, Table

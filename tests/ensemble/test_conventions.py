@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from scenes import BONDS, CELL, SPECTRUM, scene
+from helpers.scenes import BONDS, CELL, SPECTRUM, scene
 
 from sim.ensemble.simulate import run
 from sim.parts.shear import models as shear
@@ -15,7 +15,7 @@ from sim.scenario.clock import Record
 from sim.scenario.reader import load
 from sim.scenario.scenario import read_sweep
 
-SCENARIOS = sorted((Path(__file__).parent.parent / "scenarios").glob("*.toml"))
+SCENARIOS = sorted((Path(__file__).parents[2] / "scenarios").glob("*.toml"))
 
 
 def check(path):
