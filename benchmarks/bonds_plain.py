@@ -4,7 +4,7 @@ import numpy as np
 
 
 class TrackedNumpy:
-    """Bonds under Bell's hazard in fixed steps: in each, a bond breaks and a free site binds by chance.
+    """Bonds under Bell's rupture in fixed steps: in each, a bond breaks and a free site binds by chance.
 
     Parameters
     ----------
@@ -18,21 +18,21 @@ class TrackedNumpy:
     Notes
     -----
     First order in the step. A free site keeps the stretch 0; a bond breaks when an exponential number
-    is below its hazard times the step, which needs one exponential function less than its chance.
+    is below its rupture times the step, which needs one exponential function less than its chance.
     """
 
     def __init__(self, shape, rate, softness, rebinding_rate, random):
         self.rate, self.softness, self.rebinding_rate, self.random = rate, softness, rebinding_rate, random
         self.stretch, self.bound = np.zeros(shape), np.zeros(shape, bool)
-        self.hazard, self.threshold = np.empty(shape), np.empty(shape)
+        self.rupture, self.threshold = np.empty(shape), np.empty(shape)
 
     def step(self, slip, duration):
         """One step; share of sites bound, mean stretch and mean square stretch per site."""
-        np.multiply(self.stretch, self.softness, out=self.hazard)
-        np.exp(self.hazard, out=self.hazard)
-        self.hazard *= self.rate * duration
+        np.multiply(self.stretch, self.softness, out=self.rupture)
+        np.exp(self.rupture, out=self.rupture)
+        self.rupture *= self.rate * duration
         self.random.standard_exponential(out=self.threshold)
-        breaks = self.threshold < self.hazard
+        breaks = self.threshold < self.rupture
         binds = self.threshold < self.rebinding_rate * duration
         self.bound = np.where(self.bound, ~breaks, binds)
         self.stretch += slip
@@ -45,12 +45,12 @@ class TrackedChances(TrackedNumpy):
     """The same with uniform numbers against the chance of a rupture, 1 − e^(−k dt)."""
 
     def step(self, slip, duration):
-        np.multiply(self.stretch, self.softness, out=self.hazard)
-        np.exp(self.hazard, out=self.hazard)
-        self.hazard *= -self.rate * duration
-        np.exp(self.hazard, out=self.hazard)
+        np.multiply(self.stretch, self.softness, out=self.rupture)
+        np.exp(self.rupture, out=self.rupture)
+        self.rupture *= -self.rate * duration
+        np.exp(self.rupture, out=self.rupture)
         self.random.random(out=self.threshold)
-        stays = self.threshold < self.hazard
+        stays = self.threshold < self.rupture
         binds = self.threshold < -np.expm1(-self.rebinding_rate * duration)
         self.bound = np.where(self.bound, stays, binds)
         self.stretch += slip
@@ -59,7 +59,7 @@ class TrackedChances(TrackedNumpy):
         return self.bound.mean(), stretch.mean(), np.einsum("i,i->", stretch, stretch) / stretch.size
 
 
-def counted_gillespie_numpy(bound, sites, speed_ratio, healing, duration, random):
+def counted_gillespie_numpy(bound, sites, speed_ratio, rebinding_rate, duration, random):
     """Numbers of bound sites after a time, by Gillespie's algorithm on all members at once.
 
     Parameters
@@ -68,7 +68,7 @@ def counted_gillespie_numpy(bound, sites, speed_ratio, healing, duration, random
         Bound sites at the start.
     sites : int
         Sites of each member.
-    speed_ratio, healing, duration : float
+    speed_ratio, rebinding_rate, duration : float
         V/Vc [1], h [1/s], time [s].
     random : numpy.random.Generator
         Where waiting times and choices come from.
@@ -87,8 +87,8 @@ def counted_gillespie_numpy(bound, sites, speed_ratio, healing, duration, random
     active = np.arange(len(bound))
     while active.size:
         number = bound[active]
-        bind = healing * (sites - number)
-        total = bind + healing * speed_ratio * number
+        bind = rebinding_rate * (sites - number)
+        total = bind + rebinding_rate * speed_ratio * number
         time[active] += random.standard_exponential(active.size) / total
         going = time[active] < duration
         binds = random.random(active.size) * total < bind

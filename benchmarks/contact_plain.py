@@ -26,31 +26,31 @@ def radius_at_load(load, work, sphere_radius, modulus):
 
 
 def coefficients(stiffness, work, sphere_radius, modulus):
-    """Of the travel c6 x^6 + c4 x^4 - c3 x^3 - c1 x of an equilibrium, x the square root of its radius."""
+    """Of the displacement c6 x^6 + c4 x^4 - c3 x^3 - c1 x of an equilibrium, x the square root of its radius."""
     work = np.maximum(work, 0.0)
     c6, c4 = 4 * modulus / (3 * sphere_radius * stiffness), 1 / sphere_radius
     return c6, c4, np.sqrt(8 * np.pi * work * modulus) / stiffness, np.sqrt(2 * np.pi * work / modulus)
 
 
-def right_of_root(travel, stiffness, work, sphere_radius, modulus):
+def right_of_root(displacement, stiffness, work, sphere_radius, modulus):
     """A square root of the radius that is too large: no indentation or load is below its pull-off value."""
     unit = np.cbrt(np.pi * np.maximum(work, 0.0) * sphere_radius**2 / (8 * modulus))
-    load = stiffness * (travel + 3 * unit**2 / sphere_radius)
-    depth = travel + 1.5 * np.pi * np.maximum(work, 0.0) * sphere_radius / stiffness
+    load = stiffness * (displacement + 3 * unit**2 / sphere_radius)
+    depth = displacement + 1.5 * np.pi * np.maximum(work, 0.0) * sphere_radius / stiffness
     at_load = np.sqrt(radius_at_load(load, work, sphere_radius, modulus))
     at_grips = np.maximum(sphere_radius * depth, 0.0) ** 0.25 + np.sqrt(unit) * 4 ** (1 / 3)
     return np.fmin(at_load, at_grips)
 
 
-def radius_by_newton(travel, stiffness, work, sphere_radius, modulus):
+def radius_by_newton(displacement, stiffness, work, sphere_radius, modulus):
     """Newton's method on whole arrays from the right; nan where the slope vanishes before a root is met."""
     c6, c4, c3, c1 = coefficients(stiffness, work, sphere_radius, modulus)
-    x = right_of_root(travel, stiffness, work, sphere_radius, modulus)
+    x = right_of_root(displacement, stiffness, work, sphere_radius, modulus)
     with np.errstate(divide="ignore", invalid="ignore"):
         for _ in range(60):
             square = x * x
             quartic = x * (c6 * square + c4)
-            value = x * (square * (quartic - c3) - c1) - travel
+            value = x * (square * (quartic - c3) - c1) - displacement
             slope = square * (x * (6 * c6 * square + 4 * c4) - 3 * c3) - c1
             move = value / slope
             x = np.where(slope > 0, x - move, np.nan)
@@ -59,29 +59,29 @@ def radius_by_newton(travel, stiffness, work, sphere_radius, modulus):
     return x * x
 
 
-def radius_by_find_root(travel, stiffness, work, sphere_radius, modulus, fold):
+def radius_by_find_root(displacement, stiffness, work, sphere_radius, modulus, fold):
     """scipy's bracketing solver for arrays, from the fold, which is given to it, to the bound on the right."""
 
-    def excess(x, travel, c6, c4, c3, c1):
+    def excess(x, displacement, c6, c4, c3, c1):
         square = x * x
-        return x * (square * (x * (c6 * square + c4) - c3) - c1) - travel
+        return x * (square * (x * (c6 * square + c4) - c3) - c1) - displacement
 
-    bounds = np.sqrt(fold), right_of_root(travel, stiffness, work, sphere_radius, modulus)
-    known = (travel, *coefficients(stiffness, work, sphere_radius, modulus))
+    bounds = np.sqrt(fold), right_of_root(displacement, stiffness, work, sphere_radius, modulus)
+    known = (displacement, *coefficients(stiffness, work, sphere_radius, modulus))
     found = elementwise.find_root(excess, bounds, args=known)
     return found.x**2
 
 
-def exact_radius(travel, stiffness, work, sphere_radius, modulus):
+def exact_radius(displacement, stiffness, work, sphere_radius, modulus):
     """The radius to fifty digits, by Newton's method from the right."""
-    travel, stiffness, work, sphere_radius, modulus = map(
-        mpmath.mpf, map(float, (travel, stiffness, work, sphere_radius, modulus))
+    displacement, stiffness, work, sphere_radius, modulus = map(
+        mpmath.mpf, map(float, (displacement, stiffness, work, sphere_radius, modulus))
     )
     c6, c4 = 4 * modulus / (3 * sphere_radius * stiffness), 1 / sphere_radius
     c3, c1 = mpmath.sqrt(8 * mpmath.pi * work * modulus) / stiffness, mpmath.sqrt(2 * mpmath.pi * work / modulus)
     x = mpmath.mpf(1)
     while True:
-        value = x * (x**2 * (x * (c6 * x**2 + c4) - c3) - c1) - travel
+        value = x * (x**2 * (x * (c6 * x**2 + c4) - c3) - c1) - displacement
         lower = x - value / (x**2 * (x * (6 * c6 * x**2 + 4 * c4) - 3 * c3) - c1)
         if not lower < x * (1 - mpmath.mpf(10) ** -45):
             return x * x
@@ -120,7 +120,7 @@ def at_load(compare: Callable) -> list:
 
 
 def behind_machine(compare: Callable) -> list:
-    """A travel behind machines from a tenth of the contact's stiffness to a hundred times."""
+    """A displacement behind machines from a tenth of the contact's stiffness to a hundred times."""
     rows = []
     for count, repeats in ((1000, 40), (100_000, 1)):
         random = np.random.default_rng(2)
@@ -129,7 +129,7 @@ def behind_machine(compare: Callable) -> list:
         )  # fmt: skip
         known = (*states, SPHERE_RADIUS, MODULUS)
         fold = jkr.pull_off_at_stiffness(*known[1:]).radius
-        ours = lambda known=known: jkr.radius_at_travel(*known)  # noqa: E731
+        ours = lambda known=known: jkr.radius_at_displacement(*known)  # noqa: E731
         newton = lambda known=known: radius_by_newton(*known)  # noqa: E731
         scipys = lambda known=known, fold=fold: radius_by_find_root(*known, fold)  # noqa: E731
         mine = f"laws.jkr behind a machine, {count:,} radii ({error(ours, exact_radius, *states):.0e})"

@@ -85,10 +85,10 @@ def scene(members: int, **parts) -> Scenario:
 def mean_field() -> list[Row]:
     """A batch costs the Python of the loop once; what all members share is computed once."""
     shared = {
-        "bonds": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=3e5),
+        "bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5),
         "shear": shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6)),
     }
-    counted = {"bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=100, stress=3e5)}
+    counted = {"bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100, stress=3e5)}
     modal = {
         "shear": shear.Modal(
             spectrum=SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=16e-6),
@@ -145,7 +145,7 @@ def modal() -> list[Row]:
 def step() -> list[Row]:
     """What a step of the whole engine costs beside its modes."""
     recipe = shear.Modal(spectrum=SPECTRUM, cell=0.24e-3, points=256, memory=Slip(length=5e-6))
-    scenario = scene(1, shear=recipe, bonds=bonds.Rate(critical_speed=1e-2, healing=500.0))
+    scenario = scene(1, shear=recipe, bonds=bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0))
     dice = Dice.of(1, np.arange(1))
     state = {"now": start(scenario, dice)}
 
@@ -267,7 +267,7 @@ def sizes() -> list[Row]:
 
 
 #: Bonds with a rate at rest, a Bell force and a stiffness of 1; at a speed of 10 friction is near its maximum.
-BELL = {"hazard": Bell(zero_force_rate=1.0, bell_force=1.0), "bond_stiffness": 1.0, "rebinding_rate": 1.0}
+BELL = {"rupture": Bell(zero_force_rate=1.0, bell_force=1.0), "bond_stiffness": 1.0, "rebinding_rate": 1.0}
 BELL_SPEED, BELL_STEP = 10.0, 0.01
 
 
@@ -302,7 +302,7 @@ def stepped(shape: tuple[int, ...], step: float = BELL_STEP, count: int = 1) -> 
 
 
 def tracked() -> list[Row]:
-    """Bonds one by one, k0 dt = 0.01, Bell's hazard at eps = 10 and beta = 1, beside numpy's stepper of as many."""
+    """Bonds one by one, k0 dt = 0.01, Bell's rupture at eps = 10 and beta = 1, beside numpy's stepper of as many."""
     rows = []
     for sites, members, repeats, promise in (
         (100, 64, 40, ""),
@@ -360,7 +360,7 @@ def counted() -> list[Row]:
         (10_000, 1000, 1000, "500 or more"),
         (100_000, 1000, 200, "500 or more"),
     ):
-        part = bonds.Counted(critical_speed=1e-2, healing=500.0, sites=sites)
+        part = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=sites)
         first = np.full(others, sites // 2)
         rows.append(
             compare(

@@ -220,7 +220,7 @@ def stats(output: Path, csv: Path | None) -> None:
 def plot(output: Path, kind: str | None, picture: Path | None) -> None:
     """Draw a figure; without a KIND the one that fits.
 
-    KIND is curve, time, sweep, map, spectrum, friction, rivals, profile or loop.
+    KIND is curve, time, sweep, map, spectrum, friction, theories, profile or loop.
     """
     from sim.numerics.files import explained
     from sim.plots import kinds as plots

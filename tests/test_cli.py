@@ -37,7 +37,7 @@ to = "20 mm/s"
 [bonds]
 model = "counted"
 critical_speed = "10 mm/s"
-healing = "500 1/s"
+rebinding_rate = "500 1/s"
 sites = 50
 stress = "0.3 MPa"
 [contact]
@@ -169,7 +169,7 @@ def test_run_writes_the_dataset_into_a_new_folder_and_ends_with_its_path(here):
     assert len(done.stdout.splitlines()) > 3
     assert sorted(path.name for path in (here / "new/folder").iterdir()) == ["x.nc", "x.nc.log"]
     with xr.open_dataset("new/folder/x.nc") as dataset:
-        assert dataset.sizes["realization"] == 3
+        assert dataset.sizes["member"] == 3
     entry = json.loads(Path("new/folder/x.nc.log").read_text())
     assert entry["arguments"] == ["run", "scene.toml", "-o", "new/folder/x.nc"]
 
@@ -199,7 +199,7 @@ def test_seed_members_and_set_reach_the_run(here):
     assert done.exit_code == 0
     with xr.open_dataset("outputs/scene.nc") as dataset:
         assert dataset.attrs["seed"] == "99"
-        assert dataset.sizes["realization"] == 2
+        assert dataset.sizes["member"] == 2
         assert float(dataset["contact_load"]) == 2e-3
         assert json.loads(dataset.attrs["scenario_overrides"])["contact.load"] == "2 mN"
 

@@ -87,7 +87,7 @@ def check_waist(scenario, state, members):
 
 
 def balance_of(scenario, state):
-    """w = Δγ φ − χ ΔΓ − α 6 τ0² a/(π E*), an open contact's at a = 0; on a disc ΔΓ is what its growth costs."""
+    """w = Δγ φ − χ ΔΓ − α 6 τ0² a/(π E*), an open contact's at a = 0; on a disc ΔΓ is what its amplitude costs."""
     radius = np.nan_to_num(state.contact.radius, nan=0.0)
     stress = scenario.population.shear_stress(state.bonds)
     share = 1.0 if scenario.margin is None else scenario.margin(radius)
@@ -138,9 +138,9 @@ def test_a_detached_contact_stays_open():
 
     part = shear.Modal(
         spectrum=Ripple(amplitude=4e5, wavelength=24e-6),
-        memory=Time(time=1.0),
-        growth=Onset(speed=1e-3, width=0.1),
-        amplitudes="fixed",
+        correlation=Time(time=1.0),
+        amplitude=Onset(speed=1e-3, width=0.1),
+        mode_amplitudes="fixed",
     )
     pulse = drive.Table(time=(0.0, 0.003, 0.004, 0.005, 0.1), speed=(1e-5, 1e-5, 1e-1, 1e-5, 1e-5))
     scenario = scene(1, 8, shear=part, drive=pulse, contact=CONTACTS["tension"])

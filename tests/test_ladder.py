@@ -34,17 +34,17 @@ def test_steady_bonds_become_unbroken_as_the_critical_speed_grows():
     assert_allclose(fraction, last(bonds=bonds.Unbroken()).bonds.bound, rtol=1.1e-12)
 
 
-def test_the_rate_equation_becomes_the_steady_law_as_healing_grows():
+def test_the_rate_equation_becomes_the_steady_law_as_rebinding_rate_grows():
     # on the step's mean speed; the law at that speed is reached to the last digit
     steady = last(bonds=bonds.Steady(critical_speed=1e-2), drive=drive.Steady(speed=7e-3))
-    for healing in (1e5, 1e9, 1e15):
-        rate = bonds.Rate(critical_speed=1e-2, healing=healing, start_from="empty")
+    for rebinding_rate in (1e5, 1e9, 1e15):
+        rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=rebinding_rate, start_from="empty")
         found = last(bonds=rate, drive=drive.Steady(speed=7e-3))
         assert_allclose(found.bonds.bound, steady.bonds.bound, rtol=1e-14)
 
 
 def test_counted_bonds_become_the_rate_equation_as_their_number_grows():
-    recipe = {"critical_speed": 1e-2, "healing": 300.0, "start_from": "bonded"}
+    recipe = {"critical_speed": 1e-2, "rebinding_rate": 300.0, "start_from": "bonded"}
     exact = last(bonds=bonds.Rate(**recipe)).bonds.bound
     for sites in (10**2, 10**4, 10**6):
         fraction = last(400, bonds=bonds.Counted(**recipe, sites=sites)).bonds.bound / sites
@@ -56,10 +56,10 @@ def test_counted_bonds_become_the_rate_equation_as_their_number_grows():
 STARTED = drive.Start(rest=2e-3, speed=4e-3)
 
 
-@pytest.mark.parametrize("hazard", [BELL, CUT_OFF], ids=["bell", "cut-off"])
-def test_tracked_bonds_become_cohorts_as_their_number_grows(hazard):
+@pytest.mark.parametrize("rupture", [BELL, CUT_OFF], ids=["bell", "cut-off"])
+def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture):
     # sites are independent at all times: the spread of number and stress is that of one site over root N
-    members, recipe = 400, {"hazard": hazard, **STRETCHED, "start_from": "bonded"}
+    members, recipe = 400, {"rupture": rupture, **STRETCHED, "start_from": "bonded"}
     dense = bonds.Cohort(**recipe)
     exact = last(bonds=dense, drive=STARTED).bonds
     share, stress = dense.moments(exact)[0][0], dense.shear_stress(exact)[0]
@@ -81,8 +81,8 @@ def test_bell_bonds_become_those_of_a_constant_rate_to_first_order_as_the_bell_f
     fine = {"tolerance": 1e-8} if depth is bonds.Cohort else {}
     slid = {"drive": drive.Steady(speed=2e-3)}
 
-    def found(hazard):
-        part = depth(hazard=hazard, **STRETCHED, start_from="bonded", **fine)
+    def found(rupture):
+        part = depth(rupture=rupture, **STRETCHED, start_from="bonded", **fine)
         state = last(bonds=part, **slid).bonds
         return np.array([part.fraction(state)[0], part.shear_stress(state)[0]])
 
@@ -97,7 +97,7 @@ def test_bell_bonds_become_those_of_a_constant_rate_to_first_order_as_the_bell_f
 def test_the_first_moment_is_exact_where_the_rate_is_constant():
     # cohorts resolve what the first moment closes: the same number and stress, also past a reversal
     turns = drive.Table(time=(0.0, 3e-3, 3e-3, 6e-3, 6e-3, 9e-3), speed=(2e-3, 2e-3, -8e-3, -8e-3, 0.0, 0.0))
-    recipe = {"hazard": Constant(rate=200.0), **STRETCHED, "start_from": "empty"}
+    recipe = {"rupture": Constant(rate=200.0), **STRETCHED, "start_from": "empty"}
     for tolerance in (1e-2, 1e-4, 1e-6):
         closed, resolved = bonds.FirstMoment(**recipe), bonds.Cohort(**recipe, tolerance=tolerance)
         for one, other in zip(marched(closed, turns), marched(resolved, turns), strict=True):
@@ -115,7 +115,7 @@ def marched(part, motion):
 @pytest.mark.parametrize("speed", [1e-4, 8e-3, 1.0])
 def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
     # N0/(1 + V/Vc) with Vc = l k_on, at once from the steady start and for ever; each bond half stretched on average
-    recipe = {"hazard": CutOff(stretch=20e-6), **STRETCHED}
+    recipe = {"rupture": CutOff(stretch=20e-6), **STRETCHED}
     steady = last(
         bonds=bonds.Steady(critical_speed=20e-6 * STRETCHED["rebinding_rate"]), drive=drive.Steady(speed=speed)
     )
@@ -135,14 +135,17 @@ def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
 @pytest.mark.parametrize(
     ("left_open", "chosen"),
     [
-        (BONDS["auto, few sites"], bonds.Tracked(hazard=CUT_OFF, **STRETCHED, sites=20)),
-        (BONDS["auto, many sites"], bonds.Rate(critical_speed=1e-2, healing=500.0, stress=2e5)),
+        (BONDS["auto, few sites"], bonds.Tracked(rupture=CUT_OFF, **STRETCHED, sites=20)),
+        (BONDS["auto, many sites"], bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=2e5)),
         (
-            bonds.Auto(critical_speed=1e-2, healing=5.0, sites=30),
-            bonds.Counted(critical_speed=1e-2, healing=5.0, sites=30),
+            bonds.Auto(critical_speed=1e-2, rebinding_rate=5.0, sites=30),
+            bonds.Counted(critical_speed=1e-2, rebinding_rate=5.0, sites=30),
         ),
-        (bonds.Auto(hazard=BELL, **STRETCHED), bonds.Cohort(hazard=BELL, **STRETCHED)),
-        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), bonds.FirstMoment(hazard=Constant(rate=9.0), **STRETCHED)),
+        (bonds.Auto(rupture=BELL, **STRETCHED), bonds.Cohort(rupture=BELL, **STRETCHED)),
+        (
+            bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED),
+            bonds.FirstMoment(rupture=Constant(rate=9.0), **STRETCHED),
+        ),
     ],
     ids=["tracked", "rate", "counted", "cohort", "first moment"],
 )
@@ -153,7 +156,7 @@ def test_bonds_left_open_are_the_depth_that_is_chosen(left_open, chosen):
 
 
 def test_mean_fluctuations_become_uniform_as_their_rms_vanishes():
-    recipe = {"growth": Onset(speed=2e-3, width=0.3)}
+    recipe = {"amplitude": Onset(speed=2e-3, width=0.3)}
     sizes = [last(shear=shear.Mean(spectrum=Gaussian(rms=rms, length=1e-5), **recipe)) for rms in (1e3, 1e1, 1e-1)]
     energies = np.array([state.shear.energy[0] for state in sizes])
     assert_allclose(energies[:-1] / energies[1:], 1e4, rtol=1e-12)
@@ -166,7 +169,7 @@ def test_modal_fluctuations_become_the_mean_as_the_cell_grows():
     infinite = spectrum.surface_energy(shear_modulus)
     deficits, spreads = [], []
     for side in (2e-4, 4e-4, 8e-4):
-        part = shear.Modal(spectrum=spectrum, cell=side, points=round(side / 3e-6), memory=Slip(length=1e-6))
+        part = shear.Modal(spectrum=spectrum, cell=side, points=round(side / 3e-6), correlation=Slip(length=1e-6))
         errors = scene(shear=part).process.known_errors()
         deficits.append(-errors["cell_error_energy"])
         spreads.append(errors["realization_spread_energy"])
@@ -176,7 +179,7 @@ def test_modal_fluctuations_become_the_mean_as_the_cell_grows():
 
 
 def test_the_ensemble_mean_of_modal_energies_is_the_cells_own():
-    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6))
+    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6))
     members = 2000
     state = last(members, shear=part)
     pairs = scene(shear=part).process.modes.energies(1.6e6)
@@ -185,7 +188,7 @@ def test_the_ensemble_mean_of_modal_energies_is_the_cells_own():
 
 def test_banded_fluctuations_become_modal_as_the_tolerance_falls():
     # every cumulant tends to that of the sum over modes; the first two are exact at any tolerance
-    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Wave(waves=2.0)}
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Wave(waves=2.0)}
     pairs = scene(shear=shear.Modal(**recipe)).process.modes.energies(1.6e6)
     exact = np.array([math.factorial(n - 1) * np.sum(pairs**n) for n in range(1, 7)])
     before = np.full(4, np.inf)
@@ -202,7 +205,7 @@ def test_banded_fluctuations_become_modal_as_the_tolerance_falls():
 
 
 def test_auto_is_the_depth_that_it_chooses():
-    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Slip(length=5e-6)}
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Slip(length=5e-6)}
     for auto, chosen in (
         (shear.Auto(spectrum=SPECTRUM), shear.Mean(spectrum=SPECTRUM)),
         (shear.Auto(**recipe), shear.Banded(**recipe)),
@@ -215,15 +218,17 @@ def test_auto_is_the_depth_that_it_chooses():
 
 
 def test_modal_with_fixed_amplitudes_is_the_mean_with_the_cells_error():
-    growth = Onset(speed=2e-3, width=0.3)
-    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6), growth=growth, amplitudes="fixed")
+    amplitude = Onset(speed=2e-3, width=0.3)
+    part = shear.Modal(
+        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=amplitude, mode_amplitudes="fixed"
+    )
     error = scene(shear=part).process.known_errors()["cell_error_energy"]
-    mean = last(shear=shear.Mean(spectrum=SPECTRUM, growth=growth)).shear.energy
+    mean = last(shear=shear.Mean(spectrum=SPECTRUM, amplitude=amplitude)).shear.energy
     assert_allclose(last(shear=part).shear.energy, mean * (1.0 + error), rtol=1e-12)
 
 
 def test_energy_that_adhesion_does_not_pay_leaves_jkr_bit_for_bit():
-    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6), paid_by_adhesion=0.0)
+    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), paid_by_adhesion=0.0)
     found = last(4, shear=part).contact.radius
     assert np.array_equal(found, np.full(4, jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)))
 

@@ -39,7 +39,7 @@ def test_every_scenario_opens_with_its_question_and_runs(name):
 def test_the_lens_shows_the_papers_finding():
     dataset = at("pdms_lens")
     area, speed = dataset["contact_area"], dataset["speed"].values
-    share = (area / (np.pi * dataset["radius_at_rest"] ** 2)).transpose("realization", "t").values
+    share = (area / (np.pi * dataset["radius_at_rest"] ** 2)).transpose("member", "t").values
     slow = speed <= 1e-3
     assert abs(share.mean(0)[slow] - 1.0).max() < 0.03
     at_one, at_ten = (share[:, np.argmin(abs(speed - v))] for v in (1e-3, 1e-2))
@@ -86,14 +86,14 @@ def test_the_mechanisms_are_told_apart_with_the_same_noise():
     dataset = at("decomposition").isel(t=-100)
     energy = dataset["fluctuation_energy"]
     assert np.all(energy == energy.isel(bond_share=0, paid_by_adhesion=0))
-    work = dataset["work_of_adhesion"].transpose("bond_share", "paid_by_adhesion", "realization").values
+    work = dataset["work_of_adhesion"].transpose("bond_share", "paid_by_adhesion", "member").values
     assert np.all(work[0, 0] == 42e-3)
     assert_allclose(work[1, 1] - work[0, 0], (work[1, 0] - work[0, 0]) + (work[0, 1] - work[0, 0]), rtol=1e-12)
 
 
 def bell(dataset):
     """Rates, force and stiffness of a scenario's bonds, as the laws take them."""
-    names = ("hazard_zero_force_rate", "hazard_bell_force", "bond_stiffness", "rebinding_rate")
+    names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate")
     return tuple(float(dataset[f"bonds_{name}"]) for name in names)
 
 
@@ -178,7 +178,7 @@ GOLDEN = {
     "pdms_lens": (4.025421174935193e-08, 0.009510551729618833),
     "peeling": (3.343116994589865e-09, 0.0),
     "pull_off": (4.140449021877637e-09, 0.0),
-    "rivals": (3.920687657963458e-08, 0.002787734357697382),
+    "theories": (3.920687657963458e-08, 0.002787734357697382),
     "soft_lens": (1.1640794334194028e-05, 0.5291270151906378),
     "static_peak": (3.768020628008867e-08, 0.0012382541726702443),
     "uniform_stress": (3.849406592790275e-08, 0.013472923074765964),

@@ -31,7 +31,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
         - ``ever_detached``: 1 where the contact opened; ``first_detachment`` [s], nan where it never did.
         - ``time_masked``: share of the time in which adhesion was masked.
         - ``total_dissipated`` [J]: by opening and closing, to the end of the run.
-        - ``loop_energy``, ``loop_dissipation`` [J]: means over the trips there and back; see ``loop_energy``.
+        - ``loop_energy``, ``loop_dissipation`` [J]: means over the cycles there and back; see ``loop_energy``.
         - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
           ``peak_friction_time``, ``peak_friction_speed``: of a start or a ramp; see ``peaks``.
 

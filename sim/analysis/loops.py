@@ -1,4 +1,4 @@
-"""Energies of a contact that is cycled: the loop of load over travel, and what opening and closing dissipate."""
+"""Energies of a contact that is cycled: the loop of load over displacement, and what opening and closing dissipate."""
 
 import numpy as np
 import xarray as xr
@@ -10,12 +10,12 @@ _ROUNDING = 1e-12
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
-    """Work that goes into the contact over each trip there and back, and what it dissipates meanwhile.
+    """Work that goes into the contact over each cycle there and back, and what it dissipates meanwhile.
 
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it, of a scene whose load, indentation or travel makes trips.
+        As ``sim run`` writes it, of a scene whose load, indentation or displacement makes cycles.
 
     Returns
     -------
@@ -27,51 +27,53 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If nothing makes trips.
+        If nothing makes cycles.
 
     Notes
     -----
-    ``loop_energy`` is the closed integral of P dΔ with Δ the travel of what holds the sphere (its indentation,
+    ``loop_energy`` is the closed integral of P dΔ with Δ the displacement of what holds the sphere (its indentation,
     where that or a load is prescribed), by the trapezoidal rule over the records. A jump between two records is
-    drawn as a straight line, so each costs up to half its load times the travel of one record;
+    drawn as a straight line, so each costs up to half its load times the displacement of one record;
     elsewhere the error falls with the square of the time between records.
 
-    ``loop_dissipation`` is the growth of ``dissipated_energy``. Where the work of adhesion stays what it is and the
+    ``loop_dissipation`` is the amplitude of ``dissipated_energy``. Where the work of adhesion stays what it is and the
     contact follows equilibrium it is the whole loop: all that is put in is lost in jumps. With
     bonds that break and heal, or fluctuations, the work of adhesion itself does work over a cycle.
     """
-    trips = _trips(dataset)
+    cycles = _cycles(dataset)
     suffix = "" if "normal_load" in dataset else "_mean"
     going = dataset[f"contact_radius{suffix}"].notnull()
-    load, travel = (dataset[f"{name}{suffix}"].astype(float).where(going) for name in ("normal_load", "travel"))
+    load, displacement = (
+        dataset[f"{name}{suffix}"].astype(float).where(going) for name in ("normal_load", "displacement")
+    )
     number = xr.DataArray(np.arange(dataset.sizes["t"]), dims="t")
-    done = (0.5 * (load + load.shift(t=1)) * (travel - travel.shift(t=1))).where(number > 0, 0.0)
-    count = int(trips.max())
-    period = setting(dataset, "clock.duration") / trips
+    done = (0.5 * (load + load.shift(t=1)) * (displacement - displacement.shift(t=1))).where(number > 0, 0.0)
+    count = int(cycles.max())
+    period = setting(dataset, "clock.duration") / cycles
     put_in = done.fillna(0.0).cumsum("t")
     rounding = _ROUNDING * abs(put_in).max("t")
     missing = _per_cycle(done.isnull().cumsum("t").astype(float), period, dataset["t"], count)
     found = {}
     for name, series, text in (
-        ("loop_energy", put_in, "closed integral of the load over the travel"),
+        ("loop_energy", put_in, "closed integral of the load over the displacement"),
         ("loop_dissipation", dataset[f"dissipated_energy{suffix}"], "energy dissipated by opening and closing"),
     ):
         values = _per_cycle(series.astype(float), period, dataset["t"], count).where(missing == 0.0)
         values = values.where(~(abs(values) < rounding), 0.0)
-        found[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a trip", symbol="")
-    cycles = xr.DataArray(np.arange(1, count + 1), dims="cycle", attrs={"long_name": "number of the trip"})
+        found[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
+    cycles = xr.DataArray(np.arange(1, count + 1), dims="cycle", attrs={"long_name": "number of the cycle"})
     return xr.Dataset(found, {"cycle": cycles})
 
 
-def _trips(dataset: xr.Dataset) -> xr.DataArray:
+def _cycles(dataset: xr.Dataset) -> xr.DataArray:
     try:
-        trips = setting(dataset, f"contact.{control(dataset).kind}.trips")
+        cycles = setting(dataset, f"contact.{control(dataset).kind}.cycles")
     except KeyError:
-        trips = xr.DataArray(0.0)
-    if not bool((trips >= 1.0).any()):
-        said = 'give some, such as [contact] load = { from = "4 mN", to = "-1 mN", trips = 2 }'
-        raise ValueError(f"nothing makes trips there and back; {said}")
-    return trips.where(trips >= 1.0)
+        cycles = xr.DataArray(0.0)
+    if not bool((cycles >= 1.0).any()):
+        said = 'give some, such as [contact] load = { from = "4 mN", to = "-1 mN", cycles = 2 }'
+        raise ValueError(f"nothing makes cycles there and back; {said}")
+    return cycles.where(cycles >= 1.0)
 
 
 def _per_cycle(series: xr.DataArray, period: xr.DataArray, times: xr.DataArray, count: int) -> xr.DataArray:

@@ -48,8 +48,8 @@ def equilibrium_radius(dataset: xr.Dataset, work: xr.DataArray | float) -> xr.Da
     """
     held = control(dataset)
     size, modulus = setting(dataset, "sphere.radius"), dataset["contact_modulus"]
-    if held.kind == "travel":
-        return xr.apply_ufunc(jkr.radius_at_travel, held.value, held.stiffness, work, size, modulus)
+    if held.kind == "displacement":
+        return xr.apply_ufunc(jkr.radius_at_displacement, held.value, held.stiffness, work, size, modulus)
     law = jkr.radius_at_load if held.kind == "load" else jkr.radius_at_indentation
     return xr.apply_ufunc(law, held.value, work, size, modulus)
 
@@ -57,13 +57,13 @@ def equilibrium_radius(dataset: xr.Dataset, work: xr.DataArray | float) -> xr.Da
 def _opened(dataset: xr.Dataset, radius: xr.DataArray) -> xr.DataArray:
     """Where a contact that follows its equilibrium radius is open: none is left, or it was lost before.
 
-    With ``on_detach = "reattach"`` it closes again where a free sphere would touch, else never.
+    With ``after_pull_off = "reattach"`` it closes again where a free sphere would touch, else never.
     """
     held = control(dataset)
     open_now = radius.isnull() & held.value.notnull() | (radius == 0.0)
     if "t" not in radius.dims:
         return open_now
-    closes = (word(dataset, "contact.on_detach", "stay_open") == "reattach") & (held.value >= 0.0) & ~open_now
+    closes = (word(dataset, "contact.after_pull_off", "stay_open") == "reattach") & (held.value >= 0.0) & ~open_now
     number = xr.DataArray(np.arange(dataset.sizes["t"]), dims="t")
     lost, found = (_latest(number.where(where, -1)) for where in (open_now, closes))
     return lost > found
@@ -125,7 +125,8 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         ``lost_to_bonds`` and ``lost_to_fluctuations``; with ``contact.reversible`` above zero also
-        ``lost_to_mean_stress``, and with a lagging contact ``lost_to_lag``. With ``area_ratio`` they add up to one.
+        ``lost_to_mean_stress``, and with a rate-dependent contact ``lost_to_lag``. With ``area_ratio`` they
+        add up to one.
 
     Raises
     ------
@@ -169,22 +170,22 @@ def _levels(dataset: xr.Dataset) -> Iterator[tuple[str, str, xr.DataArray]]:
         return (np.pi * radius.fillna(0.0) ** 2).where(kept, 0.0).where(area.notnull())
 
     yield "lost_to_bonds", "broken bonds, which are charged first", left(bond_work(dataset))
-    alpha, lags = _reversible(dataset), word(dataset, "contact.model", "equilibrium") == "lagging"
-    stressed, lagging = bool((alpha > 0.0).any()), bool(lags.any())
-    if (stressed or lagging) and "work_of_adhesion" not in dataset:
+    alpha, lags = _reversible(dataset), word(dataset, "contact.model", "equilibrium") == "rate_dependent"
+    stressed, rate_dependent = bool((alpha > 0.0).any()), bool(lags.any())
+    if (stressed or rate_dependent) and "work_of_adhesion" not in dataset:
         raise ValueError(
             "shares of a contact that lags or pays for its mean stress need each member; record them:"
             " [record] per_member = true"
         )
     bearing = alpha * _mean_stress_work(dataset) if stressed else 0.0
-    quasistatic = left(dataset["work_of_adhesion"]).where(lags, area) if lagging else area
+    quasistatic = left(dataset["work_of_adhesion"]).where(lags, area) if rate_dependent else area
     fluctuating = (
         left(dataset["work_of_adhesion"] + bearing).where(alpha > 0.0, quasistatic) if stressed else quasistatic
     )
     yield "lost_to_fluctuations", "fluctuations, after the bonds", fluctuating
     if stressed:
         yield "lost_to_mean_stress", "the mean stress, after bonds and fluctuations", quasistatic
-    if lagging:
+    if rate_dependent:
         yield "lost_to_lag", "the edge's lag behind equilibrium, after all else", area
 
 

@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-MEMBERS = "realization"
+MEMBERS = "member"
 
-_CONTROLS = ("load", "indentation", "travel")
+_CONTROLS = ("load", "indentation", "displacement")
 
 
 def sweep_dims(dataset: xr.Dataset) -> tuple[str, ...]:
@@ -57,7 +57,7 @@ def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:
 
 
 def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
-    """A word of the scenario, such as ``"contact.on_detach"``, with the sweep's dimensions where it is swept.
+    """A word of the scenario, such as ``"contact.after_pull_off"``, with the sweep's dimensions where it is swept.
 
     ``default`` where the scenario does not say it, or a table that holds it is swept whole.
     """
@@ -114,9 +114,9 @@ class Control(NamedTuple):
     Attributes
     ----------
     kind : str
-        ``"load"``, ``"indentation"`` or ``"travel"``.
+        ``"load"``, ``"indentation"`` or ``"displacement"``.
     value : xarray.DataArray
-        Load [N], indentation or travel [m]; with the dimension ``t`` where it changes. A load is nan where
+        Load [N], indentation or displacement [m]; with the dimension ``t`` where it changes. A load is nan where
         no member is in contact and the scenario does not say it for every point of the sweep.
     stiffness : xarray.DataArray
         Of the machine [N/m]; infinite where there is none.
@@ -149,12 +149,14 @@ def control(dataset: xr.Dataset) -> Control:
     try:
         kind = next(name for name in _CONTROLS if told(dataset, "contact").get(name) is not None)
     except (KeyError, StopIteration):
-        raise KeyError("the dataset does not say what holds the sphere: a load, an indentation or a travel") from None
+        raise KeyError(
+            "the dataset does not say what holds the sphere: a load, an indentation or a displacement"
+        ) from None
     return Control(kind, _load(dataset) if kind == "load" else _first(dataset, kind), _stiffness(dataset, kind))
 
 
 def _stiffness(dataset: xr.Dataset, kind: str) -> xr.DataArray:
-    return setting(dataset, "contact.stiffness") if kind == "travel" else xr.DataArray(np.inf)
+    return setting(dataset, "contact.stiffness") if kind == "displacement" else xr.DataArray(np.inf)
 
 
 def _first(dataset: xr.Dataset, name: str) -> xr.DataArray:
@@ -181,12 +183,12 @@ def _course(dataset: xr.Dataset, key: str) -> xr.DataArray:
         said = told(dataset, key)
         if isinstance(said, dict) and "time" in said:
             return unknown.copy(data=np.interp(times, said["time"], said["value"]))
-        start, stop, trips = (setting(dataset, f"{key}.{name}") for name in ("from", "to", "trips"))
+        start, stop, cycles = (setting(dataset, f"{key}.{name}") for name in ("from", "to", "cycles"))
     except KeyError:
         return unknown
     part = times / setting(dataset, "clock.duration")
-    turn = 2.0 * trips * part % 2.0
-    part = xr.where(trips > 0.0, xr.where(turn <= 1.0, turn, 2.0 - turn), part)
+    turn = 2.0 * cycles * part % 2.0
+    part = xr.where(cycles > 0.0, xr.where(turn <= 1.0, turn, 2.0 - turn), part)
     straight = start + (stop - start) * part
     curved = start * np.abs(stop / start.where(start != 0.0)) ** part
     return xr.where(word(dataset, f"{key}.scale", "linear") == "log", curved, straight)
@@ -196,7 +198,7 @@ def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     """Whether what holds the sphere stays the same in time, at every point of the sweep.
 
     Where the table ``[contact]`` is swept whole it is read off what was recorded: one of load,
-    indentation and travel stays.
+    indentation and displacement stays.
     """
     try:
         held = control(dataset).value

@@ -18,7 +18,7 @@ def summary(trajectories: xr.Dataset) -> xr.Dataset:
     Parameters
     ----------
     trajectories : xarray.Dataset
-        Observables. One without the dimension ``realization`` is the same for all members: its
+        Observables. One without the dimension ``member`` is the same for all members: its
         spread is 0. Variables that are statistics already (``…_mean``, ``…_std``, ``…_sem``) pass.
 
     Returns
@@ -86,7 +86,7 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Statistics (``…_mean``, ``…_std``, ``…_sem``, ``…_quantile``) over the members of
         ``lost_to_bonds`` and ``lost_to_fluctuations``, with ``contact.reversible`` above zero
-        ``lost_to_mean_stress``, in a lagging contact ``lost_to_lag``; and ``radius_jkr``, ``radius_hertz``
+        ``lost_to_mean_stress``, in a rate-dependent contact ``lost_to_lag``; and ``radius_jkr``, ``radius_hertz``
         [m] and ``area_ratio_hertz`` at each sweep value, and time where what holds the sphere changes.
         nan where the contact with the full work of adhesion is open.
 

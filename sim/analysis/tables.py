@@ -35,7 +35,7 @@ class _Column(NamedTuple):
 _COLUMNS = (
     _Column("speed", "V", math.nan),
     _Column("normal_load", "P", changing=True),
-    _Column("travel", "Δ", changing=True),
+    _Column("displacement", "Δ", changing=True),
     _Column("bond_fraction", "N/N0", 1.0),
     _Column("fluctuation_energy", "ΔΓ"),
     _Column("work_of_adhesion", "w", math.nan),
@@ -55,8 +55,8 @@ _EVENTS = (
     _Column("time_masked", "masked,\nof the time"),
     _Column("ever_detached", "detached,\nof members"),
     _Column("first_detachment", "first\ndetached"),
-    _Column("loop_energy", "∮P dΔ,\na trip"),
-    _Column("loop_dissipation", "jumps,\na trip"),
+    _Column("loop_energy", "∮P dΔ,\na cycle"),
+    _Column("loop_dissipation", "jumps,\na cycle"),
     _Column("total_dissipated", "jumps,\nin all"),
     _Column("peak_stress", "peak of\nstress"),
     _Column("peak_speed", "at V", math.nan),
@@ -126,7 +126,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     -------
     list of dict
         Cells by heading, as those of ``table``: how long adhesion was masked, how many members detached and when
-        (the mean, and the 5 and 95 % quantiles of those that did), what a trip there and back took and
+        (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
         what jumps dissipated, and the friction peak of a start or a ramp.
     """
     found = summary(events(dataset))

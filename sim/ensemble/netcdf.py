@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from sim.ensemble.part_files import Parts
 from sim.ensemble.plan import Plan, part_name
-from sim.ensemble.recorded import GAUGES, Gauge
+from sim.ensemble.recorded import VARIABLES, Variable
 from sim.laws import jkr
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.declared import quantities
@@ -40,8 +40,8 @@ def write_dataset(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
     _attributes(file, plan)
     _scenario_variables(file, plan)
     _derived_variables(file, plan)
-    for gauge in GAUGES:
-        _trajectories(file, plan, parts, gauge)
+    for variable in VARIABLES:
+        _trajectories(file, plan, parts, variable)
     if plan.scenario.record.maps:
         _maps(file, plan, parts)
 
@@ -54,8 +54,8 @@ def _sweep_shape(plan: Plan) -> tuple[int, ...]:
     return tuple(len(axis.values) for axis in plan.scenario.sweep)
 
 
-def _per_member(plan: Plan, gauge: Gauge) -> bool:
-    return plan.varies(gauge) and plan.scenario.record.per_member
+def _per_member(plan: Plan, variable: Variable) -> bool:
+    return plan.varies(variable) and plan.scenario.record.per_member
 
 
 def _variable(
@@ -77,9 +77,9 @@ def _dimensions(file: netCDF4.Dataset, plan: Plan) -> None:
     for axis in plan.scenario.sweep:
         file.createDimension(axis.name, len(axis.values))
         _sweep_coordinates(file, plan, axis)
-    if plan.scenario.record.per_member and any(plan.varies(gauge) for gauge in GAUGES):
-        file.createDimension("realization", plan.members)
-        variable = _variable(file, "realization", "i4", ("realization",), "1", "number of the ensemble member")
+    if plan.scenario.record.per_member and any(plan.varies(variable) for variable in VARIABLES):
+        file.createDimension("member", plan.members)
+        variable = _variable(file, "member", "i4", ("member",), "1", "number of the ensemble member")
         variable.standard_name = "realization"
         variable[:] = np.arange(plan.members)
     file.createDimension("t", scene.clock.records)
@@ -191,25 +191,25 @@ def _derived_variables(file: netCDF4.Dataset, plan: Plan) -> None:
             file.setncattr(name, max(values, key=abs))
 
 
-def _trajectories(file: netCDF4.Dataset, plan: Plan, parts: Parts, gauge: Gauge) -> None:
+def _trajectories(file: netCDF4.Dataset, plan: Plan, parts: Parts, recorded: Variable) -> None:
     names, shape = _sweep_names(plan), _sweep_shape(plan)
     ones = (1,) * len(shape)
     kind = {"float64": "f8", "float32": "f4"}[plan.scenario.record.precision]
-    if _per_member(plan, gauge):
-        dimensions, chunks = (*names, "realization", "t"), (*ones, plan.group, plan.stretch)
-        wanted = {gauge.name: ""}
-    elif plan.varies(gauge):
+    if _per_member(plan, recorded):
+        dimensions, chunks = (*names, "member", "t"), (*ones, plan.group, plan.stretch)
+        wanted = {recorded.name: ""}
+    elif plan.varies(recorded):
         dimensions, chunks = (*names, "t"), (*ones, plan.stretch)
-        wanted, kind = {f"{gauge.name}_{s}": s for s in _STATISTICS}, "f8"
+        wanted, kind = {f"{recorded.name}_{s}": s for s in _STATISTICS}, "f8"
     else:
         dimensions, chunks = (*names, "t"), (*ones, plan.stretch)
-        wanted = {gauge.name: ""}
+        wanted = {recorded.name: ""}
     variables = {}
     for name, statistic in wanted.items():
-        long_name = f"{_STATISTICS[statistic]} {gauge.long_name}" if statistic else gauge.long_name
-        if gauge.name == "in_contact" and not statistic:
+        long_name = f"{_STATISTICS[statistic]} {recorded.long_name}" if statistic else recorded.long_name
+        if recorded.name == "in_contact" and not statistic:
             kind = "i1"
-        variable = _variable(file, name, kind, dimensions, gauge.unit, long_name, gauge.symbol, chunks)
+        variable = _variable(file, name, kind, dimensions, recorded.unit, long_name, recorded.symbol, chunks)
         if kind == "i1":
             variable.delncattr("units")
             variable.flag_values = np.array([0, 1], "i1")
@@ -219,20 +219,20 @@ def _trajectories(file: netCDF4.Dataset, plan: Plan, parts: Parts, gauge: Gauge)
         where = np.unravel_index(number, shape) if shape else ()
         for index, records in enumerate(plan.stretches(point)):
             time = slice(records.start, records.stop)
-            if _per_member(plan, gauge):
+            if _per_member(plan, recorded):
                 for group, members in enumerate(plan.groups()):
-                    values = parts.load(part_name(number, group, index), gauge.name)[gauge.name]
-                    variables[gauge.name][(*where, slice(members[0], members[-1] + 1), time)] = values
-            elif plan.varies(gauge):
+                    values = parts.load(part_name(number, group, index), recorded.name)[recorded.name]
+                    variables[recorded.name][(*where, slice(members[0], members[-1] + 1), time)] = values
+            elif plan.varies(recorded):
                 loaded = [
-                    parts.load(part_name(number, group, index), gauge.name)[gauge.name]
+                    parts.load(part_name(number, group, index), recorded.name)[recorded.name]
                     for group in range(len(plan.groups()))
                 ]
                 for statistic, values in pooled(loaded).items():
-                    variables[f"{gauge.name}_{statistic}"][(*where, time)] = values
+                    variables[f"{recorded.name}_{statistic}"][(*where, time)] = values
             else:
-                values = parts.load(part_name(number, 0, index), gauge.name)[gauge.name]
-                variables[gauge.name][(*where, time)] = values[0]
+                values = parts.load(part_name(number, 0, index), recorded.name)[recorded.name]
+                variables[recorded.name][(*where, time)] = values[0]
 
 
 def moments(values: np.ndarray) -> np.ndarray:
@@ -260,16 +260,16 @@ def _maps(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
     process = cast(MappedProcess, scene.process)
     points, cell = process.modes.points, process.modes.cell
     count = min(scene.record.map_members, plan.members)
-    file.createDimension("map_realization", count)
-    file.createDimension("snapshot", len(scene.record.maps))
-    _variable(file, "map_realization", "i4", ("map_realization",), "1", "member of a map")[:] = np.arange(count)
+    file.createDimension("map_member", count)
+    file.createDimension("map_time", len(scene.record.maps))
+    _variable(file, "map_member", "i4", ("map_member",), "1", "member of a map")[:] = np.arange(count)
     times = sorted(scene.record.maps)
-    _variable(file, "snapshot", "f8", ("snapshot",), "s", "time of a map", "t")[:] = times
+    _variable(file, "map_time", "f8", ("map_time",), "s", "time of a map", "t")[:] = times
     for axis, text in (("x", "along"), ("y", "across")):
         file.createDimension(axis, points)
         variable = _variable(file, axis, "f8", (axis,), "m", f"position {text} the sliding direction", axis)
         variable[:] = np.arange(points) * (cell / points)
-    names = (*_sweep_names(plan), "map_realization", "snapshot", "x", "y")
+    names = (*_sweep_names(plan), "map_member", "map_time", "x", "y")
     variable = _variable(file, "shear_map", "f8", names, "Pa", "shear-stress fluctuation", "tau_1")
     energies = [
         _variable(file, name, "f8", names[:-2], "J/m^2", text, symbol)

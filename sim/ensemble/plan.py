@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.ensemble.recorded import GAUGES, Gauge
+from sim.ensemble.recorded import VARIABLES, Variable
 from sim.scenario.scenario import Scenario
 
 _GROUP = 64
@@ -41,7 +41,7 @@ class Plan:
     @property
     def stretch(self) -> int:
         """Records of one part."""
-        most = max(1, _PART_NUMBERS // (self.group * len(GAUGES)))
+        most = max(1, _PART_NUMBERS // (self.group * len(VARIABLES)))
         return min(self.points[0].clock.records, most)
 
     def groups(self) -> list[np.ndarray]:
@@ -53,9 +53,9 @@ class Plan:
         records = point.clock.records
         return [range(first, min(first + self.stretch, records)) for first in range(0, records, self.stretch)]
 
-    def varies(self, gauge: Gauge) -> bool:
-        """Whether the gauge's variable has the member dimension."""
-        return any(point.varies[gauge.part] for point in self.points)
+    def varies(self, variable: Variable) -> bool:
+        """Whether the variable's variable has the member dimension."""
+        return any(point.varies[variable.part] for point in self.points)
 
 
 def work(plan: Plan) -> int:

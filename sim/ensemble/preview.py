@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sim.ensemble.plan import Plan, work
-from sim.ensemble.recorded import GAUGES
+from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
 from sim.laws.schallamach import bell_peak, first_moment_peak
 from sim.parts.bonds import FirstMoment, Tracked
@@ -213,7 +213,7 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
         power * float(np.asarray(point.shear.spectrum.surface_energy(*point.solid.effective)))
         for power, point in zip(powers, some, strict=True)
     ]
-    when = "at growth 1" if not any(isinstance(point.shear.spectrum, BondMade) for point in some) else _SETTLED
+    when = "at amplitude 1" if not any(isinstance(point.shear.spectrum, BondMade) for point in some) else _SETTLED
     rows: Rows = [
         ("rms of the stress", f"{_about(rms, 'Pa')} {when}"),
         ("stored energy", f"{_about(energies, 'J/m^2')} {when}, on the infinite plane"),
@@ -280,16 +280,18 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             said.append(
                 f"the contact exceeds {_LARGEST_SHARE} of the sphere's radius: the theory is for small contacts"
             )
-        if isinstance(point.population, FirstMoment) and isinstance(point.population.hazard, Bell):
+        if isinstance(point.population, FirstMoment) and isinstance(point.population.rupture, Bell):
             said.append(_overprediction(point.population))
         made = isinstance(getattr(point.shear, "spectrum", None), BondMade)
         if made and point.shear.paid_by_adhesion > 0.0:
             said.append("friction has paid for the energy under each bond: with paid_by_adhesion it counts twice")
         jitters = point.varies["shear"] and point.contact.model == "equilibrium"
         if jitters and getattr(point.population, "area", "present") == "carried":
-            said.append('carried area in a contact that fluctuates has no limit of fine steps: take model = "lagging"')
-        goes_on = getattr(point.population, "area", "present") == "present" and hasattr(point.population, "hazard")
-        if point.contact.on_detach == "reattach" and goes_on:
+            said.append(
+                'carried area in a contact that fluctuates has no limit of fine steps: take model = "rate_dependent"'
+            )
+        goes_on = getattr(point.population, "area", "present") == "present" and hasattr(point.population, "rupture")
+        if point.contact.after_pull_off == "reattach" and goes_on:
             said.append('bonds go on sliding while the contact is open: bonds.area = "carried" starts without them')
         if getattr(point.drive, "rest", 0.0) >= point.clock.duration:
             said.append("the slider rests for the whole run: shorten drive.rest or lengthen clock.duration")
@@ -304,7 +306,7 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
                 f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
             )
         if point.contact.lowest < 0.0 and point.varies["shear"]:
-            said.append("under tension detachment is a first passage: take clock steps well below the memory")
+            said.append("under tension detachment is a first passage: take clock steps well below the correlation")
         smallest = getattr(getattr(point.fluctuations, "spectrum", None), "support", (0.0,))[0]
         if hasattr(point.fluctuations, "cell") and 2.0 * math.pi > _cell(point) * smallest > 0.0:
             said.append("the spectrum has waves longer than the cell, which are missing: give a larger shear.cell")
@@ -330,8 +332,8 @@ def _on_a_disc(point: Scenario) -> list[str]:
 
 
 def _overprediction(bonds: FirstMoment) -> str:
-    """By how much the first-moment closure overpredicts the friction maximum under Bell's hazard."""
-    recipe = bonds.hazard.zero_force_rate, bonds.hazard.bell_force, bonds.bond_stiffness, bonds.rebinding_rate  # type: ignore[union-attr]
+    """By how much the first-moment closure overpredicts the friction maximum under Bell's rupture."""
+    recipe = bonds.rupture.zero_force_rate, bonds.rupture.bell_force, bonds.bond_stiffness, bonds.rebinding_rate  # type: ignore[union-attr]
     excess = first_moment_peak(*recipe, 1.0).stress / bell_peak(*recipe, 1.0).stress - 1.0
     return f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
 
@@ -344,7 +346,7 @@ def _reversed_friction(point: Scenario) -> float:
     for time in np.linspace(0.0, duration, 41):
         speed = point.drive.motion(0, float(time), float(time), duration).speed
         stress = np.abs(point.population.settled(speed).stress)
-        size = rms * point.fluctuations.growth.factor(speed, stress)  # type: ignore[union-attr]
+        size = rms * point.fluctuations.amplitude.factor(speed, stress)  # type: ignore[union-attr]
         ratios += [float(part / whole) for part, whole in np.broadcast(size, stress) if whole > 0.0]
     return max(ratios)
 
@@ -378,7 +380,7 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     counted = _COUNTED if any(point.population.per_member for point in plan.points) else 0.0
     seconds = _START + batches * (clock.steps * _STEP + _PART) + work(plan) * (pairs * _PAIR + counted)
     seconds += plan.members * len(plan.points) / len(some) * sum(map(_tracked_seconds, some))
-    held = _PROGRAM_BYTES + 8.0 * sample.group * (8.0 * pairs + bonds + 2.0 * len(GAUGES) * sample.stretch)
+    held = _PROGRAM_BYTES + 8.0 * sample.group * (8.0 * pairs + bonds + 2.0 * len(VARIABLES) * sample.stretch)
     alike = ", all alike, so one is computed" if scene.ensemble.members > plan.members else ""
     rows: Rows = [
         ("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records"),
@@ -400,9 +402,9 @@ def _bytes(plan: Plan, point: Scenario) -> float:
     record = plan.scenario.record
     each = 4.0 if record.precision == "float32" else 8.0
     total = 2e4
-    for gauge in GAUGES:
+    for variable in VARIABLES:
         rows, size = 1, each
-        if plan.varies(gauge):
+        if plan.varies(variable):
             rows, size = (plan.members, each) if record.per_member else (_STATISTICS, 8.0)
         total += rows * size * point.clock.records * len(plan.points)
     if record.maps:

@@ -11,7 +11,7 @@ from sim.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)
-class Gauge:
+class Variable:
     """One recorded quantity.
 
     ``part`` names the part whose class decides whether members differ; ``read`` takes the scenario
@@ -31,7 +31,11 @@ def _until_stopped(read: Callable[[Scenario, State], np.ndarray]) -> Callable[[S
 
     def told(scene: Scenario, state: State) -> np.ndarray:
         values = read(scene, state)
-        return np.where(np.isnan(state.contact.radius), np.nan, values) if scene.contact.on_detach == "stop" else values
+        return (
+            np.where(np.isnan(state.contact.radius), np.nan, values)
+            if scene.contact.after_pull_off == "stop"
+            else values
+        )
 
     return told
 
@@ -60,33 +64,35 @@ def _indentation(scene: Scenario, state: State) -> np.ndarray:
     return _grip(scene, state).depth(state.contact.radius, scene.bodies)
 
 
-def _travel(scene: Scenario, state: State) -> np.ndarray:
-    return _grip(scene, state).travel(state.contact.radius, scene.bodies)
+def _displacement(scene: Scenario, state: State) -> np.ndarray:
+    return _grip(scene, state).displacement(state.contact.radius, scene.bodies)
 
 
-GAUGES = (
-    Gauge("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.speed),
-    Gauge("slider_position", "m", "displacement of the slider", "X", "drive", lambda scene, state: state.position),
-    Gauge("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
+VARIABLES = (
+    Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.speed),
+    Variable("slider_position", "m", "displacement of the slider", "X", "drive", lambda scene, state: state.position),
+    Variable("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
           lambda scene, state: scene.population.fraction(state.bonds)),
-    Gauge("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds", _stress),
-    Gauge("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
+    Variable("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds", _stress),
+    Variable("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
           "DeltaGamma", "shear", lambda scene, state: state.shear.energy),
-    Gauge("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
+    Variable("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
           _until_stopped(lambda scene, state: state.contact.work)),
-    Gauge("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),
-    Gauge("contact_area", "m^2", "contact area", "A", "contact", _until_stopped(_area)),
-    Gauge("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact", _until_stopped(_load)),
-    Gauge("indentation", "m", "indentation of the sphere", "delta", "contact", _until_stopped(_indentation)),
-    Gauge("travel", "m", "travel of what holds the sphere", "Delta", "contact", _until_stopped(_travel)),
-    Gauge("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
+    Variable("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),
+    Variable("contact_area", "m^2", "contact area", "A", "contact", _until_stopped(_area)),
+    Variable("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact",
+          _until_stopped(_load)),
+    Variable("indentation", "m", "indentation of the sphere", "delta", "contact", _until_stopped(_indentation)),
+    Variable("displacement", "m", "displacement of what holds the sphere", "Delta", "contact",
+          _until_stopped(_displacement)),
+    Variable("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
           _until_stopped(lambda scene, state: _stress(scene, state) * _area(scene, state))),
-    Gauge("in_contact", "1", "whether the contact is closed", "", "contact",
+    Variable("in_contact", "1", "whether the contact is closed", "", "contact",
           lambda scene, state: (state.contact.radius > 0.0).astype(float)),
-    Gauge("masked", "1", "whether no work of adhesion is left, so that the contact is Hertz's", "", "contact",
+    Variable("masked", "1", "whether no work of adhesion is left, so that the contact is Hertz's", "", "contact",
           lambda scene, state: ((state.contact.work <= 0.0) & (state.contact.radius > 0.0)).astype(float)),
-    Gauge("detachment_time", "s", "time of the last detachment", "t_d", "contact",
+    Variable("detachment_time", "s", "time of the last detachment", "t_d", "contact",
           lambda scene, state: state.contact.detached),
-    Gauge("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
+    Variable("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
           lambda scene, state: state.contact.dissipated),
 )  # fmt: skip

@@ -45,10 +45,10 @@ def _crossing_at_load(z, p, m, s):
 
 
 @device
-def _crossing_at_travel(z, q, soft, m, s, stuck):
+def _crossing_at_displacement(z, q, soft, m, s, stuck):
     """Largest z with missing^2/z + stuck/z^3 = m + s z and the slope there, as at a load.
 
-    missing = (z^2 - q + (2/3) soft z^3)/(1 + soft z) is a^2/R - delta where the travel is q and a
+    missing = (z^2 - q + (2/3) soft z^3)/(1 + soft z) is a^2/R - delta where the displacement is q and a
     machine of stiffness 2 E*/soft yields; a stiff one, soft = 0, leaves z^2 - q.
     """
     slope = math.nan
@@ -93,16 +93,16 @@ def _shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_rad
 
 
 @law
-def shrunk_at_travel(
-    jkr, hertz, travel, stiffness, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio
+def shrunk_at_displacement(
+    jkr, hertz, displacement, stiffness, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio
 ):
     """JKR's radius behind a machine stiffness, less what reversible shear takes.
 
     Parameters
     ----------
     jkr, hertz : float or array
-        Radii of the same travel without shear, with the work and with none [m].
-    travel, stiffness : float or array
+        Radii of the same displacement without shear, with the work and with none [m].
+    displacement, stiffness : float or array
         Delta = delta + P/k [m], k [N/m]; k = inf holds the indentation.
     work, stress, reversible, sphere_radius, modulus, poisson_ratio : float or array
         As ``radius_at_load_reversible``.
@@ -120,7 +120,7 @@ def shrunk_at_travel(
     With y = a^2/R - delta and k the stiffness in units of 2 E* (a length), ``y = (k (a^2/R - Delta) +
     2 a^3/(3R))/(k + a)``, and G = E* y^2/(2 pi a) is convex in a for all k and Delta: its second derivative
     is a quadratic form in y with a discriminant of ``(k + 4a)^2 - 4 (k^2 + 4 k a + 6 a^2) < 0``, times a
-    square. For a travel of at least zero Hertz's contact exists.
+    square. For a displacement of at least zero Hertz's contact exists.
     """
     if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
         return jkr
@@ -131,13 +131,13 @@ def shrunk_at_travel(
         return math.nan
     m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
     start = min(1.0, m / s)
-    if travel >= 0.0 and not start * jkr > hertz:
+    if displacement >= 0.0 and not start * jkr > hertz:
         return hertz
     soft = 2.0 * modulus * jkr / stiffness
-    z, slope = _crossing_at_travel(start, travel / jkr * tilt, soft, m, -s, 0.0)
+    z, slope = _crossing_at_displacement(start, displacement / jkr * tilt, soft, m, -s, 0.0)
     if not slope >= held * s:
-        return hertz if travel >= 0.0 else math.nan
-    return max(z * jkr, hertz) if travel >= 0.0 else z * jkr
+        return hertz if displacement >= 0.0 else math.nan
+    return max(z * jkr, hertz) if displacement >= 0.0 else z * jkr
 
 
 def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
@@ -211,4 +211,4 @@ def radius_at_indentation_reversible(indentation, work, stress, reversible, sphe
     jkr = radius_at_indentation(indentation, work, sphere_radius, modulus)
     hertz = hertz_radius_at_indentation(indentation, sphere_radius)
     rest = (sphere_radius, modulus, poisson_ratio)
-    return shrunk_at_travel(jkr, hertz, indentation, math.inf, work, stress, reversible, 0.0, *rest)
+    return shrunk_at_displacement(jkr, hertz, indentation, math.inf, work, stress, reversible, 0.0, *rest)

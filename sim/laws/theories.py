@@ -47,11 +47,11 @@ from sim.laws.reversible import (
     _STICK,
     _UNIFORM,
     _compressible,
+    _crossing_at_displacement,
     _crossing_at_load,
-    _crossing_at_travel,
     _largest_force,
     _shrunk_at_load,
-    shrunk_at_travel,
+    shrunk_at_displacement,
 )
 from sim.numerics.jit import device, law
 from sim.numerics.special import cube_root
@@ -85,7 +85,7 @@ def _stuck_at_indentation(
     if math.isnan(stuck):
         return math.nan
     m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
-    z, slope = _crossing_at_travel(1.0, indentation / jkr * tilt, 0.0, m, 0.0, stuck)
+    z, slope = _crossing_at_displacement(1.0, indentation / jkr * tilt, 0.0, m, 0.0, stuck)
     if not slope >= 0.0:
         return hertz if indentation >= 0.0 else math.nan
     return max(z * jkr, hertz) if indentation >= 0.0 else z * jkr
@@ -163,7 +163,7 @@ def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus
         return known
     q = math.copysign((normal / scale) ** 2, indentation)
     m = math.copysign((adhesive / scale) ** 3, work)
-    z, _ = _crossing_at_travel(1.9, q, 0.0, m, (sheared / scale) ** 2, 0.0)  # z^2 <= 1 + sqrt(z + z^2)
+    z, _ = _crossing_at_displacement(1.9, q, 0.0, m, (sheared / scale) ** 2, 0.0)  # z^2 <= 1 + sqrt(z + z^2)
     if indentation >= 0.0:
         return scale * z if scale * z > normal else normal
     return scale * z
@@ -458,7 +458,7 @@ def compare_at_indentation(stress, indentation, work, sphere_radius, modulus, po
     rest = (sphere_radius, modulus, poisson_ratio)
 
     def shrunk(fraction, held):
-        return shrunk_at_travel(jkr, hertz, indentation, math.inf, work, stress, fraction, held, *rest)
+        return shrunk_at_displacement(jkr, hertz, indentation, math.inf, work, stress, fraction, held, *rest)
 
     return _together(
         jkr=jkr,

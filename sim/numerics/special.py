@@ -79,7 +79,7 @@ def lambert(x):
 
 @law
 def reduced_exponential_integral(z, order):
-    """Exponential integral made free of its growth and decay: from 0 at z = 0 to 1 at z = infinity.
+    """Exponential integral made free of its amplitude and decay: from 0 at z = 0 to 1 at z = infinity.
 
     Parameters
     ----------

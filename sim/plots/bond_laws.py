@@ -40,24 +40,24 @@ def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> l
     Returns
     -------
     list of Steady
-        Exact, and for Bell's hazard the first-moment closure, too. None for bonds without a stretch.
+        Exact, and for Bell's rupture the first-moment closure, too. None for bonds without a stretch.
     """
     common = ("bond_stiffness", "rebinding_rate", "site_density")
     with contextlib.suppress(KeyError):
-        rate, force = numbers(dataset, at, "hazard.zero_force_rate", "hazard.bell_force")
+        rate, force = numbers(dataset, at, "rupture.zero_force_rate", "rupture.bell_force")
         stiffness, rebinding, density = numbers(dataset, at, *common)
         bell, field = (rate, force, stiffness, rebinding), schallamach.first_moment_stress
         exact = schallamach.bell_stress(speed, *bell, density), schallamach.bell_fraction(speed, *bell)
         closed = field(speed, *bell, density), schallamach.first_moment_fraction(speed, *bell)
         return [Steady("steady sliding, exact", "-", *exact), Steady("mean field", "--", *closed)]
     with contextlib.suppress(KeyError):
-        rate, stretch = numbers(dataset, at, "hazard.rate", "hazard.stretch")
+        rate, stretch = numbers(dataset, at, "rupture.rate", "rupture.stretch")
         stiffness, rebinding, density = numbers(dataset, at, *common)
         stress = schallamach.cut_off_stress(speed, rate, stretch, stiffness, rebinding, density)
         fraction = schallamach.cut_off_fraction(speed, rate, stretch, rebinding)
         return [Steady("steady sliding, exact", "-", stress, fraction)]
     with contextlib.suppress(KeyError):
-        (rate,) = numbers(dataset, at, "hazard.rate")
+        (rate,) = numbers(dataset, at, "rupture.rate")
         stiffness, rebinding, density = numbers(dataset, at, *common)
         force = schallamach.constant_moments(speed, rate, stiffness, rebinding).force
         return [Steady("steady sliding, exact", "-", density * force, np.ones_like(speed))]
@@ -74,10 +74,10 @@ def rest_of(dataset: xr.Dataset) -> xr.DataArray | None:
 def start_peak(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray, fraction: float) -> np.ndarray | None:
     """Static peak of the dataset's Bell bonds at start-up speeds [m/s], if none of them rebinds [Pa].
 
-    ``fraction`` is that of bonds over bonds at rest when sliding begins. None for other hazards.
+    ``fraction`` is that of bonds over bonds at rest when sliding begins. None for other rupture laws.
     """
     with contextlib.suppress(KeyError):
-        rate, force = numbers(dataset, at, "hazard.zero_force_rate", "hazard.bell_force")
+        rate, force = numbers(dataset, at, "rupture.zero_force_rate", "rupture.bell_force")
         stiffness, rebinding, density = numbers(dataset, at, "bond_stiffness", "rebinding_rate", "site_density")
         bound = fraction * float(schallamach.rest_share(rate, rebinding))
         return density * bound * np.asarray(schallamach.start_up_peak(speed, rate, force, stiffness).force)

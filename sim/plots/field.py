@@ -18,7 +18,7 @@ from sim.analysis import engineering, setting, sweep_dims
 from sim.analysis.scene import word
 from sim.laws.halfspace import displacement
 from sim.numerics.grid import Grid
-from sim.parts.shear.amplitude import Growth
+from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.modes import Modes, modes
 from sim.plots.curves import swept_whole
 from sim.plots.style import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
@@ -39,7 +39,7 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     """The last stress map of the first member and its displacement, around the contact circle."""
     stress = maps_of(dataset)
     at = dict.fromkeys(sweep_dims(dataset), 0)
-    stress = stress.isel(at).isel(map_realization=0, snapshot=-1)
+    stress = stress.isel(at).isel(map_member=0, map_time=-1)
     cell = _cell_of(stress)
     modulus, ratio = (float(dataset[f"effective_{n}"].isel(at)) for n in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), cell, modulus, ratio)
@@ -52,7 +52,7 @@ def map_figure(dataset: xr.Dataset) -> Figure:
         (moved, "m", "displacement $w_1$", "PuOr_r"),
     )
     speed = dataset["speed"].isel(at, missing_dims="ignore")
-    speed_then = float(speed.sel(t=stress["snapshot"], method="nearest"))
+    speed_then = float(speed.sel(t=stress["map_time"], method="nearest"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
     for panel, (field, si, words, colours) in zip(axes, shown, strict=True):
         _draw_map(figure, panel, field, cell, radius, length, (si, words, colours))
@@ -70,9 +70,9 @@ def map_figure(dataset: xr.Dataset) -> Figure:
 def _radius_of(dataset: xr.Dataset, at: dict[str, int], stress: xr.DataArray) -> float:
     """Contact radius of the map's member at the map's time [m]."""
     radius = dataset["contact_radius" if "contact_radius" in dataset else "contact_radius_mean"].isel(at)
-    if "realization" in radius.dims:
-        radius = radius.sel(realization=stress["map_realization"])
-    return float(radius.sel(t=stress["snapshot"], method="nearest"))
+    if "member" in radius.dims:
+        radius = radius.sel(member=stress["map_member"])
+    return float(radius.sel(t=stress["map_time"], method="nearest"))
 
 
 def _draw_map(
@@ -119,25 +119,25 @@ class _Asked(NamedTuple):
 
 
 def _asked_for(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _Asked:
-    """Spectrum and growth at a point of the sweep, rebuilt from the scenario that the dataset carries."""
+    """Spectrum and amplitude at a point of the sweep, rebuilt from the scenario that the dataset carries."""
     shear = json.loads(dataset.attrs["scenario_resolved"])["shear"]
     if swept_whole(dataset, "shear"):
         raise ValueError("the spectrum is swept as a whole table; run the one of interest on its own")
-    for table in ("spectrum", "growth"):
+    for table in ("spectrum", "amplitude"):
         for key in shear[table]:
             with contextlib.suppress(KeyError):
                 shear[table][key] = float(setting(dataset, f"shear.{table}.{key}").isel(at, missing_dims="ignore"))
     spectrum = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
     if hasattr(spectrum, "wavevector"):
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
-    if shear["growth"].get("relaxing"):  # the field lags behind its growth: only the shape can be compared
+    if shear["amplitude"].get("relaxing"):  # the field lags behind its amplitude: only the shape can be compared
         cells = modes(spectrum, _cell_of(stress), stress.sizes["x"])
         return _Asked(spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "asked, scaled")
-    growth = TypeAdapter(Growth).validate_python(shear["growth"])
-    time = {"t": float(stress["snapshot"])}
+    amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
+    time = {"t": float(stress["map_time"])}
     names = ("speed", "shear_stress" if "shear_stress" in dataset else "shear_stress_mean")
     now = [dataset[name].isel(at, missing_dims="ignore").sel(time, method="nearest").to_numpy() for name in names]
-    return _Asked(spectrum, float(np.mean(growth.factor(*now) ** 2)), "asked for")
+    return _Asked(spectrum, float(np.mean(amplitude.factor(*now) ** 2)), "asked for")
 
 
 def _cell_of(stress: xr.DataArray) -> float:
@@ -158,7 +158,7 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     """The radially averaged spectrum of the last maps against the one asked for, and their ratio."""
     stress = maps_of(dataset)
     at = dict.fromkeys(sweep_dims(dataset), 0)
-    stress = stress.isel(at).isel(snapshot=-1).transpose("map_realization", "x", "y")
+    stress = stress.isel(at).isel(map_time=-1).transpose("map_member", "x", "y")
     if not np.any(stress.to_numpy()):
         raise ValueError("the last map holds no stress; record one where fluctuations have grown")
     if word(dataset, "shear.spectrum.model", "") == "bonds":

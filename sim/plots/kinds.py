@@ -29,7 +29,7 @@ from sim.plots.panels import (
 )
 from sim.plots.profile import needs_contact, profile_figure
 from sim.plots.style import STYLE, Unit, across, axis_scale, legend, symbol
-from sim.plots.theories import needs_control, rivals_figure
+from sim.plots.theories import needs_control, theories_figure
 
 
 def _needs_speeds(dataset: xr.Dataset) -> None:
@@ -122,7 +122,7 @@ KINDS: dict[str, Callable[[xr.Dataset], Figure]] = {
     "map": map_figure,
     "spectrum": spectrum_figure,
     "friction": friction_figure,
-    "rivals": rivals_figure,
+    "theories": theories_figure,
     "profile": profile_figure,
     "loop": loop_figure,
 }
@@ -134,7 +134,7 @@ _NEEDS: dict[str, Callable[[xr.Dataset], object]] = {
     "map": maps_of,
     "spectrum": maps_of,
     "friction": needs_stress,
-    "rivals": needs_control,
+    "theories": needs_control,
     "profile": needs_contact,
     "loop": needs_course,
 }
@@ -175,11 +175,11 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
         As ``sim run`` writes it.
     kind : str, optional
         One of ``KINDS``: "curve" (area with what each mechanism takes, energies and friction over
-        speed), "time" (radius, area and energies over time), "loop" (load and radius over the travel of
+        speed), "time" (radius, area and energies over time), "loop" (load and radius over the displacement of
         what holds the sphere, where that moves), "sweep" (radius, energies and friction
         against the swept key), "map" (a stress map and its displacement), "spectrum" (measured
         against asked-for spectral density), "friction" (shear stress over speed with its maximum, or
-        the static peak of a slider that rests and starts), "rivals" (contact area by every theory over
+        the static peak of a slider that rests and starts), "theories" (contact area by every theory over
         the shear stress), "profile" (pressure, surfaces and displacement across the contact). Without
         it "loop" where what holds the sphere moves, "friction" for a slider that rests and starts, "curve" where
         the speed changes or is swept, else "sweep" where something is, else "time".

@@ -1,4 +1,4 @@
-"""The figure of a loop: load and contact radius over the travel of what holds the sphere, and the energy lost."""
+"""The figure of a loop: load and contact radius over the displacement of what holds the sphere, and the energy lost."""
 
 from typing import Any, NamedTuple
 
@@ -33,12 +33,12 @@ class Held(NamedTuple):
 
     @property
     def symbol(self) -> str:
-        """What stands on the axis: the travel, or the indentation where there is no machine."""
-        return r"\Delta" if self.kind in ("travel", "") else r"\delta"
+        """What stands on the axis: the displacement, or the indentation where there is no machine."""
+        return r"\Delta" if self.kind in ("displacement", "") else r"\delta"
 
     @property
     def words(self) -> str:
-        names = {"travel": "travel", "": "travel, or indentation,"}
+        names = {"displacement": "displacement", "": "displacement, or indentation,"}
         return f"{names.get(self.kind, 'indentation')} ${self.symbol}$"
 
 
@@ -69,13 +69,13 @@ def needs_course(dataset: xr.Dataset) -> None:
     Raises
     ------
     ValueError
-        With the cure; also for a file without the travel.
+        With the cure; also for a file without the displacement.
     """
     if bool(stays_held(dataset).all()):
-        cure = '[contact] indentation = { from = "2 um", to = "-12 um", trips = 1 }'
+        cure = '[contact] indentation = { from = "2 um", to = "-12 um", cycles = 1 }'
         raise ValueError(f"what holds the sphere stays the same, so that there is no loop; move it: {cure}")
-    if not any(name in dataset for name in ("travel", "travel_mean")):
-        raise ValueError("the dataset does not hold the travel; run the scenario again")
+    if not any(name in dataset for name in ("displacement", "displacement_mean")):
+        raise ValueError("the dataset does not hold the displacement; run the scenario again")
 
 
 def _held(dataset: xr.Dataset) -> Held:
@@ -94,16 +94,16 @@ def _theory(dataset: xr.Dataset, held: Held, line: Line) -> Theory:
 
 
 def loop_figure(dataset: xr.Dataset) -> Figure:
-    """Load and contact radius over travel, or over indentation where there is no machine.
+    """Load and contact radius over displacement, or over indentation where there is no machine.
 
     A line is broken while the contact is open; there the load is a thin line at zero. Grey is JKR's contact at
     the full work of adhesion: every equilibrium, the unstable ones as well, and the loads at which a dead load and
     fixed grips lose it.
     """
     held, scene = _held(dataset), scene_along(dataset, "t")
-    travel = scene.all("travel_mean")
-    unit = Unit.of(travel, "m")
-    scene = scene.placed(unit.factor * travel)
+    displacement = scene.all("displacement_mean")
+    unit = Unit.of(displacement, "m")
+    scene = scene.placed(unit.factor * displacement)
     theories = [_theory(dataset, held, line) for line in scene.lines]
     entries = _entries(dataset, scene, held)
     figure, (loads, radii) = rows([2.3, 1.6])
@@ -162,9 +162,9 @@ def _equilibria(
         reached[theory] = max(reached.get(theory, 0.0), most)
     drawn = {theory: most for theory, most in reached.items() if most > 0.0 and not np.isnan(theory.stiffness)}
     for theory, most in drawn.items():
-        travel, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
+        displacement, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
         for panel, values in ((loads, load), (radii, radius)):
-            panel.plot(travel, values, "--", color=REFERENCE, linewidth=0.9, zorder=1.5)
+            panel.plot(displacement, values, "--", color=REFERENCE, linewidth=0.9, zorder=1.5)
     return bool(drawn)
 
 
@@ -189,40 +189,40 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
         )  # fmt: skip
 
 
-def _trips(dataset: xr.Dataset, held: Held) -> xr.DataArray | None:
+def _cycles(dataset: xr.Dataset, held: Held) -> xr.DataArray | None:
     """Trips there and back; None where something else is made, they are not known, or a run stopped on the way."""
     try:
-        trips = setting(dataset, f"contact.{held.kind}.trips")
+        cycles = setting(dataset, f"contact.{held.kind}.cycles")
     except KeyError:
         return None
     radius = dataset["contact_radius" if "contact_radius" in dataset else "contact_radius_mean"]
-    whole = bool((trips >= 1.0).all()) and bool(radius.isel(t=-1).notnull().all())
-    return trips if whole else None
+    whole = bool((cycles >= 1.0).all()) and bool(radius.isel(t=-1).notnull().all())
+    return cycles if whole else None
 
 
 def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]:
-    """Energy that opening and closing dissipate, and the closed integral of load over travel, per trip [J].
+    """Energy that opening and closing dissipate, and the closed integral of load over displacement, per cycle [J].
 
-    Means over the members, with the sweep's dimensions. Where no trips are made the energy is that of the
+    Means over the members, with the sweep's dimensions. Where no cycles are made the energy is that of the
     whole run, and there is no integral.
     """
     suffix = "" if "dissipated_energy" in dataset else "_mean"
     spent = dataset[f"dissipated_energy{suffix}"].astype(float)
     known = spent.notnull().cumsum("t").argmax("t")  # the last record of those that stop
     spent = spent.isel(t=known).drop_vars("t")
-    spent = spent.mean("realization") if "realization" in spent.dims else spent
-    trips = _trips(dataset, _held(dataset))
-    if trips is None:
+    spent = spent.mean("member") if "member" in spent.dims else spent
+    cycles = _cycles(dataset, _held(dataset))
+    if cycles is None:
         return spent, None
     loops = loop_energy(dataset)
     loop = loops["loop_energy" if "loop_energy" in loops else "loop_energy_mean"].mean("cycle")
-    return spent / trips, loop.mean("realization") if "realization" in loop.dims else loop
+    return spent / cycles, loop.mean("member") if "member" in loop.dims else loop
 
 
 def _title(dataset: xr.Dataset, held: Held) -> str:
-    if _trips(dataset, held) is None:
+    if _cycles(dataset, held) is None:
         return "dissipated in all: $W$"
-    return "per trip: dissipated $W$, and the loop enclosed"
+    return "per cycle: dissipated $W$, and the loop enclosed"
 
 
 def _entries(dataset: xr.Dataset, scene: Scene, held: Held) -> list[Line2D]:

@@ -58,7 +58,7 @@ def _first(dataset: xr.Dataset) -> dict[str, int]:
 def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
     """An observable of the first member over time, or its mean where only that was recorded."""
     values = dataset[name if name in dataset else f"{name}_mean"]
-    return values.isel({"realization": 0} | at, missing_dims="ignore").to_numpy()
+    return values.isel({"member": 0} | at, missing_dims="ignore").to_numpy()
 
 
 class _Drawn(NamedTuple):

@@ -78,7 +78,7 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
 def _mean(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Mean over the members."""
     values = dataset[name if name in dataset else f"{name}_mean"]
-    return values.mean("realization") if "realization" in values.dims else values
+    return values.mean("member") if "member" in values.dims else values
 
 
 def start_figure(dataset: xr.Dataset) -> Figure:

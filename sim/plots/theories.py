@@ -35,7 +35,7 @@ _POINTS = 40
 
 
 class Case(NamedTuple):
-    """What the theories need of a scene: ``held`` is "load" [N] or "indentation" [m], rest as in ``laws.rivals``."""
+    """What the theories need of a scene: ``held`` is "load" [N] or "indentation" [m], rest as in ``laws.theories``."""
 
     at: dict[str, int]
     held: str
@@ -69,7 +69,7 @@ def needs_control(dataset: xr.Dataset) -> str:
     """
     contact = _scenario(dataset).get("contact", {})
     why = "the sphere is not held at one number"
-    if contact.get("travel") is not None:
+    if contact.get("displacement") is not None:
         why = "the sphere is behind a machine stiffness"
     elif is_moved(dataset):
         why = "what holds the sphere varies in time"
@@ -89,7 +89,7 @@ def _scenario(dataset: xr.Dataset) -> dict[str, Any]:
 def is_moved(dataset: xr.Dataset) -> bool:
     """Whether what holds the sphere varies in time."""
     contact = _scenario(dataset).get("contact", {})
-    return any(isinstance(contact.get(key), dict) for key in ("load", "indentation", "travel"))
+    return any(isinstance(contact.get(key), dict) for key in ("load", "indentation", "displacement"))
 
 
 def _with_contact(dataset: xr.Dataset, held: str) -> str:
@@ -166,14 +166,14 @@ def points_of(dataset: xr.Dataset, at: dict[str, int]) -> tuple[np.ndarray, np.n
     else:
         chosen = np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int))
         found = found.isel(t=chosen)
-    if "realization" in found.dims:
-        found = found.mean("realization")
+    if "member" in found.dims:
+        found = found.mean("member")
     stress, area = (values.to_numpy().ravel() for values in xr.broadcast(*(found[name] for name in names)))
     closed = area > 0.0
     return np.abs(stress[closed]), area[closed]
 
 
-def rivals_figure(dataset: xr.Dataset) -> Figure:
+def theories_figure(dataset: xr.Dataset) -> Figure:
     """Contact area by every theory, over the shear stress and over the tangential force that it makes."""
     case = case_of(dataset)
     stress, area = points_of(dataset, case.at)

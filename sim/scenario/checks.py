@@ -8,15 +8,15 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.parts.bonds import Auto as AutoBonds
-from sim.parts.bonds import Depth as BondDepth
-from sim.parts.contact import Contact, Lagging
+from sim.parts.bonds import Model as BondModel
+from sim.parts.contact import Contact, RateDependent
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import Drive, Table
-from sim.parts.shear import Auto, Depth, Mean, Modal, Uniform
+from sim.parts.shear import Auto, Mean, Modal, Model, Uniform
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.spectrum.families import BondMade
 
-_STEPS_A_TRIP = 2
+_STEPS_A_CYCLE = 2
 #: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
 _MOST_PAIRS = 2**21
 _MOST_WAVES = 1e9
@@ -60,8 +60,8 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
 
 
 def _no_adhesion(contact: Contact, adhesion: Adhesion) -> Faults:
-    if isinstance(contact, Lagging) and not adhesion.work > 0.0:
-        said = "a lagging edge measures its drive by the work of adhesion at rest; give a work above zero"
+    if isinstance(contact, RateDependent) and not adhesion.work > 0.0:
+        said = "a rate-dependent edge measures its drive by the work of adhesion at rest; give a work above zero"
         return [(("adhesion", "work"), said)]
     return []
 
@@ -72,25 +72,25 @@ def _reads_forces(shear: Any) -> bool:
 
 
 def _control_too_short(contact: Contact, clock: Clock) -> Faults:
-    for name in ("load", "indentation", "travel"):
+    for name in ("load", "indentation", "displacement"):
         times = getattr(getattr(contact, name), "time", None)
         if times and times[-1] < clock.duration * (1 - 1e-9):
             said = f"the table ends at {times[-1]:g} s, before clock.duration ({clock.duration:g} s)"
             return [(("contact", name), f"{said}; add rows or shorten the run")]
-        if clock.steps < _STEPS_A_TRIP * getattr(getattr(contact, name), "trips", 0):
-            said = f"fewer than {_STEPS_A_TRIP} of the {clock.steps} clock steps for a trip"
-            return [(("contact", name, "trips"), f"{said}; make fewer trips or shorter steps")]
+        if clock.steps < _STEPS_A_CYCLE * getattr(getattr(contact, name), "cycles", 0):
+            said = f"fewer than {_STEPS_A_CYCLE} of the {clock.steps} clock steps for a cycle"
+            return [(("contact", name, "cycles"), f"{said}; make fewer cycles or shorter steps")]
     return []
 
 
-def _no_stress(shear: Depth, bonds: BondDepth) -> Faults:
+def _no_stress(shear: Model, bonds: BondModel) -> Faults:
     if shear.reads_stress and not bonds.carries_stress and not _reads_forces(shear):
-        said = 'growth model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
-        return [(("shear", "growth"), said)]
+        said = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
+        return [(("shear", "amplitude"), said)]
     return []
 
 
-def _no_forces(shear: Depth, bonds: BondDepth, solid: Solid) -> Faults:
+def _no_forces(shear: Model, bonds: BondModel, solid: Solid) -> Faults:
     if not _reads_forces(shear):
         return []
     if not bonds.knows_forces:
@@ -103,7 +103,7 @@ def _no_forces(shear: Depth, bonds: BondDepth, solid: Solid) -> Faults:
     return []
 
 
-def _no_maps(record: Record, shear: Depth) -> Faults:
+def _no_maps(record: Record, shear: Model) -> Faults:
     if record.maps and not shear.draws_maps:
         return [(("record", "maps"), 'needs shear.model = "mapped"; choose it or leave the maps out')]
     return []
@@ -127,7 +127,7 @@ def _too_many_map_members(record: Record, ensemble: Ensemble) -> Faults:
     return []
 
 
-def _shear_faults(shear: Depth, solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> Faults:
+def _shear_faults(shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> Faults:
     """What keeps the shear part from being built on its solid and cell."""
     if isinstance(shear, Uniform | Mean):
         return []

@@ -11,13 +11,13 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from sim.parts.bonds import Auto as AutoBonds
 from sim.parts.bonds import Bonds, Unbroken
-from sim.parts.bonds import Depth as BondDepth
+from sim.parts.bonds import Model as BondModel
 from sim.parts.contact import Contact
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.control import Bodies
 from sim.parts.drive import Drive
 from sim.parts.drive import Steady as SteadyDrive
-from sim.parts.shear import Auto, Depth, Shear, Uniform
+from sim.parts.shear import Auto, Model, Shear, Uniform
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import SmoothProcess
@@ -82,14 +82,14 @@ class Scenario:
         return _rest_radius(self.solid, self.sphere, self.adhesion, self.contact)
 
     @cached_property
-    def population(self) -> BondDepth:
+    def population(self) -> BondModel:
         """The bonds at their depth, chosen by their number if the scenario leaves the choice."""
         if not isinstance(self.bonds, AutoBonds):
             return self.bonds
         return self.bonds.chosen(math.pi * self.rest_radius**2, _reads_forces(self.fluctuations))
 
     @cached_property
-    def fluctuations(self) -> Depth:
+    def fluctuations(self) -> Model:
         """The shear part at its depth, chosen by what is recorded if the scenario leaves the choice."""
         return self.shear.chosen(bool(self.record.maps)) if isinstance(self.shear, Auto) else self.shear
 

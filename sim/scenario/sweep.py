@@ -11,9 +11,9 @@ from sim.units.quantity import number_and_unit
 
 #: Names that the dataset gives away itself, so that no axis may take them.
 RESERVED = frozenset(
-    ["t", "time", "realization", "snapshot", "x", "y", "map_realization", "shear_map", "name", "seed"]
+    ["t", "time", "member", "map_time", "x", "y", "map_member", "shear_map", "name", "seed"]
     + ["speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion"]
-    + ["contact_radius", "contact_area", "normal_load", "indentation", "travel", "friction_force", "in_contact"]
+    + ["contact_radius", "contact_area", "normal_load", "indentation", "displacement", "friction_force", "in_contact"]
     + ["masked", "detachment_time", "dissipated_energy", "disc_energy", "cross_energy"]
 )
 _SHARED = ("clock", "clock.duration", "clock.record", "name", "ensemble", "record")

@@ -41,7 +41,7 @@ def key_lines(text: str) -> dict[Path, int]:
     Examples
     --------
     >>> lines = key_lines('[shear]\\nmemory = { model = "slip",\\n  length = "5 um" }\\n')
-    >>> lines["shear",], lines["shear", "memory", "length"]
+    >>> lines["shear",], lines["shear", "correlation", "length"]
     (1, 3)
     """
     return _Reader(text).lines

@@ -128,11 +128,11 @@ class PowerLaws:
         """∫ q^power C dq from ``low``, where C = ``level``, to ``high`` in the same piece."""
         exponent, gradient, linear = self._slopes
         stretch = np.log(high / low)
-        growth = (exponent[row] + power + 1) * stretch
+        amplitude = (exponent[row] + power + 1) * stretch
         # from the end where q^(power+1) C is larger, so that steep rows cannot overflow
         lower = level * low ** (power + 1)
         upper = self._value(high, row) * high ** (power + 1)
-        powered = np.where(growth > 0.0, upper, lower) * stretch * _decay(np.abs(growth))
+        powered = np.where(amplitude > 0.0, upper, lower) * stretch * _decay(np.abs(amplitude))
         d, slope = high - low, gradient[row]
         straight = level * d + slope * d**2 / 2
         if power == 1:

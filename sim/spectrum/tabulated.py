@@ -18,7 +18,7 @@ _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_
 Wavenumbers = tuple[Annotated[float, _WAVENUMBER], ...]
 Densities = tuple[Annotated[float, _DENSITY], ...]
 #: Factor from a density in the named convention to C.
-CONVENTIONS = {"menga": 1.0, "persson": 4 * math.pi**2}
+NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
 
 
 def _check_rows(wavenumbers: tuple[float, ...], densities: tuple[float, ...]) -> None:
@@ -63,7 +63,7 @@ class Tabulated(Rowed):
         q [rad/m], increasing.
     densities : tuple of float
         Density at each q [Pa² m²]; next to a zero the interpolation is linear.
-    convention : {"menga", "persson"}
+    normalization : {"in_integral", "in_density"}
         Convention of ``densities``: C itself, or Persson's C / 4π².
     file : str
         In a scenario instead of the rows: a CSV with the columns ``q [rad/m], C [Pa^2 m^2]``. It is
@@ -80,14 +80,14 @@ class Tabulated(Rowed):
 
     wavenumbers: Wavenumbers
     densities: Densities
-    convention: Literal["menga", "persson"] = "menga"
+    normalization: Literal["in_integral", "in_density"] = "in_integral"
     file: str = ""
     model: Literal["tabulated"] = "tabulated"
 
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = _by_name(values, ("wavenumbers", "densities", "convention", "file"))
+        values = _by_name(values, ("wavenumbers", "densities", "normalization", "file"))
         if not isinstance(values, dict):
             return values
         values = _plain(values)
@@ -110,7 +110,7 @@ class Tabulated(Rowed):
     @functools.cached_property
     def rows(self) -> PowerLaws:
         """The table as a chain of power laws, in this project's convention."""
-        density = CONVENTIONS[self.convention] * np.array(self.densities)
+        density = NORMALIZATIONS[self.normalization] * np.array(self.densities)
         return PowerLaws(np.array(self.wavenumbers), density)
 
 

@@ -29,8 +29,8 @@ _REPEATS = 3
 #: Numbers of sites that a batch holds together, and its least and most members.
 _BATCH_SITES, _FEWEST, _MOST = 100_000, 4, 64
 
-_STRETCHED = ("hazard", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
-_PLAIN = ("critical_speed", "healing", "stress", "start_from")
+_STRETCHED = ("rupture", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
+_PLAIN = ("critical_speed", "rebinding_rate", "stress", "start_from")
 
 
 @dataclass
@@ -118,7 +118,7 @@ class Course:
 def bond_rows(scenario: Scenario) -> list[BondRow]:
     """Every depth of the scene's bonds, shallow ones first, its own among them."""
     given: Any = scenario.population
-    if not hasattr(given, "hazard"):
+    if not hasattr(given, "rupture"):
         shared = {name: getattr(given, name) for name in _PLAIN}
         steady = {name: shared[name] for name in ("critical_speed", "stress")}
         rows = [_row(given, depths.Steady(**steady), "steady"), _row(given, depths.Rate(**shared), "rate")]
@@ -214,7 +214,7 @@ def _states(part: Any, course: Course, noise: Noise, steps: int) -> Iterator[Any
 
 def _told(part: Any, state: Any) -> Array:
     """Shear stress, bond fraction and mean square force per site of each member, shape (members, 3)."""
-    if not hasattr(part, "hazard"):
+    if not hasattr(part, "rupture"):
         fraction = part.fraction(state)
         return np.stack([part.stress * fraction, fraction, np.full(fraction.shape, np.nan)], axis=1)
     bound, stretch, square = np.broadcast_arrays(*part.moments(state))

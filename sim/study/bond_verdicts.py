@@ -42,7 +42,7 @@ def bond_table(dataset: xr.Dataset) -> list[dict[str, str]]:
         friction or, where bonds have no stretch, of the fraction.
     """
     rows = []
-    which = 0 if "hazard" in str(dataset.attrs["bonds_kind"]) else 1
+    which = 0 if "rupture" in str(dataset.attrs["bonds_kind"]) else 1
     for row in range(dataset.sizes["bond_row"]):
         here = dataset.isel(bond_row=row)
         label = str(here["bond_row"].values) + (" *" if int(here["bonds_own"]) else "")

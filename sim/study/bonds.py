@@ -30,7 +30,7 @@ _UNITS = ("Pa", "1", "N^2")
 
 
 def has_bond_depths(scenario: Scenario) -> bool:
-    """Whether the scene's bonds have depths to compare: those with a hazard and those that are counted."""
+    """Whether the scene's bonds have depths to compare: those with a rupture and those that are counted."""
     return isinstance(scenario.population, depths.FirstMoment | depths.Cohort | depths.Tracked | depths.Counted)
 
 
@@ -40,7 +40,7 @@ def converge_bonds(scenario: Scenario, budget_seconds: float) -> xr.Dataset:
     Parameters
     ----------
     scenario : Scenario
-        One whose bonds have a hazard or are counted; its sweep and its contact are not looked at.
+        One whose bonds have a rupture or are counted; its sweep and its contact are not looked at.
     budget_seconds : float
         Time shared equally by the depths. One that cannot finish a march within it is told without errors.
 
@@ -57,8 +57,8 @@ def converge_bonds(scenario: Scenario, budget_seconds: float) -> xr.Dataset:
 
     Notes
     -----
-    Reference: for bonds with a hazard the closed form where drive and start are steady, else cohorts at a
-    tolerance of 1e-6 (number and stretch by the rate equation where the hazard is constant, which is exact);
+    Reference: for bonds with a rupture the closed form where drive and start are steady, else cohorts at a
+    tolerance of 1e-6 (number and stretch by the rate equation where the rupture is constant, which is exact);
     for two-state sites the linear rate equation, which is exact. All depths take the same steps. Sites are
     independent, so the variance of a mean over N of them is that of one over N, known from the reference.
     """
@@ -91,7 +91,7 @@ class Reference:
 def _reference(scenario: Scenario, course: Course, rows: list[BondRow]) -> Reference:
     """The best answer, and the variance of a single site that follows from it."""
     given: Any = rows[0].part
-    if not hasattr(given, "hazard"):
+    if not hasattr(given, "rupture"):
         values = _marched(rows, course, lambda row: isinstance(row.part, depths.Rate))
         share, scale = values[1], np.array([[given.stress**2], [1.0], [np.nan]])
         return Reference(values, scale * share * (1.0 - share), share, "the linear rate equation, exact")
@@ -102,9 +102,9 @@ def _reference(scenario: Scenario, course: Course, rows: list[BondRow]) -> Refer
         values, words = np.tile(found[:, np.newaxis], len(course.times)), "the closed form of steady sliding"
     else:
         values, words = _marched(rows, course, lambda row: row.tolerance == REFERENCE), f"cohorts at {REFERENCE:g}"
-        if isinstance(given.hazard, Constant):
+        if isinstance(given.rupture, Constant):
             values[:2] = _marched(rows, course, lambda row: isinstance(row.part, depths.FirstMoment))[:2]
-            words = f"the rate equation, exact for a constant hazard, and for the square {words}"
+            words = f"the rate equation, exact for a constant rupture, and for the square {words}"
     share = values[1] * given.bound_at_rest
     forces = given.site_density**2 * np.maximum(values[2] - (values[0] / given.site_density) ** 2, 0.0)
     numbers = share * (1.0 - share) / given.bound_at_rest**2
@@ -120,7 +120,7 @@ def _marched(rows: list[BondRow], course: Course, wanted: Callable[[BondRow], bo
 
 
 def _settled_speed(scenario: Scenario) -> float:
-    """Speed at which bonds with a hazard slide steadily from the start on, where that has a closed form; else nan."""
+    """Speed at which bonds with a rupture slide steadily from the start on, where that has a closed form; else nan."""
     given: Any = scenario.population
     drive = scenario.drive
     if not isinstance(drive, Steady) or given.start_from != "steady" or (drive.speed == 0.0 and given.law.rate == 0.0):
@@ -130,12 +130,12 @@ def _settled_speed(scenario: Scenario) -> float:
 
 def _closed_form(part: Any, speed: float) -> Any:
     """Share bound, mean force and mean square force per site of steady sliding."""
-    hazard, rest = part.hazard, (part.bond_stiffness, part.rebinding_rate)
-    if isinstance(hazard, Bell):
-        return bell_moments(speed, hazard.zero_force_rate, hazard.bell_force, *rest)
-    if isinstance(hazard, Constant):
-        return constant_moments(speed, hazard.rate, *rest)
-    return cut_off_moments(speed, hazard.rate, hazard.stretch, *rest)
+    rupture, rest = part.rupture, (part.bond_stiffness, part.rebinding_rate)
+    if isinstance(rupture, Bell):
+        return bell_moments(speed, rupture.zero_force_rate, rupture.bell_force, *rest)
+    if isinstance(rupture, Constant):
+        return constant_moments(speed, rupture.rate, *rest)
+    return cut_off_moments(speed, rupture.rate, rupture.stretch, *rest)
 
 
 def _numbers(row: BondRow, reference: Reference) -> dict[str, Array]:
@@ -208,7 +208,7 @@ def _assembled(scenario: Scenario, course: Course, rows: list[BondRow], referenc
     step = scenario.clock.step * course.taken
     found = xr.Dataset(variables, coordinates, {
         "bonds_reference": reference.words,
-        "bonds_kind": "with a hazard" if hasattr(rows[0].part, "hazard") else "of two states",
+        "bonds_kind": "with a rupture" if hasattr(rows[0].part, "rupture") else "of two states",
         "bonds_tolerance_asked": asked_tolerance(scenario),
         "bonds_sites_of_contact": number_of_sites(scenario),
         "bonds_step": step,

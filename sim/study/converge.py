@@ -14,7 +14,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sim.engine import march
-from sim.ensemble.recorded import GAUGES
+from sim.ensemble.recorded import VARIABLES
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.scenario import Scenario
 from sim.study.bond_verdicts import bond_advice, bond_table
@@ -30,7 +30,7 @@ from sim.study.verdicts import recommendation, table
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
-_READ = {gauge.name: gauge.read for gauge in GAUGES}
+_READ = {variable.name: variable.read for variable in VARIABLES}
 
 #: Members advanced together, as in a run, and the numbers that their state may hold.
 _BATCH, _STATE_NUMBERS = 64, 2**25
@@ -65,7 +65,7 @@ def converge(scenario: Scenario, budget_seconds: float, progress: Progress | Non
         reference's own value for mean, standard deviation and correlation time, its mean for
         quantiles, and the skewness of ΔΓ for both skewnesses (1 where ΔΓ has none). Along ``row`` also
         the costs, members and TOML lines, and the measured statistics in SI. Where the bonds have a
-        hazard or are counted, also what ``sim.study.bonds.converge_bonds`` gives.
+        rupture or are counted, also what ``sim.study.bonds.converge_bonds`` gives.
 
     Notes
     -----

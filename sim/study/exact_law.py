@@ -35,7 +35,7 @@ _MOST_COUNTS = 200
 
 @dataclass(frozen=True, eq=False)
 class Terms:
-    """ΔΓ at growth 1 as independent gamma numbers, arrays of shape (terms,).
+    """ΔΓ at amplitude 1 as independent gamma numbers, arrays of shape (terms,).
 
     Attributes
     ----------
@@ -77,7 +77,7 @@ class Terms:
         cell = part.cell or math.sqrt(math.pi) * scenario.rest_radius
         pairs = cell_pairs(part.spectrum, cell, points or part.points, *solid)
         weight, shape, wavenumber = np.broadcast_arrays(pairs.weight, pairs.count, pairs.wavenumber)
-        if part.amplitudes == "fixed":
+        if part.mode_amplitudes == "fixed":
             return cls.still(float(np.sum(weight * shape)))
         return cls(weight, shape.astype(float), wavenumber)._merged()
 
@@ -102,14 +102,14 @@ class Terms:
 class Course:
     """What all members share, at chosen clock steps; arrays of shape (steps,) or (steps, terms).
 
-    ``fraction`` is that of the bonds (of counted ones their mean), ``growth`` the factor g,
+    ``fraction`` is that of the bonds (of counted ones their mean), ``amplitude`` the factor g,
     ``exponent`` the integral of the rate of a mode of 1 rad/m since t = 0, ``renewal`` that of the rate
-    at which counted bonds forget, and ``size`` the variance of each term's amplitude over that at growth 1.
+    at which counted bonds forget, and ``size`` the variance of each term's amplitude over that at amplitude 1.
     """
 
     steps: Steps
     fraction: Array
-    growth: Array
+    amplitude: Array
     exponent: Array
     renewal: Array
     size: Array
@@ -123,7 +123,7 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
     scenario : Scenario
         Its clock counts the ``steps``.
     terms : Terms
-        Whose sizes are followed where growth relaxes.
+        Whose sizes are followed where amplitude relaxes.
     steps : array of int
         Increasing clock steps to report.
     refine : int
@@ -135,10 +135,10 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
         Where nothing relaxes, the walk goes straight from one of the steps to the next.
     """
     part: Any = scenario.fluctuations
-    growth, memory = getattr(part, "growth", Constant()), getattr(part, "memory", None)
+    amplitude, correlation = getattr(part, "amplitude", Constant()), getattr(part, "correlation", None)
     bonds, clock = _mean_bonds(scenario.population), scenario.clock
-    power = memory.power if memory is not None else 0
-    walked = _walked(steps, refine, growth.relaxing or not isinstance(bonds, Unbroken | Steady))
+    power = correlation.power if correlation is not None else 0
+    walked = _walked(steps, refine, amplitude.relaxing or not isinstance(bonds, Unbroken | Steady))
     wanted = set((steps * refine).tolist())
     rows: list[tuple[float, float, float, float, Array]] = []
     before, exponent, renewal, size, population = 0, 0.0, 0.0, np.ones(1), None
@@ -148,16 +148,16 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
         motion = scenario.drive.motion(step, began, ended, clock.duration)
         none: Any = None  # the bonds here draw nothing
         population = bonds.start(motion, none) if population is None else bonds.advance(population, motion, none)
-        last, factor = factor, growth.factor(motion.speed, bonds.shear_stress(population))
-        passed = float(memory.exponents(np.ones(1), motion)[0]) if memory is not None else 0.0
-        if not growth.relaxing or step == 0:
+        last, factor = factor, amplitude.factor(motion.speed, bonds.shear_stress(population))
+        passed = float(correlation.exponents(np.ones(1), motion)[0]) if correlation is not None else 0.0
+        if not amplitude.relaxing or step == 0:
             size = factor**2
         else:
             decay = 2.0 * passed * terms.wavenumber**power
             size = size * np.exp(-decay) - np.expm1(-decay) * 0.5 * (factor**2 + last**2)
         exponent += passed
         if isinstance(bonds, Rate):
-            renewal += bonds.healing * (motion.duration + float(motion.path[0]) / bonds.critical_speed)
+            renewal += bonds.rebinding_rate * (motion.duration + float(motion.path[0]) / bonds.critical_speed)
         before = step
         if step in wanted:
             rows.append((float(bonds.fraction(population)[0]), float(factor[0]), exponent, renewal, size))
@@ -170,10 +170,10 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
 def _mean_bonds(bonds: Any) -> Any:
     """Bonds whose fraction is the ensemble mean: rate equation and cohorts give that of finite numbers."""
     if isinstance(bonds, Counted):
-        shared = ("critical_speed", "healing", "stress", "start_from")
+        shared = ("critical_speed", "rebinding_rate", "stress", "start_from")
         return Rate(**{name: getattr(bonds, name) for name in shared})
     if isinstance(bonds, Tracked):
-        stretched = ("hazard", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
+        stretched = ("rupture", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
         return Cohort(**{name: getattr(bonds, name) for name in stretched})
     return bonds
 
@@ -204,7 +204,7 @@ class Expectation:
 
     @cached_property
     def tells_energy(self) -> bool:
-        """Whether ΔΓ has this law: not where its growth follows bonds that differ between members."""
+        """Whether ΔΓ has this law: not where its amplitude follows bonds that differ between members."""
         follows = isinstance(getattr(self.scenario.fluctuations, "spectrum", None), BondMade)
         return not follows and not (self.scenario.fluctuations.reads_stress and self.scenario.population.per_member)
 
@@ -225,7 +225,7 @@ class Expectation:
 
     @cached_property
     def _unit(self) -> GammaSum:
-        """The law of ΔΓ at growth 1."""
+        """The law of ΔΓ at amplitude 1."""
         return GammaSum(self.terms.weight, self.terms.shape, self.terms.constant)
 
     def _place(self, step: int) -> int:
@@ -309,18 +309,18 @@ class Expectation:
     def correlation(self, earlier: int, later: int) -> float:
         """Correlation of ΔΓ at two steps; 0 where either does not fluctuate.
 
-        The covariance is ``Σ shape w² e^(−2∫λdt)`` times the sizes of both, or where growth relaxes the
+        The covariance is ``Σ shape w² e^(−2∫λdt)`` times the sizes of both, or where amplitude relaxes the
         square of the earlier size: what was renewed since is independent.
         """
         i, j = self._place(earlier), self._place(later)
         part: Any = self.scenario.fluctuations
-        memory = getattr(part, "memory", None)
+        correlation = getattr(part, "correlation", None)
         spreads = self._spreads[i] * self._spreads[j]
-        if memory is None or not spreads > 0.0:
+        if correlation is None or not spreads > 0.0:
             return 0.0
-        passed = (self.course.exponent[j] - self.course.exponent[i]) * self.terms.wavenumber**memory.power
+        passed = (self.course.exponent[j] - self.course.exponent[i]) * self.terms.wavenumber**correlation.power
         kept = np.exp(-2.0 * passed)
-        kept = kept * self.course.size[i] * self.course.size[i if part.growth.relaxing else j]
+        kept = kept * self.course.size[i] * self.course.size[i if part.amplitude.relaxing else j]
         return float(np.sum(self.terms.shape * self.terms.weight**2 * kept)) / spreads
 
 

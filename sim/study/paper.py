@@ -178,12 +178,12 @@ def _disc() -> list[Check]:
     v = halfspace.disc_displacement(
         RADIUS * np.array([0.0, 1.0, 0.0]), RADIUS * np.array([0.0, 0.0, 1.0]), RADIUS, STRESS, SHEAR
     )
-    round_trip = np.pi * np.arange(64) / 32
-    edge = halfspace.disc_displacement(np.cos(round_trip), np.sin(round_trip), 1.0, 1.0, 1.0)
+    round_cycle = np.pi * np.arange(64) / 32
+    edge = halfspace.disc_displacement(np.cos(round_cycle), np.sin(round_cycle), 1.0, 1.0, 1.0)
     # rho = 1 - u^2 takes the logarithm at the edge out of the mean
     u = 0.5 * (1.0 + NODES)
     r = (1.0 - u * u)[:, None]
-    field = halfspace.disc_displacement(r * np.cos(round_trip), r * np.sin(round_trip), 1.0, 1.0, 1.0)
+    field = halfspace.disc_displacement(r * np.cos(round_cycle), r * np.sin(round_cycle), 1.0, 1.0, 1.0)
     mean = np.sum(WEIGHTS * u * 2.0 * (1.0 - u * u) * field.mean(axis=1))
     volume = np.pi * RADIUS**2 * halfspace.disc_mean_displacement(RADIUS, STRESS, SHEAR)
     return [
@@ -323,9 +323,9 @@ def _under_stress() -> list[Check]:
 
 
 def _bonds() -> list[Check]:
-    speed, critical, healing = np.array([1e-3, 2e-3, 3e-3]), 1e-2, 200.0
-    # the model in which the law is exact: a life of stretch/speed, then a wait of 1/healing
-    life, wait = critical / healing / speed, 1.0 / healing
+    speed, critical, rebinding_rate = np.array([1e-3, 2e-3, 3e-3]), 1e-2, 200.0
+    # the model in which the law is exact: a life of stretch/speed, then a wait of 1/rebinding_rate
+    life, wait = critical / rebinding_rate / speed, 1.0 / rebinding_rate
     slow, fast = schallamach.steady_fraction([1e-3, 1e-2], critical)
     fixed = schallamach.steady_fraction(speed, critical)
     return [

@@ -20,12 +20,12 @@ def _course(quantity: Quantity) -> type:
 
     @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
     class Course:
-        """From one value to another over the run, or ``trips`` times there and back."""
+        """From one value to another over the run, or ``cycles`` times there and back."""
 
         start: Annotated[float, quantity, Field(alias="from")]
         stop: Annotated[float, quantity, Field(alias="to")]
         scale: Literal["linear", "log"] = "linear"
-        trips: Annotated[int, Field(ge=0, le=10**6, description="trips there and back; 0: one way")] = 0
+        cycles: Annotated[int, Field(ge=0, le=10**6, description="cycles there and back; 0: one way")] = 0
 
         @model_validator(mode="after")
         def _log_needs_one_sign(self) -> "Course":
@@ -39,8 +39,8 @@ def _course(quantity: Quantity) -> type:
         def at(self, time: float, duration: float) -> float:
             """The value at a time of a run of ``duration`` [s]."""
             part = time / duration if duration > 0.0 else 0.0
-            if self.trips:
-                turn = 2.0 * self.trips * part % 2.0
+            if self.cycles:
+                turn = 2.0 * self.cycles * part % 2.0
                 part = turn if turn <= 1.0 else 2.0 - turn
             if self.scale == "log":
                 return self.start * (self.stop / self.start) ** part
@@ -108,7 +108,7 @@ def _table(quantity: Quantity, name: str) -> type:
 def _kind(value: Any) -> str:
     if isinstance(value, dict):
         return "[table]" if "file" in value or "time" in value else "[course]"
-    if hasattr(value, "trips"):
+    if hasattr(value, "cycles"):
         return "[course]"
     return "[table]" if hasattr(value, "lowest") else "[value]"
 

@@ -21,12 +21,12 @@ def _ramp():
 @pytest.fixture(scope="module")
 def known(ramp):
     """Five members whose work of adhesion is 1 ... 5 times the time, closed in four, masked in one."""
-    five = ramp.isel(realization=slice(0, 5))
+    five = ramp.isel(member=slice(0, 5))
     numbers = np.arange(1.0, 6.0)[:, None] * five["t"].to_numpy()
     numbers[0] -= 10.0
     closed = np.ones(numbers.shape, "i1")
     closed[4] = 0
-    dims = ("realization", "t")
+    dims = ("member", "t")
     masked = (dims, (numbers <= 0.0).astype(float))
     return five.assign(
         work_of_adhesion=(dims, numbers, ramp["work_of_adhesion"].attrs), in_contact=(dims, closed), masked=masked
@@ -64,7 +64,7 @@ def test_a_variable_without_members_has_no_spread(ramp):
 
 
 def test_a_single_member_has_no_standard_error(ramp):
-    found = analysis.statistics(ramp.isel(realization=[0]))
+    found = analysis.statistics(ramp.isel(member=[0]))
     np.testing.assert_array_equal(found["contact_radius_mean"], ramp["contact_radius"][0])
     assert bool(found["contact_radius_sem"].isnull().all())
     np.testing.assert_array_equal(found["contact_radius_quantile"].sel(quantile=0.05), ramp["contact_radius"][0])
@@ -74,7 +74,7 @@ def test_members_without_a_value_are_left_out(ramp):
     depth = ramp["indentation"].copy()
     depth[0] = math.nan
     found = analysis.statistics(ramp.assign(indentation=depth))
-    rest = analysis.statistics(ramp.isel(realization=slice(1, None)))
+    rest = analysis.statistics(ramp.isel(member=slice(1, None)))
     for kind in ("mean", "std", "sem", "quantile"):
         np.testing.assert_allclose(found[f"indentation_{kind}"], rest[f"indentation_{kind}"], rtol=1e-12)
     depth[:, :3] = math.nan
@@ -107,7 +107,7 @@ def test_a_file_gives_the_same_statistics_as_memory(ramp, tmp_path):
 
 
 def test_averaging_the_second_half_keeps_the_members_error(ramp):
-    dims = ("realization", "t")
+    dims = ("member", "t")
     levels = np.array([1.0, 2.0, 4.0, 4.0, 5.0, 8.0])[:, None] * np.ones(ramp.sizes["t"])
     levels[:, : ramp.sizes["t"] // 2] = 1e9  # a start-up that must not count
     stated = xr.Dataset({"level": (dims, levels)}, {"t": ramp["t"]})
@@ -129,7 +129,7 @@ def test_a_member_that_stopped_is_left_out_from_there_on(ramp):
     area = ramp["contact_area"].copy()
     area[0, 7:] = math.nan
     found = analysis.statistics(ramp.assign(contact_area=area))
-    rest = analysis.statistics(ramp.isel(realization=slice(1, None)))
+    rest = analysis.statistics(ramp.isel(member=slice(1, None)))
     for kind in ("mean", "std", "sem", "quantile"):
         name = f"contact_area_{kind}"
         np.testing.assert_allclose(found[name].isel(t=slice(7, None)), rest[name].isel(t=slice(7, None)), rtol=1e-12)

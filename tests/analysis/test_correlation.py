@@ -80,8 +80,8 @@ def test_a_run_shorter_than_its_memory_has_no_correlation_time():
 
 
 def test_energy_forgets_twice_as_fast_as_its_amplitudes():
-    """Amplitudes forget over the memory time, energies over half of it."""
-    field = shear.Modal(memory=Time(time=0.02), **FIELD)
+    """Amplitudes forget over the correlation time, energies over half of it."""
+    field = shear.Modal(correlation=Time(time=0.02), **FIELD)
     steady = scene(drive=drive.Steady(speed=1e-3), shear=field, clock=Clock(duration=0.4, step=0.001),
                    ensemble=Ensemble(members=128))  # fmt: skip
     found = analysis.statistics(run(steady))

@@ -26,8 +26,8 @@ def _ramp():
 
 def per_member(dataset, **values):
     """The dataset with these numbers per member and time."""
-    shape = (dataset.sizes["realization"], dataset.sizes["t"])
-    return dataset.assign({name: (("realization", "t"), np.broadcast_to(v, shape)) for name, v in values.items()})
+    shape = (dataset.sizes["member"], dataset.sizes["t"])
+    return dataset.assign({name: (("member", "t"), np.broadcast_to(v, shape)) for name, v in values.items()})
 
 
 # -- detachment and masking ------------------------------------------------------------------------
@@ -82,18 +82,18 @@ def test_times_of_a_pulled_ensemble_are_within_its_run():
 # -- loops -----------------------------------------------------------------------------------------
 
 
-def cycled(trips=2, steps=400, **held):
+def cycled(cycles=2, steps=400, **held):
     kind = next(iter(held))
     at_rest = {"drive": drive.Steady(speed=0.0), "bonds": bonds.Unbroken(), "shear": shear.Uniform()}
-    course = {kind: {**held[kind], "trips": trips}} | {name: value for name, value in held.items() if name != kind}
-    part = Equilibrium(**course, on_detach="reattach")
+    course = {kind: {**held[kind], "cycles": cycles}} | {name: value for name, value in held.items() if name != kind}
+    part = Equilibrium(**course, after_pull_off="reattach")
     return run(scene(contact=part, clock=Clock(duration=1.0, step=1.0 / steps), **at_rest))
 
 
 def test_loop_of_a_circle_is_its_area():
     dataset = cycled(steps=800, indentation={"from": 1e-6, "to": 2e-6})
     angle = 2.0 * math.pi * 2.0 * dataset["t"]
-    drawn = dataset.assign(normal_load=np.cos(angle), travel=np.sin(angle))
+    drawn = dataset.assign(normal_load=np.cos(angle), displacement=np.sin(angle))
     # a polygon of 400 corners
     found = analysis.loop_energy(drawn)["loop_energy"]
     np.testing.assert_allclose(found, 200.0 * math.sin(2.0 * math.pi / 400.0), rtol=1e-12)
@@ -105,31 +105,31 @@ def test_loop_of_a_circle_is_its_area():
     [
         {"indentation": {"from": 2e-6, "to": -0.3e-6}},
         {"load": {"from": 4e-3, "to": -0.2e-3}},
-        {"travel": {"from": 3e-6, "to": -0.3e-6}, "stiffness": 2e3},
+        {"displacement": {"from": 3e-6, "to": -0.3e-6}, "stiffness": 2e3},
     ],
-    ids=["indentation", "load", "travel"],
+    ids=["indentation", "load", "displacement"],
 )
 def test_a_contact_that_never_opens_gives_all_back(held):
     dataset = cycled(**held)
-    stored = np.trapezoid(dataset["normal_load"][:101], dataset["travel"][:101])
+    stored = np.trapezoid(dataset["normal_load"][:101], dataset["displacement"][:101])
     found = analysis.loop_energy(dataset)
     assert abs(stored) > 1e-12  # J, given back on the way up
     np.testing.assert_array_equal(found["loop_energy"], 0.0)
     np.testing.assert_array_equal(found["loop_dissipation"], 0.0)
-    assert not any("trip" in heading for row in analysis.highlights(dataset) for heading in row)
+    assert not any("cycle" in heading for row in analysis.highlights(dataset) for heading in row)
 
 
 @pytest.mark.parametrize("held", [{"indentation": {"from": 1e-6, "to": -2e-6}},
-                                  {"travel": {"from": 1e-6, "to": -3e-6}, "stiffness": 500.0}],
-                         ids=["indentation", "travel"])  # fmt: skip
+                                  {"displacement": {"from": 1e-6, "to": -3e-6}, "stiffness": 500.0}],
+                         ids=["indentation", "displacement"])  # fmt: skip
 def test_the_loop_is_what_its_jumps_dissipate(held):
-    """Up to the two jumps, each drawn over one record: half of their loads times the travel of a record."""
+    """Up to the two jumps, each drawn over one record: half of their loads times the displacement of a record."""
     errors = []
     for steps in (1000, 4000):
         dataset = cycled(steps=steps, **held)
         found = analysis.loop_energy(dataset)
         step = 2.0 * abs(held[next(iter(held))]["to"] - 1e-6) * 2 / steps
-        most = 1.5 * 2 * np.abs(dataset["normal_load"].where(dataset["travel"] < 0.2e-6)).max() * step
+        most = 1.5 * 2 * np.abs(dataset["normal_load"].where(dataset["displacement"] < 0.2e-6)).max() * step
         lost = found["loop_dissipation"]
         assert float(lost.min()) > 10.0 * float(most) and bool((found["loop_energy"] > 0.0).all())
         assert bool((np.abs(found["loop_energy"] - lost) < most).all())
@@ -141,24 +141,24 @@ def test_the_loop_is_what_its_jumps_dissipate(held):
 
 
 def test_a_sphere_that_flies_off_has_no_loop():
-    dataset = cycled(trips=2, load={"from": 4e-3, "to": -1e-3})
+    dataset = cycled(cycles=2, load={"from": 4e-3, "to": -1e-3})
     assert bool(analysis.loop_energy(dataset)["loop_energy"].isnull().all())
 
 
 def test_a_stopped_trajectory_has_the_loops_before_its_end():
-    dataset = cycled(trips=4, indentation={"from": 2e-6, "to": 1e-6})
+    dataset = cycled(cycles=4, indentation={"from": 2e-6, "to": 1e-6})
     stopped = dataset["contact_radius"].where(dataset["t"] < 0.6)
     found = analysis.loop_energy(dataset.assign(contact_radius=stopped))
     assert found["loop_energy"].isnull().to_numpy().tolist() == [False, False, True, True]
 
 
 def test_loops_of_a_swept_course_are_those_of_its_points():
-    course = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "trips": 1}, on_detach="reattach")
-    sweep = {"contact.indentation.trips": [1, 2], "adhesion.work": [2e-2, 4e-2]}
+    course = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach")
+    sweep = {"contact.indentation.cycles": [1, 2], "adhesion.work": [2e-2, 4e-2]}
     swept = scene(contact=course, sweep=sweep, bonds=bonds.Unbroken(), shear=shear.Uniform())
     together = analysis.loop_energy(run(swept))
     for k, point in enumerate(swept.points()):
-        alone, where = analysis.loop_energy(run(point)), dict(zip(("trips", "work"), divmod(k, 2), strict=True))
+        alone, where = analysis.loop_energy(run(point)), dict(zip(("cycles", "work"), divmod(k, 2), strict=True))
         for name in alone:
             values = together[name].isel(where)
             np.testing.assert_array_equal(values[: alone.sizes["cycle"]], alone[name])
@@ -166,17 +166,17 @@ def test_loops_of_a_swept_course_are_those_of_its_points():
 
 
 def test_loops_of_statistics_alone_are_the_members_mean():
-    held = {"contact": Equilibrium(indentation={"from": 2e-6, "to": 0.5e-6, "trips": 2})}
+    held = {"contact": Equilibrium(indentation={"from": 2e-6, "to": 0.5e-6, "cycles": 2})}
     few, members = run(scene(record=Record(per_member=False), **held)), run(scene(**held))
     found = analysis.statistics(few)["loop_energy_mean"]
     # the loop is a small difference of what is put in and given back
-    stored = float(np.abs(members["normal_load"]).max() * np.ptp(members["travel"].to_numpy()))
+    stored = float(np.abs(members["normal_load"]).max() * np.ptp(members["displacement"].to_numpy()))
     expected = analysis.loop_energy(members)["loop_energy"].mean()
     np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13 * stored)
 
 
 def test_without_trips_there_is_no_loop(ramp):
-    with pytest.raises(ValueError, match="trips = 2"):
+    with pytest.raises(ValueError, match="cycles = 2"):
         analysis.loop_energy(ramp)
     assert "loop_energy_mean" not in analysis.statistics(ramp)
 
@@ -216,7 +216,7 @@ def test_noise_makes_no_maximum(ramp):
 def started():
     """Bonds that are stretched together after a rest of a tenth of a second; the rest is swept."""
     stretched = bonds.Cohort(
-        hazard=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
+        rupture=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
         start_from="empty", tolerance=1e-3,
     )  # fmt: skip
     part = drive.Start(rest=0.1, speed=5e-6)
@@ -243,7 +243,7 @@ def test_a_start_may_peak_at_once():
     """Bonds without a stretch bear most at rest."""
     part = drive.Start(rest=0.1, speed=1e-2)
     dataset = run(
-        scene(drive=part, bonds=bonds.Rate(critical_speed=1e-2, healing=50.0, stress=3e5), shear=shear.Uniform())
+        scene(drive=part, bonds=bonds.Rate(critical_speed=1e-2, rebinding_rate=50.0, stress=3e5), shear=shear.Uniform())
     )
     found = analysis.events(dataset)
     np.testing.assert_allclose(found["peak_stress"], 3e5, rtol=1e-12)
@@ -252,12 +252,12 @@ def test_a_start_may_peak_at_once():
 
 def test_peaks_of_statistics_alone_are_those_of_the_mean():
     stretched = bonds.Tracked(
-        hazard=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
+        rupture=Bell(zero_force_rate=5.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16,
         sites=200,
     )  # fmt: skip
     parts = {"bonds": stretched, "shear": shear.Uniform(), "drive": drive.Start(rest=0.1, speed=5e-6)}
     few, members = run(scene(record=Record(per_member=False), **parts)), run(scene(**parts))
-    found, mean = analysis.statistics(few), members["shear_stress"].mean("realization")
+    found, mean = analysis.statistics(few), members["shear_stress"].mean("member")
     np.testing.assert_allclose(found["peak_stress_mean"], mean.max(), rtol=1e-12)
     at = int(np.argmax(mean.to_numpy()))
     error = members["shear_stress"][:, at].std(ddof=1) / math.sqrt(6.0)

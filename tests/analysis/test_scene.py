@@ -21,16 +21,16 @@ def test_a_setting_is_found_whether_it_is_swept_or_not():
 
 def test_a_word_is_found_whether_it_is_swept_or_not():
     contact = Equilibrium(indentation={"from": 1e-6, "to": 2e-6})
-    dataset = run(scene(contact=contact, shear=shear.Uniform(), sweep={"contact.on_detach": ["stop", "reattach"]}))
-    assert word(dataset, "contact.on_detach", "").to_numpy().tolist() == ["stop", "reattach"]
+    dataset = run(scene(contact=contact, shear=shear.Uniform(), sweep={"contact.after_pull_off": ["stop", "reattach"]}))
+    assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == ["stop", "reattach"]
     assert str(word(dataset, "contact.indentation.scale", "").to_numpy()) == "linear"
     assert str(word(dataset, "contact.colour", "grey").to_numpy()) == "grey"
 
 
 def test_words_that_are_alike_in_a_zipped_sweep_are_told_without_their_number():
-    rows = [{"contact.on_detach": "reattach", "contact.load": load} for load in (1e-3, 2e-3)]
+    rows = [{"contact.after_pull_off": "reattach", "contact.load": load} for load in (1e-3, 2e-3)]
     dataset = run(scene(shear=shear.Uniform(), sweep=rows))
-    assert word(dataset, "contact.on_detach", "").to_numpy().tolist() == ["reattach", "reattach"]
+    assert word(dataset, "contact.after_pull_off", "").to_numpy().tolist() == ["reattach", "reattach"]
 
 
 def test_a_table_that_is_swept_whole_is_known_by_its_models():

@@ -100,7 +100,7 @@ def test_csv_has_a_row_for_each_point_and_time(tmp_path):
 
 
 def test_table_of_a_cycle_tells_what_holds_the_sphere():
-    cycle = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "trips": 1}, on_detach="reattach")
+    cycle = Equilibrium(indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, after_pull_off="reattach")
     still = {"bonds": bonds.Unbroken(), "shear": shear.Uniform(), "drive": drive.Steady(speed=0.0)}
     rows = analysis.table(run(scene(contact=cycle, **still)), rows=5)
     assert [row["Δ\n(µm)"] for row in rows] == ["1", "-0.5", "-2", "-0.5", "1"]

@@ -41,7 +41,7 @@ def test_every_scenario_gives_a_conforming_dataset(path, tmp_path):
 @pytest.mark.verify
 @pytest.mark.parametrize("per_member", [True, False])
 def test_maps_labels_and_statistics_conform(per_member, tmp_path):
-    mapped = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, memory=Slip(length=3e-6))
+    mapped = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
     scenario = scene(
         3, shear=mapped, bonds=BONDS["counted"], record=Record(maps=(2e-3,), map_members=2, per_member=per_member)
     )

@@ -15,14 +15,14 @@ from numpy.testing import assert_allclose
 from sim.engine import march
 from sim.ensemble import plan as plans
 from sim.ensemble import simulate as ensemble
-from sim.ensemble.recorded import GAUGES
+from sim.ensemble.recorded import VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Record
 from sim.scenario.scenario import read_sweep
 
-MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, memory=Slip(length=3e-6))
+MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
 
 
 def sample(**parts):
@@ -34,9 +34,9 @@ def test_the_dataset_is_what_the_engine_marched():
     scenario = sample()
     dataset = ensemble.run(scenario)
     for record, state in enumerate(march(scenario, np.arange(5))):
-        for gauge in GAUGES:
-            found = dataset[gauge.name].isel(t=record).values
-            assert np.array_equal(np.atleast_1d(found), gauge.read(scenario, state), equal_nan=True), gauge.name
+        for variable in VARIABLES:
+            found = dataset[variable.name].isel(t=record).values
+            assert np.array_equal(np.atleast_1d(found), variable.read(scenario, state), equal_nan=True), variable.name
 
 
 def test_every_variable_has_unit_and_long_name():
@@ -51,7 +51,7 @@ def test_the_file_opens_lazily_and_equals_the_run_in_memory(tmp_path):
     scenario = replace(sample(), sweep=read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]}))
     path = ensemble.run(scenario, tmp_path / "out.nc")
     with ensemble.open(path) as from_disk:
-        assert from_disk["contact_radius"].dims == ("load", "bond_share", "realization", "t")
+        assert from_disk["contact_radius"].dims == ("load", "bond_share", "member", "t")
         assert from_disk["speed"].dims == ("load", "bond_share", "t")
         xr.testing.assert_identical(from_disk.load(), ensemble.run(scenario))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["out.nc"]
@@ -73,17 +73,19 @@ def test_parts_of_any_shape_give_the_same_numbers(monkeypatch):
 def test_recording_seldom_gives_the_same_numbers():
     often = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3)))
     seldom = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3, record=3e-3)))
-    for gauge in GAUGES:
-        assert np.array_equal(often[gauge.name].isel(t=[0, 3, 6]).values, seldom[gauge.name].values, equal_nan=True)
+    for variable in VARIABLES:
+        assert np.array_equal(
+            often[variable.name].isel(t=[0, 3, 6]).values, seldom[variable.name].values, equal_nan=True
+        )
 
 
 def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
     each = ensemble.run(sample())
     monkeypatch.setattr(plans, "_GROUP", 2)
     pooled = ensemble.run(sample(record=Record(per_member=False)))
-    assert "realization" not in pooled.dims
+    assert "member" not in pooled.dims
     for name in ("contact_radius", "fluctuation_energy", "friction_force"):
-        values = each[name].transpose("realization", "t").values
+        values = each[name].transpose("member", "t").values
         assert_allclose(pooled[f"{name}_mean"], values.mean(0), rtol=1e-13)
         assert_allclose(pooled[f"{name}_std"], values.std(0, ddof=1), rtol=1e-11)
         assert_allclose(pooled[f"{name}_sem"], values.std(0, ddof=1) / np.sqrt(5), rtol=1e-11)
@@ -93,12 +95,12 @@ def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
 def test_maps_are_those_of_the_members_and_times_asked_for():
     scenario = sample(shear=MAPPED, record=Record(maps=(4e-3, 1e-3), map_members=2))
     dataset = ensemble.run(scenario)
-    assert dataset["shear_map"].dims == ("map_realization", "snapshot", "x", "y")
-    assert_allclose(dataset["snapshot"], [1e-3, 4e-3])
+    assert dataset["shear_map"].dims == ("map_member", "map_time", "x", "y")
+    assert_allclose(dataset["map_time"], [1e-3, 4e-3])
     states = list(march(scenario, np.arange(5)))
     for snapshot, step in enumerate((1, 4)):
         maps = scenario.process.maps(states[step].shear, np.full(2, states[step].position[0]), 2)
-        assert np.array_equal(dataset["shear_map"].isel(snapshot=snapshot).values, maps)
+        assert np.array_equal(dataset["shear_map"].isel(map_time=snapshot).values, maps)
 
 
 def test_a_detached_contact_is_zero_and_not_in_contact():
@@ -112,7 +114,7 @@ def test_a_detached_contact_is_zero_and_not_in_contact():
 
 def test_members_that_do_not_differ_are_computed_once():
     dataset = ensemble.run(sample(members=64, shear=shear.Uniform()))
-    assert "realization" not in dataset.dims
+    assert "member" not in dataset.dims
 
 
 def test_swept_models_are_labelled():
@@ -208,5 +210,5 @@ def test_a_full_disk_is_told_with_its_reason(tmp_path):
 def test_a_swept_key_may_keep_one_value():
     scenario = replace(sample(), sweep=read_sweep({"sphere.radius": [2e-3, 2e-3], "contact.load": [1e-3, 4e-3]}))
     dataset = ensemble.run(scenario)
-    assert dataset["contact_radius"].dims == ("radius", "load", "realization", "t")
+    assert dataset["contact_radius"].dims == ("radius", "load", "member", "t")
     assert_allclose(dataset["radius"], [2e-3, 2e-3])

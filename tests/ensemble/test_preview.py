@@ -23,7 +23,7 @@ MODAL = {
     "cell": "0.24 mm",
     "points": 32,
     "spectrum": {"model": "band", "rms": "150 kPa", "longest": "60 um", "shortest": "16 um"},
-    "memory": {"model": "slip", "length": "5 um"},
+    "correlation": {"model": "slip", "length": "5 um"},
 }
 
 
@@ -94,7 +94,7 @@ def test_choices_are_told_beside_the_numbers():
     lines = told("fixed_grips", shear=MODAL)["quantities in SI"]
     assert row(lines, "drive.scale")[1] == "log"
     assert row(lines, "shear.spectrum.model")[1] == "band"
-    assert row(lines, "shear.amplitudes")[1] == "gaussian"
+    assert row(lines, "shear.mode_amplitudes")[1] == "gaussian"
     assert not any(line.startswith(("record", "name", "shear.model")) for line in lines)
     lines = told("fixed_grips", record={"per_member": False})["quantities in SI"]
     assert row(lines, "record.per_member")[1] == "false"
@@ -130,8 +130,8 @@ def test_the_errors_of_the_cell_are_those_of_the_dataset():
 
 def test_the_mean_depth_knows_its_energy():
     lines = told("masking", sweep={})["fluctuations"]
-    assert row(lines, "stored energy")[1] == "0.04196 J/m^2 at growth 1, on the infinite plane"
-    assert row(lines, "rms of the stress")[1] == "2.652e+05 Pa at growth 1"
+    assert row(lines, "stored energy")[1] == "0.04196 J/m^2 at amplitude 1, on the infinite plane"
+    assert row(lines, "rms of the stress")[1] == "2.652e+05 Pa at amplitude 1"
 
 
 @pytest.mark.parametrize(
@@ -201,9 +201,9 @@ def test_more_members_take_longer_and_more_memory():
 def test_a_depth_chosen_by_the_scene_is_named_with_its_reason():
     from helpers.scenes import SHEARS, scene
 
-    with_memory, without = (preview(scene(shear=SHEARS[f"auto {name} memory"])) for name in ("with", "without"))
-    assert "→ banded" in with_memory and "a memory is given" in with_memory
-    assert "→ mean" in without and "no memory is given" in without
+    with_memory, without = (preview(scene(shear=SHEARS[f"auto {name} correlation"])) for name in ("with", "without"))
+    assert "→ banded" in with_memory and "a correlation is given" in with_memory
+    assert "→ mean" in without and "no correlation is given" in without
 
 
 def test_waves_longer_than_the_cell_are_told():
@@ -213,7 +213,7 @@ def test_waves_longer_than_the_cell_are_told():
     from sim.parts.shear.correlation import Slip
 
     for cell, told_of in ((CELL, False), (0.4 * CELL, True)):
-        part = shear.Banded(spectrum=SPECTRUM, cell=cell, memory=Slip(length=1e-6))
+        part = shear.Banded(spectrum=SPECTRUM, cell=cell, correlation=Slip(length=1e-6))
         assert ("longer than the cell" in preview(scene(shear=part))) == told_of
     assert "longer than the cell" not in preview(scene(shear=SHEARS["modal ripple"]))
 
@@ -226,15 +226,15 @@ def test_the_mean_field_of_bell_bonds_is_told_by_how_much_it_overpredicts():
 
     for rebinding, percent in ((1.0, 27), (10.0, 37), (100.0, 47)):
         recipe = STRETCHED | {"rebinding_rate": rebinding * BELL.zero_force_rate}
-        said = preview(scene(bonds=bonds.FirstMoment(hazard=BELL, **recipe)))
+        said = preview(scene(bonds=bonds.FirstMoment(rupture=BELL, **recipe)))
         (line,) = (line.strip() for line in said.splitlines() if "overpredicts" in line)
         assert line.startswith("the mean stretch") and f" overpredicts the friction maximum by {percent}%" in line
         assert line.endswith('bonds.model = "cohort" does not')
     for silent in (
-        bonds.FirstMoment(hazard=Constant(rate=9.0), **STRETCHED),
-        bonds.FirstMoment(hazard=CUT_OFF, **STRETCHED),
-        bonds.Cohort(hazard=BELL, **STRETCHED),
-        bonds.Rate(critical_speed=1.0, healing=1.0),
+        bonds.FirstMoment(rupture=Constant(rate=9.0), **STRETCHED),
+        bonds.FirstMoment(rupture=CUT_OFF, **STRETCHED),
+        bonds.Cohort(rupture=BELL, **STRETCHED),
+        bonds.Rate(critical_speed=1.0, rebinding_rate=1.0),
     ):
         assert "overpredicts" not in preview(scene(bonds=silent))
 
@@ -246,11 +246,11 @@ def test_bonds_left_open_are_told_with_their_depth_and_the_reason():
     from sim.parts.bonds.rupture import Constant
 
     for auto, depth, reason in (
-        (bonds.Auto(critical_speed=1.0, healing=1.0), "rate", "no number of sites is given; the rupture rate does not"),
-        (bonds.Auto(critical_speed=1.0, healing=1.0, sites=64), "counted", "1/√N of 64 sites is 0.125, above the"),
-        (bonds.Auto(hazard=BELL, **STRETCHED, sites=64), "tracked", "1/√N of 64 sites is 0.125, above the"),
-        (bonds.Auto(hazard=BELL, **STRETCHED), "cohort", "1/√N of 4,547,221,756 sites is 1.48e-05, within the"),
-        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), "rate", "1/√N of 4,547,221,756 sites is 1.48e-05, within"),
+        (bonds.Auto(critical_speed=1.0, rebinding_rate=1.0), "rate", "no number of sites is given; the rupture"),
+        (bonds.Auto(critical_speed=1.0, rebinding_rate=1.0, sites=64), "counted", "1/√N of 64 sites is 0.125, above"),
+        (bonds.Auto(rupture=BELL, **STRETCHED, sites=64), "tracked", "1/√N of 64 sites is 0.125, above the"),
+        (bonds.Auto(rupture=BELL, **STRETCHED), "cohort", "1/√N of 4,547,221,756 sites is 1.48e-05, within the"),
+        (bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED), "rate", "1/√N of 4,547,221,756 sites is 1.48e-05,"),
     ):  # fmt: skip
         lines = preview(scene(bonds=auto)).split("\n\n")[1].splitlines()
         place = next(k for k, line in enumerate(lines) if line.startswith("  bonds "))

@@ -26,8 +26,8 @@ def scene(**changes):
         "adhesion": Adhesion(work=WORK),
         "contact": Equilibrium(load=LOAD),
         "drive": drive.Ramp(start=1e-5, stop=1e-1, scale="log"),
-        "bonds": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=3e5),
-        "shear": shear.Modal(memory=Time(time=0.01), growth=Onset(speed=2.5e-3, width=0.3), **FIELD),
+        "bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5),
+        "shear": shear.Modal(correlation=Time(time=0.01), amplitude=Onset(speed=2.5e-3, width=0.3), **FIELD),
         "ensemble": Ensemble(members=6),
         "seed": 2003,
     }

@@ -19,7 +19,7 @@ STEADY = drive.Steady(speed=4e-3)
 
 def field(kind=shear.Modal, spectrum=None, **changes):
     spectrum = spectrum or Band(rms=150e3, longest=60e-6, shortest=16e-6)
-    options = {"memory": Time(time=0.01), "growth": Onset(speed=2.5e-3, width=0.3), "cell": CELL, "points": 32}
+    options = {"correlation": Time(time=0.01), "amplitude": Onset(speed=2.5e-3, width=0.3), "cell": CELL, "points": 32}
     return kind(spectrum=spectrum, **(options | changes))
 
 
@@ -31,7 +31,7 @@ def simulated(**changes):
         "adhesion": Adhesion(work=42e-3),
         "contact": Equilibrium(load=4e-3),
         "drive": RAMP,
-        "bonds": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=3e5),
+        "bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5),
         "shear": field(),
         "ensemble": Ensemble(members=6),
         "seed": 2003,

@@ -2,11 +2,11 @@
 
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.contact import Equilibrium, Lagging
+from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Constant as Ungrowing
+from sim.parts.shear.amplitude import Constant as ConstantAmplitude
 from sim.parts.shear.amplitude import Onset, Stress
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
 from sim.scenario.clock import Clock, Ensemble
@@ -31,64 +31,64 @@ STRETCHED = {"bond_stiffness": 4e-7, "rebinding_rate": 400.0, "site_density": 1e
 BONDS = {
     "none": bonds.Unbroken(stress=2e5),
     "steady": bonds.Steady(critical_speed=1e-2, stress=2e5),
-    "rate": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=2e5, start_from="bonded"),
-    "rate, carried": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=2e5, area="carried"),
-    "counted": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=40, stress=2e5, start_from="steady"),
-    "rate, bell": bonds.FirstMoment(hazard=BELL, **STRETCHED, start_from="bonded"),
-    "rate, cut-off, carried": bonds.FirstMoment(hazard=CUT_OFF, **STRETCHED, area="carried"),
-    "cohort": bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=1e-3),
-    "cohort, cut-off": bonds.Cohort(hazard=CUT_OFF, **STRETCHED, tolerance=1e-2, start_from="empty"),
-    "cohort, carried": bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=1e-2, start_from="empty", area="carried"),
-    "tracked": bonds.Tracked(hazard=BELL, **STRETCHED, sites=30),
-    "tracked, constant": bonds.Tracked(hazard=Constant(rate=200.0), **STRETCHED, sites=7, start_from="bonded"),
-    "auto, few sites": bonds.Auto(hazard=CUT_OFF, **STRETCHED, sites=20),
-    "auto, many sites": bonds.Auto(critical_speed=1e-2, healing=500.0, stress=2e5, sites=10**6),
+    "rate": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=2e5, start_from="bonded"),
+    "rate, carried": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=2e5, area="carried"),
+    "counted": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=40, stress=2e5, start_from="steady"),
+    "rate, bell": bonds.FirstMoment(rupture=BELL, **STRETCHED, start_from="bonded"),
+    "rate, cut-off, carried": bonds.FirstMoment(rupture=CUT_OFF, **STRETCHED, area="carried"),
+    "cohort": bonds.Cohort(rupture=BELL, **STRETCHED, tolerance=1e-3),
+    "cohort, cut-off": bonds.Cohort(rupture=CUT_OFF, **STRETCHED, tolerance=1e-2, start_from="empty"),
+    "cohort, carried": bonds.Cohort(rupture=BELL, **STRETCHED, tolerance=1e-2, start_from="empty", area="carried"),
+    "tracked": bonds.Tracked(rupture=BELL, **STRETCHED, sites=30),
+    "tracked, constant": bonds.Tracked(rupture=Constant(rate=200.0), **STRETCHED, sites=7, start_from="bonded"),
+    "auto, few sites": bonds.Auto(rupture=CUT_OFF, **STRETCHED, sites=20),
+    "auto, many sites": bonds.Auto(critical_speed=1e-2, rebinding_rate=500.0, stress=2e5, sites=10**6),
 }
 SHEARS = {
     "uniform": shear.Uniform(),
-    "mean": shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), growth=Stress(reference=2e5)),
-    "modal, time, constant": shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3)),
+    "mean": shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=Stress(reference=2e5)),
+    "modal, time, constant": shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3)),
     "modal, slip, onset": shear.Modal(
-        spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6), growth=Onset(speed=2e-3, width=0.3, floor=0.1)
+        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=Onset(speed=2e-3, width=0.3, floor=0.1)
     ),
     "modal, wave, relaxing stress": shear.Modal(
-        spectrum=SPECTRUM, cell=CELL, memory=Wave(waves=2.0), growth=Stress(reference=2e5, relaxing=True)
+        spectrum=SPECTRUM, cell=CELL, correlation=Wave(waves=2.0), amplitude=Stress(reference=2e5, relaxing=True)
     ),
-    "modal, fixed": shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), amplitudes="fixed"),
+    "modal, fixed": shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), mode_amplitudes="fixed"),
     "mapped, diffusion, constant": shear.Mapped(
-        spectrum=SPECTRUM, cell=CELL, points=12, memory=Diffusion(diffusivity=1e-9), growth=Ungrowing()
+        spectrum=SPECTRUM, cell=CELL, points=12, correlation=Diffusion(diffusivity=1e-9), amplitude=ConstantAmplitude()
     ),
     "mapped, fixed, stress": shear.Mapped(
         spectrum=SPECTRUM,
         cell=CELL,
         points=13,
-        memory=Slip(length=1e-5),
-        growth=Stress(reference=2e5),
-        amplitudes="fixed",
+        correlation=Slip(length=1e-5),
+        amplitude=Stress(reference=2e5),
+        mode_amplitudes="fixed",
     ),
     "banded, slip, onset": shear.Banded(
-        spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6), growth=Onset(speed=2e-3, width=0.3, floor=0.1)
+        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=Onset(speed=2e-3, width=0.3, floor=0.1)
     ),
     "banded, wave, relaxing stress": shear.Banded(
         spectrum=SPECTRUM,
         cell=CELL,
         tolerance=0.1,
-        memory=Wave(waves=2.0),
-        growth=Stress(reference=2e5, relaxing=True),
+        correlation=Wave(waves=2.0),
+        amplitude=Stress(reference=2e5, relaxing=True),
     ),
-    "banded, fixed": shear.Banded(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), amplitudes="fixed"),
-    "modal on a disc": shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=2e-3), contact="disc"),
+    "banded, fixed": shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), mode_amplitudes="fixed"),
+    "modal on a disc": shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), contact="disc"),
     "mean on a disc": shear.Mean(spectrum=Gaussian(rms=1e5, length=2e-5), contact="disc", paid_by_adhesion=0.5),
-    "auto with memory": shear.Auto(spectrum=SPECTRUM, cell=CELL, memory=Diffusion(diffusivity=1e-9)),
-    "auto without memory": shear.Auto(spectrum=SPECTRUM),
+    "auto with correlation": shear.Auto(spectrum=SPECTRUM, cell=CELL, correlation=Diffusion(diffusivity=1e-9)),
+    "auto without correlation": shear.Auto(spectrum=SPECTRUM),
     "modal ripple": shear.Modal(
-        spectrum=Ripple(amplitude=1e5, wavelength=24e-6), cell=CELL, points=32, memory=Slip(length=1e-5)
+        spectrum=Ripple(amplitude=1e5, wavelength=24e-6), cell=CELL, points=32, correlation=Slip(length=1e-5)
     ),
     "modal self-affine": shear.Modal(
         spectrum=SelfAffine(rms=1e5, hurst=0.8, longest=120e-6, rolloff=100e-6, shortest=50e-6),
         cell=CELL,
-        memory=Wave(waves=1.0),
-        growth=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=True),
+        correlation=Wave(waves=1.0),
+        amplitude=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=True),
     ),
 }
 CONTACTS = {
@@ -96,15 +96,18 @@ CONTACTS = {
     "tension": Equilibrium(load=-0.3e-3),
     "indentation": Equilibrium(indentation=2e-6),
     "lifted": Equilibrium(indentation=-0.5e-6),
-    "machine": Equilibrium(travel=1e-6, stiffness=2e3, on_detach="reattach"),
-    "load there and back": Equilibrium(load={"from": 4e-3, "to": -1e-3, "trips": 1}, on_detach="reattach"),
-    "travel there and back": Equilibrium(
-        travel={"from": 1e-6, "to": -3e-6, "trips": 2}, stiffness=500.0, on_detach="stop", reversible=0.05
+    "machine": Equilibrium(displacement=1e-6, stiffness=2e3, after_pull_off="reattach"),
+    "load there and back": Equilibrium(load={"from": 4e-3, "to": -1e-3, "cycles": 1}, after_pull_off="reattach"),
+    "displacement there and back": Equilibrium(
+        displacement={"from": 1e-6, "to": -3e-6, "cycles": 2}, stiffness=500.0, after_pull_off="stop", reversible=0.05
     ),
     "indentation in a table": Equilibrium(indentation={"time": [0.0, 5e-3, 1.0], "value": [2e-6, -2e-6, -2e-6]}),
-    "lagging": Lagging(load=4e-3, front_speed=1e-2),
-    "lagging cycle": Lagging(
-        indentation={"from": 1e-6, "to": -2e-6, "trips": 1}, front_speed=1e-2, heal_speed=1e-3, on_detach="reattach"
+    "rate_dependent": RateDependent(load=4e-3, front_speed=1e-2),
+    "rate-dependent cycle": RateDependent(
+        indentation={"from": 1e-6, "to": -2e-6, "cycles": 1},
+        front_speed=1e-2,
+        heal_speed=1e-3,
+        after_pull_off="reattach",
     ),
     "partly reversible": Equilibrium(load=4e-3, reversible=0.02),
 }

@@ -1,6 +1,6 @@
 """The contact behind a machine: closed states, thirty decades of stiffness, the fold, any input.
 
-Tolerances: u = 2^-53. The travel of the fold carries some ten roundings (products, pi, a cube root, the
+Tolerances: u = 2^-53. The displacement of the fold carries some ten roundings (products, pi, a cube root, the
 two terms of F), at most 16 u. At a relative distance d from the fold, t = sqrt(|F_f| d/f_2), so that a
 relative error e of it moves the radius by e sqrt(|F_f|/f_2)/(x_f sqrt(d)) <= 0.71 e/sqrt(d): 12 u/sqrt(d).
 Elsewhere some ten roundings remain, 20 u. Wider arithmetic here is numpy's longdouble where it is wider, and
@@ -53,14 +53,14 @@ def contact_stiffness(work, sphere_radius, modulus):
     return 4.0 / 3.0 * modulus * np.cbrt(math.pi * work * sphere_radius * (sphere_radius / (8.0 * modulus)))
 
 
-def exact(travel, stiffness, work, sphere_radius, modulus):
-    """Radius and travel of the fold in fifty digits, bisected to forty; no radius beyond the fold."""
+def exact(displacement, stiffness, work, sphere_radius, modulus):
+    """Radius and displacement of the fold in fifty digits, bisected to forty; no radius beyond the fold."""
     with mpmath.workdps(50):
-        travel, stiffness, work, sphere_radius, modulus = map(
-            mpmath.mpf, (travel, stiffness, work, sphere_radius, modulus)
+        displacement, stiffness, work, sphere_radius, modulus = map(
+            mpmath.mpf, (displacement, stiffness, work, sphere_radius, modulus)
         )
 
-        def needed(x):  # the travel of the equilibrium of radius x^2
+        def needed(x):  # the displacement of the equilibrium of radius x^2
             indentation = x**4 / sphere_radius - mpmath.sqrt(2 * mpmath.pi * work / modulus) * x
             load = 4 * modulus * x**6 / (3 * sphere_radius) - mpmath.sqrt(8 * mpmath.pi * work * modulus) * x**3
             return indentation + load / stiffness
@@ -72,12 +72,12 @@ def exact(travel, stiffness, work, sphere_radius, modulus):
 
         unit = mpmath.sqrt(mpmath.cbrt(mpmath.pi * work * sphere_radius**2 / (8 * modulus)))
         last = bisected(slope, 0.9 * unit, 1.5 * unit, 0)
-        if needed(last) > travel:
+        if needed(last) > displacement:
             return None, needed(last)
         high = 2 * last
-        while needed(high) < travel:
+        while needed(high) < displacement:
             high *= 4
-        return bisected(needed, last, high, travel) ** 2, needed(last)
+        return bisected(needed, last, high, displacement) ** 2, needed(last)
 
 
 def bisected(function, low, high, target):
@@ -88,28 +88,28 @@ def bisected(function, low, high, target):
 
 
 def random_states(count, seed):
-    """Adhesive contacts behind machines, stiffnesses over thirty decades, travels around and far from the fold."""
+    """Adhesive contacts behind machines, stiffness over thirty decades, displacement around and far from the fold."""
     random = np.random.default_rng(seed)
     work, sphere_radius, modulus = 10.0 ** random.uniform(-10, 10, (3, count))
     stiffness = contact_stiffness(work, sphere_radius, modulus) * 10.0 ** random.uniform(-15, 15, count)
     distance = 10.0 ** random.uniform(-12, 12, count) * random.choice([-1.0, 1.0, 1.0, 1.0], count)
-    travel = jkr.pull_off_travel(stiffness, work, sphere_radius, modulus) * (1.0 - distance)
-    return travel, stiffness, work, sphere_radius, modulus
+    displacement = jkr.pull_off_displacement(stiffness, work, sphere_radius, modulus) * (1.0 - distance)
+    return displacement, stiffness, work, sphere_radius, modulus
 
 
 class Wide:
     """The sextic of a batch of contacts in wider arithmetic, and where it folds."""
 
-    def __init__(self, travel, stiffness, work, sphere_radius, modulus):
-        travel, k, work, sphere_radius, modulus = (
-            value.astype(WIDE) for value in (travel, stiffness, work, sphere_radius, modulus)
+    def __init__(self, displacement, stiffness, work, sphere_radius, modulus):
+        displacement, k, work, sphere_radius, modulus = (
+            value.astype(WIDE) for value in (displacement, stiffness, work, sphere_radius, modulus)
         )
         self.unit = np.cbrt(PI * work * sphere_radius * sphere_radius / (8 * modulus))
         self.depth = self.unit * self.unit / sphere_radius
         self.contact = 4 * modulus * self.unit / 3
         self.grips, self.load = 1 / (1 + self.contact / k), 1 / (1 + k / self.contact)
-        self.level = self.grips * travel / self.depth
-        x = np.full(travel.shape, 1.45, WIDE)
+        self.level = self.grips * displacement / self.depth
+        x = np.full(displacement.shape, 1.45, WIDE)
         for _ in range(9):  # from 3^(1/3) at most, quadratically
             slope = 4 * self.grips * (x**3 - 1) + 6 * self.load * x * x * (x**3 - 3)
             x = x - slope / (12 * self.grips * x * x + self.load * x * (30 * x**3 - 36))
@@ -136,26 +136,26 @@ def test_the_last_contact_of_every_machine(stiffness, radius, load, indentation)
     last = jkr.pull_off_at_stiffness(stiffness, **MAUGIS)
     assert_allclose(last, (radius, load, indentation), rtol=1e-12, atol=0)
     if stiffness > 0.0:
-        travel = jkr.pull_off_travel(stiffness, **MAUGIS)
-        assert_allclose(travel, indentation + load / stiffness, rtol=1e-12, atol=0)
-        assert_allclose(jkr.radius_at_travel(travel, stiffness, **MAUGIS), radius, rtol=1e-12, atol=0)
-        assert np.isnan(jkr.radius_at_travel(np.nextafter(travel, -9e9), stiffness, **MAUGIS))
+        displacement = jkr.pull_off_displacement(stiffness, **MAUGIS)
+        assert_allclose(displacement, indentation + load / stiffness, rtol=1e-12, atol=0)
+        assert_allclose(jkr.radius_at_displacement(displacement, stiffness, **MAUGIS), radius, rtol=1e-12, atol=0)
+        assert np.isnan(jkr.radius_at_displacement(np.nextafter(displacement, -9e9), stiffness, **MAUGIS))
 
 
 @pytest.mark.parametrize(("radius", "load", "indentation"), STATES)
 @pytest.mark.parametrize("stiffness", [1e-3, 0.1, 1.0, 5.0, 100.0, 1e6, math.inf])
 def test_radius_of_the_known_states_behind_every_machine(radius, load, indentation, stiffness):
-    computed = jkr.radius_at_travel(indentation + load / stiffness, stiffness, **MAUGIS)
+    computed = jkr.radius_at_displacement(indentation + load / stiffness, stiffness, **MAUGIS)
     assert_allclose(computed, radius, rtol=1e-12, atol=0)
 
 
 def test_a_neck_that_no_load_holds_stands_behind_a_stiff_machine():
     # the rational point (2/3, -28/27, -8/9) is the fold at stiffness 5: stable for stiffer machines only
     for stiffness in (5.5, 10.0, 1e3, math.inf):
-        travel = -8.0 / 9.0 - 28.0 / 27.0 / stiffness
-        assert_allclose(jkr.radius_at_travel(travel, stiffness, **MAUGIS), 2.0 / 3.0, rtol=1e-12, atol=0)
-    travel = -8.0 / 9.0 - 28.0 / 27.0 / 4.0
-    assert jkr.radius_at_travel(travel, 4.0, **MAUGIS) > 0.7
+        displacement = -8.0 / 9.0 - 28.0 / 27.0 / stiffness
+        assert_allclose(jkr.radius_at_displacement(displacement, stiffness, **MAUGIS), 2.0 / 3.0, rtol=1e-12, atol=0)
+    displacement = -8.0 / 9.0 - 28.0 / 27.0 / 4.0
+    assert jkr.radius_at_displacement(displacement, 4.0, **MAUGIS) > 0.7
 
 
 def test_an_infinite_stiffness_is_an_indentation():
@@ -163,29 +163,31 @@ def test_an_infinite_stiffness_is_an_indentation():
     work, sphere_radius, modulus = 10.0 ** random.uniform(-10, 10, (3, 10_000))
     last = jkr.pull_off_indentation(work, sphere_radius, modulus)
     indentation = last * (1.0 - random.choice([-1.0, 1.0], 10_000) * 10.0 ** random.uniform(-6, 6, 10_000))
-    computed = jkr.radius_at_travel(indentation, math.inf, work, sphere_radius, modulus)
+    computed = jkr.radius_at_displacement(indentation, math.inf, work, sphere_radius, modulus)
     wanted = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
     assert_allclose(computed, wanted, rtol=40 * U + 24 * U * 1e3, atol=0)
     far = indentation > 0.5 * last
     assert_allclose(computed[far], wanted[far], rtol=40 * U + 24 * U / math.sqrt(0.5), atol=0)
-    assert_allclose(jkr.pull_off_travel(math.inf, work, sphere_radius, modulus), last, rtol=20 * U, atol=0)
+    assert_allclose(jkr.pull_off_displacement(math.inf, work, sphere_radius, modulus), last, rtol=20 * U, atol=0)
 
 
 def test_a_soft_machine_is_a_load():
     # kΔ kept, the indentation adds k δ/P to the load: 1e-15 of it where the machine is that soft
     load, stiffness = np.array([-3.9e-4, -1e-4, 1e-4, 4e-3, 10.0]), 1e-16 * contact_stiffness(**LENS)
-    computed = jkr.radius_at_travel(load / stiffness, stiffness, **LENS)
+    computed = jkr.radius_at_displacement(load / stiffness, stiffness, **LENS)
     assert_allclose(computed, jkr.radius_at_load(load, **LENS), rtol=1e-13, atol=0)
 
 
-def test_without_stiffness_no_travel_loads_the_sphere():
+def test_without_stiffness_no_displacement_loads_the_sphere():
     rest = jkr.radius_at_load(0.0, **LENS)
-    travel = np.array([-1e3, -1e-6, 0.0, 1e-6, 1e3])
-    assert_allclose(jkr.radius_at_travel(travel, 0.0, **LENS), rest, rtol=20 * U, atol=0)
-    assert_array_equal(jkr.radius_at_travel(travel, -0.0, **LENS), jkr.radius_at_travel(travel, 0.0, **LENS))
-    assert_array_equal(jkr.radius_at_travel(travel, 0.0, 0.0, 2e-3, 6.4e6), 0.0)
-    assert np.isnan(jkr.radius_at_travel(math.inf, 0.0, **LENS))
-    assert jkr.pull_off_travel(0.0, **LENS) == -math.inf
+    displacement = np.array([-1e3, -1e-6, 0.0, 1e-6, 1e3])
+    assert_allclose(jkr.radius_at_displacement(displacement, 0.0, **LENS), rest, rtol=20 * U, atol=0)
+    assert_array_equal(
+        jkr.radius_at_displacement(displacement, -0.0, **LENS), jkr.radius_at_displacement(displacement, 0.0, **LENS)
+    )
+    assert_array_equal(jkr.radius_at_displacement(displacement, 0.0, 0.0, 2e-3, 6.4e6), 0.0)
+    assert np.isnan(jkr.radius_at_displacement(math.inf, 0.0, **LENS))
+    assert jkr.pull_off_displacement(0.0, **LENS) == -math.inf
     assert_allclose(jkr.pull_off_at_stiffness(0.0, **LENS).load, jkr.pull_off_load(0.042, 2e-3), rtol=20 * U, atol=0)
 
 
@@ -197,14 +199,14 @@ def test_without_stiffness_no_travel_loads_the_sphere():
 def test_radius_to_fifty_digits_with_half_of_them_lost_towards_the_fold(distance, soft, work, sphere_radius, modulus):
     rest = {"work": work, "sphere_radius": sphere_radius, "modulus": modulus}
     stiffness = float(soft * contact_stiffness(**rest))
-    last = float(jkr.pull_off_travel(stiffness, **rest))
-    travel = last * (1.0 - distance)
-    wanted, fold = exact(travel, stiffness, **rest)
+    last = float(jkr.pull_off_displacement(stiffness, **rest))
+    displacement = last * (1.0 - distance)
+    wanted, fold = exact(displacement, stiffness, **rest)
     assert abs(last / fold - 1) < 16 * U
-    nearness = float((fold - travel) / fold)
+    nearness = float((fold - displacement) / fold)
     if nearness < 1e-13:  # 1 - distance is rounded, too
         return
-    error = float(abs(jkr.radius_at_travel(travel, stiffness, **rest) / wanted - 1))
+    error = float(abs(jkr.radius_at_displacement(displacement, stiffness, **rest) / wanted - 1))
     assert error < 20 * U + 12 * U / math.sqrt(nearness)
     assert error < 1e-12 or nearness < 1e-5
 
@@ -212,9 +214,9 @@ def test_radius_to_fifty_digits_with_half_of_them_lost_towards_the_fold(distance
 @pytest.mark.parametrize("stiffness", [0.1, 5.0, 100.0])
 @pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
 def test_the_contact_leaves_the_fold_as_a_square_root(stiffness, distance):
-    last = jkr.pull_off_travel(stiffness, **MAUGIS)
+    last = jkr.pull_off_displacement(stiffness, **MAUGIS)
     radius = jkr.pull_off_at_stiffness(stiffness, **MAUGIS).radius
-    wider = jkr.radius_at_travel(last * (1.0 - distance), stiffness, **MAUGIS) - radius
+    wider = jkr.radius_at_displacement(last * (1.0 - distance), stiffness, **MAUGIS) - radius
     # Δ'' of Δ(a) = a^2 - 2/3 sqrt(6a) + (a^3 - sqrt(6 a^3))/k at the fold
     bend = 2.0 + math.sqrt(6.0) / 6.0 * radius**-1.5 + (6.0 * radius - 0.75 * math.sqrt(6.0 / radius)) / stiffness
     # the next term is smaller by about wider/radius; the rounding of the fold by 16 U/distance
@@ -226,7 +228,7 @@ def test_a_million_random_states_are_on_the_stable_branch():
     count = 1_000_000
     states = random_states(count, seed=6)
     wide = Wide(*states)
-    pulled, held = wide.check(jkr.radius_at_travel(*states), np.ones(count, bool))
+    pulled, held = wide.check(jkr.radius_at_displacement(*states), np.ones(count, bool))
     assert pulled > count // 5 and held > count // 2
     assert pulled + held > 0.999 * count
 
@@ -258,32 +260,34 @@ def test_newton_from_the_right_never_passes_the_root():
 def test_radius_at_no_or_negative_work_is_hertz_behind_the_machine(work):
     radius = np.logspace(-9, -2, 60)
     for stiffness in 10.0 ** np.arange(-12, 19, 3):
-        travel = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
-        assert_allclose(jkr.radius_at_travel(travel, stiffness, work, 2e-3, 6.4e6), radius, rtol=1e-14, atol=0)
-        assert np.isnan(jkr.radius_at_travel(-1e-300, stiffness, work, 2e-3, 6.4e6))
-        assert jkr.radius_at_travel(0.0, stiffness, work, 2e-3, 6.4e6) == 0.0
-    hertz = jkr.hertz_radius_at_indentation(travel, 2e-3)
-    assert_allclose(jkr.radius_at_travel(travel, math.inf, work, 2e-3, 6.4e6), hertz, rtol=20 * U, atol=0)
+        displacement = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
+        assert_allclose(
+            jkr.radius_at_displacement(displacement, stiffness, work, 2e-3, 6.4e6), radius, rtol=1e-14, atol=0
+        )
+        assert np.isnan(jkr.radius_at_displacement(-1e-300, stiffness, work, 2e-3, 6.4e6))
+        assert jkr.radius_at_displacement(0.0, stiffness, work, 2e-3, 6.4e6) == 0.0
+    hertz = jkr.hertz_radius_at_indentation(displacement, 2e-3)
+    assert_allclose(jkr.radius_at_displacement(displacement, math.inf, work, 2e-3, 6.4e6), hertz, rtol=20 * U, atol=0)
     assert_array_equal(jkr.pull_off_at_stiffness(1e3, work, 2e-3, 6.4e6), 0.0)
-    assert jkr.pull_off_travel(1e3, work, 2e-3, 6.4e6) == 0.0
+    assert jkr.pull_off_displacement(1e3, work, 2e-3, 6.4e6) == 0.0
 
 
 def test_hertz_is_the_limit_of_vanishing_work_behind_a_machine():
-    travel = np.array([1e-9, 5e-6, 1e-3])
-    hertz = jkr.radius_at_travel(travel, 1e3, 0.0, 2e-3, 6.4e6)
+    displacement = np.array([1e-9, 5e-6, 1e-3])
+    hertz = jkr.radius_at_displacement(displacement, 1e3, 0.0, 2e-3, 6.4e6)
     for work in (1e-40, 1e-100, 1e-300, 5e-324):
-        assert_allclose(jkr.radius_at_travel(travel, 1e3, work, 2e-3, 6.4e6), hertz, rtol=1e-12, atol=0)
-        assert np.isnan(jkr.radius_at_travel(-1e-6, 1e3, work, 2e-3, 6.4e6))
+        assert_allclose(jkr.radius_at_displacement(displacement, 1e3, work, 2e-3, 6.4e6), hertz, rtol=1e-12, atol=0)
+        assert np.isnan(jkr.radius_at_displacement(-1e-6, 1e3, work, 2e-3, 6.4e6))
 
 
-def test_a_contact_of_any_radius_shares_the_travel_with_the_machine():
+def test_a_contact_of_any_radius_shares_the_displacement_with_the_machine():
     random = np.random.default_rng(10)
-    radius, travel = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, 1e-5, 1000)
+    radius, displacement = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, 1e-5, 1000)
     stiffness = 10.0 ** random.uniform(-8, 18, 1000)
-    load = jkr.load_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
-    indentation = jkr.indentation_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
-    scale = np.abs(travel) + radius**2 / 2e-3
-    assert np.max(np.abs(indentation + load / stiffness - travel) / scale) < 10 * U
+    load = jkr.load_under_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
+    indentation = jkr.indentation_under_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
+    scale = np.abs(displacement) + radius**2 / 2e-3
+    assert np.max(np.abs(indentation + load / stiffness - displacement) / scale) < 10 * U
     again = jkr.load_under_indentation(radius, indentation, 2e-3, 6.4e6)
     # load and indentation are both known to some u of their terms, the load at worst of p times the depths
     assert np.max(np.abs(again - load) / (2 * 6.4e6 * radius * scale)) < 10 * U
@@ -291,37 +295,37 @@ def test_a_contact_of_any_radius_shares_the_travel_with_the_machine():
 
 def test_the_energy_release_rate_is_that_at_the_load_and_at_the_indentation():
     random = np.random.default_rng(11)
-    radius, travel = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, -1e-8, 1000)
-    stiffness = 10.0 ** random.uniform(-8, 18, 1000)  # a lifting travel: no differences of equal numbers
+    radius, displacement = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, -1e-8, 1000)
+    stiffness = 10.0 ** random.uniform(-8, 18, 1000)  # a lifting displacement: no differences of equal numbers
     rest = radius, 2e-3, 6.4e6
-    computed = jkr.energy_release_rate_at_travel(radius, travel, stiffness, 2e-3, 6.4e6)
-    indentation = jkr.indentation_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
+    computed = jkr.energy_release_rate_at_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
+    indentation = jkr.indentation_under_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
     at_grips = jkr.energy_release_rate_at_indentation(radius, indentation, 2e-3, 6.4e6)
-    load = jkr.load_under_travel(radius, travel, stiffness, 2e-3, 6.4e6)
+    load = jkr.load_under_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
     assert_allclose(computed, jkr.energy_release_rate(radius, load, 2e-3, 6.4e6), rtol=30 * U, atol=0)
     assert_allclose(computed, at_grips, rtol=1e-14, atol=0)
-    hard = jkr.energy_release_rate_at_travel(radius, travel, math.inf, 2e-3, 6.4e6)
-    assert_array_equal(hard, jkr.energy_release_rate_at_indentation(radius, travel, 2e-3, 6.4e6))
-    free = jkr.energy_release_rate_at_travel(radius, travel, 0.0, 2e-3, 6.4e6)
+    hard = jkr.energy_release_rate_at_displacement(radius, displacement, math.inf, 2e-3, 6.4e6)
+    assert_array_equal(hard, jkr.energy_release_rate_at_indentation(radius, displacement, 2e-3, 6.4e6))
+    free = jkr.energy_release_rate_at_displacement(radius, displacement, 0.0, 2e-3, 6.4e6)
     assert_allclose(free, jkr.energy_release_rate(rest[0], 0.0, *rest[1:]), rtol=20 * U, atol=0)
     assert_array_equal(
-        jkr.load_under_travel(radius, travel, math.inf, 2e-3, 6.4e6),
-        jkr.load_under_indentation(radius, travel, 2e-3, 6.4e6),
+        jkr.load_under_displacement(radius, displacement, math.inf, 2e-3, 6.4e6),
+        jkr.load_under_indentation(radius, displacement, 2e-3, 6.4e6),
     )
-    assert_array_equal(jkr.load_under_travel(np.append(radius, 0.0), -1e-6, 0.0, 2e-3, 6.4e6), 0.0)
-    assert_array_equal(jkr.indentation_under_travel(radius, travel, math.inf, 2e-3, 6.4e6), travel)
+    assert_array_equal(jkr.load_under_displacement(np.append(radius, 0.0), -1e-6, 0.0, 2e-3, 6.4e6), 0.0)
+    assert_array_equal(jkr.indentation_under_displacement(radius, displacement, math.inf, 2e-3, 6.4e6), displacement)
 
 
-def test_the_solution_releases_the_work_and_is_stable_at_its_travel():
+def test_the_solution_releases_the_work_and_is_stable_at_its_displacement():
     random = np.random.default_rng(12)
     work, sphere_radius, modulus = 10.0 ** random.uniform(-10, 10, (3, 1000))
     stiffness = contact_stiffness(work, sphere_radius, modulus) * 10.0 ** random.uniform(-15, 15, 1000)
-    travel = jkr.pull_off_travel(stiffness, work, sphere_radius, modulus) * random.uniform(-3.0, 0.9, 1000)
-    radius = jkr.radius_at_travel(travel, stiffness, work, sphere_radius, modulus)
-    rest = travel, stiffness, sphere_radius, modulus
-    assert_allclose(jkr.energy_release_rate_at_travel(radius, *rest), work, rtol=1e-12, atol=0)
-    assert np.all(jkr.energy_release_rate_at_travel(radius * 1.0001, *rest) > work)
-    assert np.all(jkr.energy_release_rate_at_travel(radius * 0.9999, *rest) < work)
+    displacement = jkr.pull_off_displacement(stiffness, work, sphere_radius, modulus) * random.uniform(-3.0, 0.9, 1000)
+    radius = jkr.radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus)
+    rest = displacement, stiffness, sphere_radius, modulus
+    assert_allclose(jkr.energy_release_rate_at_displacement(radius, *rest), work, rtol=1e-12, atol=0)
+    assert np.all(jkr.energy_release_rate_at_displacement(radius * 1.0001, *rest) > work)
+    assert np.all(jkr.energy_release_rate_at_displacement(radius * 0.9999, *rest) < work)
 
 
 def wild_inputs(count, seed):
@@ -343,26 +347,28 @@ def within_range(*values):
 
 def check_wild(count, seed):
     """Nothing raises, what has no meaning is nan, and where no scale leaves the range of doubles all is right."""
-    inputs = travel, stiffness, work, sphere_radius, modulus = wild_inputs(count, seed)
-    radius = jkr.radius_at_travel(*inputs)
+    inputs = displacement, stiffness, work, sphere_radius, modulus = wild_inputs(count, seed)
+    radius = jkr.radius_at_displacement(*inputs)
     assert not np.any(radius < 0.0)
-    proper = (stiffness >= 0.0) & (sphere_radius > 0.0) & (modulus > 0.0) & ~np.isnan(travel) & (work < math.inf)
+    proper = (stiffness >= 0.0) & (sphere_radius > 0.0) & (modulus > 0.0) & ~np.isnan(displacement) & (work < math.inf)
     assert np.all(np.isnan(radius[~proper]))
     bare = proper & (work <= 0.0) & (stiffness > 0.0)
-    assert np.all(np.isnan(radius[bare & (travel < 0.0)]))
+    assert np.all(np.isnan(radius[bare & (displacement < 0.0)]))
     with np.errstate(all="ignore"):
         wide = Wide(*inputs)
         reach, hard = sphere_radius / modulus.astype(WIDE), sphere_radius * modulus.astype(WIDE)
-        sized = within_range(travel, work, modulus, reach, wide.unit**3, wide.depth, wide.contact)
-        sized &= within_range(wide.grips, wide.level, travel / wide.depth, wide.depth / wide.grips)
+        sized = within_range(displacement, work, modulus, reach, wide.unit**3, wide.depth, wide.contact)
+        sized &= within_range(wide.grips, wide.level, displacement / wide.depth, wide.depth / wide.grips)
         sized &= within_range(work * sphere_radius.astype(WIDE))
         pulled, held = wide.check(radius, proper & sized & (work > 0.0))
         share, size = 1 / (1 + hard / stiffness), sphere_radius.astype(WIDE)
-        bare &= within_range(travel, modulus, sphere_radius, hard, share, share / size, share * travel / size)
+        bare &= within_range(
+            displacement, modulus, sphere_radius, hard, share, share / size, share * displacement / size
+        )
         needed = radius * (radius / size) + 4 * hard / (3 * stiffness.astype(WIDE)) * radius * (radius / size) ** 2
-    pressed = bare & (travel > 0.0) & ~(radius < 1e-300)
-    assert_allclose((needed[pressed] / travel[pressed]).astype(float), 1.0, rtol=1e-13, atol=0)
-    assert np.all(radius[bare & (travel == 0.0)] == 0.0)
+    pressed = bare & (displacement > 0.0) & ~(radius < 1e-300)
+    assert_allclose((needed[pressed] / displacement[pressed]).astype(float), 1.0, rtol=1e-13, atol=0)
+    assert np.all(radius[bare & (displacement == 0.0)] == 0.0)
     assert min(pulled, held, np.count_nonzero(bare)) > count // 100
 
 
@@ -379,26 +385,26 @@ def test_no_input_of_ten_million_raises_or_hangs_or_gives_a_wrong_branch():
 @pytest.mark.parametrize("size", [1, 2, 7, 8, 9, 255, 4095, 4096, 4097, 9000])
 def test_a_radius_does_not_depend_on_the_batch(size):
     states = random_states(9000, seed=14)
-    whole = jkr.radius_at_travel(*states)
-    part = jkr.radius_at_travel(*[value[-size:] for value in states])
+    whole = jkr.radius_at_displacement(*states)
+    part = jkr.radius_at_displacement(*[value[-size:] for value in states])
     assert_array_equal(part, whole[-size:])
     some = np.random.default_rng(15).integers(0, 9000, 20)
-    assert_array_equal(whole[some], [jkr.radius_at_travel(*[value[i] for value in states]) for i in some])
+    assert_array_equal(whole[some], [jkr.radius_at_displacement(*[value[i] for value in states]) for i in some])
 
 
-def test_radius_at_travel_broadcasts():
-    travel, stiffness = np.linspace(-1e-6, 5e-6, 30).reshape(5, 1, 6), np.logspace(1, 4, 40).reshape(40, 1)
-    radius = jkr.radius_at_travel(travel, stiffness, **LENS)
+def test_radius_at_displacement_broadcasts():
+    displacement, stiffness = np.linspace(-1e-6, 5e-6, 30).reshape(5, 1, 6), np.logspace(1, 4, 40).reshape(40, 1)
+    radius = jkr.radius_at_displacement(displacement, stiffness, **LENS)
     assert radius.shape == (5, 40, 6)
-    assert radius[4, 39, 5] == jkr.radius_at_travel(travel[4, 0, 5], stiffness[39, 0], **LENS)
+    assert radius[4, 39, 5] == jkr.radius_at_displacement(displacement[4, 0, 5], stiffness[39, 0], **LENS)
     square = np.linspace(0, 5e-6, 90_000).reshape(300, 300)
     assert_array_equal(
-        jkr.radius_at_travel(square.T, 1e3, **LENS), jkr.radius_at_travel(square, stiffness=1e3, **LENS).T
+        jkr.radius_at_displacement(square.T, 1e3, **LENS), jkr.radius_at_displacement(square, stiffness=1e3, **LENS).T
     )
     frozen = np.broadcast_to(1e-6, (3,))
-    assert jkr.radius_at_travel(frozen, 1e3, **LENS).shape == (3,)
-    assert jkr.radius_at_travel(np.empty(0), 1e3, **LENS).shape == (0,)
-    assert jkr.radius_at_travel([[1e-6]], 1e3, **LENS).shape == (1, 1)
-    assert isinstance(jkr.radius_at_travel(1e-6, 1e3, **LENS), float)
+    assert jkr.radius_at_displacement(frozen, 1e3, **LENS).shape == (3,)
+    assert jkr.radius_at_displacement(np.empty(0), 1e3, **LENS).shape == (0,)
+    assert jkr.radius_at_displacement([[1e-6]], 1e3, **LENS).shape == (1, 1)
+    assert isinstance(jkr.radius_at_displacement(1e-6, 1e3, **LENS), float)
     with pytest.raises(ValueError, match="shape"):
-        jkr.radius_at_travel(np.zeros(2), np.zeros(3), **LENS)
+        jkr.radius_at_displacement(np.zeros(2), np.zeros(3), **LENS)

@@ -291,21 +291,21 @@ def test_behind_a_machine_stiffness_stands_what_stands_at_the_load(stiffness):
     load = np.array([-1.5, 0.0, 5.0])
     exact = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
     indentation = jkr.indentation_under_load(exact, load, 1.0, 4.0)
-    travel = indentation + load / stiffness if stiffness > 0.0 else 0.0 * load
+    displacement = indentation + load / stiffness if stiffness > 0.0 else 0.0 * load
     wanted = exact if stiffness > 0.0 else exact[1]  # no stiffness bears no load
     # the search needs a radius on the right and one on the left of the answer
-    rest = (travel, stiffness, 1.0, 1.0, 0.3, 0.0, 1.0, 4.0, 0.5)
-    # a travel of load/stiffness carries the rest in its last digits only, as the load asks for
-    assert_allclose(reversible.shrunk_at_travel(1.3 * wanted, 0.5 * wanted, *rest), wanted, rtol=40 * U, atol=0)
+    rest = (displacement, stiffness, 1.0, 1.0, 0.3, 0.0, 1.0, 4.0, 0.5)
+    # a displacement of load/stiffness carries the rest in its last digits only, as the load asks for
+    assert_allclose(reversible.shrunk_at_displacement(1.3 * wanted, 0.5 * wanted, *rest), wanted, rtol=40 * U, atol=0)
 
 
 def test_release_rate_behind_any_stiffness_is_convex_in_the_radius():
     rng = np.random.default_rng(46)
     soft, a = 10.0 ** rng.uniform(-4.0, 4.0, (2, 4000))
-    travel = rng.choice([-1.0, 1.0], 4000) * 10.0 ** rng.uniform(-3.0, 8.0, 4000)
+    displacement = rng.choice([-1.0, 1.0], 4000) * 10.0 ** rng.uniform(-3.0, 8.0, 4000)
 
     def release(a):
-        return (a**2 - travel + 2.0 / 3.0 * soft * a**3) ** 2 / (a * (1.0 + soft * a) ** 2)
+        return (a**2 - displacement + 2.0 / 3.0 * soft * a**3) ** 2 / (a * (1.0 + soft * a) ** 2)
 
     middle, sides = release(a), 0.5 * (release(0.9 * a) + release(1.1 * a))
     assert np.all(sides > middle)
@@ -343,8 +343,8 @@ def test_pulling_a_reversible_contact_spends_what_its_energies_gain():
 
     a = low + 0.5 * (top - low) * (nodes + 1.0)
     b = share * 6.0 * stress**2 / (math.pi * e)
-    growth = 2.0 * a - 0.5 * np.sqrt(2.0 * math.pi / e) * (1.0 - 2.0 * b * a) / np.sqrt(a * (1.0 - b * a))
-    work = 0.5 * (top - low) * np.sum(weights * branch(a)[0] * growth)
+    amplitude = 2.0 * a - 0.5 * np.sqrt(2.0 * math.pi / e) * (1.0 - 2.0 * b * a) / np.sqrt(a * (1.0 - b * a))
+    work = 0.5 * (top - low) * np.sum(weights * branch(a)[0] * amplitude)
     assert_allclose(work, energy(top) - energy(low), rtol=1e-12, atol=0)
     assert_allclose(reversible.radius_at_load_reversible(branch(a)[0], 1.0, stress, share, 1.0, e), a, rtol=1e-13)
     lifted = reversible.radius_at_indentation_reversible(branch(a)[1], 1.0, stress, share, 1.0, e)

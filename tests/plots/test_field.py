@@ -32,7 +32,7 @@ def test_map_passes_through_every_sample(points):
 
 def test_map_of_a_ripple_and_its_displacement_have_the_closed_amplitudes():
     ripple = Ripple(amplitude=3e5, wavelength=24e-6)
-    dataset = mapped(spectrum=ripple, amplitudes="fixed", growth=Onset(speed=1e-9, width=0.1))
+    dataset = mapped(spectrum=ripple, mode_amplitudes="fixed", amplitude=Onset(speed=1e-9, width=0.1))
     shown = [panel.images[0] for panel in plots.draw(dataset, "map").axes]
     # 384 pixels to ten waves: the highest pixel is at most half a pixel's phase from the crest
     near = 1.0 - np.cos(np.pi * 10 / field_figures.PIXELS)
@@ -53,10 +53,10 @@ def test_contact_circle_has_the_members_radius():
     ("speed", "text"), [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]
 )
 def test_arrow_points_where_the_slider_goes(speed, text):
-    growth = Stress(reference=3e5)
+    amplitude = Stress(reference=3e5)
     dataset = simulated(
         drive=drive.Steady(speed=speed),
-        shear=field(shear.Mapped, growth=growth),
+        shear=field(shear.Mapped, amplitude=amplitude),
         record=Record(maps=(0.4,)),
         ensemble=Ensemble(members=1),
     )
@@ -65,7 +65,7 @@ def test_arrow_points_where_the_slider_goes(speed, text):
 
 
 @pytest.mark.parametrize(
-    ("spectrum", "growth"),
+    ("spectrum", "amplitude"),
     [
         (Band(rms=150e3, longest=60e-6, shortest=16e-6), Onset(speed=2.5e-3, width=0.3)),
         (Gaussian(rms=1e5, length=20e-6), Stress(reference=1e5)),
@@ -73,10 +73,10 @@ def test_arrow_points_where_the_slider_goes(speed, text):
     ],
     ids=["band", "gaussian", "anisotropic"],
 )
-def test_measured_spectrum_is_the_one_asked_for(spectrum, growth):
-    """Each ring within five of the standard errors that Gaussian modes have, whatever the growth."""
+def test_measured_spectrum_is_the_one_asked_for(spectrum, amplitude):
+    """Each ring within five of the standard errors that Gaussian modes have, whatever the amplitude."""
     members = 24
-    dataset = mapped(members, spectrum, growth=growth)
+    dataset = mapped(members, spectrum, amplitude=amplitude)
     above, below = rendered(plots.draw(dataset, "spectrum")).axes
     q, ratio = below.containers[0].lines[0].get_data()
     cells = modes(spectrum, CELL, 32)
@@ -90,7 +90,7 @@ def test_measured_spectrum_is_the_one_asked_for(spectrum, growth):
     density = np.mean(
         spectrum.density(1e6 * fine[:, None] * np.cos(angle), 1e6 * fine[:, None] * np.sin(angle)), axis=1
     )
-    raised = growth.factor(np.array([4e-3]), dataset["shear_stress"].to_numpy()[-1:])[0] ** 2
+    raised = amplitude.factor(np.array([4e-3]), dataset["shear_stress"].to_numpy()[-1:])[0] ** 2
     np.testing.assert_allclose(np.nan_to_num(asked), raised * density, rtol=1e-9)
 
 

@@ -21,7 +21,7 @@ from sim.scenario.clock import Clock, Ensemble, Record
 BELL = {"zero_force_rate": 1e4, "bell_force": 4e-12}
 SITES = {"bond_stiffness": 4e-4, "rebinding_rate": 1e5, "site_density": 9e16}
 LAW = (1e4, 4e-12, 4e-4, 1e5)
-COHORT = bonds.Cohort(hazard=Bell(**BELL), **SITES)
+COHORT = bonds.Cohort(rupture=Bell(**BELL), **SITES)
 PALE = "#BBBBBB"
 PLAIN = {"shear": shear.Uniform(), "ensemble": Ensemble(members=1)}
 
@@ -35,7 +35,7 @@ def ramped(population=COHORT, **changes):
 def started(**changes):
     """Slow bonds, 1/s, at rest and then slid; the speeds that are drawn by default are 0.1 and 1 µm/s."""
     population = bonds.Cohort(
-        hazard=Bell(zero_force_rate=1.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=1.0,
+        rupture=Bell(zero_force_rate=1.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=1.0,
         site_density=9e16, start_from="empty",
     )  # fmt: skip
     parts = {"bonds": population, "clock": Clock(duration=2.0, step=5e-3), "drive": drive.Start(rest=1.0, speed=1e-6)}
@@ -77,7 +77,7 @@ def test_the_exact_law_and_the_mean_field_are_beside_the_simulated(ramp):
 
 
 @pytest.mark.parametrize(
-    ("hazard", "law"),
+    ("rupture", "law"),
     [
         (CutOff(stretch=2e-8, rate=1e4), lambda v: schallamach.cut_off_stress(v, 1e4, 2e-8, 4e-4, 1e5, 9e16)),
         (CutOff(stretch=2e-8), lambda v: schallamach.cut_off_stress(v, 0.0, 2e-8, 4e-4, 1e5, 9e16)),
@@ -85,17 +85,17 @@ def test_the_exact_law_and_the_mean_field_are_beside_the_simulated(ramp):
     ],
     ids=["cut off", "cut off without heat", "constant"],
 )
-def test_every_hazard_has_its_own_law(hazard, law):
-    dataset = ramped(bonds.FirstMoment(hazard=hazard, **SITES), clock=Clock(duration=1.0, step=0.1))
+def test_every_rupture_has_its_own_law(rupture, law):
+    dataset = ramped(bonds.FirstMoment(rupture=rupture, **SITES), clock=Clock(duration=1.0, step=0.1))
     speed = np.array([1e-5, 1e-3])
     (found,) = bond_laws.steady_laws(dataset, {}, speed)
     assert_allclose(found.stress, law(speed), rtol=1e-12)
     rendered(plots.draw(dataset, "friction"))
 
 
-def test_a_swept_hazard_has_a_law_at_each_point():
+def test_a_swept_rupture_has_a_law_at_each_point():
     dataset = ramped(
-        sweep={"bonds.hazard.bell_force": [4e-12, 8e-12]}, clock=Clock(duration=1.0, step=0.1)
+        sweep={"bonds.rupture.bell_force": [4e-12, 8e-12]}, clock=Clock(duration=1.0, step=0.1)
     )  # fmt: skip
     speed = np.array([1e-3])
     for k, force in enumerate((4e-12, 8e-12)):
@@ -128,8 +128,13 @@ def test_stress_that_only_rises_has_no_maximum():
 
 
 def test_depths_side_by_side_each_tell_their_maximum():
-    hazard = {"model": "bell", "zero_force_rate": "1e4 1/s", "bell_force": "4 pN"}
-    table = {"hazard": hazard, "bond_stiffness": "0.4 mN/m", "rebinding_rate": "1e5 1/s", "site_density": "9e16 1/m^2"}
+    rupture = {"model": "bell", "zero_force_rate": "1e4 1/s", "bell_force": "4 pN"}
+    table = {
+        "rupture": rupture,
+        "bond_stiffness": "0.4 mN/m",
+        "rebinding_rate": "1e5 1/s",
+        "site_density": "9e16 1/m^2",
+    }
     tables = [{"model": model, **table} for model in ("rate", "cohort")]
     dataset = ramped(sweep={"bonds": tables})
     told = [text.get_text() for text in plots.draw(dataset, "friction").axes[0].get_legend().get_texts()]
@@ -144,10 +149,10 @@ def test_depths_side_by_side_each_tell_their_maximum():
         {"drive": drive.Ramp(start=0.0, stop=1e-2)},
         {"drive": drive.Table(time=(0.0, 0.5, 1.0), speed=(0.0, 0.02, 0.0))},
         {"drive": drive.Steady(speed=1e-3), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}},
-        {"bonds": bonds.Rate(critical_speed=1e-2, healing=500.0, stress=3e5)},
+        {"bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5)},
         {"bonds": bonds.Unbroken(stress=3e5)},
-        {"bonds": bonds.Tracked(hazard=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3)},
-        {"bonds": bonds.Tracked(hazard=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3),
+        {"bonds": bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3)},
+        {"bonds": bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3),
          "record": Record(per_member=False)},
     ],
     ids=["through zero", "from zero", "there and back", "steady speeds", "no stretch", "unbroken", "members",
@@ -234,10 +239,10 @@ def test_what_is_not_swept_is_not_an_axis(sweep, words):
 
 def test_what_lacks_stress_or_speeds_is_told_with_what_can_be_drawn():
     frictionless = ramped(bonds.Unbroken(), clock=Clock(duration=0.1, step=0.1))
-    with pytest.raises(ValueError, match=r"no shear stress; .*stress = .*drawn as: curve, time, rivals, profile$"):
+    with pytest.raises(ValueError, match=r"no shear stress; .*stress = .*drawn as: curve, time, theories, profile$"):
         plots.draw(frictionless, "friction")
     steady = ramped(drive=drive.Steady(speed=1e-3), clock=Clock(duration=0.1, step=0.1))
-    with pytest.raises(ValueError, match=r'neither changes nor is swept; .*model = "start".*time, rivals, profile$'):
+    with pytest.raises(ValueError, match=r'neither changes nor is swept; .*model = "start".*time, theories, profile$'):
         plots.draw(steady, "friction")
     resting = ramped(
         bonds.Unbroken(stress=3e5), drive=drive.Start(rest=5.0, speed=1e-3), clock=Clock(duration=0.1, step=0.1)

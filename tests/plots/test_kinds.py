@@ -222,14 +222,14 @@ def test_default_figure_fits_the_dataset(changes, kind):
 
 def test_an_unknown_kind_names_the_known_ones(ramp):
     with pytest.raises(
-        ValueError, match='no figure "histogram"; known: curve, time, sweep, map, spectrum, friction, rivals, profile'
+        ValueError, match='no figure "histogram"; known: curve, time, sweep, map, spectrum, friction, theories, profile'
     ):
         plots.draw(ramp, "histogram")
 
 
 def test_figures_that_need_a_sweep_or_a_ramp_say_so(ramp):
     with pytest.raises(
-        ValueError, match=r"nothing is swept; .*\[sweep\].*drawn as: curve, time, friction, rivals, profile"
+        ValueError, match=r"nothing is swept; .*\[sweep\].*drawn as: curve, time, friction, theories, profile"
     ):
         plots.draw(ramp, "sweep")
     with pytest.raises(ValueError, match=r'ramp it: \[drive\] model = "ramp"'):
@@ -250,7 +250,7 @@ CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equil
         {"drive": THERE_AND_BACK},
         {"contact": Equilibrium(load=-3e-4)},
         {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform()},
-        {"contact": Equilibrium(indentation=1e-6), "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=50),
+        {"contact": Equilibrium(indentation=1e-6), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9),
          "record": Record(per_member=False)},
         {"sweep": CONTACTS},
         {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},

@@ -1,4 +1,4 @@
-"""The figure of a loop shows load and radius over travel, JKR's equilibria, and the energy lost."""
+"""The figure of a loop shows load and radius over displacement, JKR's equilibria, and the energy lost."""
 
 import numpy as np
 import pytest
@@ -16,10 +16,10 @@ from sim.plots.loop import lost_energy
 from sim.scenario.clock import Clock, Ensemble, Record
 
 JKR = (42e-3, 2e-3, 6.4e6)
-BACK = {"from": 2e-6, "to": -4e-6, "trips": 2}
-RECORD = 2.0 * 2.0 * 6e-6 * 2e-3  # travel of one record [m]: trips of 12 um in 1 s, 2 ms
-GRIPS = Equilibrium(indentation=BACK, on_detach="reattach")
-MACHINE = Equilibrium(travel=BACK, stiffness=340.0, on_detach="reattach")
+BACK = {"from": 2e-6, "to": -4e-6, "cycles": 2}
+RECORD = 2.0 * 2.0 * 6e-6 * 2e-3  # displacement of one record [m]: cycles of 12 um in 1 s, 2 ms
+GRIPS = Equilibrium(indentation=BACK, after_pull_off="reattach")
+MACHINE = Equilibrium(displacement=BACK, stiffness=340.0, after_pull_off="reattach")
 
 
 def moved(contact=GRIPS, **changes):
@@ -68,10 +68,10 @@ def test_load_and_radius_stand_over_the_indentation_and_break_where_the_contact_
     np.testing.assert_array_equal(thin.get_ydata(), np.where(closed, np.nan, 0.0))
 
 
-def test_behind_a_machine_the_axis_is_its_travel(machine):
+def test_behind_a_machine_the_axis_is_its_displacement(machine):
     loads, radii = rendered(plots.draw(machine, "loop")).axes
-    assert radii.get_xlabel() == r"travel $\Delta$ (µm)"
-    assert_allclose(thick(loads)[0], 1e6 * machine["travel"], rtol=1e-14)
+    assert radii.get_xlabel() == r"displacement $\Delta$ (µm)"
+    assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
 
 
 @pytest.mark.parametrize(("which", "stiffness"), [("grips", np.inf), ("machine", 340.0)])
@@ -93,7 +93,7 @@ def test_grey_are_all_equilibria_of_jkr_stable_or_not(which, stiffness, request)
     stable = a >= a[np.argmin(x)]
     simulated = dataset["contact_radius"].to_numpy()
     closed = simulated > 0.0
-    between = np.interp(1e6 * dataset["travel"].to_numpy()[closed], x[stable], radius[stable])
+    between = np.interp(1e6 * dataset["displacement"].to_numpy()[closed], x[stable], radius[stable])
     # a chord under the square root of a fold, over 600 points of which those next to it are 2/600 of a radius apart
     assert_allclose(1e6 * simulated[closed], between, rtol=4e-3)
 
@@ -115,14 +115,14 @@ def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine
     closed = machine["in_contact"].to_numpy().astype(int)
     off, on = np.flatnonzero(np.diff(closed) == -1), np.flatnonzero(np.diff(closed) == 1) + 1
     assert len(off) == len(on) == 2
-    x, load = 1e6 * machine["travel"].to_numpy(), 1e6 * machine["normal_load"].to_numpy()
+    x, load = 1e6 * machine["displacement"].to_numpy(), 1e6 * machine["normal_load"].to_numpy()
     for marker, at in (("x", off), ("o", on)):
         ((place, value),) = marks(loads, marker)
         assert_allclose(place, x[at], rtol=1e-14)
         assert_allclose(value, load[at], rtol=1e-14)
-    # the sphere comes off before the fold and touches at a travel of zero, at most one record beyond
+    # the sphere comes off before the fold and touches at a displacement of zero, at most one record beyond
     step = 1e6 * RECORD
-    fold = 1e6 * float(jkr.pull_off_travel(340.0, *JKR))
+    fold = 1e6 * float(jkr.pull_off_displacement(340.0, *JKR))
     assert np.all((marks(loads, "x")[0][0] >= fold) & (marks(loads, "x")[0][0] <= fold + step))
     assert np.all((marks(loads, "o")[0][0] >= 0.0) & (marks(loads, "o")[0][0] <= step))
     (verticals,) = loads.collections
@@ -132,7 +132,7 @@ def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine
 
 
 def test_a_dead_load_has_no_jump_to_draw_but_a_cross():
-    dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "trips": 1}))
+    dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}))
     loads, radii = rendered(plots.draw(dataset, "loop")).axes
     assert radii.get_xlabel() == r"indentation $\delta$ (µm)"
     assert not loads.collections and len(marks(loads, "x")) == 1 and not marks(loads, "o")
@@ -142,10 +142,10 @@ def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
     spent, loop = lost_energy(machine)
     assert_allclose(spent, machine["dissipated_energy"].isel(t=-1) / 2.0, rtol=1e-14)
     assert_allclose(loop, loop_energy(machine)["loop_energy"].mean(), rtol=1e-14)
-    # P dDelta by hand; the two trips leave the contact as it was
-    P, travel = machine["normal_load"].to_numpy(), machine["travel"].to_numpy()
-    assert_allclose(loop, 0.5 * np.trapezoid(P, travel), rtol=1e-9)
-    # a jump drawn as a straight line between two records costs half its load times their distance, twice a trip
+    # P dDelta by hand; the two cycles leave the contact as it was
+    P, displacement = machine["normal_load"].to_numpy(), machine["displacement"].to_numpy()
+    assert_allclose(loop, 0.5 * np.trapezoid(P, displacement), rtol=1e-9)
+    # a jump drawn as a straight line between two records costs half its load times their distance, twice a cycle
     assert_allclose(loop, spent, rtol=0, atol=2 * 0.5 * 1.5 * np.pi * 42e-3 * 2e-3 * RECORD)
     (entry,) = plots.draw(machine, "loop").axes[0].get_legend().get_texts()
     assert entry.get_text() == (
@@ -156,7 +156,7 @@ def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
 def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
     for contact in (
         Equilibrium(indentation={"from": 2e-6, "to": -2e-6}),
-        Equilibrium(indentation=BACK, on_detach="stop"),
+        Equilibrium(indentation=BACK, after_pull_off="stop"),
         Equilibrium(indentation={"time": [0.0, 0.5, 1.0], "value": [2e-6, -2e-6, 1e-6]}),
     ):
         dataset = moved(contact)
@@ -182,8 +182,8 @@ def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
 @pytest.mark.parametrize(
     "changes",
     [
-        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=50)},
-        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=50),
+        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50)},
+        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50),
          "record": Record(per_member=False)},
         {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})},
         {"sweep": {"contact": [{"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}},

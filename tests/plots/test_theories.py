@@ -1,4 +1,4 @@
-"""The figure of the rivals shows what each theory says, and the figure of profiles the fields of the contact."""
+"""The figure of the theories shows what each theory says, and the figure of profiles the fields of the contact."""
 
 import json
 
@@ -39,7 +39,7 @@ def curve_of(panel, name):
     return line.get_data()
 
 
-# -- rivals -----------------------------------------------------------------------------------
+# -- theories -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -52,7 +52,7 @@ def curve_of(panel, name):
     ids=["load", "indentation", "pulled"],
 )
 def test_every_theory_is_drawn_as_far_as_adhesion_holds(contact, law, value):
-    stresses, forces = rendered(plots.draw(plain(contact=contact), "rivals")).axes
+    stresses, forces = rendered(plots.draw(plain(contact=contact), "theories")).axes
     for name in ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction"):
         stress, area = curve_of(stresses, name)
         factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
@@ -69,7 +69,7 @@ def test_every_theory_is_drawn_as_far_as_adhesion_holds(contact, law, value):
 
 
 def test_a_branch_ends_with_a_dot_where_its_force_is_largest():
-    panel = plots.draw(plain(), "rivals").axes[1]
+    panel = plots.draw(plain(), "theories").axes[1]
     _, colour, _ = rival_figures._THEORIES["savkoor_briggs"]
     (dot,) = (line for line in panel.lines if line.get_color() == colour and line.get_marker() == "o")
     limit = 1e3 * float(theories.savkoor_briggs_limit(4e-3, 42e-3, 2e-3))
@@ -78,7 +78,7 @@ def test_a_branch_ends_with_a_dot_where_its_force_is_largest():
 
 
 def test_jkr_and_hertz_stand_whatever_the_shear():
-    panel = plots.draw(plain(), "rivals").axes[0]
+    panel = plots.draw(plain(), "theories").axes[0]
     lines = {
         line.get_linestyle(): line.get_ydata()[0] for line in panel.lines if line.get_color() == pictures.REFERENCE
     }
@@ -102,7 +102,7 @@ def test_of_swept_loads_the_scenarios_own_is_drawn():
     case = rival_figures.case_of(dataset)
     assert (case.at, case.value) == ({"load": 2}, 4e-3)
     assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in [
-        text for p in plots.draw(dataset, "rivals").axes for text in [p.get_title("right")]
+        text for p in plots.draw(dataset, "theories").axes for text in [p.get_title("right")]
     ]
     others = plain(sweep={"contact.load": [-1.0, 1e-3]})
     assert rival_figures.case_of(others).value == 1e-3  # the first with a contact
@@ -121,7 +121,7 @@ def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
 
 
 def test_theories_are_named():
-    (legend,) = plots.draw(plain(), "rivals").legends
+    (legend,) = plots.draw(plain(), "theories").legends
     names = [text.get_text() for text in legend.get_texts()]
     assert len(names) == len(set(names)) == 8
     assert names[-1] == "simulated" and "a fraction 0.1 reversible" in names
@@ -130,7 +130,7 @@ def test_theories_are_named():
 @pytest.mark.parametrize(
     ("contact", "why"),
     [
-        ({"travel": 1e-6, "stiffness": 100.0, "load": None}, "behind a machine stiffness"),
+        ({"displacement": 1e-6, "stiffness": 100.0, "load": None}, "behind a machine stiffness"),
         ({"load": {"start": 0.0, "stop": 4e-3}}, "varies in time"),
         ({"load": None}, "not held at one number"),
     ],
@@ -140,14 +140,14 @@ def test_a_sphere_that_is_not_held_at_a_number_is_refused_with_the_cure(contact,
     told = json.loads(dataset.attrs["scenario_resolved"])
     dataset.attrs["scenario_resolved"] = json.dumps(told | {"contact": told["contact"] | contact})
     with pytest.raises(ValueError, match=rf"{why}.*load = .4 mN., or with an indentation; .*drawn as: time, profile"):
-        plots.draw(dataset, "rivals")
+        plots.draw(dataset, "theories")
 
 
 def test_without_adhesion_or_contact_there_is_nothing_to_compare():
     with pytest.raises(ValueError, match="no adhesion"):
-        plots.draw(plain(adhesion=Adhesion(work=0.0)), "rivals")
+        plots.draw(plain(adhesion=Adhesion(work=0.0)), "theories")
     with pytest.raises(ValueError, match=r"no contact at rest.*drawn as: time$"):
-        plots.draw(plain(contact=Equilibrium(load=-1.0)), "rivals")
+        plots.draw(plain(contact=Equilibrium(load=-1.0)), "theories")
 
 
 @pytest.mark.parametrize(
@@ -161,7 +161,7 @@ def test_without_adhesion_or_contact_there_is_nothing_to_compare():
     ids=["ramp", "no stress", "statistics only", "swept bodies"],
 )
 def test_every_scene_at_a_load_can_be_compared(changes):
-    rendered(plots.draw(plain(**changes), "rivals"))
+    rendered(plots.draw(plain(**changes), "theories"))
 
 
 # -- profiles ---------------------------------------------------------------------------------

@@ -34,7 +34,7 @@ scale = "log"
 [bonds]
 model = "rate"
 critical_speed = "10 mm/s"
-healing = "500 1/s"
+rebinding_rate = "500 1/s"
 
 [shear]
 model = "modal"
@@ -49,7 +49,7 @@ longest = "60 um"
 rolloff = "24 um"
 shortest = "16 um"
 
-[shear.memory]
+[shear.correlation]
 model = "slip"
 length = "5 um"
 
@@ -104,7 +104,7 @@ def edited(*edits):
         ("seed = 7", "sede = 7", "sede", "seed"),
         ('critical_speed = "10 mm/s"', 'crit_speed = "10 mm/s"', "bonds.crit_speed", "critical_speed"),
         ("[sphere]", "[shpere]", "shpere", "sphere"),
-        ("[shear.memory]", "[shear.memroy]", "shear.memroy", "memory"),
+        ("[shear.correlation]", "[shear.corelation]", "shear.corelation", "correlation"),
         ("members = 4", "member = 4", "ensemble.member", "members"),
     ],
 )
@@ -134,10 +134,10 @@ def test_a_key_in_the_wrong_table_is_told_with_the_right_one(refusal, line, adde
 
 
 def test_a_key_of_another_model_is_told_with_the_models_that_have_it(refusal):
-    at = line_of('healing = "500 1/s"')
+    at = line_of('rebinding_rate = "500 1/s"')
     assert refusal(**edited(('model = "rate"', 'model = "steady"'))) == [
-        f'x:{at}: bonds.healing: is not a key of model = "steady";'
-        ' remove it, or choose model = "rate", "counted" or "auto"'
+        f'x:{at}: bonds.rebinding_rate: is not a key of model = "steady";'
+        ' remove it, or choose model = "rate", "cohort", "counted", "tracked" or "auto"'
     ]
 
 
@@ -166,10 +166,10 @@ def test_missing_keys_and_tables_are_told_with_an_example(refusal):
         "x: adhesion: is missing; add the table [adhesion] with work",
     ]
     assert 'x:1: clock.step: is missing; add for example step = "10 ms"' in found
-    assert 'x:6: bonds.healing: is missing; add for example healing = "500 1/s"' in found
+    assert 'x:6: bonds.rebinding_rate: is missing; add for example rebinding_rate = "500 1/s"' in found
     assert "x:6: bonds.sites: is missing; add for example sites = 64" in found
-    memory = 'the table [shear.memory] with model = "time", "slip", "wave" or "diffusion"'
-    assert f"x:8: shear.memory: is missing; add {memory}" in found
+    correlation = 'the table [shear.correlation] with model = "time", "slip", "wave" or "diffusion"'
+    assert f"x:8: shear.correlation: is missing; add {correlation}" in found
     solid = next(problem for problem in found if problem.startswith("x:3: solid: "))
     assert 'shear_modulus = "1.6 MPa" or youngs_modulus = "4.8 MPa"' in solid
 
@@ -186,7 +186,7 @@ def test_a_misspelt_model_is_told_with_the_one_meant_or_all(refusal):
         f'x:{line_of("[shear]") + 1}: shear.model: must not be "modl"; did you mean "modal"?'
     ]
     assert refusal(**edited(('model = "slip"', 'model = "magnetic"'))) == [
-        f"x:{line_of('[shear.memory]') + 1}: shear.memory.model:"
+        f"x:{line_of('[shear.correlation]') + 1}: shear.correlation.model:"
         ' must be "time", "slip", "wave" or "diffusion", not "magnetic"'
     ]
 
@@ -235,7 +235,9 @@ def test_a_bad_value_is_told_with_its_key_and_the_cure(refusal, line, wrong, sai
     assert problem.startswith(f"x:{line_of(line)}: {key}: {said}")
 
 
-@pytest.mark.parametrize("zero", ["duration", "step", "shear_modulus", "radius", "critical_speed", "healing", "length"])
+@pytest.mark.parametrize(
+    "zero", ["duration", "step", "shear_modulus", "radius", "critical_speed", "rebinding_rate", "length"]
+)
 def test_nothing_that_divides_may_be_zero(refusal, zero):
     line = next(line for line in LINES if line.startswith(f"{zero} = "))
     (problem,) = refusal(**edited((line, f"{zero} = 0")))
@@ -332,10 +334,10 @@ def test_maps_are_drawn_at_recorded_times_only(refusal):
     ]
 
 
-def test_a_growth_with_the_stress_needs_a_stress(refusal):
-    text = LENS + '[shear.growth]\nmodel = "stress"\nreference = "1 MPa"\n'
+def test_a_amplitude_with_the_stress_needs_a_stress(refusal):
+    text = LENS + '[shear.amplitude]\nmodel = "stress"\nreference = "1 MPa"\n'
     (problem,) = refusal(text)
-    assert problem.startswith(f"x:{END + 1}: shear.growth: ")
+    assert problem.startswith(f"x:{END + 1}: shear.amplitude: ")
     assert "bonds.stress" in problem
 
 
@@ -383,7 +385,7 @@ def test_all_faults_come_in_one_pass_in_the_order_of_the_file(refusal):
         )
     )
     keys = [problem.split(": ")[1] for problem in found]
-    wanted = ["clock.duration", "solid.shear_modulus", "drvie", "shear.spectrum.rms", "shear.memory.lenght"]
+    wanted = ["clock.duration", "solid.shear_modulus", "drvie", "shear.spectrum.rms", "shear.correlation.lenght"]
     assert keys == [*wanted, "contact", "ensemble.members"]
     numbers = [int(problem.split(":")[1]) for problem in found]
     assert numbers == sorted(numbers)
@@ -391,11 +393,11 @@ def test_all_faults_come_in_one_pass_in_the_order_of_the_file(refusal):
 
 # --- bonds with a stretch ---
 
-HAZARD = 'hazard = { model = "bell", zero_force_rate = "200 1/s", bell_force = "4 pN" }'
+HAZARD = 'rupture = { model = "bell", zero_force_rate = "200 1/s", bell_force = "4 pN" }'
 STRETCHED = [HAZARD, 'bond_stiffness = "0.4 uN/m"', 'rebinding_rate = "400 1/s"', 'site_density = "1e17 1/m^2"']
-LINEAR = ['critical_speed = "10 mm/s"', 'healing = "500 1/s"']
+LINEAR = ['critical_speed = "10 mm/s"', 'rebinding_rate = "500 1/s"']
 BONDS = line_of("[bonds]")
-NEEDS = "give either critical_speed and healing, or hazard, bond_stiffness, rebinding_rate and site_density"
+NEEDS = "give either critical_speed and rebinding_rate, or rupture, bond_stiffness, rebinding_rate and site_density"
 
 
 def bonded(model, *lines, shear=None):
@@ -409,8 +411,8 @@ def bonded(model, *lines, shear=None):
 @pytest.mark.parametrize("model", ["rate", "cohort", "tracked"])
 def test_bonds_with_a_stretch_are_told_which_keys_they_lack(refusal, model):
     sites = ["sites = 50"] if model == "tracked" else []
-    tables = 'the table [bonds.hazard] with model = "constant", "bell" or "cut_off"'
-    assert refusal(bonded(model, *STRETCHED[1:], *sites)) == [f"x:{BONDS}: bonds.hazard: is missing; add {tables}"]
+    tables = 'the table [bonds.rupture] with model = "constant", "bell" or "cut_off"'
+    assert refusal(bonded(model, *STRETCHED[1:], *sites)) == [f"x:{BONDS}: bonds.rupture: is missing; add {tables}"]
     lacking = [problem.split(" for example")[0] for problem in refusal(bonded(model, HAZARD, *sites))]
     assert lacking == [
         f"x:{BONDS}: bonds.{key}: is missing; add" for key in ("bond_stiffness", "rebinding_rate", "site_density")
@@ -418,35 +420,35 @@ def test_bonds_with_a_stretch_are_told_which_keys_they_lack(refusal, model):
 
 
 @pytest.mark.parametrize(
-    ("hazard", "key", "said"),
+    ("rupture", "key", "said"),
     [
-        ('{ model = "bel", bell_force = 1 }', "hazard.model", 'must not be "bel"; did you mean "bell"?'),
-        ('{ model = "arrhenius" }', "hazard.model", 'must be "constant", "bell" or "cut_off", not "arrhenius"'),
-        ("{ rate = 1 }", "hazard.model", 'is missing; choose "constant", "bell" or "cut_off"'),
-        ('"bell"', "hazard", 'must be a table, not text; write hazard = { model = "bell" }'),
-        ('{ model = "bell", zero_force_rate = 1 }', "hazard.bell_force", "is missing; add for example bell_force = "),
-        ('{ model = "constant" }', "hazard.rate", "is missing; add for example rate = "),
-        ('{ model = "cut_off" }', "hazard.stretch", "is missing; add for example stretch = "),
-        ('{ model = "bell", zero_force_rate = 1, bell_force = "4 pN/m" }', "hazard.bell_force",
+        ('{ model = "bel", bell_force = 1 }', "rupture.model", 'must not be "bel"; did you mean "bell"?'),
+        ('{ model = "arrhenius" }', "rupture.model", 'must be "constant", "bell" or "cut_off", not "arrhenius"'),
+        ("{ rate = 1 }", "rupture.model", 'is missing; choose "constant", "bell" or "cut_off"'),
+        ('"bell"', "rupture", 'must be a table, not text; write rupture = { model = "bell" }'),
+        ('{ model = "bell", zero_force_rate = 1 }', "rupture.bell_force", "is missing; add for example bell_force = "),
+        ('{ model = "constant" }', "rupture.rate", "is missing; add for example rate = "),
+        ('{ model = "cut_off" }', "rupture.stretch", "is missing; add for example stretch = "),
+        ('{ model = "bell", zero_force_rate = 1, bell_force = "4 pN/m" }', "rupture.bell_force",
          'has the unit "pN/m", which is not a unit of N; write for example "'),
-        ('{ model = "bell", zero_force_rate = 0, bell_force = 1 }', "hazard.zero_force_rate", "must be above 0 1/s"),
-        ('{ model = "cut_off", stretch = "-1 nm" }', "hazard.stretch", "must be above 0 m, not -1e-09 m"),
-        ('{ model = "cut_off", stretch = 1, rate = -1 }', "hazard.rate", "must be at least 0 1/s, not -1 1/s"),
-        ('{ model = "bell", zero_force_rate = 1, bell_force = 1, stretch = 1 }', "hazard.stretch",
+        ('{ model = "bell", zero_force_rate = 0, bell_force = 1 }', "rupture.zero_force_rate", "must be above 0 1/s"),
+        ('{ model = "cut_off", stretch = "-1 nm" }', "rupture.stretch", "must be above 0 m, not -1e-09 m"),
+        ('{ model = "cut_off", stretch = 1, rate = -1 }', "rupture.rate", "must be at least 0 1/s, not -1 1/s"),
+        ('{ model = "bell", zero_force_rate = 1, bell_force = 1, stretch = 1 }', "rupture.stretch",
          'is not a key of model = "bell"; remove it, or choose model = "cut_off"'),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("model", ["rate", "cohort", "auto"])
-def test_a_bad_hazard_is_told_with_its_key_and_the_cure(refusal, model, hazard, key, said):
-    (problem,) = refusal(bonded(model, f"hazard = {hazard}", *STRETCHED[1:]))
+def test_a_bad_rupture_is_told_with_its_key_and_the_cure(refusal, model, rupture, key, said):
+    (problem,) = refusal(bonded(model, f"rupture = {rupture}", *STRETCHED[1:]))
     assert problem.startswith(f"x:{BONDS + 2}: bonds.{key}: {said}")
 
 
 @pytest.mark.parametrize(
     ("model", "added", "said"),
     [
-        ("rate", 'critical_speed = "1 mm/s"', "critical_speed: does not go with hazard; leave one of them out"),
-        ("rate", 'stress = "1 MPa"', "stress: does not go with hazard; leave one of them out"),
+        ("rate", 'critical_speed = "1 mm/s"', "critical_speed: does not go with rupture; leave one of them out"),
+        ("rate", 'stress = "1 MPa"', "stress: does not go with rupture; leave one of them out"),
         ("rate", "tolerance = 0.1", 'tolerance: is not a key of model = "rate"; remove it, or choose model = "cohort"'),
         ("cohort", 'critical_speed = "1 mm/s"', 'critical_speed: is not a key of model = "cohort"; remove it, or'),
         ("cohort", 'stress = "1 MPa"', 'stress: is not a key of model = "cohort"; remove it, or choose model = "n'),
@@ -482,12 +484,12 @@ def test_tracked_bonds_without_a_number_or_with_an_area_are_told(refusal):
     [
         ([], NEEDS),
         (["sites = 3"], NEEDS),
-        ([*LINEAR, *STRETCHED], NEEDS),
+        ([LINEAR[0], *STRETCHED], NEEDS),
         ([LINEAR[0], STRETCHED[1]], NEEDS),
-        (LINEAR[:1], "healing is missing, which bonds like these need"),
-        (LINEAR[1:], "critical_speed is missing, which bonds like these need"),
+        (LINEAR[:1], "rebinding_rate is missing, which bonds like these need"),
+        (LINEAR[1:], NEEDS),
         (STRETCHED[:3], "site_density is missing, which bonds like these need"),
-        ([*STRETCHED, 'stress = "1 MPa"'], "bonds with a hazard make their own stress; leave stress out"),
+        ([*STRETCHED, 'stress = "1 MPa"'], "bonds with a rupture make their own stress; leave stress out"),
     ],
 )
 def test_bonds_left_open_take_the_keys_of_one_kind(refusal, lines, said):
@@ -495,7 +497,7 @@ def test_bonds_left_open_take_the_keys_of_one_kind(refusal, lines, said):
 
 
 MADE = ['model = "mean"', 'spectrum = { model = "bonds", footprint = "10 um" }']
-CELLED = [MADE[1], 'memory = { model = "time", time = "1 ms" }', 'cell = "0.24 mm"']
+CELLED = [MADE[1], 'correlation = { model = "time", time = "1 ms" }', 'cell = "0.24 mm"']
 
 
 @pytest.mark.parametrize(
@@ -505,11 +507,11 @@ CELLED = [MADE[1], 'memory = { model = "time", time = "1 ms" }', 'cell = "0.24 m
         ([MADE[0], 'spectrum = { model = "bonds", footprint = 0 }'], "shear.spectrum.footprint", "must be above 0 m"),
         ([MADE[0], 'spectrum = { model = "bonds", footprint = "1 um", rms = 1 }'], "shear.spectrum.rms",
          'is not a key of model = "bonds"; remove it, or choose model = "band", '),
-        ([*MADE, 'growth = { model = "onset", speed = 1, width = 0.1 }'], "shear",
-         "the bonds set the size of the field they make; leave growth out"),
+        ([*MADE, 'amplitude = { model = "onset", speed = 1, width = 0.1 }'], "shear",
+         "the bonds set the size of the field they make; leave amplitude out"),
         (['model = "banded"', *CELLED], "shear", "the frozen part of a field that bonds make has no bands; use mod"),
-        (['model = "modal"', *CELLED, "points = 32", 'amplitudes = "fixed"'], "shear",
-         'bonds at random places make amplitudes = "gaussian"; leave it out'),
+        (['model = "modal"', *CELLED, "points = 32", 'mode_amplitudes = "fixed"'], "shear",
+         'bonds at random places make mode_amplitudes = "gaussian"; leave it out'),
         (['model = "modal"', *CELLED], "shear", "the spectrum has no shortest wavelength; give points (such as points"),
         ([MADE[0], 'spectrum = { model = "bonds", footprint = "10 fm" }'], "bonds.bond_stiffness",
          "the half-space under a bond of this footprint yields with 7.9e-08 N/m, in series with the bond: give at mo"),
@@ -750,7 +752,7 @@ def test_an_override_that_contradicts_the_file_is_told_how_to_replace_the_table(
 
 def test_a_model_chosen_by_an_override_is_told_which_keys_are_in_its_way(refusal):
     assert refusal(LENS, {"shear.model": "uniform"}) == [
-        "--set shear.model: shear holds keys that this model does not take (cell, points, spectrum, memory);"
+        "--set shear.model: shear holds keys that this model does not take (cell, points, spectrum, correlation);"
         """ replace the whole table by --set 'shear={ model = "uniform" }'"""
     ]
 

@@ -27,7 +27,7 @@ TABLE = HEAD.count("\n")
 FIRST = TABLE + 1
 
 FILES = {
-    "loads.csv": "time [s], load [mN], travel [um], indentation [nm]\n0, 4, 1, 2\n1, -2, -1, 5\n",
+    "loads.csv": "time [s], load [mN], displacement [um], indentation [nm]\n0, 4, 1, 2\n1, -2, -1, 5\n",
     "force.csv": "time [s], force [mN]\n0, 4\n1, 2\n",
     "mass.csv": "time [s], load [kg]\n0, 4\n1, 2\n",
     "order.csv": "time [s], load [mN]\n0, 4\n1, 2\n0.5, 1\n",
@@ -57,9 +57,8 @@ def sound(lines):
     return load("x").contact
 
 
-NOTHING = (
-    'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", or a travel with a stiffness'
-)
+NOTHING = 'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", '
+NOTHING += "or a displacement with a stiffness"
 
 
 @pytest.mark.parametrize(
@@ -69,9 +68,15 @@ NOTHING = (
         ('model = "equilibrium"', NOTHING),
         ('stiffness = "1 kN/m"', NOTHING),
         ('load = "4 mN"\nindentation = "1 um"', "a load and an indentation cannot both hold the sphere; leave one"),
-        ("load = 1\ntravel = 1\nstiffness = 1", "a load and a travel cannot both hold the sphere; leave one of them"),
-        ('travel = "1 um"', 'a travel needs the stiffness of the machine, such as "1 kN/m"'),
-        ('load = "4 mN"\nstiffness = 3', "a stiffness belongs to a travel; give contact.travel, or leave it out"),
+        (
+            "load = 1\ndisplacement = 1\nstiffness = 1",
+            "a load and a displacement cannot both hold the sphere; leave one of them",
+        ),
+        ('displacement = "1 um"', 'a displacement needs the stiffness of the machine, such as "1 kN/m"'),
+        (
+            'load = "4 mN"\nstiffness = 3',
+            "a stiffness belongs to a displacement; give contact.displacement, or leave it out",
+        ),
     ],
 )
 def test_one_thing_holds_the_sphere(folder, lines, said):
@@ -92,16 +97,16 @@ def test_one_thing_holds_the_sphere(folder, lines, said):
         ("load = { from = [1], to = 2 }", "load.from", "must be a number or text with a unit"),
         ('load = { from = -1, to = 1, scale = "log" }', "load", "a logarithmic course cannot reach or pass zero; give"),
         ('indentation = { from = 0, to = 1, scale = "log" }', "indentation", "a logarithmic course cannot reach or"),
-        ("load = { from = 0, to = 1, trips = -1 }", "load.trips", "must be at least 0, not -1"),
-        ("load = { from = 0, to = 1, trips = 0.5 }", "load.trips", "must be a whole number such as 64, not 0.5"),
-        ("load = { from = 0, to = 1, trips = 1000001 }", "load.trips", "must be at most 1000000, not 1000001"),
+        ("load = { from = 0, to = 1, cycles = -1 }", "load.cycles", "must be at least 0, not -1"),
+        ("load = { from = 0, to = 1, cycles = 0.5 }", "load.cycles", "must be a whole number such as 64, not 0.5"),
+        ("load = { from = 0, to = 1, cycles = 1000001 }", "load.cycles", "must be at most 1000000, not 1000001"),
         ('load = { from = 0, to = 1, scale = "lgo" }', "load.scale", 'must not be "lgo"; did you mean "log"?'),
         ("load = { from = 0 }", "load.to", "is missing; add for example to = "),
-        ("load = { from = 0, to = 1, tripps = 1 }", "load.tripps", 'is not a key; did you mean "trips"?'),
+        ("load = { from = 0, to = 1, cyclles = 1 }", "load.cyclles", 'is not a key; did you mean "cycles"?'),
         ("load = { form = 0, to = 1 }", "load.form", 'is not a key; did you mean "from"?'),
         ("load = { from = 0, too = 1 }", "load.too", 'is not a key; did you mean "to"?'),
         ('load = { file = "loads.csv", from = 1 }', "load.f", "does not go with f"),
-        ('load = { file = "loads.csv", trips = 2 }', "load.", "does not go with "),
+        ('load = { file = "loads.csv", cycles = 2 }', "load.", "does not go with "),
         ('load = { file = "none.csv" }', "load.file", "none.csv cannot be read (No such file or directory); give a"),
         ("load = { file = 3 }", "load.file", "must be text in quotes, not 3"),
         (
@@ -125,21 +130,21 @@ def test_one_thing_holds_the_sphere(folder, lines, said):
         ("load = { time = [0, 1], value = [1, 2, 3] }", "load", "a table needs "),
         ("load = { time = [0, 0.5, 0.2], value = [1, 1, 1] }", "load", "times must start at 0 s or before and never"),
         ('load = { time = [0, 1], value = [1, "2 kg"] }', "load.value", 'value 2: has the unit "kg", which is not a'),
-        ('load = 1\non_detach = "reatach"', "on_detach", 'must not be "reatach"; did you mean "reattach"?'),
+        ('load = 1\nafter_pull_off = "reatach"', "after_pull_off", 'must not be "reatach"; did you mean "reattach"?'),
         ("load = 1\nreversible = 2", "reversible", "must be at most 1, not 2"),
         ("load = 1\nreversible = -0.1", "reversible", "must be at least 0, not -0.1"),
-        ("travel = 1\nstiffness = 0", "stiffness", "must be above 0 N/m, not 0 N/m"),
-        ("travel = 1\nstiffness = -1", "stiffness", "must be above 0 N/m, not -1 N/m"),
-        ("travel = 1\nstiffness = inf", "stiffness", 'must be finite; write for example "1 N/m"'),
-        ('travel = 1\nstiffness = "1 N"', "stiffness", 'has the unit "N", which is not a unit of N/m; write for'),
+        ("displacement = 1\nstiffness = 0", "stiffness", "must be above 0 N/m, not 0 N/m"),
+        ("displacement = 1\nstiffness = -1", "stiffness", "must be above 0 N/m, not -1 N/m"),
+        ("displacement = 1\nstiffness = inf", "stiffness", 'must be finite; write for example "1 N/m"'),
+        ('displacement = 1\nstiffness = "1 N"', "stiffness", 'has the unit "N", which is not a unit of N/m; write for'),
         ("lode = 1", "lode", 'is not a key; did you mean "load"?'),
         (
             "load = 1\nfront_speed = 1",
             "front_speed",
             'is not a key of model = "equilibrium"; remove it, or choose model',
         ),
-        ('load = 1\nmodel = "laging"', "model", 'must not be "laging"; did you mean "lagging"?'),
-        ("model = 3\nload = 1", "model", 'must be "equilibrium" or "lagging", not 3'),
+        ('load = 1\nmodel = "rate_dependnt"', "model", 'must not be "rate_dependnt"; did you mean "rate_dependent"?'),
+        ("model = 3\nload = 1", "model", 'must be "equilibrium" or "rate_dependent", not 3'),
     ],
 )
 def test_what_is_wrong_is_told_once_with_its_line_and_the_cure(folder, lines, key, said):
@@ -171,12 +176,12 @@ def test_a_table_of_the_wrong_keys_names_each_of_them(folder, lines, words):
 @pytest.mark.parametrize("key", ["front_speed", "front_exponent", "heal_speed", "heal_exponent"])
 def test_an_edge_that_cannot_move_is_refused(folder, key):
     more = "" if key == "front_speed" else "front_speed = 1\n"
-    (told,) = problems(f'model = "lagging"\nload = 1\n{more}{key} = 0')
+    (told,) = problems(f'model = "rate_dependent"\nload = 1\n{more}{key} = 0')
     assert re.match(rf"x:\d+: contact\.{key}: must be above 0( m/s)?, not 0", told)
 
 
 def test_an_edge_needs_its_speed(folder):
-    assert problems('model = "lagging"\nload = 1') == [
+    assert problems('model = "rate_dependent"\nload = 1') == [
         f'x:{TABLE}: contact.front_speed: is missing; add for example front_speed = "1 mm/s"'
     ]
 
@@ -184,10 +189,10 @@ def test_an_edge_needs_its_speed(folder):
 def test_every_way_of_holding_a_sphere_is_read(folder):
     assert sound('load = "4 mN"').load == 4e-3
     assert sound('load = { from = "4 mN", to = "-1 mN" }').load.at(0.5, 1.0) == 1.5e-3
-    assert sound('load = { from = "4 mN", to = "-1 mN", trips = 2 }').load.at(0.5, 1.0) == 4e-3
+    assert sound('load = { from = "4 mN", to = "-1 mN", cycles = 2 }').load.at(0.5, 1.0) == 4e-3
     assert sound('load = { file = "loads.csv" }').load.at(0.5, 1.0) == 1e-3
     assert sound('indentation = { file = "loads.csv" }').indentation.at(1.0, 1.0) == 5e-9
-    contact = sound('travel = { file = "loads.csv" }\nstiffness = "1 kN/m"')
-    assert (contact.travel.at(0.5, 1.0), contact.stiffness) == (0.0, 1e3)
+    contact = sound('displacement = { file = "loads.csv" }\nstiffness = "1 kN/m"')
+    assert (contact.displacement.at(0.5, 1.0), contact.stiffness) == (0.0, 1e3)
     assert sound('load = { time = ["0 s", "1000 ms"], value = ["1 mN", "2 mN"] }').load.at(0.5, 1.0) == 1.5e-3
     assert -1.0001e-4 < sound('load = { from = -1e-3, to = -1e-5, scale = "log" }').load.at(0.5, 1.0) < -0.9999e-4

@@ -29,9 +29,9 @@ file = "speeds.csv"
 [shear]
 model = "modal"
 points = 26
-spectrum = { model = "tabulated", file = "psd.csv", convention = "persson" }
-memory = { model = "wave", waves = 2.0 }
-growth = { model = "constant" }
+spectrum = { model = "tabulated", file = "psd.csv", normalization = "in_density" }
+correlation = { model = "wave", waves = 2.0 }
+amplitude = { model = "constant" }
 [record]
 per_member = false
 precision = "float32"

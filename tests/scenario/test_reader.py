@@ -330,7 +330,7 @@ def test_every_alternative_of_the_starter_is_a_scene(table, text, tmp_path):
     waves = np.cos(np.arange(16)[:, None] * 1.7) + np.sin(np.arange(16) * 2.1)
     (tmp_path / "map.csv").write_text("\n".join(",".join(f"{v:.3e}" for v in row) for row in 1e5 * waves))
     changed = tomllib.loads(f"value = {text}")["value"]
-    beside = {"bonds": COHORT, "shear.growth": {"model": "constant"}} if changed["model"] == "bonds" else {}
+    beside = {"bonds": COHORT, "shear.amplitude": {"model": "constant"}} if changed["model"] == "bonds" else {}
     scenario = load(tmp_path / "x.toml", {table: changed} | beside)
     for word in table.split("."):
         scenario = getattr(scenario, word)

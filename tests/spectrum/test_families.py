@@ -1,4 +1,4 @@
-"""The spectrum families: variance, closed-form energy, cut-offs, checks and round trips."""
+"""The spectrum families: variance, closed-form energy, cut-offs, checks and round cycles."""
 
 import itertools
 import math

@@ -52,7 +52,7 @@ def white_map(points, level, cell, seed=1):
 
 def test_a_table_in_persson_s_convention_is_four_pi_squared_larger():
     rows = (1.0, 2.0, 4.0), (3.0, 2.0, 0.5)
-    plain, persson = Tabulated(*rows), Tabulated(*rows, convention="persson")
+    plain, persson = Tabulated(*rows), Tabulated(*rows, normalization="in_density")
     factor = 4 * math.pi**2
     assert_allclose(persson.radial_density(1.7), factor * plain.radial_density(1.7), rtol=1e-15, atol=0)
     assert_allclose(persson.variance, factor * plain.variance, rtol=1e-15, atol=0)
@@ -84,7 +84,7 @@ def test_rows_of_hundreds_of_decades_do_not_overflow():
 
 def test_a_table_is_read_from_csv_with_its_units(files):
     (files.folder / "psd.csv").write_text("# rubber\nq [1/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n")
-    table = read(files, model="tabulated", file="psd.csv", convention="persson")
+    table = read(files, model="tabulated", file="psd.csv", normalization="in_density")
     assert_allclose(table.wavenumbers, [1e3, 3e3], rtol=1e-15, atol=0)
     assert_allclose(table.densities, [2e-6, 4e-6], rtol=1e-15, atol=0)
     assert_allclose(table.radial_density(3e3), 4e-6 * 4 * math.pi**2, rtol=1e-13, atol=0)
@@ -215,7 +215,7 @@ def test_a_map_that_is_not_square_is_cropped_to_its_leading_square(files):
     assert_allclose(c.densities, a.densities, rtol=1e-12, atol=0)  # exchange of x and y
 
 
-def dataset(fields, spacing, units="Pa", metre=1.0, unit="m", dims=("realization", "x", "y")):
+def dataset(fields, spacing, units="Pa", metre=1.0, unit="m", dims=("member", "x", "y")):
     position = np.arange(fields.shape[-1]) * spacing / metre
     data = xr.DataArray(fields, dims=dims, attrs={"units": units})
     coordinates = {axis: (axis, position, {"units": unit}) for axis in ("x", "y")}
@@ -253,7 +253,7 @@ def test_netcdf_without_coordinates_takes_the_spacing_of_the_key(files):
         (lambda d: d.where(d.x > 0.05), "gaps"),
         (lambda d: d * 0.0, "every density is zero"),
         (lambda d: d.isel(x=slice(5)), "too small"),
-        (lambda d: d.isel(x=0, realization=0), "no two dimensions"),
+        (lambda d: d.isel(x=0, member=0), "no two dimensions"),
         (lambda d: d.assign(shear_map=d.shear_map.assign_attrs(units="N")), "not a unit of Pa"),
     ],
 )

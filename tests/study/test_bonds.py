@@ -20,10 +20,10 @@ from sim.study.bond_verdicts import bond_advice, bond_table
 from sim.study.bonds import converge_bonds, has_bond_depths
 from sim.study.converge import converge, figure
 
-COHORT = bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=3e-3)
+COHORT = bonds.Cohort(rupture=BELL, **STRETCHED, tolerance=3e-3)
 STEADY = {"bonds": COHORT, "drive": drive.Steady(speed=5e-3), "clock": Clock(duration=0.05, step=1e-3)}
 COUNTED = {
-    "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=40, stress=2e5, start_from="empty"),
+    "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=40, stress=2e5, start_from="empty"),
     "drive": drive.Ramp(start=1e-3, stop=5e-2),
     "clock": Clock(duration=0.05, step=1e-3),
 }
@@ -60,7 +60,7 @@ def test_depths_are_those_that_the_bonds_admit_and_the_own_one_is_marked():
     assert [row.label for row in rows if row.own] == ["counted 40"]
     assert [row.part.model for row in rows] == ["steady", "rate"] + 3 * ["counted"] + ["rate"]
     assert rows[-1].finer == 2  # a ramp has a clock step to judge, a steady drive none
-    assert not has_bond_depths(scene(bonds=bonds.Rate(critical_speed=1e-2, healing=500.0)))
+    assert not has_bond_depths(scene(bonds=bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0)))
 
 
 def test_the_reference_of_steady_sliding_is_the_closed_form(steady):
@@ -98,7 +98,7 @@ def test_the_noise_of_a_member_is_that_of_independent_sites(name, labels, reques
 
 def test_a_depth_of_another_law_is_found_out(monkeypatch):
     scenario, rows = scene(**STEADY), bond_rows(scene(**STEADY))
-    stiffer = bonds.Tracked(hazard=Bell(zero_force_rate=200.0, bell_force=4.4e-12), **STRETCHED, sites=1000)
+    stiffer = bonds.Tracked(rupture=Bell(zero_force_rate=200.0, bell_force=4.4e-12), **STRETCHED, sites=1000)
     rows[-1].part = stiffer
     monkeypatch.setattr(converge_bonds_module, "bond_rows", lambda _: rows[-3:-1] + rows[-1:])
     monkeypatch.setattr(march_module, "_FEWEST", 64)
@@ -128,19 +128,19 @@ def test_what_the_step_costs_is_of_second_order():
     assert_allclose(errors[0] / errors[1], 4.0, rtol=0.05)
 
 
-def test_a_constant_hazard_is_judged_by_the_rate_equation():
+def test_a_constant_rupture_is_judged_by_the_rate_equation():
     parts = STEADY | {
-        "bonds": bonds.Cohort(hazard=Constant(rate=200.0), **STRETCHED, start_from="empty"),
+        "bonds": bonds.Cohort(rupture=Constant(rate=200.0), **STRETCHED, start_from="empty"),
         "drive": drive.Start(rest=0.01, speed=5e-3),
     }
     found = converge_bonds(scene(**parts), 100.0)
-    assert "exact for a constant hazard" in found.attrs["bonds_reference"]
+    assert "exact for a constant rupture" in found.attrs["bonds_reference"]
     assert np.all(np.abs(of(found, f"cohort {REFERENCE:g}")[:2]) < REFERENCE)
 
 
 @pytest.mark.parametrize("speed", [0.0, 5e-3])
 def test_bonds_with_a_cut_off_and_a_contact_at_rest_are_no_trouble(speed):
-    parts = STEADY | {"bonds": bonds.FirstMoment(hazard=CUT_OFF, **STRETCHED), "drive": drive.Steady(speed=speed)}
+    parts = STEADY | {"bonds": bonds.FirstMoment(rupture=CUT_OFF, **STRETCHED), "drive": drive.Steady(speed=speed)}
     found = converge_bonds(scene(**parts), 100.0)
     assert abs(of(found, f"cohort {REFERENCE:g}")[1]) < 1e-5
     assert np.isnan(of(found, "rate")[0]) == (speed == 0.0)  # no stress to compare with

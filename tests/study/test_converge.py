@@ -12,7 +12,7 @@ from scipy import stats
 
 import sim.study.converge as converge_module
 from sim.engine import march
-from sim.ensemble.recorded import GAUGES
+from sim.ensemble.recorded import VARIABLES
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
@@ -31,7 +31,7 @@ from sim.study.verdicts import contradicted, real, within
 
 ROUGH = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=8e-6)
 STEADY = {
-    "shear": shear.Banded(spectrum=ROUGH, cell=CELL, memory=Wave(waves=1.0)),
+    "shear": shear.Banded(spectrum=ROUGH, cell=CELL, correlation=Wave(waves=1.0)),
     "drive": drive.Steady(speed=3e-4),
     "clock": Clock(duration=0.64, step=0.01, record=0.02),
 }
@@ -103,10 +103,10 @@ def test_a_scaled_law_is_the_law_of_scaled_weights():
 def test_closed_moments_are_sums_over_all_modes(name):
     scenario = scene(shear=SHEARS[name], drive=DRIVES["steady"])
     energies = scenario.process.modes.energies(*scenario.solid.effective)
-    growth = scenario.process.growth.factor(np.array([2e-3]), np.zeros(1))[0]
+    amplitude = scenario.process.amplitude.factor(np.array([2e-3]), np.zeros(1))[0]
     law = Expectation(scenario, *_terms_and_course(scenario)).energy(8)
-    assert_allclose(law.mean, growth**2 * energies.sum(), rtol=1e-12)
-    assert_allclose(law.std, growth**2 * math.sqrt(np.sum(energies**2)), rtol=1e-12)
+    assert_allclose(law.mean, amplitude**2 * energies.sum(), rtol=1e-12)
+    assert_allclose(law.std, amplitude**2 * math.sqrt(np.sum(energies**2)), rtol=1e-12)
     assert_allclose(law.skewness, 2.0 * np.sum(energies**3) / np.sum(energies**2) ** 1.5, rtol=1e-12)
 
 
@@ -131,32 +131,32 @@ def test_what_is_known_of_bands_is_what_the_bands_say():
 @pytest.mark.parametrize("name", ["modal, wave, relaxing stress", "mapped, diffusion, constant", "banded, slip, onset"])
 def test_closed_forms_are_what_an_ensemble_gives(name, population):
     if "stress" in name and population == "counted":
-        population = "rate"  # growth that follows counted bonds has no closed form
+        population = "rate"  # amplitude that follows counted bonds has no closed form
     members, steps = 2000, 8
     scenario = scene(
         shear=SHEARS[name], bonds=BONDS[population], drive=drive.Ramp(start=1e-3, stop=5e-3), contact=CONTACTS["load"]
     )
     law = Expectation(scenario, Terms.of_process(scenario.process), _terms_and_course(scenario)[1])
     exact = law.statistics(steps, 1, 4)
-    read = {gauge.name: gauge.read for gauge in GAUGES}
+    read = {variable.name: variable.read for variable in VARIABLES}
     found = list(march(scenario, np.arange(members)))[steps - 4 :]
     lags = Lags([np.array([4 - j]) for j in range(1, 5)], [np.array([4])] * 4, 1e-3, pooled=False)
-    for gauge, expected in zip(converge_module.QUANTITIES, exact, strict=True):
-        values = np.stack([read[gauge](scenario, state) for state in found], axis=1)
+    for variable, expected in zip(converge_module.QUANTITIES, exact, strict=True):
+        values = np.stack([read[variable](scenario, state) for state in found], axis=1)
         for one, number in zip(estimates(values, np.array([4]), lags), expected, strict=True):
             if math.isfinite(number):
                 assert abs(one.value - number) <= 5.0 * one.standard_error + 1e-4 * abs(number)
 
 
 def test_a_step_of_the_rate_equation_errs_in_second_order():
-    scenario = scene(bonds=bonds.Rate(critical_speed=1e-2, healing=200.0), drive=DRIVES["linear ramp"])
+    scenario = scene(bonds=bonds.Rate(critical_speed=1e-2, rebinding_rate=200.0), drive=DRIVES["linear ramp"])
     terms = Terms.of_cell(scenario)
     fine = course(scenario, terms, np.array([8]), 64).fraction[0]
     errors = [abs(course(scenario, terms, np.array([8]), refine).fraction[0] - fine) for refine in (1, 2, 4)]
     assert_allclose(np.divide(errors[:-1], errors[1:]), 4.0, rtol=0.05)
 
 
-def test_a_step_of_growth_that_relaxes_errs_in_second_order():
+def test_a_step_of_amplitude_that_relaxes_errs_in_second_order():
     scenario = scene(shear=SHEARS["modal self-affine"], drive=DRIVES["linear ramp"])
     terms, last = Terms.of_cell(scenario), np.array([8])
     fine = course(scenario, terms, last, 256).size[0]
@@ -297,19 +297,19 @@ def test_depths_tolerances_and_steps_are_tried_where_the_scene_admits_them():
     relaxing = shear.Banded(
         spectrum=Ripple(amplitude=1e5, wavelength=25e-6),
         cell=CELL,
-        memory=Slip(length=5e-6),
-        growth=Onset(speed=1e-3, width=0.3, relaxing=True),
+        correlation=Slip(length=5e-6),
+        amplitude=Onset(speed=1e-3, width=0.3, relaxing=True),
     )
     found, left_out = settings(scene(shear=relaxing))
     assert {s.line for s in found} == {"banded", "modal", "clock step"}
-    assert any(text.startswith("mean: growth that relaxes") for text in left_out)
+    assert any(text.startswith("mean: amplitude that relaxes") for text in left_out)
     assert any(text.startswith("mapped: a map is periodic") for text in left_out)
     assert [s.label for s in found if s.line == "banded"] == ["banded 0.3 to 0.003"]  # one pair is one band
     assert next(s for s in found if s.line == "banded").tolerance == 0.01  # the scene's own
 
 
 def test_grids_are_tried_where_the_spectrum_has_no_end():
-    part = shear.Modal(spectrum=Gaussian(rms=1e5, length=5e-6), cell=CELL, points=32, memory=Time(time=0.01))
+    part = shear.Modal(spectrum=Gaussian(rms=1e5, length=5e-6), cell=CELL, points=32, correlation=Time(time=0.01))
     assert [s.points for s in settings(scene(shear=part))[0] if s.line == "grid"] == [16, 32, 64]
     assert not [s for s in settings(scene(**STEADY))[0] if s.line == "grid"]
 
@@ -417,7 +417,7 @@ def test_a_depth_whose_variance_is_ten_percent_off_is_found_out(monkeypatch):
 
     for name in ("start", "advance"):
         monkeypatch.setattr(BandedProcess, name, wrong(getattr(BandedProcess, name)))
-    parts = STEADY | {"shear": replace(STEADY["shear"], memory=Time(time=0.02))}
+    parts = STEADY | {"shear": replace(STEADY["shear"], correlation=Time(time=0.02))}
     dataset = converge(scene(**parts), 1.0)
     found = dataset.sel(quantity="fluctuation_energy", statistic="standard deviation").isel(row=0, t=0)
     assert float(found["error"]) > 5.0 * float(found["standard_error"])
@@ -445,7 +445,7 @@ def test_a_scene_that_may_open_is_judged_by_its_deepest_and_finest(monkeypatch):
 def test_a_contact_that_is_open_throughout_is_no_trouble(monkeypatch):
     fixed_members(monkeypatch, 32)
     lifted = replace(CONTACTS["tension"], load=-1.0)
-    part = shear.Banded(spectrum=SPECTRUM, cell=CELL, memory=Slip(length=5e-6))
+    part = shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6))
     dataset = converge(scene(shear=part, contact=lifted, drive=DRIVES["steady"]), 1.0)
     assert float(dataset["contact_radius_mean"].max()) == 0.0
     assert not contradicted(dataset).any()
@@ -463,7 +463,7 @@ def test_without_fluctuations_and_memory_every_setting_is_exact():
 
 
 def test_the_clock_step_of_the_rate_equation_is_known_without_noise():
-    parts = {"bonds": bonds.Rate(critical_speed=1e-2, healing=300.0), "drive": drive.Ramp(start=1e-3, stop=3e-2)}
+    parts = {"bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=300.0), "drive": drive.Ramp(start=1e-3, stop=3e-2)}
     dataset = converge(scene(**parts, clock=Clock(duration=0.016, step=1e-3, record=4e-3)), 0.1)
     clocks = dataset.isel(row=dataset["line"] == "clock step", t=-1)
     error = clocks["error"].sel(quantity="contact_radius", statistic="mean")
@@ -475,7 +475,7 @@ def test_the_clock_step_of_the_rate_equation_is_known_without_noise():
 
 def test_counted_bonds_have_a_closed_form_of_their_own(monkeypatch):
     fixed_members(monkeypatch, 512)
-    population = bonds.Counted(critical_speed=1e-2, healing=500.0, sites=200, start_from="empty")
+    population = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=200, start_from="empty")
     clock = Clock(duration=0.012, step=1e-3, record=2e-3)
     dataset = converge(scene(bonds=population, drive=DRIVES["steady"], clock=clock), 1.0)
     radius = dataset.sel(quantity="contact_radius")
@@ -486,7 +486,7 @@ def test_counted_bonds_have_a_closed_form_of_their_own(monkeypatch):
 def test_a_grid_that_leaves_waves_out_is_told(monkeypatch):
     fixed_members(monkeypatch, 128)
     only(monkeypatch, "mean", "banded 0.01")
-    part = shear.Banded(spectrum=Gaussian(rms=1e5, length=5e-6), cell=CELL, points=32, memory=Time(time=0.02))
+    part = shear.Banded(spectrum=Gaussian(rms=1e5, length=5e-6), cell=CELL, points=32, correlation=Time(time=0.02))
     dataset = converge(scene(shear=part, drive=DRIVES["steady"], clock=Clock(duration=0.32, step=0.01)), 1.0)
     grid = dataset.isel(row=dataset["line"] == "grid").sel(quantity="fluctuation_energy", statistic="mean")
     cell = grid["cell_error_energy"]
@@ -503,7 +503,7 @@ def test_a_grid_that_leaves_waves_out_is_told(monkeypatch):
 def test_maps_and_sweeps_are_left_out(monkeypatch):
     fixed_members(monkeypatch, 16)
     only(monkeypatch, "modal", "mapped")
-    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, memory=Slip(length=5e-6))
+    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=5e-6))
     dataset = converge(scene(shear=part, drive=DRIVES["steady"], record=Record(maps=(2e-3,))), 1.0)
     assert list(dataset["row"].to_numpy()) == ["modal", "mapped"]
 

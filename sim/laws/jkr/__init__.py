@@ -6,7 +6,7 @@ the contact modulus E* = E/(1 - nu^2) throughout. The contact with radius a and 
 obeys ``energy_release_rate = w``; of its two solutions every law here returns the stable one, the
 wider.
 
-A sphere is held at a load, at an indentation, or at a travel ``Delta = delta + P/k`` behind a machine of
+A sphere is held at a load, at an indentation, or at a displacement ``Delta = delta + P/k`` behind a machine of
 stiffness k, which holds both: k = inf is an indentation, k -> 0 at a given k Delta a load.
 
 Where no equilibrium exists (pulled beyond the fold, or pulled at all without adhesion) the answer
@@ -14,6 +14,7 @@ is nan. A work of zero or below, as when stress fluctuations outweigh adhesion, 
 contact. A nan that the answer depends on makes it nan; nothing raises.
 """
 
+from sim.laws.jkr.displacement import radius_at_displacement
 from sim.laws.jkr.energy import (
     energy_release_rate,
     energy_release_rate_at_indentation,
@@ -30,38 +31,37 @@ from sim.laws.jkr.indentation import (
     radius_at_indentation,
 )
 from sim.laws.jkr.load import indentation_under_load, load_at_radius, pull_off_load, radius_at_load
-from sim.laws.jkr.machine import (
+from sim.laws.jkr.stiffness import (
     PullOff,
-    energy_release_rate_at_travel,
-    indentation_under_travel,
-    load_under_travel,
+    energy_release_rate_at_displacement,
+    indentation_under_displacement,
+    load_under_displacement,
     pull_off_at_stiffness,
-    pull_off_travel,
+    pull_off_displacement,
 )
-from sim.laws.jkr.travel import radius_at_travel
 
 __all__ = [
     "PullOff",
     "energy_release_rate",
+    "energy_release_rate_at_displacement",
     "energy_release_rate_at_indentation",
-    "energy_release_rate_at_travel",
     "hertz_radius_at_indentation",
     "hertz_radius_at_load",
     "indentation_at_radius",
+    "indentation_under_displacement",
     "indentation_under_load",
-    "indentation_under_travel",
     "load_at_radius",
+    "load_under_displacement",
     "load_under_indentation",
-    "load_under_travel",
     "potential_at_indentation",
     "potential_at_load",
     "potential_slope_at_indentation",
     "potential_slope_at_load",
     "pull_off_at_stiffness",
+    "pull_off_displacement",
     "pull_off_indentation",
     "pull_off_load",
-    "pull_off_travel",
+    "radius_at_displacement",
     "radius_at_indentation",
     "radius_at_load",
-    "radius_at_travel",
 ]

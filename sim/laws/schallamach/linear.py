@@ -7,7 +7,7 @@ sites close at a rate h, so that ``Vc = h l``. Each bond then lives for the time
 waits 1/h for the next. The friction of that very model, ``(kappa l N0/2)/(1 + |V|/Vc)`` for bonds of
 stiffness kappa, falls with speed and has no maximum: a maximum needs bonds that heat can open.
 
-Replacing the fixed life by a constant hazard |V|/l of the same mean gives the linear rate equation
+Replacing the fixed life by a constant rupture |V|/l of the same mean gives the linear rate equation
 
     ``dphi/dt = h (1 - phi) - h (|V|/Vc) phi``
 
@@ -47,12 +47,12 @@ def steady_fraction(speed, critical_speed):
 
 
 @law
-def fraction_rate(fraction, speed, critical_speed, healing):
+def fraction_rate(fraction, speed, critical_speed, rebinding_rate):
     """Time derivative of the bond fraction [1/s].
 
     Parameters
     ----------
-    fraction, speed, critical_speed, healing : float or array
+    fraction, speed, critical_speed, rebinding_rate : float or array
         phi [1], V [m/s], Vc [m/s], h [1/s].
 
     Notes
@@ -64,11 +64,11 @@ def fraction_rate(fraction, speed, critical_speed, healing):
     >>> print(f"{fraction_rate(0.5, 1e-2, 1e-2, 200.0):.1f} {fraction_rate(1.0, 1e-2, 1e-2, 200.0):.1f}")
     0.0 -200.0
     """
-    return healing * (1.0 - fraction) - healing * (math.fabs(speed) / critical_speed) * fraction
+    return rebinding_rate * (1.0 - fraction) - rebinding_rate * (math.fabs(speed) / critical_speed) * fraction
 
 
 @law
-def relax_fraction(fraction, path, duration, critical_speed, healing):
+def relax_fraction(fraction, path, duration, critical_speed, rebinding_rate):
     """Bond fraction after a step: the exact solution of the linear rate equation.
 
     Parameters
@@ -81,7 +81,7 @@ def relax_fraction(fraction, path, duration, critical_speed, healing):
         Length of the step [s], at least 0.
     critical_speed : float or array
         Vc [m/s], above 0.
-    healing : float or array
+    rebinding_rate : float or array
         h [1/s], at least 0.
 
     Returns
@@ -109,16 +109,16 @@ def relax_fraction(fraction, path, duration, critical_speed, healing):
     total = duration + path / critical_speed
     if total == 0.0:
         return fraction
-    z = healing * total
+    z = rebinding_rate * total
     return fraction * math.exp(-z) - duration / total * math.expm1(-z)
 
 
-def transition_probabilities(path, duration, critical_speed, healing):
-    """Chances of one site over a step, with hazards h to close and h |V|/Vc to open.
+def transition_probabilities(path, duration, critical_speed, rebinding_rate):
+    """Chances of one site over a step, with rupture laws h to close and h |V|/Vc to open.
 
     Parameters
     ----------
-    path, duration, critical_speed, healing : float or array
+    path, duration, critical_speed, rebinding_rate : float or array
         Integral of |V| dt [m], length of the step [s], Vc [m/s], h [1/s].
 
     Returns
@@ -140,6 +140,6 @@ def transition_probabilities(path, duration, critical_speed, healing):
     >>> print("%.3f %.3f" % transition_probabilities(1e-2, 1.0, 1e-2, 200.0))
     0.500 0.500
     """
-    stay_bound = relax_fraction(1.0, path, duration, critical_speed, healing)
-    become_bound = relax_fraction(0.0, path, duration, critical_speed, healing)
+    stay_bound = relax_fraction(1.0, path, duration, critical_speed, rebinding_rate)
+    become_bound = relax_fraction(0.0, path, duration, critical_speed, rebinding_rate)
     return stay_bound, become_bound

@@ -1,6 +1,6 @@
 """Schallamach bonds: how many there are and what shear stress they carry."""
 
-from sim.parts.bonds.models import STATES, Auto, Bonds, Depth
+from sim.parts.bonds.models import STATES, Auto, Bonds, Model
 from sim.parts.bonds.stretched import Cohort, FirstMoment, Tracked
 from sim.parts.bonds.two_state import Counted, Rate, Steady, Unbroken
 
@@ -10,8 +10,8 @@ __all__ = [
     "Bonds",
     "Cohort",
     "Counted",
-    "Depth",
     "FirstMoment",
+    "Model",
     "Rate",
     "Steady",
     "Tracked",

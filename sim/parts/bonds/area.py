@@ -37,7 +37,7 @@ class OverArea:
     The area of a step is that at its start, so dilution follows the contact by one clock step and no
     bond is lost in between. A contact in equilibrium with an energy that fluctuates moves the more, the
     finer the clock: each way out dilutes its bonds and none comes back on the way in, so there is no limit
-    of fine steps. A ``lagging`` edge has one.
+    of fine steps. A ``rate_dependent`` edge has one.
     """
 
     area: Area

@@ -44,7 +44,7 @@ def _merge(weight, stretch, width, count, travelled, cell, finest, rules):
     """Merge sorted cohorts cell by cell; the number left.
 
     A cell of many bonds is halved until its width times its share is below ``rules.heavy``: a cell
-    that comes back through zero, where the hazard has a kink, then errs by less than the tolerance.
+    that comes back through zero, where the rupture has a kink, then errs by less than the tolerance.
     """
     whole = 0.0
     for i in range(count):

@@ -7,7 +7,7 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohort_merging import settle
-from sim.parts.bonds.rupture import hazard_integral, time_to_rupture
+from sim.parts.bonds.rupture import rupture_integral, time_to_rupture
 
 
 class Rules(NamedTuple):
@@ -51,8 +51,8 @@ def _survive(pool, count, move, pace, step, rules):
         if steepness[i] > 0.0:
             one, two = math.exp(-steepness[i] * soon), math.exp(-steepness[i] * late)
         else:
-            one = math.exp(-hazard_integral(stretch[i], short, early, rules.rate, rules.softness))
-            two = math.exp(-hazard_integral(stretch[i], move, step, rules.rate, rules.softness))
+            one = math.exp(-rupture_integral(stretch[i], short, early, rules.rate, rules.softness))
+            two = math.exp(-rupture_integral(stretch[i], move, step, rules.rate, rules.softness))
         if rules.limit < math.inf:
             one *= _inside(stretch[i] + short, width[i], rules.limit)
             two *= _inside(stretch[i] + move, width[i], rules.limit)
@@ -281,7 +281,7 @@ def fill_steady(room, speed, rules):
     Notes
     -----
     Bonds of age a have survived with S(a) and are stretched by V a, so that weights are k_on F S(a)da, F = 1/(1 +
-    k_on⟨T⟩). Five Gauss nodes on panels in which neither ln S nor the hazard changes by much.
+    k_on⟨T⟩). Five Gauss nodes on panels in which neither ln S nor the rupture changes by much.
     """
     oldest = time_to_rupture(0.0, speed, 42.0, rules.rate, rules.softness, rules.limit)
     panel = 0.7 * time_to_rupture(0.0, speed, 1.0, rules.rate, rules.softness, rules.limit)
@@ -298,7 +298,7 @@ def fill_steady(room, speed, rules):
         mass, mean, spread = 0.0, 0.0, 0.0
         for node, share in zip(_NODES, _SHARES):  # noqa: B905 - compiled
             age = (k + node) * panel
-            survivors = share * panel * math.exp(-hazard_integral(0.0, speed * age, age, rules.rate, rules.softness))
+            survivors = share * panel * math.exp(-rupture_integral(0.0, speed * age, age, rules.rate, rules.softness))
             mass += survivors
             mean += survivors * age
             spread += survivors * age * age

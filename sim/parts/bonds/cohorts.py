@@ -1,7 +1,7 @@
 """A population of bonds resolved by stretch: cohorts of equal stretch, carried with the slider.
 
 A density n(x, t) per site of bonds stretched by x follows dn/dt + V dn/dx = −k(\\|x\\|) n + k_on F δ(x), F the share
-of free sites. A cohort moves with the slider and dies by its exact hazard integral, so there is no
+of free sites. A cohort moves with the slider and dies by its exact rupture integral, so there is no
 numerical diffusion and no limit to the step; only births and the merging of cohorts err, both within
 a tolerance.
 """
@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim.parts.bonds.cohort_step import settle_steady, step_rows
-from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.rupture import RuptureRate
 
 
 @dataclass(frozen=True)
@@ -38,31 +38,31 @@ class Cohorts:
     lattice: np.ndarray
 
 
-def empty(hazard: Hazard, tolerance: float) -> Cohorts:
+def empty(rupture: RuptureRate, tolerance: float) -> Cohorts:
     """One population without a bond."""
-    _check(hazard, tolerance)
-    capacity = 5 * _most(hazard, tolerance) // 4 + 32
+    _check(rupture, tolerance)
+    capacity = 5 * _most(rupture, tolerance) // 4 + 32
     blank = np.zeros((1, capacity))
-    width = np.zeros((1, capacity if hazard.limit < math.inf else 1))
+    width = np.zeros((1, capacity if rupture.limit < math.inf else 1))
     return Cohorts(blank, blank.copy(), width, np.zeros((1, 2)))
 
 
-def resting(hazard: Hazard, rebinding_rate: float, tolerance: float) -> Cohorts:
+def resting(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> Cohorts:
     """One population after a long rest: the share k_on/(k_on + k0) is bound, all unstretched.
 
     Examples
     --------
-    >>> half = resting(Hazard(rate=2.0, softness=1e9, limit=math.inf), rebinding_rate=2.0, tolerance=1e-4)
+    >>> half = resting(RuptureRate(rate=2.0, softness=1e9, limit=math.inf), rebinding_rate=2.0, tolerance=1e-4)
     >>> float(bound(half)[0]), float(first_moment(half)[0])
     (0.5, 0.0)
     """
-    rest = empty(hazard, tolerance)
+    rest = empty(rupture, tolerance)
     if rebinding_rate > 0.0:
-        rest.weight[0, 0] = rebinding_rate / (rebinding_rate + hazard.rate)
+        rest.weight[0, 0] = rebinding_rate / (rebinding_rate + rupture.rate)
     return rest
 
 
-def steady(hazard: Hazard, rebinding_rate: float, speed: float, tolerance: float) -> Cohorts:
+def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance: float) -> Cohorts:
     """One population that has slid at ``speed`` [m/s], of any sign, for ever.
 
     Notes
@@ -74,15 +74,15 @@ def steady(hazard: Hazard, rebinding_rate: float, speed: float, tolerance: float
     --------
     At a speed that stretches a bond by its Bell force in its life at rest, one bond in four is missing:
 
-    >>> bell = Hazard(rate=1.0, softness=1.0, limit=math.inf)
+    >>> bell = RuptureRate(rate=1.0, softness=1.0, limit=math.inf)
     >>> moving = steady(bell, rebinding_rate=1.0, speed=1.0, tolerance=1e-4)
     >>> print(f"{bound(moving)[0]:.3f} of {bound(steady(bell, 1.0, 0.0, 1e-4))[0]:.1f}")
     0.374 of 0.5
     """
     if rebinding_rate == 0.0 or speed == 0.0:
-        return resting(hazard, rebinding_rate, tolerance)
-    found = empty(hazard, tolerance)
-    numbers = _numbers(hazard, rebinding_rate, tolerance, math.inf)
+        return resting(rupture, rebinding_rate, tolerance)
+    found = empty(rupture, tolerance)
+    numbers = _numbers(rupture, rebinding_rate, tolerance, math.inf)
     settle_steady(float(speed), numbers, found.weight, found.stretch, found.width, found.lattice)
     return found
 
@@ -91,7 +91,7 @@ def advance(
     cohorts: Cohorts,
     slip: np.ndarray,
     duration: float,
-    hazard: Hazard,
+    rupture: RuptureRate,
     rebinding_rate: float,
     tolerance: float,
     largest: float = math.inf,
@@ -106,7 +106,7 @@ def advance(
         Slip of each row in this step [m], of any sign.
     duration : float
         Length of the step [s]; the speed in it is slip/duration.
-    hazard : Hazard
+    rupture : RuptureRate
         Rupture rate; the same one in all calls, as is the tolerance.
     rebinding_rate : float
         k_on of a free site [1/s], not negative.
@@ -137,7 +137,7 @@ def advance(
     before = cohorts.weight, cohorts.stretch, cohorts.width, cohorts.lattice
     after = [np.empty((rows, array.shape[1])) for array in before]
     after[2][:, :1] = 0.0
-    step_rows(*before, slip, float(duration), _numbers(hazard, rebinding_rate, tolerance, largest), *after)
+    step_rows(*before, slip, float(duration), _numbers(rupture, rebinding_rate, tolerance, largest), *after)
     return Cohorts(*after)
 
 
@@ -161,18 +161,18 @@ def second_moment(cohorts: Cohorts) -> np.ndarray:
     return np.sum(cohorts.weight * (cohorts.stretch**2 + cohorts.width**2 / 12.0), axis=1)
 
 
-def _check(hazard: Hazard, tolerance: float) -> None:
+def _check(rupture: RuptureRate, tolerance: float) -> None:
     if not 1e-12 <= tolerance <= 0.1:
         raise ValueError(f"a tolerance of {tolerance:g} is out of range: give 1e-12 to 0.1")
-    if hazard.limit < math.inf and hazard.softness != 0.0:
-        raise ValueError("a hazard that grows with the stretch and ends at a limit is not built: leave out one")
+    if rupture.limit < math.inf and rupture.softness != 0.0:
+        raise ValueError("a rupture that grows with the stretch and ends at a limit is not built: leave out one")
 
 
-def _most(hazard: Hazard, tolerance: float) -> int:
+def _most(rupture: RuptureRate, tolerance: float) -> int:
     """Cohorts left by merging, at most."""
-    if hazard.limit < math.inf:
+    if rupture.limit < math.inf:
         return int(min(4096.0, 2.2 / math.sqrt(tolerance) + 64.0))
-    if hazard.softness == 0.0:
+    if rupture.softness == 0.0:
         return 8
     cell = (432.0 * tolerance) ** 0.25
     return int(min(4096.0, 40.0 / cell + 2.0 * math.sqrt(10.0 / (_KINK * tolerance)) + 16.0))
@@ -182,18 +182,18 @@ _KINK = 66.0
 
 
 @functools.lru_cache(maxsize=256)
-def _numbers(hazard: Hazard, rebinding_rate: float, tolerance: float, largest: float) -> np.ndarray:
+def _numbers(rupture: RuptureRate, rebinding_rate: float, tolerance: float, largest: float) -> np.ndarray:
     """``Rules`` as an array.
 
     A two-point Gauss rule over a cell of width d errs by d⁴/4320 of the cell's bonds, a uniform segment
-    by d²/8 of them. A cell that contains zero averages a hazard with a kink and errs by 0.015 of its
+    by d²/8 of them. A cell that contains zero averages a rupture with a kink and errs by 0.015 of its
     width times its share at most.
     """
-    if hazard.limit < math.inf:
-        cell = hazard.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
-    elif hazard.softness > 0.0:
-        cell = (432.0 * tolerance) ** 0.25 / hazard.softness
+    if rupture.limit < math.inf:
+        cell = rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
+    elif rupture.softness > 0.0:
+        cell = (432.0 * tolerance) ** 0.25 / rupture.softness
     else:
         cell = math.inf
-    most = _most(hazard, tolerance)
-    return np.array([*hazard, rebinding_rate, tolerance, largest, cell, _KINK * tolerance, most], dtype=float)
+    most = _most(rupture, tolerance)
+    return np.array([*rupture, rebinding_rate, tolerance, largest, cell, _KINK * tolerance, most], dtype=float)

@@ -24,7 +24,7 @@ import numpy as np
 from scipy.special import lambertw
 
 from sim.numerics.jit import device, kernel
-from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.rupture import RuptureRate
 
 #: Largest error of N and of M that a sub-step under Bell's rate may make, by its embedded lower order, over N and M.
 #: The fifth-order result that is kept is better; errors of sub-steps fade with the bonds that carry them.
@@ -38,7 +38,7 @@ _SMALL = 1e-10  # stretch in units of Bell's below which the rate is taken as co
 _NONE = 1e-290  # share below which no site is bound
 
 
-def advance(bound, moment, slip, path, duration, hazard: Hazard, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
+def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
     """Population after a step of sliding at constant speed.
 
     Parameters
@@ -49,7 +49,7 @@ def advance(bound, moment, slip, path, duration, hazard: Hazard, rebinding_rate)
         Displacement, signed, and distance slid over the step [m].
     duration : float
         Length of the step [s]; may be 0.
-    hazard : Hazard
+    rupture : RuptureRate
         Rupture rate of a bond; a softness and a finite limit together have no first-moment form here.
     rebinding_rate : float
         k_on [1/s], at least 0.
@@ -63,7 +63,7 @@ def advance(bound, moment, slip, path, duration, hazard: Hazard, rebinding_rate)
     Raises
     ------
     ValueError
-        If the hazard has both a softness and a limit, or the arrays differ in length.
+        If the rupture has both a softness and a limit, or the arrays differ in length.
 
     Notes
     -----
@@ -77,7 +77,7 @@ def advance(bound, moment, slip, path, duration, hazard: Hazard, rebinding_rate)
     Under Bell's rate, a contact pulled at a hundred times the speed at which bonds begin to yield holds
     far more at first than for ever: static friction.
 
-    >>> bell = Hazard(rate=1.0, softness=1.0, limit=np.inf)
+    >>> bell = RuptureRate(rate=1.0, softness=1.0, limit=np.inf)
     >>> bound, moment = resting(bell, 10.0)
     >>> force = []
     >>> for _ in range(300):
@@ -86,29 +86,29 @@ def advance(bound, moment, slip, path, duration, hazard: Hazard, rebinding_rate)
     >>> print(f"{max(force):.2f} {force[-1]:.2f} {steady(100.0, bell, 10.0)[1][0]:.2f}")
     2.40 0.86 0.86
     """
-    _check(hazard)
+    _check(rupture)
     given = [np.array(value, dtype=float, ndmin=1) for value in (bound, moment, slip, path)]
     rows = max([array.size for array in given])
     if any(array.size not in (1, rows) for array in given):
         raise ValueError("bound, moment, slip and path need one entry, or one for every row")
     bound, moment = np.empty(rows), np.empty(rows)
-    _advance(*given, duration, *hazard, rebinding_rate, bound, moment)
+    _advance(*given, duration, *rupture, rebinding_rate, bound, moment)
     return bound, moment
 
 
-def resting(hazard: Hazard, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
+def resting(rupture: RuptureRate, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
     """Population at rest for ever: N = k_on/(k_on + k(0)) [1] and M = 0 [m]; arguments as in ``advance``."""
-    return steady(0.0, hazard, rebinding_rate)
+    return steady(0.0, rupture, rebinding_rate)
 
 
-def steady(speed, hazard: Hazard, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
+def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
     """Population of steady sliding.
 
     Parameters
     ----------
     speed : float or array
         V [m/s], either sign.
-    hazard, rebinding_rate
+    rupture, rebinding_rate
         As in ``advance``.
 
     Returns
@@ -127,17 +127,17 @@ def steady(speed, hazard: Hazard, rebinding_rate) -> tuple[np.ndarray, np.ndarra
     --------
     Friction has a maximum over speed, here at eps = 4.59:
 
-    >>> bell = Hazard(rate=1.0, softness=1.0, limit=np.inf)
+    >>> bell = RuptureRate(rate=1.0, softness=1.0, limit=np.inf)
     >>> print(np.round(steady(np.array([0.1, 4.59, 1000.0]), bell, 1.0)[1], 4))
     [0.0436 0.2785 0.0274]
     """
-    _check(hazard)
+    _check(rupture)
     speed = np.array(speed, dtype=float, ndmin=1)
     pace = np.abs(speed)
-    rate = hazard.rate
-    if hazard.softness > 0.0 and rate > 0.0:
-        rate = rate * np.exp(lambertw(hazard.softness * pace / rate).real)
-    travel = pace / hazard.limit
+    rate = rupture.rate
+    if rupture.softness > 0.0 and rate > 0.0:
+        rate = rate * np.exp(lambertw(rupture.softness * pace / rate).real)
+    travel = pace / rupture.limit
     bound = _ratio(rebinding_rate, rebinding_rate + rate + travel)
     return bound, bound * _ratio(speed, rate + 2.0 * travel)
 
@@ -147,8 +147,8 @@ def _ratio(part, whole):
     return np.divide(part, whole, out=np.zeros(whole.shape), where=whole > 0.0)
 
 
-def _check(hazard: Hazard) -> None:
-    if hazard.softness > 0.0 and hazard.limit < math.inf:
+def _check(rupture: RuptureRate) -> None:
+    if rupture.softness > 0.0 and rupture.limit < math.inf:
         raise ValueError("bonds that soften and have a cut-off stretch have no first-moment form: use one of them")
 
 

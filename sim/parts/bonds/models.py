@@ -1,7 +1,7 @@
 """Bond populations: which depths there are, and the choice between them.
 
 Shallow to deep: none, steady, rate, counted without a stretch; rate, cohort, tracked with one. Both
-kinds of rate equation are called ``rate``: a hazard tells them apart.
+kinds of rate equation are called ``rate``: a rupture tells them apart.
 """
 
 import math
@@ -12,13 +12,12 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.parts.bonds.area import Area
-from sim.parts.bonds.rupture import AnyHazard, Constant
+from sim.parts.bonds.rupture import Constant, Rupture
 from sim.parts.bonds.stretched import Ages, Cohort, Density, FirstMoment, Rebinding, Stiffness, Stretches, Tracked
 from sim.parts.bonds.tracked import Tracks
 from sim.parts.bonds.two_state import (
     Counted,
     CriticalSpeed,
-    Healing,
     Population,
     Rate,
     Sites,
@@ -29,15 +28,16 @@ from sim.parts.bonds.two_state import (
 )
 from sim.units.quantity import Quantity
 
-__all__ = ["STATES", "Auto", "Bonds", "Cohort", "Counted", "Depth", "FirstMoment"]
+__all__ = ["STATES", "Auto", "Bonds", "Cohort", "Counted", "FirstMoment", "Model"]
 __all__ += ["Rate", "Steady", "Tracked", "Unbroken"]
 
 _MOST_TRACKED = 10**6
-_WITHOUT = ("critical_speed", "healing")
-_WITH = ("hazard", "bond_stiffness", "rebinding_rate", "site_density")
+_WITHOUT = ("critical_speed", "rebinding_rate")
+_WITH = ("rupture", "bond_stiffness", "rebinding_rate", "site_density")
+_STRETCHED = ("rupture", "bond_stiffness", "site_density")
 
 #: A depth, chosen.
-Depth = Unbroken | Steady | Rate | Counted | FirstMoment | Cohort | Tracked
+Model = Unbroken | Steady | Rate | Counted | FirstMoment | Cohort | Tracked
 
 #: What the states of all depths are made of.
 STATES = (Population, Stretches, Ages, Tracks)
@@ -48,14 +48,13 @@ class Auto:
     """The shallowest depth that is good to ``tolerance``; it takes the keys of all of them.
 
     A finite number N of bonds fluctuates by 1/√N: where that is above the tolerance they are counted, or
-    tracked if they have a hazard. Otherwise the rate equation answers, or cohorts where the hazard depends
+    tracked if they have a rupture. Otherwise the rate equation answers, or cohorts where the rupture depends
     on the stretch.
     """
 
     critical_speed: CriticalSpeed | None = None
-    healing: Healing | None = None
     stress: Stress = 0.0
-    hazard: AnyHazard | None = None
+    rupture: Rupture | None = None
     bond_stiffness: Stiffness | None = None
     rebinding_rate: Rebinding | None = None
     site_density: Density | None = None
@@ -67,18 +66,16 @@ class Auto:
 
     @model_validator(mode="after")
     def _one_kind(self) -> "Auto":
-        without, with_ = ([name for name in names if getattr(self, name) is not None] for names in (_WITHOUT, _WITH))
-        if bool(without) == bool(with_):
-            raise PydanticCustomError(
-                "one_kind",
-                "give either critical_speed and healing, or hazard, bond_stiffness, rebinding_rate and site_density",
-            )
+        with_ = any(getattr(self, name) is not None for name in _STRETCHED)
+        if (self.critical_speed is not None) == with_:
+            said = f"give either {' and '.join(_WITHOUT)}, or {', '.join(_WITH[:-1])} and {_WITH[-1]}"
+            raise PydanticCustomError("one_kind", said)
         missing = [name for name in (_WITH if with_ else _WITHOUT) if getattr(self, name) is None]
         if missing:
             are = "is" if len(missing) == 1 else "are"
             raise PydanticCustomError("one_kind", f"{' and '.join(missing)} {are} missing, which bonds like these need")
         if with_ and self.stress:
-            raise PydanticCustomError("one_kind", "bonds with a hazard make their own stress; leave stress out")
+            raise PydanticCustomError("one_kind", "bonds with a rupture make their own stress; leave stress out")
         return self
 
     def number(self, area: float) -> float:
@@ -87,18 +84,22 @@ class Auto:
             return self.sites
         return math.inf if self.site_density is None or not area > 0.0 else max(1.0, round(self.site_density * area))
 
-    def chosen(self, area: float, forces: bool) -> Depth:
+    def chosen(self, area: float, forces: bool) -> Model:
         """The depth for a contact of this ``area`` [m²] whose shear part reads the bonds' ``forces`` or not."""
         number = self.number(area)
         noisy = self.tolerance**2 * number < 1.0 and self.area == "present"
         common: dict[str, Any] = {"start_from": self.start_from}
-        if self.hazard is None:
-            common |= {"critical_speed": self.critical_speed, "healing": self.healing, "stress": self.stress}
+        if self.rupture is None:
+            common |= {
+                "critical_speed": self.critical_speed,
+                "rebinding_rate": self.rebinding_rate,
+                "stress": self.stress,
+            }
             return Counted(**common, sites=int(number)) if noisy else Rate(**common, area=self.area)
         common |= {name: getattr(self, name) for name in _WITH}
         if noisy and number <= _MOST_TRACKED:
             return Tracked(**common, sites=int(number))
-        if isinstance(self.hazard, Constant) and not forces:
+        if isinstance(self.rupture, Constant) and not forces:
             return FirstMoment(**common, area=self.area)
         return Cohort(**common, area=self.area, tolerance=max(1e-12, min(1e-4, 0.1 * self.tolerance)))
 
@@ -118,7 +119,7 @@ class Auto:
         elif self.tolerance**2 * number < 1.0:
             size += f"; more than {_MOST_TRACKED:,} bonds are not followed one by one"
         if isinstance(depth, Cohort):
-            return f"{size}; {'the forces of the bonds are read' if forces else 'the hazard depends on the stretch'}"
+            return f"{size}; {'the forces of the bonds are read' if forces else 'the rupture depends on the stretch'}"
         return f"{size}; the rupture rate does not depend on the stretch"
 
 
@@ -128,18 +129,18 @@ def _tag(value: Any) -> str | None:
     model = read("model", None)
     if not isinstance(model, str):
         return None
-    return "rate[hazard]" if model == "rate" and _stretched(read) else model
+    return "rate[rupture]" if model == "rate" and _stretched(read) else model
 
 
 def _stretched(read: Any) -> bool:
-    return any(read(name, None) is not None for name in _WITH)
+    return any(read(name, None) is not None for name in _STRETCHED)
 
 
 Bonds = Annotated[
     Annotated[Unbroken, Tag("none")]
     | Annotated[Steady, Tag("steady")]
     | Annotated[Rate, Tag("rate")]
-    | Annotated[FirstMoment, Tag("rate[hazard]")]
+    | Annotated[FirstMoment, Tag("rate[rupture]")]
     | Annotated[Cohort, Tag("cohort")]
     | Annotated[Counted, Tag("counted")]
     | Annotated[Tracked, Tag("tracked")]

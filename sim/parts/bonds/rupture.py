@@ -1,6 +1,6 @@
 """How fast a bond of a given stretch breaks: constant, Bell, constant with a cut-off stretch.
 
-All three are one law of three numbers: the hazard is rate × exp(\\|x\\| softness) for a stretch below
+All three are one law of three numbers: the rupture is rate × exp(\\|x\\| softness) for a stretch below
 ``limit`` and infinite beyond it. The compiled helpers know nothing else.
 """
 
@@ -14,7 +14,7 @@ from sim.numerics.jit import device
 from sim.units.quantity import Quantity
 
 
-class Hazard(NamedTuple):
+class RuptureRate(NamedTuple):
     """Rupture rate of a bond: ``rate`` [1/s] × exp(\\|x\\| ``softness`` [1/m]) up to the stretch ``limit`` [m]."""
 
     rate: float
@@ -29,9 +29,9 @@ class Constant:
     rate: Annotated[float, Quantity("1/s", "rupture rate of a bond", "k_0", above=0)]
     model: Literal["constant"] = "constant"
 
-    def law(self, bond_stiffness: float) -> Hazard:
-        """The three numbers of this hazard for bonds of a stiffness [N/m]."""
-        return Hazard(self.rate, 0.0, math.inf)
+    def law(self, bond_stiffness: float) -> RuptureRate:
+        """The three numbers of this rupture for bonds of a stiffness [N/m]."""
+        return RuptureRate(self.rate, 0.0, math.inf)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -46,8 +46,8 @@ class Bell:
     ]
     model: Literal["bell"] = "bell"
 
-    def law(self, bond_stiffness: float) -> Hazard:
-        return Hazard(self.zero_force_rate, bond_stiffness / self.bell_force, math.inf)
+    def law(self, bond_stiffness: float) -> RuptureRate:
+        return RuptureRate(self.zero_force_rate, bond_stiffness / self.bell_force, math.inf)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -58,15 +58,15 @@ class CutOff:
     rate: Annotated[float, Quantity("1/s", "rupture rate of a bond below that stretch", "1/t_0", at_least=0)] = 0.0
     model: Literal["cut_off"] = "cut_off"
 
-    def law(self, bond_stiffness: float) -> Hazard:
-        return Hazard(self.rate, 0.0, self.stretch)
+    def law(self, bond_stiffness: float) -> RuptureRate:
+        return RuptureRate(self.rate, 0.0, self.stretch)
 
 
-AnyHazard = Annotated[Constant | Bell | CutOff, Field(discriminator="model")]
+Rupture = Annotated[Constant | Bell | CutOff, Field(discriminator="model")]
 
 
 @device
-def hazard_integral(stretch, slip, duration, rate, softness):
+def rupture_integral(stretch, slip, duration, rate, softness):
     """∫k dt of a bond whose stretch goes from ``stretch`` by ``slip`` at constant speed, of any sign.
 
     Notes

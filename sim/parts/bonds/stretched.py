@@ -1,7 +1,7 @@
 """Bond populations with a stretch. Shallow to deep: rate (first moment), cohort, tracked.
 
 Sites of a given density are free or hold a bond that was born unstretched, goes with the slider and
-breaks with a hazard that depends on its stretch. Their mean force makes the shear stress, so friction
+breaks with a rupture that depends on its stretch. Their mean force makes the shear stress, so friction
 has a maximum, ages and starts with a peak; nothing of that is put in by hand.
 """
 
@@ -20,7 +20,7 @@ import sim.parts.bonds.tracked as tracks
 from sim.numerics.noise import Noise
 from sim.parts.bonds.area import Area, OverArea
 from sim.parts.bonds.cohorts import Cohorts
-from sim.parts.bonds.rupture import AnyHazard, Hazard
+from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import Tracks
 from sim.parts.bonds.two_state import Start
 from sim.parts.exchange import Motion, Traction
@@ -39,7 +39,7 @@ class _Stretched:
     knows_forces: ClassVar[bool] = True
     carries_stress: ClassVar[bool] = True
     numbers: Any = 1
-    hazard: AnyHazard
+    rupture: Rupture
     bond_stiffness: float
     rebinding_rate: float
     site_density: float
@@ -49,9 +49,9 @@ class _Stretched:
         raise NotImplementedError
 
     @cached_property
-    def law(self) -> Hazard:
+    def law(self) -> RuptureRate:
         """Rupture rate of a bond of given stretch."""
-        return self.hazard.law(self.bond_stiffness)
+        return self.rupture.law(self.bond_stiffness)
 
     @property
     def bound_at_rest(self) -> float:
@@ -93,11 +93,11 @@ class Stretches:
 class FirstMoment(OverArea, _Stretched):
     """Rate equations of number and mean stretch, every bond taken at the mean. Limit: ``Cohort`` at a constant rate.
 
-    Exact in time for a constant hazard. Under Bell's it is a mean field: it overpredicts the friction
+    Exact in time for a constant rupture. Under Bell's it is a mean field: it overpredicts the friction
     maximum by some 27 to 47 %; ``Cohort`` has no such error.
     """
 
-    hazard: AnyHazard
+    rupture: Rupture
     bond_stiffness: Stiffness
     rebinding_rate: Rebinding
     site_density: Density
@@ -160,7 +160,7 @@ class Cohort(OverArea, _Stretched):
     within a step, and the merging of old cohorts that bounds the cost, are held to ``tolerance``.
     """
 
-    hazard: AnyHazard
+    rupture: Rupture
     bond_stiffness: Stiffness
     rebinding_rate: Rebinding
     site_density: Density
@@ -209,7 +209,7 @@ class Tracked(_Stretched):
 
     per_member: ClassVar[bool] = True
 
-    hazard: AnyHazard
+    rupture: Rupture
     bond_stiffness: Stiffness
     rebinding_rate: Rebinding
     site_density: Density
@@ -238,5 +238,5 @@ class Tracked(_Stretched):
 
     def settled(self, speed: np.ndarray) -> Traction:
         """Ensemble mean of what steady sliding at a speed [m/s] hands to the shear part, that of the cohorts."""
-        shared = {name: getattr(self, name) for name in ("hazard", "bond_stiffness", "rebinding_rate", "site_density")}
+        shared = {name: getattr(self, name) for name in ("rupture", "bond_stiffness", "rebinding_rate", "site_density")}
         return Cohort(**shared).settled(speed)

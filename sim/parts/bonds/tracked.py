@@ -1,7 +1,7 @@
 """Bonds followed one by one: a finite number of sites per member, every stretch, exact rupture times.
 
 Each site is free or bound. A bond is born unstretched, is stretched by the slider, and breaks when
-its integrated hazard reaches an exponential threshold; the site then waits an exponential time and
+its integrated rupture reaches an exponential threshold; the site then waits an exponential time and
 binds again, at the slider's place of that very moment. Nothing of this knows the clock step: steps
 only cut the motion into pieces of constant speed, so the same motion in other steps gives the same
 lives but for rounding. The numbers of each life have an address of their own (seed, site, life,
@@ -14,7 +14,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from sim.numerics.special import reduced_exponential_integral, scaled_exponential_integral
-from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
 from sim.parts.bonds.tracked_step import ENDLESS, LONG, SPENT, draw, live
 
@@ -55,7 +55,7 @@ class Tracks:
 
 
 def start(
-    hazard: Hazard,
+    rupture: RuptureRate,
     rebinding_rate: float,
     sites: int,
     speed: np.ndarray,
@@ -67,7 +67,7 @@ def start(
 
     Parameters
     ----------
-    hazard : Hazard
+    rupture : RuptureRate
         Rupture rate of a bond against its stretch.
     rebinding_rate : float
         k_on [1/s] of a free site, at least 0.
@@ -92,7 +92,7 @@ def start(
     --------
     At rest half of the sites are bound where bonds open as fast as they close; sliding takes them away:
 
-    >>> law, still, fast = Hazard(1.0, 1e9, math.inf), np.zeros(1), np.array([1e-8])
+    >>> law, still, fast = RuptureRate(1.0, 1e9, math.inf), np.zeros(1), np.array([1e-8])
     >>> for speed in still, fast:
     ...     tracks = start(law, 1.0, 10**5, speed, "steady", 1, np.arange(1))
     ...     print("%.2f of the sites, mean stretch %.2f nm" % (bound(tracks)[0] / 1e5, 1e9 * mean_stretch(tracks)[0]))
@@ -110,13 +110,13 @@ def start(
     )
     speed = np.asarray(speed, dtype=float)
     if begin == "steady":
-        age = mean_life(speed, hazard)
+        age = mean_life(speed, rupture)
         share = _steady_share(age, speed, rebinding_rate)
     else:
         age = np.zeros(1)
-        rest = 1.0 if hazard.rate == 0.0 else rebinding_rate / (rebinding_rate + hazard.rate)
+        rest = 1.0 if rupture.rate == 0.0 else rebinding_rate / (rebinding_rate + rupture.rate)
         share = np.array([rest if begin == "bonded" else 0.0])
-    _draw(tracks, np.ones(1, bool), speed, share, age, hazard, rebinding_rate, seed, members)
+    _draw(tracks, np.ones(1, bool), speed, share, age, rupture, rebinding_rate, seed, members)
     return tracks
 
 
@@ -124,7 +124,7 @@ def advance(
     tracks: Tracks,
     slip: np.ndarray,
     duration: float,
-    hazard: Hazard,
+    rupture: RuptureRate,
     rebinding_rate: float,
     seed: int,
     members: np.ndarray,
@@ -139,7 +139,7 @@ def advance(
         Displacement of the slider over the step, either sign [m].
     duration : float
         Length of the step [s], above 0.
-    hazard, rebinding_rate, seed, members
+    rupture, rebinding_rate, seed, members
         As at the start. Only the rates may have changed since.
 
     Raises
@@ -160,7 +160,7 @@ def advance(
     after = Tracks(tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, frame)
     said = live(
         tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, frame,
-        slip, duration, *hazard, rebinding_rate, seed, members,
+        slip, duration, *rupture, rebinding_rate, seed, members,
     )  # fmt: skip
     if said == SPENT:
         raise RuntimeError("these tracks have been advanced already: go on from the newest state, or from copies")
@@ -168,10 +168,10 @@ def advance(
         raise ValueError("slip and duration of a step must be finite, and its duration positive")
     if said == LONG:
         speed = slip / duration
-        age = mean_life(speed, hazard)
+        age = mean_life(speed, rupture)
         chosen = frame[:, STEPS] == tracks.frame[:, STEPS]
         share = _steady_share(age, speed, rebinding_rate)
-        _draw(after, chosen, speed, share, age, hazard, rebinding_rate, seed, members)
+        _draw(after, chosen, speed, share, age, rupture, rebinding_rate, seed, members)
     return after
 
 
@@ -198,14 +198,14 @@ def moments(tracks: Tracks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return bound(tracks) / tracks.due.shape[1], mean_stretch(tracks), mean_square_stretch(tracks)
 
 
-def mean_life(speed: np.ndarray, hazard: Hazard) -> np.ndarray:
+def mean_life(speed: np.ndarray, rupture: RuptureRate) -> np.ndarray:
     """Mean life of a bond born unstretched at constant speed.
 
     Parameters
     ----------
     speed : array
         V [m/s], either sign.
-    hazard : Hazard
+    rupture : RuptureRate
         Rupture rate of a bond against its stretch.
 
     Returns
@@ -222,15 +222,15 @@ def mean_life(speed: np.ndarray, hazard: Hazard) -> np.ndarray:
     --------
     A bond lives shorter the faster it is pulled, but only by the logarithm:
 
-    >>> lives = mean_life(np.array([0.0, 1e-8, 1e-6]), Hazard(1.0, 1e9, math.inf))
+    >>> lives = mean_life(np.array([0.0, 1e-8, 1e-6]), RuptureRate(1.0, 1e9, math.inf))
     >>> print("%.4f %.4f %.4f" % tuple(lives))
     1.0000 0.2015 0.0063
     """
-    return np.array([_mean_life(abs(v), hazard) for v in np.atleast_1d(speed).tolist()])
+    return np.array([_mean_life(abs(v), rupture) for v in np.atleast_1d(speed).tolist()])
 
 
-def _mean_life(speed: float, hazard: Hazard) -> float:
-    rate, softness, limit = hazard
+def _mean_life(speed: float, rupture: RuptureRate) -> float:
+    rate, softness, limit = rupture
     pace, longest = speed * softness, limit / speed if speed > 0.0 else math.inf
     if rate == 0.0:
         return longest
@@ -256,10 +256,10 @@ def _steady_share(age: np.ndarray, speed: np.ndarray, rebinding_rate: float) -> 
         return np.where(np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0))
 
 
-def _draw(tracks, chosen, speed, share, age, hazard, rebinding_rate, seed, members) -> None:
+def _draw(tracks, chosen, speed, share, age, rupture, rebinding_rate, seed, members) -> None:
     """Draw the chosen members anew, in place."""
     age = np.where(np.isinf(age), 0.0, age)
     draw(
         tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, tracks.frame, chosen,
-        speed, share, age, *hazard, rebinding_rate, seed, np.asarray(members, dtype=np.uint64),
+        speed, share, age, *rupture, rebinding_rate, seed, np.asarray(members, dtype=np.uint64),
     )  # fmt: skip

@@ -1,6 +1,6 @@
 """Bonds whose stretch has the sign of the motion: one step of a row of them, asking only those that break or bind.
 
-A row is one member. All its sites follow one slider, so Bell's hazard separates: ∫k dt of bond i is
+A row is one member. All its sites follow one slider, so Bell's rupture separates: ∫k dt of bond i is
 e^(−s x_i) times a clock common to all, Φ(t) = ∫ rate e^(s x) dt, with s the softness, x the position of
 the slider and x_i that at the bond's birth, both counted along the motion from where the frame was
 last set. A bond therefore breaks when Φ passes a number known at its birth, its ``due``, and a step
@@ -136,7 +136,7 @@ def _break(sites, count, birth, due, life, row, step, seed, member, drawn, words
 @device
 def _bind(sites, count, birth, due, row, step, last_clock, cut, drawn):
     """Bind the first ``count`` sites, exactly in place; how many of them break again in this step, put first."""
-    x0, t0, clock, first, growth, pace, _, speed, _, _ = step
+    x0, t0, clock, first, amplitude, pace, _, speed, _, _ = step
     again = 0
     bound, total, squares = 0.0, 0.0, 0.0
     for e in range(count):
@@ -147,7 +147,7 @@ def _bind(sites, count, birth, due, row, step, last_clock, cut, drawn):
         bell = pace * time
         more = math.expm1(bell)
         clock_there = clock + first * time * (more / bell if bell > 0.0 else 1.0)
-        breaks = clock_there + drawn[1, e] * growth * (1.0 + more)
+        breaks = clock_there + drawn[1, e] * amplitude * (1.0 + more)
         due[i], birth[i] = breaks, x
         bound += 1.0
         total += x
@@ -199,9 +199,9 @@ def follow(
     """One step of a row whose bonds all have the sign of the motion; ``slip`` >= 0 along it."""
     rate, softness, limit, rebinding = law
     x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
-    growth, bell = math.exp(softness * x0), softness * slip
-    first, speed = rate * growth, slip / duration
-    step = (x0, t0, clock, first, growth, speed * softness, duration, speed, limit, rebinding)
+    amplitude, bell = math.exp(softness * x0), softness * slip
+    first, speed = rate * amplitude, slip / duration
+    step = (x0, t0, clock, first, amplitude, speed * softness, duration, speed, limit, rebinding)
     last_clock = clock + first * duration * (math.expm1(bell) / bell if bell > 0.0 else 1.0)
     end, cut = t0 + duration, x0 + slip - limit
     clock_bits, time_bits = np.float64(last_clock).view(np.uint64), np.float64(-end).view(np.int64)

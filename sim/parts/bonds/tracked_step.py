@@ -11,7 +11,7 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.numerics.noise import exponential, unit_at, words_at
-from sim.parts.bonds.rupture import hazard_integral, time_to_rupture
+from sim.parts.bonds.rupture import rupture_integral, time_to_rupture
 from sim.parts.bonds.tracked_events import (
     BOUND,
     CLOCK,
@@ -43,13 +43,13 @@ _LEAP = 24.0  # Bell forces within a step above which bonds are asked singly, le
 def _cycle(speed, rate, softness, limit, rebinding):
     """About the mean time from one birth to the next of a site: a fresh bond's life at ``speed`` and the wait.
 
-    Exact for constant hazards, with or without a limit; for Bell's within a sixth,
+    Exact for constant rupture laws, with or without a limit; for Bell's within a sixth,
     e^z E1(z) ~ ½ ln(1 + 2/z).
     """
     life = math.inf
     if rate > 0.0:
-        growth = 2.0 * math.fabs(speed) * softness / rate
-        life = (math.log1p(growth) / growth if growth > 0.0 else 1.0) / rate
+        amplitude = 2.0 * math.fabs(speed) * softness / rate
+        life = (math.log1p(amplitude) / amplitude if amplitude > 0.0 else 1.0) / rate
     if speed != 0.0 and limit < math.inf:
         longest = limit / math.fabs(speed)
         life = longest if life == math.inf else -life * math.expm1(-longest / life)
@@ -68,7 +68,7 @@ def _ask(birth, due, life, row, slip, duration, law, seed, member):
             left = duration - time
             if math.copysign(1.0, due[i]) > 0.0:
                 stretch = x0 + speed * time - birth[i]
-                spent = hazard_integral(stretch, speed * left, left, rate, softness)
+                spent = rupture_integral(stretch, speed * left, left, rate, softness)
                 if spent < due[i] and math.fabs(stretch + speed * left) < limit:
                     due[i] -= spent
                     break
@@ -206,7 +206,7 @@ def draw(
                 one, two, three, _ = words_at(seed, PART, site, number, members[m], _U(lane))
                 tail = 1.0 + exponential(two) if unit_at(one) >= 0.5 else unit_at(two)
                 passed, bar = tail * mean, exponential(three) + max(tail - 1.0, 0.0)
-                spent = hazard_integral(0.0, v * passed, passed, rate, softness)
+                spent = rupture_integral(0.0, v * passed, passed, rate, softness)
                 if spent <= bar and math.fabs(v) * passed < limit:
                     break
             birth[m, i] = -v * passed

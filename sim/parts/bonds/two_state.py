@@ -20,7 +20,7 @@ from sim.units.quantity import Quantity
 
 Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
 CriticalSpeed = Annotated[float, Quantity("m/s", "critical speed of the bonds", "V_c", above=0)]
-Healing = Annotated[float, Quantity("1/s", "healing rate of broken bonds", "h", above=0)]
+Rebinding = Annotated[float, Quantity("1/s", "rate at which a free site binds", "h", above=0)]
 Start = Annotated[
     Literal["steady", "bonded", "empty"],
     Field(alias="start", description="bonds at the start, bonded being those of rest"),
@@ -111,7 +111,7 @@ class Rate(OverArea, _WithoutStretch):
     """
 
     critical_speed: CriticalSpeed
-    healing: Healing
+    rebinding_rate: Rebinding
     stress: Stress = 0.0
     start_from: Start = "steady"
     area: Area = "present"
@@ -121,7 +121,7 @@ class Rate(OverArea, _WithoutStretch):
         return Population(self.rows(noise) * _first_fraction(self.start_from, motion, self.critical_speed))
 
     def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        bound = relax_fraction(population.bound, motion.path, motion.duration, self.critical_speed, self.healing)
+        bound = relax_fraction(population.bound, motion.path, motion.duration, self.critical_speed, self.rebinding_rate)
         return replace(population, bound=np.asarray(bound))
 
     def diluted(self, population: Population, share: np.ndarray) -> Population:
@@ -143,7 +143,7 @@ class Counted(_WithoutStretch):
     per_member: ClassVar[bool] = True
 
     critical_speed: CriticalSpeed
-    healing: Healing
+    rebinding_rate: Rebinding
     sites: Sites
     stress: Stress = 0.0
     start_from: Start = "steady"
@@ -158,7 +158,7 @@ class Counted(_WithoutStretch):
         return Population(_binomial(uniform[:, 0], np.array([float(self.sites)]), first))
 
     def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        stay, bind = transition_probabilities(motion.path, motion.duration, self.critical_speed, self.healing)
+        stay, bind = transition_probabilities(motion.path, motion.duration, self.critical_speed, self.rebinding_rate)
         uniform = noise.uniforms(motion.step, 2)
         kept = _binomial(uniform[:, 0], population.bound, stay)
         return Population(kept + _binomial(uniform[:, 1], self.sites - population.bound, bind))

@@ -1,6 +1,6 @@
 """The contact of sphere and half-space: its radius under a load, an indentation, or behind a stiffness."""
 
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.contact.models import Contact, Equilibrium, Lagging
+from sim.parts.contact.models import Contact, Equilibrium, RateDependent
 
-__all__ = ["Adhesion", "Contact", "Equilibrium", "Lagging", "Solid", "Sphere"]
+__all__ = ["Adhesion", "Contact", "Equilibrium", "RateDependent", "Solid", "Sphere"]

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.laws import jkr
-from sim.laws.reversible import radius_at_indentation_reversible, radius_at_load_reversible, shrunk_at_travel
+from sim.laws.reversible import radius_at_indentation_reversible, radius_at_load_reversible, shrunk_at_displacement
 
 
 class Bodies(NamedTuple):
@@ -65,7 +65,7 @@ class AtLoad:
         """Indentation [m]; nan where an open contact leaves the sphere without a place."""
         return np.asarray(jkr.indentation_under_load(radius, self.load, bodies.sphere_radius, bodies.modulus))
 
-    def travel(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def displacement(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Travel of what holds the sphere [m]: its indentation, as nothing yields between."""
         return self.depth(radius, bodies)
 
@@ -79,8 +79,8 @@ class AtLoad:
 
 
 @dataclass(frozen=True)
-class AtTravel:
-    """A travel [m] behind a machine stiffness [N/m]; an infinite one is an indentation."""
+class AtDisplacement:
+    """A displacement [m] behind a machine stiffness [N/m]; an infinite one is an indentation."""
 
     place: float
     stiffness: float = math.inf
@@ -98,12 +98,12 @@ class AtTravel:
                 return np.asarray(jkr.radius_at_indentation(self.place, work, size, modulus))
             law = radius_at_indentation_reversible
             return np.asarray(law(self.place, work, stress, reversible, size, modulus, poisson_ratio))
-        found = jkr.radius_at_travel(self.place, self.stiffness, work, size, modulus)
+        found = jkr.radius_at_displacement(self.place, self.stiffness, work, size, modulus)
         if reversible == 0.0:
             return np.asarray(found)
-        hertz = jkr.radius_at_travel(self.place, self.stiffness, 0.0, size, modulus)
+        hertz = jkr.radius_at_displacement(self.place, self.stiffness, 0.0, size, modulus)
         return np.asarray(
-            shrunk_at_travel(
+            shrunk_at_displacement(
                 found, hertz, self.place, self.stiffness, work, stress, reversible, 0.0, size, modulus, poisson_ratio
             )
         )
@@ -111,8 +111,10 @@ class AtTravel:
     def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
         size, modulus, _ = bodies
-        missing = radius**2 / size - jkr.indentation_under_travel(radius, self.place, self.stiffness, size, modulus)
-        rate = jkr.energy_release_rate_at_travel(radius, self.place, self.stiffness, size, modulus)
+        missing = radius**2 / size - jkr.indentation_under_displacement(
+            radius, self.place, self.stiffness, size, modulus
+        )
+        rate = jkr.energy_release_rate_at_displacement(radius, self.place, self.stiffness, size, modulus)
         return np.copysign(rate, missing)
 
     def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
@@ -121,17 +123,17 @@ class AtTravel:
         if math.isinf(self.stiffness):
             load = jkr.load_under_indentation(radius, self.place, size, modulus)
         else:
-            load = jkr.load_under_travel(radius, self.place, self.stiffness, size, modulus)
+            load = jkr.load_under_displacement(radius, self.place, self.stiffness, size, modulus)
         return np.where(np.isnan(radius), 0.0, load)
 
     def depth(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Indentation [m]; the travel where the contact is open and nothing loads the machine."""
+        """Indentation [m]; the displacement where the contact is open and nothing loads the machine."""
         if math.isinf(self.stiffness):
             return np.full(radius.shape, self.place)
-        found = jkr.indentation_under_travel(radius, self.place, self.stiffness, *bodies[:2])
+        found = jkr.indentation_under_displacement(radius, self.place, self.stiffness, *bodies[:2])
         return np.where(np.isnan(radius), self.place, found)
 
-    def travel(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def displacement(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Travel of the machine [m]."""
         return np.full(radius.shape, self.place)
 
@@ -142,4 +144,4 @@ class AtTravel:
         return elastic_energy(radius, depth, bodies) + machine - gained
 
 
-Grip = AtLoad | AtTravel
+Grip = AtLoad | AtDisplacement

@@ -7,11 +7,11 @@ falls short (after Maugis & Barquins). Unlike the form with G/w this one stays f
 for w <= 0, where stress fluctuations outweigh adhesion. Limits: infinite speed is the JKR
 equilibrium, zero speed a frozen edge.
 
-One formula serves every control. A machine pushes with ``P = load + stiffness (travel - delta)``:
+One formula serves every control. A machine pushes with ``P = load + stiffness (displacement - delta)``:
 stiffness 0 is a load, an infinite one an indentation. With ``lambda = stiffness/(stiffness + 2 E* a)``
 and ``mu = 1/(stiffness + 2 E* a)`` the indentation missing from Hertz's at this radius is
 
-    y = a^2/R - delta = lambda (a^2/R - travel) + mu (4 E* a^3/(3R) - load),   G = E* y^2/(2 pi a).
+    y = a^2/R - delta = lambda (a^2/R - displacement) + mu (4 E* a^3/(3R) - load),   G = E* y^2/(2 pi a).
 
 Integration. Radau IIA of three stages (order 5, L-stable; Hairer & Wanner, Solving ODEs II, IV.8)
 takes steps of its own choice inside the clock step. Where the edge runs open, the radius falls to
@@ -51,15 +51,15 @@ _LONGEST = 0.2
 
 
 class Hold(NamedTuple):
-    """What presses the sphere during a clock step: P = load + stiffness (travel - delta), each linear in time.
+    """What presses the sphere during a clock step: P = load + stiffness (displacement - delta), each linear in time.
 
-    ``stiffness`` 0 is a load and an infinite one an indentation, namely ``travel``.
+    ``stiffness`` 0 is a load and an infinite one an indentation, namely ``displacement``.
     """
 
     load_before: Any = 0.0
     load_after: Any = 0.0
-    travel_before: Any = 0.0
-    travel_after: Any = 0.0
+    displacement_before: Any = 0.0
+    displacement_after: Any = 0.0
     stiffness: Any = 0.0
 
 
@@ -88,17 +88,17 @@ def _excess(t, a, scene):
     Below Hertz's radius G goes on as -G: nothing else than a monotone continuation for the inner
     solver, which never ends there.
     """
-    modulus, curvature, stiffness, load, load_rate, travel, travel_rate, work, work_rate, scale = scene
+    modulus, curvature, stiffness, load, load_rate, displacement, displacement_rate, work, work_rate, scale = scene
     if stiffness == math.inf:
         machine, yielding = 1.0, 0.0
     else:
         yielding = 1.0 / (stiffness + 2.0 * modulus * a)
         machine = stiffness * yielding
     hertz = a * a * curvature
-    y = machine * (hertz - travel - travel_rate * t)
+    y = machine * (hertz - displacement - displacement_rate * t)
     y += yielding * (4.0 / 3.0 * modulus * a * hertz - load - load_rate * t)
     y_a = 2.0 * a * curvature - 2.0 * modulus * yielding * y
-    y_t = -machine * travel_rate - yielding * load_rate
+    y_t = -machine * displacement_rate - yielding * load_rate
     unit = modulus * abs(y) / (2.0 * math.pi * a * scale)
     s = unit * y - (work + work_rate * t) / scale
     return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
@@ -220,10 +220,10 @@ def _radau(running, x, y, h, size, first, start, scene, front):
 @device
 def _bare_force(t, scene):
     """What the control presses with on a contact of no size: N, or m where the stiffness is infinite."""
-    _, _, stiffness, load, load_rate, travel, travel_rate, _, _, _ = scene
+    _, _, stiffness, load, load_rate, displacement, displacement_rate, _, _, _ = scene
     if stiffness == math.inf:
-        return travel + travel_rate * t
-    return load + load_rate * t + stiffness * (travel + travel_rate * t)
+        return displacement + displacement_rate * t
+    return load + load_rate * t + stiffness * (displacement + displacement_rate * t)
 
 
 @device
@@ -261,12 +261,12 @@ def _hertz(t, scene):
 def _pushed(t, scene, front):
     """Whether Hertz's contact at t outruns the edge, and its radius."""
     a = _hertz(t, scene)
-    modulus, curvature, stiffness, _, load_rate, _, travel_rate, work, work_rate, scale = scene
+    modulus, curvature, stiffness, _, load_rate, _, displacement_rate, work, work_rate, scale = scene
     rate, _ = _speed(-(work + work_rate * t) / scale, front)
     if stiffness == math.inf:
-        indenting = travel_rate
+        indenting = displacement_rate
     else:
-        indenting = (load_rate + stiffness * travel_rate) / (stiffness + 2.0 * modulus * a)
+        indenting = (load_rate + stiffness * displacement_rate) / (stiffness + 2.0 * modulus * a)
     return rate <= indenting / (2.0 * a * curvature), a
 
 
@@ -443,14 +443,14 @@ def _zero(before, after, duration):
 def _advance(rows, out):
     """Fill (radius, time of detachment, energy) of each member from its seventeen numbers."""
     for m in range(rows.shape[0]):
-        a, w0, w1, load0, load1, travel0, travel1, stiffness = rows[m, :8]
+        a, w0, w1, load0, load1, displacement0, displacement1, stiffness = rows[m, :8]
         duration, scale, speed, exponent, heal_speed, heal_exponent, sphere_radius, modulus, least = rows[m, 8:]
         out[m, 0], out[m, 1], out[m, 2] = math.nan, math.nan, (0.0 if math.isnan(a) or a <= 0.0 else math.nan)
         if stiffness == math.inf:
             load0 = load1 = 0.0
         if stiffness == 0.0:
-            travel0 = travel1 = 0.0
-        ends = abs(w0) + abs(w1) + abs(load0) + abs(load1) + abs(travel0) + abs(travel1)
+            displacement0 = displacement1 = 0.0
+        ends = abs(w0) + abs(w1) + abs(load0) + abs(load1) + abs(displacement0) + abs(displacement1)
         positive = min(scale, exponent, heal_exponent, sphere_radius, modulus)
         wide = max(abs(a), scale, exponent, heal_exponent, sphere_radius, modulus, duration, least)
         lowest = min(stiffness, duration, speed, heal_speed, least)
@@ -462,7 +462,7 @@ def _advance(rows, out):
         heal_speed = min(heal_speed, a * per * min(_ROUNDING**-heal_power, 1e250))
         front = speed, power, heal_speed, heal_power
         machine = modulus, 1.0 / sphere_radius, stiffness, load0, (load1 - load0) * per
-        scene = machine + (travel0, (travel1 - travel0) * per, w0, (w1 - w0) * per, scale)
+        scene = machine + (displacement0, (displacement1 - displacement0) * per, w0, (w1 - w0) * per, scale)
         end, opened, energy = _member(a, duration, max(least, _LEAST * a), scene, front)
         if energy < math.inf and end != math.inf:
             out[m, 0], out[m, 1], out[m, 2] = end, opened, energy
@@ -478,7 +478,7 @@ def advance(radius, work, hold, kinetics, duration, sphere_radius, modulus, deta
     work : pair of arrays
         Work of adhesion w at the start and at the end [J/m^2], of any sign.
     hold : Hold
-        Load [N], travel [m] and stiffness [N/m] of what presses.
+        Load [N], displacement [m] and stiffness [N/m] of what presses.
     kinetics : Kinetics
         Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
         freezes the edge or leaves it in equilibrium.

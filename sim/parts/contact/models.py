@@ -1,6 +1,6 @@
-"""The contact: which radius follows from the work of adhesion that is left. Shallow to deep: equilibrium, lagging.
+"""The contact: its radius at the work of adhesion that is left. Simple to full: equilibrium, rate-dependent.
 
-Every depth is held at a load, at an indentation or at a travel behind a machine, each a number, a course
+Every depth is held at a load, at an indentation or at a displacement behind a machine, each a number, a course
 or a table; ``sim.parts.contact.control`` says what a contact is under each.
 """
 
@@ -13,7 +13,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.parts.contact.balance import Balance, Touch
-from sim.parts.contact.control import AtLoad, AtTravel, Bodies, Grip
+from sim.parts.contact.control import AtDisplacement, AtLoad, Bodies, Grip
 from sim.parts.contact.crack_front import Hold, Kinetics
 from sim.parts.contact.crack_front import advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
@@ -26,7 +26,7 @@ _SPOT = 1e-3
 
 _Load = held(Quantity("N", "normal load, compression positive", "P"), "load")
 _Indentation = held(Quantity("m", "indentation of the sphere", "delta"), "indentation")
-_Travel = held(Quantity("m", "travel of the machine that holds the sphere", "Delta"), "travel")
+_Displacement = held(Quantity("m", "displacement of the machine that holds the sphere", "Delta"), "displacement")
 _Stiffness = Annotated[float, Quantity("N/m", "stiffness of the machine", "k", above=0)]
 _Reversible = Annotated[
     float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)
@@ -40,31 +40,30 @@ _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description=
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class _Held:
-    """What holds the sphere: a load, an indentation, or a travel with a stiffness."""
+    """What holds the sphere: a load, an indentation, or a displacement with a stiffness."""
 
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
-    travel: _Travel | None = None  # type: ignore[valid-type]
+    displacement: _Displacement | None = None  # type: ignore[valid-type]
     stiffness: _Stiffness | None = None
     reversible: _Reversible = 0.0
-    on_detach: _Policy = "stay_open"
+    after_pull_off: _Policy = "stay_open"
 
     @model_validator(mode="after")
     def _one_control(self) -> "_Held":
-        given = [name for name in ("load", "indentation", "travel") if getattr(self, name) is not None]
+        given = [name for name in ("load", "indentation", "displacement") if getattr(self, name) is not None]
         if not given:
             raise PydanticCustomError(
                 "control",
-                'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", or a travel'
+                'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", or a displacement'
                 " with a stiffness",
             )
         if len(given) > 1:
-            names = " and ".join(("a load", "an indentation", "a travel")[("load", "indentation", "travel").index(n)]
-                                 for n in given)  # fmt: skip
+            names = " and ".join(f"an {name}" if name == "indentation" else f"a {name}" for name in given)
             raise PydanticCustomError("control", f"{names} cannot both hold the sphere; leave one of them out")
-        if (self.travel is None) != (self.stiffness is None):
-            said = 'a travel needs the stiffness of the machine, such as "1 kN/m"'
-            other = "a stiffness belongs to a travel; give contact.travel, or leave it out"
+        if (self.displacement is None) != (self.stiffness is None):
+            said = 'a displacement needs the stiffness of the machine, such as "1 kN/m"'
+            other = "a stiffness belongs to a displacement; give contact.displacement, or leave it out"
             raise PydanticCustomError("control", said if self.stiffness is None else other)
         return self
 
@@ -73,18 +72,18 @@ class _Held:
         if self.load is not None:
             return AtLoad(value_at(self.load, time, duration))
         if self.indentation is not None:
-            return AtTravel(value_at(self.indentation, time, duration))
-        return AtTravel(value_at(self.travel, time, duration), self.stiffness or math.inf)
+            return AtDisplacement(value_at(self.indentation, time, duration))
+        return AtDisplacement(value_at(self.displacement, time, duration), self.stiffness or math.inf)
 
     @property
     def changes(self) -> bool:
         """Whether what holds the sphere changes in time."""
-        return any(hasattr(control, "at") for control in (self.load, self.indentation, self.travel))
+        return any(hasattr(control, "at") for control in (self.load, self.indentation, self.displacement))
 
     @property
     def lowest(self) -> float:
-        """The least load, indentation or travel of the run."""
-        return min(lowest(control) for control in (self.load, self.indentation, self.travel))
+        """The least load, indentation or displacement of the run."""
+        return min(lowest(control) for control in (self.load, self.indentation, self.displacement))
 
     def equilibrium_radius(self, work: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
         """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
@@ -138,8 +137,8 @@ class _Held:
 class Equilibrium(_Held):
     """The contact is in JKR equilibrium with the work of adhesion at every step, on its stable branch.
 
-    Where no equilibrium is left it detaches. ``on_detach`` says what follows: it stays open; it reattaches as
-    soon as the free sphere would touch (at a load that is not negative, at a travel of zero or more), where it
+    Where no equilibrium is left it detaches. ``after_pull_off`` says what follows: it stays open; it reattaches as
+    soon as the free sphere would touch (at a load that is not negative, at a displacement of zero or more), where it
     jumps into equilibrium; or the member's trajectory stops there.
     """
 
@@ -148,12 +147,12 @@ class Equilibrium(_Held):
     def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
         grip = self.grip(motion.time, duration)
         opened = np.isnan(touch.radius)
-        if opened.all() and (self.on_detach != "reattach" or not grip.closes):
+        if opened.all() and (self.after_pull_off != "reattach" or not grip.closes):
             shape = np.broadcast(touch.radius, balance.bonded, balance.fluctuating).shape
             radius = np.full(shape, np.nan)
         else:
             radius = self._equilibrium(grip, balance)
-        if self.on_detach != "reattach" or not grip.closes:
+        if self.after_pull_off != "reattach" or not grip.closes:
             radius = np.where(opened, np.nan, radius)
         return _after(touch, radius, self._left(radius, balance), motion.time, grip, balance, self.reversible)
 
@@ -172,7 +171,7 @@ def _after(
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
-class Lagging(_Held):
+class RateDependent(_Held):
     """The edge of the contact runs with a finite speed: G − w = work (v/v0)ⁿ. Limit: equilibrium as v0 -> infinity.
 
     It opens where the energy release rate G exceeds the work of adhesion w that is left, and heals, with a
@@ -185,7 +184,7 @@ class Lagging(_Held):
     front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
     heal_speed: _Healing | None = None
     heal_exponent: _HealingExponent | None = None
-    model: Literal["lagging"] = "lagging"
+    model: Literal["rate_dependent"] = "rate_dependent"
 
     def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
         before, grip = self.grip(motion.time - motion.duration, duration), self.grip(motion.time, duration)
@@ -199,7 +198,7 @@ class Lagging(_Held):
         opens = ~np.isnan(radius) & np.isnan(moved.radius)
         detached = np.where(opens, motion.time - motion.duration + moved.detached_at, touch.detached)
         left = self._left(moved.radius, balance)
-        counts = isinstance(grip, AtTravel) | (self._held(touch.radius, after, grip, bodies) & ~opens)
+        counts = isinstance(grip, AtDisplacement) | (self._held(touch.radius, after, grip, bodies) & ~opens)
         lost = np.where(counts, moved.dissipated, 0.0)
         return Touch(left, moved.radius, detached, touch.dissipated + lost)
 
@@ -219,7 +218,7 @@ class Lagging(_Held):
 
     def _seeded(self, radius: np.ndarray, grip: Grip, balance: Balance) -> np.ndarray:
         """The radius from which an edge starts: where a free sphere touches again, a spot that heals on."""
-        if self.on_detach != "reattach" or not grip.closes:
+        if self.after_pull_off != "reattach" or not grip.closes:
             return radius
         return np.where(np.isnan(radius), _spot(balance), radius)
 
@@ -234,8 +233,10 @@ def _hold(before: Grip, after: Grip) -> Hold:
     """What presses during a step."""
     if isinstance(before, AtLoad) and isinstance(after, AtLoad):
         return Hold(load_before=before.load, load_after=after.load)
-    assert isinstance(before, AtTravel) and isinstance(after, AtTravel)  # one control holds for the whole run
-    return Hold(travel_before=before.place, travel_after=after.place, stiffness=after.stiffness)
+    assert isinstance(before, AtDisplacement) and isinstance(
+        after, AtDisplacement
+    )  # one control holds for the whole run
+    return Hold(displacement_before=before.place, displacement_after=after.place, stiffness=after.stiffness)
 
 
 def _model(value: Any) -> Any:
@@ -244,5 +245,5 @@ def _model(value: Any) -> Any:
 
 
 Contact = Annotated[
-    Annotated[Equilibrium, Tag("equilibrium")] | Annotated[Lagging, Tag("lagging")], Discriminator(_model)
+    Annotated[Equilibrium, Tag("equilibrium")] | Annotated[RateDependent, Tag("rate_dependent")], Discriminator(_model)
 ]

@@ -25,10 +25,10 @@ class Constant:
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Onset:
-    """A prescribed growth around the onset of stick-slip: g = floor + (1 − floor)/(1 + (V/V0)^(−1/width)).
+    """A prescribed amplitude around the onset of stick-slip: g = floor + (1 − floor)/(1 + (V/V0)^(−1/width)).
 
     A stand-in: it says *that* fluctuations set in near ``speed``, as the paper supposes, not why.
-    With ``relaxing`` only what the memory renews has the new size; otherwise the whole field scales
+    With ``relaxing`` only what the correlation renews has the new size; otherwise the whole field scales
     at once.
     """
 
@@ -62,4 +62,4 @@ class Stress:
         return np.abs(stress) / self.reference
 
 
-Growth = Annotated[Constant | Onset | Stress, Field(discriminator="model")]
+Amplitude = Annotated[Constant | Onset | Stress, Field(discriminator="model")]

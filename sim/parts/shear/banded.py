@@ -8,9 +8,9 @@ import numpy as np
 
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
-from sim.parts.shear.amplitude import Growth
+from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.bands import Bands
-from sim.parts.shear.correlation import Memory
+from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.process import Fluctuation, _Renewing
 
 
@@ -23,13 +23,13 @@ class BandedProcess(_Renewing):
     A band's X is chi-square distributed with k degrees of freedom, k >= 2 and not whole. With
     e = exp(−∫λdt) and c = 1 − e² one step is exact for any dt:
     X' = (√c Z + e √X)² + 2c Γ((k − 1)/2), Z normal and Γ a standard gamma number; ΔΓ = ½ Σ weight X.
-    Where growth relaxes, c is that of the renewed part times its g².
+    Where amplitude relaxes, c is that of the renewed part times its g².
     """
 
     bands: Bands
     cell_errors: dict[str, float]
-    memory: Memory
-    growth: Growth
+    correlation: Correlation
+    amplitude: Amplitude
 
     @property
     def pairs(self) -> int:
@@ -56,18 +56,18 @@ class BandedProcess(_Renewing):
 
     def _renewed(
         self,
-        amplitude: np.ndarray,
+        values: np.ndarray,
         keep: np.ndarray,
         renew: np.ndarray,
         size: np.ndarray,
-        growth: np.ndarray,
+        amplitude: np.ndarray,
         step: int,
         noise: Noise,
     ) -> Fluctuation:
-        members, bands = amplitude.shape
-        after, energy = np.empty_like(amplitude), np.empty(members)
+        members, bands = values.shape
+        after, energy = np.empty_like(values), np.empty(members)
         _renew_bands(
-            amplitude,
+            values,
             noise.normals(step, bands),
             noise.gammas(step, self.shapes),
             np.full(bands, keep),
@@ -77,8 +77,8 @@ class BandedProcess(_Renewing):
             after,
             energy,
         )
-        scale = np.ones(1) if self.growth.relaxing else growth
-        return Fluctuation(scale**2 * energy, growth, after)
+        scale = np.ones(1) if self.amplitude.relaxing else amplitude
+        return Fluctuation(scale**2 * energy, amplitude, after)
 
     def known_errors(self) -> dict[str, float]:
         """What banding adds to the cell's own mode sum, and the cell's own errors beside it."""

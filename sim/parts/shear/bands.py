@@ -37,7 +37,7 @@ class Bands:
     errors : dict
         Relative errors of the third and fourth cumulant and of the integral correlation time, and
         the largest difference of the autocorrelation, each against the sum over all pairs; under
-        growth that relaxes also the largest error of the mean while it does.
+        amplitude that relaxes also the largest error of the mean while it does.
     """
 
     weight: Array
@@ -64,11 +64,11 @@ def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) ->
     pairs : Pairs
         The mode pairs.
     power : int
-        Rates go with \\|q\\|^power: 0 for memories of time and slip, 1 for waves, 2 for diffusion.
+        Rates go with \\|q\\|^power: 0 for correlations of time and slip, 1 for waves, 2 for diffusion.
     tolerance : float
         Bound of every error, between 0 and 1.
     relaxing : bool
-        Whether the growth relaxes, so that the mean energy itself follows the rates: its largest
+        Whether the amplitude relaxes, so that the mean energy itself follows the rates: its largest
         error while it relaxes is then bounded, too.
 
     Returns

@@ -27,7 +27,7 @@ class SiteMean(SmoothProcess):
 class SiteModes(ModalProcess):
     """Every mode of the cell as √(n f̄²) Z + √(n Var f) Y: Z a frozen standard normal, Y one that renews.
 
-    Y keeps e^(−∫λdt) of itself in a step, λ that of ``memory``. The state holds Z and Y, shape
+    Y keeps e^(−∫λdt) of itself in a step, λ that of ``correlation``. The state holds Z and Y, shape
     (members, 4, pairs).
     """
 
@@ -37,14 +37,14 @@ class SiteModes(ModalProcess):
         return self._sized(parts, traction)
 
     def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        exponents, pairs = self.memory.exponents(self.wavenumber, motion), len(self.wavenumber)
+        exponents, pairs = self.correlation.exponents(self.wavenumber, motion), len(self.wavenumber)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
         fresh = noise.normals(motion.step, 2 * pairs).reshape(-1, 2, pairs)
-        parts = np.concatenate([state.amplitude[:, :2], keep * state.amplitude[:, 2:] + renew * fresh], axis=1)
+        parts = np.concatenate([state.values[:, :2], keep * state.values[:, 2:] + renew * fresh], axis=1)
         return self._sized(parts, traction)
 
     def _sized(self, parts: np.ndarray, traction: Traction) -> Fluctuation:
-        """The state of these parts; ``growth`` holds the sizes of both, shape (2, 1) or (2, members)."""
+        """The state of these parts; ``amplitude`` holds the sizes of both, shape (2, 1) or (2, members)."""
         sizes = np.sqrt(np.stack([traction.frozen, traction.varying]))
         sizes[0] *= np.where(traction.stress < 0.0, -1.0, 1.0)
         field = _combined(parts, sizes)
@@ -52,7 +52,7 @@ class SiteModes(ModalProcess):
         return Fluctuation(energy, sizes.T, parts)
 
     def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
-        field = _combined(state.amplitude, state.growth.T)
+        field = _combined(state.values, state.amplitude.T)
         return 0.5 * self.deviation * (field[:, 0] + 1j * field[:, 1])
 
 

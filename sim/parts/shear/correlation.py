@@ -1,7 +1,7 @@
 """How long the shear-stress fluctuations remember, and how large they grow with the speed.
 
-A memory gives each mode the integral of its rate lambda over a step: amplitudes keep the share
-exp(−∫λdt), their energy exp(−2∫λdt). A growth gives the factor g by which the field exceeds the
+A correlation gives each mode the integral of its rate lambda over a step: amplitudes keep the share
+exp(−∫λdt), their energy exp(−2∫λdt). A amplitude gives the factor g by which the field exceeds the
 unit field that the spectrum describes.
 """
 
@@ -22,7 +22,7 @@ class Time:
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
 
-    time: Annotated[float, Quantity("s", "memory time of the fluctuations", "t_m", above=0)]
+    time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
 
     def exponents(self, wavenumber: np.ndarray, motion: Motion) -> np.ndarray:
@@ -37,7 +37,7 @@ class Slip:
     #: The rate goes with |q| to this power.
     power: ClassVar[int] = 0
 
-    length: Annotated[float, Quantity("m", "memory length of the fluctuations", "l", above=0)]
+    length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
 
     def exponents(self, wavenumber: np.ndarray, motion: Motion) -> np.ndarray:
@@ -72,4 +72,4 @@ class Diffusion:
         return wavenumber**2 * (self.diffusivity * motion.duration)
 
 
-Memory = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]
+Correlation = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]

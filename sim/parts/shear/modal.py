@@ -9,8 +9,8 @@ from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Motion, Traction
-from sim.parts.shear.amplitude import Growth
-from sim.parts.shear.correlation import Memory
+from sim.parts.shear.amplitude import Amplitude
+from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modes import Modes
 from sim.parts.shear.process import Fluctuation, _Renewing
 
@@ -33,8 +33,8 @@ class ModalProcess(_Renewing):
     poisson_ratio: float
     infinite_energy: float
     infinite_variance: float
-    memory: Memory
-    growth: Growth
+    correlation: Correlation
+    amplitude: Amplitude
 
     @property
     def pairs(self) -> int:
@@ -61,18 +61,18 @@ class ModalProcess(_Renewing):
 
     def _renewed(
         self,
-        amplitude: np.ndarray,
+        values: np.ndarray,
         keep: np.ndarray,
         renew: np.ndarray,
         size: np.ndarray,
-        growth: np.ndarray,
+        amplitude: np.ndarray,
         step: int,
         noise: Noise,
     ) -> Fluctuation:
-        members, _, pairs = amplitude.shape
-        after, energy = np.empty_like(amplitude), np.empty(members)
+        members, _, pairs = values.shape
+        after, energy = np.empty_like(values), np.empty(members)
         _renew(
-            amplitude,
+            values,
             noise.normals(step, 2 * pairs),
             np.full(pairs, keep),
             np.full(pairs, renew),
@@ -81,17 +81,17 @@ class ModalProcess(_Renewing):
             after,
             energy,
         )
-        scale = np.ones(1) if self.growth.relaxing else growth
-        return Fluctuation(scale**2 * energy, growth, after)
+        scale = np.ones(1) if self.amplitude.relaxing else amplitude
+        return Fluctuation(scale**2 * energy, amplitude, after)
 
     def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
         """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
-        scale = np.ones(1) if self.growth.relaxing else state.growth
+        scale = np.ones(1) if self.amplitude.relaxing else state.amplitude
         size = 0.5 * scale[:, np.newaxis] * self.deviation
-        amplitude = np.empty((len(state.amplitude), self.pairs), dtype=complex)
-        np.multiply(state.amplitude[:, 0], size, out=amplitude.real)
-        np.multiply(state.amplitude[:, 1], size, out=amplitude.imag)
-        return amplitude
+        values = np.empty((len(state.values), self.pairs), dtype=complex)
+        np.multiply(state.values[:, 0], size, out=values.real)
+        np.multiply(state.values[:, 1], size, out=values.imag)
+        return values
 
     def known_errors(self) -> dict[str, float]:
         """The cell's own errors against the infinite plane, and the spreads of one realisation."""
@@ -107,22 +107,22 @@ class FixedProcess(ModalProcess):
     """Modes that keep their modulus and diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
 
     def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
+        amplitude = self.amplitude.factor(motion.speed, traction.stress)
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
-        return Fluctuation(self._energy(growth), growth, phases)
+        return Fluctuation(self._energy(amplitude), amplitude, phases)
 
     def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
-        turn = np.sqrt(2.0 * self.memory.exponents(self.wavenumber, motion))
-        phases = state.amplitude + turn * noise.normals(motion.step, len(self.wavenumber))
-        return Fluctuation(self._energy(growth), growth, phases)
+        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+        turn = np.sqrt(2.0 * self.correlation.exponents(self.wavenumber, motion))
+        phases = state.values + turn * noise.normals(motion.step, len(self.wavenumber))
+        return Fluctuation(self._energy(amplitude), amplitude, phases)
 
-    def _energy(self, growth: np.ndarray) -> np.ndarray:
-        return growth**2 * (2.0 * np.sum(self.weights))
+    def _energy(self, amplitude: np.ndarray) -> np.ndarray:
+        return amplitude**2 * (2.0 * np.sum(self.weights))
 
     def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
-        size = np.sqrt(0.5) * state.growth[:, np.newaxis] * self.deviation
-        return size * np.exp(1j * state.amplitude)
+        size = np.sqrt(0.5) * state.amplitude[:, np.newaxis] * self.deviation
+        return size * np.exp(1j * state.values)
 
     def known_errors(self) -> dict[str, float]:
         fixed = {"realization_spread_variance": 0.0, "realization_spread_energy": 0.0}
@@ -175,9 +175,9 @@ class DrawsMaps:
         The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
         e^{iq(x − X)}.
         """
-        first = replace(state, amplitude=state.amplitude[:members])
-        if len(state.growth) > 1:
-            first = replace(first, growth=state.growth[:members])
+        first = replace(state, values=state.values[:members])
+        if len(state.amplitude) > 1:
+            first = replace(first, amplitude=state.amplitude[:members])
         lattice = np.arange(-self.grid.points, self.grid.points + 1)
         turns = np.exp(-2j * np.pi / self.grid.cell * position[:members, np.newaxis] * lattice) * self.grid.cell**2
         amplitudes = self.complex_amplitudes(first)  # type: ignore[attr-defined]

@@ -13,11 +13,11 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.parts.shear.amplitude import Constant, Growth
+from sim.parts.shear.amplitude import Amplitude, Constant
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.bands import Bands, group
 from sim.parts.shear.bond_field import MappedSiteModes, SiteMean, SiteModes
-from sim.parts.shear.correlation import Memory
+from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modal import FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess
 from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.modes import cell_variance, modes
@@ -57,10 +57,10 @@ def _bonds_set_the_size(part: Any) -> None:
     """Refuse what a field that bonds make cannot follow."""
     if not isinstance(part.spectrum, BondMade):
         return
-    if not isinstance(part.growth, Constant):
-        raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave growth out")
-    if getattr(part, "amplitudes", "gaussian") == "fixed":
-        raise PydanticCustomError("bond_made", 'bonds at random places make amplitudes = "gaussian"; leave it out')
+    if not isinstance(part.amplitude, Constant):
+        raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
+    if getattr(part, "mode_amplitudes", "gaussian") == "fixed":
+        raise PydanticCustomError("bond_made", 'bonds at random places make mode_amplitudes = "gaussian"; leave it out')
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -71,7 +71,7 @@ class Mean:
     draws_maps: ClassVar[bool] = False
 
     spectrum: Spectrum
-    growth: Growth = Field(default_factory=Constant)
+    amplitude: Amplitude = Field(default_factory=Constant)
     paid_by_adhesion: _Paid = 1.0
     contact: _Contact = "plane"
     model: Literal["mean"] = "mean"
@@ -79,26 +79,26 @@ class Mean:
     @property
     def reads_stress(self) -> bool:
         """Whether the size of the field follows the bonds."""
-        return self.growth.reads_stress or isinstance(self.spectrum, BondMade)
+        return self.amplitude.reads_stress or isinstance(self.spectrum, BondMade)
 
     @model_validator(mode="after")
     def _no_memory(self) -> "Mean":
-        if self.growth.relaxing:
+        if self.amplitude.relaxing:
             raise PydanticCustomError(
                 "mean_has_no_memory",
-                'growth that relaxes needs a memory, which "mean" has not; use model = "modal"',
+                'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"',
             )
         _bonds_set_the_size(self)
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         kind = SiteMean if isinstance(self.spectrum, BondMade) else SmoothProcess
-        return kind(float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))), self.growth)
+        return kind(float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))), self.amplitude)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class _Fluctuating:
-    """What every depth with a periodic cell and a memory is given.
+    """What every depth with a periodic cell and a correlation is given.
 
     ``cell`` None means √π times the radius at rest, the square of the contact's area; ``points``
     None means the grid that holds the spectrum's shortest wavelength.
@@ -107,30 +107,30 @@ class _Fluctuating:
     draws_maps: ClassVar[bool] = False
 
     spectrum: Spectrum
-    memory: Memory
-    growth: Growth = Field(default_factory=Constant)
+    correlation: Correlation
+    amplitude: Amplitude = Field(default_factory=Constant)
     cell: _Cell | None = None
     points: _Points | None = None
-    amplitudes: Literal["gaussian", "fixed"] = "gaussian"
+    mode_amplitudes: Literal["gaussian", "fixed"] = "gaussian"
     paid_by_adhesion: _Paid = 1.0
     contact: _Contact = "plane"
 
     @property
     def per_member(self) -> bool:
-        """Whether ΔΓ differs between members: with fixed amplitudes it does not."""
-        return self.amplitudes == "gaussian"
+        """Whether ΔΓ differs between members: with fixed mode_amplitudes it does not."""
+        return self.mode_amplitudes == "gaussian"
 
     @property
     def reads_stress(self) -> bool:
         """Whether the size of the field follows the bonds."""
-        return self.growth.reads_stress or isinstance(self.spectrum, BondMade)
+        return self.amplitude.reads_stress or isinstance(self.spectrum, BondMade)
 
     @model_validator(mode="after")
     def _fixed_cannot_relax(self) -> "_Fluctuating":
-        if self.amplitudes == "fixed" and self.growth.relaxing:
+        if self.mode_amplitudes == "fixed" and self.amplitude.relaxing:
             raise PydanticCustomError(
                 "fixed_cannot_relax",
-                'fixed amplitudes are never renewed; use amplitudes = "gaussian" or relaxing = false',
+                'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false',
             )
         _bonds_set_the_size(self)
         return self
@@ -148,15 +148,15 @@ class Modal(_Fluctuating):
 
     def _process(self, gaussian: Any, fixed: Any, shear_modulus: float, poisson_ratio: float, cell: float) -> Any:
         side = cell if self.cell is None else self.cell
-        kind = fixed if self.amplitudes == "fixed" else gaussian
+        kind = fixed if self.mode_amplitudes == "fixed" else gaussian
         return kind(
             modes(self.spectrum, side, self.points),
             shear_modulus,
             poisson_ratio,
             float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))),
             float(self.spectrum.variance),
-            self.memory,
-            self.growth,
+            self.correlation,
+            self.amplitude,
         )
 
 
@@ -188,7 +188,7 @@ class Banded(_Fluctuating):
 
     ``tolerance`` bounds what banding adds to the cell's own sum over modes: relative errors of the
     third and fourth cumulant and of the integral correlation time, and the largest difference of the
-    autocorrelation; under growth that relaxes also the error of the mean while it does. Mean and
+    autocorrelation; under amplitude that relaxes also the error of the mean while it does. Mean and
     variance of the stationary field are exact.
     """
 
@@ -211,14 +211,14 @@ class Banded(_Fluctuating):
             self.points,
             shear_modulus,
             poisson_ratio,
-            self.memory.power,
+            self.correlation.power,
             self.tolerance,
-            self.growth.relaxing,
+            self.amplitude.relaxing,
         )
         bands, errors = _grouped(recipe)
-        if self.amplitudes == "fixed":
-            return SmoothProcess(bands.mean, self.growth)
-        return BandedProcess(bands, errors, self.memory, self.growth)
+        if self.mode_amplitudes == "fixed":
+            return SmoothProcess(bands.mean, self.amplitude)
+        return BandedProcess(bands, errors, self.correlation, self.amplitude)
 
 
 class _BandRecipe(NamedTuple):
@@ -258,11 +258,11 @@ class Auto:
     """The shallowest depth that gives what the scene records; it takes the keys of all of them."""
 
     spectrum: Spectrum
-    memory: Memory | None = None
-    growth: Growth = Field(default_factory=Constant)
+    correlation: Correlation | None = None
+    amplitude: Amplitude = Field(default_factory=Constant)
     cell: _Cell | None = None
     points: _Points | None = None
-    amplitudes: Literal["gaussian", "fixed"] = "gaussian"
+    mode_amplitudes: Literal["gaussian", "fixed"] = "gaussian"
     tolerance: _Tolerance = 0.01
     paid_by_adhesion: _Paid = 1.0
     contact: _Contact = "plane"
@@ -274,35 +274,40 @@ class Auto:
         Raises
         ------
         PydanticCustomError
-            If maps are recorded and no memory is given.
+            If maps are recorded and no correlation is given.
         """
         common: dict[str, Any] = {
             "spectrum": self.spectrum,
-            "growth": self.growth,
+            "amplitude": self.amplitude,
             "paid_by_adhesion": self.paid_by_adhesion,
             "contact": self.contact,
         }
-        if self.memory is None and maps:
-            raise PydanticCustomError("maps_need_memory", "maps change in time: give shear.memory")
-        if self.memory is None:
+        if self.correlation is None and maps:
+            raise PydanticCustomError("maps_need_memory", "maps change in time: give shear.correlation")
+        if self.correlation is None:
             return Mean(**common)
-        common |= {"memory": self.memory, "cell": self.cell, "points": self.points, "amplitudes": self.amplitudes}
+        common |= {
+            "correlation": self.correlation,
+            "cell": self.cell,
+            "points": self.points,
+            "mode_amplitudes": self.mode_amplitudes,
+        }
         if maps or isinstance(self.spectrum, BondMade):
             return Mapped(**common) if maps else Modal(**common)
         return Banded(**common, tolerance=self.tolerance)
 
     def why(self, maps: bool) -> str:
         """The reason for the choice, in words."""
-        if self.memory is None:
-            return "no memory is given, so the ensemble mean answers, exactly and without noise"
+        if self.correlation is None:
+            return "no correlation is given, so the ensemble mean answers, exactly and without noise"
         if maps:
             return "maps are recorded"
         if isinstance(self.spectrum, BondMade):
             return "the field that bonds make has a frozen part, so each mode is followed"
-        return "a memory is given and no maps are recorded: energies in time are all the contact feels"
+        return "a correlation is given and no maps are recorded: energies in time are all the contact feels"
 
 
 #: A depth, chosen.
-Depth = Uniform | Mean | Banded | Modal | Mapped
+Model = Uniform | Mean | Banded | Modal | Mapped
 
 Shear = Annotated[Uniform | Mean | Banded | Modal | Mapped | Auto, Field(discriminator="model")]

@@ -10,8 +10,8 @@ import numpy as np
 
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Motion, Traction
-from sim.parts.shear.amplitude import Growth
-from sim.parts.shear.correlation import Memory
+from sim.parts.shear.amplitude import Amplitude
+from sim.parts.shear.correlation import Correlation
 
 
 @dataclass(frozen=True)
@@ -22,16 +22,16 @@ class Fluctuation:
     ----------
     energy : array, shape (1,) or (members,)
         Elastic energy per area ΔΓ [J/m^2].
-    growth : array, shape (1,) or (members,)
-        Growth factor g [1] at this time.
-    amplitude : array
+    amplitude : array, shape (1,) or (members,)
+        Amplitude factor g [1] at this time.
+    values : array
         Own numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
         standard deviation, or phases (members, pairs) [rad]; empty where there are none.
     """
 
     energy: np.ndarray
-    growth: np.ndarray
     amplitude: np.ndarray
+    values: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class SmoothProcess:
     """ΔΓ = g² × a given energy, without noise: the ensemble mean, or nothing at all."""
 
     energy: float
-    growth: Growth
+    amplitude: Amplitude
     pairs: ClassVar[int] = 0
 
     def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
-        return Fluctuation(growth**2 * self.energy, growth, np.empty(0))
+        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+        return Fluctuation(amplitude**2 * self.energy, amplitude, np.empty(0))
 
     def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
         return self.start(motion, traction, noise)
@@ -57,32 +57,34 @@ class SmoothProcess:
 class _Renewing:
     """What processes share that renew part of themselves at each step: the start is a whole renewal."""
 
-    memory: Memory
-    growth: Growth
+    correlation: Correlation
+    amplitude: Amplitude
     wavenumber: Any
     _empty: Any
     _renewed: Any
 
     def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
-        size = growth if self.growth.relaxing else np.ones(1)
-        return self._renewed(self._empty(len(noise.members)), np.zeros(1), np.ones(1), size, growth, motion.step, noise)
+        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+        size = amplitude if self.amplitude.relaxing else np.ones(1)
+        return self._renewed(
+            self._empty(len(noise.members)), np.zeros(1), np.ones(1), size, amplitude, motion.step, noise
+        )
 
     def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        growth = self.growth.factor(motion.speed, traction.stress)
-        size = _renewed_size(self.growth, state, motion, growth)
-        exponents = self.memory.exponents(self.wavenumber, motion)
+        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+        size = _renewed_size(self.amplitude, state, motion, amplitude)
+        exponents = self.correlation.exponents(self.wavenumber, motion)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-        return self._renewed(state.amplitude, keep, renew, size, growth, motion.step, noise)
+        return self._renewed(state.values, keep, renew, size, amplitude, motion.step, noise)
 
 
-def _renewed_size(law: Growth, state: Fluctuation, motion: Motion, growth: np.ndarray) -> np.ndarray:
-    """Growth of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
+def _renewed_size(law: Amplitude, state: Fluctuation, motion: Motion, amplitude: np.ndarray) -> np.ndarray:
+    """Amplitude of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
 
     Second order in the step. Its beginning is seen after a jump of the speed; stress has no jumps
     but under bonds that follow the speed at once.
     """
     if not law.relaxing:
         return np.ones(1)
-    before = state.growth if law.reads_stress else law.factor(motion.first, np.zeros(1))
-    return np.sqrt(0.5 * (growth**2 + before**2))
+    before = state.amplitude if law.reads_stress else law.factor(motion.first, np.zeros(1))
+    return np.sqrt(0.5 * (amplitude**2 + before**2))

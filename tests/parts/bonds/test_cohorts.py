@@ -12,10 +12,10 @@ from scipy.integrate import quad
 from scipy.special import lambertw
 
 from sim.parts.bonds.cohorts import advance, bound, diluted, empty, first_moment, resting, second_moment, steady
-from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.rupture import RuptureRate
 
-BELL = Hazard(rate=1.0, softness=1.0, limit=math.inf)
-CONSTANT = Hazard(rate=1.0, softness=0.0, limit=math.inf)
+BELL = RuptureRate(rate=1.0, softness=1.0, limit=math.inf)
+CONSTANT = RuptureRate(rate=1.0, softness=0.0, limit=math.inf)
 
 # beta = k_on/k0, eps = speed × softness/k0: bound share, mean force, mean square force per site in Bell forces
 TABLE = [
@@ -37,11 +37,11 @@ def moments(cohorts):
     return np.array([bound(cohorts)[0], first_moment(cohorts)[0], second_moment(cohorts)[0]])
 
 
-def march(cohorts, speeds, duration, hazard, rebinding, tolerance, **more):
+def march(cohorts, speeds, duration, rupture, rebinding, tolerance, **more):
     """Moments after each step of these speeds, shape (steps, 3), and the last state."""
     out = []
     for speed in speeds:
-        cohorts = advance(cohorts, np.array([speed * duration]), duration, hazard, rebinding, tolerance, **more)
+        cohorts = advance(cohorts, np.array([speed * duration]), duration, rupture, rebinding, tolerance, **more)
         out.append(moments(cohorts))
     return np.array(out), cohorts
 
@@ -167,7 +167,7 @@ def test_births_of_bell_bonds_are_third_order_in_the_step():
 
 
 def constant_exact(beta, speed, time):
-    """Moments 0 to 2 of bonds of constant hazard 1 at ``time`` after a start from rest."""
+    """Moments 0 to 2 of bonds of constant rupture 1 at ``time`` after a start from rest."""
     rest = beta / (1.0 + beta)
     decay = math.exp(-time)
     one = rest * speed * -math.expm1(-time)
@@ -187,7 +187,7 @@ def test_births_are_third_order_down_to_1e_9_where_merging_is_exact():
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-7])
-def test_constant_hazard_follows_the_exact_moments(tolerance):
+def test_constant_rupture_follows_the_exact_moments(tolerance):
     # a step h errs by h^3/72 of the moments, h = (7 tolerance)^(1/3): a tenth of the tolerance
     start = resting(CONSTANT, 2.0, tolerance)
     out, last = march(start, [0.7] * 20, 0.25, CONSTANT, 2.0, tolerance)
@@ -209,20 +209,20 @@ def cut_off_exact(u, m):
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
 def test_cut_off_bonds_slide_by_their_closed_form(tolerance):
-    hazard = Hazard(rate=1.0, softness=0.0, limit=1.0)
+    rupture = RuptureRate(rate=1.0, softness=0.0, limit=1.0)
     for u in (0.1, 0.730401, 5.0, 1e3):
         for m in (0.1, 1.0, 10.0):
-            start = steady(hazard, 1.0 / m, u, tolerance)
+            start = steady(rupture, 1.0 / m, u, tolerance)
             assert_allclose(moments(start), cut_off_exact(u, m), rtol=1e-9, atol=0)
-            out, _ = march(start, [u] * 50, 0.11 * min(1.0, 1.0 / u), hazard, 1.0 / m, tolerance)
+            out, _ = march(start, [u] * 50, 0.11 * min(1.0, 1.0 / u), rupture, 1.0 / m, tolerance)
             assert_allclose(out, np.tile(cut_off_exact(u, m), (50, 1)), rtol=tolerance, atol=0)
     assert_allclose(cut_off_exact(0.730401, 1.0)[1], 0.166299, rtol=5e-6, atol=0)
 
 
 def test_bonds_that_break_only_by_stretch_all_break_at_once():
-    hazard = Hazard(rate=0.0, softness=0.0, limit=1.0)
-    start = resting(hazard, 2.0, 1e-4)
-    out, _ = march(start, [1.0] * 30, 0.07, hazard, 2.0, 1e-4)
+    rupture = RuptureRate(rate=0.0, softness=0.0, limit=1.0)
+    start = resting(rupture, 2.0, 1e-4)
+    out, _ = march(start, [1.0] * 30, 0.07, rupture, 2.0, 1e-4)
     time = 0.07 * np.arange(1, 31)
     assert_allclose(out[time < 1.0, :2], np.stack([np.ones(14), time[:14]], 1), rtol=1e-12, atol=0)
     after = time[(time > 1.0)] - 1.0
@@ -288,15 +288,15 @@ def test_dilution_frees_sites_that_bind_anew():
 )
 def test_any_rates_and_slips_give_shares_between_zero_and_one(exponents, kind, steps):
     rate, rebinding, slip = (10.0**e for e in exponents)
-    hazard = {
-        "bell": Hazard(rate, 1.0, math.inf),
-        "constant": Hazard(rate, 0.0, math.inf),
-        "cut off": Hazard(rate, 0.0, 1.0),
-        "only cut off": Hazard(0.0, 0.0, 1.0),
+    rupture = {
+        "bell": RuptureRate(rate, 1.0, math.inf),
+        "constant": RuptureRate(rate, 0.0, math.inf),
+        "cut off": RuptureRate(rate, 0.0, 1.0),
+        "only cut off": RuptureRate(0.0, 0.0, 1.0),
     }[kind]
-    state = steady(hazard, rebinding, -slip, 1e-2)
+    state = steady(rupture, rebinding, -slip, 1e-2)
     for factor in steps:
-        state = advance(state, np.array([factor * slip]), 1.0, hazard, rebinding, 1e-2)
+        state = advance(state, np.array([factor * slip]), 1.0, rupture, rebinding, 1e-2)
         assert np.all(state.weight >= 0.0)
         assert np.all(np.isfinite(state.stretch))
         assert np.all(state.width >= 0.0)
@@ -306,8 +306,8 @@ def test_any_rates_and_slips_give_shares_between_zero_and_one(exponents, kind, s
 @pytest.mark.parametrize("fast", [1e-9, 1e9])
 @pytest.mark.parametrize("bind", [1e-9, 1e9])
 def test_steps_of_extreme_length_have_their_limits(fast, bind):
-    hazard = Hazard(fast, 1.0, math.inf)
-    found = bound(advance(empty(hazard, 1e-4), np.array([1.0]), 1.0, hazard, bind, 1e-4))[0]
+    rupture = RuptureRate(fast, 1.0, math.inf)
+    found = bound(advance(empty(rupture, 1e-4), np.array([1.0]), 1.0, rupture, bind, 1e-4))[0]
     grown = -math.expm1(-bind) if fast < 1.0 else bind / (bind + fast)
     assert_allclose(found, grown, rtol=1e-4, atol=0)
 
@@ -351,8 +351,8 @@ def test_a_row_is_the_same_bit_for_bit_alone_or_in_a_batch():
 
 
 def test_merging_keeps_four_moments():
-    # without hazard to speak of nothing breaks; every birth is where it was made but for merging
-    slow = Hazard(1e-12, 1.0, math.inf)
+    # without rupture to speak of nothing breaks; every birth is where it was made but for merging
+    slow = RuptureRate(1e-12, 1.0, math.inf)
     state = empty(slow, 1e-2)
     for _ in range(300):
         state = advance(state, np.array([0.01]), 0.01, slow, 1e-3, 1e-2)
@@ -367,7 +367,7 @@ def test_merging_keeps_four_moments():
 
 def test_what_is_not_built_is_refused():
     with pytest.raises(ValueError, match="leave out one"):
-        empty(Hazard(1.0, 1.0, 1.0), 1e-3)
+        empty(RuptureRate(1.0, 1.0, 1.0), 1e-3)
     with pytest.raises(ValueError, match="out of range"):
         resting(BELL, 1.0, 0.5)
     with pytest.raises(ValueError, match="do not fit"):

@@ -10,34 +10,34 @@ from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
 from sim.parts.bonds.first_moment import LOCAL_ERROR, _rosenbrock, advance, resting, steady
-from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.rupture import RuptureRate
 
-BELL = Hazard(1.0, 1.0, math.inf)
+BELL = RuptureRate(1.0, 1.0, math.inf)
 ULP = 2.0**-52
 # an error of a stretch comes back in ln N multiplied by the fall of ln N, thirty at most here, and the errors of
 # three sub-steps at a time are in memory
 TRANSIENT = 100.0 * LOCAL_ERROR
 
 
-def slide(state, speed, duration, hazard, rebinding, pieces=1):
+def slide(state, speed, duration, rupture, rebinding, pieces=1):
     """Population after a time at constant speed, in equal steps."""
     part = duration / pieces
     for _ in range(pieces):
-        state = advance(*state, speed * part, np.abs(speed) * part, part, hazard, rebinding)
+        state = advance(*state, speed * part, np.abs(speed) * part, part, rupture, rebinding)
     return state
 
 
 # --- linear: constant rate and cut-off
 
 
-def exact_linear(bound, moment, slip, binding, breaking, travel):
+def exact_linear(bound, moment, slip, binding, breaking, displacement):
     """The matrix exponential of d(N, M, 1)/dt over a step as the unit of time, with 60 digits."""
     with mpmath.workdps(60):
-        binding, breaking, travel = mpmath.mpf(binding), mpmath.mpf(breaking), mpmath.mpf(travel)
+        binding, breaking, displacement = mpmath.mpf(binding), mpmath.mpf(breaking), mpmath.mpf(displacement)
         matrix = mpmath.matrix(
             [
-                [-(binding + breaking + travel), 0, binding],
-                [mpmath.mpf(slip), -(breaking + 2 * travel), 0],
+                [-(binding + breaking + displacement), 0, binding],
+                [mpmath.mpf(slip), -(breaking + 2 * displacement), 0],
                 [0, 0, 0],
             ]
         )
@@ -46,22 +46,22 @@ def exact_linear(bound, moment, slip, binding, breaking, travel):
 
 
 LINEAR = [
-    (rate, rebinding, travel)
+    (rate, rebinding, displacement)
     for rate in (0.0, 1e-9, 1e-3, 30.0, 1e9)
     for rebinding in (0.0, 1e-9, 1e-3, 0.02, 0.7, 1e9)
-    for travel in (0.0, 1e-9, 0.7, 1e9)
+    for displacement in (0.0, 1e-9, 0.7, 1e9)
 ]
 
 
 @pytest.mark.parametrize("start", [(0.0, 0.0), (0.6, 0.3), (1.0, 0.0), (1e-12, 1e-13)])
 def test_a_linear_step_is_the_matrix_exponential(start):
-    for rate, rebinding, travel in LINEAR:
+    for rate, rebinding, displacement in LINEAR:
         slip = 0.37
-        limit = slip / travel if travel else math.inf
-        found = advance(*start, slip, slip, 1.0, Hazard(rate, 0.0, limit), rebinding)
+        limit = slip / displacement if displacement else math.inf
+        found = advance(*start, slip, slip, 1.0, RuptureRate(rate, 0.0, limit), rebinding)
         exact = exact_linear(*start, slip, rebinding, rate, slip / limit)
         # an exponential of x knows x to one rounding of each term; more than 745 leaves nothing of it
-        exponent = min(745.0, rebinding + rate + 2.0 * travel)
+        exponent = min(745.0, rebinding + rate + 2.0 * displacement)
         for value, truth in zip(found, exact, strict=True):
             if truth > 1e-290 or truth == 0.0:
                 assert_allclose(value[0], truth, rtol=ULP * (16.0 + 2.0 * exponent), atol=0)
@@ -72,48 +72,48 @@ def test_a_linear_step_is_the_matrix_exponential(start):
 @pytest.mark.parametrize("limit", [math.inf, 2e-9])
 @pytest.mark.parametrize("duration", [1e-9, 1e-4, 0.5, 7.0, 90.0])
 def test_seven_linear_steps_are_one(limit, duration):
-    hazard, speed = Hazard(2.0, 0.0, limit), np.array([0.0, 1e-12, 1e-9, 3e-8, 1e-6])
+    rupture, speed = RuptureRate(2.0, 0.0, limit), np.array([0.0, 1e-12, 1e-9, 3e-8, 1e-6])
     start = np.full(5, 0.3), np.full(5, 4e-10)
-    once = slide(start, speed, duration, hazard, 5.0)
-    often = slide(start, speed, duration, hazard, 5.0, pieces=7)
+    once = slide(start, speed, duration, rupture, 5.0)
+    often = slide(start, speed, duration, rupture, 5.0, pieces=7)
     assert_allclose(often, once, rtol=1e-12, atol=0)
 
 
 def test_a_linear_step_is_even_in_speed_but_for_the_sign_of_the_stretch():
-    hazard = Hazard(2.0, 0.0, 3e-9)
-    bound, moment = advance(0.3, 4e-10, 5e-9, 5e-9, 0.1, hazard, 5.0)
-    other, back = advance(0.3, -4e-10, -5e-9, 5e-9, 0.1, hazard, 5.0)
+    rupture = RuptureRate(2.0, 0.0, 3e-9)
+    bound, moment = advance(0.3, 4e-10, 5e-9, 5e-9, 0.1, rupture, 5.0)
+    other, back = advance(0.3, -4e-10, -5e-9, 5e-9, 0.1, rupture, 5.0)
     assert other == bound
     assert back == -moment
 
 
 def test_no_more_than_all_sites_are_bound():
     for exponent in np.linspace(0.01, 40.0, 3000):
-        assert advance(1.0, 0.0, 0.1, 0.1, 1.0, Hazard(0.0, 0.0, math.inf), exponent)[0] <= 1.0
+        assert advance(1.0, 0.0, 0.1, 0.1, 1.0, RuptureRate(0.0, 0.0, math.inf), exponent)[0] <= 1.0
 
 
 def test_path_that_leads_back_breaks_bonds_of_a_cut_off_but_stretches_none():
-    bound, moment = advance(1.0, 1e-9, 0.0, 4e-9, 0.0, Hazard(0.0, 0.0, 2e-9), 5.0)
+    bound, moment = advance(1.0, 1e-9, 0.0, 4e-9, 0.0, RuptureRate(0.0, 0.0, 2e-9), 5.0)
     assert_allclose([bound[0], moment[0]], [math.exp(-2.0), 1e-9 * math.exp(-4.0)], rtol=4 * ULP, atol=0)
 
 
 def test_steady_stress_of_a_cut_off_is_that_of_its_renewal():
     # each bond lives l/V and carries l/2 on average, each free site waits 1/k_on
     limit, rebinding, speed = 2e-9, 50.0, np.array([1e-15, 1e-9, 1e-7, 1e-5])
-    bound, moment = steady(speed, Hazard(0.0, 0.0, limit), rebinding)
+    bound, moment = steady(speed, RuptureRate(0.0, 0.0, limit), rebinding)
     share = (limit / speed) / (limit / speed + 1.0 / rebinding)
     assert_allclose(bound, share, rtol=4 * ULP, atol=0)
     assert_allclose(moment, 0.5 * limit * share, rtol=4 * ULP, atol=0)
 
 
 def test_friction_of_a_cut_off_does_not_end_at_rest():
-    hazard, speed = Hazard(0.0, 0.0, 2e-9), 1e-7
-    state = slide(resting(hazard, 50.0), speed, 1.0, hazard, 50.0)
-    held = slide(state, 0.0, 1e6, hazard, 50.0)
+    rupture, speed = RuptureRate(0.0, 0.0, 2e-9), 1e-7
+    state = slide(resting(rupture, 50.0), speed, 1.0, rupture, 50.0)
+    held = slide(state, 0.0, 1e6, rupture, 50.0)
     assert_array_equal(held[1], state[1])
     assert_allclose(held[0], 1.0, rtol=ULP, atol=0)
-    assert_allclose(slide(held, -1e-15, 1e9, hazard, 50.0)[1], -1e-9, rtol=1e-7, atol=0)
-    assert steady(0.0, hazard, 50.0)[1] == 0.0
+    assert_allclose(slide(held, -1e-15, 1e9, rupture, 50.0)[1], -1e-9, rtol=1e-7, atol=0)
+    assert steady(0.0, rupture, 50.0)[1] == 0.0
 
 
 # --- Bell: steady states
@@ -137,7 +137,7 @@ MEAN_FIELD = [
 @pytest.mark.parametrize(("eps", "beta", "bound", "moment"), MEAN_FIELD)
 def test_steady_sliding_under_bell_s_rate_is_lambert_s_w(eps, beta, bound, moment):
     rate, softness = 3.0, 2e9
-    found = steady(eps * rate / softness, Hazard(rate, softness, math.inf), beta * rate)
+    found = steady(eps * rate / softness, RuptureRate(rate, softness, math.inf), beta * rate)
     assert_allclose([found[0][0], softness * found[1][0]], [bound, moment], rtol=1e-13, atol=0)
 
 
@@ -192,9 +192,9 @@ def test_the_largest_mean_field_friction(beta, largest, eps):
 
 
 def test_no_bonds_without_rebinding():
-    for hazard in (BELL, Hazard(1.0, 0.0, math.inf), Hazard(0.0, 0.0, 1.0)):
-        assert_array_equal(steady([0.0, 1.0, -2.0], hazard, 0.0), np.zeros((2, 3)))
-        assert_array_equal(slide((np.zeros(1), np.zeros(1)), 2.0, 5.0, hazard, 0.0), np.zeros((2, 1)))
+    for rupture in (BELL, RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.0, 0.0, 1.0)):
+        assert_array_equal(steady([0.0, 1.0, -2.0], rupture, 0.0), np.zeros((2, 3)))
+        assert_array_equal(slide((np.zeros(1), np.zeros(1)), 2.0, 5.0, rupture, 0.0), np.zeros((2, 1)))
 
 
 # --- Bell: transients
@@ -319,16 +319,16 @@ def test_a_reversal_is_seen_at_its_time_by_small_steps_and_by_large_ones():
 
 def test_bell_s_rate_with_little_softness_is_the_constant_rate():
     first, speed = (np.full(1, 0.2), np.full(1, -0.3)), 2.0
-    constant = slide(first, speed, 1.5, Hazard(1.0, 0.0, math.inf), 0.7)
+    constant = slide(first, speed, 1.5, RuptureRate(1.0, 0.0, math.inf), 0.7)
     distance = []
     for softness in (1e-4, 1e-5, 1e-7):
-        soft = slide(first, speed, 1.5, Hazard(1.0, softness, math.inf), 0.7)
+        soft = slide(first, speed, 1.5, RuptureRate(1.0, softness, math.inf), 0.7)
         distance.append((np.array(soft) / constant - 1.0)[:, 0])
     # of first order: a term of 1e-4 is next, and a few LOCAL_ERROR of 1e-7 come in
     assert_allclose(distance[1] / distance[0], 0.1, rtol=1e-3, atol=0)
     assert_allclose(distance[2] / distance[0], 1e-3, rtol=0.05, atol=0)
     for softness in (1e-14, 1e-300):
-        near = slide(first, speed, 1.5, Hazard(1.0, softness, math.inf), 0.7)
+        near = slide(first, speed, 1.5, RuptureRate(1.0, softness, math.inf), 0.7)
         assert_allclose(near, constant, rtol=1e-13, atol=0)
 
 
@@ -398,11 +398,11 @@ def test_a_row_alone_is_the_row_in_a_batch():
     bound, moment = random.uniform(0, 1, 40), random.normal(0, 0.3, 40)
     slip = 10.0 ** random.uniform(-12, 4, 40) * random.choice([-1, 1], 40)
     bound[:3], moment[:3] = 0.0, 0.0
-    for hazard in (BELL, Hazard(1.0, 0.0, math.inf), Hazard(0.5, 0.0, 0.1)):
-        batch = advance(bound, moment, slip, np.abs(slip), 0.3, hazard, 2.0)
+    for rupture in (BELL, RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.5, 0.0, 0.1)):
+        batch = advance(bound, moment, slip, np.abs(slip), 0.3, rupture, 2.0)
         for i in range(40):
             row = slice(i, i + 1)
-            alone = advance(bound[row], moment[row], slip[row], np.abs(slip[row]), 0.3, hazard, 2.0)
+            alone = advance(bound[row], moment[row], slip[row], np.abs(slip[row]), 0.3, rupture, 2.0)
             assert_array_equal(alone, np.array(batch)[:, row])
 
 
@@ -425,7 +425,7 @@ def test_what_has_no_answer_is_nan_and_does_not_hang():
 
 
 def test_softness_and_a_limit_together_are_refused():
-    both = Hazard(1.0, 1.0, 1.0)
+    both = RuptureRate(1.0, 1.0, 1.0)
     with pytest.raises(ValueError, match="use one of them"):
         advance(0.5, 0.1, 0.1, 0.1, 1.0, both, 1.0)
     with pytest.raises(ValueError, match="use one of them"):

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
-from sim.parts.bonds.rupture import Bell, Constant, CutOff, Hazard, hazard_integral, time_to_rupture
+from sim.parts.bonds.rupture import Bell, Constant, CutOff, RuptureRate, rupture_integral, time_to_rupture
 
 #: Stretch and speed: along, against, through zero, from zero, at rest; softness from nothing to steep.
 WAYS = list(product([-1.7, -0.3, 0.0, 0.2, 2.1], [-3.0, -0.4, 0.0, 0.7, 2.5], [0.0, 1e-9, 0.8, 4.0]))
@@ -25,15 +25,15 @@ def integral(stretch, slip, duration, rate, softness):
 
 
 @pytest.mark.parametrize(("stretch", "speed", "softness"), WAYS)
-def test_the_integral_is_that_of_the_hazard_along_the_way(stretch, speed, softness):
+def test_the_integral_is_that_of_the_rupture_along_the_way(stretch, speed, softness):
     exact = integral(stretch, speed * 1.3, 1.3, 0.6, softness)
-    assert_allclose(hazard_integral(stretch, speed * 1.3, 1.3, 0.6, softness), exact, rtol=1e-12, atol=0)
+    assert_allclose(rupture_integral(stretch, speed * 1.3, 1.3, 0.6, softness), exact, rtol=1e-12, atol=0)
 
 
 @pytest.mark.parametrize(("stretch", "speed", "softness"), WAYS)
 @pytest.mark.parametrize("time", [1e-9, 0.2, 1.1])
 def test_a_bond_breaks_when_its_integral_has_reached_the_threshold(stretch, speed, softness, time):
-    threshold = hazard_integral(stretch, speed * time, time, 0.6, softness)
+    threshold = rupture_integral(stretch, speed * time, time, 0.6, softness)
     found = time_to_rupture(stretch, speed, threshold, 0.6, softness, math.inf)
     # the answer is as good as the threshold, whose rounding e^(softness x) undoes where the stretch shrinks
     worse = math.exp(softness * max(0.0, abs(stretch) - abs(stretch + speed * time)))
@@ -41,13 +41,13 @@ def test_a_bond_breaks_when_its_integral_has_reached_the_threshold(stretch, spee
 
 
 def test_the_integrals_of_two_parts_of_a_way_add_up():
-    whole = hazard_integral(-1.0, 2.5, 0.5, 2.0, 3.0)
-    parts = hazard_integral(-1.0, 0.5, 0.1, 2.0, 3.0) + hazard_integral(-0.5, 2.0, 0.4, 2.0, 3.0)
+    whole = rupture_integral(-1.0, 2.5, 0.5, 2.0, 3.0)
+    parts = rupture_integral(-1.0, 0.5, 0.1, 2.0, 3.0) + rupture_integral(-0.5, 2.0, 0.4, 2.0, 3.0)
     assert_allclose(parts, whole, rtol=4e-15, atol=0)
 
 
 def test_sense_does_not_matter():
-    assert hazard_integral(-0.4, 1.1, 0.3, 2.0, 3.0) == hazard_integral(0.4, -1.1, 0.3, 2.0, 3.0)
+    assert rupture_integral(-0.4, 1.1, 0.3, 2.0, 3.0) == rupture_integral(0.4, -1.1, 0.3, 2.0, 3.0)
     assert time_to_rupture(-0.4, 1.1, 3.0, 2.0, 3.0, 0.6) == time_to_rupture(0.4, -1.1, 3.0, 2.0, 3.0, 0.6)
 
 
@@ -58,25 +58,25 @@ def test_a_cut_off_ends_a_bond_at_its_stretch_ahead():
     assert time_to_rupture(0.0, 2.0, 0.1, 1.0, 0.0, 2.0) == 0.1  # the threshold comes first
 
 
-def test_bonds_without_a_hazard_never_break():
-    assert hazard_integral(1.0, 5.0, 10.0, 0.0, 2.0) == 0.0
+def test_bonds_without_a_rupture_never_break():
+    assert rupture_integral(1.0, 5.0, 10.0, 0.0, 2.0) == 0.0
     assert time_to_rupture(1.0, 0.0, 1.0, 0.0, 2.0, math.inf) == math.inf
     assert time_to_rupture(1.0, 0.0, 1.0, 0.0, 2.0, 3.0) == math.inf
     assert time_to_rupture(0.0, 1.0, 1.0, 0.0, 2.0, math.inf) == math.inf
 
 
 def test_no_time_spends_nothing():
-    assert hazard_integral(3.0, 0.0, 0.0, 1.0, 1.0) == 0.0
+    assert rupture_integral(3.0, 0.0, 0.0, 1.0, 1.0) == 0.0
 
 
 @pytest.mark.parametrize("slip", [1e4, -1e4])
-def test_a_hazard_beyond_all_numbers_is_infinite_and_breaks_in_time(slip):
-    assert hazard_integral(0.0, slip, 1.0, 1.0, 1.0) == math.inf
+def test_a_rupture_beyond_all_numbers_is_infinite_and_breaks_in_time(slip):
+    assert rupture_integral(0.0, slip, 1.0, 1.0, 1.0) == math.inf
     assert_allclose(time_to_rupture(0.0, slip, 1.0, 1.0, 1.0, math.inf), math.log1p(1e4) / 1e4, rtol=1e-15, atol=0)
 
 
 def test_the_models_are_one_law_of_three_numbers():
-    assert Constant(rate=2.0).law(7.0) == Hazard(2.0, 0.0, math.inf)
-    assert Bell(zero_force_rate=2.0, bell_force=0.5).law(7.0) == Hazard(2.0, 14.0, math.inf)
-    assert CutOff(stretch=3.0).law(7.0) == Hazard(0.0, 0.0, 3.0)
+    assert Constant(rate=2.0).law(7.0) == RuptureRate(2.0, 0.0, math.inf)
+    assert Bell(zero_force_rate=2.0, bell_force=0.5).law(7.0) == RuptureRate(2.0, 14.0, math.inf)
+    assert CutOff(stretch=3.0).law(7.0) == RuptureRate(0.0, 0.0, 3.0)
     assert np.isfinite(CutOff(stretch=3.0, rate=1.0).law(1.0).rate)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from pydantic import ValidationError
 
 from sim.engine import march
-from sim.ensemble.recorded import GAUGES
+from sim.ensemble.recorded import VARIABLES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.area import share_kept
@@ -22,14 +22,14 @@ from sim.scenario.clock import Clock
 from sim.spectrum.bond_made import BondMade
 from sim.spectrum.families import Band
 
-READ = {gauge.name: gauge.read for gauge in GAUGES}
+READ = {variable.name: variable.read for variable in VARIABLES}
 RATES = BELL.zero_force_rate, BELL.bell_force, STRETCHED["bond_stiffness"]
 SITES, BINDING = STRETCHED["site_density"], STRETCHED["rebinding_rate"]
 REST = BINDING / (BINDING + BELL.zero_force_rate)
 PACE = BELL.zero_force_rate * BELL.bell_force / STRETCHED["bond_stiffness"]  # where a life at rest stretches by f_b
-COHORT = bonds.Cohort(hazard=BELL, **STRETCHED, tolerance=1e-4)
+COHORT = bonds.Cohort(rupture=BELL, **STRETCHED, tolerance=1e-4)
 FIELD = BondMade(footprint=1e-5)
-CELLED = {"spectrum": FIELD, "cell": CELL, "points": 32, "memory": Time(time=2e-3)}
+CELLED = {"spectrum": FIELD, "cell": CELL, "points": 32, "correlation": Time(time=2e-3)}
 
 
 def marched(name, members=1, **parts):
@@ -52,7 +52,7 @@ def test_the_start_of_a_rested_contact_is_the_closed_form_plus_what_rebinds(eps)
     # fewer than k_on sites bind a second, and each bears the force of its age: k_on kappa V <T^2>/2 at the most
     speed = eps * PACE
     times = start_up_peak(speed, *RATES).time * np.arange(41) / 20.0
-    rested = bonds.Cohort(hazard=BELL, **STRETCHED, start_from="bonded")
+    rested = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
     found = marched(
         "shear_stress", bonds=rested, drive=drive.Steady(speed=speed), clock=Clock(duration=times[-1], step=times[1])
     )[:, 0]
@@ -92,7 +92,7 @@ def volterra(first, beta, eps, end, points=400):
 def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate(rest):
     # at rest the share is REST (1 - exp(-(k_on + k_0) t)), all unstretched: the renewal equation from there
     speed, sliding = 10.0 * PACE, 1e-3
-    empty = bonds.Cohort(hazard=BELL, **STRETCHED, start_from="empty")
+    empty = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="empty")
     steps = round((rest + sliding) / 0.25e-3)
     parts = {"bonds": empty, "drive": drive.Start(rest=rest, speed=speed)}
     parts["clock"] = Clock(duration=rest + sliding, step=(rest + sliding) / steps)
@@ -112,7 +112,7 @@ def test_static_peaks_grow_with_the_logarithm_of_the_speed():
     peaks = []
     for speed in speeds:
         time = start_up_peak(speed, *RATES).time
-        rested = bonds.Cohort(hazard=BELL, **STRETCHED, start_from="bonded")
+        rested = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
         found = marched(
             "shear_stress",
             bonds=rested,
@@ -152,7 +152,7 @@ def test_friction_turns_with_the_slider_and_back(name):
 
 def test_a_scene_of_tracked_bonds_is_the_same_for_any_clock_step():
     stepped = drive.Table(time=(0.0, 0.004, 0.004, 0.008, 0.008, 0.012), speed=(2e-3, 2e-3, -1e-3, -1e-3, 8e-3, 8e-3))
-    tracked = bonds.Tracked(hazard=BELL, **STRETCHED, sites=50)
+    tracked = bonds.Tracked(rupture=BELL, **STRETCHED, sites=50)
     coarse, fine = (
         {
             name: marched(name, 20, bonds=tracked, drive=stepped, clock=Clock(duration=0.012, step=0.012 / steps))
@@ -172,14 +172,14 @@ def test_a_scene_of_tracked_bonds_is_the_same_for_any_clock_step():
 DEAD = Constant(rate=1e-9)
 LASTING = STRETCHED | {"rebinding_rate": 1e-9}
 CARRIED = {
-    "rate": bonds.Rate(critical_speed=1e9, healing=1e-9, stress=2e5, start_from="bonded", area="carried"),
-    "first moment": bonds.FirstMoment(hazard=DEAD, **LASTING, start_from="bonded", area="carried"),
-    "cohort": bonds.Cohort(hazard=DEAD, **LASTING, start_from="bonded", area="carried"),
+    "rate": bonds.Rate(critical_speed=1e9, rebinding_rate=1e-9, stress=2e5, start_from="bonded", area="carried"),
+    "first moment": bonds.FirstMoment(rupture=DEAD, **LASTING, start_from="bonded", area="carried"),
+    "cohort": bonds.Cohort(rupture=DEAD, **LASTING, start_from="bonded", area="carried"),
 }
 
 
 @pytest.mark.parametrize("name", CARRIED)
-def test_growth_dilutes_bonds_and_shrinkage_takes_them_along(name):
+def test_amplitude_dilutes_bonds_and_shrinkage_takes_them_along(name):
     part = CARRIED[name]
     _, state = last(1, steps=1, bonds=part, drive=drive.Steady(speed=1e-3))
     full, stress = part.fraction(state.bonds), part.shear_stress(state.bonds)
@@ -197,16 +197,18 @@ def test_growth_dilutes_bonds_and_shrinkage_takes_them_along(name):
     assert part.fraction(part.over(opened, np.array([1e-4]))) == 0.0
 
 
-def test_the_share_that_growth_keeps_is_that_of_the_areas():
+def test_the_share_that_amplitude_keeps_is_that_of_the_areas():
     kept = share_kept(np.array([1.0, 3.0, 2.0, 0.0, np.nan]), np.array([3.0, 1.0, 2.0, 0.0, 5.0]))
     assert_allclose(kept, [1.0 / 9.0, 1.0, 1.0, 1.0, 1.0], rtol=1e-15)
 
 
 @pytest.mark.parametrize("name", [*CARRIED, "present"])
-def test_in_a_contact_that_breathes_the_bonds_thin_with_every_growth(name):
+def test_in_a_contact_that_breathes_the_bonds_thin_with_every_amplitude(name):
     # nothing binds or breaks: the share that is left is that of all growths, which follow the radius by one step
-    part = CARRIED.get(name, bonds.FirstMoment(hazard=DEAD, **LASTING, start_from="bonded"))
-    breathing = shear.Modal(spectrum=Band(rms=50e3, longest=120e-6, shortest=60e-6), cell=CELL, memory=Time(time=2e-3))
+    part = CARRIED.get(name, bonds.FirstMoment(rupture=DEAD, **LASTING, start_from="bonded"))
+    breathing = shear.Modal(
+        spectrum=Band(rms=50e3, longest=120e-6, shortest=60e-6), cell=CELL, correlation=Time(time=2e-3)
+    )
     scenario = scene(5, steps=12, bonds=part, shear=breathing)
     states = list(march(scenario, np.arange(5)))
     radii = np.array([state.contact.radius for state in states])
@@ -249,7 +251,7 @@ def test_the_members_mean_energy_is_that_of_the_mean_on_their_own_cell(kind, mot
 
 
 def test_sites_of_the_slider_keep_a_pattern_and_forget_what_differs():
-    # eight memories: e^-8 of the differences is left, so the pattern correlates by n f²/(n f² + n Var f)
+    # eight correlations: e^-8 of the differences is left, so the pattern correlates by n f²/(n f² + n Var f)
     members, steady = 400, {"bonds": COHORT, "drive": drive.Steady(speed=2.0 * PACE)}
     scenario = scene(members, steps=16, shear=shear.Modal(**CELLED), **steady)
     states = list(march(scenario, np.arange(members)))
@@ -288,7 +290,7 @@ def test_a_field_of_bonds_without_forces_is_refused(population, said):
 def test_a_bond_stiffer_than_the_half_space_under_it_is_refused_with_the_number():
     limit = 0.5 * math.pi**2 * 1.6e6 * 1e-9
     for stiffness, refused in ((limit, False), (1.0001 * limit, True)):
-        stiff = bonds.Cohort(hazard=BELL, **(STRETCHED | {"bond_stiffness": stiffness}))
+        stiff = bonds.Cohort(rupture=BELL, **(STRETCHED | {"bond_stiffness": stiffness}))
         parts = {"bonds": stiff, "shear": shear.Mean(spectrum=BondMade(footprint=1e-9))}
         if refused:
             with pytest.raises(ValidationError, match=r"yields with 0\.0079 N/m"):

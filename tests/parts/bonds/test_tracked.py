@@ -10,14 +10,14 @@ from scipy.integrate import cumulative_trapezoid, quad
 from scipy.stats import kstwo
 
 from sim.numerics.noise import PARTS
-from sim.parts.bonds.rupture import Hazard
+from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.bonds.tracked import advance, bound, mean_life, mean_square_stretch, mean_stretch, start
 from sim.parts.bonds.tracked_events import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS
 
-BELL, CONSTANT, CUT = Hazard(1.0, 1.0, math.inf), Hazard(1.0, 0.0, math.inf), Hazard(0.3, 0.0, 2.0)
-BOTH = Hazard(1.0, 1.0, 3.0)
+BELL, CONSTANT, CUT = RuptureRate(1.0, 1.0, math.inf), RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.3, 0.0, 2.0)
+BOTH = RuptureRate(1.0, 1.0, 3.0)
 LAWS = {"bell": BELL, "constant": CONSTANT, "cut_off": CUT, "both": BOTH}
-UNBREAKING = Hazard(0.0, 1.0, math.inf)
+UNBREAKING = RuptureRate(0.0, 1.0, math.inf)
 
 
 def begin(law, sites, members=1, speed=0.0, how="steady", rebinding=1.0, seed=5):
@@ -83,7 +83,7 @@ def test_steady_sliding_has_the_exact_moments_at_once_and_later(speed, rebinding
 
 
 @pytest.mark.parametrize("name", ["constant", "cut_off", "both"])
-def test_every_hazard_keeps_its_steady_law(name):
+def test_every_rupture_keeps_its_steady_law(name):
     law, speed = LAWS[name], 1.3
     exact = moments(law, speed, 1.0)
     tracks = begin(law, 10_000, 10, speed)
@@ -94,7 +94,7 @@ def test_every_hazard_keeps_its_steady_law(name):
 
 
 def test_bonds_that_only_a_stretch_breaks_give_the_steady_law_of_the_shallow_depth():
-    law, speed, rebinding = Hazard(0.0, 0.0, 2.0), 3.0, 0.5
+    law, speed, rebinding = RuptureRate(0.0, 0.0, 2.0), 3.0, 0.5
     fraction = 1.0 / (1.0 + speed / (2.0 * rebinding))
     tracks = begin(law, 10_000, 10, speed, rebinding=rebinding)
     for _ in range(50):
@@ -134,7 +134,7 @@ def test_loaded_bonds_break_by_the_law_of_bell_and_evans(speed, sense):
 def test_constant_rates_relax_exponentially(how, first):
     rebinding, sites = 4.0, 200_000
     tracks = begin(CONSTANT, sites, how=how, rebinding=rebinding)
-    law, total = Hazard(6.0, 0.0, math.inf), 10.0
+    law, total = RuptureRate(6.0, 0.0, math.inf), 10.0
     before, steady = bound(tracks)[0] / sites, 0.4
     assert abs(before - first) <= 5.0 * math.sqrt(first * (1 - first) / sites)
     for step in range(1, 31):
@@ -197,8 +197,8 @@ def test_rows_ask_singly_after_a_reversal_until_all_bonds_follow():
 def volterra(law, rebinding, position, step):
     """Fraction, mean and mean square stretch in time from all-empty sites, by the renewal equation on a grid."""
     count = len(position)
-    hazard = law.rate * np.exp(law.softness * np.abs(position[np.newaxis, :] - position[:, np.newaxis]))
-    spent = cumulative_trapezoid(hazard, dx=step, axis=1, initial=0.0)
+    rupture = law.rate * np.exp(law.softness * np.abs(position[np.newaxis, :] - position[:, np.newaxis]))
+    spent = cumulative_trapezoid(rupture, dx=step, axis=1, initial=0.0)
     survival = np.triu(np.exp(np.minimum(np.diagonal(spent)[:, np.newaxis] - spent, 0.0)))
     free = np.ones(count)
     for n in range(1, count):
@@ -243,7 +243,7 @@ def test_a_cluster_that_shares_a_force_lives_as_erdmann_and_schwarz_say(sites, f
             rate = math.exp(force / left)
             # as long as it takes to the next rupture, and the least bit more
             wait = (tracks.soonest[0, 0].min() - tracks.frame[0, CLOCK]) / rate * (1.0 + 1e-12)
-            tracks = go(tracks, 0.0, wait, Hazard(rate, 1.0, math.inf), 0.0, 8, number)
+            tracks = go(tracks, 0.0, wait, RuptureRate(rate, 1.0, math.inf), 0.0, 8, number)
             assert bound(tracks)[0] == left - 1
             time += wait
         lives.append(time)
@@ -300,8 +300,8 @@ def test_the_words_of_a_life_are_philoxs_at_its_address():
     assert_allclose([tracks.birth[0, site], -tracks.due[0, site]], [threshold, wait / 2.0], rtol=1e-14, atol=0)
 
 
-def test_a_bell_force_beyond_all_stretches_makes_the_hazard_constant():
-    soft = ramp(Hazard(1.0, 1e-12, math.inf), 1, FORWARD)
+def test_a_bell_force_beyond_all_stretches_makes_the_rupture_constant():
+    soft = ramp(RuptureRate(1.0, 1e-12, math.inf), 1, FORWARD)
     same_lives(soft, ramp(CONSTANT, 1, FORWARD), scale=1.0)
 
 
@@ -337,7 +337,9 @@ def test_only_the_members_whose_step_is_long_are_drawn_anew():
 
 @pytest.mark.parametrize("slip", [0.0, 5e-324, 1e-300, -1e-12, 1e3, -1e300, 1.7e308])
 @pytest.mark.parametrize("duration", [5e-324, 1e-300, 1.0, 1e300])
-@pytest.mark.parametrize("law", [*LAWS.values(), UNBREAKING, Hazard(1e308, 1e300, 1e-300), Hazard(5e-324, 1.0, 5e-324)])
+@pytest.mark.parametrize(
+    "law", [*LAWS.values(), UNBREAKING, RuptureRate(1e308, 1e300, 1e-300), RuptureRate(5e-324, 1.0, 5e-324)]
+)
 def test_no_numbers_make_a_step_endless(law, slip, duration):
     for rebinding in (0.0, 5e-324, 1.0, 1e300):
         tracks = begin(law, 33, how="bonded", rebinding=rebinding)
@@ -375,11 +377,13 @@ def test_the_mean_life_is_the_integral_of_the_survival(speed):
 
 
 def test_the_mean_life_ends_at_the_limit():
-    law = Hazard(0.7, 0.0, 2.0)
+    law = RuptureRate(0.7, 0.0, 2.0)
     assert_allclose(mean_life(np.array([3.0]), law), -math.expm1(-1.4 / 3.0) / 0.7, rtol=1e-14, atol=0)
-    assert_allclose(mean_life(np.array([3.0]), Hazard(0.0, 1.0, 2.0)), 2.0 / 3.0, rtol=1e-15, atol=0)
-    assert_allclose(mean_life(np.array([3.0]), Hazard(1.0, 1.0, 1e9)), mean_life(np.array([3.0]), BELL), rtol=1e-12)
-    nearly = mean_life(np.array([3.0]), Hazard(0.7, 1e-9, 2.0))
+    assert_allclose(mean_life(np.array([3.0]), RuptureRate(0.0, 1.0, 2.0)), 2.0 / 3.0, rtol=1e-15, atol=0)
+    assert_allclose(
+        mean_life(np.array([3.0]), RuptureRate(1.0, 1.0, 1e9)), mean_life(np.array([3.0]), BELL), rtol=1e-12
+    )
+    nearly = mean_life(np.array([3.0]), RuptureRate(0.7, 1e-9, 2.0))
     assert_allclose(nearly, mean_life(np.array([3.0]), law), rtol=1e-8, atol=0)
 
 

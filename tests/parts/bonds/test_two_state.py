@@ -28,26 +28,26 @@ def fractions(population, motion, steps, members=1, seed=5, duration=2.1):
 @pytest.mark.parametrize("motion", [drive.Steady(speed=3e-3), STEPPED], ids=["steady", "stepped"])
 @pytest.mark.parametrize("start", ["steady", "bonded", "empty"])
 def test_the_rate_equation_has_no_step_error(motion, start):
-    rate = bonds.Rate(critical_speed=1e-2, healing=3.0, start_from=start)
+    rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0, start_from=start)
     coarse, fine = fractions(rate, motion, 21), fractions(rate, motion, 147)
     assert_allclose(fine[::7], coarse, rtol=1e-12, atol=0)
 
 
 def test_the_rate_equation_is_second_order_under_a_ramp():
-    rate, ramp = bonds.Rate(critical_speed=1e-2, healing=3.0), drive.Ramp(start=1e-3, stop=5e-2)
+    rate, ramp = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0), drive.Ramp(start=1e-3, stop=5e-2)
     ends = [fractions(rate, ramp, steps)[-1, 0] for steps in (32, 64, 128, 256)]
     steps = np.diff(ends)
     assert_allclose(np.log2(steps[:-1] / steps[1:]), 2.0, atol=0.1)
 
 
 def test_bonds_of_a_rest_contact_stay_bonded():
-    rate = bonds.Rate(critical_speed=1e-2, healing=3.0)
+    rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0)
     assert_allclose(fractions(rate, drive.Steady(speed=0.0), 10), 1.0, rtol=1e-15)
 
 
 @pytest.mark.parametrize("step", [1e-9, 1e-3, 1.0, 1e9])
 def test_the_rate_equation_relaxes_for_any_step(step):
-    rate = bonds.Rate(critical_speed=1e-2, healing=1.0, start_from="empty")
+    rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=1.0, start_from="empty")
     values = fractions(rate, drive.Steady(speed=1e-2), 1, duration=step)[:, 0]
     assert_allclose(values, [0.0, -0.5 * np.expm1(-2.0 * step)], rtol=1e-13)
 
@@ -56,8 +56,8 @@ def test_the_rate_equation_relaxes_for_any_step(step):
 def test_counted_bonds_have_the_exact_distribution_at_every_time(start):
     # sites are independent, so their number is binomial at all times, with the probability of the rate equation
     sites, members = 6, 100_000
-    rate = bonds.Rate(critical_speed=1e-2, healing=3.0, start_from=start)
-    counted = bonds.Counted(critical_speed=1e-2, healing=3.0, sites=sites, start_from=start)
+    rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=3.0, start_from=start)
+    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=3.0, sites=sites, start_from=start)
     expected = fractions(rate, STEPPED, 9)[:, 0]
     numbers = np.rint(sites * fractions(counted, STEPPED, 9, members)).astype(int)
     for probability, found in zip(expected[1:], numbers[1:], strict=True):
@@ -73,17 +73,17 @@ def test_counted_bonds_have_the_exact_distribution_at_every_time(start):
 
 def test_counted_bonds_remember_with_the_rate_of_the_population():
     # correlation over one step of a stationary two-state site: exp(-(h + h V/Vc) dt)
-    sites, members, healing, step = 30, 20_000, 3.0, 0.1
-    counted = bonds.Counted(critical_speed=1e-2, healing=healing, sites=sites)
+    sites, members, rebinding_rate, step = 30, 20_000, 3.0, 0.1
+    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=rebinding_rate, sites=sites)
     values = fractions(counted, drive.Steady(speed=1e-2), 3, members, duration=3 * step)
     found = np.corrcoef(values[1], values[2])[0, 1]
-    expected = np.exp(-2.0 * healing * step)
+    expected = np.exp(-2.0 * rebinding_rate * step)
     assert abs(found - expected) < 5.0 * (1.0 - expected**2) / np.sqrt(members)
 
 
 @pytest.mark.parametrize("sites", [1, 10**8])
 def test_counted_bonds_serve_one_bond_and_a_hundred_million(sites):
-    counted = bonds.Counted(critical_speed=1e-2, healing=3.0, sites=sites)
+    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=3.0, sites=sites)
     values = fractions(counted, drive.Steady(speed=1e-2), 4, 500)
     spread = np.sqrt(0.25 / sites)
     assert np.all((values >= 0.0) & (values <= 1.0))
@@ -99,7 +99,7 @@ def test_the_steady_law_follows_the_speed_at_once():
 
 # --- the choice of the depth
 
-LINEAR = {"critical_speed": 1e-2, "healing": 3.0}
+LINEAR = {"critical_speed": 1e-2, "rebinding_rate": 3.0}
 FIELD = shear.Mean(spectrum=BondMade(footprint=1e-5))
 
 
@@ -111,16 +111,16 @@ FIELD = shear.Mean(spectrum=BondMade(footprint=1e-5))
         (bonds.Auto(**LINEAR, sites=10_000), bonds.Rate, "1/√N of 10,000 sites is 0.01, within the tolerance of 0.01"),
         (bonds.Auto(**LINEAR, sites=10_000, tolerance=5e-3), bonds.Counted, "is 0.01, above the tolerance of 0.005"),
         (bonds.Auto(**LINEAR, sites=1, tolerance=0.999), bonds.Counted, "1/√N of 1 site is 1, above the tolerance"),
-        (bonds.Auto(hazard=BELL, **STRETCHED), bonds.Cohort, "within the tolerance of 0.01; the hazard depends on"),
-        (bonds.Auto(hazard=CUT_OFF, **STRETCHED), bonds.Cohort, "the hazard depends on the stretch"),
-        (bonds.Auto(hazard=BELL, **STRETCHED, sites=64), bonds.Tracked, "1/√N of 64 sites is 0.125, above the toler"),
-        (bonds.Auto(hazard=BELL, **STRETCHED | {"site_density": 1e11}), bonds.Tracked, "4,547 sites is 0.0148, above"),
-        (bonds.Auto(hazard=BELL, **STRETCHED, sites=10_000), bonds.Cohort, "10,000 sites is 0.01, within the to"),
-        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED, sites=64), bonds.Tracked, "above the tolerance of 0.01"),
-        (bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED), bonds.FirstMoment, "rate does not depend on the stretch"),
+        (bonds.Auto(rupture=BELL, **STRETCHED), bonds.Cohort, "within the tolerance of 0.01; the rupture depends on"),
+        (bonds.Auto(rupture=CUT_OFF, **STRETCHED), bonds.Cohort, "the rupture depends on the stretch"),
+        (bonds.Auto(rupture=BELL, **STRETCHED, sites=64), bonds.Tracked, "1/√N of 64 sites is 0.125, above the toler"),
+        (bonds.Auto(rupture=BELL, **STRETCHED | {"site_density": 1e11}), bonds.Tracked, "4,547 sites is 0.0148, above"),
+        (bonds.Auto(rupture=BELL, **STRETCHED, sites=10_000), bonds.Cohort, "10,000 sites is 0.01, within the to"),
+        (bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED, sites=64), bonds.Tracked, "above the tolerance of 0.01"),
+        (bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED), bonds.FirstMoment, "rate does not depend on the stretch"),
     ],
 )  # fmt: skip
-def test_the_depth_left_open_is_chosen_by_noise_and_hazard(auto, depth, why):
+def test_the_depth_left_open_is_chosen_by_noise_and_rupture(auto, depth, why):
     scenario = scene(bonds=auto)
     assert type(scenario.population) is depth
     assert why in scenario.why["bonds"]
@@ -128,7 +128,7 @@ def test_the_depth_left_open_is_chosen_by_noise_and_hazard(auto, depth, why):
 
 
 def test_bonds_whose_forces_are_read_are_resolved_even_at_a_constant_rate():
-    auto = bonds.Auto(hazard=Constant(rate=9.0), **STRETCHED)
+    auto = bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED)
     scenario = scene(bonds=auto, shear=FIELD)
     assert type(scenario.population) is bonds.Cohort
     assert scenario.why["bonds"].endswith("the forces of the bonds are read")
@@ -136,16 +136,16 @@ def test_bonds_whose_forces_are_read_are_resolved_even_at_a_constant_rate():
 
 def test_the_number_of_sites_is_given_or_that_of_the_contact_at_rest():
     area = math.pi * scene().rest_radius ** 2
-    by_density = bonds.Auto(hazard=BELL, **STRETCHED | {"site_density": 1e11})
+    by_density = bonds.Auto(rupture=BELL, **STRETCHED | {"site_density": 1e11})
     assert by_density.number(area) == scene(bonds=by_density).population.sites == round(1e11 * area)
-    assert bonds.Auto(hazard=BELL, **STRETCHED, sites=12).number(area) == 12
+    assert bonds.Auto(rupture=BELL, **STRETCHED, sites=12).number(area) == 12
     assert by_density.number(1e-15) == 1.0  # the smallest contact holds one
     assert by_density.number(0.0) == by_density.number(math.nan) == bonds.Auto(**LINEAR).number(area) == math.inf
 
 
 @pytest.mark.parametrize(("tolerance", "cohorts"), [(0.5, 1e-4), (1e-2, 1e-4), (1e-4, 1e-5)])
 def test_cohorts_chosen_are_finer_than_the_noise_left_out(tolerance, cohorts):
-    auto = bonds.Auto(hazard=BELL, **STRETCHED, tolerance=tolerance)
+    auto = bonds.Auto(rupture=BELL, **STRETCHED, tolerance=tolerance)
     assert_allclose(scene(bonds=auto).population.tolerance, cohorts, rtol=1e-15)
 
 
@@ -154,5 +154,5 @@ def test_the_choice_keeps_what_the_depth_is_given():
     assert scene(bonds=bonds.Auto(**LINEAR, **shared, stress=2e5)).population == bonds.Rate(
         **LINEAR, **shared, stress=2e5
     )
-    chosen = scene(bonds=bonds.Auto(hazard=BELL, **STRETCHED, **shared)).population
-    assert chosen == bonds.Cohort(hazard=BELL, **STRETCHED, **shared)
+    chosen = scene(bonds=bonds.Auto(rupture=BELL, **STRETCHED, **shared)).population
+    assert chosen == bonds.Cohort(rupture=BELL, **STRETCHED, **shared)

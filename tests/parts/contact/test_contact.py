@@ -10,10 +10,10 @@ from helpers.scenes import SHEARS, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.engine import march, pack
-from sim.ensemble.recorded import GAUGES
+from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
 from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium, Lagging
+from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.control import elastic_energy
 from sim.parts.drive import prescribed as drive
@@ -25,7 +25,7 @@ from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, S
 from sim.spectrum.finite_contact import Margin, marginal_energy
 
 WORK = 1.0 / math.pi
-GAUGE = {gauge.name: gauge for gauge in GAUGES}
+GAUGE = {variable.name: variable for variable in VARIABLES}
 
 
 def maugis(contact, steps=100, duration=1.0, **parts):
@@ -51,15 +51,15 @@ def course(scenario, *names):
 HELD = {
     "load": ({}, "normal_load"),
     "indentation": ({}, "indentation"),
-    "travel": ({"stiffness": 2.0}, "travel"),
+    "displacement": ({"stiffness": 2.0}, "displacement"),
 }
 
 
 @pytest.mark.parametrize("control", HELD)
 def test_a_linear_course_takes_its_values_at_the_clock_times(control):
-    more, gauge = HELD[control]
+    more, variable = HELD[control]
     scenario = maugis(Equilibrium(**{control: {"from": 0.3, "to": 2.7}}, **more), 13, 0.7)
-    (values,) = course(scenario, gauge)
+    (values,) = course(scenario, variable)
     exact = [float(Fraction(0.3) + (Fraction(2.7) - Fraction(0.3)) * k / 13) for k in range(14)]
     assert_allclose(values, exact, rtol=1e-15)
     assert values[0] == 0.3
@@ -68,18 +68,18 @@ def test_a_linear_course_takes_its_values_at_the_clock_times(control):
 
 @pytest.mark.parametrize("control", HELD)
 def test_a_course_there_and_back_turns_where_it_says(control):
-    more, gauge = HELD[control]
-    scenario = maugis(Equilibrium(**{control: {"from": 3.0, "to": 1.0, "trips": 3}}, **more), 24, 0.3)
-    (values,) = course(scenario, gauge)
-    one_trip = [3.0, 2.5, 2.0, 1.5, 1.0, 1.5, 2.0, 2.5]
-    assert_allclose(values, [*one_trip * 3, 3.0], rtol=4e-15)  # the time over the duration is right to 2 eps
+    more, variable = HELD[control]
+    scenario = maugis(Equilibrium(**{control: {"from": 3.0, "to": 1.0, "cycles": 3}}, **more), 24, 0.3)
+    (values,) = course(scenario, variable)
+    one_cycle = [3.0, 2.5, 2.0, 1.5, 1.0, 1.5, 2.0, 2.5]
+    assert_allclose(values, [*one_cycle * 3, 3.0], rtol=4e-15)  # the time over the duration is right to 2 eps
 
 
 @pytest.mark.parametrize("control", HELD)
 def test_a_logarithmic_course_multiplies(control):
-    more, gauge = HELD[control]
+    more, variable = HELD[control]
     scenario = maugis(Equilibrium(**{control: {"from": 1e-3, "to": 10.0, "scale": "log"}}, **more), 8)
-    (values,) = course(scenario, gauge)
+    (values,) = course(scenario, variable)
     assert_allclose(values, [10.0 ** (-3.0 + k / 2.0) for k in range(9)], rtol=1e-14)
 
 
@@ -90,23 +90,23 @@ def test_a_logarithmic_course_may_pull():
 
 @pytest.mark.parametrize("control", HELD)
 def test_a_table_is_linear_between_its_rows_and_jumps_where_two_share_a_time(control):
-    more, gauge = HELD[control]
+    more, variable = HELD[control]
     table = {"time": [-1.0, 0.0, 0.4, 0.4, 0.8, 1.0], "value": [9.0, 1.0, 2.0, 0.5, 1.5, 1.5]}
     scenario = maugis(Equilibrium(**{control: table}, **more), 5)
-    (values,) = course(scenario, gauge)
+    (values,) = course(scenario, variable)
     assert_allclose(values, [1.0, 1.5, 0.5, 1.0, 1.5, 1.5], rtol=1e-15)
 
 
 def test_a_course_does_not_depend_on_the_step():
-    fine = course(maugis(Equilibrium(load={"from": 2.0, "to": -1.0, "trips": 2}), 80), "contact_radius")[0]
-    coarse = course(maugis(Equilibrium(load={"from": 2.0, "to": -1.0, "trips": 2}), 20), "contact_radius")[0]
+    fine = course(maugis(Equilibrium(load={"from": 2.0, "to": -1.0, "cycles": 2}), 80), "contact_radius")[0]
+    coarse = course(maugis(Equilibrium(load={"from": 2.0, "to": -1.0, "cycles": 2}), 20), "contact_radius")[0]
     assert_array_equal(fine[::4], coarse)
 
 
 def test_a_soft_machine_far_back_pulls_off_like_a_load():
     k, load = 1e-9, {"from": 3.0, "to": -1.99}
     held = course(maugis(Equilibrium(load=load), 500), "contact_radius")[0]
-    machine = Equilibrium(travel={"from": 3.0 / k, "to": -1.99 / k}, stiffness=k)
+    machine = Equilibrium(displacement={"from": 3.0 / k, "to": -1.99 / k}, stiffness=k)
     soft = course(maugis(machine, 500), "contact_radius")[0]
     assert_array_equal(held == 0.0, soft == 0.0)
     # k delta changes the load by 1e-9, magnified by 1/sqrt of the distance from the fold, at least 0.003
@@ -115,7 +115,7 @@ def test_a_soft_machine_far_back_pulls_off_like_a_load():
 
 def test_a_stiff_machine_pulls_off_like_an_indentation():
     held = course(maugis(Equilibrium(indentation={"from": 2.0, "to": -1.0}), 500), "contact_radius")[0]
-    machine = Equilibrium(travel={"from": 2.0, "to": -1.0}, stiffness=1e12)
+    machine = Equilibrium(displacement={"from": 2.0, "to": -1.0}, stiffness=1e12)
     stiff = course(maugis(machine, 500), "contact_radius")[0]
     assert_array_equal(held == 0.0, stiff == 0.0)
     assert_allclose(stiff, held, rtol=1e-9)
@@ -142,10 +142,10 @@ def fold(stiffness):
 
 def limit(control, stiffness=math.inf):
     _, load, depth = fold(0.0 if control == "load" else stiffness)
-    return {"load": load, "indentation": depth, "travel": depth + load / stiffness}[control]
+    return {"load": load, "indentation": depth, "displacement": depth + load / stiffness}[control]
 
 
-LIMITS = [("load", None), ("indentation", None), *(("travel", k) for k in (0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0))]
+LIMITS = [("load", None), ("indentation", None), *(("displacement", k) for k in (0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0))]
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ LIMITS = [("load", None), ("indentation", None), *(("travel", k) for k in (0.1, 
     [
         ("load", None, -1.5),
         ("indentation", None, -3.0 * 6.0 ** (-2.0 / 3.0)),
-        ("travel", 5.0, -8.0 / 9.0 - 28.0 / 27.0 / 5.0),
+        ("displacement", 5.0, -8.0 / 9.0 - 28.0 / 27.0 / 5.0),
     ],
 )
 def test_the_fold_is_where_it_is_known(control, stiffness, last):
@@ -177,7 +177,7 @@ def test_the_contact_opens_between_the_last_step_before_the_limit_and_the_next(c
 
 
 def test_a_contact_that_shrinks_slowly_follows_its_branch_to_the_fold():
-    scenario = maugis(Equilibrium(travel={"from": 1.0, "to": -1.2}, stiffness=5.0), 4000)
+    scenario = maugis(Equilibrium(displacement={"from": 1.0, "to": -1.2}, stiffness=5.0), 4000)
     radius, load, depth = course(scenario, "contact_radius", "normal_load", "indentation")
     closed = radius > 0.0
     a = radius[closed]
@@ -202,7 +202,7 @@ def test_a_contact_that_is_open_from_the_start_never_detached(control):
 # --- what follows a detachment ---
 
 #: Exact in binary at 128 steps; zero on the way back comes after 24 and 56 of 64.
-BACK = {"from": 1.0, "to": -3.0, "trips": 2}
+BACK = {"from": 1.0, "to": -3.0, "cycles": 2}
 
 
 def test_a_contact_that_stays_open_is_open_to_the_end():
@@ -214,7 +214,7 @@ def test_a_contact_that_stays_open_is_open_to_the_end():
 
 
 def test_a_contact_that_stops_has_no_radius_any_more():
-    scenario = maugis(Equilibrium(load=BACK, on_detach="stop"), 128)
+    scenario = maugis(Equilibrium(load=BACK, after_pull_off="stop"), 128)
     radius, area, force, closed = course(scenario, "contact_radius", "contact_area", "friction_force", "in_contact")
     for values in (radius, area, force):
         assert np.isnan(values[21:]).all()
@@ -227,11 +227,11 @@ def test_a_contact_that_stops_has_no_radius_any_more():
     [
         ({"indentation": BACK}, (8.0 / 3.0) ** (1.0 / 3.0)),
         ({"load": BACK}, 6.0 ** (1.0 / 3.0)),
-        ({"travel": BACK, "stiffness": 2.0}, None),
+        ({"displacement": BACK, "stiffness": 2.0}, None),
     ],
 )
 def test_a_free_sphere_jumps_into_contact_where_it_touches(held, radius):
-    scenario = maugis(Equilibrium(**held, on_detach="reattach"), 128)
+    scenario = maugis(Equilibrium(**held, after_pull_off="reattach"), 128)
     found, when = course(scenario, "contact_radius", "detachment_time")
     returns = np.nonzero((found[:-1] == 0.0) & (found[1:] > 0.0))[0] + 1
     assert returns.tolist() == [56, 120]
@@ -241,8 +241,8 @@ def test_a_free_sphere_jumps_into_contact_where_it_touches(held, radius):
 
 @pytest.mark.parametrize("policy", ["stay_open", "reattach", "stop"])
 def test_a_hundred_cycles_through_pull_off_are_all_alike(policy):
-    held = {"indentation": {"from": 1.0, "to": -2.0, "trips": 128}}
-    scenario = maugis(Equilibrium(**held, on_detach=policy), 128 * 32)
+    held = {"indentation": {"from": 1.0, "to": -2.0, "cycles": 128}}
+    scenario = maugis(Equilibrium(**held, after_pull_off=policy), 128 * 32)
     radius, lost = course(scenario, "contact_radius", "dissipated_energy")
     if policy == "reattach":
         cycles = radius[:-1].reshape(128, 32)
@@ -256,7 +256,7 @@ def test_a_hundred_cycles_through_pull_off_are_all_alike(policy):
 
 
 def released(a, stiffness, reversible=0.0):
-    """Energy of an equilibrium over that of the open contact at the same travel."""
+    """Energy of an equilibrium over that of the open contact at the same displacement."""
     depth = a**2 - 2.0 / 3.0 * math.sqrt(6.0 * a)
     load = a**3 - math.sqrt(6.0 * a**3)
     elastic = 0.75 * (a * depth**2 - 2.0 / 3.0 * a**3 * depth + a**5 / 5.0)
@@ -264,28 +264,28 @@ def released(a, stiffness, reversible=0.0):
 
 
 def touching(stiffness):
-    """Radius at a travel of zero."""
+    """Radius at a displacement of zero."""
     low, high = 1.3, 2.0
     for _ in range(80):
         a = 0.5 * (low + high)
-        travel = a**2 - 2 / 3 * math.sqrt(6 * a) + (a**3 - math.sqrt(6 * a**3)) / stiffness
-        low, high = (a, high) if travel < 0.0 else (low, a)
+        displacement = a**2 - 2 / 3 * math.sqrt(6 * a) + (a**3 - math.sqrt(6 * a**3)) / stiffness
+        low, high = (a, high) if displacement < 0.0 else (low, a)
     return 0.5 * (low + high)
 
 
 @pytest.mark.parametrize("stiffness", [0.3, 5.0, math.inf])
-def test_the_loop_of_load_and_travel_holds_what_is_dissipated(stiffness):
+def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(stiffness):
     """To first order in the step: each of the two jumps comes within a step of its place, where at most the
     pull-off load of 1.5 acts; the trapezoidal rule takes half of either jump, and is of second order elsewhere
     but at the fold, where the load has a square root: of order 3/2."""
     exact = released(fold(stiffness)[0], stiffness) - released(touching(stiffness), stiffness)
-    reach = 2.0 - 2.0 * limit("travel", stiffness) if math.isfinite(stiffness) else 3.0
-    held = {"from": 1.0, "to": 1.0 - reach, "trips": 1}
-    control = {"indentation": held} if math.isinf(stiffness) else {"travel": held, "stiffness": stiffness}
+    reach = 2.0 - 2.0 * limit("displacement", stiffness) if math.isfinite(stiffness) else 3.0
+    held = {"from": 1.0, "to": 1.0 - reach, "cycles": 1}
+    control = {"indentation": held} if math.isinf(stiffness) else {"displacement": held, "stiffness": stiffness}
     for steps in (400, 4000):
-        scenario = maugis(Equilibrium(**control, on_detach="reattach"), steps)
-        load, travel, lost = course(scenario, "normal_load", "travel", "dissipated_energy")
-        loop = float(np.sum(0.5 * (load[1:] + load[:-1]) * np.diff(travel)))
+        scenario = maugis(Equilibrium(**control, after_pull_off="reattach"), steps)
+        load, displacement, lost = course(scenario, "normal_load", "displacement", "dissipated_energy")
+        loop = float(np.sum(0.5 * (load[1:] + load[:-1]) * np.diff(displacement)))
         width = 2.0 * reach / steps
         assert lost[-1] > 0.5
         assert_allclose(lost[-1], exact, rtol=0.0, atol=3.0 * width)
@@ -340,14 +340,14 @@ def test_what_a_free_sphere_dissipates_as_it_jumps_in_at_a_load():
     a, depth = 6.0 ** (1.0 / 3.0), 6.0 ** (2.0 / 3.0) / 3.0
     exact = a**2 - elastic_energy(a, depth, maugis(Equilibrium(load=1.0)).bodies)
     table = {"time": [0.0, 0.3, 0.6, 1.0], "value": [0.0, -2.0, 0.0, 0.0]}
-    scenario = maugis(Equilibrium(load=table, on_detach="reattach"), 10)
+    scenario = maugis(Equilibrium(load=table, after_pull_off="reattach"), 10)
     lost = course(scenario, "dissipated_energy")[0]
     assert_allclose(lost[-1] - lost[5], exact, rtol=1e-12)
 
 
 def test_a_fast_edge_jumps_in_where_equilibrium_does_and_dissipates_the_same():
-    held = {"load": {"from": 1.0, "to": -3.0, "trips": 1}, "on_detach": "reattach"}
-    depths = Equilibrium(**held), Lagging(**held, front_speed=1e12)
+    held = {"load": {"from": 1.0, "to": -3.0, "cycles": 1}, "after_pull_off": "reattach"}
+    depths = Equilibrium(**held), RateDependent(**held, front_speed=1e12)
     one, two = (
         course(maugis(depth, 128), "contact_radius", "detachment_time", "dissipated_energy") for depth in depths
     )
@@ -361,8 +361,8 @@ def test_a_fast_edge_jumps_in_where_equilibrium_does_and_dissipates_the_same():
 
 
 def test_a_fast_edge_behind_a_machine_dissipates_what_the_equilibrium_does():
-    held = {"travel": {"from": 1.0, "to": -3.0, "trips": 1}, "stiffness": 3.0, "on_detach": "reattach"}
-    depths = Equilibrium(**held), Lagging(**held, front_speed=1e9)
+    held = {"displacement": {"from": 1.0, "to": -3.0, "cycles": 1}, "stiffness": 3.0, "after_pull_off": "reattach"}
+    depths = Equilibrium(**held), RateDependent(**held, front_speed=1e9)
     one, two = (course(maugis(depth, 800), "dissipated_energy", "detachment_time") for depth in depths)
     # within two steps' work of the pull-off load at most; the edge itself loses little
     assert_allclose(two[0][-1], one[0][-1], rtol=0.0, atol=2.0 * 1.5 * 8.0 / 800)
@@ -376,7 +376,7 @@ def pulse(contact, paid=1.0, steps=400, on="plane"):
     """The lens with fluctuations that grow beyond what adhesion can pay, and fall back."""
     part = shear.Mean(
         spectrum=Gaussian(rms=3e5, length=24e-6),
-        growth=Onset(speed=5e-2, width=0.5),
+        amplitude=Onset(speed=5e-2, width=0.5),
         paid_by_adhesion=paid,
         contact=on,
     )
@@ -384,7 +384,7 @@ def pulse(contact, paid=1.0, steps=400, on="plane"):
     return scene(1, steps, shear=part, drive=table, contact=contact)
 
 
-@pytest.mark.parametrize("held", [{"load": 4e-3}, {"indentation": 2e-6}, {"travel": 2e-6, "stiffness": 2e3}])
+@pytest.mark.parametrize("held", [{"load": 4e-3}, {"indentation": 2e-6}, {"displacement": 2e-6, "stiffness": 2e3}])
 def test_work_that_falls_through_zero_leaves_hertz_and_comes_back(held):
     scenario = pulse(Equilibrium(**held))
     radius, work, masked = course(scenario, "contact_radius", "work_of_adhesion", "masked")
@@ -409,9 +409,9 @@ def test_a_lifted_contact_opens_where_no_work_is_left():
 
 
 def test_a_sphere_laid_down_without_adhesion_makes_hertzs_contact():
-    back = {"from": 1e-3, "to": -1e-3, "trips": 1}
+    back = {"from": 1e-3, "to": -1e-3, "cycles": 1}
     part = shear.Mean(spectrum=Gaussian(rms=1e6, length=24e-6))
-    scenario = scene(1, 40, shear=part, contact=Equilibrium(load=back, on_detach="reattach"))
+    scenario = scene(1, 40, shear=part, contact=Equilibrium(load=back, after_pull_off="reattach"))
     radius, load, when = course(scenario, "contact_radius", "normal_load", "detachment_time")
     pressed = load > 1e-9
     assert_array_equal(radius[pressed], jkr.hertz_radius_at_load(load[pressed], 2e-3, 6.4e6))
@@ -426,9 +426,9 @@ def test_a_sphere_laid_down_without_adhesion_makes_hertzs_contact():
 def test_a_field_for_which_adhesion_does_not_pay_leaves_jkr_to_the_bit(name):
     part = SHEARS[name]
     free = replace(part, paid_by_adhesion=0.0)
-    load = {"from": 4e-3, "to": -1e-3, "trips": 1}
+    load = {"from": 4e-3, "to": -1e-3, "cycles": 1}
     held = {"bonds": bonds.Steady(critical_speed=1e-2, stress=2e5), "drive": drive.Ramp(start=1e-4, stop=1e-2)}
-    contact = Equilibrium(load=load, on_detach="reattach")
+    contact = Equilibrium(load=load, after_pull_off="reattach")
     plain = march(scene(2, 8, contact=contact, **held), np.arange(2))
     for one, two in zip(plain, march(scene(2, 8, contact=contact, shear=free, **held), np.arange(2)), strict=True):
         for key, value in pack(one.contact).items():
@@ -436,7 +436,7 @@ def test_a_field_for_which_adhesion_does_not_pay_leaves_jkr_to_the_bit(name):
             assert np.array_equal(np.broadcast_to(value, found.shape), found, equal_nan=True), key
 
 
-@pytest.mark.parametrize("held", [{"load": 4e-3}, {"indentation": -1e-7}, {"travel": 1e-6, "stiffness": 2e3}])
+@pytest.mark.parametrize("held", [{"load": 4e-3}, {"indentation": -1e-7}, {"displacement": 1e-6, "stiffness": 2e3}])
 @pytest.mark.parametrize("stress", [0.0, 2e5, 1e9])
 def test_a_uniform_stress_that_the_drive_pays_leaves_jkr_to_the_bit(held, stress):
     scenario = scene(1, 4, contact=Equilibrium(**held), bonds=bonds.Unbroken(stress=stress))
@@ -482,10 +482,10 @@ def test_a_disc_of_many_waves_pays_for_all_and_a_vanishing_one_for_nothing():
 
 
 @pytest.mark.parametrize(
-    "held", [{"load": 4e-3}, {"load": -2e-4}, {"indentation": -4e-7}, {"travel": 1e-6, "stiffness": 2e3}]
+    "held", [{"load": 4e-3}, {"load": -2e-4}, {"indentation": -4e-7}, {"displacement": 1e-6, "stiffness": 2e3}]
 )
 @pytest.mark.parametrize("paid", [1.0, 0.4])
-def test_a_disc_is_where_its_release_rate_is_the_work_that_its_own_growth_leaves(held, paid):
+def test_a_disc_is_where_its_release_rate_is_the_work_that_its_own_amplitude_leaves(held, paid):
     scenario = pulse(Equilibrium(**held), paid, 60, on="disc")
     names = ("contact_radius", "work_of_adhesion", "fluctuation_energy", "indentation")
     radius, work, energy, depth = course(scenario, *names)
@@ -526,11 +526,11 @@ def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
     assert_allclose(lost[-1], held - math.pi * a**2 * (WORK - disc_energy(spectrum, a, 0.1875)), rtol=1e-7)
 
 
-def test_what_a_lagging_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch):
+def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch):
     # below the radius at pull-off the falling load gains energy like 1/radius; that is not the edge's
     from sim.parts.contact import models as part
 
-    pulled = Lagging(load={"from": 1e-3, "to": -1e-3}, front_speed=1e-3)
+    pulled = RateDependent(load={"from": 1e-3, "to": -1e-3}, front_speed=1e-3)
     found = []
     for spot in (1e-3, 1e-2):
         monkeypatch.setattr(part, "_SPOT", spot)
@@ -544,7 +544,9 @@ def test_what_a_lagging_edge_dissipates_under_a_load_is_no_matter_of_the_least_r
 
 
 def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
-    held = Equilibrium(travel={"from": 1e-6, "to": -1.6e-5, "trips": 2}, stiffness=340.0, on_detach="reattach")
+    held = Equilibrium(
+        displacement={"from": 1e-6, "to": -1.6e-5, "cycles": 2}, stiffness=340.0, after_pull_off="reattach"
+    )
     sites = bonds.Rate(critical_speed=1e-2, healing=2.0, area="carried")
     scenario = scene(1, 2000, contact=held, bonds=sites)
     states = list(march(scenario, np.arange(1)))

@@ -9,11 +9,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sim.laws import jkr
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.balance import Balance
-from sim.parts.contact.control import AtLoad, AtTravel, Bodies, elastic_energy
+from sim.parts.contact.control import AtDisplacement, AtLoad, Bodies, elastic_energy
 from sim.spectrum.families import Gaussian
 from sim.spectrum.finite_contact import Margin, disc_energy
 
-#: Maugis's units: K = 4 E*/3, R and pi w are 1, so that radii, loads and travels are those of the textbooks.
+#: Maugis's units: K = 4 E*/3, R and pi w are 1, so that radii, loads and displacements are those of the textbooks.
 MAUGIS = Bodies(1.0, 0.75, 0.5)
 WORK = 1.0 / math.pi
 PATCHES = Gaussian(rms=1.0, length=0.4)
@@ -50,7 +50,7 @@ class Path:
         grip, balance, a = self.state(part)
         depth = grip.depth(a, MAUGIS)
         machine = 0.0
-        if isinstance(grip, AtTravel) and math.isfinite(grip.stiffness):
+        if isinstance(grip, AtDisplacement) and math.isfinite(grip.stiffness):
             machine = 0.5 * grip.stiffness * (grip.place - depth) ** 2
         area = math.pi * a**2
         plane = float(PATCHES.surface_energy(SHEAR_MODULUS))
@@ -60,27 +60,27 @@ class Path:
         return (elastic_energy(a, depth, MAUGIS) + machine - adhesive + mean)[0]
 
     def spent(self):
-        """int P d(travel) - int A dw over the path, by Gauss's nodes; at a load by parts."""
+        """int P d(displacement) - int A dw over the path, by Gauss's nodes; at a load by parts."""
         total = 0.0
         for node, weight in zip(0.5 * (1.0 + NODES), 0.5 * WEIGHTS, strict=True):
             grip, _, a = self.state(node)
             rate = (self.ends[1] - self.ends[0]) * (
-                -grip.travel(a, MAUGIS) if isinstance(grip, AtLoad) else grip.normal_load(a, MAUGIS)
+                -grip.displacement(a, MAUGIS) if isinstance(grip, AtLoad) else grip.normal_load(a, MAUGIS)
             )
             rate = rate - math.pi * a**2 * WORK * self.changing * drift(node)[1]
             total += weight * rate[0]
         if "load" in self.control(1.0):
             for part, sign in ((1.0, 1.0), (0.0, -1.0)):
                 grip, _, a = self.state(part)
-                total += sign * (grip.load * grip.travel(a, MAUGIS))[0]
+                total += sign * (grip.load * grip.displacement(a, MAUGIS))[0]
         return total
 
 
 CONTROLS = {
     "load": (lambda value: {"load": value}, (3.0, -1.0)),
     "indentation": (lambda value: {"indentation": value}, (2.0, -0.5)),
-    "soft machine": (lambda value: {"travel": value, "stiffness": 0.1}, (9.0, -10.0)),
-    "machine": (lambda value: {"travel": value, "stiffness": 5.0}, (3.0, -0.8)),
+    "soft machine": (lambda value: {"displacement": value, "stiffness": 0.1}, (9.0, -10.0)),
+    "machine": (lambda value: {"displacement": value, "stiffness": 5.0}, (3.0, -0.8)),
 }
 PAID = {
     "constant work": {},
@@ -119,42 +119,42 @@ def test_energies_slope_to_the_load_and_to_the_energy_release_rate(control):
 def test_a_soft_machine_far_away_is_a_load(load):
     # the load changes by k delta: a relative change of 1e-12 delta, magnified by 1/sqrt(distance from the fold)
     k = 1e-12
-    soft = AtTravel(load / k, k).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+    soft = AtDisplacement(load / k, k).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
     held = AtLoad(load).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
     assert_allclose(soft, held, rtol=1e-10)
-    assert_allclose(AtTravel(load / k, k).normal_load(soft, MAUGIS), load, rtol=1e-10)
+    assert_allclose(AtDisplacement(load / k, k).normal_load(soft, MAUGIS), load, rtol=1e-10)
 
 
 @pytest.mark.parametrize("place", [3.0, 0.0, -0.5, -0.9])
 def test_a_stiff_machine_is_an_indentation(place):
     for stiffness in (1e13, 1e30, math.inf):
-        found = AtTravel(place, stiffness)
+        found = AtDisplacement(place, stiffness)
         radius = found.radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
-        held = AtTravel(place).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+        held = AtDisplacement(place).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
         assert_allclose(radius, held, rtol=1e-11)
         assert_allclose(found.depth(radius, MAUGIS), place, rtol=0.0, atol=1e-11)
 
 
-def test_load_indentation_and_travel_of_any_radius_go_together():
+def test_load_indentation_and_displacement_of_any_radius_go_together():
     rng = np.random.default_rng(7)
     a = rng.uniform(0.1, 3.0, 200)
-    for grip in (AtLoad(-0.7), AtTravel(0.4), AtTravel(0.4, 3.0)):
+    for grip in (AtLoad(-0.7), AtDisplacement(0.4), AtDisplacement(0.4, 3.0)):
         load, depth = grip.normal_load(a, MAUGIS), grip.depth(a, MAUGIS)
         assert_allclose(load, 2.0 * 0.75 * a * (depth - a**2 / 3.0), rtol=0.0, atol=1e-13)
         yielded = load / 3.0 if getattr(grip, "stiffness", math.inf) == 3.0 else 0.0
-        assert_allclose(grip.travel(a, MAUGIS), depth + yielded, rtol=0.0, atol=1e-14)
+        assert_allclose(grip.displacement(a, MAUGIS), depth + yielded, rtol=0.0, atol=1e-14)
 
 
 def test_an_open_contact_bears_no_load():
     gone = np.array([math.nan])
-    for grip in (AtLoad(-3.0), AtTravel(-2.0), AtTravel(-2.0, 5.0)):
+    for grip in (AtLoad(-3.0), AtDisplacement(-2.0), AtDisplacement(-2.0, 5.0)):
         assert_array_equal(grip.normal_load(gone, MAUGIS), 0.0)
         assert not grip.closes
     assert math.isnan(AtLoad(-3.0).depth(gone, MAUGIS)[0])  # a free sphere is anywhere
-    assert_array_equal(AtTravel(-2.0, 5.0).depth(gone, MAUGIS), -2.0)
+    assert_array_equal(AtDisplacement(-2.0, 5.0).depth(gone, MAUGIS), -2.0)
 
 
-@pytest.mark.parametrize("grip", [AtLoad(0.0), AtTravel(0.0), AtTravel(0.0, 5.0)])
+@pytest.mark.parametrize("grip", [AtLoad(0.0), AtDisplacement(0.0), AtDisplacement(0.0, 5.0)])
 def test_a_free_sphere_closes_from_zero_on(grip):
     assert grip.closes
 
@@ -168,14 +168,14 @@ def random_balance(rng, size, margin):
 
 def random_contact(rng, kind, reversible):
     value = rng.uniform(-2.0, 3.0)
-    if kind == "travel":
-        return Equilibrium(travel=value, stiffness=10.0 ** rng.uniform(-3.0, 3.0), reversible=reversible)
+    if kind == "displacement":
+        return Equilibrium(displacement=value, stiffness=10.0 ** rng.uniform(-3.0, 3.0), reversible=reversible)
     return Equilibrium(**{kind: value}, reversible=reversible)
 
 
 @pytest.mark.parametrize("reversible", [0.0, 0.3])
 @pytest.mark.parametrize("margin", [None, Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)], ids=["plane", "disc"])
-@pytest.mark.parametrize("kind", ["load", "indentation", "travel"])
+@pytest.mark.parametrize("kind", ["load", "indentation", "displacement"])
 def test_no_contact_is_smaller_than_hertz_and_each_balances(kind, margin, reversible):
     rng = np.random.default_rng(11)
     for _ in range(60):
@@ -196,7 +196,7 @@ def test_no_contact_is_smaller_than_hertz_and_each_balances(kind, margin, revers
         assert np.all(left[masked] <= 1e-8 * WORK)
 
 
-@pytest.mark.parametrize("kind", ["load", "indentation", "travel"])
+@pytest.mark.parametrize("kind", ["load", "indentation", "displacement"])
 def test_the_contact_on_a_disc_is_the_widest_that_balances(kind):
     # a walk from the right over 4000 places of the surplus G - w(a), G below Hertz's radius counted negative
     rng = np.random.default_rng(13)
@@ -237,8 +237,8 @@ def test_no_number_raises_or_hangs_or_makes_a_contact_smaller_than_hertz(reversi
         for value in (size, -size):
             for grip in (
                 AtLoad(value),
-                AtTravel(value),
-                *(AtTravel(value, k) for k in (5e-324, 1e-30, 1.0, 1e30, 1e308)),
+                AtDisplacement(value),
+                *(AtDisplacement(value, k) for k in (5e-324, 1e-30, 1.0, 1e30, 1e308)),
             ):
                 for stress in (0.0, 1.0, 1e150):
                     a = grip.radius(works, np.full(works.shape, stress), reversible, MAUGIS)
@@ -248,7 +248,7 @@ def test_no_number_raises_or_hangs_or_makes_a_contact_smaller_than_hertz(reversi
                         assert np.all(a[closed] >= hertz * (1.0 - 1e-13))
                     if value < 0.0:
                         assert np.all(np.isnan(a[:2]))
-                    for read in (grip.normal_load, grip.depth, grip.travel):
+                    for read in (grip.normal_load, grip.depth, grip.displacement):
                         assert read(a, MAUGIS).shape == a.shape
 
 
@@ -257,8 +257,8 @@ def test_without_work_a_contact_is_hertz_to_the_bit():
         one = np.full(1, work)
         for load in (0.0, 5e-324, 0.3, 7.0):
             assert AtLoad(load).radius(one, np.ones(1), 0.5, MAUGIS) == jkr.hertz_radius_at_load(load, 1.0, 0.75)
-            assert AtTravel(load).radius(one, np.ones(1), 0.5, MAUGIS) == math.sqrt(load)
-            a = AtTravel(load, 5.0).radius(one, np.ones(1), 0.5, MAUGIS)[0]
+            assert AtDisplacement(load).radius(one, np.ones(1), 0.5, MAUGIS) == math.sqrt(load)
+            a = AtDisplacement(load, 5.0).radius(one, np.ones(1), 0.5, MAUGIS)[0]
             assert_allclose(a**2 + a**3 / 5.0, load, rtol=1e-14, atol=0.0)
 
 
@@ -266,7 +266,7 @@ def test_nothing_reversible_is_jkr_to_the_bit_at_any_stress():
     rng = np.random.default_rng(17)
     works = WORK * rng.uniform(-0.2, 1.0, 100)
     for value in rng.uniform(-1.5, 3.0, 20):
-        for grip in (AtLoad(value), AtTravel(value), AtTravel(value, 0.7)):
+        for grip in (AtLoad(value), AtDisplacement(value), AtDisplacement(value, 0.7)):
             plain = grip.radius(works, np.zeros(1), 0.0, MAUGIS)
             assert_array_equal(grip.radius(works, 10.0 ** rng.uniform(-9, 9, 100), 0.0, MAUGIS), plain)
             assert_array_equal(grip.radius(works, np.zeros(1), 0.5, MAUGIS), plain)

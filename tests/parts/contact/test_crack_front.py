@@ -47,13 +47,13 @@ def marched(hold_at, end, steps, radius=REST, edge=EDGE, work=W, below=0.05):
     return a[0], math.nan, energy
 
 
-def potential(a, load=0.0, travel=0.0, stiffness=0.0, work=W):
-    """Elastic energy of solid and machine, minus the load's work, minus adhesion; P = load + k (travel - delta)."""
+def potential(a, load=0.0, displacement=0.0, stiffness=0.0, work=W):
+    """Elastic energy of solid and spring, less the load's work, less adhesion; P = load + k (displacement - delta)."""
     if stiffness == math.inf:
-        delta = travel
+        delta = displacement
     else:
-        delta = (load + stiffness * travel + 0.5 * a**3) / (stiffness + 1.5 * a)
-    machine = 0.0 if stiffness in (0.0, math.inf) else 0.5 * stiffness * (travel - delta) ** 2
+        delta = (load + stiffness * displacement + 0.5 * a**3) / (stiffness + 1.5 * a)
+    machine = 0.0 if stiffness in (0.0, math.inf) else 0.5 * stiffness * (displacement - delta) ** 2
     solid = 0.75 * (a * delta**2 - 2.0 / 3.0 * a**3 * delta + 0.2 * a**5)
     return solid + machine - load * delta - math.pi * work * a * a
 
@@ -91,8 +91,12 @@ def test_detachment_comes_at_its_time(hold, time, clock):
 
 def release(a, hold):
     """G of the textbook formula, written another way than the module's."""
-    load, travel, stiffness = hold.load_before, hold.travel_before, hold.stiffness
-    delta = travel if stiffness == math.inf else (load + stiffness * travel + 0.5 * a**3) / (stiffness + 1.5 * a)
+    load, displacement, stiffness = hold.load_before, hold.displacement_before, hold.stiffness
+    delta = (
+        displacement
+        if stiffness == math.inf
+        else (load + stiffness * displacement + 0.5 * a**3) / (stiffness + 1.5 * a)
+    )
     return 0.75 * (delta - a * a) ** 2 / (2.0 * math.pi * a)
 
 
@@ -122,7 +126,7 @@ def test_a_fixed_control_takes_the_time_of_its_quadrature(hold, low, exponent):
     assert_allclose(out.radius if low > 1e-3 else low, low, rtol=1e-7, atol=0)
 
 
-def test_ramps_of_load_travel_and_work_agree_with_another_integrator():
+def test_ramps_of_load_displacement_and_work_agree_with_another_integrator():
     def hold(t0, t1):
         return Hold(0.3 * t0, 0.3 * t1, 0.2 - 0.5 * t0, 0.2 - 0.5 * t1, 0.7)
 
@@ -152,9 +156,9 @@ def test_ramps_of_load_travel_and_work_agree_with_another_integrator():
 def test_pull_off_force_grows_with_the_speed_of_a_hard_machine(speed, path, lowest):
     # the lowest loads are those of LSODA at 1e-11; its printed four digits agree with two other integrators
     rest, count = jkr.indentation_at_radius(REST, W, **SPHERE), 2000
-    travel = rest - path * np.arange(count + 1) / count
+    displacement = rest - path * np.arange(count + 1) / count
     a, loads = REST * ONE, []
-    for before, after in itertools.pairwise(travel):
+    for before, after in itertools.pairwise(displacement):
         hold = Hold(0.0, 0.0, before, after, math.inf)
         a = advance(a, (W, W), hold, EDGE, path / count / speed, **SPHERE, detached_below=1e-3).radius
         if np.isnan(a[0]):
@@ -186,24 +190,24 @@ def test_one_inner_step_is_of_order_five_per_unit_time():
 
 @pytest.mark.parametrize("stiffness", [0.0, 0.02, 1.0, 50.0, math.inf])
 def test_what_the_potential_loses_at_a_fixed_control_is_dissipated(stiffness):
-    for load, travel, start in ((-0.8, -0.6, 2.5), (0.5, 0.7, 0.9), (-0.1, 0.1, REST)):
+    for load, displacement, start in ((-0.8, -0.6, 2.5), (0.5, 0.7, 0.9), (-0.1, 0.1, REST)):
         load = 0.0 if stiffness == math.inf else load
-        hold = Hold(load, load, travel, travel, stiffness)
+        hold = Hold(load, load, displacement, displacement, stiffness)
         for duration in (1e-3, 0.3, 30.0):
             radius, _, energy = marched(lambda *_, h=hold: h, duration, 1, start)
-            lost = potential(start, load, travel, stiffness) - potential(radius, load, travel, stiffness)
+            lost = potential(start, load, displacement, stiffness) - potential(radius, load, displacement, stiffness)
             assert_allclose(energy, lost, rtol=1e-7, atol=1e-14)
 
 
-def test_energy_is_balanced_along_ramps_of_travel_and_work():
-    def travel(t):
+def test_energy_is_balanced_along_ramps_of_displacement_and_work():
+    def displacement(t):
         return 0.5 - 1.2 * t
 
     def work(t):
         return W * (1.0 + 0.5 * t)
 
     def hold(t0, t1):
-        return Hold(0.0, 0.0, travel(t0), travel(t1), 2.0)
+        return Hold(0.0, 0.0, displacement(t0), displacement(t1), 2.0)
 
     nodes, weights = np.polynomial.legendre.leggauss(3)
     a, energy, supplied = REST, 0.0, 0.0
@@ -211,11 +215,13 @@ def test_energy_is_balanced_along_ramps_of_travel_and_work():
         for node, weight in zip(nodes, weights, strict=True):
             t = 0.5 * (t0 + t1) + 0.5 * node * (t1 - t0)
             b = advance(a * ONE, (work(t0), work(t)), hold(t0, t), EDGE, t - t0, **SPHERE).radius[0]
-            delta = (2.0 * travel(t) + 0.5 * b**3) / (2.0 + 1.5 * b)
-            supplied += 0.5 * (t1 - t0) * weight * (2.0 * (travel(t) - delta) * -1.2 - math.pi * b * b * 0.5 * W)
+            delta = (2.0 * displacement(t) + 0.5 * b**3) / (2.0 + 1.5 * b)
+            supplied += 0.5 * (t1 - t0) * weight * (2.0 * (displacement(t) - delta) * -1.2 - math.pi * b * b * 0.5 * W)
         out = advance(a * ONE, (work(t0), work(t1)), hold(t0, t1), EDGE, t1 - t0, **SPHERE)
         a, energy = out.radius[0], energy + out.dissipated[0]
-    gained = potential(a, 0.0, travel(1.0), 2.0, work(1.0)) - potential(REST, 0.0, travel(0.0), 2.0, work(0.0))
+    gained = potential(a, 0.0, displacement(1.0), 2.0, work(1.0)) - potential(
+        REST, 0.0, displacement(0.0), 2.0, work(0.0)
+    )
     assert_allclose(energy, supplied - gained, rtol=1e-7, atol=0)
 
 
@@ -228,9 +234,11 @@ def test_an_infinitely_fast_edge_is_the_jkr_equilibrium(speed):
     load = rng.uniform(-0.99, 4.0, 300) * 1.5 * math.pi * work
     out = advance(np.full(300, start), (work, work), Hold(load, load), edge, 1.0, **SPHERE)
     assert_allclose(out.radius, jkr.radius_at_load(load, work, **SPHERE), rtol=1e-9, atol=0)
-    travel = rng.uniform(-3.0, 0.99, 300) * jkr.pull_off_indentation(work, **SPHERE)
-    out = advance(np.full(300, start), (work, work), Hold(0.0, 0.0, travel, travel, math.inf), edge, 1.0, **SPHERE)
-    assert_allclose(out.radius, jkr.radius_at_indentation(travel, work, **SPHERE), rtol=1e-9, atol=0)
+    displacement = rng.uniform(-3.0, 0.99, 300) * jkr.pull_off_indentation(work, **SPHERE)
+    out = advance(
+        np.full(300, start), (work, work), Hold(0.0, 0.0, displacement, displacement, math.inf), edge, 1.0, **SPHERE
+    )
+    assert_allclose(out.radius, jkr.radius_at_indentation(displacement, work, **SPHERE), rtol=1e-9, atol=0)
 
 
 def test_an_infinitely_fast_edge_lets_go_beyond_the_fold():
@@ -329,13 +337,15 @@ def test_one_clock_step_does_the_work_of_many():
     ten = lambda low, high: 10.0 ** rng.uniform(low, high, size)  # noqa: E731
     between = lambda low, high: rng.uniform(low, high, (2, size))  # noqa: E731
     start, stiffness = ten(-0.3, 0.5), rng.choice([0.0, 0.1, 1.0, 10.0, math.inf], size)
-    work, load, travel = W * between(-0.5, 2.0), between(-2.0, 3.0), between(-0.8, 1.0)
+    work, load, displacement = W * between(-0.5, 2.0), between(-2.0, 3.0), between(-0.8, 1.0)
     edge = Kinetics(W, ten(-2, 6), rng.uniform(0.1, 1.0, size), ten(-2, 6), rng.uniform(0.1, 1.0, size))
 
     def end(steps):
         a, time, energy = start, np.full(size, math.nan), np.zeros(size)
         for i in range(steps):
-            at = [[(1.0 - s) * x[0] + s * x[1] for s in (i / steps, (i + 1) / steps)] for x in (work, load, travel)]
+            at = [
+                [(1.0 - s) * x[0] + s * x[1] for s in (i / steps, (i + 1) / steps)] for x in (work, load, displacement)
+            ]
             hold = Hold(*at[1], *at[2], stiffness)
             out = advance(a, at[0], hold, edge, 1.0 / steps, **SPHERE, detached_below=0.01)
             assert (out.dissipated >= 0.0).all()

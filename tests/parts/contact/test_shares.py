@@ -11,7 +11,7 @@ from sim import analysis
 from sim.ensemble.simulate import run
 from sim.laws import jkr, reversible
 from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium, Lagging
+from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
@@ -28,7 +28,7 @@ def test_shares_and_what_is_left_add_up_to_one_in_every_member(ramp):
     lost, left = analysis.share_observables(ramp), analysis.observables(ramp)["area_ratio"]
     total = lost["lost_to_bonds"] + lost["lost_to_fluctuations"] + left
     np.testing.assert_allclose(total, 1.0, rtol=1e-15)
-    assert lost["lost_to_fluctuations"].dims == ("realization", "t")
+    assert lost["lost_to_fluctuations"].dims == ("member", "t")
 
 
 def test_bonds_alone_take_what_their_work_takes():
@@ -115,8 +115,8 @@ HELD = {
     "indentation": (Equilibrium, {"indentation": 2e-6}, lambda w: jkr.radius_at_indentation(2e-6, w, RADIUS, MODULUS)),
     "machine": (
         Equilibrium,
-        {"travel": 3e-6, "stiffness": 2e3},
-        lambda w: jkr.radius_at_travel(3e-6, 2e3, w, RADIUS, MODULUS),
+        {"displacement": 3e-6, "stiffness": 2e3},
+        lambda w: jkr.radius_at_displacement(3e-6, 2e3, w, RADIUS, MODULUS),
     ),
 }
 
@@ -148,10 +148,10 @@ def test_mean_stress_alone_takes_what_the_reversible_law_says():
         np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
 
 
-def test_what_a_lagging_edge_has_still_to_lose_is_no_ones_loss():
+def test_what_a_rate_dependent_edge_has_still_to_lose_is_no_ones_loss():
     """A jump of the speed breaks half of the bonds at once; the edge follows within a few records."""
     jump = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(0.0, 0.0, 1e-2, 1e-2))
-    part = Lagging(load=LOAD, front_speed=1e-4)
+    part = RateDependent(load=LOAD, front_speed=1e-4)
     population = bonds.Steady(critical_speed=1e-2)
     found = analysis.shares(run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform())))
     np.testing.assert_allclose(found["lost_to_fluctuations_mean"], 0.0, rtol=0, atol=1e-13)
@@ -162,7 +162,9 @@ def test_what_a_lagging_edge_has_still_to_lose_is_no_ones_loss():
     assert "lost_to_lag_mean" not in analysis.shares(run(scene(shear=shear.Uniform())))
 
 
-@pytest.mark.parametrize("contact", [Equilibrium(load=LOAD, reversible=0.02), Lagging(load=LOAD, front_speed=1e-3)])
+@pytest.mark.parametrize(
+    "contact", [Equilibrium(load=LOAD, reversible=0.02), RateDependent(load=LOAD, front_speed=1e-3)]
+)
 def test_shares_of_a_contact_that_lags_or_pays_for_its_stress_need_its_members(contact):
     few = scene(contact=contact, record=Record(per_member=False))
     with pytest.raises(ValueError, match="per_member = true"):
@@ -173,10 +175,10 @@ def test_shares_of_a_contact_that_lags_or_pays_for_its_stress_need_its_members(c
 
 MOVED = {
     "load": {"load": {"from": 4e-3, "to": -0.3e-3}},
-    "load, log": {"load": {"from": 1e-3, "to": 8e-3, "scale": "log", "trips": 2}},
+    "load, log": {"load": {"from": 1e-3, "to": 8e-3, "scale": "log", "cycles": 2}},
     "load in a table": {"load": {"time": [0.0, 0.1, 0.4], "value": [1e-3, 8e-3, -0.2e-3]}},
-    "indentation": {"indentation": {"from": 2e-6, "to": -0.4e-6, "trips": 1}},
-    "travel": {"travel": {"from": 3e-6, "to": -0.5e-6, "trips": 3}, "stiffness": 2e3},
+    "indentation": {"indentation": {"from": 2e-6, "to": -0.4e-6, "cycles": 1}},
+    "displacement": {"displacement": {"from": 3e-6, "to": -0.5e-6, "cycles": 3}, "stiffness": 2e3},
 }
 
 
@@ -198,7 +200,7 @@ def test_shares_of_a_moved_sphere_are_those_at_its_present_place(control):
     parts["shear"] = shear.Mean(spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6))
     dataset = run(scene(contact=Equilibrium(**MOVED[control]), **parts))
     moved = analysis.share_observables(dataset)
-    kind = next(name for name in ("load", "indentation", "travel") if name in MOVED[control])
+    kind = next(name for name in ("load", "indentation", "displacement") if name in MOVED[control])
     held = MOVED[control] | {kind: analysis.control(dataset).value.to_numpy()}
     for at in (0, 3, 10, 17, 20):
         still = run(scene(contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts))
@@ -211,9 +213,9 @@ def test_shares_of_a_moved_sphere_are_those_at_its_present_place(control):
 
 
 def test_jkrs_contact_comes_off_and_closes_by_the_same_policy():
-    course = {"from": 2e-6, "to": -3e-6, "trips": 1}
+    course = {"from": 2e-6, "to": -3e-6, "cycles": 1}
     for policy, closes in (("stay_open", False), ("reattach", True), ("stop", False)):
-        part = Equilibrium(indentation=course, on_detach=policy)
+        part = Equilibrium(indentation=course, after_pull_off=policy)
         dataset = run(scene(contact=part, bonds=bonds.Unbroken(), shear=shear.Uniform()))
         reference = analysis.reference_radii(dataset)["radius_jkr"].to_numpy()
         recorded = dataset["contact_radius"].to_numpy()
@@ -245,7 +247,7 @@ def test_a_swept_course_has_the_shares_of_its_points():
 
 
 def test_shares_of_a_moved_sphere_follow_from_its_statistics():
-    moved = {"contact": Equilibrium(load={"from": 4e-3, "to": 1e-3, "trips": 1})}
+    moved = {"contact": Equilibrium(load={"from": 4e-3, "to": 1e-3, "cycles": 1})}
     few, all_of_them = run(scene(record=Record(per_member=False), **moved)), run(scene(**moved))
     for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "lost_to_fluctuations_sem"):
         np.testing.assert_allclose(
@@ -262,7 +264,7 @@ def test_a_load_is_read_off_statistics_where_some_contacts_are_open():
 
 
 def test_shares_end_where_a_trajectory_stops():
-    part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, on_detach="stop")
+    part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, after_pull_off="stop")
     dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
     gone = dataset["contact_area"].isnull()
     assert 0 < int(gone.sum()) < gone.size
@@ -281,11 +283,11 @@ def test_a_swept_table_of_courses_has_no_area_ratio():
     assert bool(ratio[0].isnull().all()) and bool(ratio[1].notnull().all())
 
 
-@pytest.mark.parametrize("trips", [0, 2])
-@pytest.mark.parametrize("control", ["load", "indentation", "travel"])
-def test_control_is_that_of_the_scene(control, trips):
-    held = {control: {"from": 1e-6, "to": 3e-6, "scale": "log", "trips": trips}}
-    part = Equilibrium(**held, **({"stiffness": 2e3} if control == "travel" else {}))
+@pytest.mark.parametrize("cycles", [0, 2])
+@pytest.mark.parametrize("control", ["load", "indentation", "displacement"])
+def test_control_is_that_of_the_scene(control, cycles):
+    held = {control: {"from": 1e-6, "to": 3e-6, "scale": "log", "cycles": cycles}}
+    part = Equilibrium(**held, **({"stiffness": 2e3} if control == "displacement" else {}))
     dataset = run(scene(contact=part, clock=Clock(duration=0.4, step=0.02)))
     found = analysis.control(dataset)
     exact = [
@@ -293,4 +295,4 @@ def test_control_is_that_of_the_scene(control, trips):
     ]
     assert found.kind == control and found.changes
     np.testing.assert_allclose(found.value, exact, rtol=1e-12)
-    assert not analysis.is_stationary(dataset) and math.isinf(found.stiffness) == (control != "travel")
+    assert not analysis.is_stationary(dataset) and math.isinf(found.stiffness) == (control != "displacement")

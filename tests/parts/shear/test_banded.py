@@ -44,13 +44,13 @@ SPECTRA = {
 }
 
 
-def process_of(name, memory=None, tolerance=0.01, growth=None):
+def process_of(name, correlation=None, tolerance=0.01, amplitude=None):
     """The banded process of a spectrum, and the weights [J/m^2] and wavenumbers of all modes it stands for."""
     spectrum, points, poisson_ratio = SPECTRA[name]
     recipe = shear.Banded(
         spectrum=spectrum,
-        memory=memory or Slip(length=1.0),
-        growth=growth or Constant(),
+        correlation=correlation or Slip(length=1.0),
+        amplitude=amplitude or Constant(),
         cell=CELL,
         points=points,
         tolerance=tolerance,
@@ -136,7 +136,7 @@ def test_stationary_draws_follow_the_law_of_all_modes(name, tolerance):
 
 
 def test_one_ripple_is_exponentially_distributed():
-    part = shear.Banded(spectrum=Ripple(amplitude=1e5, wavelength=24e-6), memory=Slip(length=1.0), cell=CELL)
+    part = shear.Banded(spectrum=Ripple(amplitude=1e5, wavelength=24e-6), correlation=Slip(length=1.0), cell=CELL)
     sample = starts(part.process(G, 0.5, 1.0), 100_000)
     exact = 1e5**2 * 24e-6 / (16.0 * np.pi * G)
     assert kstest(sample, expon(scale=exact).cdf).pvalue > FIVE_SIGMA
@@ -168,7 +168,7 @@ def stepped(process, start, durations, seed=1):
     state = Fluctuation(np.zeros(25), np.ones(1), np.full((25, len(process.bands.weight)), float(start)))
     for step, duration in enumerate(durations, 1):
         state = process.advance(state, moved(step, 0.0, duration), UNLOADED, noise)
-    return state.amplitude.ravel()
+    return state.values.ravel()
 
 
 @pytest.mark.parametrize("durations", [(0.4,), (0.2, 0.2), (0.01, 0.09, 0.3)])
@@ -195,15 +195,15 @@ def test_a_step_of_any_length_has_the_exact_moments(freedom, ratio):
         assert abs(change.var() - spread) < 5.0 * np.sqrt((fourth + 2.0 * spread**2) / change.size) + rounding**2
 
 
-@pytest.mark.parametrize("memory", [Slip(length=1e-6), Wave(waves=1.0)])
-def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit(memory):
-    process, _, _ = process_of("self-affine", memory)
+@pytest.mark.parametrize("correlation", [Slip(length=1e-6), Wave(waves=1.0)])
+def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit(correlation):
+    process, _, _ = process_of("self-affine", correlation)
     noise = Noise(5, "shear", np.arange(20))
     first = process.start(moved(0), UNLOADED, noise)
     state = first
     for step in range(1, 4):
         state = process.advance(state, moved(step, 0.0), UNLOADED, noise)
-        assert np.array_equal(state.amplitude, first.amplitude)
+        assert np.array_equal(state.values, first.values)
         assert np.array_equal(state.energy, first.energy)
 
 
@@ -248,13 +248,13 @@ def check_joint(found, plain, weights, exponents):
 @pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1.0, 1e3, 1e6])
 @pytest.mark.parametrize("name", ["time", "slip", "wave", "diffusion"])
 def test_the_joint_law_of_two_times_is_that_of_all_modes(name, ratio):
-    memory = {"time": Time(time=1e-3), "slip": Slip(length=2e-6), "wave": Wave(waves=0.5)}
-    memory = (memory | {"diffusion": Diffusion(diffusivity=1e-9)})[name]
-    process, weights, wavenumbers = process_of("band", memory, tolerance=0.001)
+    correlation = {"time": Time(time=1e-3), "slip": Slip(length=2e-6), "wave": Wave(waves=0.5)}
+    correlation = (correlation | {"diffusion": Diffusion(diffusivity=1e-9)})[name]
+    process, weights, wavenumbers = process_of("band", correlation, tolerance=0.001)
     # the longest wave keeps e^(−ratio) of its amplitude
     path = {"slip": 2e-6, "wave": 0.5 * 2.0 * np.pi / wavenumbers.min()}.get(name, 0.0)
     duration = {"time": 1e-3, "diffusion": 1e9 / wavenumbers.min() ** 2}.get(name, 1.0)
-    exponents = ratio * (wavenumbers / wavenumbers.min()) ** memory.power
+    exponents = ratio * (wavenumbers / wavenumbers.min()) ** correlation.power
     plain = all_modes(weights, exponents, 20_000, np.random.default_rng(3))
     found = two_times(process, lambda step: moved(step, ratio * path, ratio * duration), 20_000)
     check_joint(found, plain, weights, exponents)
@@ -291,26 +291,26 @@ def march_energies(part, members, clock, motion, population=None, seed=5):
 
 @pytest.mark.parametrize("motion", [drive.Steady(speed=4e-3), drive.Ramp(start=1e-4, stop=2e-2, scale="log")])
 @pytest.mark.parametrize("kind", ["constant", "onset", "stress"])
-def test_growth_multiplies_the_unit_process_at_once(kind, motion):
+def test_amplitude_multiplies_the_unit_process_at_once(kind, motion):
     growths = {
         "constant": Constant(),
         "onset": Onset(speed=2e-3, width=0.3, floor=0.1),
         "stress": Stress(reference=1e5),
     }
-    growth, population = growths[kind], bonds.Steady(critical_speed=2e-3, stress=4e5)
-    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Wave(waves=1.0)}
+    amplitude, population = growths[kind], bonds.Steady(critical_speed=2e-3, stress=4e5)
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Wave(waves=1.0)}
     clock = Clock(duration=5e-3, step=1e-3)
     _, unit = march_energies(shear.Banded(**recipe), 3, clock, motion, population)
-    states, grown = march_energies(shear.Banded(**recipe, growth=growth), 3, clock, motion, population)
+    states, grown = march_energies(shear.Banded(**recipe, amplitude=amplitude), 3, clock, motion, population)
     for before, after, state in zip(unit, grown, states, strict=True):
         stress = population.shear_stress(state.bonds)
-        assert_allclose(after, before * growth.factor(state.speed, stress) ** 2, rtol=1e-14, atol=0)
+        assert_allclose(after, before * amplitude.factor(state.speed, stress) ** 2, rtol=1e-14, atol=0)
 
 
-def test_relaxing_growth_follows_the_law_of_all_modes_after_a_jump():
+def test_relaxing_amplitude_follows_the_law_of_all_modes_after_a_jump():
     # g is constant after the jump: equal rates keep the unit field's law, times g0² e^(−2s) + g1² (1 − e^(−2s))
-    growth = Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True)
-    process, weights, _ = process_of("self-affine", Time(time=1e-3), growth=growth)
+    amplitude = Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True)
+    process, weights, _ = process_of("self-affine", Time(time=1e-3), amplitude=amplitude)
     motion = drive.Table(time=(0.0, 1e-3, 1e-3, 1.0), speed=(1e-5, 1e-5, 1.0, 1.0))
     noise, found = Noise(4, "shear", np.arange(MEMBERS)), []
     times = (0.0, 1e-3, 1.2e-3, 1.7e-3, 9e-3)
@@ -329,9 +329,9 @@ def test_relaxing_growth_follows_the_law_of_all_modes_after_a_jump():
         assert kstest(sample / size, law).pvalue > FIVE_SIGMA
 
 
-def test_relaxing_growth_renews_with_the_mean_variance_of_the_ends_of_a_step():
-    growth = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
-    process, weights, _ = process_of("self-affine", Time(time=1e-3), growth=growth)
+def test_relaxing_amplitude_renews_with_the_mean_variance_of_the_ends_of_a_step():
+    amplitude = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
+    process, weights, _ = process_of("self-affine", Time(time=1e-3), amplitude=amplitude)
     ramp, times = drive.Ramp(start=5e-4, stop=2e-2), np.linspace(0.0, 4e-3, 4)
     noise, found = Noise(9, "shear", np.arange(MEMBERS)), []
     for run in range(50):
@@ -342,7 +342,7 @@ def test_relaxing_growth_renews_with_the_mean_variance_of_the_ends_of_a_step():
             state = process.advance(state, motion, UNLOADED, noise)
             energies.append(state.energy)
         found.append(energies)
-    squares = [growth.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]
+    squares = [amplitude.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]
     sizes = [squares[0]]
     for before, after in itertools.pairwise(squares):
         renewed = -math.expm1(-2.0 * times[1] / 1e-3)
@@ -352,18 +352,20 @@ def test_relaxing_growth_renews_with_the_mean_variance_of_the_ends_of_a_step():
 
 
 @pytest.mark.parametrize("relaxing", [False, True])
-@pytest.mark.parametrize("memory", [Time(time=2e-3), Slip(length=5e-6), Wave(waves=1.0), Diffusion(diffusivity=1e-9)])
-def test_members_restarts_and_records_leave_every_bit(memory, relaxing):
+@pytest.mark.parametrize(
+    "correlation", [Time(time=2e-3), Slip(length=5e-6), Wave(waves=1.0), Diffusion(diffusivity=1e-9)]
+)
+def test_members_restarts_and_records_leave_every_bit(correlation, relaxing):
     part = shear.Banded(
         spectrum=SPECTRA["self-affine"][0],
         cell=CELL,
-        memory=memory,
-        growth=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=relaxing),
+        correlation=correlation,
+        amplitude=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=relaxing),
     )
     parts = {
         "shear": part,
         "drive": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
-        "bonds": bonds.Counted(critical_speed=1e-2, healing=500.0, sites=40, stress=2e5, start_from="steady"),
+        "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=40, stress=2e5, start_from="steady"),
     }
     scenario, members = scene(5, 6, **parts), 5
     straight = list(march(scenario, np.arange(members)))
@@ -386,38 +388,38 @@ def test_members_restarts_and_records_leave_every_bit(memory, relaxing):
 @pytest.mark.parametrize("name", SPECTRA)
 def test_fixed_amplitudes_store_the_cells_mean_at_all_times(name):
     spectrum, points, _ = SPECTRA[name]
-    growth = Onset(speed=2e-3, width=0.3, floor=0.1)
+    amplitude = Onset(speed=2e-3, width=0.3, floor=0.1)
     part = shear.Banded(
         spectrum=spectrum,
         cell=CELL,
         points=points,
-        memory=Slip(length=1e-6),
-        growth=growth,
-        amplitudes="fixed",
+        correlation=Slip(length=1e-6),
+        amplitude=amplitude,
+        mode_amplitudes="fixed",
         tolerance=0.1,
     )
     states, found = march_energies(part, 2, Clock(duration=4e-3, step=1e-3), drive.Ramp(start=1e-4, stop=1e-2))
     mean = modes(spectrum, CELL, points).energies(G).sum()
     for state, energy in zip(states, found, strict=True):
         assert state.shear.energy.shape == (1,)
-        assert_allclose(energy, growth.factor(state.speed, 0.0)[0] ** 2 * mean, rtol=1e-12, atol=0)
+        assert_allclose(energy, amplitude.factor(state.speed, 0.0)[0] ** 2 * mean, rtol=1e-12, atol=0)
 
 
 def test_the_state_holds_one_number_a_band():
     process, _, _ = process_of("self-affine")
     state = process.start(moved(0), UNLOADED, Noise(1, "shear", np.arange(7)))
-    assert state.amplitude.shape == (7, len(process.bands.weight))
-    assert_allclose(state.energy, state.amplitude @ (0.5 * process.bands.weight), rtol=1e-14, atol=0)
+    assert state.values.shape == (7, len(process.bands.weight))
+    assert_allclose(state.energy, state.values @ (0.5 * process.bands.weight), rtol=1e-14, atol=0)
 
 
 def test_a_ripple_of_no_amplitude_stores_nothing():
-    part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, memory=Slip(length=1e-6))
+    part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, correlation=Slip(length=1e-6))
     _, found = march_energies(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=1e-3))
     assert np.all(found == 0.0)
 
 
 def banded(spectrum=SPECTRUM, **keys):
-    return shear.Banded(spectrum=spectrum, memory=Slip(length=1e-6), **({"cell": CELL} | keys))
+    return shear.Banded(spectrum=spectrum, correlation=Slip(length=1e-6), **({"cell": CELL} | keys))
 
 
 @pytest.mark.parametrize(
@@ -431,8 +433,8 @@ def banded(spectrum=SPECTRUM, **keys):
         (lambda: banded(cell=0.0), "cell.*must be above 0 m"),
         (lambda: banded(tolerence=0.1), "tolerence"),
         (
-            lambda: banded(amplitudes="fixed", growth=Stress(reference=1.0, relaxing=True)),
-            'use amplitudes = "gaussian"',
+            lambda: banded(mode_amplitudes="fixed", amplitude=Stress(reference=1.0, relaxing=True)),
+            'use mode_amplitudes = "gaussian"',
         ),
         (
             lambda: scene(shear=banded(points=8)),
@@ -458,13 +460,13 @@ def test_bad_input_is_refused_with_its_cure(wrong, words):
 
 
 @pytest.mark.verify
-@pytest.mark.parametrize("memory", ["slip", "wave"])
-def test_errors_of_a_thousand_seeds_are_standard_normal(tmp_path, memory):
+@pytest.mark.parametrize("correlation", ["slip", "wave"])
+def test_errors_of_a_thousand_seeds_are_standard_normal(tmp_path, correlation):
     """z-scores of mean, variance and covariance over 1000 seeds; their figure lies in the test's folder."""
     process, weights, wavenumbers = process_of(
-        "self-affine", {"slip": Slip(length=2e-6), "wave": Wave(waves=0.1)}[memory], tolerance=0.001
+        "self-affine", {"slip": Slip(length=2e-6), "wave": Wave(waves=0.1)}[correlation], tolerance=0.001
     )
-    kept = np.exp(-2e-6 * (wavenumbers / (0.2 * np.pi) if memory == "wave" else np.full(len(weights), 1 / 2e-6)))
+    kept = np.exp(-2e-6 * (wavenumbers / (0.2 * np.pi) if correlation == "wave" else np.full(len(weights), 1 / 2e-6)))
     draws, mean, variance, covariance = 2000, weights.sum(), np.sum(weights**2), np.sum(weights**2 * kept)
     # E[x²y²] less σ⁴ + 2 cov² is the joint cumulant Σ w⁴ (4 ρ² + 2 ρ⁴) of two squared moduli of correlation ρ²
     spreads = {
@@ -478,7 +480,7 @@ def test_errors_of_a_thousand_seeds_are_standard_normal(tmp_path, memory):
         found = {"mean": before, "variance": before**2 - variance, "covariance": before * after - covariance}
         for name, values in found.items():
             scores[name].append(values.mean() / np.sqrt(spreads[name] / draws))
-    draw_scores(scores, tmp_path / f"scores_{memory}.png")
+    draw_scores(scores, tmp_path / f"scores_{correlation}.png")
     for name, values in scores.items():
         values = np.array(values)
         assert abs(values.mean()) < 5.0 / np.sqrt(values.size), name
@@ -507,7 +509,7 @@ def draw_scores(scores, path):
 @pytest.mark.parametrize("tolerance", [0.1, 0.01])
 def test_the_law_holds_on_a_large_cell(tolerance):
     spectrum = SelfAffine(150e3, 0.8, longest=60e-6, rolloff=24e-6, shortest=CELL / 255)
-    process = shear.Banded(spectrum=spectrum, memory=Wave(waves=1.0), cell=CELL, tolerance=tolerance).process(
+    process = shear.Banded(spectrum=spectrum, correlation=Wave(waves=1.0), cell=CELL, tolerance=tolerance).process(
         G, 0.5, 1.0
     )
     weights, shapes = np.unique(modes(spectrum, CELL).energies(G), return_counts=True)

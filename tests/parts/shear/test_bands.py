@@ -82,14 +82,18 @@ def lack_of_autocorrelation(weights, rates, squares, own_rates, lags):
 
 
 @pytest.mark.parametrize("points", [41, 42])
-@pytest.mark.parametrize("memory", MEMORIES)
+@pytest.mark.parametrize("correlation", MEMORIES)
 @pytest.mark.parametrize("name", FAMILIES)
-def test_mean_and_variance_are_those_of_all_modes(name, memory, points):
+def test_mean_and_variance_are_those_of_all_modes(name, correlation, points):
     for poisson_ratio in (0.5, 0.3):
         weights, _ = listed(name, points, poisson_ratio)
         for tolerance in (0.3, 0.01):
             recipe = shear.Banded(
-                spectrum=FAMILIES[name], memory=MEMORIES[memory][0], cell=CELL, points=points, tolerance=tolerance
+                spectrum=FAMILIES[name],
+                correlation=MEMORIES[correlation][0],
+                cell=CELL,
+                points=points,
+                tolerance=tolerance,
             )
             bands = recipe.process(G, poisson_ratio, 1.0).bands
             for moment, found in ((1, bands.mean), (2, bands.variance)):
@@ -126,7 +130,7 @@ def test_every_other_error_is_the_one_told_and_within_the_tolerance(name, power)
 
 @pytest.mark.parametrize("power", [0, 1, 2])
 @pytest.mark.parametrize("name", ["band", "von karman 0.3", "self-affine 0"])
-def test_under_growth_that_relaxes_the_mean_follows_all_modes(name, power):
+def test_under_amplitude_that_relaxes_the_mean_follows_all_modes(name, power):
     weights, wavenumbers = listed(name)
     pairs, rates = Pairs(weights, wavenumbers, np.ones(len(weights))), (wavenumbers / 1e5) ** power
     lags = np.geomspace(1e-3 / rates.max(), 100.0 / rates.min(), 2000)
@@ -175,8 +179,8 @@ def test_any_pairs_are_grouped_within_the_tolerance(seed):
 
 
 def test_one_ripple_is_one_band_of_two_degrees_without_error():
-    for memory, _ in MEMORIES.values():
-        process = shear.Banded(spectrum=FAMILIES["ripple"], memory=memory, cell=CELL).process(G, 0.5, 1.0)
+    for correlation, _ in MEMORIES.values():
+        process = shear.Banded(spectrum=FAMILIES["ripple"], correlation=correlation, cell=CELL).process(G, 0.5, 1.0)
         assert process.bands.freedom.tolist() == [2.0]
         assert set(process.bands.errors.values()) == {0.0}
         assert_allclose(process.bands.weight, FAMILIES["ripple"].surface_energy(G), rtol=1e-14, atol=0)
@@ -353,7 +357,7 @@ def test_a_cell_without_modes_says_what_to_do(spectrum, points, cure):
 
 def test_a_longest_wave_beyond_the_cell_costs_what_the_cells_error_tells():
     spectrum = Band(RMS, longest=4 * CELL, shortest=10e-6)
-    recipe = functools.partial(shear.Banded, spectrum=spectrum, memory=Slip(length=1e-6))
+    recipe = functools.partial(shear.Banded, spectrum=spectrum, correlation=Slip(length=1e-6))
     short, long = (recipe(cell=side).process(G, 0.5, 1.0) for side in (CELL, 40 * CELL))
     exact = float(spectrum.surface_energy(G))
     for process in (short, long):

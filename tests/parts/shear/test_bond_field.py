@@ -83,7 +83,7 @@ def test_the_modes_hold_the_energy_of_frozen_and_varying_forces(mean, spread):
 
 
 def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_not():
-    # correlation of the amplitudes over one memory time: (f² + Var e^-1)/(f² + Var), f² = 0.64, Var = 0.36
+    # correlation of the amplitudes over one correlation time: (f² + Var e^-1)/(f² + Var), f² = 0.64, Var = 0.36
     field, noise = process(), Noise(2, "shear", np.arange(MEMBERS))
     carried = traction(-0.8, 0.6)
     first = field.start(moved(0), carried, noise)

@@ -1,4 +1,4 @@
-"""Fluctuations: stationarity, memory, growth, and the energy of their own map."""
+"""Fluctuations: stationarity, correlation, amplitude, and the energy of their own map."""
 
 import itertools
 
@@ -47,7 +47,7 @@ def energies(*arguments, **keywords):
 @pytest.mark.parametrize("name", MEMORIES)
 def test_modes_are_stationary_for_any_step(name, ratio):
     step, members = ratio * 1e-3, 400
-    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=MEMORIES[name])
+    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=MEMORIES[name])
     process, found = energies(part, members, Clock(duration=4 * step, step=step))
     pairs = process.modes.energies(G)
     error = np.sqrt(np.sum(pairs**2) / members)
@@ -59,7 +59,7 @@ def test_modes_are_stationary_for_any_step(name, ratio):
 @pytest.mark.parametrize("name", MEMORIES)
 def test_the_energy_forgets_with_twice_the_rate_of_the_amplitudes(name):
     members, step = 4000, 0.4e-3
-    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=MEMORIES[name])
+    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=MEMORIES[name])
     process, found = energies(part, members, Clock(duration=2 * step, step=step))
     pairs = process.modes.energies(G)
     rates = {
@@ -75,7 +75,7 @@ def test_the_energy_forgets_with_twice_the_rate_of_the_amplitudes(name):
 
 
 def test_a_contact_at_rest_keeps_its_pattern_under_slip_memory():
-    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, memory=Slip(length=1e-6))
+    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=1e-6))
     scenario, found = states(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=0.0))
     first, last = (scenario.process.maps(s.shear, s.position, 2) for s in (found[0], found[-1]))
     assert np.array_equal(first, last)
@@ -88,9 +88,9 @@ def test_the_energy_is_that_of_the_map_by_the_greens_function(points, amplitudes
         spectrum=SPECTRUM,
         cell=CELL,
         points=points,
-        memory=Slip(length=3e-6),
-        growth=Onset(speed=2e-3, width=0.3),
-        amplitudes=amplitudes,
+        correlation=Slip(length=3e-6),
+        amplitude=Onset(speed=2e-3, width=0.3),
+        mode_amplitudes=amplitudes,
     )
     scenario, found = states(part, 3, Clock(duration=4e-3, step=1e-3), drive.Ramp(start=1e-3, stop=5e-3))
     for state in found:
@@ -104,7 +104,9 @@ def test_the_energy_is_that_of_the_map_by_the_greens_function(points, amplitudes
 @pytest.mark.parametrize("amplitudes", ["gaussian", "fixed"])
 def test_a_frozen_pattern_moves_with_the_slider(amplitudes):
     spacing = CELL / 16
-    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=16, memory=Time(time=1e30), amplitudes=amplitudes)
+    part = shear.Mapped(
+        spectrum=SPECTRUM, cell=CELL, points=16, correlation=Time(time=1e30), mode_amplitudes=amplitudes
+    )
     clock = Clock(duration=3.0, step=1.0)
     scenario, found = states(part, 2, clock, drive.Steady(speed=spacing))
     maps = [scenario.process.maps(s.shear, np.full(2, s.position[0]), 2) for s in found]
@@ -113,7 +115,7 @@ def test_a_frozen_pattern_moves_with_the_slider(amplitudes):
 
 
 def test_mapped_and_modal_give_the_same_energy_number_for_number():
-    recipe = {"spectrum": SPECTRUM, "cell": CELL, "points": 12, "memory": Slip(length=3e-6)}
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "points": 12, "correlation": Slip(length=3e-6)}
     clock = Clock(duration=5e-3, step=1e-3)
     _, modal = energies(shear.Modal(**recipe), 3, clock)
     _, mapped = energies(shear.Mapped(**recipe), 3, clock)
@@ -125,8 +127,8 @@ def test_a_ripple_of_fixed_amplitude_stores_the_papers_energy():
     for angle, share in ((0.0, 1.0), (np.pi / 2, 2.0)):
         part = shear.Modal(
             spectrum=Ripple(amplitude=amplitude, wavelength=wavelength, angle=angle),
-            memory=Slip(length=1e-6),
-            amplitudes="fixed",
+            correlation=Slip(length=1e-6),
+            mode_amplitudes="fixed",
         )
         _, found = energies(part, 2, Clock(duration=3e-3, step=1e-3))
         exact = share * amplitude**2 * wavelength / (16.0 * np.pi * G)
@@ -135,31 +137,31 @@ def test_a_ripple_of_fixed_amplitude_stores_the_papers_energy():
 
 
 def test_fixed_phases_diffuse_by_twice_the_exponent():
-    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, memory=Time(time=1e-3), amplitudes="fixed")
+    part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=1e-3), mode_amplitudes="fixed")
     members = 200
     _, found = states(part, members, Clock(duration=1e-3, step=0.5e-3))
-    turns = found[1].shear.amplitude - found[0].shear.amplitude
+    turns = found[1].shear.values - found[0].shear.values
     assert abs(turns.var() - 1.0) < 5.0 * np.sqrt(2.0 / turns.size)
 
 
 @pytest.mark.parametrize("motion", [drive.Steady(speed=4e-3), drive.Ramp(start=1e-4, stop=2e-2, scale="log")])
-def test_growth_multiplies_the_field_at_once(motion):
+def test_amplitude_multiplies_the_field_at_once(motion):
     onset = Onset(speed=2e-3, width=0.3, floor=0.1)
-    recipe = {"spectrum": SPECTRUM, "cell": CELL, "memory": Slip(length=3e-6)}
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Slip(length=3e-6)}
     clock = Clock(duration=5e-3, step=1e-3)
     _, unit = energies(shear.Modal(**recipe), 3, clock, motion)
-    _scenario, grown = states(shear.Modal(**recipe, growth=onset), 3, clock, motion)
+    _scenario, grown = states(shear.Modal(**recipe, amplitude=onset), 3, clock, motion)
     for before, state in zip(unit, grown, strict=True):
         assert_allclose(state.shear.energy, before * onset.factor(state.speed, 0.0) ** 2, rtol=1e-14)
 
 
-def test_relaxing_growth_follows_the_exact_second_moment():
+def test_relaxing_amplitude_follows_the_exact_second_moment():
     # with g constant after a jump of the speed, the mean energy relaxes as 1 + (g^2 - 1) (1 - exp(-2 t/t_m))
     part = shear.Modal(
         spectrum=SPECTRUM,
         cell=CELL,
-        memory=Time(time=1e-3),
-        growth=Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True),
+        correlation=Time(time=1e-3),
+        amplitude=Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True),
     )
     motion = drive.Table(time=(0.0, 0.5e-3, 0.5e-3, 2.5e-3), speed=(1e-5, 1e-5, 1.0, 1.0))
     members, step = 3000, 0.5e-3
@@ -172,7 +174,7 @@ def test_relaxing_growth_follows_the_exact_second_moment():
     assert np.all(np.abs(found.mean(axis=1) - np.array(expected) * pairs.sum()) < 5.0 * error)
 
 
-def test_relaxing_growth_is_second_order_in_the_step():
+def test_relaxing_amplitude_is_second_order_in_the_step():
     onset = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
     ramp = drive.Ramp(start=5e-4, stop=6e-3)
     duration, time = 4e-3, 1e-3
@@ -180,9 +182,9 @@ def test_relaxing_growth_is_second_order_in_the_step():
     def mean_energy(steps):
         """The mean of the process, from the same two coefficients that the step uses."""
         times = np.linspace(0.0, duration, steps + 1)
-        growth = [onset.factor(ramp.motion(1, t, t, duration).speed, 0.0)[0] for t in times]
-        energy = growth[0] ** 2
-        for before, after in itertools.pairwise(growth):
+        amplitude = [onset.factor(ramp.motion(1, t, t, duration).speed, 0.0)[0] for t in times]
+        energy = amplitude[0] ** 2
+        for before, after in itertools.pairwise(amplitude):
             share = -np.expm1(-2.0 * duration / steps / time)
             energy += share * (0.5 * (before**2 + after**2) - energy)
         return energy
@@ -192,8 +194,8 @@ def test_relaxing_growth_is_second_order_in_the_step():
     assert_allclose(np.log2(changes[:-1] / changes[1:]), 2.0, atol=0.1)
 
 
-def test_stress_growth_follows_the_bonds():
-    part = shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), growth=Stress(reference=1e5))
+def test_stress_amplitude_follows_the_bonds():
+    part = shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=Stress(reference=1e5))
     population = bonds.Steady(critical_speed=2e-3, stress=4e5)
     process, found = energies(part, 1, Clock(duration=2e-3, step=1e-3), population=population)
     assert_allclose(found, process.energy * 2.0**2, rtol=1e-13)
@@ -203,29 +205,31 @@ def test_stress_growth_follows_the_bonds():
     ("wrong", "word"),
     [
         (
-            lambda: shear.Mean(spectrum=SPECTRUM, growth=Onset(speed=1.0, width=1.0, relaxing=True)),
+            lambda: shear.Mean(spectrum=SPECTRUM, amplitude=Onset(speed=1.0, width=1.0, relaxing=True)),
             'use model = "modal"',
         ),
         (
             lambda: shear.Modal(
                 spectrum=SPECTRUM,
-                memory=Time(time=1.0),
-                growth=Stress(reference=1.0, relaxing=True),
-                amplitudes="fixed",
+                correlation=Time(time=1.0),
+                amplitude=Stress(reference=1.0, relaxing=True),
+                mode_amplitudes="fixed",
             ),
             "gaussian",
         ),
         (
             lambda: scene(
                 shear=shear.Mapped(
-                    spectrum=Ripple(amplitude=1.0, wavelength=25e-6), cell=CELL, points=64, memory=Time(time=1.0)
+                    spectrum=Ripple(amplitude=1.0, wavelength=25e-6), cell=CELL, points=64, correlation=Time(time=1.0)
                 )
             ),
             "whole number of wavelengths",
         ),
         (
             lambda: scene(
-                shear=shear.Modal(spectrum=SPECTRUM, cell=CELL, memory=Time(time=1.0), growth=Stress(reference=1.0)),
+                shear=shear.Modal(
+                    spectrum=SPECTRUM, cell=CELL, correlation=Time(time=1.0), amplitude=Stress(reference=1.0)
+                ),
                 bonds=bonds.Unbroken(),
             ),
             "bonds.stress",
@@ -237,9 +241,9 @@ def test_depths_that_do_not_go_together_are_refused(wrong, word):
         wrong()
 
 
-def test_growth_at_rest_is_its_floor():
-    for growth, floor in ((Onset(speed=1e-3, width=0.3, floor=0.05), 0.05), (Constant(), 1.0)):
-        assert_allclose(growth.factor(np.zeros(1), np.zeros(1)), floor, rtol=1e-15)
+def test_amplitude_at_rest_is_its_floor():
+    for amplitude, floor in ((Onset(speed=1e-3, width=0.3, floor=0.05), 0.05), (Constant(), 1.0)):
+        assert_allclose(amplitude.factor(np.zeros(1), np.zeros(1)), floor, rtol=1e-15)
     assert Stress(reference=1e5).factor(np.zeros(1), np.zeros(1)) == 0.0
 
 
@@ -247,15 +251,15 @@ def test_growth_at_rest_is_its_floor():
 def test_a_banded_mean_that_relaxes_follows_that_of_all_modes(name):
     # many weak fast modes hold much of the mean and little of the variance: the bands must keep both
     onset = Onset(speed=1e-3, width=0.05, floor=0.0, relaxing=True)
-    memory = {"wave": Wave(waves=1.0), "diffusion": Diffusion(diffusivity=2e-9)}[name]
+    correlation = {"wave": Wave(waves=1.0), "diffusion": Diffusion(diffusivity=2e-9)}[name]
     recipe = {"spectrum": VonKarman(rms=150e3, length=2e-5, hurst=0.1), "cell": CELL, "points": 128}
     motion = drive.Table(time=(0.0, 0.1e-3, 0.1e-3, 10.0), speed=(1e-5, 1e-5, 1e-2, 1e-2))
-    process = scene(shear=shear.Banded(**recipe, memory=memory, growth=onset, tolerance=0.01)).process
-    modal = scene(shear=shear.Modal(**recipe, memory=memory, growth=onset)).process
+    process = scene(shear=shear.Banded(**recipe, correlation=correlation, amplitude=onset, tolerance=0.01)).process
+    modal = scene(shear=shear.Modal(**recipe, correlation=correlation, amplitude=onset)).process
     pairs, share = modal.modes.energies(G), 0.5 * process.bands.weight * process.bands.freedom
     for time in np.geomspace(1e-4, 3.0, 30):
         exponents = (
-            memory.exponents(q, motion.motion(1, 0.1e-3, 0.1e-3 + time, 10.0))
+            correlation.exponents(q, motion.motion(1, 0.1e-3, 0.1e-3 + time, 10.0))
             for q in (modal.wavenumber, process.bands.wavenumber)
         )
         exact, banded = (np.sum(w * -np.expm1(-2.0 * x)) for w, x in zip((pairs, share), exponents, strict=True))

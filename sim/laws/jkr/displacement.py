@@ -1,11 +1,11 @@
-"""The adhesive contact at a travel behind a machine of any stiffness: one compiled solver for all."""
+"""The adhesive contact at a displacement behind a machine of any stiffness: one compiled solver for all."""
 
 import math
 
 import numpy as np
 
-from sim.laws.jkr.machine import fold_level, fold_root
 from sim.laws.jkr.scales import adhesive_unit, grips_share
+from sim.laws.jkr.stiffness import fold_level, fold_root
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import cube_root
 
@@ -40,19 +40,19 @@ def _step(t, excess, second, third, fourth, fifth, sixth):
 
 
 @kernel("void(float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
-def _solve(travels, stiffnesses, works, sphere_radii, moduli, radii):
-    """See ``radius_at_travel``.
+def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
+    """See ``radius_at_displacement``.
 
     No branch but selections, no call and no loop that ends early: the compiler turns the whole body into
     vector instructions, which makes it fourteen times faster.
     """
     for i in range(radii.size):
-        travel, stiffness, work, sphere_radius, modulus = (
-            travels[i], stiffnesses[i], works[i], sphere_radii[i], moduli[i],
+        displacement, stiffness, work, sphere_radius, modulus = (
+            displacements[i], stiffnesses[i], works[i], sphere_radii[i], moduli[i],
         )  # fmt: skip
         unit = adhesive_unit(work, sphere_radius, modulus)
         depth = unit * (unit / sphere_radius)
-        sticks = work > 0.0 and depth > 1e-300 and travel / depth < 1e290  # else adhesion is lost in rounding
+        sticks = work > 0.0 and depth > 1e-300 and displacement / depth < 1e290  # else adhesion is lost in rounding
         unit = unit if sticks else sphere_radius
         depth = depth if sticks else sphere_radius
         contact = 4.0 / 3.0 * modulus * unit
@@ -61,7 +61,7 @@ def _solve(travels, stiffnesses, works, sphere_radii, moduli, radii):
         level = fold_level(root, grips, load) if sticks else 0.0
         root = root if sticks else 0.0
         last = level * (depth / grips)
-        excess = (travel - last) * (grips / depth) if last > -1e300 else grips * (travel / depth) - level
+        excess = (displacement - last) * (grips / depth) if last > -1e300 else grips * (displacement / depth) - level
         cube = root * root * root
         second = 6.0 * grips * root * root + load * root * (15.0 * cube - 18.0)
         third = 4.0 * grips * root + load * (20.0 * cube - 6.0) if sticks else 0.0
@@ -72,17 +72,17 @@ def _solve(travels, stiffnesses, works, sphere_radii, moduli, radii):
         for _ in range(5):
             t = _step(t, excess, second, third, fourth, fifth, load)
         known = excess >= 0.0 and stiffness >= 0.0 and sphere_radius > 0.0 and modulus > 0.0 and work < math.inf
-        known = known and 1e-300 < contact < math.inf and (excess < math.inf or travel == math.inf)
-        known = known and (sticks or excess > 0.0 or travel == 0.0 or stiffness == 0.0)
+        known = known and 1e-300 < contact < math.inf and (excess < math.inf or displacement == math.inf)
+        known = known and (sticks or excess > 0.0 or displacement == 0.0 or stiffness == 0.0)
         radii[i] = unit * (root + t) * (root + t) if known else math.nan
 
 
-def radius_at_travel(travel, stiffness, work, sphere_radius, modulus):
-    """Contact radius at a prescribed travel behind a machine of given stiffness.
+def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus):
+    """Contact radius at a prescribed displacement behind a machine of given stiffness.
 
     Parameters
     ----------
-    travel : float or array
+    displacement : float or array
         Delta = delta + P/k [m]; below 0 the machine pulls.
     stiffness : float or array
         k [N/m], 0 to inf.
@@ -96,8 +96,8 @@ def radius_at_travel(travel, stiffness, work, sphere_radius, modulus):
     Returns
     -------
     float or array
-        a [m]; nan below ``pull_off_travel`` and for a negative stiffness. At k = inf the radius at the
-        indentation Delta, at k = 0 the radius without load, for no travel can then press or pull. Where
+        a [m]; nan below ``pull_off_displacement`` and for a negative stiffness. At k = inf the radius at the
+        indentation Delta, at k = 0 the radius without load, for no displacement can then press or pull. Where
         w <= 0 Hertz's radius behind the machine, the root of ``a^2/R + 4 E* a^3/(3 R k) = Delta``.
 
     Notes
@@ -124,13 +124,13 @@ def radius_at_travel(travel, stiffness, work, sphere_radius, modulus):
 
     Examples
     --------
-    The same travel pulls a sphere off a stiff machine, not off a soft one:
+    The same displacement pulls a sphere off a stiff machine, not off a soft one:
 
-    >>> a = radius_at_travel(-9e-7, [100.0, 1e3, float("inf")], 0.042, 2e-3, 6.4e6)
+    >>> a = radius_at_displacement(-9e-7, [100.0, 1e3, float("inf")], 0.042, 2e-3, 6.4e6)
     >>> print("%.2e %.2e %.2e" % tuple(a))
     6.68e-05 3.83e-05 nan
     """
-    arrays = [np.asarray(value, dtype=float) for value in (travel, stiffness, work, sphere_radius, modulus)]
+    arrays = [np.asarray(value, dtype=float) for value in (displacement, stiffness, work, sphere_radius, modulus)]
     shape = np.broadcast(*arrays).shape
     flat = [array if array.size == 1 or array.shape == shape else np.broadcast_to(array, shape) for array in arrays]
     flat = [array.reshape(-1) for array in flat]

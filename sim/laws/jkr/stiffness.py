@@ -1,12 +1,12 @@
 """The adhesive contact behind a machine: a spring of stiffness k between the sphere and what moves it.
 
-A travel ``Delta = delta + P/k`` of the machine is the indentation and what the load shortens the
+A displacement ``Delta = delta + P/k`` of the machine is the indentation and what the load shortens the
 spring by. An infinite stiffness is an indentation; towards zero stiffness, with ``k Delta`` kept, it
-becomes a load, and without stiffness no travel can load the sphere: P = 0.
+becomes a load, and without stiffness no displacement can load the sphere: P = 0.
 
 Let a_g be the radius at which the contact at fixed grips ends, h = a_g^2/R and b = 4 E* a_g/3. With
 sqrt(a) = x sqrt(a_g) an equilibrium has ``delta = h (x^4 - 4x)`` and ``P = b h (x^6 - 6x^3)``, so that
-with g = k/(k + b) the travel is
+with g = k/(k + b) the displacement is
 
     ``g Delta/h = F(x) = g (x^4 - 4x) + (1 - g) (x^6 - 6x^3)``
 
@@ -57,8 +57,8 @@ def fold_level(root, grips, load):
 
 
 @law
-def pull_off_travel(stiffness, work, sphere_radius, modulus):
-    """Lowest travel that an adhesive contact bears behind a machine [m]; 0 where w <= 0.
+def pull_off_displacement(stiffness, work, sphere_radius, modulus):
+    """Lowest displacement that an adhesive contact bears behind a machine [m]; 0 where w <= 0.
 
     Parameters
     ----------
@@ -69,13 +69,13 @@ def pull_off_travel(stiffness, work, sphere_radius, modulus):
     -------
     float or array
         Delta [m], the indentation plus load/k of ``pull_off_at_stiffness``; ``pull_off_indentation``
-        at k = inf; -inf at k = 0, where no travel can pull. ``radius_at_travel`` is nan just below it.
+        at k = inf; -inf at k = 0, where no displacement can pull. ``radius_at_displacement`` is nan just below it.
 
     Examples
     --------
     The softer the machine, the further it must go back, though the contact itself ends sooner:
 
-    >>> stiff, soft = pull_off_travel([1e4, 100.0], 0.042, 2e-3, 6.4e6)
+    >>> stiff, soft = pull_off_displacement([1e4, 100.0], 0.042, 2e-3, 6.4e6)
     >>> print(f"{stiff:.2e} {soft:.2e}")
     -7.33e-07 -4.35e-06
     """
@@ -140,7 +140,7 @@ def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
 
     Notes
     -----
-    The travel of the equilibrium with radius a is least where ``P'(a) + k delta'(a) = 0``. That is
+    The displacement of the equilibrium with radius a is least where ``P'(a) + k delta'(a) = 0``. That is
     where the load is least (-3/2 pi w R) for k = 0, where the indentation is (5/9 of that load) for
     k = inf, and between the two otherwise.
 
@@ -157,12 +157,12 @@ def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
 
 
 @law
-def load_under_travel(radius, travel, stiffness, sphere_radius, modulus):
+def load_under_displacement(radius, displacement, stiffness, sphere_radius, modulus):
     """Load of any contact, in equilibrium or not, of given radius behind a machine [N].
 
     Parameters
     ----------
-    radius, travel, stiffness, sphere_radius, modulus : float or array
+    radius, displacement, stiffness, sphere_radius, modulus : float or array
         a [m], Delta [m], k [N/m] from 0 (no load) to inf (an indentation), R [m], E* [Pa].
 
     Notes
@@ -172,51 +172,51 @@ def load_under_travel(radius, travel, stiffness, sphere_radius, modulus):
 
     Examples
     --------
-    A machine as stiff as the contact takes half of the travel:
+    A machine as stiff as the contact takes half of the displacement:
 
-    >>> print(f"{load_under_travel(1.0, 1.0, [2.0, float('inf')], 1.0, 1.0).round(4)}")
+    >>> print(f"{load_under_displacement(1.0, 1.0, [2.0, float('inf')], 1.0, 1.0).round(4)}")
     [0.6667 1.3333]
     """
     punch = 2.0 * modulus * radius
     if not stiffness >= 0.0:
         return math.nan
     if stiffness == 0.0:
-        return 0.0 * travel * punch
-    return punch * (travel - radius * (radius / sphere_radius) / 3.0) / (1.0 + punch / stiffness)
+        return 0.0 * displacement * punch
+    return punch * (displacement - radius * (radius / sphere_radius) / 3.0) / (1.0 + punch / stiffness)
 
 
 @law
-def indentation_under_travel(radius, travel, stiffness, sphere_radius, modulus):
+def indentation_under_displacement(radius, displacement, stiffness, sphere_radius, modulus):
     """Indentation of any contact, in equilibrium or not, of given radius behind a machine [m].
 
     Parameters
     ----------
-    radius, travel, stiffness, sphere_radius, modulus : float or array
+    radius, displacement, stiffness, sphere_radius, modulus : float or array
         a [m], Delta [m], k [N/m] from 0 to inf, R [m], E* [Pa].
 
     Notes
     -----
-    ``delta = g Delta + (1 - g) a^2/(3R)`` with ``g = k/(k + 2 E* a)``: between the travel and the
+    ``delta = g Delta + (1 - g) a^2/(3R)`` with ``g = k/(k + 2 E* a)``: between the displacement and the
     depth to which an unloaded contact of that radius sinks, which is all that is left at k = 0.
 
     Examples
     --------
-    >>> print(f"{indentation_under_travel(1.0, 1.0, [2.0, float('inf')], 1.0, 1.0).round(4)}")
+    >>> print(f"{indentation_under_displacement(1.0, 1.0, [2.0, float('inf')], 1.0, 1.0).round(4)}")
     [0.6667 1.    ]
     """
     grips, load = grips_share(stiffness, 2.0 * modulus * radius)
     if not stiffness >= 0.0:
         return math.nan
-    return grips * travel + load * (radius * (radius / sphere_radius) / 3.0)
+    return grips * displacement + load * (radius * (radius / sphere_radius) / 3.0)
 
 
 @law
-def energy_release_rate_at_travel(radius, travel, stiffness, sphere_radius, modulus):
+def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_radius, modulus):
     """Elastic energy released per area by a shrinking contact behind a machine [J/m^2].
 
     Parameters
     ----------
-    radius, travel, stiffness, sphere_radius, modulus : float or array
+    radius, displacement, stiffness, sphere_radius, modulus : float or array
         a [m], Delta [m], k [N/m] from 0 to inf, R [m], E* [Pa].
 
     Notes
@@ -228,7 +228,7 @@ def energy_release_rate_at_travel(radius, travel, stiffness, sphere_radius, modu
     Examples
     --------
     >>> a = 1e-4
-    >>> between = energy_release_rate_at_travel(a, 1e-6, [0.0, 1e3, float("inf")], 2e-3, 6.4e6)
+    >>> between = energy_release_rate_at_displacement(a, 1e-6, [0.0, 1e3, float("inf")], 2e-3, 6.4e6)
     >>> print("%.3f %.3f %.3f" % tuple(between))
     0.113 0.134 0.163
     """
@@ -236,5 +236,5 @@ def energy_release_rate_at_travel(radius, travel, stiffness, sphere_radius, modu
     if not stiffness >= 0.0:
         return math.nan
     hertz = radius * (radius / sphere_radius)
-    missing = grips * (hertz - travel) + load * (2.0 / 3.0 * hertz)
+    missing = grips * (hertz - displacement) + load * (2.0 / 3.0 * hertz)
     return missing * modulus / (2.0 * math.pi * radius) * missing
