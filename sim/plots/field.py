@@ -62,7 +62,7 @@ def map_figure(dataset: xr.Dataset) -> Figure:
         )  # fmt: skip
     axes[0].set_ylabel(label("$y$", length.name))
     letter(list(axes))
-    then = f"$t$ = {engineering(float(stress['snapshot']), 's')}, $V$ = {engineering(speed_then, 'm/s')}"
+    then = f"$t$ = {engineering(float(stress['map_time']), 's')}, $V$ = {engineering(speed_then, 'm/s')}"
     axes[0].set_title(then.replace("-", "−"))
     return figure
 
