@@ -24,4 +24,5 @@ def test_the_cube_root_is_right_to_one_unit_in_the_last_place():
 
 def test_the_cube_root_of_special_numbers():
     assert_array_equal(root(np.array([0.0, np.inf, np.nan, -1.0, -np.inf])), [0.0, np.inf, np.nan, np.nan, np.nan])
-    assert_array_equal(root(np.array([1.0, 8.0, 27.0, 1e-3])), np.cbrt([1.0, 8.0, 27.0, 1e-3]))
+    # a cube of a float has its root exactly; numpy's own is a unit off at 27 on some machines
+    assert_array_equal(root(np.array([1.0, 8.0, 27.0, 1e-3])), [1.0, 2.0, 3.0, 0.1])

@@ -547,7 +547,7 @@ def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
     held = Equilibrium(
         displacement={"from": 1e-6, "to": -1.6e-5, "cycles": 2}, stiffness=340.0, after_pull_off="reattach"
     )
-    sites = bonds.Rate(critical_speed=1e-2, healing=2.0, area="carried")
+    sites = bonds.Rate(critical_speed=1e-2, rebinding_rate=2.0, area="carried")
     scenario = scene(1, 2000, contact=held, bonds=sites)
     states = list(march(scenario, np.arange(1)))
     radius = np.array([state.contact.radius[0] for state in states])
