@@ -305,7 +305,7 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             said.append(
                 f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
             )
-        if point.contact.lowest < 0.0 and point.varies["shear"]:
+        if point.contact.control.lowest < 0.0 and point.varies["shear"]:
             said.append("under tension detachment is a first passage: take clock steps well below the correlation")
         smallest = getattr(getattr(point.fluctuations, "spectrum", None), "support", (0.0,))[0]
         if hasattr(point.fluctuations, "cell") and 2.0 * math.pi > _cell(point) * smallest > 0.0:

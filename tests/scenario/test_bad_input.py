@@ -369,7 +369,7 @@ def test_cut_offs_out_of_order_and_logarithms_of_zero_are_told(refusal):
         f"x:{line_of('[shear.spectrum]')}: shear.spectrum: longest (6e-06 m) is shorter than rolloff"
     )
     (problem,) = refusal(**edited(('from = "10 um/s"', "from = 0")))
-    assert problem.startswith(f"x:{line_of('[drive]')}: drive: a logarithmic ramp cannot reach or pass zero")
+    assert problem.startswith(f"x:{line_of('[drive]')}: drive: a logarithmic course cannot reach or pass zero")
 
 
 def test_all_faults_come_in_one_pass_in_the_order_of_the_file(refusal):

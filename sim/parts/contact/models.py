@@ -5,7 +5,7 @@ or a table; ``sim.parts.contact.control`` says what a contact is under each.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -18,7 +18,7 @@ from sim.parts.contact.crack_front import Hold, Kinetics
 from sim.parts.contact.crack_front import advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
 from sim.parts.exchange import Motion
-from sim.units.course import held, lowest, value_at
+from sim.units.course import Course, Prescribed, Table, held, prescribed
 from sim.units.quantity import Quantity
 
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
@@ -67,23 +67,25 @@ class _Held:
             raise PydanticCustomError("control", said if self.stiffness is None else other)
         return self
 
+    @property
+    def control(self) -> Prescribed:
+        """The load, indentation or displacement over time."""
+        given = next(given for given in (self.load, self.indentation, self.displacement) if given is not None)
+        return prescribed(cast(float | Course | Table, given))
+
     def grip(self, time: float, duration: float) -> Grip:
         """How the sphere is held at a time of a run of ``duration`` [s]."""
+        return self._held_at(self.control.at(time, duration))
+
+    def _held_at(self, value: float) -> Grip:
         if self.load is not None:
-            return AtLoad(value_at(self.load, time, duration))
-        if self.indentation is not None:
-            return AtDisplacement(value_at(self.indentation, time, duration))
-        return AtDisplacement(value_at(self.displacement, time, duration), self.stiffness or math.inf)
+            return AtLoad(value)
+        return AtDisplacement(value, self.stiffness or math.inf)
 
     @property
     def changes(self) -> bool:
         """Whether what holds the sphere changes in time."""
-        return any(hasattr(control, "at") for control in (self.load, self.indentation, self.displacement))
-
-    @property
-    def lowest(self) -> float:
-        """The least load, indentation or displacement of the run."""
-        return min(lowest(control) for control in (self.load, self.indentation, self.displacement))
+        return self.control.changes
 
     def equilibrium_radius(self, work: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
         """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
