@@ -9,7 +9,7 @@ lost when the run is killed, a renamed part is not.
 import hashlib
 import importlib.metadata
 import json
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import netCDF4
 import numpy as np
@@ -22,11 +22,13 @@ from sim.laws import jkr
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
+from sim.scenario.sweep import Axis, written
 
 _DISC_ENERGIES = (
     ("disc_energy", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
     ("cross_energy", "energy of the map in the field of the mean stress, per area of the disc", "DeltaGamma_x"),
 )
+_FLAGS = "detached in_contact"
 _STATISTICS = {
     "mean": "ensemble mean of",
     "std": "standard deviation over the ensemble of",
@@ -34,7 +36,44 @@ _STATISTICS = {
 }
 
 
-def write_dataset(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
+class MemoryVariable(NamedTuple):
+    """A variable in memory, written to as a variable of a netCDF file is."""
+
+    dimensions: tuple[str, ...]
+    values: np.ndarray
+    attributes: dict[str, Any]
+
+    def __setitem__(self, place: Any, values: Any) -> None:
+        self.values[place] = values
+
+    def setncatts(self, attributes: dict[str, Any]) -> None:
+        self.attributes.update(attributes)
+
+
+class MemoryFile:
+    """A dataset in memory, filled by the calls that fill a netCDF file; no HDF5 behind it."""
+
+    def __init__(self) -> None:
+        self.sizes: dict[str, int] = {}
+        self.variables: dict[str, MemoryVariable] = {}
+        self.attributes: dict[str, Any] = {}
+
+    def createDimension(self, name: str, size: int) -> None:
+        self.sizes[name] = size
+
+    def createVariable(self, name: str, kind: Any, dimensions: tuple[str, ...], **storage: Any) -> MemoryVariable:
+        values = np.empty([self.sizes[size] for size in dimensions], object if kind is str else kind)
+        self.variables[name] = MemoryVariable(dimensions, values, {})
+        return self.variables[name]
+
+    def setncatts(self, attributes: dict[str, Any]) -> None:
+        self.attributes.update(attributes)
+
+
+File = netCDF4.Dataset | MemoryFile
+
+
+def write_dataset(file: File, plan: Plan, parts: Parts) -> None:
     """Fill an open netCDF file from all parts of a plan."""
     _dimensions(file, plan)
     _attributes(file, plan)
@@ -59,34 +98,32 @@ def _per_member(plan: Plan, variable: Variable) -> bool:
 
 
 def _variable(
-    file: netCDF4.Dataset, name: str, kind: Any, dimensions: tuple[str, ...], unit: str, long_name: str,
-    symbol: str = "", chunks: tuple[int, ...] | None = None,
-) -> netCDF4.Variable:  # fmt: skip
+    file: File, name: str, kind: Any, dimensions: tuple[str, ...], unit: str, long_name: str,
+    symbol: str = "", chunks: tuple[int, ...] | None = None, **more: Any,
+) -> Any:  # fmt: skip
     packed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True} if dimensions and kind is not str else {}
     variable = file.createVariable(name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed)
-    if unit:
-        variable.units = unit
-    variable.long_name = long_name
-    if symbol:
-        variable.symbol = symbol
+    attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
+    variable.setncatts({key: value for key, value in attributes.items() if not isinstance(value, str) or value})
     return variable
 
 
-def _dimensions(file: netCDF4.Dataset, plan: Plan) -> None:
+def _dimensions(file: File, plan: Plan) -> None:
     scene = plan.points[0]
     for axis in plan.scenario.sweep:
         file.createDimension(axis.name, len(axis.values))
         _sweep_coordinates(file, plan, axis)
     if plan.scenario.record.per_member and any(plan.varies(variable) for variable in VARIABLES):
         file.createDimension("member", plan.members)
-        variable = _variable(file, "member", "i4", ("member",), "1", "number of the ensemble member")
-        variable.standard_name = "realization"
+        variable = _variable(
+            file, "member", "i4", ("member",), "1", "number of the ensemble member", standard_name="realization"
+        )
         variable[:] = np.arange(plan.members)
     file.createDimension("t", scene.clock.records)
     _variable(file, "t", "f8", ("t",), "s", "time since the start", "t")[:] = scene.clock.times
 
 
-def _sweep_coordinates(file: netCDF4.Dataset, plan: Plan, axis: Any) -> None:
+def _sweep_coordinates(file: File, plan: Plan, axis: Axis) -> None:
     """The swept values as coordinates: numbers in SI, anything else as a label."""
     stride = int(np.prod([len(a.values) for a in plan.scenario.sweep[plan.scenario.sweep.index(axis) + 1 :]]))
     for position, key in enumerate(axis.keys):
@@ -110,15 +147,16 @@ def _label(value: Any) -> str:
 
 
 def scenario_json(scenario: Scenario) -> str:
-    """The resolved scenario, SI numbers throughout, as canonical JSON."""
+    """The resolved scenario as canonical JSON: SI numbers throughout, and the sweep as it was given."""
     dumped = TypeAdapter(Scenario).dump_python(scenario, by_alias=True, exclude={"source", "sweep"}, mode="json")
-    return json.dumps(dumped, sort_keys=True)
+    sweep = {"sweep": written(scenario.sweep)} if scenario.sweep else {}
+    return json.dumps(dumped | sweep, sort_keys=True, default=str)
 
 
-def _attributes(file: netCDF4.Dataset, plan: Plan) -> None:
-    scene, source = plan.scenario, plan.scenario.source
+def _attributes(file: File, plan: Plan) -> None:
+    scene, source = plan.scenario, plan.scenario.origin
     resolved = scenario_json(scene)
-    digest = hashlib.sha256((resolved + json.dumps([list(a.values) for a in scene.sweep], default=str)).encode())
+    digest = hashlib.sha256(resolved.encode())
     versions = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
     sim_version = importlib.metadata.version("sliding-sim")
     attributes = {
@@ -145,7 +183,7 @@ def _attributes(file: netCDF4.Dataset, plan: Plan) -> None:
     file.setncatts(attributes)
 
 
-def _scenario_variables(file: netCDF4.Dataset, plan: Plan) -> None:
+def _scenario_variables(file: File, plan: Plan) -> None:
     """Every number of the scenario that is the same at all points, as a 0-d variable."""
     tables = [quantities(point) for point in plan.points]
     swept = {key for axis in plan.scenario.sweep for key in axis.keys}
@@ -156,7 +194,7 @@ def _scenario_variables(file: netCDF4.Dataset, plan: Plan) -> None:
             variable[...] = value
 
 
-def _derived_variables(file: netCDF4.Dataset, plan: Plan) -> None:
+def _derived_variables(file: File, plan: Plan) -> None:
     """What readers of the file need beside the trajectories, at each point of the sweep."""
     derived: dict[str, tuple[str, str, str, list[float]]] = {}
 
@@ -188,10 +226,10 @@ def _derived_variables(file: netCDF4.Dataset, plan: Plan) -> None:
         variable = _variable(file, name, "f8", _sweep_names(plan), unit, long_name, symbol)
         variable[...] = np.reshape(values, _sweep_shape(plan)) if _sweep_names(plan) else values[0]
         if "error" in name:
-            file.setncattr(name, max(values, key=abs))
+            file.setncatts({name: max(values, key=abs)})
 
 
-def _trajectories(file: netCDF4.Dataset, plan: Plan, parts: Parts, recorded: Variable) -> None:
+def _trajectories(file: File, plan: Plan, parts: Parts, recorded: Variable) -> None:
     names, shape = _sweep_names(plan), _sweep_shape(plan)
     ones = (1,) * len(shape)
     kind = {"float64": "f8", "float32": "f4"}[plan.scenario.record.precision]
@@ -207,13 +245,10 @@ def _trajectories(file: netCDF4.Dataset, plan: Plan, parts: Parts, recorded: Var
     variables = {}
     for name, statistic in wanted.items():
         long_name = f"{_STATISTICS[statistic]} {recorded.long_name}" if statistic else recorded.long_name
+        flags: dict[str, Any] = {}
         if recorded.name == "in_contact" and not statistic:
-            kind = "i1"
-        variable = _variable(file, name, kind, dimensions, recorded.unit, long_name, recorded.symbol, chunks)
-        if kind == "i1":
-            variable.delncattr("units")
-            variable.flag_values = np.array([0, 1], "i1")
-            variable.flag_meanings = "detached in_contact"
+            kind, flags = "i1", {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
+        variable = _variable(file, name, kind, dimensions, recorded.unit, long_name, recorded.symbol, chunks, **flags)
         variables[name] = variable
     for number, point in enumerate(plan.points):
         where = np.unravel_index(number, shape) if shape else ()
@@ -255,7 +290,7 @@ def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
     return {"mean": mean, "std": deviation, "sem": deviation / np.sqrt(count)}
 
 
-def _maps(file: netCDF4.Dataset, plan: Plan, parts: Parts) -> None:
+def _maps(file: File, plan: Plan, parts: Parts) -> None:
     scene = plan.points[0]
     process = cast(MappedProcess, scene.process)
     points, cell = process.modes.points, process.modes.cell

@@ -8,7 +8,6 @@ import json
 import os
 import platform
 import shutil
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -18,12 +17,12 @@ import netCDF4
 import numpy as np
 
 from sim.engine import State, march, pack
-from sim.ensemble.netcdf import moments, write_dataset
+from sim.ensemble.netcdf import MemoryFile, moments, write_dataset
 from sim.ensemble.part_files import MemoryParts, PartFiles, Parts
 from sim.ensemble.plan import Plan, part_name, work
 from sim.ensemble.recorded import VARIABLES
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
-from sim.numerics.files import StoreTrouble, explained, sync_folder
+from sim.numerics.files import HDF5, StoreTrouble, explained, sync_folder
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.scenario import Scenario
 
@@ -86,7 +85,7 @@ def run(
         parts = PartFiles(folder)
         simulate(plan, parts, progress)
         with explained(target.parent):
-            _write_file(target, plan, parts)
+            _write_file(target, folder, plan, parts)
     return target
 
 
@@ -153,36 +152,23 @@ def _on_the_disc(point: Scenario, state: State, maps: np.ndarray) -> np.ndarray:
 def _in_memory(plan: Plan, progress: Progress | None) -> Any:
     import xarray
 
-    parts = MemoryParts()
+    parts, file = MemoryParts(), MemoryFile()
     simulate(plan, parts, progress)
-    file = netCDF4.Dataset("in-memory", "w", format="NETCDF4", memory=1)
     write_dataset(file, plan, parts)
-    content = file.close()
-    with netCDF4.Dataset("in-memory", "r", memory=content) as file:
-        return xarray.open_dataset(xarray.backends.NetCDF4DataStore(file)).load()
+    return xarray.Dataset(file.variables, attrs=file.attributes)
 
 
-def _write_file(target: Path, plan: Plan, parts: Parts) -> None:
-    """Make the dataset under a temporary name, sync it and rename it into place."""
-    descriptor, name = tempfile.mkstemp(prefix=f".{target.name}.", suffix=".tmp", dir=target.parent)
-    os.close(descriptor)
-    beside = Path(name)
-    try:
-        with netCDF4.Dataset(beside, "w", format="NETCDF4") as file:
-            write_dataset(file, plan, parts)
-        beside.chmod(0o666 & ~_umask())
-        with builtins.open(beside, "rb") as written:
-            os.fsync(written.fileno())
-        os.replace(beside, target)
-    finally:
-        beside.unlink(missing_ok=True)
+def _write_file(target: Path, folder: Path, plan: Plan, parts: Parts) -> None:
+    """Make the dataset beside the parts, sync it and rename it into place."""
+    from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK  # of who reads a dataset lazily in another thread
+
+    beside = folder / "dataset.nc"
+    with HDF5, NETCDF4_PYTHON_LOCK, netCDF4.Dataset(beside, "w", format="NETCDF4") as file:
+        write_dataset(file, plan, parts)
+    with builtins.open(beside, "rb") as written:
+        os.fsync(written.fileno())
+    os.replace(beside, target)
     sync_folder(target.parent)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 @contextlib.contextmanager
@@ -211,7 +197,8 @@ def open(path: str | os.PathLike) -> Any:
     """Open the dataset of a finished run lazily: an ``xarray.Dataset`` with named dimensions and units."""
     import xarray
 
-    return xarray.open_dataset(path, engine="netcdf4")
+    with HDF5:
+        return xarray.open_dataset(path, engine="netcdf4", lock=HDF5)
 
 
 def write_log(target: Path, began: float, arguments: list[str]) -> None:

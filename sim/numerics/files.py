@@ -4,11 +4,33 @@ import contextlib
 import errno
 import os
 import shutil
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
 # HDF5 reports trouble with its file as a RuntimeError
 _WRITE_TROUBLE = (OSError, RuntimeError)
+
+
+class _Lock:
+    """A reentrant lock of the process; pickled it is the lock of the process that reads it."""
+
+    def __init__(self) -> None:
+        lock = threading.RLock()
+        self.acquire, self.release = lock.acquire, lock.release
+
+    def __enter__(self) -> bool:
+        return self.acquire()
+
+    def __exit__(self, *trouble: object) -> None:
+        self.release()
+
+    def __reduce__(self) -> str:
+        return "HDF5"
+
+
+#: Held around every use of netCDF and HDF5, which crash when two threads call them at once.
+HDF5 = _Lock()
 
 
 class StoreTrouble(OSError):

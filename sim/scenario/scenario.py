@@ -1,6 +1,7 @@
 """A scenario: one of each part, a clock, and what must hold between them."""
 
 import math
+from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
@@ -74,7 +75,20 @@ class Scenario:
         ]
         if faults:
             raise ValidationError.from_exception_data("Scenario", faults)
+        if self.source.text and not self.source.parts:
+            self.source.parts.update(self._parts)
         return self
+
+    @property
+    def _parts(self) -> dict[str, Any]:
+        """Everything that decides about the run, the sweep included."""
+        return {item.name: getattr(self, item.name) for item in fields(self) if item.name != "source"}
+
+    @property
+    def origin(self) -> Source:
+        """The file that describes this scenario; of one that was changed in Python only the files it has read."""
+        source = self.source
+        return source if source.describes(self._parts) else Source(path=source.path, files=source.files)
 
     @cached_property
     def rest_radius(self) -> float:
@@ -150,7 +164,7 @@ class Scenario:
         for key, value in values.items():
             set_key(document, key, value)
             _forget_file(document, key)
-        document["source"] = self.source
+        document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
         files = Files(Path(self.source.path).parent, self.source.files)
         return TypeAdapter(Scenario).validate_python(document, context={"files": files})
 

@@ -11,12 +11,26 @@ _MOST_BYTES = 2**28
 
 @plain_dataclass(frozen=True)
 class Source:
-    """Where a scenario came from: the file's text, what was changed on top, and every file it names."""
+    """Where a scenario came from: the file's text, what was changed on top, and every file it names.
+
+    ``parts`` are those of the first scenario made from it, the one that text and overrides describe.
+    """
 
     path: str = ""
     text: str = ""
     overrides: dict[str, Any] = field(default_factory=dict)
     files: dict[str, str] = field(default_factory=dict)
+    parts: dict[str, Any] = field(default_factory=dict)
+
+    def describes(self, parts: dict[str, Any]) -> bool:
+        """Whether text and overrides give a scenario of these parts."""
+        return bool(self.text) and self.parts == parts
+
+    def changed(self, values: dict[str, Any]) -> "Source":
+        """The source of the same text with more overrides, which replace those of the keys inside theirs."""
+        inside = tuple(f"{key}." for key in values)
+        kept = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
+        return Source(self.path, self.text, kept | values, self.files)
 
 
 @plain_dataclass(frozen=True)

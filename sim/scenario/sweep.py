@@ -63,6 +63,13 @@ def read_sweep(sweep: Any) -> tuple[Axis, ...]:
     return axes
 
 
+def written(axes: tuple[Axis, ...]) -> Any:
+    """The sweep of a scenario file that has these axes: a list of tables of one zipped axis, else a table of lists."""
+    if len(axes) == 1 and len(axes[0].keys) > 1:
+        return [dict(zip(axes[0].keys, row, strict=True)) for row in axes[0].values]
+    return {axis.keys[0]: [row[0] for row in axis.values] for axis in axes}
+
+
 def sweep_axes(sweep: Any) -> tuple[tuple[Axis, ...], list[Fault]]:
     """The sound axes of a sweep and all of its faults, each with its path in the sweep and its cure."""
     if isinstance(sweep, tuple) and all(isinstance(axis, Axis) for axis in sweep):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 
+from sim.numerics.files import HDF5
 from sim.numerics.grid import Grid
 from sim.spectrum.periodogram import periodogram, radial_average
 from sim.spectrum.radial import PowerLaws, Rowed
@@ -106,7 +107,7 @@ def _read_netcdf(name: str, variable: str, spacing: float | None, context: Any) 
 
     path = file_path(name, context)
     try:
-        with xr.open_dataset(path, decode_times=False) as dataset:
+        with HDF5, xr.open_dataset(path, decode_times=False) as dataset:
             if variable not in dataset:
                 found = ", ".join(map(str, dataset.data_vars))[:80]
                 raise ValueError(f'there is no variable "{variable}" (found: {found}); name it by variable = "..."')

@@ -1,9 +1,11 @@
 """From parts to a dataset: names and units, equal bytes, and trouble with the disk."""
 
 import json
+import pickle
 import resource
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -212,3 +214,26 @@ def test_a_swept_key_may_keep_one_value():
     dataset = ensemble.run(scenario)
     assert dataset["contact_radius"].dims == ("radius", "load", "member", "t")
     assert_allclose(dataset["radius"], [2e-3, 2e-3])
+
+
+def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
+    scenarios = [sample(members=2, seed=seed) for seed in range(8)]
+    alone = [ensemble.run(scenario) for scenario in scenarios]
+
+    def whole(number):
+        with ensemble.open(ensemble.run(scenarios[number], tmp_path / f"{number}.nc")) as dataset:
+            return ensemble.run(scenarios[number]), dataset.load()
+
+    with ThreadPoolExecutor(4) as pool:
+        for expected, found in zip(alone, pool.map(whole, range(8)), strict=True):
+            for dataset in found:
+                xr.testing.assert_identical(dataset, expected)
+
+
+def test_datasets_can_be_pickled(tmp_path):
+    dataset = ensemble.run(sample())
+    xr.testing.assert_identical(pickle.loads(pickle.dumps(dataset)), dataset)
+    with ensemble.open(ensemble.run(sample(), tmp_path / "out.nc")) as lazy:
+        again = pickle.loads(pickle.dumps(lazy))
+        xr.testing.assert_identical(again.load(), dataset)
+        again.close()
