@@ -98,7 +98,8 @@ def test_shares_are_unknown_where_there_is_no_contact_at_rest():
 
 
 def test_shares_that_cannot_be_told_name_the_cure():
-    few = scene(bonds=bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100), record=Record(per_member=False))
+    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100)
+    few = scene(bonds=counted, record=Record(per_member=False))
     with pytest.raises(ValueError, match="per_member = true"):
         analysis.shares(run(few))
     controls = {"contact": [{"model": "equilibrium", "load": 1e-3}, {"model": "equilibrium", "indentation": 1e-6}]}
