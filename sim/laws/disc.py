@@ -17,7 +17,7 @@ import numpy as np
 import scipy.fft
 import scipy.special
 
-from sim.laws.halfspace import disc_displacement
+from sim.laws.halfspace import angular_compliance, disc_displacement
 from sim.numerics.grid import Grid
 
 # Below this argument the closed forms cancel, above it their power series do; 16 terms are exact there.
@@ -111,7 +111,8 @@ def marginal_factors(x):
 def _ripple(factors, amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio):
     amplitude, q, nu = (np.asarray(number, float) for number in (amplitude, wavenumber, poisson_ratio))
     mean, skew = factors(2.0 * q * np.asarray(radius, float))
-    turned = (1.0 - 0.5 * nu) * mean + 0.5 * nu * np.cos(2.0 * np.asarray(angle, float)) * skew
+    level, swing = angular_compliance(nu)
+    turned = level * mean - swing * np.cos(2.0 * np.asarray(angle, float)) * skew
     return amplitude**2 / (2.0 * math.pi * np.asarray(shear_modulus, float) * q) * turned
 
 
@@ -224,8 +225,9 @@ def _free_kernel(points, poisson_ratio):
     j1, h0, h1 = scipy.special.j1(x), scipy.special.struve(0, x), scipy.special.struve(1, x)
     mean = x * scipy.special.j0(x) + 0.5 * math.pi * x * (j1 * h0 - scipy.special.j0(x) * h1)
     skew = (qx**2 - qy**2) / q**2 * (mean - 2.0 * j1)
-    kernel = ((1.0 - 0.5 * poisson_ratio) * mean - 0.5 * poisson_ratio * skew) / q
-    kernel[0, 0] = (1.0 - 0.5 * poisson_ratio) * 0.5 * points
+    level, swing = angular_compliance(poisson_ratio)
+    kernel = (level * mean + swing * skew) / q
+    kernel[0, 0] = level * 0.5 * points
     kernel.flags.writeable = False
     return grid, kernel
 

@@ -19,7 +19,17 @@ import numpy as np
 import scipy.special
 
 from sim.numerics.grid import Grid
-from sim.numerics.jit import law
+from sim.numerics.jit import device, law
+
+# Above this parameter m the hypergeometric series lose digits near m = 1, below it the elliptic
+# integrals cancel near m = 0: measured, both hold 1e-14 on their side.
+_SWITCH = 0.9
+
+
+@device
+def _softness(cosine, poisson_ratio):
+    """``G q G_x(q) = 1 - nu cos^2 theta`` [1] of the cosine between wavevector and sliding direction."""
+    return 1.0 - poisson_ratio * (cosine * cosine)
 
 
 @law
@@ -42,7 +52,7 @@ def compliance(qx, qy, shear_modulus, poisson_ratio=0.5):
 
     Notes
     -----
-    ``G_x(q) = (1 - nu + nu qy^2/q^2) / (G q)``: MCD's ``(1 + qy^2/q^2) / (2 G q)`` at nu = 1/2.
+    ``G_x(q) = (1 - nu qx^2/q^2) / (G q)``: MCD's ``(1 + qy^2/q^2) / (2 G q)`` at nu = 1/2.
 
     Examples
     --------
@@ -55,8 +65,30 @@ def compliance(qx, qy, shear_modulus, poisson_ratio=0.5):
     q = math.hypot(qx, qy)
     if q == 0.0:
         return 0.0
-    sine = qy / q
-    return (1.0 - poisson_ratio + poisson_ratio * sine * sine) / (shear_modulus * q)
+    return _softness(qx / q, poisson_ratio) / (shear_modulus * q)
+
+
+def angular_compliance(poisson_ratio=0.5):
+    """Mean over the directions of G q G_x(q), and what multiplies cos 2 theta in it.
+
+    Parameters
+    ----------
+    poisson_ratio : float or array
+        nu [1].
+
+    Returns
+    -------
+    mean, swing : float or array
+        [1] of ``G_x(q) = (mean + swing cos 2 theta) / (G q)``, theta from the sliding direction: ``1 - nu/2``
+        and ``-nu/2``.
+
+    Examples
+    --------
+    >>> mean, swing = angular_compliance(0.5)
+    >>> print(mean + swing, compliance(1.0, 0.0, 1.0))
+    0.5 0.5
+    """
+    return 1.0 - 0.5 * poisson_ratio, -0.5 * poisson_ratio
 
 
 @law
@@ -148,11 +180,6 @@ def in_series(shear_modulus_1, poisson_ratio_1, shear_modulus_2, poisson_ratio_2
     inverse = 1.0 / shear_modulus_1 + 1.0 / shear_modulus_2
     share = poisson_ratio_1 / shear_modulus_1 + poisson_ratio_2 / shear_modulus_2
     return 1.0 / inverse, share / inverse
-
-
-# Above this parameter m the hypergeometric series lose digits near m = 1, below it the elliptic
-# integrals cancel near m = 0: measured, both hold 1e-14 on their side.
-_SWITCH = 0.9
 
 
 def _second(m):
@@ -346,8 +373,7 @@ def ripple_energy(amplitude, wavenumber, angle, shear_modulus, poisson_ratio=0.5
     >>> print(f"{ripple_energy(1.0, 1.0, 0.0, 1.0):.3f} {ripple_energy(1.0, 1.0, math.pi / 2, 1.0):.3f}")
     0.125 0.250
     """
-    cosine = math.cos(angle)
-    slope = 1.0 - poisson_ratio * cosine * cosine
+    slope = _softness(math.cos(angle), poisson_ratio)
     return amplitude * amplitude * slope / (4.0 * shear_modulus * wavenumber)
 
 
@@ -387,8 +413,7 @@ def masking_amplitude(work, wavelength, shear_modulus, angle=0.0, poisson_ratio=
     >>> print(f"{masking_amplitude(0.042, 4e-3 / 10, 0.5e6):.5g} Pa")
     51371 Pa
     """
-    cosine = math.cos(angle)
-    slope = 1.0 - poisson_ratio * cosine * cosine
+    slope = _softness(math.cos(angle), poisson_ratio)
     return math.sqrt(8.0 * math.pi * shear_modulus * work / (wavelength * slope))
 
 

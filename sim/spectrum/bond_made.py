@@ -1,4 +1,4 @@
-"""The spectrum that independent bonds make: each one's force, spread over a small disc."""
+"""Spectrum of the stress field of independent bonds, the force of each spread over a small disc."""
 
 import math
 from typing import Annotated, ClassVar, Literal
@@ -8,15 +8,21 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic.dataclasses import dataclass
 from scipy import special
 
+from sim.laws.disc import energy_factors
+from sim.spectrum.family import Factors
+from sim.spectrum.finite_contact import disc_sums
 from sim.spectrum.radial import Isotropic
 from sim.units.quantity import Quantity
 
 Array = NDArray[np.float64]
 
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
+_PHASE, _WEIGHTS = 0.25 * math.pi * (1 + _NODES), 0.25 * math.pi * _WEIGHTS
+
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class BondMade(Isotropic):
-    """The field of bonds at random places, each pulling on a disc of radius ``footprint``; its size follows the bonds.
+    """Field of bonds at random places, each pulling on a disc of radius ``footprint``; its size follows the bonds.
 
     Parameters
     ----------
@@ -41,8 +47,7 @@ class BondMade(Isotropic):
     footprint: Annotated[float, Quantity("m", "radius of the disc that a bond pulls on", "b", above=0, typical="1 nm")]
     model: Literal["bonds"] = "bonds"
 
-    support: ClassVar[tuple[float, float]] = (0.0, math.inf)
-    breaks: ClassVar[Array] = np.empty(0)
+    bond_made: ClassVar[bool] = True
 
     def stiffest(self, shear_modulus: float, poisson_ratio: float = 0.5) -> float:
         """Stiffness of the half-space under one bond [N/m], π²Gb/2 for an incompressible one.
@@ -75,6 +80,19 @@ class BondMade(Isotropic):
     def beyond(self, q: ArrayLike) -> Array:
         """Variance beyond wavenumber q [Pa²]."""
         return self.variance * self._outside(q)
+
+    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
+        """Integrals over discs, in real space, where the field ends: its spectrum oscillates."""
+        return disc_sums(self, radii, lambda radius: (self._overlap(factors, radius), 0.0))
+
+    def _overlap(self, factors: Factors, radius: float) -> float:
+        """``∫ C0 P dq``: that of J0(qs) q C/2π over q is the autocorrelation, the overlap of two footprints."""
+        least = min(self.footprint, radius)
+        distance = least * np.sin(_PHASE)  # half of it; the root at the end of the overlap becomes smooth
+        u, v = distance / radius, distance / self.footprint
+        disc = np.arccos(u) - (u * np.sqrt(1 - u * u) if factors is energy_factors else 0.0)
+        bond = np.arccos(v) - v * np.sqrt(1 - v * v)
+        return 16 / self.footprint**2 * float(np.sum(disc * bond * np.cos(_PHASE) * _WEIGHTS)) * least
 
     def _outside(self, q: ArrayLike) -> Array:
         x = np.asarray(q, float) * self.footprint

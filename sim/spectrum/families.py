@@ -21,7 +21,10 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 from scipy import special
 
+from sim.laws.halfspace import angular_compliance, ripple_energy
 from sim.spectrum.bond_made import BondMade
+from sim.spectrum.family import Factors
+from sim.spectrum.finite_contact import wave_sums
 from sim.spectrum.measured import Measured
 from sim.spectrum.pixels import gaussian_boxes
 from sim.spectrum.radial import Isotropic, PowerLaws, Rowed
@@ -64,7 +67,7 @@ class Ripple:
     angle: Angle = 0.0
     model: Literal["ripple"] = "ripple"
 
-    isotropic: ClassVar[bool] = False
+    bond_made: ClassVar[bool] = False
 
     @property
     def wavevector(self) -> tuple[float, float]:
@@ -73,19 +76,34 @@ class Ripple:
         return q * math.cos(self.angle), q * math.sin(self.angle)
 
     @property
+    def support(self) -> tuple[float, float]:
+        """Its wavenumber [rad/m], twice."""
+        q = 2 * math.pi / self.wavelength
+        return q, q
+
+    @property
     def variance(self) -> float:
         """Mean square of the stress [Pa²]."""
         return self.amplitude**2 / 2
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
-        """A ripple has no density; raises ValueError that says what to use."""
+        """Raise ValueError: a ripple has no density."""
         raise ValueError("a ripple has no density: all its variance lies at ±wavevector; use those two")
 
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> ArrayLike:
+    def pixels(self, step: float, reach: int) -> Array:
+        """Raise ValueError: a ripple has no density."""
+        return self.density(step, reach)
+
+    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
         """Mean energy per area [J/m²]: ``τ1² (1 - ν cos²θ) / (4 G q)``."""
-        q = 2 * math.pi / self.wavelength
-        softening = 1 - np.asarray(poisson_ratio, float) * math.cos(self.angle) ** 2
-        return self.amplitude**2 * softening / (4 * np.asarray(shear_modulus, float) * q)
+        return ripple_energy(self.amplitude, self.support[0], self.angle, shear_modulus, poisson_ratio)
+
+    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
+        """Integrals over discs of the density's two peaks, see ``Family``."""
+        q = self.support[0]
+        mean, skew = factors(2 * q * radii)
+        level = 2 * math.pi**2 * self.amplitude**2 / q
+        return level * mean, level * math.cos(2 * self.angle) * skew
 
 
 def _ordered(*wavelengths: tuple[str, float]) -> None:
@@ -222,13 +240,14 @@ class Gaussian(Isotropic):
     length: Length
     model: Literal["gaussian"] = "gaussian"
 
-    support: ClassVar[tuple[float, float]] = (0.0, math.inf)
-    breaks: ClassVar[Array] = np.empty(0)
-
     @property
     def variance(self) -> float:
         """Mean square of the stress [Pa²]."""
         return self.rms**2
+
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Wavenumbers [rad/m] between which the density varies."""
+        return 0.25 / self.length, 14.0 / self.length
 
     def radial_density(self, q: ArrayLike) -> Array:
         """Density C at wavenumber q [rad/m], in Pa² m²."""
@@ -279,13 +298,14 @@ class VonKarman(Isotropic):
     hurst: Annotated[float, Quantity("1", "Hurst exponent", "H", above=0, at_most=1)]
     model: Literal["von_karman"] = "von_karman"
 
-    support: ClassVar[tuple[float, float]] = (0.0, math.inf)
-    breaks: ClassVar[Array] = np.empty(0)
-
     @property
     def variance(self) -> float:
         """Mean square of the stress [Pa²]."""
         return self.rms**2
+
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Wavenumbers [rad/m] between which the density varies and a disc of this radius [m] stores energy."""
+        return 0.25 / self.length, 1e13 / min(self.length, radius)
 
     def radial_density(self, q: ArrayLike) -> Array:
         """Density C at wavenumber q [rad/m], in Pa² m²."""
@@ -344,8 +364,10 @@ class AnisotropicGaussian:
     angle: Angle = 0.0
     model: Literal["anisotropic_gaussian"] = "anisotropic_gaussian"
 
-    isotropic: ClassVar[bool] = False
     support: ClassVar[tuple[float, float]] = (0.0, math.inf)
+    breaks: ClassVar[Array] = np.empty(0)
+    wavevector: ClassVar[None] = None
+    bond_made: ClassVar[bool] = False
 
     @property
     def variance(self) -> float:
@@ -357,15 +379,15 @@ class AnisotropicGaussian:
         level = np.pi * self.length_x * self.length_y * self.variance
         return level * np.exp(-self._exponent(np.asarray(qx, float), np.asarray(qy, float)))
 
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> ArrayLike:
+    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
         """Mean energy per area [J/m²] stored in an infinite half-space (see Notes)."""
         a, b, cosine = self.length_x, self.length_y, math.cos(self.angle)
         scale = self.variance * a * b / (3 * math.sqrt(math.pi))
         along = scale * b**2 * special.elliprd(0.0, a**2, b**2)
         across = scale * a**2 * special.elliprd(0.0, b**2, a**2)
-        turned = along * cosine**2 + across * (1 - cosine**2)
-        modulus, nu = np.asarray(shear_modulus, float), np.asarray(poisson_ratio, float)
-        return (along + across - nu * turned) / (2 * modulus)
+        level, swing = angular_compliance(np.asarray(poisson_ratio, float))
+        turned = swing * (along - across) * (2 * cosine**2 - 1)
+        return (level * (along + across) + turned) / (2 * np.asarray(shear_modulus, float))
 
     @functools.cached_property
     def _form(self) -> tuple[float, float, float]:
@@ -378,10 +400,27 @@ class AnisotropicGaussian:
         xx, xy, yy = self._form
         return xx * qx**2 + 2 * xy * qx * qy + yy * qy**2
 
-    def boxes(self, x_edges: Array, y_edges: Array) -> Array:
-        """Variance [Pa²] in each rectangle of a wavevector lattice, shape (columns, rows)."""
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Wavenumbers [rad/m] between which the density varies."""
+        both = self.length_x, self.length_y
+        return 0.25 / max(both), 14.0 / min(both)
+
+    def harmonics(self, q: Array) -> tuple[Array, Array]:
+        """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
+        a, b = self.length_x, self.length_y
+        level = 2 * math.pi**2 * a * b * self.variance * np.exp(-((min(a, b) * q) ** 2) / 4)
+        bend = (a - b) * (a + b) / 8 * q**2
+        return level * special.ive(0, bend), -level * special.ive(1, bend) * math.cos(2 * self.angle)
+
+    def pixels(self, step: float, reach: int) -> Array:
+        """Variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
         level = self.variance * self.length_x * self.length_y / (4 * math.pi)
-        return level * gaussian_boxes(self._form, x_edges, y_edges)
+        edges = step * (np.arange(-reach, reach + 2) - 0.5)
+        return level * gaussian_boxes(self._form, edges, edges[reach:])
+
+    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
+        """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
+        return wave_sums(self, factors, radii)
 
 
 #: Any spectrum, told apart in a scenario by its ``model``.

@@ -12,22 +12,20 @@ the overlap integral over the autocorrelation in another order, and one-dimensio
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import special
 from scipy.interpolate import CubicSpline
 
-from sim.laws.disc import energy_factors, marginal_factors, ripple_energy, ripple_marginal_energy
-from sim.spectrum.bond_made import BondMade
-from sim.spectrum.families import AnisotropicGaussian, Gaussian, Ripple, Spectrum, VonKarman
+from sim.laws.disc import energy_factors, marginal_factors
+from sim.laws.halfspace import angular_compliance
+from sim.spectrum.family import Factors, Family
 
 Array = NDArray[np.float64]
-Factors = Callable[[Array], tuple[Array, Array]]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
-_FINE_NODES, _FINE_WEIGHTS = np.polynomial.legendre.leggauss(80)
 
 #: P and S oscillate like cos(x)/x: followed within this distance of x = 0 and of each break of the spectrum, and
 #: faded out beyond over a length so large that nothing of a smooth spectrum is left of the oscillation.
@@ -35,15 +33,34 @@ _FOLLOWED, _FADING = 60.0, 10.0
 #: Beyond this x only the two ends of a spectrum are followed, not the kinks of its rows.
 _LAST_KINK = 3000.0
 
+#: Points of the splines over ln a, from 1e-4 to 1 sphere radii. Good to 1e-8 for smooth spectra, 1e-5 for a broad
+#: power law, 3e-5 for a band and 3e-3 for one a few per cent wide: its share oscillates with the waves in the contact.
+_POINTS, _DECADES = 513, 4
 
-def disc_energy(
-    spectrum: Spectrum, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
-) -> ArrayLike:
+
+class Waves(Protocol):
+    """What a quadrature over wavenumbers reads of a spectrum."""
+
+    @property
+    def breaks(self) -> Array:
+        """Wavenumbers [rad/m] where the density jumps or kinks."""
+
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
+
+    def harmonics(self, q: Array) -> tuple[Array, Array]:
+        """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
+
+    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+        """Mean elastic energy per area of an infinite half-space [J/m²]."""
+
+
+def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
     """Mean elastic energy per area that a fluctuating shear stress stores on a disc of contact.
 
     Parameters
     ----------
-    spectrum : Spectrum
+    spectrum : Family
         Any family of ``sim.spectrum``.
     radius : float or array
         a [m]; 0 stores nothing, inf is the infinite plane.
@@ -71,16 +88,17 @@ def disc_energy(
     --------
     Patches of a tenth of the radius store 3.6 % less than on the infinite plane:
 
+    >>> from sim.spectrum import Gaussian
     >>> patches = Gaussian(rms=1.0, length=0.1)
     >>> print(f"{disc_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.5f}")
     0.96410
     """
-    return _on_disc(energy_factors, ripple_energy, spectrum, radius, shear_modulus, poisson_ratio)
+    return _on_disc(energy_factors, spectrum, radius, shear_modulus, poisson_ratio)
 
 
 def marginal_energy(
-    spectrum: Spectrum, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
-) -> ArrayLike:
+    spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+) -> Array:
     """Mean energy that a unit of new contact area stores at the edge of a growing disc: dE/dA.
 
     Parameters
@@ -102,88 +120,65 @@ def marginal_energy(
     --------
     The deficit of the whole disc comes from its edge; a unit of new area lacks half of it:
 
+    >>> from sim.spectrum import Gaussian
     >>> patches = Gaussian(rms=1.0, length=0.1)
     >>> print(f"{1 - marginal_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.4f}")
     0.0180
     """
-    return _on_disc(marginal_factors, ripple_marginal_energy, spectrum, radius, shear_modulus, poisson_ratio)
+    return _on_disc(marginal_factors, spectrum, radius, shear_modulus, poisson_ratio)
 
 
 def _on_disc(
-    factors: Factors,
-    ripple: Callable[..., Array],
-    spectrum: Spectrum,
-    radius: ArrayLike,
-    shear_modulus: ArrayLike,
-    poisson_ratio: ArrayLike,
-) -> ArrayLike:
+    factors: Factors, spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike
+) -> Array:
     radii = np.asarray(radius, float)
     if not np.all(radii >= 0.0):
         raise ValueError("the radius of a disc must be at least zero; give detached contacts the radius 0")
-    modulus, nu = np.asarray(shear_modulus, float), np.asarray(poisson_ratio, float)
-    if isinstance(spectrum, Ripple):
-        q = 2 * math.pi / spectrum.wavelength
-        return ripple(spectrum.amplitude, q, spectrum.angle, radii, modulus, nu)
-    sums = np.array([_sums(factors, spectrum, a) for a in radii.ravel().tolist()])
-    mean, skew = sums.T.reshape(2, *radii.shape)
-    return ((1 - 0.5 * nu) * mean + 0.5 * nu * skew) / (4 * math.pi**3 * modulus)
+    mean, skew = spectrum.on_disc(factors, radii)
+    level, swing = angular_compliance(np.asarray(poisson_ratio, float))
+    return (level * mean - swing * skew) / (4 * math.pi**3 * np.asarray(shear_modulus, float))
 
 
-def _sums(factors: Factors, spectrum: Any, radius: float) -> tuple[float, float]:
-    """``integral of C0 P dq`` and ``integral of C2 S dq`` for one disc."""
-    if radius == 0.0:
-        return 0.0, 0.0
-    if math.isinf(radius):
-        at_zero, at_one = (4 * math.pi**3 * float(spectrum.surface_energy(1.0, nu)) for nu in (0.0, 1.0))
-        return at_zero, 2 * at_one - at_zero
-    if isinstance(spectrum, BondMade):
-        return _bond_sum(factors, spectrum.footprint, radius), 0.0
-    q, step = _nodes(spectrum, radius)
-    x = 2 * radius * q
-    followed = _window(spectrum, radius, x)
-    mean, skew = factors(x)
-    # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
-    limit = 4.0 / x if factors is energy_factors else 2.0 / x
-    mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
-    skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
-    level, lean = _harmonics(spectrum, q)
-    return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
+def disc_sums(spectrum: Waves, radii: Array, one: Callable[[float], tuple[float, float]]) -> tuple[Array, Array]:
+    """``∫ C0 P dq`` and ``∫ C2 S dq`` for discs of any radius, by ``one`` for those between 0 and infinity."""
+
+    def sums(radius: float) -> tuple[float, float]:
+        if radius == 0.0:
+            return 0.0, 0.0
+        if math.isinf(radius):
+            at_zero, at_one = (4 * math.pi**3 * float(spectrum.surface_energy(1.0, nu)) for nu in (0.0, 1.0))
+            return at_zero, 2 * at_one - at_zero
+        return one(radius)
+
+    mean, skew = np.array([sums(radius) for radius in radii.ravel().tolist()]).reshape(-1, 2).T
+    return mean.reshape(radii.shape), skew.reshape(radii.shape)
 
 
-def _harmonics(spectrum: Any, q: Array) -> tuple[Array, Array]:
-    """``integral of C`` and ``integral of C cos(2 theta)`` over the directions, at wavenumber q."""
-    if not isinstance(spectrum, AnisotropicGaussian):
-        return 2 * math.pi * spectrum.radial_density(q), np.zeros(())
-    a, b = spectrum.length_x, spectrum.length_y
-    level = 2 * math.pi**2 * a * b * spectrum.variance * np.exp(-((min(a, b) * q) ** 2) / 4)
-    bend = (a - b) * (a + b) / 8 * q**2
-    return level * special.ive(0, bend), -level * special.ive(1, bend) * math.cos(2 * spectrum.angle)
+def wave_sums(spectrum: Waves, factors: Factors, radii: Array) -> tuple[Array, Array]:
+    """``∫ C0 P dq`` and ``∫ C2 S dq`` by quadrature over wavenumbers, for discs of given radii [m]."""
+
+    def one(radius: float) -> tuple[float, float]:
+        q, step = _nodes(spectrum, radius)
+        x = 2 * radius * q
+        followed = _window(spectrum, radius, x)
+        mean, skew = factors(x)
+        # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
+        limit = 4.0 / x if factors is energy_factors else 2.0 / x
+        mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
+        skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
+        level, lean = spectrum.harmonics(q)
+        return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
+
+    return disc_sums(spectrum, radii, one)
 
 
-def _breaks(spectrum: Any) -> Array:
-    """Wavenumbers at which the density jumps or kinks."""
-    return np.asarray(getattr(spectrum, "breaks", ()), float)
-
-
-def _reach(spectrum: Any, radius: float) -> tuple[float, float]:
-    """Wavenumbers below which nothing varies, and beyond which nothing is left of the integrals."""
-    if isinstance(spectrum, Gaussian):
-        return 0.25 / spectrum.length, 14.0 / spectrum.length
-    if isinstance(spectrum, AnisotropicGaussian):
-        both = spectrum.length_x, spectrum.length_y
-        return 0.25 / max(both), 14.0 / min(both)
-    if isinstance(spectrum, VonKarman):
-        return 0.25 / spectrum.length, 1e13 / min(spectrum.length, radius)
-    return spectrum.support
-
-
-def _nodes(spectrum: Any, radius: float) -> tuple[Array, Array]:
+def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:
     """Wavenumbers and steps of a composite Gauss-Legendre sum over all q that matter."""
-    low, high = _reach(spectrum, radius)
-    start = low if len(_breaks(spectrum)) else min(low, 0.5 / radius)
+    low, high = spectrum.reach(radius)
+    start = low if spectrum.breaks.size else min(low, 0.5 / radius)
     halves = math.ceil(2 * math.log2(high / start))
-    edges: list[ArrayLike] = [_breaks(spectrum), start * 2.0 ** (0.5 * np.arange(halves)), [high]]
-    if not len(_breaks(spectrum)):
+    edges: list[ArrayLike] = [spectrum.breaks, start * 2.0 ** (0.5 * np.arange(halves)), [high]]
+    if not spectrum.breaks.size:
         edges.append([0.0])
     for begin, end in _followed(spectrum, radius):
         begin, end = max(begin - 6 * _FADING, 0.0), end + 6 * _FADING
@@ -195,9 +190,9 @@ def _nodes(spectrum: Any, radius: float) -> tuple[Array, Array]:
     return (edge[:-1, None] + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
 
 
-def _followed(spectrum: Any, radius: float) -> list[tuple[float, float]]:
+def _followed(spectrum: Waves, radius: float) -> list[tuple[float, float]]:
     """Intervals of x = 2qa in which the oscillation of P and S is followed, increasing and apart."""
-    x = 2 * radius * _breaks(spectrum)
+    x = 2 * radius * spectrum.breaks
     near = np.concatenate([[0.0], x[x < _LAST_KINK], x[:1], x[-1:]])
     intervals: list[tuple[float, float]] = []
     for begin, end in zip(np.sort(near) - _FOLLOWED, np.sort(near) + _FOLLOWED, strict=True):
@@ -207,32 +202,13 @@ def _followed(spectrum: Any, radius: float) -> list[tuple[float, float]]:
     return intervals
 
 
-def _window(spectrum: Any, radius: float, x: Array) -> Array:
+def _window(spectrum: Waves, radius: float, x: Array) -> Array:
     """1 where the oscillation of P and S is followed, falling smoothly to 0 elsewhere."""
     followed = np.zeros_like(x)
     for number, (begin, end) in enumerate(_followed(spectrum, radius)):
         rise = special.erfc((begin - x) / _FADING) if number else 2.0
         followed += 0.25 * rise * special.erfc((x - end) / _FADING)
     return followed
-
-
-def _bond_sum(factors: Factors, footprint: float, radius: float) -> float:
-    """``integral of C0 P dq`` of bond footprints, whose spectrum oscillates: in real space, where it ends.
-
-    The integral of J0(qs) q C/2pi over q is the autocorrelation, the overlap of two footprints.
-    """
-    least = min(footprint, radius)
-    phase, weight = 0.25 * math.pi * (1 + _FINE_NODES), 0.25 * math.pi * _FINE_WEIGHTS
-    distance = least * np.sin(phase)  # half of it; the root at the end of the overlap becomes smooth
-    u, v = distance / radius, distance / footprint
-    disc = np.arccos(u) - (u * np.sqrt(1 - u * u) if factors is energy_factors else 0.0)
-    bond = np.arccos(v) - v * np.sqrt(1 - v * v)
-    return 16 / footprint**2 * float(np.sum(disc * bond * np.cos(phase) * weight)) * least
-
-
-#: Points of the splines over ln a, from 1e-4 to 1 sphere radii. Good to 1e-8 for smooth spectra, 1e-5 for a broad
-#: power law, 3e-5 for a band and 3e-3 for one a few per cent wide: its share oscillates with the waves in the contact.
-_POINTS, _DECADES = 513, 4
 
 
 class Margin:
@@ -242,20 +218,20 @@ class Margin:
     a contact that grows pays dE/dA. A spline over ln a, made once for a scene; a ripple's is in closed form.
     """
 
-    def __init__(self, spectrum: Any, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
+    def __init__(self, spectrum: Family, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
         self.spectrum, self.solid, self.sphere_radius = spectrum, (shear_modulus, poisson_ratio), sphere_radius
 
-    def __call__(self, radius: np.ndarray) -> np.ndarray:
+    def __call__(self, radius: Array) -> Array:
         """The share at contact radii [m]; nan stays nan."""
         return self._share(radius, marginal_energy, lambda x: self._spline(x))
 
-    def mean(self, radius: np.ndarray) -> np.ndarray:
+    def mean(self, radius: Array) -> Array:
         """What the whole disc has paid per area over ΔΓ of the plane [1]: the mean of the share over its area."""
         return self._share(radius, disc_energy, lambda x: self._mean_spline(x))
 
-    def _share(self, radius: np.ndarray, law: Callable[..., Any], spline: Callable[..., np.ndarray]) -> np.ndarray:
-        if isinstance(self.spectrum, Ripple) and self._plane > 0.0:
-            share = np.asarray(law(self.spectrum, np.nan_to_num(radius), *self.solid)) / self._plane
+    def _share(self, radius: Array, law: Callable[..., Array], spline: Callable[[Array], Array]) -> Array:
+        if self.spectrum.wavevector is not None and self._plane > 0.0:
+            share = law(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
             return np.where(np.isnan(radius), np.nan, share)
         low, high = self._ends
         share = spline(np.log(np.clip(radius, low, high)))
@@ -267,7 +243,7 @@ class Margin:
 
     @cached_property
     def _plane(self) -> float:
-        return float(np.asarray(self.spectrum.surface_energy(*self.solid)))
+        return float(self.spectrum.surface_energy(*self.solid))
 
     @cached_property
     def _spline(self) -> CubicSpline:
@@ -277,7 +253,7 @@ class Margin:
     def _mean_spline(self) -> CubicSpline:
         return self._splined(disc_energy)
 
-    def _splined(self, law: Callable[..., Any]) -> CubicSpline:
+    def _splined(self, law: Callable[..., Array]) -> CubicSpline:
         radii = np.geomspace(*self._ends, _POINTS)
-        energies = np.asarray(law(self.spectrum, radii, *self.solid)) if self._plane > 0.0 else np.zeros(_POINTS)
+        energies = law(self.spectrum, radii, *self.solid) if self._plane > 0.0 else np.zeros(_POINTS)
         return CubicSpline(np.log(radii), energies / (self._plane or 1.0))

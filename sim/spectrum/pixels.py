@@ -5,10 +5,10 @@ steep spectrum; integrating over pixels loses nothing but the pixel of q = 0.
 """
 
 import math
-from typing import Any
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic_core import PydanticCustomError
 from scipy import special
 
@@ -20,13 +20,31 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 _MOST_PANELS = 256
 
 
-def radial_quadrant(spectrum: Any, step: float, reach: int) -> Array:
+class Radial(Protocol):
+    """An isotropic spectrum by its variance within and beyond a wavenumber q [rad/m]."""
+
+    @property
+    def variance(self) -> float:
+        """Mean square of the stress [Pa²]."""
+
+    @property
+    def breaks(self) -> Array:
+        """Wavenumbers [rad/m] where the density jumps or kinks."""
+
+    def cumulative(self, q: ArrayLike) -> Array:
+        """Variance within wavenumber q [Pa²]."""
+
+    def beyond(self, q: ArrayLike) -> Array:
+        """Variance beyond wavenumber q [Pa²]."""
+
+
+def radial_quadrant(spectrum: Radial, step: float, reach: int) -> Array:
     """Variance of an isotropic spectrum in the pixels of a wavevector lattice.
 
     Parameters
     ----------
-    spectrum : object
-        With ``variance``, ``cumulative(q)``, ``beyond(q)`` and ``breaks``.
+    spectrum : Radial
+        The spectrum.
     step : float
         Side of a pixel [rad/m].
     reach : int
@@ -59,14 +77,14 @@ def _around(edges: Array) -> Array:
     return across + across.T
 
 
-def _edges(spectrum: Any, step: float, reach: int) -> tuple[Array, Array]:
+def _edges(spectrum: Radial, step: float, reach: int) -> tuple[Array, Array]:
     """``(1/2π) ∫ f dθ`` along each vertical pixel edge, f = variance within and beyond q.
 
     Edge (i, j) lies on qx = (i + ½) step, qy from (j - ½) to (j + ½) step. Lengths are in units of
     ``step``; edges are split where the circles on which the density jumps or kinks cross them.
     """
     bounds = np.concatenate([[0.0], np.arange(reach + 1) + 0.5])
-    circles = np.asarray(spectrum.breaks, float) / step
+    circles = spectrum.breaks / step
     lines, starts, ends = [], [], []
     for line in np.arange(reach + 1) + 0.5:
         crossings = np.sqrt(np.maximum(circles[circles > line] ** 2 - line**2, 0.0))
@@ -85,7 +103,7 @@ def _edges(spectrum: Any, step: float, reach: int) -> tuple[Array, Array]:
     return within, beyond
 
 
-def _integrate(spectrum: Any, step: float, line: Array, start: Array, end: Array) -> Array:
+def _integrate(spectrum: Radial, step: float, line: Array, start: Array, end: Array) -> Array:
     """∫ f dθ along pieces of lines, by bisection until Gauss-Legendre sums agree; shape (2, pieces)."""
     total = np.zeros((2, len(line)))
     owner = np.arange(len(line))
@@ -115,7 +133,7 @@ def _integrate(spectrum: Any, step: float, line: Array, start: Array, end: Array
     raise ArithmeticError("the pixel integrals of the spectrum do not converge")
 
 
-def _legendre(spectrum: Any, step: float, line: Array, start: Array, end: Array) -> Array:
+def _legendre(spectrum: Radial, step: float, line: Array, start: Array, end: Array) -> Array:
     """Gauss-Legendre sums of ∫ f dθ, θ the polar angle along the line; shape (2, pieces)."""
     half = (end - start) / 2
     y = (start + half)[:, None] + half[:, None] * _NODES
@@ -125,7 +143,7 @@ def _legendre(spectrum: Any, step: float, line: Array, start: Array, end: Array)
     return np.stack([np.sum(spectrum.cumulative(q) * turn, axis=1), np.sum(spectrum.beyond(q) * turn, axis=1)])
 
 
-def gaussian_boxes(form: tuple[float, float, float], x_edges: Array, y_edges: Array) -> Array:
+def gaussian_boxes(form: tuple[float, float, float], x_edges: NDArray, y_edges: NDArray) -> Array:
     """∫∫ exp(-(xx qx² + 2 xy qx qy + yy qy²)) over each rectangle between the edges.
 
     Parameters

@@ -1,49 +1,87 @@
-"""What all isotropic spectra share: a radial density, the variance within a circle, the energy.
+"""Isotropic spectra: a radial density, the variance within a circle, the energy.
 
 A spectrum that is given by rows (a band, a self-affine law with cut-offs, a table, a measurement)
 is a chain of power laws, whose integrals are closed forms.
 """
 
 import functools
+import math
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from sim.laws.halfspace import angular_compliance
+from sim.spectrum.family import Factors
+from sim.spectrum.finite_contact import wave_sums
+from sim.spectrum.pixels import radial_quadrant
+
 Array = NDArray[np.float64]
 
 
-class Isotropic:
-    """Base of spectra whose density depends on the length of the wavevector only.
+class Isotropic(Protocol):
+    """Base of the families (``sim.spectrum.family``) whose density depends on the length of the wavevector only."""
 
-    A family supplies ``radial_density``, ``cumulative``, ``beyond``, ``line_integral``,
-    ``variance``, ``support`` and ``breaks``.
-    """
+    wavevector: ClassVar[None] = None
+    bond_made: ClassVar[bool] = False
 
-    isotropic: ClassVar[bool] = True
-
-    def radial_density(self, q: ArrayLike) -> Array:
-        """Density C at wavenumber q [rad/m], in Pa² m²."""
-        raise NotImplementedError
+    @property
+    def variance(self) -> float:
+        """Mean square of the stress [Pa²]."""
 
     @property
     def line_integral(self) -> float:
         """∫ C dq [Pa² m]."""
-        raise NotImplementedError
+
+    def radial_density(self, q: ArrayLike) -> Array:
+        """Density C at wavenumber q [rad/m], in Pa² m²; zero outside ``support``."""
+
+    def cumulative(self, q: ArrayLike) -> Array:
+        """Variance within wavenumber q [Pa²]."""
+
+    def beyond(self, q: ArrayLike) -> Array:
+        """Variance beyond wavenumber q [Pa²]."""
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Wavenumbers [rad/m] between which the density may differ from zero."""
+        return 0.0, math.inf
+
+    @property
+    def breaks(self) -> Array:
+        """Wavenumbers [rad/m] where the density jumps or kinks."""
+        return np.empty(0)
+
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
+        return self.support
+
+    def harmonics(self, q: Array) -> tuple[Array, Array]:
+        """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
+        return 2 * math.pi * self.radial_density(q), np.zeros(())
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
         return self.radial_density(np.hypot(qx, qy))
 
-    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> ArrayLike:
+    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
         """Mean elastic energy per area [J/m²] stored by the fluctuations in an infinite half-space.
 
         ``ΔΓ = (2 - nu) / (8 pi G) ∫ C dq``, the angular mean of ``½ G_x C``; the normal-tangential
         coupling that exists for nu other than 1/2 is neglected.
         """
-        modulus, nu = np.asarray(shear_modulus, float), np.asarray(poisson_ratio, float)
-        return (2 - nu) / (8 * np.pi * modulus) * self.line_integral
+        mean, _ = angular_compliance(np.asarray(poisson_ratio, float))
+        return mean / (4 * np.pi * np.asarray(shear_modulus, float)) * self.line_integral
+
+    def pixels(self, step: float, reach: int) -> Array:
+        """Variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
+        quadrant = radial_quadrant(self, step, reach)
+        return np.concatenate([quadrant[:0:-1], quadrant])
+
+    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
+        """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
+        return wave_sums(self, factors, radii)
 
 
 def _decay(x: Array) -> Array:
@@ -140,13 +178,12 @@ class PowerLaws:
         return np.where(linear[row], straight, powered)
 
 
-class Rowed(Isotropic):
-    """Base of isotropic spectra that are a chain of power laws; the family supplies ``rows``."""
+class Rowed(Isotropic, Protocol):
+    """Base of isotropic spectra that are a chain of power laws."""
 
     @property
     def rows(self) -> PowerLaws:
         """The chain of power laws."""
-        raise NotImplementedError
 
     def radial_density(self, q: ArrayLike) -> Array:
         """Density C at wavenumber q [rad/m], in Pa² m²; zero outside ``support``."""

@@ -67,9 +67,9 @@ def along_ray(spectrum, angle, power):
 
 def angular_mean(spectrum, power, weight):
     """Mean over directions of weight(θ) ∫ q^power C dq; the trapezium rule is exact for smooth periods."""
-    count = 4 if spectrum.isotropic else 64
+    count = 4 if hasattr(spectrum, "radial_density") else 64
     angles = TURN * (np.arange(count) + 0.5) / count
-    if spectrum.isotropic:
+    if hasattr(spectrum, "radial_density"):
         return np.mean(weight(angles)) * along_ray(spectrum, 0.3, power)
     return np.mean([weight(t) * along_ray(spectrum, t, power) for t in angles])
 

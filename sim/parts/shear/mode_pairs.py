@@ -3,12 +3,13 @@
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.laws.halfspace import compliance
 from sim.parts.shear.modes import Indices, grid_reach, half_lattice, modes
+from sim.spectrum.family import Family
 
 Array = NDArray[np.float64]
 
@@ -32,13 +33,13 @@ class Pairs:
     count: Array
 
 
-def cell_pairs(spectrum: Any, cell: float, points: int | None, shear_modulus: float, poisson_ratio: float) -> Pairs:
+def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus: float, poisson_ratio: float) -> Pairs:
     """The mode pairs of a cell, listed near q = 0 where the weight sits, counted in blocks beyond.
 
     Parameters
     ----------
-    spectrum : object
-        Any family of ``sim.spectrum``.
+    spectrum : Family
+        The spectrum.
     cell : float
         Side L of the cell [m].
     points : int, optional
@@ -61,7 +62,7 @@ def cell_pairs(spectrum: Any, cell: float, points: int | None, shear_modulus: fl
     PydanticCustomError
         As ``sim.parts.shear.modes.modes``.
     """
-    if getattr(spectrum, "wavevector", None) is not None:
+    if spectrum.wavevector is not None:
         found = modes(spectrum, cell, points)
         weight = found.energies(shear_modulus, poisson_ratio)
         return Pairs(weight, np.hypot(found.qx, found.qy), np.ones(1))
@@ -77,16 +78,15 @@ def cell_pairs(spectrum: Any, cell: float, points: int | None, shear_modulus: fl
 
 
 def _level(
-    spectrum: Any, cell: float, reach: int, block: int, shear_modulus: float, poisson_ratio: float
+    spectrum: Family, cell: float, reach: int, block: int, shear_modulus: float, poisson_ratio: float
 ) -> tuple[Array, Array, Array]:
     """Weight, wavenumber and count of the blocks of block² pixels around the finer ones."""
     step = 2.0 * math.pi / cell
     outermost = min(_LISTED, math.ceil((reach + 0.5) / block - 0.5))
     ix, iy, share = half_lattice(spectrum, cell / block, outermost)
     if block == 1:
-        radius = np.hypot(ix, iy)
-        compliance = (1.0 - poisson_ratio * (ix / radius) ** 2) / (shear_modulus * step * radius)
-        return compliance * share, step * radius, np.ones(ix.size)
+        softness = compliance(ix, iy, shear_modulus * step, poisson_ratio)
+        return softness * share, step * np.hypot(ix, iy), np.ones(ix.size)
     farthest = np.maximum(np.abs(ix), iy)
     kept = farthest > (_LISTED - 1) // 3
     ix, iy, share, farthest = ix[kept], iy[kept], share[kept], farthest[kept]
@@ -113,13 +113,16 @@ class _Squares:
 
     size: float
     qx: Array
+    qy: Array
     radius: Array
     held: Array
     density: Array
     on_grid: Array
 
     @classmethod
-    def of(cls, spectrum: Any, step: float, reach: int, x: Indices, y: Indices, size: float, side: int) -> "_Squares":
+    def of(
+        cls, spectrum: Family, step: float, reach: int, x: Indices, y: Indices, size: float, side: int
+    ) -> "_Squares":
         """The squares of blocks around (x, y)."""
         offsets = size * (np.arange(side) - 0.5 * (side - 1))
         qx = x[:, np.newaxis, np.newaxis] + offsets[:, np.newaxis]
@@ -130,12 +133,11 @@ class _Squares:
         inside = step * np.clip(radius, low * (1.0 + 1e-12), high * (1.0 - 1e-12)) / radius
         last = reach + 0.5 if math.isinf(high) else math.inf  # a spectrum that ends is all on the grid
         on_grid = np.clip((last - np.abs(qx)) / size + 0.5, 0.0, 1.0) * np.clip((last - qy) / size + 0.5, 0.0, 1.0)
-        return cls(size, qx, radius, held, spectrum.density(inside * qx, inside * qy), on_grid)
+        return cls(size, qx, qy, radius, held, spectrum.density(inside * qx, inside * qy), on_grid)
 
     def counted(self, share: Array, poisson_ratio: float) -> Array:
         """Rows weight, wavenumber and count of the blocks: sum and sum of squares of their energies are kept."""
-        compliance = (1.0 - poisson_ratio * (self.qx / self.radius) ** 2) / self.radius * self.on_grid
-        energy = compliance * self.density
+        energy = compliance(self.qx, self.qy, 1.0, poisson_ratio) * self.on_grid * self.density
         # of the pixels in a square only those on the edge are held in part
         square = energy**2 * self.held * (1.0 - (1.0 - self.held) / self.size)
         values = (self.density * self.held, energy * self.held, energy * self.held * self.radius, square)

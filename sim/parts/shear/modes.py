@@ -9,13 +9,13 @@ renormalised; what the cell lacks is told by ``error_variance`` and ``error_ener
 import functools
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
-from sim.spectrum.pixels import radial_quadrant
+from sim.laws.halfspace import compliance
+from sim.spectrum.family import Family
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -33,7 +33,7 @@ class Modes:
 
     Parameters
     ----------
-    spectrum : object
+    spectrum : Family
         The spectrum whose modes these are.
     cell : float
         Side L of the cell [m].
@@ -49,7 +49,7 @@ class Modes:
         False where a ripple does not fit the cell; qx, qy are then its own, ix, iy the nearest.
     """
 
-    spectrum: Any
+    spectrum: Family
     cell: float
     points: int
     ix: Indices
@@ -64,11 +64,10 @@ class Modes:
 
         Notes
         -----
-        ``½ G_x(q) · variance = G_x(q) C(q) / L²`` with C averaged over the pixel and
-        ``G_x = (1 - ν qx²/q²) / (G q)``. The cell's mean ΔΓ is their sum.
+        ``½ G_x(q) · variance = G_x(q) C(q) / L²`` with C averaged over the pixel and G_x by
+        ``sim.laws.halfspace.compliance``. The cell's mean ΔΓ is their sum.
         """
-        q = np.hypot(self.qx, self.qy)
-        return (1 - poisson_ratio * (self.qx / q) ** 2) / (2 * shear_modulus * q) * self.variance
+        return 0.5 * compliance(self.qx, self.qy, shear_modulus, poisson_ratio) * self.variance
 
     @functools.cached_property
     def error_variance(self) -> float:
@@ -100,13 +99,13 @@ def _spread(weights: Array) -> float:
 
 
 @functools.lru_cache(maxsize=4)  # a sweep asks for the same modes again and again
-def modes(spectrum: Any, cell: float, points: int | None = None) -> Modes:
+def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     """The mode pairs of a spectrum on a periodic square cell.
 
     Parameters
     ----------
-    spectrum : object
-        Any family of ``sim.spectrum`` or a measured one.
+    spectrum : Family
+        The spectrum.
     cell : float
         Side L of the cell [m].
     points : int, optional
@@ -137,9 +136,8 @@ def modes(spectrum: Any, cell: float, points: int | None = None) -> Modes:
     """
     if not (math.isfinite(cell) and cell > 0.0):
         raise PydanticCustomError("bad_cell", "the cell must be a positive length", {})
-    wavevector = getattr(spectrum, "wavevector", None)
-    if wavevector is not None:
-        return _single(spectrum, cell, points, wavevector)
+    if spectrum.wavevector is not None:
+        return _single(spectrum, cell, points, spectrum.wavevector)
     step = 2 * math.pi / cell
     reach, points = grid_reach(spectrum, cell, points)
     ix, iy, share = half_lattice(spectrum, cell, reach)
@@ -152,7 +150,7 @@ def modes(spectrum: Any, cell: float, points: int | None = None) -> Modes:
     return _frozen(spectrum, cell, points, ix, iy, step * ix, step * iy, 2 * share)
 
 
-def _frozen(spectrum: Any, cell: float, points: int, *arrays: NDArray, on_lattice: bool = True) -> Modes:
+def _frozen(spectrum: Family, cell: float, points: int, *arrays: NDArray, on_lattice: bool = True) -> Modes:
     """Modes whose arrays cannot be written: several callers share them."""
     for array in arrays:
         array.flags.writeable = False
@@ -160,7 +158,7 @@ def _frozen(spectrum: Any, cell: float, points: int, *arrays: NDArray, on_lattic
     return Modes(spectrum, cell, points, ix, iy, qx, qy, variance, on_lattice)
 
 
-def grid_reach(spectrum: Any, cell: float, points: int | None) -> tuple[int, int]:
+def grid_reach(spectrum: Family, cell: float, points: int | None) -> tuple[int, int]:
     """Largest lattice index that holds modes of a spectrum, and the points of the grid; raises as ``modes``."""
     _, high = spectrum.support
     step = 2 * math.pi / cell
@@ -188,7 +186,7 @@ def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
     return (reach if needed is None else needed), points
 
 
-def _single(spectrum: Any, cell: float, points: int | None, wavevector: tuple[float, float]) -> Modes:
+def _single(spectrum: Family, cell: float, points: int | None, wavevector: tuple[float, float]) -> Modes:
     """The one pair of a ripple, at its own wavevector."""
     qx, qy = wavevector
     size = math.hypot(qx, qy)
@@ -204,47 +202,23 @@ def _single(spectrum: Any, cell: float, points: int | None, wavevector: tuple[fl
     return _frozen(spectrum, cell, points, *arrays, on_lattice=on_lattice)
 
 
-def pixel_variances(spectrum: Any, cell: float, reach: int) -> Array:
-    """Variance in each pixel of a cell's wavevector lattice, the one of q = 0 included.
-
-    Parameters
-    ----------
-    spectrum : object
-        Any family with a density.
-    cell : float
-        Side of the cell [m].
-    reach : int
-        Largest lattice index.
-
-    Returns
-    -------
-    array, shape (2 reach + 1, reach + 1)
-        C integrated over the pixel / 4π² [Pa²]: rows ix = -reach ... reach, columns iy = 0 ... reach.
-    """
-    step = 2 * math.pi / cell
-    if not spectrum.isotropic:
-        edges = step * (np.arange(-reach, reach + 2) - 0.5)
-        return spectrum.boxes(edges, edges[reach:])
-    quadrant = radial_quadrant(spectrum, step, reach)
-    return np.concatenate([quadrant[:0:-1], quadrant])
-
-
-def cell_variance(spectrum: Any, cell: float, points: int | None = None) -> float:
+def cell_variance(spectrum: Family, cell: float, points: int | None = None) -> float:
     """Variance that the modes of a cell carry together [Pa²], without listing them.
 
     The square of all their pixels is itself a pixel, of a lattice as much coarser; that of q = 0 is
     left out. Raises as ``modes``.
     """
-    if getattr(spectrum, "wavevector", None) is not None:
-        return float(spectrum.variance)
+    if spectrum.wavevector is not None:
+        return spectrum.variance
     reach, _ = grid_reach(spectrum, cell, points)
-    whole, middle = (pixel_variances(spectrum, cell / side, 0)[0, 0] for side in (2 * reach + 1, 1))
+    step = 2 * math.pi / cell
+    whole, middle = (spectrum.pixels(side * step, 0)[0, 0] for side in (2 * reach + 1, 1))
     return float(whole - middle)
 
 
-def half_lattice(spectrum: Any, cell: float, reach: int) -> tuple[Indices, Indices, Array]:
+def half_lattice(spectrum: Family, cell: float, reach: int) -> tuple[Indices, Indices, Array]:
     """Lattice indices and pixel variance of one of each pair up to ``reach``, without q = 0 and negligible ones."""
-    pixels = pixel_variances(spectrum, cell, reach)
+    pixels = spectrum.pixels(2 * math.pi / cell, reach)
     ix, iy = (index.ravel() for index in np.mgrid[-reach : reach + 1, 0 : reach + 1])
     share = pixels.ravel()
     kept = ((iy > 0) | (ix > 0)) & (2 * share > _NEGLIGIBLE * spectrum.variance)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from scipy import integrate, special
 
 from sim.numerics.grid import Grid
-from sim.parts.shear.modes import Modes, modes, pixel_variances
+from sim.parts.shear.modes import Modes, modes
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 
 TURN = 2 * math.pi
@@ -69,7 +69,7 @@ def pixel_by_quadrature(spectrum, ix, iy):
 def test_a_pixel_cut_by_the_cut_offs_has_the_integral_of_the_density(name, pixels):
     spectrum = CUT_OFF[name]
     reach = 9
-    found = pixel_variances(spectrum, 1.0, reach)
+    found = spectrum.pixels(TURN, reach)
     for ix, iy in pixels:
         # inner end points with a square root leave quad with 1e-9 at worst
         exact = pixel_by_quadrature(spectrum, ix, iy)
@@ -79,7 +79,7 @@ def test_a_pixel_cut_by_the_cut_offs_has_the_integral_of_the_density(name, pixel
 @pytest.mark.parametrize("name", SMOOTH)
 def test_a_pixel_of_a_smooth_spectrum_has_the_integral_of_the_density(name):
     spectrum = SMOOTH[name]
-    found = pixel_variances(spectrum, 1.0, 7)
+    found = spectrum.pixels(TURN, 7)
     for ix, iy in [(0, 0), (1, 0), (-1, 1), (0, 2), (-3, 2), (7, 7), (-7, 6)]:
         exact = pixel_by_quadrature(spectrum, ix, iy)
         assert_allclose(found[7 + ix, iy], exact, rtol=1e-9, atol=1e-14 * spectrum.variance)
@@ -88,7 +88,7 @@ def test_a_pixel_of_a_smooth_spectrum_has_the_integral_of_the_density(name):
 @pytest.mark.parametrize("length", [0.03, 0.3, 1.0, 3.0, 30.0])
 def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions(length):
     reach = 6
-    pixels = pixel_variances(Gaussian(1.3, length), 1.0, reach)
+    pixels = Gaussian(1.3, length).pixels(TURN, reach)
     edges = TURN * length / 2 * (np.arange(-reach, reach + 2) - 0.5)
     across = np.where(edges[:-1] > 0, -np.diff(special.erfc(edges)), np.diff(special.erf(edges))) / 2
     exact = 1.3**2 * across[:, None] * across[reach:]
@@ -100,7 +100,7 @@ def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions(length)
 
 @pytest.mark.parametrize("spectrum", CUT_OFF.values(), ids=CUT_OFF)
 def test_all_pixels_together_hold_the_variance_of_a_spectrum_that_ends(spectrum):
-    pixels = pixel_variances(spectrum, 1.0, 10)
+    pixels = spectrum.pixels(TURN, 10)
     assert_allclose(whole_plane(pixels), spectrum.variance, rtol=1e-13, atol=0)
 
 
@@ -111,7 +111,7 @@ def whole_plane(pixels):
 @pytest.mark.parametrize("name", ["gaussian", "anisotropic"])
 def test_all_pixels_together_hold_the_share_of_a_gaussian_inside_the_square(name):
     spectrum, reach = SMOOTH[name], 3
-    pixels = pixel_variances(spectrum, 1.0, reach)
+    pixels = spectrum.pixels(TURN, reach)
     edge = TURN * (reach + 0.5) / 2
     lengths = (spectrum.length,) * 2 if name == "gaussian" else (spectrum.length_x, spectrum.length_y)
     share = math.prod(special.erf(edge * length) for length in lengths)
@@ -121,15 +121,15 @@ def test_all_pixels_together_hold_the_share_of_a_gaussian_inside_the_square(name
 @pytest.mark.parametrize("spectrum", (CUT_OFF | SMOOTH).values(), ids=CUT_OFF | SMOOTH)
 def test_pixels_add_up_to_the_one_large_pixel_that_they_fill(spectrum):
     reach = 4
-    pixels = pixel_variances(spectrum, 1.0, reach)
-    large = pixel_variances(spectrum, 1.0 / (2 * reach + 1), 0)
+    pixels = spectrum.pixels(TURN, reach)
+    large = spectrum.pixels(TURN * (2 * reach + 1), 0)
     assert_allclose(whole_plane(pixels), large[0, 0], rtol=1e-12, atol=0)
 
 
 @pytest.mark.parametrize("name", ["gaussian", "von_karman"])
 def test_far_pixels_keep_their_relative_accuracy(name):
     spectrum, reach = SMOOTH[name], 60
-    pixels = pixel_variances(spectrum, 1.0, reach)
+    pixels = spectrum.pixels(TURN, reach)
     node, weight = np.polynomial.legendre.leggauss(20)
     for ix, iy in [(20, 5), (30, 0)]:
         x, y = TURN * (ix + node[:, None] / 2), TURN * (iy + node / 2)
