@@ -20,7 +20,6 @@ from sim.scenario.clock import Record
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
 from sim.scenario.source import Source
-from sim.spectrum.families import BondMade
 from sim.spectrum.finite_contact import marginal_energy
 
 # Rough costs of one core, for the estimate only [s]: starting up, a step of a batch, and for each member of it
@@ -213,7 +212,7 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
         power * float(np.asarray(point.shear.spectrum.surface_energy(*point.solid.effective)))
         for power, point in zip(powers, some, strict=True)
     ]
-    when = "at amplitude 1" if not any(isinstance(point.shear.spectrum, BondMade) for point in some) else _SETTLED
+    when = "at amplitude 1" if not any(point.shear.spectrum.bond_made for point in some) else _SETTLED
     rows: Rows = [
         ("rms of the stress", f"{_about(rms, 'Pa')} {when}"),
         ("stored energy", f"{_about(energies, 'J/m^2')} {when}, on the infinite plane"),
@@ -244,7 +243,7 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
 
 def _power(point: Scenario) -> float:
     """Factor of the spectrum's variance: 1, or n E[f²] of bonds that make the field, in steady sliding at the end."""
-    if not isinstance(point.shear.spectrum, BondMade):  # type: ignore[union-attr]
+    if not point.shear.spectrum.bond_made:  # type: ignore[union-attr]
         return 1.0
     end = point.clock.duration
     settled = point.population.settled(point.drive.motion(0, end, end, end).speed)
@@ -282,7 +281,7 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             )
         if isinstance(point.population, FirstMoment) and isinstance(point.population.rupture, Bell):
             said.append(_overprediction(point.population))
-        made = isinstance(getattr(point.shear, "spectrum", None), BondMade)
+        made = getattr(getattr(point.shear, "spectrum", None), "bond_made", False)
         if made and point.shear.paid_by_adhesion > 0.0:
             said.append("friction has paid for the energy under each bond: with paid_by_adhesion it counts twice")
         jitters = point.varies["shear"] and point.contact.model == "equilibrium"
@@ -307,7 +306,8 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             )
         if point.contact.control.lowest < 0.0 and point.varies["shear"]:
             said.append("under tension detachment is a first passage: take clock steps well below the correlation")
-        smallest = getattr(getattr(point.fluctuations, "spectrum", None), "support", (0.0,))[0]
+        spectrum = getattr(point.fluctuations, "spectrum", None)
+        smallest = spectrum.support[0] if spectrum is not None and spectrum.wavevector is None else 0.0
         if hasattr(point.fluctuations, "cell") and 2.0 * math.pi > _cell(point) * smallest > 0.0:
             said.append("the spectrum has waves longer than the cell, which are missing: give a larger shear.cell")
         off = (abs(value) for name, value in point.process.known_errors().items() if name.startswith("cell_error"))
@@ -340,7 +340,7 @@ def _overprediction(bonds: FirstMoment) -> str:
 
 def _reversed_friction(point: Scenario) -> float:
     """Largest ratio of the rms of the fluctuations to the mean stress of the bonds over the run; 0 without a stress."""
-    if not point.population.carries_stress or isinstance(point.shear.spectrum, BondMade):  # type: ignore[union-attr]
+    if not point.population.carries_stress or point.shear.spectrum.bond_made:  # type: ignore[union-attr]
         return 0.0
     rms, duration, ratios = math.sqrt(point.shear.spectrum.variance), point.clock.duration, [0.0]  # type: ignore[union-attr]
     for time in np.linspace(0.0, duration, 41):
@@ -354,7 +354,7 @@ def _reversed_friction(point: Scenario) -> float:
 def _longest_wave(point: Scenario) -> float:
     """The longest wave of the fluctuations that the cell holds [m]."""
     spectrum: Any = getattr(point.shear, "spectrum", None)
-    lowest = math.hypot(*spectrum.wavevector) if hasattr(spectrum, "wavevector") else spectrum.support[0]
+    lowest = spectrum.support[0]
     longest = 2.0 * math.pi / lowest if lowest > 0.0 else math.inf
     return min(longest, _cell(point)) if hasattr(point.shear, "cell") else longest
 

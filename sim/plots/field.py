@@ -128,7 +128,7 @@ def _asked_for(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) ->
             with contextlib.suppress(KeyError):
                 shear[table][key] = float(setting(dataset, f"shear.{table}.{key}").isel(at, missing_dims="ignore"))
     spectrum = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
-    if hasattr(spectrum, "wavevector"):
+    if spectrum.wavevector is not None:
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
     if shear["amplitude"].get("relaxing"):  # the field lags behind its amplitude: only the shape can be compared
         cells = modes(spectrum, _cell_of(stress), stress.sizes["x"])

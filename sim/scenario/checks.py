@@ -14,7 +14,6 @@ from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import Drive, Table
 from sim.parts.shear import Auto, Mean, Modal, Model, Uniform
 from sim.scenario.clock import Clock, Ensemble, Record
-from sim.spectrum.families import BondMade
 
 _STEPS_A_CYCLE = 2
 #: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
@@ -68,7 +67,7 @@ def _no_adhesion(contact: Contact, adhesion: Adhesion) -> Faults:
 
 def _reads_forces(shear: Any) -> bool:
     """Whether the shear part follows the forces of the single bonds."""
-    return isinstance(getattr(shear, "spectrum", None), BondMade)
+    return getattr(getattr(shear, "spectrum", None), "bond_made", False)
 
 
 def _control_too_short(contact: Contact, clock: Clock) -> Faults:
@@ -149,7 +148,7 @@ def _shear_faults(shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion
 
 def _too_many_modes(shear: Any, cell: float) -> str | None:
     """What is too large about the smallest grid that holds the spectrum, or about the one asked for."""
-    ripple = getattr(shear.spectrum, "wavevector", None)
+    ripple = shear.spectrum.wavevector
     waves = (max(map(abs, ripple)) if ripple else shear.spectrum.support[1]) * cell / (2.0 * math.pi)
     if math.isfinite(waves) and waves > _MOST_WAVES:
         return f"the cell of {cell:g} m holds {waves:.2g} of the shortest waves along a side"

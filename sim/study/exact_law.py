@@ -19,7 +19,6 @@ from sim.parts.shear.modal import FixedProcess, ModalProcess
 from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.process import SmoothProcess
 from sim.scenario.scenario import Scenario
-from sim.spectrum.families import BondMade
 from sim.study.estimates import RARE
 from sim.study.gamma_sum import GammaSum
 
@@ -205,7 +204,7 @@ class Expectation:
     @cached_property
     def tells_energy(self) -> bool:
         """Whether ΔΓ has this law: not where its amplitude follows bonds that differ between members."""
-        follows = isinstance(getattr(self.scenario.fluctuations, "spectrum", None), BondMade)
+        follows = getattr(getattr(self.scenario.fluctuations, "spectrum", None), "bond_made", False)
         return not follows and not (self.scenario.fluctuations.reads_stress and self.scenario.population.per_member)
 
     @cached_property

@@ -22,7 +22,7 @@ from sim.parts.shear.modal import FixedProcess, MappedFixedProcess, MappedProces
 from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.modes import cell_variance, modes
 from sim.parts.shear.process import SmoothProcess
-from sim.spectrum.families import BondMade, Spectrum
+from sim.spectrum.families import Spectrum
 from sim.units.quantity import Quantity
 
 _Paid = Annotated[
@@ -55,7 +55,7 @@ class Uniform:
 
 def _bonds_set_the_size(part: Any) -> None:
     """Refuse what a field that bonds make cannot follow."""
-    if not isinstance(part.spectrum, BondMade):
+    if not part.spectrum.bond_made:
         return
     if not isinstance(part.amplitude, Constant):
         raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
@@ -79,7 +79,7 @@ class Mean:
     @property
     def reads_stress(self) -> bool:
         """Whether the size of the field follows the bonds."""
-        return self.amplitude.reads_stress or isinstance(self.spectrum, BondMade)
+        return self.amplitude.reads_stress or self.spectrum.bond_made
 
     @model_validator(mode="after")
     def _no_memory(self) -> "Mean":
@@ -92,7 +92,7 @@ class Mean:
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
-        kind = SiteMean if isinstance(self.spectrum, BondMade) else SmoothProcess
+        kind = SiteMean if self.spectrum.bond_made else SmoothProcess
         return kind(float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))), self.amplitude)
 
 
@@ -123,7 +123,7 @@ class _Fluctuating:
     @property
     def reads_stress(self) -> bool:
         """Whether the size of the field follows the bonds."""
-        return self.amplitude.reads_stress or isinstance(self.spectrum, BondMade)
+        return self.amplitude.reads_stress or self.spectrum.bond_made
 
     @model_validator(mode="after")
     def _fixed_cannot_relax(self) -> "_Fluctuating":
@@ -143,7 +143,7 @@ class Modal(_Fluctuating):
     model: Literal["modal"] = "modal"
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
-        kind = SiteModes if isinstance(self.spectrum, BondMade) else ModalProcess
+        kind = SiteModes if self.spectrum.bond_made else ModalProcess
         return self._process(kind, FixedProcess, shear_modulus, poisson_ratio, cell)
 
     def _process(self, gaussian: Any, fixed: Any, shear_modulus: float, poisson_ratio: float, cell: float) -> Any:
@@ -172,7 +172,7 @@ class Mapped(Modal):
     draws_maps: ClassVar[bool] = True
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> MappedProcess:
-        kind = MappedSiteModes if isinstance(self.spectrum, BondMade) else MappedProcess
+        kind = MappedSiteModes if self.spectrum.bond_made else MappedProcess
         process = self._process(kind, MappedFixedProcess, shear_modulus, poisson_ratio, cell)
         if not process.modes.on_lattice:
             raise PydanticCustomError(
@@ -197,7 +197,7 @@ class Banded(_Fluctuating):
 
     @model_validator(mode="after")
     def _not_of_bonds(self) -> "Banded":
-        if isinstance(self.spectrum, BondMade):
+        if self.spectrum.bond_made:
             raise PydanticCustomError(
                 "bond_made", 'the frozen part of a field that bonds make has no bands; use model = "mean" or "modal"'
             )
@@ -292,7 +292,7 @@ class Auto:
             "points": self.points,
             "mode_amplitudes": self.mode_amplitudes,
         }
-        if maps or isinstance(self.spectrum, BondMade):
+        if maps or self.spectrum.bond_made:
             return Mapped(**common) if maps else Modal(**common)
         return Banded(**common, tolerance=self.tolerance)
 
@@ -302,7 +302,7 @@ class Auto:
             return "no correlation is given, so the ensemble mean answers, exactly and without noise"
         if maps:
             return "maps are recorded"
-        if isinstance(self.spectrum, BondMade):
+        if self.spectrum.bond_made:
             return "the field that bonds make has a frozen part, so each mode is followed"
         return "a correlation is given and no maps are recorded: energies in time are all the contact feels"
 
