@@ -61,32 +61,34 @@ def test_the_lens_shows_the_papers_finding():
 def test_a_ripple_of_375_kpa_brings_the_contact_onto_hertz():
     dataset = at("masking").isel(t=-1)
     hertz = dataset["radius_without_adhesion"].values
-    masked = dataset["amplitude"].values >= 375.158e3
+    masked = dataset["shear_spectrum_amplitude"].values >= 375.158e3
     assert_allclose(dataset["contact_radius"].values[masked], hertz[masked], rtol=1e-13)
     assert np.all(dataset["contact_radius"].values[~masked] > hertz[~masked] * (1.0 + 1e-4))
     assert_allclose(
-        float(dataset["work_of_adhesion"].sel(amplitude=375e3)), 42e-3 * (1 - (375 / 375.157768) ** 2), rtol=1e-6
+        float(dataset["work_of_adhesion"].sel(shear_spectrum_amplitude=375e3)),
+        42e-3 * (1 - (375 / 375.157768) ** 2),
+        rtol=1e-6,
     )
 
 
 def test_a_uniform_stress_changes_no_radius():
     radii = at("uniform_stress")["contact_radius"]
-    assert np.all(radii == radii.isel(stress=0))
+    assert np.all(radii == radii.isel(bonds_stress=0))
 
 
 def test_the_friction_of_the_tip_follows_the_jkr_area_into_tension():
     dataset = at("afm_tip").isel(t=-1)
     assert_allclose(dataset["friction_force"], 0.9e9 * dataset["contact_area"], rtol=1e-14)
-    open_ = dataset["load"] < dataset["pull_off_load"]
+    open_ = dataset["contact_load"] < dataset["pull_off_load"]
     assert np.all(dataset["in_contact"] == ~open_)
-    assert 0 < int(open_.sum()) < dataset.sizes["load"] / 2
+    assert 0 < int(open_.sum()) < dataset.sizes["contact_load"] / 2
 
 
 def test_the_mechanisms_are_told_apart_with_the_same_noise():
     dataset = at("decomposition").isel(t=-100)
     energy = dataset["fluctuation_energy"]
-    assert np.all(energy == energy.isel(bond_share=0, paid_by_adhesion=0))
-    work = dataset["work_of_adhesion"].transpose("bond_share", "paid_by_adhesion", "member").values
+    assert np.all(energy == energy.isel(adhesion_bond_share=0, shear_paid_by_adhesion=0))
+    work = dataset["work_of_adhesion"].transpose("adhesion_bond_share", "shear_paid_by_adhesion", "member").values
     assert np.all(work[0, 0] == 42e-3)
     assert_allclose(work[1, 1] - work[0, 0], (work[1, 0] - work[0, 0]) + (work[0, 1] - work[0, 0]), rtol=1e-12)
 
@@ -129,10 +131,10 @@ def test_the_static_peak_ages_to_an_end_and_grows_with_the_logarithm_of_the_spee
     dataset = four("static_peak")
     rate, force, stiffness, binding = bell(dataset)
     stress = dataset["shear_stress"] / (dataset["bonds_site_density"] * force)
-    for rest in dataset["rest"].values:
+    for rest in dataset["drive_rest"].values:
         bound = binding / (binding + rate) * -math.expm1(-(binding + rate) * rest)
         for speed in dataset["drive_speed"].values:
-            found = stress.sel(rest=rest, drive_speed=speed).values
+            found = stress.sel(drive_rest=rest, drive_speed=speed).values
             sliding = np.maximum(dataset["t"].values - rest, 0.0)
             # the bonds of the rest, all unstretched, and at the most what would rebind if every site were free
             held = bound * start_up_force(sliding, speed, rate, force, stiffness) / force
@@ -140,15 +142,15 @@ def test_the_static_peak_ages_to_an_end_and_grows_with_the_logarithm_of_the_spee
             assert np.all(found >= held * (1.0 - 1e-4))
             assert np.all(found <= (held + reborn) * (1.0 + 1e-4))
             assert found.max() > 1.05 * bell_moments(speed, rate, force, stiffness, binding).force / force
-    peaks = stress.max("t").transpose("rest", "drive_speed").values
+    peaks = stress.max("t").transpose("drive_rest", "drive_speed").values
     assert np.all(np.diff(peaks, axis=0) > 0.0) and np.all(np.diff(peaks, axis=1) > 0.0)
     # at 10 um/s rebinding adds 0.021 of a Bell force a site at the most: the peak is the number that came at rest
-    came = -np.expm1(-2.0 * dataset["rest"].values)
+    came = -np.expm1(-2.0 * dataset["drive_rest"].values)
     assert_allclose(peaks[:, -1] / peaks[-1, -1], came / came[-1], atol=0.021 / peaks[-1, -1])
 
 
 def test_the_field_that_bonds_make_is_their_force_squared_and_costs_little():
-    dataset = four("bond_noise").transpose("paid_by_adhesion", "t")
+    dataset = four("bond_noise").transpose("shear_paid_by_adhesion", "t")
     recipe, speed, density = bell(dataset), speed_of_steps(dataset), float(dataset["bonds_site_density"])
     energy = dataset["fluctuation_energy"].values
     force_square = bell_moments(speed, *recipe).force_square

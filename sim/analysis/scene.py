@@ -37,8 +37,7 @@ def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it: a number that is the same everywhere is the variable
-        ``contact_load``, a swept one the coordinate ``load`` (or ``contact_load``).
+        As ``sim run`` writes it: the key ``"contact.load"`` is the variable ``contact_load``, swept or not.
     key : str
         Such as ``"contact.load"``.
 
@@ -47,12 +46,9 @@ def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:
     KeyError
         If the dataset does not hold it as a number.
     """
-    names = _names(key)
-    if names[0] in dataset.variables and dataset[names[0]].dtype.kind == "f":
-        return dataset[names[0]]
-    for name in names[1:]:
-        if name in dataset.coords and name != "t" and dataset[name].dtype.kind == "f":
-            return dataset[name]
+    name = key.replace(".", "_")
+    if name in dataset.variables and dataset[name].dtype.kind == "f":
+        return dataset[name]
     raise KeyError(f"the dataset does not hold {key} as a number")
 
 
@@ -93,18 +89,11 @@ def told(dataset: xr.Dataset, key: str) -> Any:
     return value
 
 
-def _names(key: str) -> list[str]:
-    """Names that a swept key may have in the dataset, the full one first."""
-    words = key.split(".")
-    tails = ["_".join(words[-count:]) for count in range(len(words), 0, -1)]
-    return [*tails, "_".join(["swept", *words])]
-
-
 def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
-    """The coordinate of labels that a key is swept by, None where it is not."""
-    for name in _names(key):
-        if name in dataset.coords and dataset[name].dtype.kind in "OUST" and dataset[name].ndim == 1:
-            return dataset[name]
+    """The labels that a key is swept by, None where it is not."""
+    name = key.replace(".", "_")
+    if name in dataset.variables and dataset[name].dtype.kind in "OUST" and dataset[name].ndim == 1:
+        return dataset[name]
     return None
 
 

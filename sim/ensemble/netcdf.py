@@ -28,6 +28,8 @@ _DISC_ENERGIES = (
     ("disc_energy", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
     ("cross_energy", "energy of the map in the field of the mean stress, per area of the disc", "DeltaGamma_x"),
 )
+#: What HDF5 keeps of a variable in memory [byte]; its own 64 MiB hold every variable of a usual run whole.
+_CHUNK_CACHE = 4 * 2**20
 _FLAGS = "detached in_contact"
 _STATISTICS = {
     "mean": "ensemble mean of",
@@ -45,6 +47,9 @@ class MemoryVariable(NamedTuple):
 
     def __setitem__(self, place: Any, values: Any) -> None:
         self.values[place] = values
+
+    def set_var_chunk_cache(self, size: int) -> None:
+        """Nothing: the values are in memory."""
 
     def setncatts(self, attributes: dict[str, Any]) -> None:
         self.attributes.update(attributes)
@@ -86,7 +91,12 @@ def write_dataset(file: File, plan: Plan, parts: Parts) -> None:
 
 
 def _sweep_names(plan: Plan) -> tuple[str, ...]:
-    return tuple(axis.name for axis in plan.scenario.sweep)
+    return tuple(variable_name(axis.keys[0]) for axis in plan.scenario.sweep)
+
+
+def variable_name(key: str) -> str:
+    """Name in the dataset of a key of the scenario, swept or not, so that runs can be joined along any of them."""
+    return key.replace(".", "_")
 
 
 def _sweep_shape(plan: Plan) -> tuple[int, ...]:
@@ -103,6 +113,8 @@ def _variable(
 ) -> Any:  # fmt: skip
     packed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True} if dimensions and kind is not str else {}
     variable = file.createVariable(name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed)
+    if chunks:
+        variable.set_var_chunk_cache(_CHUNK_CACHE)
     attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
     variable.setncatts({key: value for key, value in attributes.items() if not isinstance(value, str) or value})
     return variable
@@ -111,7 +123,7 @@ def _variable(
 def _dimensions(file: File, plan: Plan) -> None:
     scene = plan.points[0]
     for axis in plan.scenario.sweep:
-        file.createDimension(axis.name, len(axis.values))
+        file.createDimension(variable_name(axis.keys[0]), len(axis.values))
         _sweep_coordinates(file, plan, axis)
     if plan.scenario.record.per_member and any(plan.varies(variable) for variable in VARIABLES):
         file.createDimension("member", plan.members)
@@ -127,14 +139,14 @@ def _sweep_coordinates(file: File, plan: Plan, axis: Axis) -> None:
     """The swept values as coordinates: numbers in SI, anything else as a label."""
     stride = int(np.prod([len(a.values) for a in plan.scenario.sweep[plan.scenario.sweep.index(axis) + 1 :]]))
     for position, key in enumerate(axis.keys):
-        name = axis.name if position == 0 else key.replace(".", "_")
+        name, along = variable_name(key), (variable_name(axis.keys[0]),)
         tables = [quantities(plan.points[i * stride]) for i in range(len(axis.values))]
         if all(key in table for table in tables):
             quantity = tables[0][key][0]
-            variable = _variable(file, name, "f8", (axis.name,), quantity.unit, quantity.meaning, quantity.symbol)
+            variable = _variable(file, name, "f8", along, quantity.unit, quantity.meaning, quantity.symbol)
             variable[:] = [table[key][1] for table in tables]
         else:
-            variable = _variable(file, name, str, (axis.name,), "", f"swept {key}")
+            variable = _variable(file, name, str, along, "", f"swept {key}")
             labels = [_label(row[position]) for row in axis.values]
             for i, label in enumerate(labels):
                 variable[i] = label if labels.count(label) == 1 else f"{label} {i + 1}"
@@ -189,9 +201,8 @@ def _scenario_variables(file: File, plan: Plan) -> None:
     swept = {key for axis in plan.scenario.sweep for key in axis.keys}
     for key, (quantity, value) in tables[0].items():
         if key not in swept and all(key in table and table[key][1] == value for table in tables):
-            name = key.replace(".", "_")
-            variable = _variable(file, name, "f8", (), quantity.unit, quantity.meaning, quantity.symbol)
-            variable[...] = value
+            described = quantity.unit, quantity.meaning, quantity.symbol
+            _variable(file, variable_name(key), "f8", (), *described)[...] = value
 
 
 def _derived_variables(file: File, plan: Plan) -> None:
@@ -305,7 +316,8 @@ def _maps(file: File, plan: Plan, parts: Parts) -> None:
         variable = _variable(file, axis, "f8", (axis,), "m", f"position {text} the sliding direction", axis)
         variable[:] = np.arange(points) * (cell / points)
     names = (*_sweep_names(plan), "map_member", "map_time", "x", "y")
-    variable = _variable(file, "shear_map", "f8", names, "Pa", "shear-stress fluctuation", "tau_1")
+    chunks = (1,) * (len(names) - 2) + (points, points)
+    variable = _variable(file, "shear_map", "f8", names, "Pa", "shear-stress fluctuation", "tau_1", chunks)
     energies = [
         _variable(file, name, "f8", names[:-2], "J/m^2", text, symbol)
         for name, text, symbol in _DISC_ENERGIES

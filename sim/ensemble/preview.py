@@ -387,7 +387,7 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
         ("members", f"{scene.ensemble.members:,}{alike}"),
     ]
     if scene.sweep:
-        axes = " × ".join(f"{len(axis.values)} {axis.name}" for axis in scene.sweep)
+        axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
     return [
         *rows,

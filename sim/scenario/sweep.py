@@ -9,13 +9,6 @@ from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import number_and_unit
 
-#: Names that the dataset gives away itself, so that no axis may take them.
-RESERVED = frozenset(
-    ["t", "time", "member", "map_time", "x", "y", "map_member", "shear_map", "name", "seed"]
-    + ["speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion"]
-    + ["contact_radius", "contact_area", "normal_load", "indentation", "displacement", "friction_force", "in_contact"]
-    + ["masked", "detachment_time", "dissipated_energy", "disc_energy", "cross_energy"]
-)
 _SHARED = ("clock", "clock.duration", "clock.record", "name", "ensemble", "record")
 _RANGE = ("from", "to", "count", "scale")
 _MOST_POINTS = 20_000
@@ -27,7 +20,6 @@ Fault = tuple[tuple[str | int, ...], str]
 class Axis:
     """One dimension of a sweep: its ``keys`` take the rows of ``values`` together."""
 
-    name: str
     keys: tuple[str, ...]
     values: tuple[tuple[Any, ...], ...]
 
@@ -53,8 +45,8 @@ def read_sweep(sweep: Any) -> tuple[Axis, ...]:
     Examples
     --------
     >>> loads, _ = read_sweep({"contact.load": ["1 mN", "4 mN"], "solid.poisson_ratio": [0.4, 0.5]})
-    >>> loads.name, loads.values
-    ('load', (('1 mN',), ('4 mN',)))
+    >>> loads.keys, loads.values
+    (('contact.load',), (('1 mN',), ('4 mN',)))
     """
     axes, faults = sweep_axes(sweep)
     for path, said in faults:
@@ -87,10 +79,7 @@ def sweep_axes(sweep: Any) -> tuple[tuple[Axis, ...], list[Fault]]:
     columns = [column for column in columns if not unfit.keys() & set(column[0])]
     if math.prod(len(rows) for _, rows in columns) > _MOST_POINTS:
         return (), [*faults, ((), f"asks for more than {_MOST_POINTS:,} points; take fewer values, or several runs")]
-    axes: list[Axis] = []
-    for several, rows in columns:
-        axes.append(Axis(_axis_name(several[0], {axis.name for axis in axes}), several, tuple(rows)))
-    return tuple(axes), faults
+    return tuple(Axis(several, tuple(rows)) for several, rows in columns), faults
 
 
 def _zipped(tables: list[Any], faults: list[Fault]) -> list[tuple[tuple[str, ...], list[tuple]]]:
@@ -146,13 +135,6 @@ def _unfit(key: str, keys: list[str]) -> str | None:
     if any(other != key and key.startswith(f"{other}.") for other in keys) or keys.count(key) > 1:
         return "is swept twice; take it out once"
     return None
-
-
-def _axis_name(key: str, taken: set[str]) -> str:
-    """The key's last word, with the words before it where that is not unique."""
-    words = key.split(".")
-    names = ("_".join(words[-count:]) for count in range(1, len(words) + 1))
-    return next((name for name in names if name not in taken and name not in RESERVED), "_".join(["swept", *words]))
 
 
 def _range_fault(values: dict[str, Any]) -> str | None:

@@ -158,9 +158,9 @@ def test_loops_of_a_swept_course_are_those_of_its_points():
     swept = scene(contact=course, sweep=sweep, bonds=bonds.Unbroken(), shear=shear.Uniform())
     together = analysis.loop_energy(run(swept))
     for k, point in enumerate(swept.points()):
-        alone, where = analysis.loop_energy(run(point)), dict(zip(("cycles", "work"), divmod(k, 2), strict=True))
+        alone, where = analysis.loop_energy(run(point)), divmod(k, 2)
         for name in alone:
-            values = together[name].isel(where)
+            values = together[name].isel(contact_indentation_cycles=where[0], adhesion_work=where[1])
             np.testing.assert_array_equal(values[: alone.sizes["cycle"]], alone[name])
             assert bool(values[alone.sizes["cycle"] :].isnull().all())
 
@@ -234,7 +234,7 @@ def test_static_peak_is_timed_from_the_start_of_sliding(started):
         np.testing.assert_allclose(found["peak_time"][k], t[at] - rest, rtol=1e-12)
     assert float(found["peak_stress"][1]) > float(found["peak_stress"][0])  # more bonds after a longer rest
     rows = analysis.highlights(started)
-    assert [row["rest\n(ms)"] for row in rows] == ["100", "200"]
+    assert [row["drive_rest\n(ms)"] for row in rows] == ["100", "200"]
     assert {"peak of\nstress (kPa)", "peak of\nfriction (mN)", "after\n(ms)"} < set(rows[0])
     assert not any(heading.startswith("at V") for heading in rows[0])
 

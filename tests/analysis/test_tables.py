@@ -50,13 +50,13 @@ def test_table_of_a_steady_sweep_has_a_row_for_each_point(loads, shares, rows):
     dataset = run(scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep))
     table = analysis.table(dataset)
     assert len(table) == rows
-    assert [row["load\n(mN)"] for row in (table[0], table[-1])] == ["1", "9"]
+    assert [row["contact_load\n(mN)"] for row in (table[0], table[-1])] == ["1", "9"]
     assert not any(heading.startswith("t\n") for heading in table[0])
 
 
 def test_table_of_a_swept_ramp_shows_each_point_in_time():
     rows = analysis.table(run(scene(sweep={"contact.load": ["1 mN", "4 mN"]}, shear=shear.Uniform())))
-    points = [(row["load\n(mN)"], row["t\n(ms)"]) for row in rows]
+    points = [(row["contact_load\n(mN)"], row["t\n(ms)"]) for row in rows]
     assert points == list(itertools.product(["1", "4"], ["0", "80", "160", "240", "320", "400"]))
 
 
@@ -92,7 +92,11 @@ def test_csv_has_a_row_for_each_point_and_time(tmp_path):
     dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
     analysis.to_csv(dataset, tmp_path / "out.csv")
     text = (tmp_path / "out.csv").read_text(encoding="utf-8")
-    wanted = {"load": Quantity("N", "load"), "bond_share": Quantity("1", "share"), "t": Quantity("s", "time")}
+    wanted = {
+        "contact_load": Quantity("N", "load"),
+        "adhesion_bond_share": Quantity("1", "share"),
+        "t": Quantity("s", "time"),
+    }
     read = columns(text, {**wanted, "contact_area_mean": Quantity("m^2", "area")})
     expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
     assert list(zip(*(read[name].tolist() for name in wanted), strict=True)) == list(expected)

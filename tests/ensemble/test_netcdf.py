@@ -8,20 +8,23 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
+import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
+from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
 from numpy.testing import assert_allclose
 
 from sim.engine import march
 from sim.ensemble import plan as plans
 from sim.ensemble import simulate as ensemble
+from sim.ensemble.netcdf import variable_name
 from sim.ensemble.recorded import VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Record
+from sim.scenario.declared import quantities
 from sim.scenario.scenario import read_sweep
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
@@ -53,8 +56,8 @@ def test_the_file_opens_lazily_and_equals_the_run_in_memory(tmp_path):
     scenario = replace(sample(), sweep=read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]}))
     path = ensemble.run(scenario, tmp_path / "out.nc")
     with ensemble.open(path) as from_disk:
-        assert from_disk["contact_radius"].dims == ("load", "bond_share", "member", "t")
-        assert from_disk["speed"].dims == ("load", "bond_share", "t")
+        assert from_disk["contact_radius"].dims == ("contact_load", "adhesion_bond_share", "member", "t")
+        assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
         xr.testing.assert_identical(from_disk.load(), ensemble.run(scenario))
     assert sorted(file.name for file in tmp_path.iterdir()) == ["out.nc"]
 
@@ -144,8 +147,8 @@ def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
         ),
     )
     dataset = ensemble.run(scenario)
-    assert_allclose(dataset["load"], [1e-3, 4e-3])
-    assert dataset["sphere_radius"].dims == ("load",)
+    assert_allclose(dataset["contact_load"], [1e-3, 4e-3])
+    assert dataset["sphere_radius"].dims == ("contact_load",)
     assert_allclose(dataset["sphere_radius"], [1e-3, 2e-3])
 
 
@@ -212,8 +215,8 @@ def test_a_full_disk_is_told_with_its_reason(tmp_path):
 def test_a_swept_key_may_keep_one_value():
     scenario = replace(sample(), sweep=read_sweep({"sphere.radius": [2e-3, 2e-3], "contact.load": [1e-3, 4e-3]}))
     dataset = ensemble.run(scenario)
-    assert dataset["contact_radius"].dims == ("radius", "load", "member", "t")
-    assert_allclose(dataset["radius"], [2e-3, 2e-3])
+    assert dataset["contact_radius"].dims == ("sphere_radius", "contact_load", "member", "t")
+    assert_allclose(dataset["sphere_radius"], [2e-3, 2e-3])
 
 
 def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
@@ -237,3 +240,31 @@ def test_datasets_can_be_pickled(tmp_path):
         again = pickle.loads(pickle.dumps(lazy))
         xr.testing.assert_identical(again.load(), dataset)
         again.close()
+
+
+def test_runs_join_along_a_key_by_xarrays_own_means():
+    base, names = sample(), [variable.name for variable in VARIABLES]
+    swept = replace(base, sweep=read_sweep({"contact.load": [1e-3, 2e-3, 4e-3]}))
+    whole = ensemble.run(swept)
+    runs = [ensemble.run(point).set_coords("contact_load") for point in swept.points()]
+    xr.testing.assert_equal(xr.concat(runs, "contact_load", data_vars="minimal")[names], whole[names])
+    two = ensemble.run(replace(base, sweep=read_sweep({"contact.load": [1e-3, 2e-3]})))
+    joined = xr.combine_by_coords(
+        [runs[2][names].expand_dims("contact_load"), two[names]], combine_attrs="drop_conflicts"
+    )
+    xr.testing.assert_equal(joined, whole[names])
+
+
+def test_no_variable_that_is_recorded_has_the_name_of_a_key():
+    mapped = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
+    own = {variable_name(key) for key in quantities(mapped)}
+    tables = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
+    found = [quantities(part, f"{name}.") for name, parts in tables.items() for part in parts.values()]
+    keys = {variable_name(key) for keys in found for key in keys}
+    assert len(keys) > 50 and not keys & (set(ensemble.run(mapped).variables) - own)
+
+
+def test_reading_one_map_reads_one_map(tmp_path):
+    path = ensemble.run(sample(shear=MAPPED, record=Record(maps=(2e-3, 4e-3), map_members=2)), tmp_path / "out.nc")
+    with netCDF4.Dataset(path) as file:
+        assert file["shear_map"].chunking() == [1, 1, 12, 12]

@@ -87,7 +87,7 @@ def test_a_swept_quantity_is_told_from_where_to_where():
     assert row(lines, "contact.load")[1:] == ["-0.0003 to 0.016 N", "normal load, compression positive (5 values)"]
     assert row(lines, "bonds.stress")[1] == "0 to 1e+06 Pa"
     run = told("uniform_stress")["the run"]
-    assert row(run, "sweep")[1] == "4 stress × 5 load = 20 points"
+    assert row(run, "sweep")[1] == "4 bonds.stress × 5 contact.load = 20 points"
 
 
 def test_choices_are_told_beside_the_numbers():

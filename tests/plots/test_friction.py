@@ -100,7 +100,9 @@ def test_a_swept_rupture_has_a_law_at_each_point():
     speed = np.array([1e-3])
     for k, force in enumerate((4e-12, 8e-12)):
         exact = schallamach.bell_stress(speed, 1e4, force, 4e-4, 1e5, 9e16)
-        assert_allclose(bond_laws.steady_laws(dataset, {"bell_force": k}, speed)[0].stress, exact, rtol=1e-12)
+        assert_allclose(
+            bond_laws.steady_laws(dataset, {"bonds_rupture_bell_force": k}, speed)[0].stress, exact, rtol=1e-12
+        )
 
 
 def test_the_maximum_is_marked_and_told(ramp):

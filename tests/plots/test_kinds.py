@@ -97,7 +97,7 @@ def test_further_swept_keys_are_further_curves_with_their_values():
     labels = [text.get_text() for text in panel.get_legend().get_texts()]
     assert labels == ["$R$ = 1 mm", "$R$ = 2 mm", "JKR", "Hertz"]
     np.testing.assert_allclose(
-        drawn(panel, pictures.LINES[1])[1], 1e6 * dataset["contact_radius"].isel(radius=1, t=-1), rtol=1e-14
+        drawn(panel, pictures.LINES[1])[1], 1e6 * dataset["contact_radius"].isel(sphere_radius=1, t=-1), rtol=1e-14
     )
 
 
@@ -154,7 +154,9 @@ def test_swept_models_are_marks_that_no_line_joins():
             # a line within a category, or the one at zero across them all
             assert np.all(np.abs(np.diff(x))[joined] < 0.5) or np.all(y == 0.0)
     radii = [line for line in figure.axes[0].lines if line.get_marker() == "o"]
-    np.testing.assert_allclose(radii[1].get_ydata(), 1e6 * dataset["contact_radius"].isel(load=1, t=-1), rtol=1e-14)
+    np.testing.assert_allclose(
+        radii[1].get_ydata(), 1e6 * dataset["contact_radius"].isel(contact_load=1, t=-1), rtol=1e-14
+    )
     assert np.all(radii[0].get_xdata() < [0.0, 1.0]) and np.all(radii[1].get_xdata() > [0.0, 1.0])  # side by side
     assert [text.get_text() for text in figure.axes[-1].get_xticklabels()] == ["none", "steady"]
 

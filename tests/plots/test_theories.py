@@ -89,9 +89,9 @@ def test_jkr_and_hertz_stand_whatever_the_shear():
 
 def test_the_datasets_points_are_means_over_members_and_the_second_half():
     dataset = plain(sweep={"bonds.stress": [0.0, 1e5, 1e6], "contact.load": [1e-3, 4e-3]})
-    stress, area = rival_figures.points_of(dataset, {"load": 1})
+    stress, area = rival_figures.points_of(dataset, {"contact_load": 1})
     assert_allclose(stress, [0.0, 1e5, 1e6], rtol=1e-14)
-    assert_allclose(area, dataset["contact_area"].isel(load=1, t=-1), rtol=1e-14)
+    assert_allclose(area, dataset["contact_area"].isel(contact_load=1, t=-1), rtol=1e-14)
     members = simulated(drive=STEADY, ensemble=Ensemble(members=5))
     late = members["contact_area"].isel(t=slice(members.sizes["t"] // 2, None))
     assert_allclose(rival_figures.points_of(members, {})[1], [late.mean()], rtol=1e-13)
@@ -100,7 +100,7 @@ def test_the_datasets_points_are_means_over_members_and_the_second_half():
 def test_of_swept_loads_the_scenarios_own_is_drawn():
     dataset = plain(sweep={"contact.load": [-3e-4, 1e-3, 4e-3]})
     case = rival_figures.case_of(dataset)
-    assert (case.at, case.value) == ({"load": 2}, 4e-3)
+    assert (case.at, case.value) == ({"contact_load": 2}, 4e-3)
     assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in [
         text for p in plots.draw(dataset, "theories").axes for text in [p.get_title("right")]
     ]
