@@ -1,4 +1,4 @@
-"""Closed forms: half-space elasticity, JKR contact, bond populations. Everything broadcasts over arrays."""
+"""Closed forms: half-space elasticity, JKR contact, bond populations; all broadcast over arrays."""
 
 import importlib
 from types import ModuleType

@@ -1,4 +1,4 @@
-"""Shear stress on one finite disc of contact: what a wave and what a map of stress store there.
+"""Elastic energy of a fluctuating shear stress on one finite disc of contact: of a wave, of a map.
 
 On an infinite plane a wave stores ``sigma^2 G_x(q)/2`` per area. A disc of radius a cuts it off: the
 stress is zero outside, and its energy is the overlap integral
@@ -20,6 +20,8 @@ import scipy.special
 from sim.laws.halfspace import angular_compliance, disc_displacement
 from sim.numerics.grid import Grid
 
+#: A disc smaller than this many pixels stores nothing that a number could hold.
+_LEAST_RADIUS = 1e-12
 # Below this argument the closed forms cancel, above it their power series do; 16 terms are exact there.
 _SERIES_END = 3.0
 _TERM = np.arange(16)
@@ -38,7 +40,7 @@ def _series(x, mean_growth, skew_growth):
 
 
 def energy_factors(x):
-    """How much of a wave's energy a disc holds: the mean over directions, and the skew between them.
+    """Energy of a wave on a disc: its mean over directions, and the part that goes with cos 2 theta.
 
     Parameters
     ----------
@@ -76,7 +78,7 @@ def energy_factors(x):
 
 
 def marginal_factors(x):
-    """The factors of ``energy_factors`` for dE/dA, the energy of a unit of new contact at the edge.
+    """Factors as of ``energy_factors`` for dE/dA, the energy of a unit of new contact at the edge.
 
     Parameters
     ----------
@@ -150,17 +152,9 @@ def ripple_energy(amplitude, wavenumber, angle, radius, shear_modulus, poisson_r
 
 
 def ripple_marginal_energy(amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio=0.5):
-    """Energy per area that a growing disc adds under a sinusoidal shear stress, its phase averaged: dE/dA.
+    """Energy of a unit of new contact under a sinusoidal shear stress: dE/dA = (1/(2 pi a)) dE/da [J/m^2].
 
-    Parameters
-    ----------
-    amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio : float or array
-        As for ``ripple_energy``.
-
-    Returns
-    -------
-    float or array
-        dE/dA = (1/(2 pi a)) dE/da [J/m^2].
+    Arguments as for ``ripple_energy``.
 
     Examples
     --------
@@ -168,10 +162,6 @@ def ripple_marginal_energy(amplitude, wavenumber, angle, radius, shear_modulus, 
     0.98987
     """
     return _ripple(marginal_factors, amplitude, wavenumber, angle, radius, shear_modulus, poisson_ratio)
-
-
-#: A disc smaller than this many pixels stores nothing that a number could hold.
-_LEAST_RADIUS = 1e-12
 
 
 def _quarter(x, y):
@@ -239,8 +229,8 @@ def _padded_size(radius):
     return max(16, scipy.fft.next_fast_len(2 * math.ceil(0.5 * step * math.ceil(least / step)), real=True))
 
 
-def _members(field, cell, radius):
-    """Each map with its radius, and the shape of the answer."""
+def _each(energy, field, cell, radius, poisson_ratio):
+    """An energy of each map on the disc of its radius, at unit modulus; 0 without contact."""
     field = np.asarray(field, dtype=float)
     shape = np.broadcast_shapes(field.shape[:-2], np.shape(radius))
     maps = np.broadcast_to(field, shape + field.shape[-2:]).reshape(-1, *field.shape[-2:])
@@ -250,7 +240,10 @@ def _members(field, cell, radius):
             f"a disc of radius {np.max(radii):g} m does not fit in a cell of {cell:g} m; "
             "make the cell at least twice the radius"
         )
-    return zip(maps, radii, strict=True), shape
+    pixel, nu = cell / field.shape[-1], float(poisson_ratio)
+    pairs = zip(maps, radii, strict=True)
+    found = [energy(one, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a for one, a in pairs]
+    return np.reshape(found, shape)[()]
 
 
 def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
@@ -295,18 +288,11 @@ def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
     >>> print(f"{disc_energy_of_map(np.ones((64, 64)), 2.0, 1.0, 1.0) * math.pi:.3f}")
     1.000
     """
-    nu = float(poisson_ratio)
-    pairs, shape = _members(field, cell, radius)
-    energy = np.array([_energy(one, cell, a, nu) for one, a in pairs])
-    return energy.reshape(shape)[()] / np.asarray(shear_modulus, dtype=float)
+    return _each(_energy, field, cell, radius, poisson_ratio) / np.asarray(shear_modulus, dtype=float)
 
 
-def _energy(field, cell, radius, poisson_ratio):
-    points = field.shape[-1]
-    pixel = cell / points
-    if not radius > _LEAST_RADIUS * pixel:
-        return 0.0 * radius
-    index, _, share = _coverage(points, radius / pixel)
+def _energy(field, pixel, radius, poisson_ratio):
+    index, _, share = _coverage(field.shape[-1], radius / pixel)
     grid, kernel = _free_kernel(_padded_size(radius / pixel), poisson_ratio)
     spectrum = scipy.fft.rfft2(field[index[:, None], index] * share, s=(grid.points, grid.points))
     power = np.square(spectrum.real) + np.square(spectrum.imag)
@@ -318,18 +304,10 @@ def cross_energy_of_map(field, cell, radius, mean_stress, shear_modulus, poisson
 
     Parameters
     ----------
-    field : array, shape (..., points, points)
-        tau1 along x [Pa], as for ``disc_energy_of_map``.
-    cell : float
-        Side of the periodic cell [m].
-    radius : float or array, shape (...)
-        a [m], at most cell/2; 0 gives 0.
+    field, cell, radius, shear_modulus, poisson_ratio
+        As for ``disc_energy_of_map``.
     mean_stress : float or array, shape (...)
         tau0 [Pa].
-    shear_modulus : float or array, shape (...)
-        G [Pa].
-    poisson_ratio : float
-        nu [1].
 
     Returns
     -------
@@ -338,8 +316,8 @@ def cross_energy_of_map(field, cell, radius, mean_stress, shear_modulus, poisson
 
     Notes
     -----
-    The energy of tau0 + tau1 is that of tau0, plus this, plus that of tau1 (by reciprocity the integrals of tau1 w0
-    and tau0 w1 are equal and the half cancels).
+    The energy of tau0 + tau1 is that of tau0, plus this, plus that of tau1, for by reciprocity the integrals of
+    tau1 w0 and tau0 w1 are equal.
     For patches of any size far below a its standard deviation is ``1.93 (tau0/sigma)`` times the energy of tau1
     (correlation ``exp(-r^2/xi^2)``, nu = 1/2): as large, but paid by the drive like the energy of tau0 itself.
 
@@ -350,19 +328,12 @@ def cross_energy_of_map(field, cell, radius, mean_stress, shear_modulus, poisson
     >>> print(f"{cross_energy_of_map(np.ones((64, 64)), 2.0, 1.0, 1.0, 1.0) * math.pi:.3f}")
     2.000
     """
-    nu = float(poisson_ratio)
-    pairs, shape = _members(field, cell, radius)
-    energy = np.array([_cross(one, cell, a, nu) for one, a in pairs])
     stress, modulus = np.asarray(mean_stress, dtype=float), np.asarray(shear_modulus, dtype=float)
-    return energy.reshape(shape)[()] * stress / modulus
+    return _each(_cross, field, cell, radius, poisson_ratio) * stress / modulus
 
 
-def _cross(field, cell, radius, poisson_ratio):
-    points = field.shape[-1]
-    pixel = cell / points
-    if not radius > _LEAST_RADIUS * pixel:
-        return 0.0 * radius
-    index, weight = _cross_weight(points, radius / pixel, poisson_ratio)
+def _cross(field, pixel, radius, poisson_ratio):
+    index, weight = _cross_weight(field.shape[-1], radius / pixel, poisson_ratio)
     return pixel * (field[index[:, None], index] * weight).ravel().sum() * (pixel / radius) ** 2 / math.pi
 
 

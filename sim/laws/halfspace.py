@@ -116,7 +116,7 @@ def point_displacement(x, y, shear_modulus, poisson_ratio=0.5):
 
     Examples
     --------
-    Ahead of the force the surface yields twice as much as beside it:
+    Ahead of the force the surface moves twice as far as beside it:
 
     >>> print(f"{point_displacement(1e-6, 0.0, 1e6) / point_displacement(0.0, 1e-6, 1e6):.3f}")
     2.000
@@ -148,7 +148,7 @@ def contact_modulus(shear_modulus, poisson_ratio=0.5):
 
 
 def in_series(shear_modulus_1, poisson_ratio_1, shear_modulus_2, poisson_ratio_2):
-    """The one elastic half-space that yields as much as two bodies pressed against each other.
+    """Equivalent half-space of two elastic bodies in contact, whose compliances add.
 
     Parameters
     ----------
@@ -172,7 +172,7 @@ def in_series(shear_modulus_1, poisson_ratio_1, shear_modulus_2, poisson_ratio_2
 
     Examples
     --------
-    Two equal bodies yield twice as much as one:
+    Two equal bodies are twice as compliant as one:
 
     >>> print("%.1e %.2f" % in_series(2e6, 0.5, 2e6, 0.5))
     1.0e+06 0.50
@@ -320,7 +320,7 @@ def disc_tangential_energy(radius, stress, shear_modulus, poisson_ratio=0.5):
 
 @law
 def edge_work(radius, stress, shear_modulus, poisson_ratio=0.5):
-    """Change of the paper's potential per unit growth of the radius, at a uniform stress [J/m].
+    """Change of MCD's potential per unit growth of the radius, at a uniform stress [J/m].
 
     Parameters
     ----------
@@ -419,7 +419,7 @@ def masking_amplitude(work, wavelength, shear_modulus, angle=0.0, poisson_ratio=
 
 @functools.lru_cache(maxsize=4)
 def _unit_compliance(cell, points, poisson_ratio):
-    """The cell's grid and its compliance at unit shear modulus on the half spectrum."""
+    """Grid of a cell and its compliance at unit shear modulus on the half spectrum."""
     grid = Grid(cell=cell, points=points)
     table = compliance(*grid.wavevectors, 1.0, poisson_ratio)
     table.flags.writeable = False
@@ -443,7 +443,7 @@ def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
     Returns
     -------
     array, shape of the field
-        w1 [m], zero mean: ``w1(q) = G_x(q) tau1(q)``, with nothing at q = 0.
+        w1 [m], zero mean: ``w1(q) = G_x(q) tau1(q)``, zero at q = 0.
 
     Examples
     --------
@@ -462,14 +462,8 @@ def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
 
     Parameters
     ----------
-    field : array, shape (..., points, points)
-        Shear stress along x [Pa]; axis -2 is x, axis -1 is y; an odd or even number of points.
-    cell : float
-        Side of the periodic cell [m].
-    shear_modulus : float or array, shape (...)
-        G [Pa]; an array goes with the leading axes of the field.
-    poisson_ratio : float
-        nu [1].
+    field, cell, shear_modulus, poisson_ratio
+        As for ``displacement``.
 
     Returns
     -------
@@ -479,8 +473,8 @@ def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
     Notes
     -----
     By Parseval ``(1/2L^4) sum over q of G_x(q) |tau(q)|^2``, q = 0 left out: only the fluctuation
-    counts, never the mean. Neither is it added back: for a stress whose spectrum is smooth through
-    q = 0 the periodic cell holds less than the infinite plane by ``(2 - nu)/(8 pi) 3.900265 C(0) /
+    counts, never the mean. For a stress whose spectrum is smooth through q = 0 the periodic cell holds
+    less than the infinite plane by ``(2 - nu)/(8 pi) 3.900265 C(0) /
     (G L)`` (0.23278 C(0)/(G L) at nu = 1/2).
 
     Examples

@@ -1,14 +1,14 @@
-"""Stress and displacement across one contact: what the figure that everyone draws shows.
+"""Profiles of stress and displacement across one contact.
 
 Normal fields (Johnson, Contact Mechanics 3.4 and 5.5; Maugis): a contact of radius a and
-indentation delta, in equilibrium or not, is Hertz's contact of that radius, which goes in by a^2/R,
-and a flat punch of that radius lifted by what is missing, a^2/R - delta. The punch brings the
-tension at the edge. At a load, ``jkr.indentation_under_load`` gives delta. Lengths along the normal
+indentation delta, in equilibrium or not, is Hertz's contact of that radius, indented by a^2/R, plus
+a flat punch of that radius lifted by the difference, a^2/R - delta. The punch makes the tension at
+the edge. At a load, ``jkr.indentation_under_load`` gives delta. Lengths along the normal
 point into the half-space, pressure presses; the sphere is the paraboloid r^2/(2R).
 
 Tangential fields: the uniform shear stress of sliding and its displacement,
-``halfspace.disc_displacement``. The two do not touch each other at nu = 1/2; for another Poisson ratio
-their coupling is neglected.
+``halfspace.disc_displacement``. Normal and tangential fields are uncoupled at nu = 1/2; for another
+Poisson ratio their coupling is neglected.
 """
 
 import math

@@ -1,31 +1,68 @@
-"""JKR contact whose adhesion also pays the reversible share alpha of the elastic energy of the mean shear stress."""
+"""JKR contact whose adhesion also pays a share alpha of the elastic energy of the mean shear stress.
+
+A contact that grows by dA under a uniform stress tau stores ``6 tau^2 a/(pi E*) dA`` (at nu = 1/2,
+``mean_stress_energy``). Menga, Carbone & Dini (MCD) let the drive pay for all of it, alpha = 0; at
+alpha = 1 sliding is reversible and adhesion pays for all of it. With G the energy release rate of
+the normal load alone (``jkr.energy_release_rate``) the contact obeys ``G(a) = w - alpha 6 tau^2 a/(pi E*)``.
+
+**One crossing.** G(a) is convex in a at a load, at an indentation and behind a spring of any stiffness:
+at a load it is ``(X - 2P + P^2/X)/(6 pi R)`` with X = 4 E* a^3/(3R), at an indentation
+``E*/(2 pi) (a^3/R^2 - 2 delta a/R + delta^2/a)``. The right side is a straight line in a. So there are at
+most two crossings, and only the wider is stable: there G rises above the line, whose slope is the
+dw/da in the condition of stability. Newton's method from the right of it goes left and never passes
+it. A step that does not go left is rounding and ends the search; a slope that is not positive means
+that there is no crossing.
+
+**Never below Hertz.** The edge can pull but not push: where adhesion does not pay for the shear even
+at Hertz's radius, the contact has that radius. It does so under a load or an indentation of at
+least zero, beyond the last adhesive state; a contact that is pulled comes off there, and the
+answer is nan.
+"""
 
 import math
 
-from sim.laws.jkr import hertz_radius_at_indentation, hertz_radius_at_load, radius_at_indentation, radius_at_load
+from sim.laws.jkr import (
+    hertz_radius_at_indentation,
+    hertz_radius_at_load,
+    radius_at_displacement,
+    radius_at_indentation,
+    radius_at_load,
+)
 from sim.numerics.jit import device, law
-
-_STICK = 1.5  # of T^2 in the energy balance at a load: full stick,
-_UNIFORM = 16.0 / math.pi**2  # and uniform stress
-_AS_STICK = math.pi**2 / 32.0  # alpha at a held stress that gives the same radii
-_AS_UNIFORM = 1.0 / 3.0
 
 
 @device
-def _compressible(poisson_ratio):
-    """Shear energy at a given stress and modulus E*, relative to that at nu = 1/2."""
+def compressible(poisson_ratio):
+    """Shear energy at a given stress and modulus E*, over that at nu = 1/2: (2 - nu)/(3 (1 - nu))."""
     return (2.0 - poisson_ratio) / (3.0 * (1.0 - poisson_ratio))
 
 
-@device
-def _largest_force(load, work, sphere_radius, share):
-    """Tangential force at which the root below ends: sqrt(c (2P + c)/share), c = 3 pi w R [N]."""
-    pull = 3.0 * math.pi * work * sphere_radius
-    return math.sqrt(pull) * math.sqrt(2.0 * load + pull) / math.sqrt(share)
+@law
+def mean_stress_energy(radius, stress, modulus, poisson_ratio=0.5):
+    """Elastic energy of the mean shear stress per area of new contact [J/m^2].
+
+    Parameters
+    ----------
+    radius, stress, modulus, poisson_ratio : float or array
+        a [m], tau [Pa], E* [Pa], nu [1].
+
+    Notes
+    -----
+    ``2 (2 - nu)/(1 - nu) tau^2 a/(pi E*)``, 6 tau^2 a/(pi E*) at nu = 1/2: the stress times
+    ``halfspace.disc_edge_mean_displacement``. Over the whole disc its mean is two thirds of it.
+
+    Examples
+    --------
+    At 0.3 MPa the contact of a PDMS lens stores 77 times a work of adhesion of 42 mJ/m^2:
+
+    >>> print(f"{mean_stress_energy(1.2e-4, 3e5, 6.4e6) / 0.042:.1f}")
+    76.7
+    """
+    return 6.0 / math.pi * compressible(poisson_ratio) * (stress * stress) * radius / modulus
 
 
 @device
-def _crossing_at_load(z, p, m, s):
+def crossing_at_load(z, p, m, s):
     """Largest z with (z^3 - p)^2/z^3 = m + s z and the slope there, from a z right of it; nan if none."""
     slope = math.nan
     for _ in range(100):
@@ -45,11 +82,11 @@ def _crossing_at_load(z, p, m, s):
 
 
 @device
-def _crossing_at_displacement(z, q, soft, m, s, stuck):
+def crossing_at_displacement(z, q, soft, m, s, stuck):
     """Largest z with missing^2/z + stuck/z^3 = m + s z and the slope there, as at a load.
 
-    missing = (z^2 - q + (2/3) soft z^3)/(1 + soft z) is a^2/R - delta where the displacement is q and a
-    machine of stiffness 2 E*/soft yields; a stiff one, soft = 0, leaves z^2 - q.
+    missing = (z^2 - q + (2/3) soft z^3)/(1 + soft z) is a^2/R - delta at a displacement q behind a spring of
+    stiffness 2 E*/soft; without the spring, soft = 0, it is z^2 - q.
     """
     slope = math.nan
     hard = 1.0 / (1.0 + soft)
@@ -73,20 +110,20 @@ def _crossing_at_displacement(z, q, soft, m, s, stuck):
 
 
 @law
-def _shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
-    """JKR's radius less what reversible shear takes; held = 0 holds the stress, 4 the force."""
+def shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio):
+    """Contact radius at a load from those of JKR and Hertz; ``held`` as in ``shrunk_at_displacement``."""
     if reversible == 0.0 or stress == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
         return jkr
     tilt = sphere_radius / jkr
     shear = stress / modulus * tilt
-    s = 27.0 * reversible * _compressible(poisson_ratio) * shear * shear
+    s = 27.0 * reversible * compressible(poisson_ratio) * shear * shear
     if not s >= 0.0:
         return math.nan
     m = 4.5 * math.pi * (work / modulus / jkr) * tilt * tilt
     start = min(1.0, m / s)
     if load >= 0.0 and not start * jkr > hertz:
         return hertz
-    z, slope = _crossing_at_load(start, 0.75 * (load / modulus / jkr) * (tilt / jkr), m, -s)
+    z, slope = crossing_at_load(start, 0.75 * (load / modulus / jkr) * (tilt / jkr), m, -s)
     if not slope >= held * s:
         return hertz if load >= 0.0 else math.nan
     return max(z * jkr, hertz) if load >= 0.0 else z * jkr
@@ -96,18 +133,18 @@ def _shrunk_at_load(jkr, hertz, load, work, stress, reversible, held, sphere_rad
 def shrunk_at_displacement(
     jkr, hertz, displacement, stiffness, work, stress, reversible, held, sphere_radius, modulus, poisson_ratio
 ):
-    """JKR's radius behind a machine stiffness, less what reversible shear takes.
+    """Contact radius at a displacement behind a spring, from those of JKR and Hertz.
 
     Parameters
     ----------
     jkr, hertz : float or array
-        Radii of the same displacement without shear, with the work and with none [m].
+        Radii at the same displacement without shear, with the work of adhesion and with none [m].
     displacement, stiffness : float or array
-        Delta = delta + P/k [m], k [N/m]; k = inf holds the indentation.
+        Delta = delta + P/k [m], k [N/m]; k = inf prescribes the indentation.
     work, stress, reversible, sphere_radius, modulus, poisson_ratio : float or array
         As ``radius_at_load_reversible``.
     held : float
-        0 where the stress is held as the edge moves, 4 where the tangential force is.
+        0 if the stress stays the same as the edge moves, 4 if the tangential force does.
 
     Returns
     -------
@@ -126,7 +163,7 @@ def shrunk_at_displacement(
         return jkr
     tilt = sphere_radius / jkr
     shear = stress / modulus * tilt
-    s = 12.0 * reversible * _compressible(poisson_ratio) * shear * shear
+    s = 12.0 * reversible * compressible(poisson_ratio) * shear * shear
     if not s >= 0.0:
         return math.nan
     m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
@@ -134,14 +171,14 @@ def shrunk_at_displacement(
     if displacement >= 0.0 and not start * jkr > hertz:
         return hertz
     soft = 2.0 * modulus * jkr / stiffness
-    z, slope = _crossing_at_displacement(start, displacement / jkr * tilt, soft, m, -s, 0.0)
+    z, slope = crossing_at_displacement(start, displacement / jkr * tilt, soft, m, -s, 0.0)
     if not slope >= held * s:
         return hertz if displacement >= 0.0 else math.nan
     return max(z * jkr, hertz) if displacement >= 0.0 else z * jkr
 
 
 def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load when adhesion pays for a fraction of the energy of the mean stress.
+    """Contact radius at a load when adhesion pays a share of the energy of the mean stress.
 
     Parameters
     ----------
@@ -150,9 +187,9 @@ def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, mod
     work : float or array
         w [J/m^2].
     stress : float or array
-        tau, held while the contact grows or shrinks [Pa].
+        tau [Pa], the same while the contact grows or shrinks.
     reversible : float or array
-        alpha [1], at least 0: MCD's 0 to 1.
+        alpha [1], at least 0; MCD's is 0.
     sphere_radius, modulus, poisson_ratio : float or array
         R [m], E* [Pa], nu [1].
 
@@ -164,8 +201,8 @@ def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, mod
 
     Notes
     -----
-    ``G(a) = w - alpha 2 (2 - nu)/(1 - nu) tau^2 a/(pi E*)``: 6 tau^2 a/(pi E*) at nu = 1/2. As ``P(X)``
-    with X = 4 E* a^3/(3R) this is ``X - sqrt(6 pi R X (w - b a))``, convex in X, hence with one fold.
+    ``G(a) = w - alpha mean_stress_energy(a)``. As ``P(X)`` with X = 4 E* a^3/(3R) this is
+    ``X - sqrt(6 pi R X (w - b a))``, convex in X, hence with one fold.
 
     Examples
     --------
@@ -177,23 +214,11 @@ def radius_at_load_reversible(load, work, stress, reversible, sphere_radius, mod
     """
     jkr = radius_at_load(load, work, sphere_radius, modulus)
     hertz = hertz_radius_at_load(load, sphere_radius, modulus)
-    return _shrunk_at_load(jkr, hertz, load, work, stress, reversible, 0.0, sphere_radius, modulus, poisson_ratio)
+    return shrunk_at_load(jkr, hertz, load, work, stress, reversible, 0.0, sphere_radius, modulus, poisson_ratio)
 
 
 def radius_at_indentation_reversible(indentation, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation when adhesion pays for a fraction of the energy of the mean stress.
-
-    Parameters
-    ----------
-    indentation : float or array
-        delta [m].
-    work, stress, reversible, sphere_radius, modulus, poisson_ratio : float or array
-        As ``radius_at_load_reversible``.
-
-    Returns
-    -------
-    float or array
-        a [m], as ``radius_at_load_reversible``; bit for bit ``jkr.radius_at_indentation`` at alpha = 0.
+    """Contact radius at an indentation [m]; otherwise as ``radius_at_load_reversible``.
 
     Notes
     -----
@@ -212,3 +237,20 @@ def radius_at_indentation_reversible(indentation, work, stress, reversible, sphe
     hertz = hertz_radius_at_indentation(indentation, sphere_radius)
     rest = (sphere_radius, modulus, poisson_ratio)
     return shrunk_at_displacement(jkr, hertz, indentation, math.inf, work, stress, reversible, 0.0, *rest)
+
+
+def radius_at_displacement_reversible(
+    displacement, stiffness, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5
+):
+    """Contact radius at a displacement Delta [m] behind a spring of stiffness k [N/m]; otherwise as at a load.
+
+    Examples
+    --------
+    >>> a = radius_at_displacement_reversible(-6e-7, 1e4, 0.042, 1e5, [0.0, 0.1, 0.2], 2e-3, 6.4e6)
+    >>> print("%.2e %.2e %.2e" % tuple(a))
+    3.64e-05 2.76e-05 nan
+    """
+    jkr = radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus)
+    hertz = radius_at_displacement(displacement, stiffness, 0.0, sphere_radius, modulus)
+    rest = (sphere_radius, modulus, poisson_ratio)
+    return shrunk_at_displacement(jkr, hertz, displacement, stiffness, work, stress, reversible, 0.0, *rest)

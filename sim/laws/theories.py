@@ -1,4 +1,4 @@
-"""Competing theories of an adhesive contact under shear: what each says of its radius.
+"""Competing theories of the radius of an adhesive contact under shear.
 
 They differ in what becomes of the elastic energy of the tangential stress when the contact grows.
 At nu = 1/2, with G the release rate of the normal load alone (``jkr.energy_release_rate``), T the
@@ -7,28 +7,18 @@ tangential force, tau = T/(pi a^2) the mean shear stress and E* the contact modu
     ``G = w``                           JKR, MCD as corrected: the drive pays, the contact feels nothing
     ``G = w + 6 tau^2 a/(pi E*)``       MCD as first published in 2018: the contact grows
     ``G + 3 T^2/(16 pi E* a^3) = w``    Savkoor & Briggs 1977: full stick at a given force
-    ``G + 2 T^2/(pi^3 E* a^3) = w``     uniform stress, reversible, force held: adhesion pays for all of it
-    ``G + 6 tau^2 a/(pi E*) = w``       uniform stress, reversible, stress held
-    ``G + alpha 6 tau^2 a/(pi E*) = w`` a reversible fraction alpha
+    ``G + 2 T^2/(pi^3 E* a^3) = w``     uniform stress, reversible, constant force: adhesion pays for all of it
+    ``G + 6 tau^2 a/(pi E*) = w``       uniform stress, reversible, constant stress
+    ``G + alpha 6 tau^2 a/(pi E*) = w`` a reversible share alpha (``sim.laws.reversible``)
     ``A = A0 - alpha_S T^2``            Sahli et al. 2018, measured
 
-MCD is Menga, Carbone & Dini. The two laws at a held force differ by 32/(3 pi^2) = 1.08 in energy;
-both have the radius of the last but one at alpha = pi^2/32 and 1/3, but are less stable, for T is
-held and not tau. For another Poisson ratio all shear terms gain the factor (2 - nu)/(3 (1 - nu)),
+MCD is Menga, Carbone & Dini. The two laws at a constant force differ by 32/(3 pi^2) = 1.08 in energy;
+both have the radius of the last but one at alpha = pi^2/32 and 1/3, but are less stable, for T stays
+the same and not tau. For another Poisson ratio all shear terms gain the factor (2 - nu)/(3 (1 - nu)),
 the coupling of normal and tangential fields being neglected.
 
-**One crossing.** G(a) is convex in a at a load, at an indentation and behind any machine stiffness:
-at a load it is ``(X - 2P + P^2/X)/(6 pi R)`` with X = 4 E* a^3/(3R), at an indentation
-``E*/(2 pi) (a^3/R^2 - 2 delta a/R + delta^2/a)``. The terms in T^2/a^3 are convex, too, while w and the
-terms in tau^2 a make a straight line. So there are at most two crossings, and only the wider is stable:
-there G rises above the line, whose slope is the dw/da in the condition of stability. Newton's
-method from the right of it goes left and never passes it. A step that does not go left is rounding
-and ends the search; a slope that is not positive means that there is no crossing.
-
-**Never below Hertz.** The edge can pull but not push: where adhesion does not pay for the shear even
-at Hertz's radius, the contact has that radius. It does so under a load or an indentation of at
-least zero, beyond the last adhesive state; a contact that is pulled comes off there, and the
-answer is nan.
+The terms in T^2/a^3 are convex in a, so that each theory has one stable radius at most, found and
+bounded by Hertz's as in ``sim.laws.reversible``.
 """
 
 import math
@@ -41,33 +31,41 @@ from sim.laws.jkr import (
     radius_at_indentation,
     radius_at_load,
 )
+from sim.laws.jkr.scales import twice_pull_off
 from sim.laws.reversible import (
-    _AS_STICK,
-    _AS_UNIFORM,
-    _STICK,
-    _UNIFORM,
-    _compressible,
-    _crossing_at_displacement,
-    _crossing_at_load,
-    _largest_force,
-    _shrunk_at_load,
+    compressible,
+    crossing_at_displacement,
+    crossing_at_load,
     shrunk_at_displacement,
+    shrunk_at_load,
 )
 from sim.numerics.jit import device, law
 from sim.numerics.special import cube_root
 
+_STICK = 1.5  # of T^2 in the energy balance at a load: full stick,
+_UNIFORM = 16.0 / math.pi**2  # and uniform stress
+_AS_STICK = math.pi**2 / 32.0  # alpha at a constant stress that gives the same radii
+_AS_UNIFORM = 1.0 / 3.0
+
+
+@device
+def _largest_force(load, work, sphere_radius, share):
+    """Tangential force at which the contact at a load ends: sqrt(c (2P + c)/share), c = 3 pi w R [N]."""
+    pull = twice_pull_off(work, sphere_radius)
+    return math.sqrt(pull) * math.sqrt(2.0 * load + pull) / math.sqrt(share)
+
 
 @law
 def _stuck_at_load(jkr, hertz, load, work, tangential_force, share, sphere_radius, modulus, poisson_ratio):
-    """JKR's radius less what shear at a given force takes: share T^2 in the energy balance."""
+    """Contact radius at a load from those of JKR and Hertz, with ``share`` T^2 in the energy balance."""
     if tangential_force == 0.0 or work <= 0.0 or math.isnan(jkr):
         return jkr
-    share *= _compressible(poisson_ratio)
+    share *= compressible(poisson_ratio)
     limit = _largest_force(load, work, sphere_radius, share)
     force = abs(tangential_force)
     if force > limit:
         return hertz if load >= 0.0 else math.nan
-    pull = 3.0 * math.pi * work * sphere_radius
+    pull = twice_pull_off(work, sphere_radius)
     rest = math.sqrt(share) * math.sqrt(limit - force) * math.sqrt(limit + force)
     return cube_root(0.75 * (sphere_radius / modulus) * (load + pull + rest))
 
@@ -76,16 +74,16 @@ def _stuck_at_load(jkr, hertz, load, work, tangential_force, share, sphere_radiu
 def _stuck_at_indentation(
     jkr, hertz, indentation, work, tangential_force, share, sphere_radius, modulus, poisson_ratio
 ):
-    """JKR's radius at an indentation less what shear at a given force takes."""
+    """Contact radius at an indentation, otherwise as ``_stuck_at_load``."""
     if tangential_force == 0.0 or work <= 0.0 or not jkr > 0.0 or jkr == math.inf:
         return jkr
     tilt = sphere_radius / jkr
     shear = tangential_force / modulus / jkr * (tilt / jkr)
-    stuck = 0.25 * share * _compressible(poisson_ratio) * shear * shear
+    stuck = 0.25 * share * compressible(poisson_ratio) * shear * shear
     if math.isnan(stuck):
         return math.nan
     m = 2.0 * math.pi * (work / modulus / jkr) * tilt * tilt
-    z, slope = _crossing_at_displacement(1.0, indentation / jkr * tilt, 0.0, m, 0.0, stuck)
+    z, slope = crossing_at_displacement(1.0, indentation / jkr * tilt, 0.0, m, 0.0, stuck)
     if not slope >= 0.0:
         return hertz if indentation >= 0.0 else math.nan
     return max(z * jkr, hertz) if indentation >= 0.0 else z * jkr
@@ -108,8 +106,8 @@ def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_rati
     Notes
     -----
     ``G = w + 6 tau^2 a/(pi E*)`` at nu = 1/2: the slope of the potential set to zero, where it should
-    equal the work of the stress (the corrigendum). Kept to be compared with, not to be used. With
-    reversible energies it is alpha = -1.
+    equal the work of the stress (the corrigendum). For comparison only. It is alpha = -1 of
+    ``sim.laws.reversible``.
 
     Examples
     --------
@@ -118,14 +116,14 @@ def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_rati
     """
     normal = cube_root(0.75 * (sphere_radius / modulus) * abs(load))
     adhesive = cube_root(4.5 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
-    sheared = math.sqrt(27.0 * _compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
+    sheared = math.sqrt(27.0 * compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
     scale = max(normal, max(adhesive, sheared))
     known = normal + adhesive + sheared
     if known == 0.0 or not known < math.inf:
         return known
     p = math.copysign((normal / scale) ** 3, load)
     m = math.copysign((adhesive / scale) ** 3, work)
-    z, _ = _crossing_at_load(1.7, p, m, (sheared / scale) ** 2)  # z^3 < 2 p + m + s z <= 3 + z
+    z, _ = crossing_at_load(1.7, p, m, (sheared / scale) ** 2)  # z^3 < 2 p + m + s z <= 3 + z
     if load >= 0.0:
         return scale * z if scale * z > normal else normal
     return scale * z
@@ -133,21 +131,7 @@ def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_rati
 
 @law
 def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation by MCD as first published in 2018.
-
-    Parameters
-    ----------
-    indentation, work, stress, sphere_radius, modulus, poisson_ratio : float or array
-        delta [m], w [J/m^2], tau [Pa], R [m], E* [Pa], nu [1].
-
-    Returns
-    -------
-    float or array
-        a [m]; nan where a lifted contact has no equilibrium.
-
-    Notes
-    -----
-    See ``uncorrected_at_load``.
+    """Contact radius at an indentation [m]; otherwise as ``uncorrected_at_load``.
 
     Examples
     --------
@@ -156,14 +140,14 @@ def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus
     """
     normal = math.sqrt(sphere_radius) * math.sqrt(abs(indentation))
     adhesive = cube_root(2.0 * math.pi * abs(work) * sphere_radius * (sphere_radius / modulus))
-    sheared = math.sqrt(12.0 * _compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
+    sheared = math.sqrt(12.0 * compressible(poisson_ratio)) * abs(stress) / modulus * sphere_radius
     scale = max(normal, max(adhesive, sheared))
     known = normal + adhesive + sheared
     if known == 0.0 or not known < math.inf:
         return known
     q = math.copysign((normal / scale) ** 2, indentation)
     m = math.copysign((adhesive / scale) ** 3, work)
-    z, _ = _crossing_at_displacement(1.9, q, 0.0, m, (sheared / scale) ** 2, 0.0)  # z^2 <= 1 + sqrt(z + z^2)
+    z, _ = crossing_at_displacement(1.9, q, 0.0, m, (sheared / scale) ** 2, 0.0)  # z^2 <= 1 + sqrt(z + z^2)
     if indentation >= 0.0:
         return scale * z if scale * z > normal else normal
     return scale * z
@@ -200,17 +184,7 @@ def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus,
 
 
 def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation and a tangential force, in full stick.
-
-    Parameters
-    ----------
-    indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio : float or array
-        delta [m], w [J/m^2], T [N], R [m], E* [Pa], nu [1].
-
-    Returns
-    -------
-    float or array
-        a [m]; as at a load.
+    """Contact radius at an indentation [m]; otherwise as ``savkoor_briggs_at_load``.
 
     Notes
     -----
@@ -247,7 +221,7 @@ def savkoor_briggs_limit(load, work, sphere_radius, poisson_ratio=0.5):
     """
     if work <= 0.0:
         return 0.0
-    return _largest_force(load, work, sphere_radius, _STICK * _compressible(poisson_ratio))
+    return _largest_force(load, work, sphere_radius, _STICK * compressible(poisson_ratio))
 
 
 @law
@@ -273,15 +247,15 @@ def savkoor_briggs_shrinkage(load, work, sphere_radius, modulus, poisson_ratio=0
     """
     if work <= 0.0:
         return 0.0
-    pull = 3.0 * math.pi * work * sphere_radius
+    pull = twice_pull_off(work, sphere_radius)
     root = math.sqrt(pull) * math.sqrt(2.0 * load + pull)
     cube = load + pull + root
     radius = cube_root(0.75 * (sphere_radius / modulus) * cube)
-    return _compressible(poisson_ratio) * 0.5 * math.pi * (radius / cube) * (radius / root)
+    return compressible(poisson_ratio) * 0.5 * math.pi * (radius / cube) * (radius / root)
 
 
 def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load and a tangential force spread evenly, its energy paid by adhesion.
+    """Contact radius at a load under a uniformly spread tangential force whose energy adhesion pays.
 
     Parameters
     ----------
@@ -308,18 +282,7 @@ def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulu
 
 
 def reversible_force_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at an indentation and a tangential force spread evenly, paid by adhesion.
-
-    Parameters
-    ----------
-    indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio : float or array
-        delta [m], w [J/m^2], T [N], R [m], E* [Pa], nu [1].
-
-    Returns
-    -------
-    float or array
-        a [m]; as at a load.
-    """
+    """Contact radius at an indentation [m]; otherwise as ``reversible_force_at_load``."""
     jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
     rest = (tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
     return _stuck_at_indentation(jkr, hertz, indentation, work, *rest)
@@ -345,7 +308,7 @@ def _measured_at_stress(jkr, hertz, shrinkage, stress):
 
 
 def sahli_at_load(load, work, tangential_force, shrinkage, sphere_radius, modulus):
-    """Contact radius at a load by the law that Sahli et al. (2018) found in experiments.
+    """Contact radius at a load by the empirical law of Sahli et al. (2018).
 
     Parameters
     ----------
@@ -405,8 +368,8 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
 
     Notes
     -----
-    The theories at a held force are drawn up to the largest force that they bear, from there as
-    Hertz's contact that slides.
+    The theories at a constant force hold up to the largest force that they bear; beyond it the contact
+    slides and has Hertz's radius.
 
     Examples
     --------
@@ -426,7 +389,7 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
     rest = (sphere_radius, modulus, poisson_ratio)
 
     def shrunk(fraction, held):
-        return _shrunk_at_load(jkr, hertz, load, work, stress, fraction, held, *rest)
+        return shrunk_at_load(jkr, hertz, load, work, stress, fraction, held, *rest)
 
     return _together(
         jkr=jkr,
@@ -441,18 +404,7 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
 
 
 def compare_at_indentation(stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1):
-    """Contact radius at an indentation and a mean shear stress by every theory that has one.
-
-    Parameters
-    ----------
-    stress, indentation, work, sphere_radius, modulus, poisson_ratio, reversible : float or array
-        tau [Pa], delta [m], w [J/m^2], R [m], E* [Pa], nu [1], alpha [1].
-
-    Returns
-    -------
-    dict of array
-        a [m] by theory, as ``compare_at_load`` but for ``"sahli"``, measured at loads.
-    """
+    """Contact radius [m] at an indentation by theory, as ``compare_at_load`` but for ``"sahli"``, measured at loads."""
     stress = np.asarray(stress, dtype=float)
     jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
     rest = (sphere_radius, modulus, poisson_ratio)

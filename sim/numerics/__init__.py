@@ -1,1 +1,1 @@
-"""The compiled ground: compilation, random numbers, special functions, grids, files."""
+"""Numerical ground: compilation, random numbers, special functions, grids, files."""

@@ -1,9 +1,9 @@
 """Binomial numbers by inversion at one uniform number each, for any number of trials.
 
-An expansion of the inverse tells the number at once where its error cannot change it; elsewhere the
-distribution function is evaluated, once and near the answer. The time does not grow with the number of
-trials. All is exact but for some roundings of the distribution function, so a number differs from the
-true inverse with a chance of about 1e-14 times its own spread.
+An expansion of the inverse gives the number where its error cannot change it; elsewhere the
+distribution function is evaluated, once and near the result. The time does not grow with the number of
+trials. The result is exact but for rounding of the distribution function: a number differs from the
+true inverse with a probability of about 1e-14 times its standard deviation.
 """
 
 import math
@@ -28,7 +28,7 @@ _WEIGHTS = np.array((
 ))  # fmt: skip
 _WEIGHTS = np.concatenate([_WEIGHTS, _WEIGHTS[::-1]])
 _END = 40.0  # of the exponent, where the integral may end
-#: ln n! less Stirling's formula for n = 1 to 15; none is asked for n = 0.
+#: ln n! less Stirling's formula for n = 1 to 15; unused at n = 0.
 _STIRLING = np.array((
     0.0, 0.08106146679532726, 0.0413406959554093, 0.02767792568499834, 0.020790672103765093, 0.016644691189821193,
     0.013876128823070748, 0.01189670994589177, 0.010411265261972096, 0.009255462182712733, 0.00833056343336287,
@@ -63,7 +63,7 @@ _SPLIT = 2.0**30 + 1.0  # leaves 23 bits, so that their product with a number be
 
 
 def binomial_numbers(uniform, trials, chance) -> np.ndarray:
-    """Numbers of successes: the least k whose distribution function reaches ``uniform``.
+    """Binomial numbers by inversion: the least k whose distribution function reaches ``uniform``.
 
     Parameters
     ----------
@@ -81,8 +81,8 @@ def binomial_numbers(uniform, trials, chance) -> np.ndarray:
 
     Notes
     -----
-    ``F(k) = sum over j <= k of binom(n, j) p^j (1 - p)^(n - j)``. Cornish & Fisher's expansion tells k to a
-    known error; where that leaves two of them, the smaller of F and 1 − F decides, as a sum or as
+    ``F(k) = sum over j <= k of binom(n, j) p^j (1 - p)^(n - j)``. Cornish & Fisher's expansion gives k to a
+    known error; where that leaves two candidates, the smaller of F and 1 − F decides, as a sum or as
 
         ``F(k) = f(k) (n - k) p ∫ over s > 0 of exp((k + 1) s - (n + 1) ln(1 + p (e^s - 1))) ds``
 
@@ -103,15 +103,15 @@ def binomial_numbers(uniform, trials, chance) -> np.ndarray:
 
 
 def binomial_tails(number, trials, chance) -> tuple[float, float]:
-    """Chance of at most, and of more than, ``number`` successes, each to some 1e-14 of itself.
+    """Probabilities of at most, and of more than, ``number`` successes, each to a relative 1e-14.
 
     >>> least, more = binomial_tails(0, 10, 0.5)
     >>> print(f"{1024 * least:.6f} {1024 * more:.6f}")
     1.000000 1023.000000
     """
-    told = np.empty(2)
-    _tell(float(number), float(trials), float(chance), told)
-    return float(told[0]), float(told[1])
+    both = np.empty(2)
+    _both_tails(float(number), float(trials), float(chance), both)
+    return float(both[0]), float(both[1])
 
 
 @device
@@ -288,7 +288,7 @@ def _inverse(low, high, strict, n, p, work):
 
 @device
 def _searched(k, low, high, strict, n, p, work):
-    """The same from the guess k on, by the distribution function itself."""
+    """The inverse by the distribution function itself, searched from the guess k."""
     odds, upper = p / (1.0 - p), low > 0.5
     here = _chance(k, n, p)
     below, above = _tails(k, n, p, here, work)
@@ -342,11 +342,11 @@ def _draw(uniform, trials, chance, drawn):
 
 
 @kernel("void(float64, float64, float64, float64[::1])")
-def _tell(k, n, p, told):
+def _both_tails(k, n, p, both):
     work = np.empty(_NODES.size)
     if p <= 0.5:
-        told[0], told[1] = _tails(k, n, p, _chance(k, n, p), work)
+        both[0], both[1] = _tails(k, n, p, _chance(k, n, p), work)
     elif k >= n:
-        told[0], told[1] = 1.0, 0.0
+        both[0], both[1] = 1.0, 0.0
     else:  # at most k successes are n − k failures or more
-        told[1], told[0] = _tails(n - k - 1.0, n, 1.0 - p, _chance(n - k - 1.0, n, 1.0 - p), work)
+        both[1], both[0] = _tails(n - k - 1.0, n, 1.0 - p, _chance(n - k - 1.0, n, 1.0 - p), work)

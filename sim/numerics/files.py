@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all, and trouble with them told with its reason."""
+"""Atomic writing of files, and file errors with their reason."""
 
 import contextlib
 import errno
@@ -34,11 +34,11 @@ HDF5 = _Lock()
 
 
 class StoreTrouble(OSError):
-    """The disk or a file made trouble; the message says what and where."""
+    """Disk or file error; the message names the folder and the reason."""
 
 
 def write_whole(path: Path, content: memoryview | bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
+    """Write a file whole or not at all: beside its place, to disk, then renamed."""
     beside = path.with_name(f".{path.name}.tmp")
     try:
         with open(beside, "wb") as file:
@@ -53,7 +53,7 @@ def write_whole(path: Path, content: memoryview | bytes) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make a rename in a folder last."""
+    """Flush a folder to disk, so that a rename in it survives a crash."""
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -63,7 +63,7 @@ def sync_folder(folder: Path) -> None:
 
 @contextlib.contextmanager
 def explained(folder: Path) -> Iterator[None]:
-    """Turn trouble with files into one message with its reason, which HDF5 by itself does not give."""
+    """Turn file errors into ``StoreTrouble`` with the reason, such as a full disk, which HDF5 does not give."""
     try:
         yield
     except StoreTrouble:

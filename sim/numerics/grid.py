@@ -1,4 +1,4 @@
-"""A periodic square cell: coordinates, wavevectors, a Fourier pair and Parseval's sum.
+"""Periodic square cell: coordinates, wavevectors, the Fourier pair and Parseval's sum.
 
 Conventions, once for the whole project. A field f(x, y) is an array (..., points, points): axis -2
 is x (the sliding direction), axis -1 is y, axes before them are members or times. Its spectrum is

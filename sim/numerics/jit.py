@@ -1,4 +1,4 @@
-"""The only place where numba decorates.
+"""Compilation by numba, the only place that decorates with it.
 
 Three decorators: ``device`` for a scalar helper that compiles into its callers, ``kernel`` for a
 loop over arrays, ``law`` for a formula that broadcasts as a numpy ufunc but keeps its Python
@@ -28,7 +28,7 @@ _BLOCK = 4096
 
 @functools.cache
 def _cache_folder() -> str:
-    """A folder of compiled code that belongs to exactly these sources."""
+    """Folder of compiled code, named by a hash of all sources that import this module."""
     package = Path(__file__).parents[1]
     digest = hashlib.sha256(numba.__version__.encode())
     for source in sorted(package.rglob("*.py")):
@@ -42,7 +42,7 @@ def _cache_folder() -> str:
 def _build(compile_it: Callable[[bool], Any]) -> Any:
     """Compile with the disk cache; if the cache is at fault in any way, compile without it.
 
-    numba signals a bad cache by whatever its file layer or unpickler meets (OSError, EOFError,
+    A bad cache raises whatever numba's file layer or unpickler meets (OSError, EOFError,
     UnpicklingError, RuntimeError, ...), so every exception leads to the second try, where a fault
     of the code itself shows again.
     """
@@ -105,9 +105,9 @@ def law(function: Callable) -> Callable:
     return call
 
 
-@functools.lru_cache(maxsize=64)  # constants of a scene are asked for again and again
+@functools.lru_cache(maxsize=64)  # constants of a scene come back at every step
 def _filled(shape: tuple[int, ...], value: float) -> np.ndarray:
-    """An array of one number, which nobody may write to."""
+    """Read-only array of one number."""
     array = np.empty(shape)
     array.fill(value)
     array.flags.writeable = False

@@ -1,7 +1,7 @@
-"""Random numbers by address: the same question always gets the same answer.
+"""Counter-based random numbers: a draw depends only on (seed, part, member, step).
 
-A number is addressed by (seed, part, member, step); no generator is carried along. Member 7 of a
-batch of 64, alone, after a restart or on another machine therefore draws the same numbers.
+No generator is carried along, so that a member draws the same numbers alone, in a batch, after a
+restart or on another machine.
 
 The words are those of Philox4x64-10 (Salmon, Moraes, Dror & Shaw, SC11, 2011), equal to numpy's
 ``Philox(...).random_raw``; normals follow by Box & Muller. Both are written without branches or
@@ -40,14 +40,14 @@ def steps_per_block(count: int) -> int:
 
 @dataclass(frozen=True)
 class Noise:
-    """The random numbers of one part for the members of one batch.
+    """Random numbers of one part for the members of one batch.
 
     Parameters
     ----------
     seed : int
         Seed of the run, 0 to 2**64 - 1.
     part : str
-        Which part asks, a key of ``PARTS``.
+        The part that draws, a key of ``PARTS``.
     members : array of int, shape (members,)
         Absolute numbers of the members in this batch.
 
@@ -55,8 +55,8 @@ class Noise:
     -----
     A member's block has the key (seed, part) and the counters (1, 2, ...; block, member, lane); step 0
     is the draw of the start. The lane is 256 × count plus 0 for normals, 1 for uniforms, 2 and more for
-    gammas: numbers of another law, or laid out otherwise, are independent. The block in use is kept,
-    which changes no answer; what is returned is a view into it, good until the next step is asked for.
+    gammas: numbers of another law, or laid out otherwise, are independent. The block in use is kept, which
+    changes no number; the result is a view into it, valid until the next step is drawn.
 
     Examples
     --------
@@ -258,7 +258,7 @@ def _gammas(seed, part, block, members, lane, shapes, numbers):
 
 @device
 def words_at(seed, part, c0, c1, c2, c3):
-    """The four words of one counter under the key (seed, part): for draws whose number depends on the state."""
+    """Four words of one counter under the key (seed, part), for draws whose number depends on the state."""
     k0, k1 = seed, part
     for _ in range(10):
         high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0

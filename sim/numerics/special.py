@@ -1,13 +1,12 @@
-"""Integrals of exp(-z u) over u > 1, and Lambert's W: what Bell's law of rupture is made of.
+"""Special functions of the laws: exponential integrals and Lambert's W for Bell's rupture law, the cube root.
 
 The generalised exponential integral of order j is
 
     ``E(z) = 1/j! int_1^inf (ln u)^j/u e^(-z u) du``
 
 (Milgram, Math. Comp. 44, 443 (1985)); order 0 is the ordinary E1. It decays like e^-z and grows like a
-power of ln z at small z. Multiplied by ``e^z z^(j + 1)`` it runs from 0 at z = 0 to 1 at z = infinity
-without overflow: that product is what is computed here, for any z from 0 to infinity, and the rest
-follows from it.
+power of ln z at small z. The product with ``e^z z^(j + 1)`` runs from 0 at z = 0 to 1 at z = infinity
+without overflow; it is computed for any z, and the rest follows from it.
 """
 
 import math
@@ -23,18 +22,21 @@ _SPAN = 44.0
 _SWITCH = 0.5
 _EULER = 0.57721566490153286061
 _ZETA2, _ZETA3 = 1.64493406684822643647, 1.20205690315959428540
+#: Of a cube root's first guess: upper half of a word, a third of 2^32, what the exponent's bias leaves.
+_HIGH_HALF, _HALF = np.uint64(0xFFFFFFFF00000000), np.uint64(32)
+_THIRD, _OFFSET = np.uint64(0x55555556), np.uint64(715094163 << 32)
 
 
 @device
 def _series(z, order):
     """E(z) of small z: the residues of its Mellin transform Gamma(s)/s^(j + 1) at s = 0, -1, -2, ..."""
-    depth = -math.log(z) - _EULER
+    log = -math.log(z) - _EULER
     if order == 0:
-        total = depth
+        total = log
     elif order == 1:
-        total = 0.5 * (depth * depth + _ZETA2)
+        total = 0.5 * (log * log + _ZETA2)
     else:
-        total = depth * (depth * depth / 6.0 + 0.5 * _ZETA2) - _ZETA3 / 3.0
+        total = log * (log * log / 6.0 + 0.5 * _ZETA2) - _ZETA3 / 3.0
     power = 1.0
     for n in range(1, 20):
         power *= -z / n
@@ -77,9 +79,32 @@ def lambert(x):
     return root
 
 
+@device
+def cube_root(x):
+    """Cube root of x >= 0, right to one unit in the last place; nan below zero.
+
+    A third of the exponent is a first guess good to 6 %; two of Halley's steps and one of Newton's
+    finish it. Without branches or calls it runs several times faster over arrays than the library's.
+    """
+    small = x < 1e-280
+    large = x > 1e280
+    scaled = x * 2.0**300 if small else x
+    scaled = x * 2.0**-300 if large else scaled
+    exponent = np.uint64(np.float64(scaled).view(np.int64)) >> _HALF
+    root = np.uint64(((exponent * _THIRD) & _HIGH_HALF) + _OFFSET).view(np.float64)
+    for _ in range(2):
+        cube = root * root * root
+        root = root * ((cube + 2.0 * scaled) / (2.0 * cube + scaled))
+    root -= (root * root * root - scaled) / (3.0 * root * root)
+    root = root * 2.0**-100 if small else root
+    root = root * 2.0**100 if large else root
+    root = x if x == 0.0 or x == math.inf else root
+    return root if x >= 0.0 else math.nan
+
+
 @law
 def reduced_exponential_integral(z, order):
-    """Exponential integral made free of its amplitude and decay: from 0 at z = 0 to 1 at z = infinity.
+    """Exponential integral times ``e^z z^(j + 1)``: from 0 at z = 0 to 1 at z = infinity.
 
     Parameters
     ----------
@@ -108,7 +133,7 @@ def reduced_exponential_integral(z, order):
 
 @law
 def scaled_exponential_integral(z, order):
-    """Exponential integral times e^z, which neither over- nor underflows.
+    """Exponential integral times e^z, without overflow or underflow.
 
     Parameters
     ----------
@@ -152,39 +177,3 @@ def lambert_w(x):
     0.567143
     """
     return lambert(x)
-
-
-_LOW = np.uint64(0xFFFFFFFF00000000)
-
-
-_THIRD = np.uint64(0x55555556)  # of 2**32
-
-
-_OFFSET = np.uint64(715094163 << 32)
-
-
-_HALF_WORD = np.uint64(32)
-
-
-@device
-def cube_root(x):
-    """Cube root of x >= 0, right to one unit in the last place; nan below zero.
-
-    A third of the exponent is a first guess good to 6 %; two of Halley's steps and one of Newton's
-    finish it. Without branches or calls it runs several times faster over arrays than the library's.
-    """
-    small = x < 1e-280
-    large = x > 1e280
-    scaled = x * 2.0**300 if small else x
-    scaled = x * 2.0**-300 if large else scaled
-    exponent = np.uint64(np.float64(scaled).view(np.int64)) >> _HALF_WORD
-    root = np.uint64(((exponent * _THIRD) & _LOW) + _OFFSET).view(np.float64)
-    for _ in range(2):
-        cube = root * root * root
-        root = root * ((cube + 2.0 * scaled) / (2.0 * cube + scaled))
-    root -= (root * root * root - scaled) / (3.0 * root * root)
-    root = root * 2.0**-100 if small else root
-    root = root * 2.0**100 if large else root
-    special = x == 0.0 or x == math.inf
-    root = x if special else root
-    return root if x >= 0.0 else math.nan

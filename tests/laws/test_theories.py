@@ -1,4 +1,4 @@
-"""Rival theories: their own closed states, one another, fifty digits, and never a wrong branch.
+"""Theories of a contact under shear: their own closed states, one another, fifty digits, and never a wrong branch.
 
 Tolerances: u = 2^-53. A crossing of G and the straight line is found to a few roundings of the two
 sides, which move it by their relative error over the relative difference of the slopes: that is
@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.laws import jkr, reversible, theories
+from sim.laws import halfspace, jkr, reversible, theories
 
 U = 2.0**-53
 UNIT = {"work": 1.0, "sphere_radius": 1.0, "modulus": 4.0}
@@ -286,8 +286,31 @@ def test_a_held_force_gives_the_radius_of_its_stress_up_to_the_limit(poisson_rat
     assert all(5 < end < 60 for end in ends)
 
 
+@pytest.mark.parametrize("poisson_ratio", [0.0, 0.3, 0.5])
+def test_energy_of_the_mean_stress_per_new_area_is_the_work_along_the_edge(poisson_ratio):
+    radius, stress, shear_modulus = np.array([1e-6, 1.2e-4, 3.0]), 3e5, 1.6e6
+    modulus = halfspace.contact_modulus(shear_modulus, poisson_ratio)
+    edge = halfspace.disc_edge_mean_displacement(radius, stress, shear_modulus, poisson_ratio)
+    found = reversible.mean_stress_energy(radius, stress, modulus, poisson_ratio)
+    assert_allclose(found, stress * edge, rtol=1e-14, atol=0)
+    # and two thirds of it, over the whole disc, what the disc stores
+    stored = halfspace.disc_tangential_energy(radius, stress, shear_modulus, poisson_ratio)
+    assert_allclose(2.0 / 3.0 * found * math.pi * radius**2, stored, rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize("stiffness", [1e-3, 1.0, 1e6])
+def test_a_contact_behind_a_spring_is_the_contact_at_its_load(stiffness):
+    load = np.array([0.0, 5.0])
+    exact = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
+    displacement = jkr.indentation_under_load(exact, load, 1.0, 4.0) + load / stiffness
+    found = reversible.radius_at_displacement_reversible(displacement, stiffness, 1.0, 1.0, 0.3, 1.0, 4.0)
+    assert_allclose(found, exact, rtol=200 * U, atol=0)
+    bare = reversible.radius_at_displacement_reversible(displacement, stiffness, 1.0, 1.0, 0.0, 1.0, 4.0)
+    assert_array_equal(bare, jkr.radius_at_displacement(displacement, stiffness, 1.0, 1.0, 4.0))
+
+
 @pytest.mark.parametrize("stiffness", [0.0, 1e-3, 1.0, 30.0, 1e6, math.inf])
-def test_behind_a_machine_stiffness_stands_what_stands_at_the_load(stiffness):
+def test_the_search_behind_any_stiffness_finds_the_contact_at_its_load(stiffness):
     load = np.array([-1.5, 0.0, 5.0])
     exact = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
     indentation = jkr.indentation_under_load(exact, load, 1.0, 4.0)

@@ -6,12 +6,14 @@ the contact modulus E* = E/(1 - nu^2) throughout. The contact with radius a and 
 obeys ``energy_release_rate = w``; of its two solutions every law here returns the stable one, the
 wider.
 
-A sphere is held at a load, at an indentation, or at a displacement ``Delta = delta + P/k`` behind a machine of
-stiffness k, which holds both: k = inf is an indentation, k -> 0 at a given k Delta a load.
+The control is a load, an indentation, or a displacement ``Delta = delta + P/k`` of a base behind a spring
+of stiffness k, which comprises both: k = inf is an indentation, k -> 0 at a given k Delta a load. In names
+``_at_load`` and so on mean an equilibrium under that control (a work of adhesion is given), and ``_under_load``
+any contact of a given radius, in equilibrium or not.
 
-Where no equilibrium exists (pulled beyond the fold, or pulled at all without adhesion) the answer
+Where no equilibrium exists (pulled beyond the fold, or pulled at all without adhesion) the result
 is nan. A work of zero or below, as when stress fluctuations outweigh adhesion, leaves Hertz's
-contact. A nan that the answer depends on makes it nan; nothing raises.
+contact. A nan among the numbers a result depends on makes it nan; nothing raises.
 """
 
 from sim.laws.jkr.displacement import radius_at_displacement

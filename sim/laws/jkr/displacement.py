@@ -1,10 +1,10 @@
-"""The adhesive contact at a displacement behind a machine of any stiffness: one compiled solver for all."""
+"""Adhesive contact at a displacement behind a spring of any stiffness: one compiled solver."""
 
 import math
 
 import numpy as np
 
-from sim.laws.jkr.scales import adhesive_unit, grips_share
+from sim.laws.jkr.scales import fold_radius, series_shares
 from sim.laws.jkr.stiffness import fold_level, fold_root
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import cube_root
@@ -14,11 +14,11 @@ _BLOCK = 4096
 
 @device
 def _first_guess(excess, second, third, fourth, sixth, root, floor):
-    """A point right of the root t >= 0 of F(root + t) - F(root) = excess, at most 22 % too far.
+    """Upper bound of the root t >= 0 of F(root + t) - F(root) = excess, at most 22 % too far.
 
     The smaller of two bounds, each from a lower bound of the left side f_2 t^2 + ... + f_6 t^6. Near
     the fold it is the square of ``A t + B t^2`` with A^2 = f_2 and 2 A B = f_3, for B^2 < f_4. Where x^6
-    prevails x^4 - 4x is -3 at least. Without adhesion, f_2 = f_3 = 0, the terms in x^4 and x^6 stay alone.
+    prevails x^4 - 4x is -3 at least. Without adhesion, f_2 = f_3 = 0, only the terms in x^4 and x^6 remain.
     """
     level = math.sqrt(excess)
     linear = math.sqrt(second)
@@ -32,7 +32,7 @@ def _first_guess(excess, second, third, fourth, sixth, root, floor):
 
 @device
 def _step(t, excess, second, third, fourth, fifth, sixth):
-    """Newton's step towards the root of f_2 t^2 + ... + f_6 t^6 = excess; one that does not go left is rounding."""
+    """Newton's step towards the root of f_2 t^2 + ... + f_6 t^6 = excess; t itself if rounding stops it."""
     value = t * t * (second + t * (third + t * (fourth + t * (fifth + t * sixth))))
     slope = t * (2.0 * second + t * (3.0 * third + t * (4.0 * fourth + t * (5.0 * fifth + t * 6.0 * sixth))))
     lower = t - (value - excess) / slope
@@ -41,7 +41,7 @@ def _step(t, excess, second, third, fourth, fifth, sixth):
 
 @kernel("void(float64[::1], float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
 def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
-    """See ``radius_at_displacement``.
+    """Radii for flat arrays, see ``radius_at_displacement``.
 
     No branch but selections, no call and no loop that ends early: the compiler turns the whole body into
     vector instructions, which makes it fourteen times faster.
@@ -50,13 +50,13 @@ def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
         displacement, stiffness, work, sphere_radius, modulus = (
             displacements[i], stiffnesses[i], works[i], sphere_radii[i], moduli[i],
         )  # fmt: skip
-        unit = adhesive_unit(work, sphere_radius, modulus)
+        unit = fold_radius(work, sphere_radius, modulus)
         depth = unit * (unit / sphere_radius)
         sticks = work > 0.0 and depth > 1e-300 and displacement / depth < 1e290  # else adhesion is lost in rounding
         unit = unit if sticks else sphere_radius
         depth = depth if sticks else sphere_radius
         contact = 4.0 / 3.0 * modulus * unit
-        grips, load = grips_share(stiffness, contact)
+        grips, load = series_shares(stiffness, contact)
         root = fold_root(grips, load)
         level = fold_level(root, grips, load) if sticks else 0.0
         root = root if sticks else 0.0
@@ -78,12 +78,12 @@ def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
 
 
 def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus):
-    """Contact radius at a prescribed displacement behind a machine of given stiffness.
+    """Contact radius at a prescribed displacement behind a spring of given stiffness.
 
     Parameters
     ----------
     displacement : float or array
-        Delta = delta + P/k [m]; below 0 the machine pulls.
+        Delta = delta + P/k [m]; below 0 the base pulls.
     stiffness : float or array
         k [N/m], 0 to inf.
     work : float or array
@@ -98,7 +98,7 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
     float or array
         a [m]; nan below ``pull_off_displacement`` and for a negative stiffness. At k = inf the radius at the
         indentation Delta, at k = 0 the radius without load, for no displacement can then press or pull. Where
-        w <= 0 Hertz's radius behind the machine, the root of ``a^2/R + 4 E* a^3/(3 R k) = Delta``.
+        w <= 0 Hertz's radius, the root of ``a^2/R + 4 E* a^3/(3 R k) = Delta``.
 
     Notes
     -----
@@ -124,7 +124,7 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
 
     Examples
     --------
-    The same displacement pulls a sphere off a stiff machine, not off a soft one:
+    The same displacement pulls the sphere off behind a stiff spring, not behind a soft one:
 
     >>> a = radius_at_displacement(-9e-7, [100.0, 1e3, float("inf")], 0.042, 2e-3, 6.4e6)
     >>> print("%.2e %.2e %.2e" % tuple(a))

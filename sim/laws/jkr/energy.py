@@ -1,4 +1,4 @@
-"""Energies of the contact: what its edge releases, and the potentials of Menga, Carbone & Dini (MCD)."""
+"""Energy release rate of the contact, and the potentials of Menga, Carbone & Dini (MCD)."""
 
 import math
 
@@ -18,8 +18,8 @@ def energy_release_rate(radius, load, sphere_radius, modulus):
     -----
     ``(P_H - P)^2 / (8 pi E* a^3)`` with P_H = 4 E* a^3/(3R) the load that Hertz's contact of that
     radius needs. It equals w in equilibrium; the contact closes where it is below w, and opens
-    where it is above. It does not know the sign of P_H - P: below P_H the edge is pulled open, above
-    it the bodies would overlap at the edge.
+    where it is above. The sign of P_H - P is lost in the square: below P_H the edge is pulled open,
+    above it the bodies would overlap at the edge.
 
     Examples
     --------
@@ -35,17 +35,11 @@ def energy_release_rate(radius, load, sphere_radius, modulus):
 
 @law
 def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modulus):
-    """Elastic energy released per area by a shrinking contact at an indentation [J/m^2].
-
-    Parameters
-    ----------
-    radius, indentation, sphere_radius, modulus : float or array
-        a [m], delta [m], R [m], E* [Pa].
+    """Elastic energy released per area at an indentation delta [m]; otherwise as ``energy_release_rate``.
 
     Notes
     -----
-    ``E* (delta - a^2/R)^2 / (2 pi a)``: the same number as ``energy_release_rate`` at the load that
-    goes with it, for the growth of area alone decides it, not the control.
+    ``E* (delta - a^2/R)^2 / (2 pi a)``: the same number as at the load that goes with it, whatever the control.
 
     Examples
     --------
@@ -60,7 +54,7 @@ def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modul
 
 @law
 def potential_at_indentation(separation, stress, radius, work, sphere_radius, modulus):
-    """The paper's potential H of the contact at a fixed separation and uniform shear stress [J].
+    """MCD's potential H of the contact at a fixed separation and uniform shear stress [J].
 
     Parameters
     ----------
@@ -85,12 +79,7 @@ def potential_at_indentation(separation, stress, radius, work, sphere_radius, mo
 
 @law
 def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
-    """The paper's potential G of the contact at a fixed load and uniform shear stress [J].
-
-    Parameters
-    ----------
-    tractive_force, stress, radius, work, sphere_radius, modulus : float or array
-        F = -P [N], tau [Pa], a [m], w [J/m^2], R [m], E* [Pa].
+    """MCD's potential G at a fixed tractive force F = -P [N]; otherwise as ``potential_at_indentation``.
 
     Notes
     -----
@@ -110,12 +99,7 @@ def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modul
 
 @law
 def potential_slope_at_indentation(separation, stress, radius, work, sphere_radius, modulus):
-    """dH/da at fixed separation and stress [J/m].
-
-    Parameters
-    ----------
-    separation, stress, radius, work, sphere_radius, modulus : float or array
-        s = -delta [m], tau [Pa], a [m], w [J/m^2], R [m], E* [Pa].
+    """dH/da at fixed separation and stress [J/m]; arguments as for ``potential_at_indentation``.
 
     Notes
     -----
@@ -134,17 +118,11 @@ def potential_slope_at_indentation(separation, stress, radius, work, sphere_radi
 
 @law
 def potential_slope_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
-    """dG/da at fixed load and stress [J/m].
-
-    Parameters
-    ----------
-    tractive_force, stress, radius, work, sphere_radius, modulus : float or array
-        F = -P [N], tau [Pa], a [m], w [J/m^2], R [m], E* [Pa].
+    """dG/da at fixed load and stress [J/m]; arguments as for ``potential_at_load``.
 
     Notes
     -----
-    ``(F + 4 E* a^3/(3R))^2/(4 E* a^2) - 12 tau^2 a^2/E* - 2 pi w a``; see
-    ``potential_slope_at_indentation``.
+    ``(F + 4 E* a^3/(3R))^2/(4 E* a^2) - 12 tau^2 a^2/E* - 2 pi w a``.
 
     Examples
     --------

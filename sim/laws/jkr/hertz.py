@@ -1,4 +1,4 @@
-"""The contact of a sphere without adhesion, after Hertz."""
+"""Contact of a sphere without adhesion, after Hertz."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""The adhesive contact at a given indentation ("fixed grips")."""
+"""Adhesive contact at a given indentation ("fixed grips")."""
 
 import math
 
@@ -75,7 +75,7 @@ def radius_at_indentation(indentation, work, sphere_radius, modulus):
     if not indentation >= fold:
         return math.nan
     excess = (indentation - fold) / -fold
-    if not excess < 1e300:  # adhesion is lost in rounding: its scale is below the smallest number
+    if not excess < 1e300:  # adhesion is lost in rounding
         return math.sqrt(indentation) * math.sqrt(sphere_radius)
     stretch = 1.0 + _above_fold(excess)
     return fold_radius(work, sphere_radius, modulus) * stretch * stretch

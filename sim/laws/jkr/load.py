@@ -1,4 +1,4 @@
-"""The adhesive contact at a given load."""
+"""Adhesive contact at a given load."""
 
 import math
 
@@ -36,8 +36,8 @@ def radius_at_load(load, work, sphere_radius, modulus):
 
     Examples
     --------
-    Without load a sphere of 2 mm on PDMS still makes a contact, and pulling shrinks it by at most
-    the factor (1/4)^(1/3) = 0.63:
+    A sphere of 2 mm on PDMS makes a contact without load, and pulling shrinks it by at most the
+    factor (1/4)^(1/3) = 0.63:
 
     >>> rest = radius_at_load(0.0, 0.042, 2e-3, 6.4e6)
     >>> last = radius_at_load(pull_off_load(0.042, 2e-3), 0.042, 2e-3, 6.4e6)

@@ -1,11 +1,6 @@
-"""The scales that adhesion sets: twice the pull-off load, and where the contact at fixed grips ends.
-
-And how a machine and a contact share what moves them.
-"""
+"""Scales that adhesion sets: twice the pull-off load, the last contact at fixed grips; two springs in series."""
 
 import math
-
-import numpy as np
 
 from sim.numerics.jit import device
 from sim.numerics.special import cube_root
@@ -19,26 +14,20 @@ def twice_pull_off(work, sphere_radius):
 
 @device
 def fold_radius(work, sphere_radius, modulus):
-    """Radius at which the contact at a given indentation ends: (pi w R^2 / 8 E*)^(1/3) [m]."""
-    return np.cbrt(math.pi * work * sphere_radius * (sphere_radius / (8.0 * modulus)))
+    """Radius at which the contact at a given indentation ends: (pi w R^2 / 8 E*)^(1/3) [m]; nan for w < 0."""
+    return cube_root(math.pi * work * sphere_radius * (sphere_radius / (8.0 * modulus)))
 
 
 @device
 def fold_indentation(work, sphere_radius, modulus):
-    """Indentation at which it ends: -3 a^2/R with a the radius there [m]."""
+    """Indentation at which it ends: -3 a^2/R with that radius [m]."""
     a = fold_radius(work, sphere_radius, modulus)
     return -3.0 * a * (a / sphere_radius)
 
 
 @device
-def adhesive_unit(work, sphere_radius, modulus):
-    """The same radius as ``fold_radius``, by a cube root that vector instructions can take; nan for w < 0."""
-    return cube_root(math.pi * work * sphere_radius * (sphere_radius / (8.0 * modulus)))
-
-
-@device
-def grips_share(stiffness, contact):
-    """k/(k + b) and b/(k + b) for a stiffness k of the machine and b of the contact, each from 0 to inf."""
+def series_shares(stiffness, contact):
+    """k/(k + b) and b/(k + b) for the stiffness k of the spring and b of the contact, each from 0 to inf."""
     stiffness = stiffness + 0.0  # no -0
     stiffer = stiffness > contact
     high = stiffness if stiffer else contact

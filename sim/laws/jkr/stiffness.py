@@ -1,8 +1,8 @@
-"""The adhesive contact behind a machine: a spring of stiffness k between the sphere and what moves it.
+"""Adhesive contact behind a spring of stiffness k: pull-off, load, indentation and energy release rate.
 
-A displacement ``Delta = delta + P/k`` of the machine is the indentation and what the load shortens the
+The displacement ``Delta = delta + P/k`` of the base is the indentation plus what the load shortens the
 spring by. An infinite stiffness is an indentation; towards zero stiffness, with ``k Delta`` kept, it
-becomes a load, and without stiffness no displacement can load the sphere: P = 0.
+becomes a load; at k = 0 no displacement can load the sphere, P = 0.
 
 Let a_g be the radius at which the contact at fixed grips ends, h = a_g^2/R and b = 4 E* a_g/3. With
 sqrt(a) = x sqrt(a_g) an equilibrium has ``delta = h (x^4 - 4x)`` and ``P = b h (x^6 - 6x^3)``, so that
@@ -18,12 +18,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.laws.jkr.scales import adhesive_unit, grips_share
+from sim.laws.jkr.scales import fold_radius, series_shares
 from sim.numerics.jit import device, law
 
 
 class PullOff(NamedTuple):
-    """The last equilibrium before a contact is pulled off: radius [m], load [N], indentation [m]."""
+    """Last equilibrium before pull-off: radius [m], load [N], indentation [m]."""
 
     radius: np.ndarray
     load: np.ndarray
@@ -56,9 +56,21 @@ def fold_level(root, grips, load):
     return grips * root * (cube - 4.0) + load * cube * (cube - 6.0)
 
 
+@device
+def _fold(stiffness, work, sphere_radius, modulus):
+    """x_f and a_g of the last contact, with g and 1 - g; x_f is nan for a negative stiffness, 0 where w <= 0."""
+    if not stiffness >= 0.0:
+        return math.nan, 1.0, 1.0, 0.0
+    if work <= 0.0:
+        return 0.0, 1.0, 1.0, 0.0
+    unit = fold_radius(work, sphere_radius, modulus)
+    grips, load = series_shares(stiffness, 4.0 / 3.0 * modulus * unit)
+    return fold_root(grips, load), unit, grips, load
+
+
 @law
 def pull_off_displacement(stiffness, work, sphere_radius, modulus):
-    """Lowest displacement that an adhesive contact bears behind a machine [m]; 0 where w <= 0.
+    """Lowest displacement that an adhesive contact bears behind a spring [m]; 0 where w <= 0.
 
     Parameters
     ----------
@@ -73,60 +85,37 @@ def pull_off_displacement(stiffness, work, sphere_radius, modulus):
 
     Examples
     --------
-    The softer the machine, the further it must go back, though the contact itself ends sooner:
+    The softer the spring, the further the base must go back, though the contact itself ends sooner:
 
     >>> stiff, soft = pull_off_displacement([1e4, 100.0], 0.042, 2e-3, 6.4e6)
     >>> print(f"{stiff:.2e} {soft:.2e}")
     -7.33e-07 -4.35e-06
     """
-    unit = adhesive_unit(work, sphere_radius, modulus)
-    grips, load = grips_share(stiffness, 4.0 / 3.0 * modulus * unit)
-    if not stiffness >= 0.0:
-        return math.nan
-    if work <= 0.0:
-        return 0.0
-    return fold_level(fold_root(grips, load), grips, load) * (unit * (unit / sphere_radius) / grips)
+    root, unit, grips, load = _fold(stiffness, work, sphere_radius, modulus)
+    return fold_level(root, grips, load) * (unit * (unit / sphere_radius) / grips) + 0.0  # no -0
 
 
 @law
 def _pull_off_radius(stiffness, work, sphere_radius, modulus):
-    unit = adhesive_unit(work, sphere_radius, modulus)
-    grips, load = grips_share(stiffness, 4.0 / 3.0 * modulus * unit)
-    if not stiffness >= 0.0:
-        return math.nan
-    if work <= 0.0:
-        return 0.0
-    root = fold_root(grips, load)
+    root, unit, _, _ = _fold(stiffness, work, sphere_radius, modulus)
     return unit * root * root
 
 
 @law
 def _pull_off_load(stiffness, work, sphere_radius, modulus):
-    unit = adhesive_unit(work, sphere_radius, modulus)
-    grips, load = grips_share(stiffness, 4.0 / 3.0 * modulus * unit)
-    if not stiffness >= 0.0:
-        return math.nan
-    if work <= 0.0:
-        return 0.0
-    root = fold_root(grips, load)
+    root, _, _, _ = _fold(stiffness, work, sphere_radius, modulus)
     cube = root * root * root
-    return math.pi * work * sphere_radius * (cube * (cube - 6.0) / 6.0)
+    return math.pi * work * sphere_radius * (cube * (cube - 6.0) / 6.0) + 0.0
 
 
 @law
 def _pull_off_indentation(stiffness, work, sphere_radius, modulus):
-    unit = adhesive_unit(work, sphere_radius, modulus)
-    grips, load = grips_share(stiffness, 4.0 / 3.0 * modulus * unit)
-    if not stiffness >= 0.0:
-        return math.nan
-    if work <= 0.0:
-        return 0.0
-    root = fold_root(grips, load)
-    return unit * (unit / sphere_radius) * (root * (root * root * root - 4.0))
+    root, unit, _, _ = _fold(stiffness, work, sphere_radius, modulus)
+    return unit * (unit / sphere_radius) * (root * (root * root * root - 4.0)) + 0.0
 
 
 def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
-    """The last equilibrium of a contact that a machine of given stiffness pulls off.
+    """Last equilibrium of a contact that is pulled off through a spring of given stiffness.
 
     Parameters
     ----------
@@ -158,7 +147,7 @@ def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
 
 @law
 def load_under_displacement(radius, displacement, stiffness, sphere_radius, modulus):
-    """Load of any contact, in equilibrium or not, of given radius behind a machine [N].
+    """Load of any contact, in equilibrium or not, of given radius behind a spring [N].
 
     Parameters
     ----------
@@ -168,11 +157,11 @@ def load_under_displacement(radius, displacement, stiffness, sphere_radius, modu
     Notes
     -----
     ``P = p (Delta - a^2/(3R))/(1 + p/k)``: a contact of fixed radius is a spring of stiffness
-    p = 2 E* a, in series with the machine.
+    p = 2 E* a, in series with the other one.
 
     Examples
     --------
-    A machine as stiff as the contact takes half of the displacement:
+    A spring as stiff as the contact takes half of the displacement:
 
     >>> print(f"{load_under_displacement(1.0, 1.0, [2.0, float('inf')], 1.0, 1.0).round(4)}")
     [0.6667 1.3333]
@@ -187,7 +176,7 @@ def load_under_displacement(radius, displacement, stiffness, sphere_radius, modu
 
 @law
 def indentation_under_displacement(radius, displacement, stiffness, sphere_radius, modulus):
-    """Indentation of any contact, in equilibrium or not, of given radius behind a machine [m].
+    """Indentation of any contact, in equilibrium or not, of given radius behind a spring [m].
 
     Parameters
     ----------
@@ -197,14 +186,14 @@ def indentation_under_displacement(radius, displacement, stiffness, sphere_radiu
     Notes
     -----
     ``delta = g Delta + (1 - g) a^2/(3R)`` with ``g = k/(k + 2 E* a)``: between the displacement and the
-    depth to which an unloaded contact of that radius sinks, which is all that is left at k = 0.
+    depth to which an unloaded contact of that radius sinks, its value at k = 0.
 
     Examples
     --------
     >>> print(f"{indentation_under_displacement(1.0, 1.0, [2.0, float('inf')], 1.0, 1.0).round(4)}")
     [0.6667 1.    ]
     """
-    grips, load = grips_share(stiffness, 2.0 * modulus * radius)
+    grips, load = series_shares(stiffness, 2.0 * modulus * radius)
     if not stiffness >= 0.0:
         return math.nan
     return grips * displacement + load * (radius * (radius / sphere_radius) / 3.0)
@@ -212,7 +201,7 @@ def indentation_under_displacement(radius, displacement, stiffness, sphere_radiu
 
 @law
 def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_radius, modulus):
-    """Elastic energy released per area by a shrinking contact behind a machine [J/m^2].
+    """Elastic energy released per area by a shrinking contact behind a spring [J/m^2].
 
     Parameters
     ----------
@@ -221,9 +210,9 @@ def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_
 
     Notes
     -----
-    ``E* (delta - a^2/R)^2/(2 pi a)`` as at an indentation, with the indentation that the machine leaves:
+    ``E* (delta - a^2/R)^2/(2 pi a)`` as at an indentation, with the indentation of that displacement:
     ``a^2/R - delta = g (a^2/R - Delta) + (1 - g) 2a^2/(3R)``, g = k/(k + 2 E* a). The energy of the
-    machine's spring is in it.
+    spring is included.
 
     Examples
     --------
@@ -232,7 +221,7 @@ def energy_release_rate_at_displacement(radius, displacement, stiffness, sphere_
     >>> print("%.3f %.3f %.3f" % tuple(between))
     0.113 0.134 0.163
     """
-    grips, load = grips_share(stiffness, 2.0 * modulus * radius)
+    grips, load = series_shares(stiffness, 2.0 * modulus * radius)
     if not stiffness >= 0.0:
         return math.nan
     hertz = radius * (radius / sphere_radius)

@@ -1,12 +1,12 @@
-"""Bonds between sliding surfaces, in closed form: how many are closed, and what force they bear.
+"""Bonds between sliding surfaces, in closed form: their number and the force that they bear.
 
-From the law of the paper to what replaces it, each with its own assumption on how bonds break:
+From the law of Menga, Carbone & Dini to fuller ones, each with its own assumption on rupture:
 
-- ``linear``: the fraction ``1/(1 + V/Vc)`` of Menga, Carbone & Dini, its rate equation and exact step;
-- ``renewal``: any law of rupture, from three moments of the life of a bond; a constant rate;
-- ``bell``: force helps heat to open a bond; exact, with the friction maximum;
+- ``linear``: their fraction ``1/(1 + V/Vc)``, its rate equation and exact step;
+- ``renewal``: any rupture law, from three moments of the life of a bond; a constant rate;
+- ``bell``: a rupture rate that grows exponentially with force; exact, with the friction maximum;
 - ``first_moment``: the same in mean field, whose maximum is too high;
-- ``cut_off``: bonds that break at a stretch, of which the law of the paper is the limit without heat;
+- ``cut_off``: bonds that break at a stretch, whose limit without thermal rupture is ``linear``;
 - ``loading``: a Bell bond pulled once: rupture forces and the static peak;
 - ``cluster``: a finite number of bonds under a shared force.
 

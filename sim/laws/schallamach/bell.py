@@ -1,12 +1,12 @@
-"""Bonds that force helps to open, ``k = k_0 e^(f/f_b)`` (Bell 1978), resolved in their stretch: exact.
+"""Bonds whose rupture rate grows with force, ``k = k_0 e^(f/f_b)`` (Bell 1978), resolved in stretch: exact.
 
-A bond of stiffness kappa that is stretched by V t outlives the age t with the chance
+A bond of stiffness kappa that is stretched by V t outlives the age t with probability
 ``S = exp(-z (e^(t k_0/z) - 1))``, where ``z = k_0 f_b/(kappa |V|)``: at z above 1 bonds open by
 themselves before the sliding pulls on them, below 1 the sliding tears them off. Friction is largest
 at z = 0.38 if sites rebind slowly, near z = k_0/k_on if they rebind fast, and falls like (ln V)^2/V
 after it.
 
-All that is needed are the integrals ``R_j`` of ``sim.numerics.special`` at z, which run from 0 at z = 0
+Everything follows from the integrals ``R_j`` of ``sim.numerics.special`` at z, which run from 0 at z = 0
 (infinite speed) to 1 at z = infinity (rest, or an infinite Bell force: a constant rate).
 """
 
@@ -85,9 +85,9 @@ def _force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, o
     n = int(order)
     z = _pace(speed, zero_force_rate, bell_force, bond_stiffness)
     cycle = reduced(z, 0) + zero_force_rate / rebinding_rate
-    if z >= 1.0:  # in units of kappa V/k_0, to which rest and an infinite Bell force are no exceptions
+    if z >= 1.0:  # in units of kappa V/k_0: rest and an infinite Bell force are regular
         unit, moment = bond_stiffness * math.fabs(speed) / zero_force_rate, reduced(z, n)
-    else:  # in units of the Bell force, to which infinite speed is none
+    else:  # in units of the Bell force: infinite speed is regular
         unit, moment = bell_force, _times_z(z, n)
     if n == 2:
         return 2.0 * moment * unit * unit / cycle
@@ -95,7 +95,7 @@ def _force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, o
 
 
 def bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    """Population of Bell bonds in steady sliding.
+    """Bound share and force moments of Bell bonds in steady sliding.
 
     Parameters
     ----------
@@ -261,8 +261,8 @@ def bell_critical_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_r
 
     Notes
     -----
-    The root of ``bell_fraction = 1/2``: what comes nearest to the critical speed of
-    ``steady_fraction``, though the bonds of a Bell population go over more decades of speed.
+    The root of ``bell_fraction = 1/2``, the counterpart of the critical speed of ``steady_fraction``; a
+    Bell population loses its bonds over more decades of speed.
 
     Examples
     --------

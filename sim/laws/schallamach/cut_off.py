@@ -1,4 +1,4 @@
-"""Bonds that open at one rate and break for certain at a stretch l (after Chernyak & Leonov 1986).
+"""Bonds that open at a constant rate and all break at a stretch l (after Chernyak & Leonov 1986).
 
 A bond lives until l/|V| at the longest. Without the rate, ``k_0 = 0``, lives are all equal and the
 fraction is the law of Menga, Carbone & Dini, ``1/(1 + |V|/Vc)`` with ``Vc = l k_on``; its friction then is
@@ -52,7 +52,7 @@ def _site(speed, rate, stretch, bond_stiffness, rebinding_rate, power):
 
 
 def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
-    """Population in steady sliding whose bonds open at one rate and break at a stretch.
+    """Bound share and force moments of such bonds in steady sliding.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
 
 @law
 def cut_off_fraction(speed, rate, stretch, rebinding_rate):
-    """Bond fraction in steady sliding of bonds that open at one rate and break at a stretch [1].
+    """Bond fraction of such bonds in steady sliding: bonds over bonds at rest [1].
 
     Parameters
     ----------
@@ -102,12 +102,12 @@ def cut_off_fraction(speed, rate, stretch, rebinding_rate):
     Returns
     -------
     float or array
-        Bonds over bonds at rest: 1 at rest, 0 at infinite speed; ``1/(1 + |V|/(l k_on))`` where ``rate``
+        1 at rest, 0 at infinite speed; ``1/(1 + |V|/(l k_on))`` where ``rate``
         is 0.
 
     Examples
     --------
-    Bonds that open by themselves besides are less of a loss when sliding adds to it:
+    Bonds that open by themselves, too, lose a smaller share by sliding:
 
     >>> print("%.3f %.3f" % tuple(cut_off_fraction(1.0, [0.0, 1.0], 1.0, 1.0)))
     0.500 0.775
@@ -124,7 +124,7 @@ def cut_off_fraction(speed, rate, stretch, rebinding_rate):
 
 
 def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_density):
-    """Shear stress in steady sliding of bonds that open at one rate and break at a stretch [Pa].
+    """Shear stress of such bonds in steady sliding [Pa].
 
     Parameters
     ----------

@@ -1,10 +1,10 @@
-"""Bell bonds in mean field: every bond has the mean stretch. Closed forms by Lambert's W.
+"""Bell bonds in mean field, every bond at the mean stretch: closed forms by Lambert's W.
 
 The first-moment closure of a population follows the bound share phi and the mean stretch x,
 
     ``dphi/dt = k_on (1 - phi) - k phi``,  ``dx/dt = V - x k_on (1 - phi)/phi``,  ``k = k_0 e^(kappa x/f_b)``
 
-and forgets that it is the stretched bonds that break. Its friction maximum is too high, by 24 to 55 %
+and neglects that stretched bonds break first. Its friction maximum is too high, by 24 to 55 %
 for k_on/k_0 from 0.1 to 1000 (``bell_peak`` is exact), at a speed right to 7 %. These are the steady
 states of that closure, not of bonds; for those see ``bell_moments``.
 """
@@ -19,7 +19,7 @@ from sim.numerics.special import lambert
 
 
 @device
-def _tilt(speed, zero_force_rate, bell_force, bond_stiffness):
+def steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness):
     """Steady stretch in units of f_b/kappa: W(eps)."""
     return lambert(bond_stiffness * math.fabs(speed) / (zero_force_rate * bell_force))
 
@@ -50,7 +50,7 @@ def first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness):
     >>> print("%.4f %.4f" % tuple(first_moment_stretch([1.0, -1.0], 1.0, 1.0, 1.0)))
     0.5671 -0.5671
     """
-    tilt = _tilt(speed, zero_force_rate, bell_force, bond_stiffness)
+    tilt = steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
     return _stretch(tilt, speed, zero_force_rate, bell_force, bond_stiffness)
 
 
@@ -76,13 +76,13 @@ def first_moment_fraction(speed, zero_force_rate, bell_force, bond_stiffness, re
     """
     if rebinding_rate == math.inf:
         return 1.0
-    growth = math.exp(_tilt(speed, zero_force_rate, bell_force, bond_stiffness))
+    growth = math.exp(steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness))
     return (rebinding_rate + zero_force_rate) / (rebinding_rate + zero_force_rate * growth)
 
 
 @law
 def _force(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    tilt = _tilt(speed, zero_force_rate, bell_force, bond_stiffness)
+    tilt = steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
     wait = zero_force_rate / rebinding_rate
     if tilt == math.inf and wait > 0.0:
         return 0.0
@@ -122,7 +122,7 @@ def _peak_speed(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
 
 @law
 def _peak_force(zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
-    # the stiffness gives the answer its shape, nothing else
+    # the stiffness only broadcasts
     return bell_force * lambert(rebinding_rate / zero_force_rate / math.e)
 
 

@@ -1,18 +1,18 @@
-"""Bonds between sliding surfaces: how many are closed, at rest and on the way there.
+"""Linear law of the bond fraction: steady sliding, rate equation and its exact step.
 
 The bond fraction phi is the number of bonds over the number of bonds *at rest*. The law of Menga,
 Carbone & Dini (MCD, after Schallamach 1963) is ``phi = 1/(1 + |V|/Vc)``. It is not a general result:
 it is exact only for bonds that never open by themselves and break at a fixed stretch l, while open
 sites close at a rate h, so that ``Vc = h l``. Each bond then lives for the time l/|V| and each site
 waits 1/h for the next. The friction of that very model, ``(kappa l N0/2)/(1 + |V|/Vc)`` for bonds of
-stiffness kappa, falls with speed and has no maximum: a maximum needs bonds that heat can open.
+stiffness kappa, falls with speed and has no maximum: a maximum needs thermally activated rupture.
 
-Replacing the fixed life by a constant rupture |V|/l of the same mean gives the linear rate equation
+Replacing the fixed life by a constant rupture rate |V|/l of the same mean gives the linear rate equation
 
     ``dphi/dt = h (1 - phi) - h (|V|/Vc) phi``
 
 with the same steady state. Its coefficients depend on time through the speed alone, so one step of
-any length at a mean speed is known exactly, for the mean and for the chances of a single site.
+any length at a mean speed is exact, for the mean and for the probabilities of a single site.
 """
 
 import math
@@ -114,7 +114,7 @@ def relax_fraction(fraction, path, duration, critical_speed, rebinding_rate):
 
 
 def transition_probabilities(path, duration, critical_speed, rebinding_rate):
-    """Chances of one site over a step, with rupture laws h to close and h |V|/Vc to open.
+    """Transition probabilities of one site over a step, with rates h to close and h |V|/Vc to open.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def transition_probabilities(path, duration, critical_speed, rebinding_rate):
 
     Examples
     --------
-    After a long time a site has forgotten where it started:
+    After a long time the start no longer matters:
 
     >>> print("%.3f %.3f" % transition_probabilities(1e-2, 1.0, 1e-2, 200.0))
     0.500 0.500

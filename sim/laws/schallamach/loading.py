@@ -1,14 +1,15 @@
-"""A Bell bond that is pulled once, at a constant rate, until it breaks: rupture forces and the static peak.
+"""Bell bonds loaded once, at a constant rate, until they break: rupture forces and the static peak.
 
-Evans & Ritchie (1997) for the forces; a population that has rested and is then slid at once is many
-such bonds pulled together, as long as the sites that broke do not matter.
+Evans & Ritchie (1997) for the forces. A population at rest that suddenly slides is many such bonds
+loaded together, as long as sites do not rebind.
 """
 
 import math
 from typing import Any, NamedTuple
 
+from sim.laws.schallamach.first_moment import steady_tilt
 from sim.numerics.jit import device, law
-from sim.numerics.special import lambert, reduced
+from sim.numerics.special import reduced
 
 
 class StartUpPeak(NamedTuple):
@@ -16,6 +17,12 @@ class StartUpPeak(NamedTuple):
 
     time: Any
     force: Any
+
+
+@device
+def _growth(tilt):
+    """(e^x - 1)/x for x >= 0."""
+    return math.expm1(tilt) / tilt if tilt > 0.0 else 1.0
 
 
 @law
@@ -74,9 +81,8 @@ def bell_rupture_force_density(force, loading_rate, zero_force_rate, bell_force)
     if force < 0.0 or force == math.inf:
         return 0.0
     tilt = force / bell_force
-    growth = math.expm1(tilt) / tilt if tilt > 0.0 else 1.0
     rate = zero_force_rate / loading_rate
-    return rate * math.exp(tilt - rate * force * growth)
+    return rate * math.exp(tilt - rate * force * _growth(tilt))
 
 
 @law
@@ -108,26 +114,18 @@ def start_up_force(time, speed, zero_force_rate, bell_force, bond_stiffness):
     1.8762 2.5451 1.1449
     """
     pull = bond_stiffness * speed * time
-    tilt = math.fabs(pull) / bell_force
-    growth = math.expm1(tilt) / tilt if tilt > 0.0 else 1.0
-    alive = math.exp(-zero_force_rate * time * growth)
+    alive = math.exp(-zero_force_rate * time * _growth(math.fabs(pull) / bell_force))
     return pull * alive if alive > 0.0 else 0.0
-
-
-@device
-def _tilt(speed, zero_force_rate, bell_force, bond_stiffness):
-    """Largest force of the mean bond in units of f_b: W(1/z)."""
-    return lambert(bond_stiffness * math.fabs(speed) / (zero_force_rate * bell_force))
 
 
 @law
 def _peak_time(speed, zero_force_rate, bell_force, bond_stiffness):
-    return math.exp(-_tilt(speed, zero_force_rate, bell_force, bond_stiffness)) / zero_force_rate
+    return math.exp(-steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)) / zero_force_rate
 
 
 @law
 def _peak_force(speed, zero_force_rate, bell_force, bond_stiffness):
-    tilt = _tilt(speed, zero_force_rate, bell_force, bond_stiffness)
+    tilt = steady_tilt(speed, zero_force_rate, bell_force, bond_stiffness)
     lost = math.expm1(-tilt) / tilt if tilt > 0.0 else -1.0
     if tilt > 1.0:
         return math.copysign(bell_force * tilt * math.exp(lost), speed)

@@ -1,8 +1,8 @@
-"""Sites that bind and break again and again at a constant speed: what any law of rupture amounts to.
+"""Sites that bind and break repeatedly at a constant speed (a renewal process), for any rupture law.
 
 A bond is born unstretched and stretched by V t until it breaks at the age T; its site then waits for
-the time 1/k_on on average and binds afresh (renewal-reward; Schallamach 1963 for the picture). Three
-moments of the life T decide everything that is measured, whatever law T comes from. Numbers are per
+the time 1/k_on on average and binds afresh (renewal-reward; Schallamach 1963). Three moments of the
+life T determine bound share, force and force fluctuations, whatever the rupture law. Numbers are per
 *site* here: at rest a share ``k_on/(k_on + k_0)`` of the sites is bound, and only relative to that
 share do the ``*_fraction`` functions give the bond fraction of Menga, Carbone & Dini.
 """
@@ -16,7 +16,7 @@ from sim.numerics.jit import law
 
 
 class SiteMoments(NamedTuple):
-    """Population in steady sliding.
+    """Bound share and force moments per site of a population in steady sliding.
 
     Attributes
     ----------
@@ -74,7 +74,7 @@ def rest_share(rupture_rate, rebinding_rate):
 
 @law
 def _bound(life, pull, rebinding_rate):
-    # the pull gives the answer its shape, nothing else
+    # the pull only broadcasts
     if life == math.inf and rebinding_rate > 0.0:
         return 1.0
     return life / (life + 1.0 / rebinding_rate)
@@ -87,7 +87,7 @@ def _reward(moment, reach, life, rebinding_rate):
 
 
 def renewal(life, half_square, third_cube, speed, bond_stiffness, rebinding_rate):
-    """Population in steady sliding whose bonds live for times of given moments.
+    """Bound share and force moments in steady sliding from the moments of a bond's life.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def renewal(life, half_square, third_cube, speed, bond_stiffness, rebinding_rate
 
 
 def constant_moments(speed, rate, bond_stiffness, rebinding_rate):
-    """Population in steady sliding whose bonds break at one rate, however stretched they are.
+    """Bound share and force moments in steady sliding of bonds that break at a constant rate.
 
     Parameters
     ----------

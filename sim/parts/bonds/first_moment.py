@@ -21,9 +21,9 @@ the sign of it: the Coulomb friction of bonds that nothing but sliding breaks.
 import math
 
 import numpy as np
-from scipy.special import lambertw
 
 from sim.numerics.jit import device, kernel
+from sim.numerics.special import lambert_w
 from sim.parts.bonds.rupture import RuptureRate
 
 #: Largest error of N and of M that a sub-step under Bell's rate may make, by its embedded lower order, over N and M.
@@ -136,7 +136,7 @@ def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[np.ndarray, np.
     pace = np.abs(speed)
     rate = rupture.rate
     if rupture.softness > 0.0 and rate > 0.0:
-        rate = rate * np.exp(lambertw(rupture.softness * pace / rate).real)
+        rate = rate * np.exp(lambert_w(rupture.softness * pace / rate))
     travel = pace / rupture.limit
     bound = _ratio(rebinding_rate, rebinding_rate + rate + travel)
     return bound, bound * _ratio(speed, rate + 2.0 * travel)

@@ -5,6 +5,7 @@ from dataclasses import dataclass as plain_dataclass
 
 import numpy as np
 
+from sim.laws.reversible import mean_stress_energy
 from sim.parts.contact.control import Bodies
 from sim.spectrum.finite_contact import Margin
 
@@ -45,11 +46,10 @@ class Balance:
     def reversible(self, radius: np.ndarray) -> np.ndarray:
         """Energy per area that the mean stress would give back if the contact shrank [J/m²].
 
-        ``2 (2 − ν)/(1 − ν) τ0² a/(π E*)``, 6 τ0² a/(π E*) for an incompressible half-space.
+        6 τ0² a/(π E*) for an incompressible half-space.
         """
         _, modulus, poisson_ratio = self.bodies
-        coefficient = 2.0 * (2.0 - poisson_ratio) / (1.0 - poisson_ratio) / math.pi
-        return coefficient * self.stress**2 * radius / modulus
+        return np.asarray(mean_stress_energy(radius, self.stress, modulus, poisson_ratio))
 
     def gained(self, radius: np.ndarray, reversible: float) -> np.ndarray:
         """What adhesion has given for the area of a contact, the work left at each radius over it [J]."""
