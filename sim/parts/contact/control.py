@@ -11,7 +11,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.laws import jkr
-from sim.laws.reversible import radius_at_indentation_reversible, radius_at_load_reversible, shrunk_at_displacement
+from sim.laws.reversible import (
+    radius_at_displacement_reversible,
+    radius_at_indentation_reversible,
+    radius_at_load_reversible,
+)
 
 
 class Bodies(NamedTuple):
@@ -98,14 +102,11 @@ class AtDisplacement:
                 return np.asarray(jkr.radius_at_indentation(self.place, work, size, modulus))
             law = radius_at_indentation_reversible
             return np.asarray(law(self.place, work, stress, reversible, size, modulus, poisson_ratio))
-        found = jkr.radius_at_displacement(self.place, self.stiffness, work, size, modulus)
         if reversible == 0.0:
-            return np.asarray(found)
-        hertz = jkr.radius_at_displacement(self.place, self.stiffness, 0.0, size, modulus)
+            return np.asarray(jkr.radius_at_displacement(self.place, self.stiffness, work, size, modulus))
+        held = (self.place, self.stiffness)
         return np.asarray(
-            shrunk_at_displacement(
-                found, hertz, self.place, self.stiffness, work, stress, reversible, 0.0, size, modulus, poisson_ratio
-            )
+            radius_at_displacement_reversible(*held, work, stress, reversible, size, modulus, poisson_ratio)
         )
 
     def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
