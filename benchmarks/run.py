@@ -7,7 +7,7 @@ the middle half of the turns; absolute times are only as seen. Machines are nois
 import itertools
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import bonds_plain
 import contact_plain
@@ -24,7 +24,7 @@ from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
-from sim.parts.exchange import Traction
+from sim.parts.exchange import Bonding
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Ensemble
@@ -118,7 +118,7 @@ def modal() -> list[Row]:
     scenario = scene(1, shear=recipe)
     process, noise = scenario.process, Noise(1, "shear", np.arange(1))
     motion = scenario.drive.motion(0, 0.0, 0.0, 0.2)
-    stress = Traction.of_stress(np.zeros(1))
+    stress = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
     state = {"now": process.start(motion, stress, noise), "step": 0}
 
     def ours() -> None:
@@ -156,7 +156,7 @@ def step() -> list[Row]:
 
     def alone() -> None:
         moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
-        scenario.process.advance(fluctuation, moved, Traction.of_stress(np.zeros(1)), noise)
+        scenario.process.advance(fluctuation, moved, Bonding(np.ones(1), np.zeros(1), np.zeros(1)), noise)
 
     return [compare("engine step, modal 256²", whole, "its modes alone", alone, "", 4)]
 
@@ -170,7 +170,7 @@ def lens(exponent: float, points: int, members: int, recipe: shear.Modal | shear
     process, noise = recipe.process(1.6e6, 0.5, 0.24e-3), Noise(1, "shear", np.arange(members))
     rest, stress, counter = (
         drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0),
-        Traction.of_stress(np.zeros(1)),
+        Bonding(np.ones(1), np.zeros(1), np.zeros(1)),
         itertools.count(1),
     )
     state = [process.start(rest, stress, noise)]
@@ -222,7 +222,7 @@ def maps() -> list[Row]:
     points, cell, spectrum = 256, 0.24e-3, Gaussian(rms=1e5, length=12e-6)
     recipe = shear.Mapped(spectrum=VonKarman(rms=1e5, length=12e-6, hurst=0.8), cell=cell, points=points, memory=SLIP)
     process, noise = recipe.process(1.6e6, 0.5, cell), Noise(1, "shear", np.arange(1))
-    rest, stress = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), Traction.of_stress(np.zeros(1))
+    rest, stress = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), Bonding(np.ones(1), np.zeros(1), np.zeros(1))
     state, counter = [process.start(rest, stress, noise)], itertools.count(1)
     generator, numbers = np.random.Generator(np.random.Philox(1)), np.empty(2 * process.pairs)
     half = np.ones((points, points // 2 + 1), dtype=complex)
@@ -275,11 +275,11 @@ def population(part, members: int, motion) -> Callable:
     """A program that advances a population of bonds by one step and tells its moments, for a batch of members."""
     noise, state = Noise(1, "bonds", np.arange(members)), []
     state.append(part.start(motion, noise))
-    motions = itertools.cycle([replace(motion, step=step) for step in range(1, 4097)])
+    motions = itertools.cycle([motion._replace(step=step) for step in range(1, 4097)])
 
     def program() -> None:
-        state[0] = part.advance(state[0], next(motions), noise)
-        part.traction(state[0])
+        state[0] = part.advance(state[0], next(motions), np.ones(1), noise)
+        part.bonding(state[0])
 
     return program
 

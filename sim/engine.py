@@ -4,37 +4,34 @@ drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(f
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any
+from typing import NamedTuple, cast, get_type_hints
 
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.bonds import STATES
-from sim.parts.bonds.tracked import Tracks
-from sim.parts.contact.balance import Balance, Touch
-from sim.parts.exchange import Motion
-from sim.parts.shear.process import Fluctuation
+from sim.parts.contact.balance import Balance
+from sim.parts.exchange import NO_RESISTANCE, Bonding, Resistance, Sliding, Storing, Touching
 from sim.scenario.scenario import Scenario
 
+Arrays = dict[str, np.ndarray]
 
-@dataclass(frozen=True)
-class State:
+
+class State(NamedTuple):
     """Everything a batch of members needs to go on, at the end of one step.
 
-    Arrays have the member as first axis, or length 1 there where all members agree.
+    Arrays have the member as first axis, or length 1 there where all members agree. ``bonding`` is what ``bonds``
+    hand to the others, computed once a step.
     """
 
     step: int
-    position: np.ndarray
-    speed: np.ndarray
-    bonds: Any
-    shear: Fluctuation
-    contact: Touch
+    drive: Sliding
+    bonds: tuple[object, ...]
+    bonding: Bonding
+    shear: Storing
+    contact: Touching
 
 
-@dataclass(frozen=True)
-class Dice:
+class Dice(NamedTuple):
     """The addressed noise of each part for one batch of members."""
 
     bonds: Noise
@@ -47,24 +44,26 @@ class Dice:
 
 def start(scenario: Scenario, dice: Dice) -> State:
     """The state at t = 0."""
-    motion = scenario.drive.motion(0, 0.0, 0.0, scenario.clock.duration)
-    population: Any = scenario.population  # each depth knows its own state
+    drive, population, process, contact = scenario.parts
+    slider, motion = drive.begin(scenario.times)
     bonds = population.start(motion, dice.bonds)
-    shear = scenario.process.start(motion, population.traction(bonds), dice.shear)
-    contact = scenario.contact.start(motion, scenario.clock.duration, _balance(scenario, bonds, shear))
-    return State(0, np.zeros(1), motion.speed, bonds, shear, contact)
+    bonding = population.bonding(bonds)
+    shear = process.start(motion, bonding, dice.shear)
+    touch = contact.start(motion, scenario.times.duration, _balance(scenario, bonding, shear))
+    return State(0, slider, bonds, bonding, shear, touch)
 
 
 def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     """The state one clock step later."""
-    motion = _motion(scenario, state.step + 1)
-    population: Any = scenario.population
-    over = population.over(state.bonds, state.contact.radius)
-    bonds = population.advance(over, motion, dice.bonds)
-    shear = scenario.process.advance(state.shear, motion, population.traction(bonds), dice.shear)
-    balance = _balance(scenario, bonds, shear)
-    contact = scenario.contact.advance(state.contact, motion, scenario.clock.duration, balance)
-    return State(motion.step, state.position + motion.slip, motion.speed, bonds, shear, contact)
+    drive, population, process, contact = scenario.parts
+    step, times = state.step + 1, scenario.times
+    resistance = _resistance(scenario, state) if drive.feeds_back else NO_RESISTANCE
+    slider, motion = drive.advance(state.drive, resistance, times, step)
+    bonds = population.advance(state.bonds, motion, state.contact.radius, dice.bonds)
+    bonding = population.bonding(bonds)
+    shear = process.advance(state.shear, motion, bonding, dice.shear)
+    touch = contact.advance(state.contact, motion, times.duration, _balance(scenario, bonding, shear))
+    return State(step, slider, bonds, bonding, shear, touch)
 
 
 def march(scenario: Scenario, members: np.ndarray, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -79,7 +78,7 @@ def march(scenario: Scenario, members: np.ndarray, state: State | None = None, k
     state : State, optional
         Where to go on from; without it the march starts at t = 0 and yields that state first.
     keep : bool
-        Whether a state stays good after the next has been asked for. Without it large arrays (those of
+        Whether a state stays good after the next one is made. Without it large arrays (those of
         tracked bonds) are handed on from state to state, which saves a copy of them at each step.
 
     Yields
@@ -91,67 +90,63 @@ def march(scenario: Scenario, members: np.ndarray, state: State | None = None, k
     if state is None:
         state = start(scenario, dice)
         yield state
-    while state.step < scenario.clock.steps:
-        state = advance(scenario, _copied(state) if keep else state, dice)
+    while state.step < scenario.times.steps:
+        if keep:
+            state = state._replace(bonds=scenario.parts.bonds.copied(state.bonds))
+        state = advance(scenario, state, dice)
         yield state
 
 
-def _copied(state: State) -> State:
-    """The state with bonds of its own, so that the next step leaves those it was made from alone."""
-    if not isinstance(state.bonds, Tracks):
-        return state
-    return replace(state, bonds=Tracks(*(getattr(state.bonds, item.name).copy() for item in fields(Tracks))))
-
-
-def _motion(scenario: Scenario, step: int) -> Motion:
-    clock = scenario.clock
-    return scenario.drive.motion(step, clock.time(step - 1), clock.time(step), clock.duration)
-
-
-def _balance(scenario: Scenario, bonds: Any, shear: Fluctuation) -> Balance:
-    """What w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*) is made of."""
-    population = scenario.population
-    bonded = scenario.adhesion.work_of_bonds(population.fraction(bonds))
+def _balance(scenario: Scenario, bonding: Bonding, shear: Storing) -> Balance:
+    """The terms of the effective work of adhesion w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*)."""
+    bonded = scenario.adhesion.work_of_bonds(bonding.fraction)
     fluctuating = scenario.fluctuations.paid_by_adhesion * shear.energy
-    stress, reference = population.shear_stress(bonds), scenario.adhesion.work
-    return Balance(bonded, fluctuating, stress, scenario.margin, scenario.bodies, reference)
+    return Balance(bonded, fluctuating, bonding.strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
 
 
-def pack(state: Any, prefix: str = "") -> dict[str, np.ndarray]:
+def _resistance(scenario: Scenario, state: State) -> Resistance:
+    """Friction of the contact as it is, its slope over slip, and the tangential stiffness 3π²Ga/(4(2 − ν))."""
+    radius = np.nan_to_num(state.contact.radius, nan=0.0)
+    area, (shear_modulus, poisson_ratio) = np.pi * radius**2, scenario.solid.effective
+    stiffness = 0.75 * np.pi**2 * shear_modulus / (2.0 - poisson_ratio) * radius
+    return Resistance(area * state.bonding.stress, area * state.bonding.stiffness, stiffness)
+
+
+def pack(state: State) -> Arrays:
     """A state as named arrays, ``{"bonds.bound": ...}``, from which ``unpack`` makes it again."""
-    arrays: dict[str, np.ndarray] = {}
-    for item in fields(state):
-        value = getattr(state, item.name)
-        if is_dataclass(value):
-            arrays |= pack(value, f"{prefix}{item.name}.")
+    return dict(_named(state, type(state)))
+
+
+def _named(state: tuple[object, ...], kind: type) -> Iterator[tuple[str, np.ndarray]]:
+    """The arrays of a state with their names, those of a state inside it with a dotted one."""
+    for name, value in zip(_fields(kind), state, strict=True):
+        if isinstance(value, tuple):
+            yield from ((f"{name}.{inner}", array) for inner, array in _named(value, type(value)))
         else:
-            arrays[prefix + item.name] = np.array(value)
-    return arrays
+            yield name, np.array(value)
 
 
-def unpack(arrays: dict[str, np.ndarray]) -> State:
-    """The state that ``pack`` took apart."""
-    parts: dict[str, dict[str, np.ndarray]] = {"bonds": {}, "shear": {}, "contact": {}}
-    for name, array in arrays.items():
-        part, _, rest = name.partition(".")
-        if rest:
-            parts[part][rest] = array
-    names = {key.partition(".")[0] for key in parts["bonds"]}
-    kind = next(kind for kind in STATES if {item.name for item in fields(kind)} == names)
-    return State(
-        int(arrays["step"]),
-        arrays["position"],
-        arrays["speed"],
-        _assembled(kind, parts["bonds"]),
-        _assembled(Fluctuation, parts["shear"]),
-        _assembled(Touch, parts["contact"]),
-    )
+def unpack(scenario: Scenario, arrays: Arrays) -> State:
+    """The state of a scenario that ``pack`` took apart."""
+    kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()} | {"bonding": Bonding}
+    inner = {name: _assembled(kind, _within(arrays, name)) for name, kind in kinds.items()}
+    return State(*cast(State, (int(arrays["step"]), *(inner[name] for name in State._fields[1:]))))
 
 
-def _assembled(kind: Any, arrays: dict[str, np.ndarray]) -> Any:
-    """A state of a part from its arrays, those of a state inside it by dotted names."""
-    values = {}
-    for item in fields(kind):
-        inner = {key.partition(".")[2]: array for key, array in arrays.items() if key.startswith(f"{item.name}.")}
-        values[item.name] = _assembled(item.type, inner) if inner else arrays[item.name]
-    return kind(**values)
+def _assembled(kind: type, arrays: Arrays) -> tuple[object, ...]:
+    """A state of a part from its arrays."""
+    hints = get_type_hints(kind)
+    inner = {name: _within(arrays, name) for name in _fields(kind)}
+    values = {name: _assembled(hints[name], found) if found else arrays[name] for name, found in inner.items()}
+    made: tuple[object, ...] = kind(**values)
+    return made
+
+
+def _within(arrays: Arrays, name: str) -> Arrays:
+    """The arrays of what stands under a name."""
+    return {key.removeprefix(f"{name}."): array for key, array in arrays.items() if key.startswith(f"{name}.")}
+
+
+def _fields(kind: type) -> tuple[str, ...]:
+    names: tuple[str, ...] = kind.__dict__["_fields"]
+    return names

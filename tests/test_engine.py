@@ -59,7 +59,7 @@ def check_case(case, members=3, steps=6):
     scenario = scene(members, steps, **{part: DEPTHS[part][name] for part, name in case.items()})
     straight = list(march(scenario, np.arange(members)))
     assert len(straight) == steps + 1
-    restarted = list(march(scenario, np.arange(members), unpack(pack(straight[2]))))
+    restarted = list(march(scenario, np.arange(members), unpack(scenario, pack(straight[2]))))
     assert all(same(one, two) for one, two in zip(straight[3:], restarted, strict=True))
     alone = list(march(scenario, np.array([1])))
     for together, single in zip(straight, alone, strict=True):
@@ -72,7 +72,7 @@ def check_case(case, members=3, steps=6):
 def check_waist(scenario, state, members):
     """Shapes follow from the classes; w is the balance of its parts; no contact is smaller than Hertz."""
     values = {
-        "bonds": scenario.population.fraction(state.bonds),
+        "bonds": state.bonding.fraction,
         "shear": state.shear.energy,
         "contact": state.contact.radius,
     }
@@ -90,11 +90,11 @@ def check_waist(scenario, state, members):
 def balance_of(scenario, state):
     """w = Δγ φ − χ ΔΓ − α 6 τ0² a/(π E*), an open contact's at a = 0; on a disc ΔΓ is what its amplitude costs."""
     radius = np.nan_to_num(state.contact.radius, nan=0.0)
-    stress = scenario.population.shear_stress(state.bonds)
+    stress = state.bonding.strength
     share = 1.0 if scenario.margin is None else scenario.margin(radius)
     paid = scenario.fluctuations.paid_by_adhesion * share * state.shear.energy
     mean = scenario.contact.reversible * 6.0 * stress**2 * radius / (np.pi * scenario.solid.contact_modulus)
-    return 42e-3 * scenario.population.fraction(state.bonds) - paid - mean
+    return 42e-3 * state.bonding.fraction - paid - mean
 
 
 COVERING = covering()
@@ -139,7 +139,7 @@ def test_long_marches_do_not_drift(steps):
     rate = 500.0 * (1.0 + 2e-3 / 1e-2)
     exact = 1.0 / 1.2 + (1.0 - 1.0 / 1.2) * math.exp(-rate * scenario.clock.duration)
     assert_allclose(last.bonds.bound, exact, rtol=1e-12)
-    assert_allclose(last.position, 2e-3 * scenario.clock.duration, rtol=1e-16 * steps + 1e-14)
+    assert_allclose(last.drive.position, 2e-3 * scenario.clock.duration, rtol=1e-16 * steps + 1e-14)
 
 
 def test_a_detached_contact_stays_open():

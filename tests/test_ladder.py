@@ -61,15 +61,15 @@ def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture):
     # sites are independent at all times: the spread of number and stress is that of one site over root N
     members, recipe = 400, {"rupture": rupture, **STRETCHED, "start_from": "bonded"}
     dense = bonds.Cohort(**recipe)
-    exact = last(bonds=dense, drive=STARTED).bonds
-    share, stress = dense.moments(exact)[0][0], dense.shear_stress(exact)[0]
-    varying = dense.traction(exact).varying[0]
+    exact = last(bonds=dense, drive=STARTED)
+    share, stress = dense.moments(exact.bonds)[0][0], exact.bonding.stress[0]
+    varying = exact.bonding.varying[0]
     for sites in (10**2, 10**3, 10**4):
         few = bonds.Tracked(**recipe, sites=sites)
-        found = last(members, bonds=few, drive=STARTED).bonds
+        found = last(members, bonds=few, drive=STARTED)
         for values, mean, spread in (
-            (few.moments(found)[0], share, math.sqrt(share * (1.0 - share) / sites)),
-            (few.shear_stress(found), stress, math.sqrt(STRETCHED["site_density"] * varying / sites)),
+            (few.moments(found.bonds)[0], share, math.sqrt(share * (1.0 - share) / sites)),
+            (found.bonding.stress, stress, math.sqrt(STRETCHED["site_density"] * varying / sites)),
         ):
             # cohorts are good to 1e-4 themselves; one site's excess kurtosis is below 10, that of N below 10/N
             assert abs(values.mean() - mean) < 5.0 * spread / math.sqrt(members) + 1e-4 * abs(mean)
@@ -83,8 +83,8 @@ def test_bell_bonds_become_those_of_a_constant_rate_to_first_order_as_the_bell_f
 
     def found(rupture):
         part = depth(rupture=rupture, **STRETCHED, start_from="bonded", **fine)
-        state = last(bonds=part, **slid).bonds
-        return np.array([part.fraction(state)[0], part.shear_stress(state)[0]])
+        bonding = last(bonds=part, **slid).bonding
+        return np.array([bonding.fraction[0], bonding.stress[0]])
 
     limit = found(Constant(rate=200.0))
     errors = [found(Bell(zero_force_rate=200.0, bell_force=factor * 4e-12)) / limit - 1.0 for factor in (1e2, 1e3, 1e4)]
@@ -109,7 +109,7 @@ def test_the_first_moment_is_exact_where_the_rate_is_constant():
 def marched(part, motion):
     """Bond fraction and stress after each step."""
     states = march(scene(bonds=part, drive=motion), np.arange(1))
-    return [(part.fraction(state.bonds)[0], part.shear_stress(state.bonds)[0]) for state in states]
+    return [(state.bonding.fraction[0], state.bonding.stress[0]) for state in states]
 
 
 @pytest.mark.parametrize("speed", [1e-4, 8e-3, 1.0])
@@ -122,14 +122,14 @@ def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
     full = 0.5 * STRETCHED["site_density"] * STRETCHED["bond_stiffness"] * 20e-6
     for start, steps in (("steady", 8), ("empty", 100))[: 1 if speed < 1e-3 else 2]:  # the slowest live for 0.2 s
         part = bonds.Cohort(**recipe, start_from=start)
-        state = last(steps=steps, bonds=part, drive=drive.Steady(speed=speed)).bonds
-        assert_allclose(part.fraction(state), steady.bonds.bound, rtol=1e-4)
-        assert_allclose(part.shear_stress(state), full * steady.bonds.bound, rtol=1e-4)
+        state = last(steps=steps, bonds=part, drive=drive.Steady(speed=speed)).bonding
+        assert_allclose(state.fraction, steady.bonds.bound, rtol=1e-4)
+        assert_allclose(state.stress, full * steady.bonds.bound, rtol=1e-4)
     tracked = bonds.Tracked(**recipe, sites=400)
-    state = last(400, bonds=tracked, drive=drive.Steady(speed=speed)).bonds
+    state = last(400, bonds=tracked, drive=drive.Steady(speed=speed))
     share = steady.bonds.bound[0]
     error = math.sqrt(share * (1.0 - share) / 400 / 400)
-    assert abs(tracked.fraction(state).mean() - share) < 5.0 * error
+    assert abs(state.bonding.fraction.mean() - share) < 5.0 * error
 
 
 @pytest.mark.parametrize(

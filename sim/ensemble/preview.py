@@ -246,7 +246,7 @@ def _power(point: Scenario) -> float:
     if not point.shear.spectrum.bond_made:  # type: ignore[union-attr]
         return 1.0
     end = point.clock.duration
-    settled = point.population.settled(point.drive.motion(0, end, end, end).speed)
+    settled = point.population.steady(point.drive.motion(0, end, end, end).speed)
     return float(settled.frozen[0] + settled.varying[0])
 
 
@@ -345,7 +345,7 @@ def _reversed_friction(point: Scenario) -> float:
     rms, duration, ratios = math.sqrt(point.shear.spectrum.variance), point.clock.duration, [0.0]  # type: ignore[union-attr]
     for time in np.linspace(0.0, duration, 41):
         speed = point.drive.motion(0, float(time), float(time), duration).speed
-        stress = np.abs(point.population.settled(speed).stress)
+        stress = point.population.steady(speed).strength
         size = rms * point.fluctuations.amplitude.factor(speed, stress)  # type: ignore[union-attr]
         ratios += [float(part / whole) for part, whole in np.broadcast(size, stress) if whole > 0.0]
     return max(ratios)

@@ -49,7 +49,7 @@ def _area(scene: Scenario, state: State) -> np.ndarray:
 
 
 def _stress(scene: Scenario, state: State) -> np.ndarray:
-    return scene.population.shear_stress(state.bonds)
+    return state.bonding.stress
 
 
 def _grip(scene: Scenario, state: State) -> Grip:
@@ -69,10 +69,11 @@ def _displacement(scene: Scenario, state: State) -> np.ndarray:
 
 
 VARIABLES = (
-    Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.speed),
-    Variable("slider_position", "m", "displacement of the slider", "X", "drive", lambda scene, state: state.position),
+    Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.drive.speed),
+    Variable("slider_position", "m", "displacement of the slider", "X", "drive",
+          lambda scene, state: state.drive.position),
     Variable("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
-          lambda scene, state: scene.population.fraction(state.bonds)),
+          lambda scene, state: state.bonding.fraction),
     Variable("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds", _stress),
     Variable("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
           "DeltaGamma", "shear", lambda scene, state: state.shear.energy),

@@ -24,6 +24,7 @@ from sim.ensemble.recorded import VARIABLES
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import HDF5, StoreTrouble, explained, sync_folder
 from sim.parts.shear.modal import MappedProcess
+from sim.parts.shear.process import Fluctuation
 from sim.scenario.scenario import Scenario
 
 Progress = Callable[[int], None]
@@ -124,7 +125,9 @@ def _record(
             rows[variable.name][:, column] = variable.read(point, state)
         if state.step in snapshots and drawn:
             number, process = snapshots[state.step], cast(MappedProcess, point.process)
-            maps[f"map.{number}"] = process.maps(state.shear, np.broadcast_to(state.position, drawn), drawn)
+            maps[f"map.{number}"] = process.maps(
+                cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn
+            )
             if point.margin is not None:
                 maps[f"disc.{number}"] = _on_the_disc(point, state, maps[f"map.{number}"])
         if progress is not None:
@@ -142,7 +145,7 @@ def _on_the_disc(point: Scenario, state: State, maps: np.ndarray) -> np.ndarray:
     cell, solid = cast(MappedProcess, point.process).modes.cell, point.solid.effective
     radius, stress = (
         np.broadcast_to(values, max(len(values), len(maps)))[: len(maps)]
-        for values in (state.contact.radius, point.population.shear_stress(state.bonds))
+        for values in (state.contact.radius, state.bonding.stress)
     )
     radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
     own = disc_energy_of_map(maps, cell, radius, *solid)

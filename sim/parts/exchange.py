@@ -1,13 +1,67 @@
-"""What a drive hands to the other parts for one clock step."""
+"""Quantities that the parts hand each other at a step, and the protocol of each part.
 
-from dataclasses import dataclass
+    drive ── slip, speed ─► bonds ── fraction, stress, … ─► shear ── energy ΔΓ ─► contact ── radius
+
+Every array has the member as first axis, or length 1 there where all members agree. The state of a part is a
+``NamedTuple`` of arrays of its own (or of such tuples); others read of it only what its protocol names. Sliding
+in +x is positive.
+"""
+
+from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from sim.numerics.noise import Noise
 
-@dataclass(frozen=True)
-class Motion:
-    """Sliding during one clock step, each array of shape (1,) or (members,).
+
+class Times(NamedTuple):
+    """Clock of a run: length of a step [s], number of steps, duration [s]."""
+
+    step: float
+    steps: int
+    duration: float
+
+    def at(self, step: int) -> float:
+        """Time at the end of a step [s]; never accumulated."""
+        return self.duration * (step / self.steps)
+
+
+class Setting(NamedTuple):
+    """Constants of a scene that a part may need to judge itself.
+
+    Attributes
+    ----------
+    shear_modulus, poisson_ratio : float
+        G [Pa] and ν [1] of the effective half-space.
+    modulus : float
+        Contact modulus E* [Pa].
+    sphere_radius : float
+        R [m].
+    work : float
+        Work of adhesion with all the bonds of rest [J/m²].
+    strength : float
+        Shear stress that the bonds of rest can bear [Pa]; 0 for bonds with a stretch.
+    rest_radius : float
+        Contact radius with all the bonds of rest and no fluctuation [m]; nan without equilibrium.
+    cell : float
+        Side of the square that has the contact's area at rest [m].
+    times : Times
+        Clock of the run.
+    """
+
+    shear_modulus: float
+    poisson_ratio: float
+    modulus: float
+    sphere_radius: float
+    work: float
+    strength: float
+    rest_radius: float
+    cell: float
+    times: Times
+
+
+class Motion(NamedTuple):
+    """Sliding during one clock step, from the drive to all; each array of shape (1,) or (members,).
 
     Attributes
     ----------
@@ -36,27 +90,196 @@ class Motion:
     speed: np.ndarray
 
 
-@dataclass(frozen=True)
-class Traction:
-    """Shear that bonds carry, each array of shape (1,) or (members,).
+def _constant(value: float) -> np.ndarray:
+    array = np.full(1, value)
+    array.setflags(write=False)
+    return array
+
+
+_NONE, _UNKNOWN = _constant(0.0), _constant(np.nan)
+
+
+class Bonding(NamedTuple):
+    """Bonds at the end of a step, for shear, contact, drive and recorder; each array of shape (1,) or (members,).
 
     Attributes
     ----------
+    fraction : array
+        Bonds over bonds at rest [1].
     stress : array
-        Mean shear stress τ0 [Pa], positive against positive sliding.
+        Mean shear stress [Pa], with its sign: that of the last slip for bonds without a stretch, that of the mean
+        stretch for bonds with one.
+    strength : array
+        Magnitude of the stress that ΔΓ, the reversible term and the amplitude law use, slip or no slip [Pa].
+    stiffness : array
+        Slope of the stress over slip at frozen time [Pa/m]; negative where slip breaks more than it stretches.
     frozen : array
-        n f̄² [N²/m²] for n sites per area of mean force f̄: what a pattern of sites fixed on the slider
-        makes of the mean force. nan where bonds carry no stretch.
+        n f̄² [N²/m²] for n sites per area of mean force f̄: the power of a pattern of sites fixed on the slider.
+        nan where bonds carry no stretch.
     varying : array
-        n Var f [N²/m²]: what forces that differ from bond to bond add. nan where it is not known.
+        n Var f [N²/m²]: the power that forces add which differ from bond to bond. nan where it is not known.
+    stored, dissipated : array
+        Elastic energy of the bonds, and the running sum of what their rupture took [J/m²]: kept for drives that
+        balance energies; 0 under a prescribed drive.
     """
 
+    fraction: np.ndarray
     stress: np.ndarray
-    frozen: np.ndarray
-    varying: np.ndarray
+    strength: np.ndarray
+    stiffness: np.ndarray = _NONE
+    frozen: np.ndarray = _UNKNOWN
+    varying: np.ndarray = _UNKNOWN
+    stored: np.ndarray = _NONE
+    dissipated: np.ndarray = _NONE
 
-    @classmethod
-    def of_stress(cls, stress: np.ndarray) -> "Traction":
-        """A stress of bonds whose forces are not known."""
-        unknown = np.full(1, np.nan)
-        return cls(stress, unknown, unknown)
+
+class Resistance(NamedTuple):
+    """What a drive that feeds back feels of the contact: friction force [N], its tangent and k_t [N/m]."""
+
+    force: np.ndarray
+    tangent: np.ndarray
+    contact_stiffness: np.ndarray
+
+
+#: A drive that prescribes the motion feels nothing.
+NO_RESISTANCE = Resistance(_NONE, _NONE, _NONE)
+
+
+class Sliding(Protocol):
+    """State of any drive."""
+
+    @property
+    def position(self) -> np.ndarray:
+        """Displacement of the slider since the start [m]."""
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Speed of the slider [m/s]."""
+
+
+class Storing(Protocol):
+    """State of any shear process."""
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Elastic energy of the fluctuations per area ΔΓ [J/m²]."""
+
+
+class Touching(Protocol):
+    """State of any contact."""
+
+    @property
+    def work(self) -> np.ndarray:
+        """Work of adhesion left at this radius [J/m²]."""
+
+    @property
+    def radius(self) -> np.ndarray:
+        """Contact radius [m], nan where the contact is open."""
+
+    @property
+    def detached(self) -> np.ndarray:
+        """Time of the last detachment [s], nan if never."""
+
+    @property
+    def dissipated(self) -> np.ndarray:
+        """Energy that the edge and the jumps of the contact have dissipated so far [J]."""
+
+
+Own = TypeVar("Own")
+Terms = TypeVar("Terms", contravariant=True)
+
+
+class Part(Protocol):
+    """What every part of a scene declares about itself."""
+
+    @property
+    def per_member(self) -> bool:
+        """Whether members differ by this part: a matter of its model and keys, never of data."""
+
+    @property
+    def feeds_back(self) -> bool:
+        """Whether a step of this part needs what parts after it have become in the step before.
+
+        The order is drive, bonds, shear, contact. Where no part of a scene feeds back, each can be advanced over a
+        whole block of steps before the next one.
+        """
+
+    def remarks(self, setting: Setting) -> list[str]:
+        """Sentences on what this part assumes or cannot hold in such a scene, for ``sim check``."""
+
+
+class Drive(Part, Protocol[Own]):
+    """Motion of the slider."""
+
+    @property
+    def state_class(self) -> type[Own]:
+        """Class of the state, a ``NamedTuple`` with ``position`` and ``speed``."""
+
+    def begin(self, times: Times) -> tuple[Own, Motion]:
+        """State and motion at t = 0: no slip, and the speed with which the run begins."""
+
+    def advance(self, state: Own, resistance: Resistance, times: Times, step: int) -> tuple[Own, Motion]:
+        """State at the end of a step and the exact motion in it; ``resistance`` is that at its start."""
+
+
+class Bonds(Part, Protocol[Own]):
+    """A population of bonds between slider and half-space."""
+
+    @property
+    def state_class(self) -> type[Own]:
+        """Class of the state."""
+
+    def start(self, motion: Motion, noise: Noise) -> Own:
+        """Population at t = 0, as the scene's ``start`` says."""
+
+    def advance(self, state: Own, motion: Motion, radius: np.ndarray, noise: Noise) -> Own:
+        """Population after a step over a contact that had this ``radius`` [m] at its start, nan where it was open."""
+
+    def bonding(self, state: Own) -> Bonding:
+        """Everything that others read of a population, computed once a step."""
+
+    def copied(self, state: Own) -> Own:
+        """A state that stays good after ``advance`` was called with it: a copy where a step works in place."""
+
+    def steady(self, speed: np.ndarray) -> Bonding:
+        """Ensemble mean in steady sliding at speeds [m/s], arrays of their shape or (1,)."""
+
+
+class Shear(Protocol[Own]):
+    """Process of the shear-stress fluctuations: a shear model on a given solid and cell."""
+
+    @property
+    def state_class(self) -> type[Own]:
+        """Class of the state, a ``NamedTuple`` with ``energy``."""
+
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Own:
+        """Stationary fluctuations at t = 0."""
+
+    def advance(self, state: Own, motion: Motion, bonding: Bonding, noise: Noise) -> Own:
+        """Fluctuations after a step, at the end of which the bonds are ``bonding``."""
+
+    def known_errors(self) -> dict[str, float]:
+        """Errors and spreads known before the run [1], by name."""
+
+
+class Contact(Part, Protocol[Own, Terms]):
+    """Contact of sphere and half-space."""
+
+    @property
+    def state_class(self) -> type[Own]:
+        """Class of the state, a ``NamedTuple`` with ``work`` and ``radius``."""
+
+    def start(self, motion: Motion, duration: float, balance: Terms) -> Own:
+        """Contact at the start of a run of ``duration`` [s], in equilibrium with the terms of the work of adhesion."""
+
+    def advance(self, state: Own, motion: Motion, duration: float, balance: Terms) -> Own:
+        """Contact after a step, at the end of which the terms of the work of adhesion are ``balance``."""
+
+
+class Parts(NamedTuple):
+    """The four parts of a scene, seen by what they exchange alone; each keeps its own class of state."""
+
+    drive: Drive[Sliding]
+    bonds: Bonds[tuple[object, ...]]
+    shear: Shear[Storing]
+    contact: Contact[Touching, tuple[object, ...]]

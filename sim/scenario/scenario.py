@@ -4,8 +4,9 @@ import math
 from dataclasses import fields
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, cast
 
+import numpy as np
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
@@ -18,6 +19,7 @@ from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.control import Bodies
 from sim.parts.drive import Drive
 from sim.parts.drive import Steady as SteadyDrive
+from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Auto, Model, Shear, Uniform
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.modal import ModalProcess
@@ -136,9 +138,35 @@ class Scenario:
             return None
         return Margin(self.fluctuations.spectrum, *self.solid.effective, self.sphere.radius)  # type: ignore[union-attr]
 
+    @cached_property
+    def times(self) -> Times:
+        """Clock of the run."""
+        return Times(self.clock.step, self.clock.steps, self.clock.duration)
+
+    @cached_property
+    def setting(self) -> Setting:
+        """Constants by which parts judge themselves."""
+        strength = float(self.population.steady(np.zeros(1)).strength[0])
+        return Setting(
+            *self.solid.effective,
+            self.solid.contact_modulus,
+            self.sphere.radius,
+            self.adhesion.work,
+            strength,
+            self.rest_radius,
+            math.sqrt(math.pi) * self.rest_radius,
+            self.times,
+        )
+
+    @cached_property
+    def parts(self) -> Parts:
+        """The parts as the engine sees them: each model fits its protocol with a class of state of its own."""
+        return Parts(*cast(Parts, (self.drive, self.population, self.process, self.contact)))
+
     def release(self) -> None:
-        """Let go of the process, whose arrays may be large; it is made again when it is asked for."""
+        """Drop the process, whose arrays may be large; it is made again when needed."""
         self.__dict__.pop("process", None)
+        self.__dict__.pop("parts", None)
 
     @cached_property
     def varies(self) -> dict[str, bool]:

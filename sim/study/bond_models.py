@@ -208,15 +208,14 @@ def _states(part: Any, course: Course, noise: Noise, steps: int) -> Iterator[Any
     state = part.start(course.motion(0), noise)
     yield state
     for step in range(1, steps + 1):
-        state = part.advance(state, course.motion(step), noise)
+        state = part.advance(state, course.motion(step), np.ones(1), noise)
         yield state
 
 
 def _told(part: Any, state: Any) -> Array:
     """Shear stress, bond fraction and mean square force per site of each member, shape (members, 3)."""
+    bonding = part.bonding(state)
     if not hasattr(part, "rupture"):
-        fraction = part.fraction(state)
-        return np.stack([part.stress * fraction, fraction, np.full(fraction.shape, np.nan)], axis=1)
-    bound, stretch, square = np.broadcast_arrays(*part.moments(state))
-    stress = part.site_density * part.bond_stiffness * stretch
-    return np.stack([stress, bound / part.bound_at_rest, part.bond_stiffness**2 * square], axis=1)
+        return np.stack([bonding.stress, bonding.fraction, np.full(bonding.fraction.shape, np.nan)], axis=1)
+    square = np.broadcast_to(part.moments(state)[2], bonding.stress.shape)
+    return np.stack([bonding.stress, bonding.fraction, part.bond_stiffness**2 * square], axis=1)

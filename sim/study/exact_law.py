@@ -146,8 +146,12 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
         began, ended = (clock.duration * (k / (clock.steps * refine)) for k in (before, step))
         motion = scenario.drive.motion(step, began, ended, clock.duration)
         none: Any = None  # the bonds here draw nothing
-        population = bonds.start(motion, none) if population is None else bonds.advance(population, motion, none)
-        last, factor = factor, amplitude.factor(motion.speed, bonds.shear_stress(population))
+        if population is None:
+            population = bonds.start(motion, none)
+        else:
+            population = bonds.advance(population, motion, np.ones(1), none)
+        bonding = bonds.bonding(population)
+        last, factor = factor, amplitude.factor(motion.speed, bonding.strength)
         passed = float(correlation.exponents(np.ones(1), motion)[0]) if correlation is not None else 0.0
         if not amplitude.relaxing or step == 0:
             size = factor**2
@@ -159,7 +163,7 @@ def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> C
             renewal += bonds.rebinding_rate * (motion.duration + float(motion.path[0]) / bonds.critical_speed)
         before = step
         if step in wanted:
-            rows.append((float(bonds.fraction(population)[0]), float(factor[0]), exponent, renewal, size))
+            rows.append((float(bonding.fraction[0]), float(factor[0]), exponent, renewal, size))
     fraction, growths, exponents, renewals = np.array([row[:4] for row in rows]).T
     widest = max(row[4].size for row in rows)
     sizes = np.stack([np.broadcast_to(row[4], widest) for row in rows])

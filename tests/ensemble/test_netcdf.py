@@ -104,7 +104,7 @@ def test_maps_are_those_of_the_members_and_times_asked_for():
     assert_allclose(dataset["map_time"], [1e-3, 4e-3])
     states = list(march(scenario, np.arange(5)))
     for snapshot, step in enumerate((1, 4)):
-        maps = scenario.process.maps(states[step].shear, np.full(2, states[step].position[0]), 2)
+        maps = scenario.process.maps(states[step].shear, np.full(2, states[step].drive.position[0]), 2)
         assert np.array_equal(dataset["shear_map"].isel(map_time=snapshot).values, maps)
 
 

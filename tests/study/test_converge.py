@@ -411,7 +411,7 @@ def test_a_depth_whose_variance_is_ten_percent_off_is_found_out(monkeypatch):
     def wrong(advance):
         def spread(self, *arguments):
             state = advance(self, *arguments)
-            return replace(state, energy=self.bands.mean + math.sqrt(1.1) * (state.energy - self.bands.mean))
+            return state._replace(energy=self.bands.mean + math.sqrt(1.1) * (state.energy - self.bands.mean))
 
         return spread
 

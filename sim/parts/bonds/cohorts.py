@@ -8,7 +8,7 @@ a tolerance.
 
 import functools
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,8 +16,7 @@ from sim.parts.bonds.cohort_step import settle_steady, step_rows
 from sim.parts.bonds.rupture import RuptureRate
 
 
-@dataclass(frozen=True)
-class Cohorts:
+class Cohorts(NamedTuple):
     """State of bond populations, one in each row.
 
     Attributes
@@ -143,7 +142,7 @@ def advance(
 
 def diluted(cohorts: Cohorts, share: np.ndarray) -> Cohorts:
     """The populations with only a share of their bonds left, of shape (1,) or (rows,); the other sites are free."""
-    return replace(cohorts, weight=cohorts.weight * np.asarray(share)[:, np.newaxis])
+    return cohorts._replace(weight=cohorts.weight * np.asarray(share)[:, np.newaxis])
 
 
 def bound(cohorts: Cohorts) -> np.ndarray:
@@ -159,6 +158,11 @@ def first_moment(cohorts: Cohorts) -> np.ndarray:
 def second_moment(cohorts: Cohorts) -> np.ndarray:
     """Square stretch per site [m^2], shape (rows,): the sum of w x², that within the width of a cohort included."""
     return np.sum(cohorts.weight * (cohorts.stretch**2 + cohorts.width**2 / 12.0), axis=1)
+
+
+def moments(cohorts: Cohorts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Share of the sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each shape (rows,)."""
+    return bound(cohorts), first_moment(cohorts), second_moment(cohorts)
 
 
 def _check(rupture: RuptureRate, tolerance: float) -> None:

@@ -13,12 +13,10 @@ from pydantic_core import PydanticCustomError
 
 from sim.parts.bonds.area import Area
 from sim.parts.bonds.rupture import Constant, Rupture
-from sim.parts.bonds.stretched import Ages, Cohort, Density, FirstMoment, Rebinding, Stiffness, Stretches, Tracked
-from sim.parts.bonds.tracked import Tracks
+from sim.parts.bonds.stretched import Cohort, Density, FirstMoment, Rebinding, Stiffness, Tracked
 from sim.parts.bonds.two_state import (
     Counted,
     CriticalSpeed,
-    Population,
     Rate,
     Sites,
     Start,
@@ -28,7 +26,7 @@ from sim.parts.bonds.two_state import (
 )
 from sim.units.quantity import Quantity
 
-__all__ = ["STATES", "Auto", "Bonds", "Cohort", "Counted", "FirstMoment", "Model"]
+__all__ = ["Auto", "Bonds", "Cohort", "Counted", "FirstMoment", "Model"]
 __all__ += ["Rate", "Steady", "Tracked", "Unbroken"]
 
 _MOST_TRACKED = 10**6
@@ -38,9 +36,6 @@ _STRETCHED = ("rupture", "bond_stiffness", "site_density")
 
 #: A depth, chosen.
 Model = Unbroken | Steady | Rate | Counted | FirstMoment | Cohort | Tracked
-
-#: What the states of all depths are made of.
-STATES = (Population, Stretches, Ages, Tracks)
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})

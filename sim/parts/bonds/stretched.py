@@ -1,14 +1,12 @@
-"""Bond populations with a stretch. Shallow to deep: rate (first moment), cohort, tracked.
+"""Bond populations with a stretch. Simple to full: rate (first moment), cohort, tracked.
 
 Sites of a given density are free or hold a bond that was born unstretched, goes with the slider and
-breaks with a rupture that depends on its stretch. Their mean force makes the shear stress, so friction
+breaks at a rate that depends on its stretch. Their mean force makes the shear stress, so friction
 has a maximum, ages and starts with a peak; nothing of that is put in by hand.
 """
 
-from dataclasses import dataclass as plain_dataclass
-from dataclasses import field, fields, replace
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -18,12 +16,12 @@ import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.first_moment as first_moment
 import sim.parts.bonds.tracked as tracks
 from sim.numerics.noise import Noise
-from sim.parts.bonds.area import Area, OverArea
+from sim.parts.bonds.area import UNSEEN, Area, OverArea, kept
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import Tracks
 from sim.parts.bonds.two_state import Start
-from sim.parts.exchange import Motion, Traction
+from sim.parts.exchange import Bonding, Motion, Setting
 from sim.units.quantity import Quantity
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
@@ -33,20 +31,14 @@ CohortTolerance = Annotated[float, Quantity("1", "tolerance of the cohorts", "",
 
 
 class _Stretched:
-    """What depths with a stretch share; a subclass gives the moments of the stretch over all sites."""
+    """Attributes of models with a stretch; a subclass gives the moments of the stretch over all sites."""
 
-    per_member: ClassVar[Any] = False
     knows_forces: ClassVar[bool] = True
     carries_stress: ClassVar[bool] = True
-    numbers: Any = 1
     rupture: Rupture
     bond_stiffness: float
     rebinding_rate: float
     site_density: float
-
-    def moments(self, population: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site, each per member."""
-        raise NotImplementedError
 
     @cached_property
     def law(self) -> RuptureRate:
@@ -58,35 +50,31 @@ class _Stretched:
         """Share of sites that are bound at rest [1]."""
         return self.rebinding_rate / (self.rebinding_rate + self.law.rate)
 
-    def fraction(self, population: Any) -> np.ndarray:
-        """Bonds over bonds at rest [1]."""
-        return self.moments(population)[0] / self.bound_at_rest
+    def _bonding(self, bound: np.ndarray, stretch: np.ndarray, square: np.ndarray) -> Bonding:
+        """Readings of a population of these moments per site.
 
-    def shear_stress(self, population: Any) -> np.ndarray:
-        """Mean shear stress [Pa]: sites per area × stiffness × mean stretch per site."""
-        return self.site_density * self.bond_stiffness * self.moments(population)[1]
-
-    def traction(self, population: Any) -> Traction:
-        """What the shear part is told: with f̄ and E[f²] per site, n f̄² and n (E[f²] − f̄²)."""
-        return self._traction(*self.moments(population)[1:])
-
-    def _traction(self, stretch: np.ndarray, square: np.ndarray) -> Traction:
+        The stress is n κ x̄; with f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²).
+        """
         frozen, scale = stretch**2, self.site_density * self.bond_stiffness**2
         varying = np.maximum(square - frozen, 0.0)  # nan stays nan
-        return Traction(self.site_density * self.bond_stiffness * stretch, scale * frozen, scale * varying)
+        per_stretch = self.site_density * self.bond_stiffness
+        stress = per_stretch * stretch
+        fraction = bound / self.bound_at_rest
+        return Bonding(fraction, stress, np.abs(stress), per_stretch * bound, scale * frozen, scale * varying)
 
-    def over(self, population: Any, radius: np.ndarray) -> Any:
-        """The population over the contact as it is now."""
-        return population
+    def remarks(self, setting: Setting) -> list[str]:
+        return []
 
 
-@plain_dataclass(frozen=True)
-class Stretches:
+Moments = tuple[np.ndarray, np.ndarray, np.ndarray]
+
+
+class Stretches(NamedTuple):
     """State of the first-moment equation: share of sites bound [1] and mean stretch per site [m]."""
 
     bound: np.ndarray
     stretch: np.ndarray
-    seen: np.ndarray = field(default_factory=lambda: np.full(1, np.nan))
+    seen: np.ndarray = UNSEEN
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -105,7 +93,9 @@ class FirstMoment(OverArea, _Stretched):
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
+    state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
+    numbers: ClassVar[int] = 1
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
         if self.start_from == "steady":
@@ -116,40 +106,42 @@ class FirstMoment(OverArea, _Stretched):
         rows = self.rows(noise)
         return Stretches(rows * bound, rows * stretch)
 
-    def advance(self, population: Stretches, motion: Motion, noise: Noise) -> Stretches:
+    def advance(self, state: Stretches, motion: Motion, radius: np.ndarray, noise: Noise) -> Stretches:
+        before = self.over(state, radius)
         bound, stretch = first_moment.advance(
-            population.bound,
-            population.stretch,
-            motion.slip,
-            motion.path,
-            motion.duration,
-            self.law,
-            self.rebinding_rate,
+            before.bound, before.stretch, motion.slip, motion.path, motion.duration, self.law, self.rebinding_rate
         )
-        return replace(population, bound=bound, stretch=stretch)
+        return Stretches(bound, stretch, before.seen)
 
-    def diluted(self, population: Stretches, share: np.ndarray) -> Stretches:
-        return replace(population, bound=population.bound * share, stretch=population.stretch * share)
+    def over(self, state: Stretches, radius: np.ndarray) -> Stretches:
+        """The population over a contact of this radius [m], nan where it is open."""
+        if self.area == "present":
+            return state
+        share, seen = kept(state.seen, radius)
+        return Stretches(state.bound * share, state.stretch * share, seen)
 
-    def moments(self, population: Stretches) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return population.bound, population.stretch, np.full(1, np.nan)
+    def copied(self, state: Stretches) -> Stretches:
+        return state
 
-    def settled(self, speed: np.ndarray) -> Traction:
-        """What steady sliding at a speed [m/s] hands to the shear part."""
-        _, stretch = first_moment.steady(speed, self.law, self.rebinding_rate)
-        return self._traction(stretch, np.full(1, np.nan))
+    def bonding(self, state: Stretches) -> Bonding:
+        return self._bonding(*self.moments(state))
+
+    def moments(self, state: Stretches) -> Moments:
+        """Share of sites bound [1] and mean stretch [m] per site; the mean square stretch is not known."""
+        return state.bound, state.stretch, _UNKNOWN
+
+    def steady(self, speed: np.ndarray) -> Bonding:
+        return self._bonding(*first_moment.steady(speed, self.law, self.rebinding_rate), _UNKNOWN)
 
 
-@plain_dataclass(frozen=True)
-class Ages:
+class Ages(NamedTuple):
     """State of a cohort population."""
 
     cohorts: Cohorts
-    seen: np.ndarray = field(default_factory=lambda: np.full(1, np.nan))
+    seen: np.ndarray = UNSEEN
 
 
-def _cohort_moments(population: Cohorts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return cohorts.bound(population), cohorts.first_moment(population), cohorts.second_moment(population)
+_UNKNOWN = np.full(1, np.nan)
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -169,6 +161,9 @@ class Cohort(OverArea, _Stretched):
     area: Area = "present"
     model: Literal["cohort"] = "cohort"
 
+    state_class: ClassVar[type[Ages]] = Ages
+    numbers: ClassVar[int] = 1
+
     def start(self, motion: Motion, noise: Noise) -> Ages:
         recipe = self.law, self.rebinding_rate
         if self.start_from == "steady":
@@ -178,25 +173,33 @@ class Cohort(OverArea, _Stretched):
         else:
             first = cohorts.empty(self.law, self.tolerance)
         rows = len(self.rows(noise))
-        return Ages(Cohorts(*(np.repeat(getattr(first, item.name), rows, axis=0) for item in fields(Cohorts))))
+        return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
-    def advance(self, population: Ages, motion: Motion, noise: Noise) -> Ages:
-        moved = cohorts.advance(
-            population.cohorts, motion.slip, motion.duration, self.law, self.rebinding_rate, self.tolerance
-        )
-        return replace(population, cohorts=moved)
+    def advance(self, state: Ages, motion: Motion, radius: np.ndarray, noise: Noise) -> Ages:
+        before, seen = self.over(state, radius)
+        moved = cohorts.advance(before, motion.slip, motion.duration, self.law, self.rebinding_rate, self.tolerance)
+        return Ages(moved, seen)
 
-    def diluted(self, population: Ages, share: np.ndarray) -> Ages:
-        return replace(population, cohorts=cohorts.diluted(population.cohorts, share))
+    def over(self, state: Ages, radius: np.ndarray) -> Ages:
+        """The population over a contact of this radius [m], nan where it is open."""
+        if self.area == "present":
+            return state
+        share, seen = kept(state.seen, radius)
+        return Ages(cohorts.diluted(state.cohorts, share), seen)
 
-    def moments(self, population: Ages) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return _cohort_moments(population.cohorts)
+    def copied(self, state: Ages) -> Ages:
+        return state
 
-    def settled(self, speed: np.ndarray) -> Traction:
-        """What steady sliding at a speed [m/s] hands to the shear part."""
+    def bonding(self, state: Ages) -> Bonding:
+        return self._bonding(*self.moments(state))
+
+    def moments(self, state: Ages) -> Moments:
+        """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""
+        return cohorts.moments(state.cohorts)
+
+    def steady(self, speed: np.ndarray) -> Bonding:
         rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]
-        _, stretch, square = np.concatenate([_cohort_moments(row) for row in rows], axis=1)
-        return self._traction(stretch, square)
+        return self._bonding(*np.concatenate([cohorts.moments(row) for row in rows], axis=1))
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -207,8 +210,6 @@ class Tracked(_Stretched):
     At speeds that are constant within each step a member's bonds are the same for any clock step.
     """
 
-    per_member: ClassVar[bool] = True
-
     rupture: Rupture
     bond_stiffness: Stiffness
     rebinding_rate: Rebinding
@@ -216,6 +217,16 @@ class Tracked(_Stretched):
     sites: Annotated[int, Field(ge=1, le=10**6, description="number of bond sites that are followed")]
     start_from: Start = "steady"
     model: Literal["tracked"] = "tracked"
+
+    state_class: ClassVar[type[Tracks]] = Tracks
+
+    @property
+    def per_member(self) -> bool:
+        return True
+
+    @property
+    def feeds_back(self) -> bool:
+        return False
 
     @property
     def numbers(self) -> int:
@@ -227,16 +238,20 @@ class Tracked(_Stretched):
             self.law, self.rebinding_rate, self.sites, motion.first, self.start_from, noise.seed, noise.members
         )
 
-    def advance(self, population: Tracks, motion: Motion, noise: Noise) -> Tracks:
+    def advance(self, state: Tracks, motion: Motion, radius: np.ndarray, noise: Noise) -> Tracks:
         return tracks.advance(
-            population, motion.slip, motion.duration, self.law, self.rebinding_rate, noise.seed, noise.members
+            state, motion.slip, motion.duration, self.law, self.rebinding_rate, noise.seed, noise.members
         )
 
-    def moments(self, population: Tracks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        bound = tracks.bound(population) / self.sites
-        return bound, tracks.mean_stretch(population), tracks.mean_square_stretch(population)
+    def copied(self, state: Tracks) -> Tracks:
+        return state.copy()
 
-    def settled(self, speed: np.ndarray) -> Traction:
-        """Ensemble mean of what steady sliding at a speed [m/s] hands to the shear part, that of the cohorts."""
-        shared = {name: getattr(self, name) for name in ("rupture", "bond_stiffness", "rebinding_rate", "site_density")}
-        return Cohort(**shared).settled(speed)
+    def bonding(self, state: Tracks) -> Bonding:
+        return self._bonding(*self.moments(state))
+
+    def moments(self, state: Tracks) -> Moments:
+        """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""
+        return tracks.moments(state)
+
+    def steady(self, speed: np.ndarray) -> Bonding:
+        return Cohort(self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density).steady(speed)

@@ -9,7 +9,7 @@ member), so members do not depend on the batch, nor on where a run was taken up 
 """
 
 import math
-from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER,
 from sim.parts.bonds.tracked_step import ENDLESS, LONG, SPENT, draw, live
 
 
-@dataclass(frozen=True)
-class Tracks:
+class Tracks(NamedTuple):
     """State of the bonds of all members; plain arrays, so that it can be written and read back.
 
     ``advance`` works in the large arrays themselves, which the states of a run share: only the newest
@@ -51,7 +50,7 @@ class Tracks:
 
     def copy(self) -> "Tracks":
         """The same state with arrays of its own."""
-        return Tracks(*[getattr(self, each.name).copy() for each in fields(self)])
+        return Tracks(*[array.copy() for array in self])
 
 
 def start(

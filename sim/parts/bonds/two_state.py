@@ -1,11 +1,9 @@
-"""Bond populations without a stretch. Shallow to deep: none, steady, rate, counted.
+"""Bond populations without a stretch. Simple to full: none, steady, rate, counted.
 
-``fraction`` is bonds over bonds at rest; their shear stress is ``stress`` times the fraction.
+Their strength is ``stress`` times the fraction of bonds; their shear stress is ± that, with the sign of the last slip.
 """
 
-from dataclasses import dataclass as plain_dataclass
-from dataclasses import field, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
@@ -14,8 +12,8 @@ from pydantic.dataclasses import dataclass
 from sim.laws.schallamach import relax_fraction, steady_fraction, transition_probabilities
 from sim.numerics.binomial import binomial_numbers
 from sim.numerics.noise import Noise
-from sim.parts.bonds.area import Area, OverArea
-from sim.parts.exchange import Motion, Traction
+from sim.parts.bonds.area import UNSEEN, Area, OverArea, kept
+from sim.parts.exchange import Bonding, Motion, Setting
 from sim.units.quantity import Quantity
 
 Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
@@ -28,50 +26,70 @@ Start = Annotated[
 Sites = Annotated[int, Field(ge=1, le=10**9, description="number of bond sites of the contact")]
 
 
-@plain_dataclass(frozen=True)
-class Population:
-    """State of a population: ``bound`` is a fraction [1] or a number of bonds, per member.
+class Population(NamedTuple):
+    """State of a population.
 
-    ``seen`` is the contact radius [m] whose area the fraction refers to, nan as long as it does not matter.
+    Attributes
+    ----------
+    bound : array
+        Fraction [1] or number of bonds.
+    sense : array
+        Sign of the last slip: 1, -1, or 0 before any.
+    seen : array
+        Contact radius [m] whose area the fraction refers to, nan as long as it does not matter.
     """
 
     bound: np.ndarray
-    seen: np.ndarray = field(default_factory=lambda: np.full(1, np.nan))
+    sense: np.ndarray
+    seen: np.ndarray = UNSEEN
 
 
 class _WithoutStretch:
-    """What all depths without a stretch share: the stress follows the fraction."""
+    """Attributes of all models without a stretch: their strength is proportional to the fraction."""
 
-    per_member: ClassVar[Any] = False
+    state_class: ClassVar[type[Population]] = Population
     knows_forces: ClassVar[bool] = False
     numbers: ClassVar[int] = 1
     stress: float
+
+    @property
+    def per_member(self) -> bool:
+        return False
+
+    @property
+    def feeds_back(self) -> bool:
+        return False
 
     @property
     def carries_stress(self) -> bool:
         """Whether there is a shear stress at all."""
         return self.stress > 0.0
 
-    def fraction(self, population: Population) -> np.ndarray:
-        """Bonds over bonds at rest [1]."""
-        return population.bound
+    def bonding(self, state: Population) -> Bonding:
+        strength = self.stress * state.bound
+        return Bonding(state.bound, state.sense * strength, strength)
 
-    def shear_stress(self, population: Population) -> np.ndarray:
-        """Mean shear stress tau_0 that the bonds carry [Pa]."""
-        return self.stress * self.fraction(population)
+    def copied(self, state: Population) -> Population:
+        return state
 
-    def traction(self, population: Population) -> Traction:
-        """What the shear part is told."""
-        return Traction.of_stress(self.shear_stress(population))
+    def steady(self, speed: np.ndarray) -> Bonding:
+        strength = self.stress * self._steady_fraction(speed)
+        return Bonding(self._steady_fraction(speed), np.sign(speed) * strength, strength)
 
-    def settled(self, speed: np.ndarray) -> Traction:
-        """What steady sliding at a speed [m/s] hands to the shear part."""
-        critical_speed = getattr(self, "critical_speed", np.inf)
-        return Traction.of_stress(self.stress * np.asarray(steady_fraction(speed, critical_speed)))
+    def _steady_fraction(self, speed: np.ndarray) -> np.ndarray:
+        return np.ones(1)
 
-    def over(self, population: Population, radius: np.ndarray) -> Population:
-        """The population over the contact as it is now."""
-        return population
+    def remarks(self, setting: Setting) -> list[str]:
+        return []
+
+
+def _sense(motion: Motion, before: np.ndarray) -> np.ndarray:
+    """Sign of the last slip at the end of a step: that of the speed, of the step's slip once it has stopped."""
+    moved = np.where(motion.slip == 0.0, before, motion.slip)
+    return np.sign(np.where(motion.speed == 0.0, moved, motion.speed))
+
+
+_STILL = np.zeros(1)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -82,10 +100,10 @@ class Unbroken(_WithoutStretch):
     model: Literal["none"] = "none"
 
     def start(self, motion: Motion, noise: Noise) -> Population:
-        return Population(np.ones(1))
+        return Population(np.ones(1), _sense(motion, _STILL))
 
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        return population
+    def advance(self, state: Population, motion: Motion, radius: np.ndarray, noise: Noise) -> Population:
+        return state._replace(sense=_sense(motion, state.sense))
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -97,10 +115,13 @@ class Steady(_WithoutStretch):
     model: Literal["steady"] = "steady"
 
     def start(self, motion: Motion, noise: Noise) -> Population:
-        return Population(np.asarray(steady_fraction(motion.speed, self.critical_speed)))
+        return Population(self._steady_fraction(motion.speed), _sense(motion, _STILL))
 
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        return self.start(motion, noise)
+    def advance(self, state: Population, motion: Motion, radius: np.ndarray, noise: Noise) -> Population:
+        return Population(self._steady_fraction(motion.speed), _sense(motion, state.sense))
+
+    def _steady_fraction(self, speed: np.ndarray) -> np.ndarray:
+        return np.asarray(steady_fraction(speed, self.critical_speed))
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -118,14 +139,27 @@ class Rate(OverArea, _WithoutStretch):
     model: Literal["rate"] = "rate"
 
     def start(self, motion: Motion, noise: Noise) -> Population:
-        return Population(self.rows(noise) * _first_fraction(self.start_from, motion, self.critical_speed))
+        first = self.rows(noise) * _first_fraction(self.start_from, motion, self.critical_speed)
+        return Population(first, _sense(motion, _STILL))
 
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
-        bound = relax_fraction(population.bound, motion.path, motion.duration, self.critical_speed, self.rebinding_rate)
-        return replace(population, bound=np.asarray(bound))
+    def advance(self, state: Population, motion: Motion, radius: np.ndarray, noise: Noise) -> Population:
+        bound, sense, seen = self.over(state, radius)
+        bound = relax_fraction(bound, motion.path, motion.duration, self.critical_speed, self.rebinding_rate)
+        return Population(np.asarray(bound), _sense(motion, sense), seen)
 
-    def diluted(self, population: Population, share: np.ndarray) -> Population:
-        return replace(population, bound=population.bound * share)
+    def over(self, state: Population, radius: np.ndarray) -> Population:
+        """The population over a contact of this radius [m], nan where it is open."""
+        if self.area == "present":
+            return state
+        share, seen = kept(state.seen, radius)
+        return state._replace(bound=state.bound * share, seen=seen)
+
+    def bonding(self, state: Population) -> Bonding:
+        bonding = super().bonding(state)
+        return bonding._replace(stiffness=-self.rebinding_rate / self.critical_speed * bonding.strength)
+
+    def _steady_fraction(self, speed: np.ndarray) -> np.ndarray:
+        return np.asarray(steady_fraction(speed, self.critical_speed))
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -140,8 +174,6 @@ class Counted(_WithoutStretch):
     numbers a step whatever the state, and members keep their noise across sweep values.
     """
 
-    per_member: ClassVar[bool] = True
-
     critical_speed: CriticalSpeed
     rebinding_rate: Rebinding
     sites: Sites
@@ -149,19 +181,27 @@ class Counted(_WithoutStretch):
     start_from: Start = "steady"
     model: Literal["counted"] = "counted"
 
-    def fraction(self, population: Population) -> np.ndarray:
-        return population.bound / self.sites
+    @property
+    def per_member(self) -> bool:
+        return True
+
+    def bonding(self, state: Population) -> Bonding:
+        return super().bonding(state._replace(bound=state.bound / self.sites))
 
     def start(self, motion: Motion, noise: Noise) -> Population:
         first = _first_fraction(self.start_from, motion, self.critical_speed)
         uniform = noise.uniforms(motion.step, 2)
-        return Population(_binomial(uniform[:, 0], np.array([float(self.sites)]), first))
+        return Population(_binomial(uniform[:, 0], np.array([float(self.sites)]), first), _sense(motion, _STILL))
 
-    def advance(self, population: Population, motion: Motion, noise: Noise) -> Population:
+    def advance(self, state: Population, motion: Motion, radius: np.ndarray, noise: Noise) -> Population:
         stay, bind = transition_probabilities(motion.path, motion.duration, self.critical_speed, self.rebinding_rate)
         uniform = noise.uniforms(motion.step, 2)
-        kept = _binomial(uniform[:, 0], population.bound, stay)
-        return Population(kept + _binomial(uniform[:, 1], self.sites - population.bound, bind))
+        kept = _binomial(uniform[:, 0], state.bound, stay)
+        bound = kept + _binomial(uniform[:, 1], self.sites - state.bound, bind)
+        return Population(bound, _sense(motion, state.sense))
+
+    def _steady_fraction(self, speed: np.ndarray) -> np.ndarray:
+        return np.asarray(steady_fraction(speed, self.critical_speed))
 
 
 def _first_fraction(start: str, motion: Motion, critical_speed: float) -> np.ndarray:

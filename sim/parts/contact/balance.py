@@ -1,7 +1,7 @@
 """Terms of the effective work of adhesion, and the state of a contact."""
 
 import math
-from dataclasses import dataclass as plain_dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,8 +10,7 @@ from sim.parts.contact.control import Bodies
 from sim.spectrum.finite_contact import Margin
 
 
-@plain_dataclass(frozen=True)
-class Balance:
+class Balance(NamedTuple):
     """What the contact is told at a step.
 
     Attributes
@@ -58,8 +57,7 @@ class Balance:
         return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
 
 
-@plain_dataclass(frozen=True)
-class Touch:
+class Touch(NamedTuple):
     """State of the contact.
 
     Attributes

@@ -5,7 +5,7 @@ or a table; ``sim.parts.contact.control`` says what a contact is under each.
 """
 
 import math
-from typing import Annotated, Any, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -17,7 +17,7 @@ from sim.parts.contact.control import AtDisplacement, AtLoad, Bodies, Grip
 from sim.parts.contact.crack_front import Hold, Kinetics
 from sim.parts.contact.crack_front import advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
-from sim.parts.exchange import Motion
+from sim.parts.exchange import Motion, Setting
 from sim.units.course import Course, Prescribed, Table, held, prescribed
 from sim.units.quantity import Quantity
 
@@ -41,6 +41,10 @@ _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description=
 @dataclass(frozen=True, config={"extra": "forbid"})
 class _Held:
     """What holds the sphere: a load, an indentation, or a displacement with a stiffness."""
+
+    state_class: ClassVar[type[Touch]] = Touch
+    per_member: ClassVar[bool] = False
+    feeds_back: ClassVar[bool] = False
 
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
@@ -66,6 +70,9 @@ class _Held:
             other = "a stiffness belongs to a displacement; give contact.displacement, or leave it out"
             raise PydanticCustomError("control", said if self.stiffness is None else other)
         return self
+
+    def remarks(self, setting: Setting) -> list[str]:
+        return []
 
     @property
     def control(self) -> Prescribed:

@@ -5,13 +5,13 @@ step, never the speed times the step, so that parts that live on slip see no ste
 """
 
 import math
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.parts.exchange import Motion
+from sim.parts.exchange import Motion, Resistance, Setting, Times
 from sim.units.course import Course, Number, Piece, table_pieces
 from sim.units.course import Table as Rows
 from sim.units.quantity import Quantity
@@ -19,10 +19,30 @@ from sim.units.quantity import Quantity
 _SPEED = Quantity("m/s", "sliding speed", "V")
 
 
-class _Sliding:
-    """A drive whose speed is a given function of time; a subclass gives ``pieces``."""
+class Slider(NamedTuple):
+    """State of a prescribed drive: displacement since the start [m] and speed [m/s]."""
 
+    position: np.ndarray
+    speed: np.ndarray
+
+
+class _Sliding:
+    """Motion as a given function of time; a subclass gives ``pieces``."""
+
+    state_class: ClassVar[type[Slider]] = Slider
     per_member: ClassVar[bool] = False
+    feeds_back: ClassVar[bool] = False
+
+    def begin(self, times: Times) -> tuple[Slider, Motion]:
+        motion = self.motion(0, 0.0, 0.0, times.duration)
+        return Slider(np.zeros(1), motion.speed), motion
+
+    def advance(self, state: Slider, resistance: Resistance, times: Times, step: int) -> tuple[Slider, Motion]:
+        motion = self.motion(step, times.at(step - 1), times.at(step), times.duration)
+        return Slider(state.position + motion.slip, motion.speed), motion
+
+    def remarks(self, setting: Setting) -> list[str]:
+        return []
 
     def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
         """The speed from ``start`` to ``stop`` [s] in pieces."""

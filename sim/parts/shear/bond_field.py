@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Motion, Traction
+from sim.parts.exchange import Bonding, Motion
 from sim.parts.shear.modal import DrawsMaps, ModalProcess
 from sim.parts.shear.process import Fluctuation, SmoothProcess
 
@@ -20,8 +20,8 @@ from sim.parts.shear.process import Fluctuation, SmoothProcess
 class SiteMean(SmoothProcess):
     """The ensemble mean of ΔΓ: ``energy`` is that for n E[f²] = 1 N²/m²."""
 
-    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        return Fluctuation((traction.frozen + traction.varying) * self.energy, np.ones(1), np.empty(0))
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        return Fluctuation((bonding.frozen + bonding.varying) * self.energy, np.ones(1), np.empty(0))
 
 
 class SiteModes(ModalProcess):
@@ -31,22 +31,22 @@ class SiteModes(ModalProcess):
     (members, 4, pairs).
     """
 
-    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         pairs = len(self.wavenumber)
         parts = noise.normals(motion.step, 4 * pairs).reshape(-1, 4, pairs).copy()
-        return self._sized(parts, traction)
+        return self._sized(parts, bonding)
 
-    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
+    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         exponents, pairs = self.correlation.exponents(self.wavenumber, motion), len(self.wavenumber)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
         fresh = noise.normals(motion.step, 2 * pairs).reshape(-1, 2, pairs)
         parts = np.concatenate([state.values[:, :2], keep * state.values[:, 2:] + renew * fresh], axis=1)
-        return self._sized(parts, traction)
+        return self._sized(parts, bonding)
 
-    def _sized(self, parts: np.ndarray, traction: Traction) -> Fluctuation:
+    def _sized(self, parts: np.ndarray, bonding: Bonding) -> Fluctuation:
         """The state of these parts; ``amplitude`` holds the sizes of both, shape (2, 1) or (2, members)."""
-        sizes = np.sqrt(np.stack([traction.frozen, traction.varying]))
-        sizes[0] *= np.where(traction.stress < 0.0, -1.0, 1.0)
+        sizes = np.sqrt(np.stack([bonding.frozen, bonding.varying]))
+        sizes[0] *= np.where(bonding.stress < 0.0, -1.0, 1.0)
         field = _combined(parts, sizes)
         energy = np.sum(self.weights * np.sum(np.square(field), axis=1), axis=1)
         return Fluctuation(energy, sizes.T, parts)

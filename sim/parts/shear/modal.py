@@ -1,6 +1,6 @@
 """Every Fourier mode of the stress field as an Ornstein-Uhlenbeck process, and maps of the field."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Motion, Traction
+from sim.parts.exchange import Bonding, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modes import Modes
@@ -106,13 +106,13 @@ class ModalProcess(_Renewing):
 class FixedProcess(ModalProcess):
     """Modes that keep their modulus and diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
 
-    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(amplitude), amplitude, phases)
 
-    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         turn = np.sqrt(2.0 * self.correlation.exponents(self.wavenumber, motion))
         phases = state.values + turn * noise.normals(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(amplitude), amplitude, phases)
@@ -175,9 +175,9 @@ class DrawsMaps:
         The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
         e^{iq(x − X)}.
         """
-        first = replace(state, values=state.values[:members])
+        first = state._replace(values=state.values[:members])
         if len(state.amplitude) > 1:
-            first = replace(first, amplitude=state.amplitude[:members])
+            first = first._replace(amplitude=state.amplitude[:members])
         lattice = np.arange(-self.grid.points, self.grid.points + 1)
         turns = np.exp(-2j * np.pi / self.grid.cell * position[:members, np.newaxis] * lattice) * self.grid.cell**2
         amplitudes = self.complex_amplitudes(first)  # type: ignore[attr-defined]

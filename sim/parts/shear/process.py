@@ -4,18 +4,17 @@ A process is a depth of ``parts.shear`` on a given solid and cell.
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Motion, Traction
+from sim.parts.exchange import Bonding, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 
 
-@dataclass(frozen=True)
-class Fluctuation:
+class Fluctuation(NamedTuple):
     """State of the fluctuations.
 
     Attributes
@@ -41,13 +40,14 @@ class SmoothProcess:
     energy: float
     amplitude: Amplitude
     pairs: ClassVar[int] = 0
+    state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
-    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         return Fluctuation(amplitude**2 * self.energy, amplitude, np.empty(0))
 
-    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        return self.start(motion, traction, noise)
+    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        return self.start(motion, bonding, noise)
 
     def known_errors(self) -> dict[str, float]:
         """Errors and spreads known before the run."""
@@ -62,16 +62,17 @@ class _Renewing:
     wavenumber: Any
     _empty: Any
     _renewed: Any
+    state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
-    def start(self, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         size = amplitude if self.amplitude.relaxing else np.ones(1)
         return self._renewed(
             self._empty(len(noise.members)), np.zeros(1), np.ones(1), size, amplitude, motion.step, noise
         )
 
-    def advance(self, state: Fluctuation, motion: Motion, traction: Traction, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, traction.stress)
+    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         size = _renewed_size(self.amplitude, state, motion, amplitude)
         exponents = self.correlation.exponents(self.wavenumber, motion)
         keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))

@@ -182,19 +182,19 @@ CARRIED = {
 def test_amplitude_dilutes_bonds_and_shrinkage_takes_them_along(name):
     part = CARRIED[name]
     _, state = last(1, steps=1, bonds=part, drive=drive.Steady(speed=1e-3))
-    full, stress = part.fraction(state.bonds), part.shear_stress(state.bonds)
+    full, stress, *_ = state.bonding
     held = part.over(state.bonds, np.array([1e-4]))
-    before = part.fraction(held)
+    before = part.bonding(held).fraction
     for radius in (1.1e-4, 1.7e-4, 1.7e-4, 5e-4):
         held = part.over(held, np.array([radius]))
-        assert_allclose(part.fraction(held) * radius**2, before * 1e-8, rtol=1e-14)  # n A phi
-        assert_allclose(part.shear_stress(held) / stress, part.fraction(held) / full, rtol=1e-14)
-    diluted = part.fraction(held)
+        diluted = part.bonding(held)
+        assert_allclose(diluted.fraction * radius**2, before * 1e-8, rtol=1e-14)  # n A phi
+        assert_allclose(diluted.stress / stress, diluted.fraction / full, rtol=1e-14)
     shrunk = part.over(held, np.array([2e-4]))
-    assert np.array_equal(part.fraction(shrunk), diluted)
+    assert np.array_equal(part.bonding(shrunk).fraction, diluted.fraction)
     opened = part.over(shrunk, np.array([np.nan]))
-    assert part.fraction(opened) == 0.0  # an open contact has no bonds
-    assert part.fraction(part.over(opened, np.array([1e-4]))) == 0.0
+    assert part.bonding(opened).fraction == 0.0  # an open contact has no bonds
+    assert part.bonding(part.over(opened, np.array([1e-4]))).fraction == 0.0
 
 
 def test_the_share_that_amplitude_keeps_is_that_of_the_areas():
@@ -215,7 +215,7 @@ def test_in_a_contact_that_breathes_the_bonds_thin_with_every_amplitude(name):
     assert np.sum(np.diff(radii, axis=0) > 1e-8) > 10
     grown = np.maximum(radii[1:-1] / radii[:-2], 1.0)
     expected = np.concatenate([np.ones((2, 5)), 1.0 / np.cumprod(grown, axis=0) ** 2])
-    found = np.array([scenario.population.fraction(state.bonds) for state in states])
+    found = np.array([state.bonding.fraction for state in states])
     if name == "present":
         assert found.shape == (13, 1)
         expected = np.ones((13, 1))
@@ -268,8 +268,8 @@ def test_sites_of_the_slider_keep_a_pattern_and_forget_what_differs():
 def test_a_few_bonds_give_each_member_its_own_field():
     scenario, state = last(4, bonds=BONDS["tracked"], shear=shear.Mean(spectrum=FIELD), drive=drive.Steady(speed=PACE))
     assert scenario.varies["shear"] and len(np.unique(state.shear.energy)) == 4
-    moments = scenario.population.traction(state.bonds)
-    assert_allclose(state.shear.energy, (moments.frozen + moments.varying) * FIELD.surface_energy(1.6e6), rtol=1e-14)
+    bonding = state.bonding
+    assert_allclose(state.shear.energy, (bonding.frozen + bonding.varying) * FIELD.surface_energy(1.6e6), rtol=1e-14)
 
 
 @pytest.mark.parametrize(

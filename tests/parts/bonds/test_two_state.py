@@ -23,7 +23,7 @@ def fractions(population, motion, steps, members=1, seed=5, duration=2.1):
     scenario = scene(bonds=population, drive=motion, clock=Clock(duration=duration, step=duration / steps), seed=seed)
     # 2500 members at a time: each draws the numbers of 4096 steps ahead
     batches = [np.arange(first, min(first + 2500, members)) for first in range(0, members, 2500)]
-    marched = [[scenario.bonds.fraction(state.bonds) for state in march(scenario, batch)] for batch in batches]
+    marched = [[state.bonding.fraction for state in march(scenario, batch)] for batch in batches]
     return np.concatenate(marched, axis=1)
 
 

@@ -551,7 +551,7 @@ def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
     scenario = scene(1, 2000, contact=held, bonds=sites)
     states = list(march(scenario, np.arange(1)))
     radius = np.array([state.contact.radius[0] for state in states])
-    fraction = np.array([scenario.population.fraction(state.bonds)[0] for state in states])
+    fraction = np.array([state.bonding.fraction[0] for state in states])
     closing = np.flatnonzero(np.isnan(radius[:-1]) & ~np.isnan(radius[1:])) + 1
     assert closing.size == 2
     # one step of healing from nothing, and nothing again once the area is seen

@@ -20,7 +20,7 @@ from sim.ensemble import simulate as ensemble
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
-from sim.parts.exchange import Traction
+from sim.parts.exchange import Bonding
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Constant, Onset, Stress
 from sim.parts.shear.banded import BandedProcess
@@ -32,7 +32,7 @@ from sim.scenario.clock import Clock
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 
 G, MEMBERS = 1.6e6, 400
-UNLOADED = Traction.of_stress(np.zeros(1))
+UNLOADED = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
 #: Two-sided probability of five standard deviations.
 FIVE_SIGMA = 5.7e-7
 
@@ -303,8 +303,8 @@ def test_amplitude_multiplies_the_unit_process_at_once(kind, motion):
     _, unit = march_energies(shear.Banded(**recipe), 3, clock, motion, population)
     states, grown = march_energies(shear.Banded(**recipe, amplitude=amplitude), 3, clock, motion, population)
     for before, after, state in zip(unit, grown, states, strict=True):
-        stress = population.shear_stress(state.bonds)
-        assert_allclose(after, before * amplitude.factor(state.speed, stress) ** 2, rtol=1e-14, atol=0)
+        stress = state.bonding.strength
+        assert_allclose(after, before * amplitude.factor(state.drive.speed, stress) ** 2, rtol=1e-14, atol=0)
 
 
 def test_relaxing_amplitude_follows_the_law_of_all_modes_after_a_jump():
@@ -375,7 +375,7 @@ def test_members_restarts_and_records_leave_every_bit(correlation, relaxing):
             for one, other in zip(pack(together).values(), pack(state).values(), strict=True):
                 if one.ndim and len(one) == members:
                     assert np.array_equal(other[row], one[3], equal_nan=True)
-    restarted = list(march(scenario, np.arange(members), unpack(pack(straight[2]))))
+    restarted = list(march(scenario, np.arange(members), unpack(scenario, pack(straight[2]))))
     for one, other in zip(straight[3:], restarted, strict=True):
         left, right = pack(one), pack(other)
         assert all(np.array_equal(left[key], right[key], equal_nan=True) for key in left)
@@ -402,7 +402,7 @@ def test_fixed_amplitudes_store_the_cells_mean_at_all_times(name):
     mean = modes(spectrum, CELL, points).energies(G).sum()
     for state, energy in zip(states, found, strict=True):
         assert state.shear.energy.shape == (1,)
-        assert_allclose(energy, amplitude.factor(state.speed, 0.0)[0] ** 2 * mean, rtol=1e-12, atol=0)
+        assert_allclose(energy, amplitude.factor(state.drive.speed, 0.0)[0] ** 2 * mean, rtol=1e-12, atol=0)
 
 
 def test_the_state_holds_one_number_a_band():

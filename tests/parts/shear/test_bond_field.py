@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Motion, Traction
+from sim.parts.exchange import Bonding, Motion
 from sim.parts.shear.amplitude import Constant
 from sim.parts.shear.bond_field import MappedSiteModes, SiteMean, SiteModes
 from sim.parts.shear.correlation import Time
@@ -25,9 +25,10 @@ def moved(step, duration=0.0):
     return Motion(step, 0.0, duration, still, still, still, still)
 
 
-def traction(mean, spread):
+def bonding(mean, spread):
     """Bonds of 1 site per m², mean force and its standard deviation [N]."""
-    return Traction(np.array([mean]), np.array([mean**2]), np.array([spread**2]))
+    known = {"frozen": np.array([mean**2]), "varying": np.array([spread**2])}
+    return Bonding(np.ones(1), np.array([mean]), np.array([abs(mean)]), **known)
 
 
 def process(kind=SiteModes, poisson_ratio=0.5):
@@ -66,7 +67,7 @@ def test_variance_and_energy_are_the_integrals_of_the_density():
 
 def test_the_mean_follows_both_moments_of_the_force():
     mean = SiteMean(SPECTRUM.surface_energy(G), Constant())
-    state = mean.start(moved(0), traction(3.0, 2.0), None)
+    state = mean.start(moved(0), bonding(3.0, 2.0), None)
     assert_allclose(state.energy, 13.0 / (math.pi**2 * G * B), rtol=1e-14)
 
 
@@ -74,9 +75,9 @@ def test_the_mean_follows_both_moments_of_the_force():
 def test_the_modes_hold_the_energy_of_frozen_and_varying_forces(mean, spread):
     field = process()
     noise = Noise(1, "shear", np.arange(MEMBERS))
-    state = field.start(moved(0), traction(mean, spread), noise)
+    state = field.start(moved(0), bonding(mean, spread), noise)
     for step in range(1, 4):
-        state = field.advance(state, moved(step, 0.7), traction(mean, spread), noise)
+        state = field.advance(state, moved(step, 0.7), bonding(mean, spread), noise)
     expected = 2.0 * np.sum(field.weights)
     spread_of_mean = 2.0 * math.sqrt(np.sum(field.weights**2) / MEMBERS)
     assert abs(state.energy.mean() - expected) < 5.0 * spread_of_mean
@@ -85,7 +86,7 @@ def test_the_modes_hold_the_energy_of_frozen_and_varying_forces(mean, spread):
 def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_not():
     # correlation of the amplitudes over one correlation time: (f² + Var e^-1)/(f² + Var), f² = 0.64, Var = 0.36
     field, noise = process(), Noise(2, "shear", np.arange(MEMBERS))
-    carried = traction(-0.8, 0.6)
+    carried = bonding(-0.8, 0.6)
     first = field.start(moved(0), carried, noise)
     then = field.advance(first, moved(1, 1.0), carried, noise)
     before, after = (field.complex_amplitudes(state) for state in (first, then))
@@ -96,8 +97,8 @@ def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_n
 
 def test_the_sign_of_the_mean_force_turns_the_frozen_pattern():
     field, noise = process(), Noise(2, "shear", np.arange(3))
-    first = field.start(moved(0), traction(0.8, 0.0), noise)
-    back = field.advance(first, moved(1, 1.0), traction(-0.8, 0.0), noise)
+    first = field.start(moved(0), bonding(0.8, 0.0), noise)
+    back = field.advance(first, moved(1, 1.0), bonding(-0.8, 0.0), noise)
     assert_allclose(field.complex_amplitudes(back), -field.complex_amplitudes(first), rtol=1e-14)
 
 
@@ -105,6 +106,6 @@ def test_a_map_of_the_bonds_field_has_the_energy_of_its_modes():
     from sim.laws.halfspace import surface_energy
 
     field, noise = process(MappedSiteModes), Noise(3, "shear", np.arange(2))
-    state = field.start(moved(0), traction(0.8, 0.6), noise)
+    state = field.start(moved(0), bonding(0.8, 0.6), noise)
     maps = field.maps(state, np.zeros(1), 2)
     assert_allclose([surface_energy(one, CELL, G) for one in maps], state.energy, rtol=1e-12)

@@ -77,7 +77,7 @@ def test_the_energy_forgets_with_twice_the_rate_of_the_amplitudes(name):
 def test_a_contact_at_rest_keeps_its_pattern_under_slip_memory():
     part = shear.Mapped(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=1e-6))
     scenario, found = states(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=0.0))
-    first, last = (scenario.process.maps(s.shear, s.position, 2) for s in (found[0], found[-1]))
+    first, last = (scenario.process.maps(s.shear, s.drive.position, 2) for s in (found[0], found[-1]))
     assert np.array_equal(first, last)
 
 
@@ -94,7 +94,7 @@ def test_the_energy_is_that_of_the_map_by_the_greens_function(points, amplitudes
     )
     scenario, found = states(part, 3, Clock(duration=4e-3, step=1e-3), drive.Ramp(start=1e-3, stop=5e-3))
     for state in found:
-        maps = scenario.process.maps(state.shear, np.full(3, state.position[0]), 3)
+        maps = scenario.process.maps(state.shear, np.full(3, state.drive.position[0]), 3)
         stored = halfspace.surface_energy(maps, CELL, G)
         assert_allclose(stored, np.broadcast_to(state.shear.energy, 3), rtol=1e-12)
         w1 = halfspace.displacement(maps, CELL, G)
@@ -109,7 +109,7 @@ def test_a_frozen_pattern_moves_with_the_slider(amplitudes):
     )
     clock = Clock(duration=3.0, step=1.0)
     scenario, found = states(part, 2, clock, drive.Steady(speed=spacing))
-    maps = [scenario.process.maps(s.shear, np.full(2, s.position[0]), 2) for s in found]
+    maps = [scenario.process.maps(s.shear, np.full(2, s.drive.position[0]), 2) for s in found]
     for cells, moved in enumerate(maps):
         assert_allclose(moved, np.roll(maps[0], cells, axis=1), rtol=0, atol=1e-9 * np.abs(maps[0]).max())
 
@@ -152,7 +152,7 @@ def test_amplitude_multiplies_the_field_at_once(motion):
     _, unit = energies(shear.Modal(**recipe), 3, clock, motion)
     _scenario, grown = states(shear.Modal(**recipe, amplitude=onset), 3, clock, motion)
     for before, state in zip(unit, grown, strict=True):
-        assert_allclose(state.shear.energy, before * onset.factor(state.speed, 0.0) ** 2, rtol=1e-14)
+        assert_allclose(state.shear.energy, before * onset.factor(state.drive.speed, 0.0) ** 2, rtol=1e-14)
 
 
 def test_relaxing_amplitude_follows_the_exact_second_moment():
