@@ -252,7 +252,7 @@ CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equil
         {"drive": THERE_AND_BACK},
         {"contact": Equilibrium(load=-3e-4)},
         {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform()},
-        {"contact": Equilibrium(indentation=1e-6), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9),
+        {"contact": Equilibrium(indentation=1e-6), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=9, sites=9),
          "record": Record(per_member=False)},
         {"sweep": CONTACTS},
         {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
