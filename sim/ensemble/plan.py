@@ -1,6 +1,7 @@
 """Division of a run into points, groups of members and stretches of time."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class Plan:
         varies = any(any(point.varies.values()) for point in self.points)
         return self.scenario.ensemble.members if varies else 1
 
-    @property
+    @cached_property
     def group(self) -> int:
         """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
         some = self.points[:: max(1, len(self.points) // 4)]
