@@ -33,8 +33,8 @@ class BondMade(Isotropic):
     -----
     With n sites per area and a mean square force E[f²] per site ``C = n E[f²] (2 J1(qb)/(qb))²``: here for
     n E[f²] = 1 N²/m², so that the variance is 1/(πb²) and ``ΔΓ = (2 − ν) n E[f²]/(1.5 π² G b)``, which is
-    n E[f²]/(π² G b) for an incompressible half-space. That is the work stored under the bonds themselves: a
-    bond's force sinks its disc by 2f/(π²Gb).
+    n E[f²]/(π² G b) for an incompressible half-space. That is the energy stored under the bonds themselves: a
+    force f moves its disc by 2f/(π²Gb).
 
     Examples
     --------

@@ -1,7 +1,7 @@
 """Power spectra of the fluctuating shear stress: density, variance and stored energy.
 
 One convention throughout: ``C(q) = ∫ d²x <τ1(x) τ1(0)> e^{-iq·x}`` in Pa² m², so that
-``<τ1²> = (1/4π²) ∫ d²q C = (1/2π) ∫ q C dq``. Persson's density is C / 4π². Every ``variance`` and
+``<τ1²> = (1/4π²) ∫ d²q C = (1/2π) ∫ q C dq``. The density in Persson's papers is C / 4π². Every ``variance`` and
 ``surface_energy`` is a closed form on the infinite plane and any Poisson ratio ν,
 
 ``ΔΓ = (1/8π²) ∫ d²q C (1 - ν qx²/q²) / (G q)``  (Menga, Carbone & Dini at ν = 1/2),
@@ -43,7 +43,7 @@ Angle = Annotated[float, Quantity("rad", "angle to the sliding direction", "θ")
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Ripple:
-    """A single sinusoid, ``τ1 cos(q·x)``: the paper's example.
+    """A single sinusoid, ``τ1 cos(q·x)``.
 
     Parameters
     ----------
@@ -423,7 +423,7 @@ class AnisotropicGaussian:
         return wave_sums(self, factors, radii)
 
 
-#: Any spectrum, told apart in a scenario by its ``model``.
+#: Any spectrum, by the key ``model`` of a scenario.
 Spectrum = Annotated[
     Ripple | Band | SelfAffine | Gaussian | AnisotropicGaussian | VonKarman | Tabulated | Measured | BondMade,
     Field(discriminator="model"),

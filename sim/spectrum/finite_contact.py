@@ -114,7 +114,7 @@ def marginal_energy(
 
     Notes
     -----
-    This, not the mean over the disc, enters the balance of energies at the contact's edge.
+    This, not the mean over the disc, enters the energy balance at the contact's edge.
 
     Examples
     --------
@@ -212,21 +212,21 @@ def _window(spectrum: Waves, radius: float, x: Array) -> Array:
 
 
 class Margin:
-    """dE/dA of a disc over ΔΓ of the plane [1]: 1 for many waves in the contact, 0 for a vanishing one.
+    """Share of ΔΓ that a growing contact of finite radius pays, dE/dA over ΔΓ of the plane [1].
 
-    E is the ensemble mean of the energy that fluctuations confined to a disc of radius a store (``finite_contact``);
-    a contact that grows pays dE/dA. A spline over ln a, made once for a scene; a ripple's is in closed form.
+    1 for many waves in the contact, 0 for a vanishing one. A spline over ln a, made once for a scene; closed form
+    for a ripple.
     """
 
     def __init__(self, spectrum: Family, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
         self.spectrum, self.solid, self.sphere_radius = spectrum, (shear_modulus, poisson_ratio), sphere_radius
 
     def __call__(self, radius: Array) -> Array:
-        """The share at contact radii [m]; nan stays nan."""
+        """Share at contact radii [m]; nan at nan."""
         return self._share(radius, marginal_energy, lambda x: self._spline(x))
 
     def mean(self, radius: Array) -> Array:
-        """What the whole disc has paid per area over ΔΓ of the plane [1]: the mean of the share over its area."""
+        """Mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
         return self._share(radius, disc_energy, lambda x: self._mean_spline(x))
 
     def _share(self, radius: Array, law: Callable[..., Array], spline: Callable[[Array], Array]) -> Array:

@@ -1,8 +1,7 @@
-"""Spectra from data: a table of a radial density, or an estimate from measured stress maps.
+"""Spectrum estimated from measured stress maps.
 
 Convention: ``C(q) = ∫ d²x <τ1(x) τ1(0)> e^{-iq·x}`` in Pa² m², q in rad/m (2π over the wavelength),
-``<τ1²> = (1/2π) ∫ q C dq``. Of a map of side L it is ``|∫ τ1 e^{-iq·x} d²x|² / L²``. A table in
-Persson's convention, C / 4π², says so.
+``<τ1²> = (1/2π) ∫ q C dq``. For a map of side L it is ``|∫ τ1 e^{-iq·x} d²x|² / L²``.
 """
 
 import functools
@@ -18,7 +17,7 @@ from sim.numerics.files import HDF5
 from sim.numerics.grid import Grid
 from sim.spectrum.periodogram import periodogram, radial_average
 from sim.spectrum.radial import PowerLaws, Rowed
-from sim.spectrum.tabulated import Densities, Wavenumbers, _by_name, _check_rows, _file_fault, _plain
+from sim.spectrum.tabulated import Densities, Wavenumbers, by_name, check_rows, file_fault
 from sim.units.quantity import Quantity
 from sim.units.table import TableError, file_path, file_text, matrix
 
@@ -65,17 +64,16 @@ class Measured(Rowed):
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = _by_name(values, ("file", "spacing", "window", "variable", "wavenumbers", "densities"))
+        values = by_name(values, ("file", "spacing", "window", "variable", "wavenumbers", "densities"))
         if not isinstance(values, dict):
             return values
-        values = _plain(values)
         name, window = values.get("file"), values.get("window", "none")
         if values.get("wavenumbers") or not isinstance(name, str) or window not in ("none", "hann"):
             return values
         try:
             spacing = None if values.get("spacing") is None else _SPACING.read(values["spacing"])
         except ValueError:
-            return values  # the field's own check says what is wrong
+            return values  # refused by the field's own check
         if name.lower().endswith((".nc", ".nc4", ".cdf")):
             maps, spacing = _read_netcdf(name, str(values.get("variable", "shear_map")), spacing, info.context)
         else:
@@ -85,7 +83,7 @@ class Measured(Rowed):
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_rows(self.wavenumbers, self.densities)
+        check_rows(self.wavenumbers, self.densities)
         return self
 
     @functools.cached_property
@@ -98,7 +96,7 @@ def _read_matrix(name: str, context: Any) -> Array:
     try:
         return matrix(file_text(name, context), _STRESS)
     except TableError as fault:
-        raise _file_fault(name, fault) from None
+        raise file_fault(name, fault) from None
 
 
 def _read_netcdf(name: str, variable: str, spacing: float | None, context: Any) -> tuple[Array, float | None]:
@@ -113,16 +111,16 @@ def _read_netcdf(name: str, variable: str, spacing: float | None, context: Any) 
                 raise ValueError(f'there is no variable "{variable}" (found: {found}); name it by variable = "..."')
             data = dataset[variable].load()
     except (OSError, ValueError, RuntimeError) as fault:
-        raise _file_fault(name, ValueError(str(fault).splitlines()[0])) from None
+        raise file_fault(name, ValueError(str(fault).splitlines()[0])) from None
     if data.ndim < 2:
-        raise _file_fault(name, ValueError(f'"{variable}" has no two dimensions; name a map by variable = "..."'))
+        raise file_fault(name, ValueError(f'"{variable}" has no two dimensions; name a map by variable = "..."'))
     try:
         if {"x", "y"} <= set(data.dims):
             data = data.transpose(..., "x", "y")
             spacing = _coordinate_spacing(data, spacing)
         return np.asarray(data, float) * _factor(data, _STRESS), spacing
     except ValueError as fault:
-        raise _file_fault(name, fault) from None
+        raise file_fault(name, fault) from None
 
 
 def _factor(data: Any, quantity: Quantity) -> float:
@@ -132,7 +130,7 @@ def _factor(data: Any, quantity: Quantity) -> float:
 
 
 def _coordinate_spacing(data: Any, spacing: float | None) -> float | None:
-    """The spacing that the coordinates tell, held against the one given."""
+    """Spacing of the coordinates [m], which must agree with the one given."""
     for axis in ("x", "y"):
         if axis not in data.coords or data.sizes[axis] < 2:
             continue
@@ -152,11 +150,11 @@ def _estimate(name: str, maps: Array, spacing: float | None, window: str) -> tup
     """Rows of the radial spectrum of maps (..., x, y), averaged over the leading axes."""
     points = min(maps.shape[-2:])
     if spacing is None:
-        raise _file_fault(name, ValueError('the map has no coordinates; give spacing, such as "0.5 um"'))
+        raise file_fault(name, ValueError('the map has no coordinates; give spacing, such as "0.5 um"'))
     if points < 8:
-        raise _file_fault(name, ValueError(f"a map of {points} points along a side is too small; give at least 8"))
+        raise file_fault(name, ValueError(f"a map of {points} points along a side is too small; give at least 8"))
     if not np.all(np.isfinite(maps)):
-        raise _file_fault(name, ValueError("the map has gaps (nan or infinite); fill them or crop the map"))
+        raise file_fault(name, ValueError("the map has gaps (nan or infinite); fill them or crop the map"))
     field = maps[..., :points, :points].reshape(-1, points, points)
     grid = Grid(points * spacing, points)
     density = np.mean(periodogram(field, grid.cell, window), axis=0)

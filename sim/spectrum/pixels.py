@@ -1,7 +1,7 @@
 """Exact integrals of a spectrum over the pixels of a square wavevector lattice.
 
-Sampling a spectrum at lattice points misses its cut-offs by whole pixels and, near q = 0, most of a
-steep spectrum; integrating over pixels loses nothing but the pixel of q = 0.
+Samples at lattice points miss cut-offs by whole pixels and, near q = 0, most of a steep spectrum;
+integrals over pixels lose only the pixel of q = 0.
 """
 
 import math

@@ -1,11 +1,11 @@
-"""Stress spectra given by a table of wavenumbers and densities."""
+"""Spectrum given by a table of wavenumbers and densities, and the reading that tables from data share."""
 
 import functools
 import math
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import ArgsKwargs, PydanticCustomError
 
@@ -17,11 +17,13 @@ _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
 _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0)
 Wavenumbers = tuple[Annotated[float, _WAVENUMBER], ...]
 Densities = tuple[Annotated[float, _DENSITY], ...]
-#: Factor from a density in the named convention to C.
+_WHERE = "4π² in the integral, <τ1²> = ∫ d²q C / 4π², or in the density, <τ1²> = ∫ d²q C (Persson)"
+_Normalization = Annotated[Literal["in_integral", "in_density"], Field(description=_WHERE)]
+#: Factor from a density to C: the 4π² stands in the integral ⟨τ1²⟩ = ∫ d²q C / 4π², or already in the density.
 NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
 
 
-def _check_rows(wavenumbers: tuple[float, ...], densities: tuple[float, ...]) -> None:
+def check_rows(wavenumbers: tuple[float, ...], densities: tuple[float, ...]) -> None:
     if len(wavenumbers) != len(densities) or len(wavenumbers) < 2:
         raise PydanticCustomError(
             "table_too_short",
@@ -40,16 +42,18 @@ def _check_rows(wavenumbers: tuple[float, ...], densities: tuple[float, ...]) ->
         raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
 
 
-def _by_name(values: Any, names: tuple[str, ...]) -> Any:
-    """Arguments of a direct construction as the dictionary a scenario would give."""
-    if not isinstance(values, ArgsKwargs):
+def by_name(values: Any, names: tuple[str, ...]) -> Any:
+    """Arguments of a direct construction as a dictionary, as in a scenario, arrays as lists."""
+    if isinstance(values, ArgsKwargs):
+        if len(values.args) > len(names):
+            raise TypeError(f"at most {len(names)} positional arguments: {', '.join(names)}")
+        values = dict(zip(names, values.args, strict=False)) | dict(values.kwargs or {})
+    if not isinstance(values, dict):
         return values
-    if len(values.args) > len(names):
-        raise TypeError(f"at most {len(names)} positional arguments: {', '.join(names)}")
-    return dict(zip(names, values.args, strict=False)) | dict(values.kwargs or {})
+    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}
 
 
-def _file_fault(name: str, fault: ValueError) -> PydanticCustomError:
+def file_fault(name: str, fault: ValueError) -> PydanticCustomError:
     return PydanticCustomError("bad_table", "{file}: {reason}", {"file": name, "reason": str(fault)})
 
 
@@ -64,10 +68,11 @@ class Tabulated(Rowed):
     densities : tuple of float
         Density at each q [Pa² m²]; next to a zero the interpolation is linear.
     normalization : {"in_integral", "in_density"}
-        Convention of ``densities``: C itself, or Persson's C / 4π².
+        Where the 4π² stands. "in_integral": the densities are C, and ``<τ1²> = ∫ d²q C / 4π²``. "in_density":
+        they are C / 4π², as in Persson's papers, and ``<τ1²> = ∫ d²q`` of them.
     file : str
         In a scenario instead of the rows: a CSV with the columns ``q [rad/m], C [Pa^2 m^2]``. It is
-        not read where the rows are given too.
+        not read if the rows are given too.
 
     Examples
     --------
@@ -80,40 +85,32 @@ class Tabulated(Rowed):
 
     wavenumbers: Wavenumbers
     densities: Densities
-    normalization: Literal["in_integral", "in_density"] = "in_integral"
-    file: str = ""
+    normalization: _Normalization = "in_integral"
+    file: Annotated[str, Field(description="CSV with the columns q [rad/m], C [Pa^2 m^2], in place of the rows")] = ""
     model: Literal["tabulated"] = "tabulated"
 
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = _by_name(values, ("wavenumbers", "densities", "normalization", "file"))
-        if not isinstance(values, dict):
+        values = by_name(values, ("wavenumbers", "densities", "normalization", "file"))
+        if not isinstance(values, dict) or "wavenumbers" in values or "densities" in values:
             return values
-        values = _plain(values)
         name = values.get("file")
-        if "wavenumbers" in values or "densities" in values:
-            return values
         if not name or not isinstance(name, str):
             raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
         try:
             table = columns(file_text(name, info.context), {"q": _WAVENUMBER, "C": _DENSITY})
         except TableError as fault:
-            raise _file_fault(name, fault) from None
+            raise file_fault(name, fault) from None
         return {**values, "wavenumbers": table["q"].tolist(), "densities": table["C"].tolist()}
 
     @model_validator(mode="after")
     def _check(self) -> Self:
-        _check_rows(self.wavenumbers, self.densities)
+        check_rows(self.wavenumbers, self.densities)
         return self
 
     @functools.cached_property
     def rows(self) -> PowerLaws:
-        """The table as a chain of power laws, in this project's convention."""
+        """The table as a chain of power laws, with the 4π² in the integral."""
         density = NORMALIZATIONS[self.normalization] * np.array(self.densities)
         return PowerLaws(np.array(self.wavenumbers), density)
-
-
-def _plain(values: dict) -> dict:
-    """Arrays as lists, which is what the field types accept."""
-    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}

@@ -1,10 +1,10 @@
-"""Every equation and number of Menga, Carbone & Dini, recomputed: ``sim paper``.
+"""The equations and numbers of Menga, Carbone & Dini recomputed, for ``sim paper``.
 
 N. Menga, G. Carbone, D. Dini, "Do uniform tangential interfacial stresses affect adhesion?", J. Mech.
 Phys. Solids 112 (2018) 145 with the corrigendum 133 (2019) 103744, in the corrected text of
-arXiv:1710.06506. Equation numbers count its numbered displays. Each line sets what the package
-computes against something that does not use it: a closed number, the paper's formula written out
-here, or a quadrature or root found by numpy and scipy alone.
+arXiv:1710.06506. Equation numbers count its numbered displays. Each line compares a value of the
+package with an independent one: a closed number, the paper's formula written out here, or a
+quadrature or root found by numpy and scipy alone.
 
 What the paper does not settle, or settles twice (``docs/paper.md`` has the details):
 
@@ -18,7 +18,8 @@ What the paper does not settle, or settles twice (``docs/paper.md`` has the deta
 - N0/(1 + V/Vc) belongs to one bond model without a friction maximum, and no Delta gamma(N) is given;
 - the balance that cancels the uniform stress cancels the fluctuation just as well: that adhesion
   pays for Delta Gamma is an assumption (``paid_by_adhesion``);
-- the mean stress stores some eighty times Delta gamma, so that a hundredth of it would matter;
+- the mean stress stores some eighty times Delta gamma, so that a hundredth of it would matter
+  (``contact.reversible``);
 - Delta Gamma is that of an infinite plane.
 """
 
@@ -47,7 +48,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(400)
 
 @dataclass(frozen=True)
 class Check:
-    """One line of ``sim paper``: what is computed, what the paper says, and how far they are apart.
+    """One line of ``sim paper``: a computed value, the expected one, and their relative difference.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ class Check:
 
     @property
     def passed(self) -> bool:
-        """Whether the error is within the tolerance; a nan is not."""
+        """True if the error is within the tolerance; False for nan."""
         return self.error <= self.tolerance
 
 

@@ -1,11 +1,11 @@
-"""Grouping the modes of a cell into few bands, with every error known before the run.
+"""Grouping of a cell's modes into few bands, with every error known before the run.
 
-ΔΓ is a sum over mode pairs of w ξ with ξ ~ Exp(1), each ξ forgetting with e^(−2λt). A *band* replaces
+ΔΓ is a sum over mode pairs of w ξ with ξ ~ Exp(1), of autocorrelation e^(−2λt). A *band* replaces
 pairs of similar w and λ by one squared Ornstein-Uhlenbeck process of weight S2/S1 and 2 S1²/S2
-degrees of freedom, rate Σw²λ/S2, where Sn = Σw^n: mean and variance of ΔΓ stay exact. What remains is
-lower third and fourth cumulants (Cauchy) and a shorter correlation time (Jensen): all errors have one
-sign, each is a sum over bands, and so the bands are split where that buys most until every error is
-within the tolerance.
+degrees of freedom, rate Σw²λ/S2, where Sn = Σw^n: mean and variance of ΔΓ stay exact. The third and fourth cumulants
+come out low (Cauchy) and the correlation time short (Jensen): all errors have one sign and each is a
+sum over bands, so the band whose splitting gains most is split until every error is within the
+tolerance.
 """
 
 import heapq
@@ -19,7 +19,16 @@ from sim.parts.shear.mode_pairs import Pairs
 
 Array = NDArray[np.float64]
 
+#: Lags at which the autocorrelation of bands is compared.
 _LAGS = 120
+
+#: Errors of a grouping but for that of a mean that relaxes.
+_ERRORS = tuple(
+    f"banded_error_{name}" for name in ("third_cumulant", "fourth_cumulant", "correlation_time", "autocorrelation")
+)
+
+#: Number of errors that a candidate's score adds up, each in units of what the tolerance allows.
+_SCORES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +45,7 @@ class Bands:
         |q| at which a mode has the band's rate [rad/m].
     errors : dict
         Relative errors of the third and fourth cumulant and of the integral correlation time, and
-        the largest difference of the autocorrelation, each against the sum over all pairs; under
+        the largest difference of the autocorrelation, each against the sum over all pairs; with an
         amplitude that relaxes also the largest error of the mean while it does.
     """
 
@@ -57,7 +66,7 @@ class Bands:
 
 
 def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) -> Bands:
-    """The coarsest bands whose known errors all stay within a tolerance.
+    """Coarsest bands whose known errors all stay within a tolerance.
 
     Parameters
     ----------
@@ -68,13 +77,13 @@ def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) ->
     tolerance : float
         Bound of every error, between 0 and 1.
     relaxing : bool
-        Whether the amplitude relaxes, so that the mean energy itself follows the rates: its largest
+        True if the amplitude relaxes, so that the mean energy itself follows the rates: its largest
         error while it relaxes is then bounded, too.
 
     Returns
     -------
     Bands
-        As few as splitting one band after another finds; single pairs need no splitting.
+        As few as splitting one band after another gives; single pairs are never split.
 
     Examples
     --------
@@ -104,15 +113,6 @@ def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) ->
             alive.add(len(live))
             live.append(_Candidate.of(scaled, part, tolerance))
             heapq.heappush(heap, (-live[-1].gain, len(live) - 1))
-
-
-#: What a grouping tells beside the error of a mean that relaxes.
-_ERRORS = tuple(
-    f"banded_error_{name}" for name in ("third_cumulant", "fourth_cumulant", "correlation_time", "autocorrelation")
-)
-
-#: Number of errors that a candidate's score adds up, each in units of what the tolerance allows.
-_SCORES = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,7 +154,7 @@ class _Scaled:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A band with what it costs in error, and what its best cut in two would gain."""
+    """A band with its share of the errors, and what its best cut in two would gain."""
 
     entries: NDArray[np.int64]
     score: float

@@ -1,4 +1,8 @@
-"""Mode pairs of a periodic cell with their energies and rates, high wavenumbers counted by squares of the lattice."""
+"""Mean energies of the mode pairs of a periodic cell: listed near q = 0, counted by squares of the lattice beyond.
+
+Squares are 3 × 3 to 27 × 27 to a block of pixels. Of each block the sum and the sum of squares of its pairs'
+energies are kept, so that mean and variance of the cell's energy are right without a list of 10^8 pairs.
+"""
 
 import functools
 import math
@@ -12,6 +16,11 @@ from sim.parts.shear.modes import Indices, grid_reach, half_lattice, modes
 from sim.spectrum.family import Family
 
 Array = NDArray[np.float64]
+
+#: Squares handled at a time.
+_SQUARES = 2**18
+#: Largest lattice index listed singly, and of the blocks at each level: 3 × 85 + 1, so that levels join.
+_LISTED = 256
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +43,7 @@ class Pairs:
 
 
 def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus: float, poisson_ratio: float) -> Pairs:
-    """The mode pairs of a cell, listed near q = 0 where the weight sits, counted in blocks beyond.
+    """Mode pairs of a cell, listed near q = 0 where the weight sits, counted in blocks beyond.
 
     Parameters
     ----------
@@ -73,7 +82,7 @@ def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus:
         block *= 3
     pairs = Pairs(*(np.concatenate(parts) for parts in zip(*levels, strict=True)))
     if not pairs.weight.size:
-        modes(spectrum, cell, points)  # says what is wrong
+        modes(spectrum, cell, points)  # raises with the reason
     return pairs
 
 
@@ -107,8 +116,8 @@ def _level(
 class _Squares:
     """Equal squares that divide blocks of the lattice, arrays of shape (blocks, side, side); lengths in pixels.
 
-    ``held`` is the share of a square between the ends of the spectrum, ``density`` the spectrum's
-    there, ``on_grid`` the share of it that the grid holds.
+    ``held`` is the share of a square between the ends of the spectrum, ``density`` the density there,
+    ``on_grid`` the share of it on the grid.
     """
 
     size: float
@@ -149,7 +158,7 @@ class _Squares:
 
 
 def _within(edge: float, qx: Array, qy: Array, radius: Array, size: float) -> Array:
-    """Share of squares within a circle that is wide enough to be a straight line in each."""
+    """Share of squares within a circle so wide that it is a straight line in each."""
     if math.isinf(edge):
         return np.ones_like(radius)
     along = np.maximum(np.abs(qx), np.abs(qy)) / radius
@@ -158,9 +167,3 @@ def _within(edge: float, qx: Array, qy: Array, radius: Array, size: float) -> Ar
     far, near = 0.5 * (along + across), 0.5 * (along - across)
     ramps = [np.maximum(depth + shift, 0.0) ** 2 for shift in (far, near, -near, -far)]
     return np.clip((ramps[0] - ramps[1] - ramps[2] + ramps[3]) / (2.0 * along * across), 0.0, 1.0)
-
-
-#: Squares looked at in one go.
-_SQUARES = 2**18
-#: Largest lattice index listed singly, and of the blocks at each level: 3 × 85 + 1, so that levels join.
-_LISTED = 256

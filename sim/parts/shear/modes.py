@@ -1,9 +1,9 @@
-"""The Fourier modes of a periodic cell: which there are, and the variance each pair carries.
+"""Fourier modes of a periodic cell, and the variance of each pair ±q.
 
 A pair ±q stands for the pixel (2π/L)² of the wavevector plane around its lattice point. Its
 variance is the spectrum *integrated* over that pixel, so that a cell's field has the spectrum's
 variance but for the pixel of q = 0, even where the spectrum ends inside a pixel. Nothing is
-renormalised; what the cell lacks is told by ``error_variance`` and ``error_energy``.
+renormalised; ``error_variance`` and ``error_energy`` are what the cell lacks.
 """
 
 import functools
@@ -98,7 +98,7 @@ def _spread(weights: Array) -> float:
     return math.sqrt(float(np.sum(weights**2))) / total if total > 0.0 else 0.0
 
 
-@functools.lru_cache(maxsize=4)  # a sweep asks for the same modes again and again
+@functools.lru_cache(maxsize=4)  # a sweep needs the same modes again and again
 def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     """The mode pairs of a spectrum on a periodic square cell.
 
