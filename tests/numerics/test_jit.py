@@ -1,16 +1,11 @@
 """Compiled laws broadcast like numpy, and their cache may be missing, broken, read-only or full."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
 from sim.laws import halfspace, jkr
-
-PROGRAM = "from sim.laws import jkr; print(repr(float(jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6))))"
+from sim.numerics import jit
 
 
 def test_a_law_keeps_its_signature_defaults_and_docstring():
@@ -42,32 +37,46 @@ def test_a_law_broadcasts_and_keeps_shapes():
     assert jkr.radius_at_load(np.zeros(1), 0.042, np.full(5000, 2e-3), 6.4e6).shape == (5000,)
 
 
-def compiled_in(folder, before=None):
-    environment = {"PATH": os.environ.get("PATH", ""), "SIM_CACHE_DIR": str(folder), "PYTHONDONTWRITEBYTECODE": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", PROGRAM], env=environment, preexec_fn=before, capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0, done.stderr
-    return float(done.stdout)
+LITTLE = """
+from sim.numerics.jit import law
+
+@law
+def cubed(x):
+    return x**3
+"""
 
 
-def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path):
-    import resource
-    import signal
+@pytest.fixture
+def compiled_in(tmp_path, monkeypatch):
+    """A little law compiled or loaded anew with its cache in a folder, and what it gives."""
+    source = tmp_path / "little.py"
+    source.write_text(LITTLE)
 
-    def full():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (100, 100))
+    def answer(folder):
+        monkeypatch.setenv("SIM_CACHE_DIR", str(folder))
+        jit._cache_folder.cache_clear()
+        module = {"__name__": "little", "__file__": str(source)}
+        exec(compile(LITTLE, source, "exec"), module)
+        return float(module["cubed"](1.1))
 
+    yield answer
+    jit._cache_folder.cache_clear()
+
+
+def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path, compiled_in, room):
     fresh = compiled_in(tmp_path / "cache")
     files = [path for path in (tmp_path / "cache").rglob("*") if path.suffix in (".nbi", ".nbc")]
-    assert files
+    assert len(files) == 2
+    before = [path.read_bytes() for path in files]
     again = compiled_in(tmp_path / "cache")
+    assert [path.read_bytes() for path in files] == before
     for path in files:
         path.write_bytes(b"broken")
     broken = compiled_in(tmp_path / "cache")
     (tmp_path / "file").write_text("no folder")
     no_folder = compiled_in(tmp_path / "file")
     unmakeable = compiled_in("/proc/no-such-place")
-    no_room = compiled_in(tmp_path / "full", before=full)
+    with room(100):
+        no_room = compiled_in(tmp_path / "full")
+    assert not list((tmp_path / "full").rglob("*.nb?"))
     assert fresh == again == broken == no_folder == unmakeable == no_room
