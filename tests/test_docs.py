@@ -1,6 +1,7 @@
 """The documentation keeps up with the code."""
 
 import importlib.util
+import inspect
 import re
 from pathlib import Path
 
@@ -9,12 +10,25 @@ import pytest
 ROOT = Path(__file__).parent.parent
 
 
-def test_every_key_is_documented_as_it_is_declared():
-    path = ROOT / "docs" / "make_keys.py"
-    spec = importlib.util.spec_from_file_location("make_keys", path)
+def maker_of(page):
+    """The script that makes a page."""
+    spec = importlib.util.spec_from_file_location(f"make_{page}", ROOT / "docs" / f"make_{page}.py")
     maker = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(maker)
-    assert (ROOT / "docs" / "keys.md").read_text(encoding="utf-8") == maker.text(), "run python docs/make_keys.py"
+    return maker
+
+
+@pytest.mark.parametrize("page", ["keys", "api"])
+def test_a_page_made_from_the_code_is_up_to_date(page):
+    found = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
+    assert found == maker_of(page).text(), f"run python docs/make_{page}.py"
+
+
+def test_every_law_has_a_unit_on_its_page():
+    api = maker_of("api")
+    for name in (name for name in api.MODULES if name.startswith("sim.laws")):
+        for law, thing in api._public(importlib.import_module(name)):
+            assert inspect.isclass(thing) or api.units(thing), f"{name}.{law}: no unit in Returns or the first line"
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/design.md", "docs/paper.md"])

@@ -30,6 +30,13 @@ from sim.laws.jkr import (
 )
 from sim.numerics.jit import device, law
 
+__all__ = [
+    "mean_stress_energy",
+    "radius_at_displacement_reversible",
+    "radius_at_indentation_reversible",
+    "radius_at_load_reversible",
+]
+
 
 @device
 def compressible(poisson_ratio):
@@ -242,7 +249,7 @@ def radius_at_indentation_reversible(indentation, work, stress, reversible, sphe
 def radius_at_displacement_reversible(
     displacement, stiffness, work, stress, reversible, sphere_radius, modulus, poisson_ratio=0.5
 ):
-    """Contact radius at a displacement Delta [m] behind a spring of stiffness k [N/m]; otherwise as at a load.
+    """Contact radius at a displacement behind a spring [m]; otherwise as ``radius_at_load_reversible``.
 
     Examples
     --------

@@ -30,7 +30,7 @@ class Family(Protocol):
 
     @property
     def bond_made(self) -> bool:
-        """True if bonds make the field: C then is that of n E[f²] = 1 N²/m², and the bonds set its size."""
+        """True if bonds make the field: C is then that of n <f²> = 1 N²/m², and the bonds set its size."""
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Power spectral density C at wavevector (qx, qy) [Pa² m²]; raises ValueError for a single wave."""
@@ -39,10 +39,10 @@ class Family(Protocol):
         """Mean elastic energy per area of an infinite half-space [J/m²] under this stress."""
 
     def pixels(self, step: float, reach: int) -> Array:
-        """Variance in each pixel of side ``step`` [rad/m] around the points of a square wavevector lattice [Pa²].
+        """Variance in each pixel around the points of a square wavevector lattice [Pa²], its side ``step`` in rad/m.
 
         Shape (2 reach + 1, reach + 1): rows ix = -reach ... reach, columns iy = 0 ... reach; q = 0 included.
         """
 
     def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
-        """Integrals ∫ C0 P dq and ∫ C2 S dq over a disc of each radius [m], see ``sim.spectrum.finite_contact``."""
+        """Integrals ∫ C0 P dq and ∫ C2 S dq over discs of given radii [Pa² m], see ``sim.spectrum.finite_contact``."""

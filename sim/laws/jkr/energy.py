@@ -35,7 +35,7 @@ def energy_release_rate(radius, load, sphere_radius, modulus):
 
 @law
 def energy_release_rate_at_indentation(radius, indentation, sphere_radius, modulus):
-    """Elastic energy released per area at an indentation delta [m]; otherwise as ``energy_release_rate``.
+    """Elastic energy released per area at an indentation [J/m^2]; otherwise as ``energy_release_rate``.
 
     Notes
     -----
@@ -79,7 +79,7 @@ def potential_at_indentation(separation, stress, radius, work, sphere_radius, mo
 
 @law
 def potential_at_load(tractive_force, stress, radius, work, sphere_radius, modulus):
-    """MCD's potential G at a fixed tractive force F = -P [N]; otherwise as ``potential_at_indentation``.
+    """MCD's potential G at a fixed tractive force F = -P [J]; otherwise as ``potential_at_indentation``.
 
     Notes
     -----

@@ -52,7 +52,7 @@ def _site(speed, rate, stretch, bond_stiffness, rebinding_rate, power):
 
 
 def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
-    """Bound share and force moments of such bonds in steady sliding.
+    """Bound share and force moments of bonds that break at a stretch, in steady sliding.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
 
 @law
 def cut_off_fraction(speed, rate, stretch, rebinding_rate):
-    """Bond fraction of such bonds in steady sliding: bonds over bonds at rest [1].
+    """Bond fraction of bonds that break at a stretch, in steady sliding: bonds over bonds at rest [1].
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def cut_off_fraction(speed, rate, stretch, rebinding_rate):
 
 
 def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_density):
-    """Shear stress of such bonds in steady sliding [Pa].
+    """Shear stress of bonds that break at a stretch, in steady sliding [Pa].
 
     Parameters
     ----------
