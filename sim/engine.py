@@ -49,7 +49,7 @@ def start(scenario: Scenario, dice: Dice) -> State:
     bonds = population.start(motion, dice.bonds)
     bonding = population.bonding(bonds)
     shear = process.start(motion, bonding, dice.shear)
-    touch = contact.start(motion, scenario.times.duration, _balance(scenario, bonding, shear))
+    touch = contact.start(motion, scenario.times.duration, balance(scenario, bonding, shear))
     return State(0, slider, bonds, bonding, shear, touch)
 
 
@@ -62,7 +62,7 @@ def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     bonds = population.advance(state.bonds, motion, state.contact.radius, dice.bonds)
     bonding = population.bonding(bonds)
     shear = process.advance(state.shear, motion, bonding, dice.shear)
-    touch = contact.advance(state.contact, motion, times.duration, _balance(scenario, bonding, shear))
+    touch = contact.advance(state.contact, motion, times.duration, balance(scenario, bonding, shear))
     return State(step, slider, bonds, bonding, shear, touch)
 
 
@@ -97,7 +97,7 @@ def march(scenario: Scenario, members: np.ndarray, state: State | None = None, k
         yield state
 
 
-def _balance(scenario: Scenario, bonding: Bonding, shear: Storing) -> Balance:
+def balance(scenario: Scenario, bonding: Bonding, shear: Storing) -> Balance:
     """The terms of the effective work of adhesion w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*)."""
     bonded = scenario.adhesion.work_of_bonds(bonding.fraction)
     fluctuating = scenario.fluctuations.paid_by_adhesion * shear.energy

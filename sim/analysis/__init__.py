@@ -11,7 +11,6 @@ from sim.analysis.events import events, peaks
 from sim.analysis.loops import loop_energy
 from sim.analysis.observables import (
     bond_work,
-    equilibrium_radius,
     observables,
     reference_radii,
     settled,
@@ -31,7 +30,6 @@ __all__ = [
     "control",
     "correlation_time",
     "engineering",
-    "equilibrium_radius",
     "events",
     "highlights",
     "integral_time",

@@ -9,8 +9,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from sim.analysis.scene import MEMBERS, control, setting, stays_held, word
-from sim.laws import jkr
+from sim.analysis.scene import MEMBERS, setting, stays_held
 
 KEPT = ("mean", "std", "sem")
 
@@ -25,79 +24,19 @@ def pure(values: xr.DataArray, text: str, symbol: str = "") -> xr.DataArray:
     return ordered(values).assign_attrs(units="1", long_name=text, symbol=symbol)
 
 
-def equilibrium_radius(dataset: xr.Dataset, work: xr.DataArray | float) -> xr.DataArray:
-    """Stable JKR radius for a work of adhesion under what holds the dataset's sphere.
-
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    work : xarray.DataArray or float
-        Work of adhesion [J/m^2], at most with the dimensions of the dataset's trajectories.
-
-    Returns
-    -------
-    xarray.DataArray
-        [m], with the dimension ``t`` where the work or what holds the sphere changes in time; Hertz's where
-        there is no work; nan where there is no equilibrium.
-
-    Raises
-    ------
-    KeyError
-        If the dataset does not tell what holds the sphere.
-    """
-    held = control(dataset)
-    size, modulus = setting(dataset, "sphere.radius"), dataset["contact_modulus"]
-    if held.kind == "displacement":
-        return xr.apply_ufunc(jkr.radius_at_displacement, held.value, held.stiffness, work, size, modulus)
-    law = jkr.radius_at_load if held.kind == "load" else jkr.radius_at_indentation
-    return xr.apply_ufunc(law, held.value, work, size, modulus)
-
-
-def _opened(dataset: xr.Dataset, radius: xr.DataArray) -> xr.DataArray:
-    """Where a contact that follows its equilibrium radius is open: none is left, or it was lost before.
-
-    With ``after_pull_off = "reattach"`` it closes again where a free sphere would touch, else never.
-    """
-    held = control(dataset)
-    open_now = radius.isnull() & held.value.notnull() | (radius == 0.0)
-    if "t" not in radius.dims:
-        return open_now
-    closes = (word(dataset, "contact.after_pull_off", "stay_open") == "reattach") & (held.value >= 0.0) & ~open_now
-    number = xr.DataArray(np.arange(dataset.sizes["t"]), dims="t")
-    lost, found = (_latest(number.where(where, -1)) for where in (open_now, closes))
-    return lost > found
-
-
-def _latest(numbers: xr.DataArray) -> xr.DataArray:
-    """The largest number so far."""
-    dims = [["t"]]
-    return xr.apply_ufunc(
-        np.maximum.accumulate, numbers, input_core_dims=dims, output_core_dims=dims, kwargs={"axis": -1}
-    )
-
-
 def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
     """Radii of the contacts with the full work of adhesion and with none, held as the sphere is.
 
     Returns
     -------
     xarray.Dataset
-        ``radius_jkr`` and ``radius_hertz`` [m]: those at rest where what holds the sphere stays, else with the
-        dimension ``t``. JKR's contact follows the same policy on detachment as the recorded one. nan
-        where it is open, and where the dataset does not tell what holds the sphere.
+        ``radius_jkr`` and ``radius_hertz`` [m], without the dimension ``t`` where what holds the sphere stays at all
+        points of the sweep; nan where such a contact is open.
     """
-    rest, hertz = dataset["radius_at_rest"], dataset["radius_without_adhesion"]
-    stays = stays_held(dataset)
-    if not bool(stays.all()):
-        try:
-            jkr_radius = equilibrium_radius(dataset, setting(dataset, "adhesion.work"))
-            jkr_radius = ordered(jkr_radius.where(~_opened(dataset, jkr_radius)))
-            bare = ordered(equilibrium_radius(dataset, 0.0))
-        except KeyError:
-            jkr_radius, bare = rest.where(stays), hertz.where(stays)
-        rest, hertz = jkr_radius.assign_attrs(rest.attrs), bare.assign_attrs(hertz.attrs)
-    return xr.Dataset({"radius_jkr": rest, "radius_hertz": hertz})
+    found = dataset[["jkr_radius", "hertz_radius"]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
+    if bool(stays_held(dataset).all()):
+        found = found.isel(t=0, drop=True)
+    return found.astype(float).where(found > 0.0).map(ordered)
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
@@ -131,25 +70,18 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If the members differ in what a share needs but only their mean was recorded, or the dataset
-        does not tell what holds the sphere.
+        If the members differ in what a share needs but only their mean was recorded.
 
     Notes
     -----
     The mechanisms are charged in this order, each by the equilibrium area that the work of adhesion left
-    after it would give. What fluctuations leave is the recorded work plus what the mean stress takes at
-    the recorded radius, ``α 2(2-ν)/(1-ν) τ0² a/(π E*)``; for a disc both are those of that radius.
+    after it would give: ``bonds_radius``, ``fluctuations_radius``, ``equilibrium_radius`` and ``contact_radius``,
+    as recorded.
     """
-    if "bond_fraction" not in dataset:
-        raise ValueError("shares need the bonds of each member; record them: [record] per_member = true")
-    try:
-        levels = list(_levels(dataset))
-    except KeyError as missing:
-        raise ValueError(f"{missing.args[0]}; sweep its number, not its whole table") from None
     suffix = "" if "contact_area" in dataset else "_mean"
-    before = full = full_area(dataset)
-    found = {}
-    for name, text, after in levels:
+    area, before = dataset[f"contact_area{suffix}"].astype(float), full_area(dataset)
+    full, found = before, {}
+    for name, text, after in _levels(dataset, area):
         key = name if name == "lost_to_bonds" else name + suffix
         found[key] = pure((before - after) / full, f"share of JKR's area lost to {text}")
         before = after
@@ -159,48 +91,23 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(found)
 
 
-def _levels(dataset: xr.Dataset) -> Iterator[tuple[str, str, xr.DataArray]]:
+def _levels(dataset: xr.Dataset, area: xr.DataArray) -> Iterator[tuple[str, str, xr.DataArray]]:
     """Share, what it is lost to, and the area [m^2] that is left after it."""
-    area = dataset["contact_area" if "contact_area" in dataset else "contact_area_mean"].astype(float)
-
-    def left(work: xr.DataArray) -> xr.DataArray:
-        radius = equilibrium_radius(dataset, work)
-        # pulled off for good: where this work alone had opened the contact, its staying open is its doing
-        kept = ~(_opened(dataset, radius) & (area == 0.0))
-        return (np.pi * radius.fillna(0.0) ** 2).where(kept, 0.0).where(area.notnull())
-
-    yield "lost_to_bonds", "broken bonds, which are charged first", left(bond_work(dataset))
-    alpha, lags = _reversible(dataset), word(dataset, "contact.model", "equilibrium") == "rate_dependent"
-    stressed, rate_dependent = bool((alpha > 0.0).any()), bool(lags.any())
-    if (stressed or rate_dependent) and "work_of_adhesion" not in dataset:
-        raise ValueError(
-            "shares of a contact that lags or pays for its mean stress need each member; record them:"
-            " [record] per_member = true"
-        )
-    bearing = alpha * _mean_stress_work(dataset) if stressed else 0.0
-    quasistatic = left(dataset["work_of_adhesion"]).where(lags, area) if rate_dependent else area
-    fluctuating = (
-        left(dataset["work_of_adhesion"] + bearing).where(alpha > 0.0, quasistatic) if stressed else quasistatic
-    )
-    yield "lost_to_fluctuations", "fluctuations, after the bonds", fluctuating
-    if stressed:
-        yield "lost_to_mean_stress", "the mean stress, after bonds and fluctuations", quasistatic
-    if rate_dependent:
-        yield "lost_to_lag", "the edge's lag behind equilibrium, after all else", area
+    stressed, lags = (_has(dataset, f"{kind}_radius") for kind in ("fluctuations", "equilibrium"))
+    charged = [("lost_to_bonds", "broken bonds, which are charged first")]
+    charged += [("lost_to_fluctuations", "fluctuations, after the bonds")]
+    charged += [("lost_to_mean_stress", "the mean stress, after bonds and fluctuations")] * stressed
+    charged += [("lost_to_lag", "the edge's lag behind equilibrium, after all else")] * lags
+    left = ["bonds_radius"] + ["fluctuations_radius"] * stressed + ["equilibrium_radius"] * lags
+    if any(name not in dataset for name in left):
+        raise ValueError("shares need each member; record them: [record] per_member = true")
+    areas = [(np.pi * dataset[name].astype(float) ** 2).where(area.notnull()) for name in left]
+    for (name, text), after in zip(charged, [*areas, area], strict=True):
+        yield name, text, after
 
 
-def _reversible(dataset: xr.Dataset) -> xr.DataArray:
-    try:
-        return setting(dataset, "contact.reversible")
-    except KeyError:
-        return xr.DataArray(0.0)
-
-
-def _mean_stress_work(dataset: xr.Dataset) -> xr.DataArray:
-    """Energy per area that the mean stress gives back where the contact shrinks, at the recorded radius [J/m^2]."""
-    poisson_ratio, modulus = dataset["effective_poisson_ratio"], dataset["contact_modulus"]
-    coefficient = 2.0 * (2.0 - poisson_ratio) / (1.0 - poisson_ratio) / np.pi
-    return coefficient * dataset["shear_stress"] ** 2 * dataset["contact_radius"] / modulus
+def _has(dataset: xr.Dataset, name: str) -> bool:
+    return name in dataset or f"{name}_mean" in dataset
 
 
 def observables(dataset: xr.Dataset) -> xr.Dataset:

@@ -98,27 +98,13 @@ def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
 
 
 class Control(NamedTuple):
-    """What holds the sphere, at every sweep value and, where it changes, time.
+    """What holds the sphere: ``kind`` is ``"load"``, ``"indentation"`` or ``"displacement"``.
 
-    Attributes
-    ----------
-    kind : str
-        ``"load"``, ``"indentation"`` or ``"displacement"``.
-    value : xarray.DataArray
-        Load [N], indentation or displacement [m]; with the dimension ``t`` where it changes. A load is nan where
-        no member is in contact and the scenario does not say it for every point of the sweep.
-    stiffness : xarray.DataArray
-        Of the machine [N/m]; infinite where there is none.
+    ``stiffness`` [N/m] is that behind a displacement, with the sweep's dimensions; infinite without one.
     """
 
     kind: str
-    value: xr.DataArray
     stiffness: xr.DataArray
-
-    @property
-    def changes(self) -> bool:
-        """Whether it changes in time."""
-        return "t" in self.value.dims
 
 
 def control(dataset: xr.Dataset) -> Control:
@@ -127,85 +113,32 @@ def control(dataset: xr.Dataset) -> Control:
     Raises
     ------
     KeyError
-        If the table ``[contact]`` is swept whole, so that the dataset does not tell.
+        If the table ``[contact]`` is swept whole, so that the dataset does not say.
     """
     for kind in _CONTROLS:
-        try:
-            value = setting(dataset, f"contact.{kind}")
-        except KeyError:
-            continue
-        return Control(kind, value, _stiffness(dataset, kind))
+        if _given(dataset, kind):
+            stiffness = setting(dataset, "contact.stiffness") if kind == "displacement" else xr.DataArray(np.inf)
+            return Control(kind, stiffness)
+    raise KeyError("the dataset does not say what holds the sphere: a load, an indentation or a displacement")
+
+
+def _given(dataset: xr.Dataset, kind: str) -> bool:
+    """Whether the scenario gives such a control, as a number or as a course."""
     try:
-        kind = next(name for name in _CONTROLS if told(dataset, "contact").get(name) is not None)
-    except (KeyError, StopIteration):
-        raise KeyError(
-            "the dataset does not say what holds the sphere: a load, an indentation or a displacement"
-        ) from None
-    return Control(kind, _load(dataset) if kind == "load" else _first(dataset, kind), _stiffness(dataset, kind))
-
-
-def _stiffness(dataset: xr.Dataset, kind: str) -> xr.DataArray:
-    return setting(dataset, "contact.stiffness") if kind == "displacement" else xr.DataArray(np.inf)
-
-
-def _first(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """A recorded variable that is the same for all members."""
-    variable = dataset[name if name in dataset else f"{name}_mean"].astype(float)
-    return variable.isel({MEMBERS: 0}, drop=True) if MEMBERS in variable.dims else variable
-
-
-def _load(dataset: xr.Dataset) -> xr.DataArray:
-    """A load that changes: read off the members in contact, else off the scenario."""
-    if "normal_load" in dataset:
-        loads = dataset["normal_load"].astype(float).where(dataset["in_contact"] == 1)
-        loads = loads.max(MEMBERS) if MEMBERS in loads.dims else loads
-    else:  # an open contact counts with a load of zero
-        closed = dataset["in_contact_mean"]
-        loads = dataset["normal_load_mean"] / closed.where(closed > 0.0)
-    return loads.fillna(_course(dataset, "contact.load"))
-
-
-def _course(dataset: xr.Dataset, key: str) -> xr.DataArray:
-    """A course or a table of the scenario at the recorded times; nan where the dataset does not tell."""
-    times, unknown = dataset["t"], xr.full_like(dataset["t"], np.nan, dtype=float)
-    try:
-        said = told(dataset, key)
-        if isinstance(said, dict) and "time" in said:
-            return unknown.copy(data=np.interp(times, said["time"], said["value"]))
-        start, stop, cycles = (setting(dataset, f"{key}.{name}") for name in ("from", "to", "cycles"))
+        setting(dataset, f"contact.{kind}")
     except KeyError:
-        return unknown
-    part = times / setting(dataset, "clock.duration")
-    turn = 2.0 * cycles * part % 2.0
-    part = xr.where(cycles > 0.0, xr.where(turn <= 1.0, turn, 2.0 - turn), part)
-    straight = start + (stop - start) * part
-    curved = start * np.abs(stop / start.where(start != 0.0)) ** part
-    return xr.where(word(dataset, f"{key}.scale", "linear") == "log", curved, straight)
+        try:
+            return told(dataset, "contact").get(kind) is not None
+        except KeyError:
+            return False
+    return True
 
 
 def stays_held(dataset: xr.Dataset) -> xr.DataArray:
-    """Whether what holds the sphere stays the same in time, at every point of the sweep.
+    """Whether what holds the sphere stays the same in time, at each point of the sweep.
 
-    Where the table ``[contact]`` is swept whole it is read off what was recorded: one of load,
-    indentation and displacement stays.
+    It does where the contacts with all adhesion and with none, which depend on nothing else, stay.
     """
-    try:
-        held = control(dataset).value
-    except KeyError:
-        return _recorded_to_stay(dataset).broadcast_like(dataset["contact_modulus"])
-    still = (held == held.isel(t=0)).all("t") if "t" in held.dims else xr.DataArray(True)
-    return still.broadcast_like(dataset["contact_modulus"])
-
-
-def _recorded_to_stay(dataset: xr.Dataset) -> xr.DataArray:
-    stays = xr.DataArray(False)
-    for kind in _CONTROLS:
-        values = _load(dataset) if kind == "load" else _first(dataset, kind) if _has(dataset, kind) else None
-        if values is not None:
-            least, most = values.min("t"), values.max("t")
-            stays = stays | (most - least <= 1e-6 * np.abs(most))  # what single precision leaves
-    return stays
-
-
-def _has(dataset: xr.Dataset, name: str) -> bool:
-    return name in dataset or f"{name}_mean" in dataset
+    radii = dataset[["jkr_radius", "hertz_radius"]]
+    still = (radii == radii.isel(t=0)).all("t")
+    return (still["jkr_radius"] & still["hertz_radius"]).broadcast_like(dataset["contact_modulus"])

@@ -15,7 +15,7 @@ import xarray as xr
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import observables, settled, share_observables
-from sim.analysis.scene import control, is_stationary, stays_held, sweep_dims, word
+from sim.analysis.scene import is_stationary, stays_held, sweep_dims, word
 from sim.analysis.statistics import QUANTILES, shares, statistics, summary
 from sim.numerics.files import write_whole
 from sim.units.notation import concise, scaled
@@ -204,11 +204,9 @@ def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, dict[str, xr
     if is_stationary(dataset) and dims:
         trajectories = settled(trajectories)
     found = summary(trajectories).merge(correlation_time(dataset))
-    with contextlib.suppress(KeyError):  # a load that changes is told of open contacts too
-        held = control(dataset)
-        if held.kind == "load" and held.changes:
-            found["normal_load_mean"] = held.value.assign_attrs(units="N")
-            found["normal_load_sem"] = xr.zeros_like(held.value)
+    if "applied_load" in dataset:  # it is known of open contacts too
+        found["normal_load_mean"] = dataset["applied_load"].fillna(found["normal_load_mean"])
+        found["normal_load_sem"] = found["normal_load_sem"].where(dataset["applied_load"].isnull(), 0.0)
     counts = _thinned({name: dataset.sizes[name] for name in dims}, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
     return found, _points(found.sizes, counts)

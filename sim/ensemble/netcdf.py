@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from sim.ensemble.part_files import Parts
 from sim.ensemble.plan import Plan, part_name
-from sim.ensemble.recorded import VARIABLES, Variable
+from sim.ensemble.recorded import Variable
 from sim.laws import jkr
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.declared import quantities
@@ -84,7 +84,7 @@ def write_dataset(file: File, plan: Plan, parts: Parts) -> None:
     _attributes(file, plan)
     _scenario_variables(file, plan)
     _derived_variables(file, plan)
-    for variable in VARIABLES:
+    for variable in plan.variables:
         _trajectories(file, plan, parts, variable)
     if plan.scenario.record.maps:
         _maps(file, plan, parts)
@@ -125,7 +125,7 @@ def _dimensions(file: File, plan: Plan) -> None:
     for axis in plan.scenario.sweep:
         file.createDimension(variable_name(axis.keys[0]), len(axis.values))
         _sweep_coordinates(file, plan, axis)
-    if plan.scenario.record.per_member and any(plan.varies(variable) for variable in VARIABLES):
+    if plan.scenario.record.per_member and any(plan.varies(variable) for variable in plan.variables):
         file.createDimension("member", plan.members)
         variable = _variable(
             file, "member", "i4", ("member",), "1", "number of the ensemble member", standard_name="realization"

@@ -31,6 +31,11 @@ class Plan:
         return self.scenario.ensemble.members if varies else 1
 
     @cached_property
+    def variables(self) -> tuple[Variable, ...]:
+        """What is recorded of such scenes."""
+        return tuple(one for one in VARIABLES if any(one.there(point) for point in self.points))
+
+    @cached_property
     def group(self) -> int:
         """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
         some = self.points[:: max(1, len(self.points) // 4)]

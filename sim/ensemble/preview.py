@@ -402,7 +402,7 @@ def _bytes(plan: Plan, point: Scenario) -> float:
     record = plan.scenario.record
     each = 4.0 if record.precision == "float32" else 8.0
     total = 2e4
-    for variable in VARIABLES:
+    for variable in plan.variables:
         rows, size = 1, each
         if plan.varies(variable):
             rows, size = (plan.members, each) if record.per_member else (_STATISTICS, 8.0)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.engine import State
+from sim.engine import State, balance
 from sim.parts.contact.control import Grip
 from sim.scenario.scenario import Scenario
 
@@ -15,7 +15,8 @@ class Variable:
     """One recorded quantity.
 
     ``part`` names the part whose class decides whether members differ; ``read`` takes the scenario
-    and a state and gives an array of shape (1,) or (members,).
+    and a state and gives an array of shape (1,) or (members,). ``there`` says for which scenes it is recorded, with
+    ``condition`` in words.
     """
 
     name: str
@@ -24,20 +25,13 @@ class Variable:
     symbol: str
     part: str
     read: Callable[[Scenario, State], np.ndarray]
+    there: Callable[[Scenario], bool] = lambda scene: True
+    condition: str = ""
 
 
 def _until_stopped(read: Callable[[Scenario, State], np.ndarray]) -> Callable[[Scenario, State], np.ndarray]:
-    """A reading that is nan once a member's trajectory has stopped at its detachment."""
-
-    def told(scene: Scenario, state: State) -> np.ndarray:
-        values = read(scene, state)
-        return (
-            np.where(np.isnan(state.contact.radius), np.nan, values)
-            if scene.contact.after_pull_off == "stop"
-            else values
-        )
-
-    return told
+    """A reading that is nan once a member's trajectory has stopped at its pull-off."""
+    return lambda scene, state: np.where(scene.contact.stopped(state.contact), np.nan, read(scene, state))
 
 
 def _radius(scene: Scenario, state: State) -> np.ndarray:
@@ -68,6 +62,41 @@ def _displacement(scene: Scenario, state: State) -> np.ndarray:
     return _grip(scene, state).displacement(state.contact.radius, scene.bodies)
 
 
+def _applied_load(scene: Scenario, state: State) -> np.ndarray:
+    load = scene.contact.load
+    return np.full(
+        1, np.nan if load is None else scene.contact.control.at(scene.clock.time(state.step), scene.clock.duration)
+    )
+
+
+def _hertz_radius(scene: Scenario, state: State) -> np.ndarray:
+    return np.nan_to_num(_grip(scene, state).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
+
+
+def _jkr_radius(scene: Scenario, state: State) -> np.ndarray:
+    work, grip = np.full(1, scene.adhesion.work), _grip(scene, state)
+    return scene.contact.reference_radius(state.contact.whole, work, grip, scene.bodies)
+
+
+def _bonds_radius(scene: Scenario, state: State) -> np.ndarray:
+    work = balance(scene, state.bonding, state.shear).bonded
+    return scene.contact.reference_radius(state.contact.bonded, work, _grip(scene, state), scene.bodies)
+
+
+def _stressless_radius(scene: Scenario, state: State) -> np.ndarray:
+    if not scene.contact.reversible:
+        return _equilibrium_radius(scene, state)
+    work = balance(scene, state.bonding, state.shear).work(_radius(scene, state))
+    return scene.contact.reference_radius(state.contact.stressless, work, _grip(scene, state), scene.bodies)
+
+
+def _equilibrium_radius(scene: Scenario, state: State) -> np.ndarray:
+    if not scene.contact.lags:
+        return _radius(scene, state)
+    found = _grip(scene, state).radius(state.contact.work, np.zeros(1), 0.0, scene.bodies)
+    return np.where(state.contact.radius > 0.0, np.nan_to_num(found), 0.0)
+
+
 VARIABLES = (
     Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.drive.speed),
     Variable("slider_position", "m", "displacement of the slider", "X", "drive",
@@ -96,4 +125,19 @@ VARIABLES = (
           lambda scene, state: state.contact.detached),
     Variable("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
           lambda scene, state: state.contact.dissipated),
+    Variable("jkr_radius", "m", "radius in equilibrium with the full work of adhesion, under the same control and rule"
+          " after pull-off; 0 while that contact is open", "a_JKR", "drive", _jkr_radius),
+    Variable("hertz_radius", "m", "radius without adhesion, under the same control; 0 where nothing presses", "a_H",
+          "drive", _hertz_radius),
+    Variable("bonds_radius", "m", "radius in equilibrium with the work of adhesion of the bonds alone, under the same"
+          " control and rule after pull-off; 0 while that contact is open", "a_b", "bonds", _bonds_radius),
+    Variable("fluctuations_radius", "m", "radius in equilibrium with the work of adhesion that fluctuations leave"
+          " before the mean stress takes its share, under the same control and rule after pull-off; 0 while that"
+          " contact is open", "a_f", "contact", _stressless_radius,
+          lambda scene: scene.contact.reversible > 0.0, "contact.reversible above 0"),
+    Variable("equilibrium_radius", "m", "radius in equilibrium with the work of adhesion left; 0 where the contact is"
+          " open", "a_e", "contact", _equilibrium_radius,
+          lambda scene: scene.contact.lags, 'contact.model = "rate_dependent"'),
+    Variable("applied_load", "N", "load applied to the sphere, in contact or not", "P_a", "drive", _applied_load,
+          lambda scene: scene.contact.load is not None and scene.contact.changes, "a contact.load that changes"),
 )  # fmt: skip

@@ -20,7 +20,6 @@ from sim.engine import State, march, pack
 from sim.ensemble.netcdf import MemoryFile, moments, write_dataset
 from sim.ensemble.part_files import MemoryParts, PartFiles, Parts
 from sim.ensemble.plan import Plan, part_name, work
-from sim.ensemble.recorded import VARIABLES
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import HDF5, StoreTrouble, explained, sync_folder
 from sim.parts.shear.modal import MappedProcess
@@ -111,7 +110,7 @@ def _record(
     progress: Progress | None,
 ) -> dict[str, np.ndarray]:
     """One part: every variable over a stretch of records, the maps in it, and the state at its end."""
-    rows = {g.name: np.empty((len(members) if plan.varies(g) else 1, len(records))) for g in VARIABLES}
+    rows = {g.name: np.empty((len(members) if plan.varies(g) else 1, len(records))) for g in plan.variables}
     maps: dict[str, np.ndarray] = {}
     snapshots = {
         round(t / point.clock.duration * point.clock.steps): k for k, t in enumerate(sorted(point.record.maps))
@@ -121,7 +120,7 @@ def _record(
         state = next(states)
         while state.step < record * point.clock.stride:
             state = next(states)
-        for variable in VARIABLES:
+        for variable in plan.variables:
             rows[variable.name][:, column] = variable.read(point, state)
         if state.step in snapshots and drawn:
             number, process = snapshots[state.step], cast(MappedProcess, point.process)
@@ -133,7 +132,7 @@ def _record(
         if progress is not None:
             progress(len(members) * (point.clock.stride if record else 1))
     if not plan.scenario.record.per_member:
-        rows = {g.name: moments(rows[g.name]) if plan.varies(g) else rows[g.name] for g in VARIABLES}
+        rows = {g.name: moments(rows[g.name]) if plan.varies(g) else rows[g.name] for g in plan.variables}
     return rows | maps | {f"state.{name}": array for name, array in pack(state).items()}
 
 

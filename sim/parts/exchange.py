@@ -184,6 +184,18 @@ class Touching(Protocol):
     def dissipated(self) -> np.ndarray:
         """Energy that the edge and the jumps of the contact have dissipated so far [J]."""
 
+    @property
+    def whole(self) -> np.ndarray:
+        """Phase (before its first touch, closed, open) of a contact with all adhesion."""
+
+    @property
+    def bonded(self) -> np.ndarray:
+        """Phase of a contact with the adhesion of the bonds alone."""
+
+    @property
+    def stressless(self) -> np.ndarray:
+        """Phase of a contact with the adhesion that fluctuations leave."""
+
 
 Own = TypeVar("Own")
 Terms = TypeVar("Terms", contravariant=True)

@@ -70,9 +70,20 @@ class Touch(NamedTuple):
         When it last opened [s], nan if never.
     dissipated : array
         Energy dissipated so far by the opening and closing of the contact [J].
+    whole, bonded, stressless : array
+        Phases (``AHEAD``, ``CLOSED``, ``OPEN``) of three contacts in equilibrium under the same control and the same
+        rule of ``after_pull_off``: with all adhesion, with that of the bonds, and with what fluctuations leave of it
+        before the mean stress takes its share. The last is followed only where it does.
     """
 
     work: np.ndarray
     radius: np.ndarray
     detached: np.ndarray
     dissipated: np.ndarray
+    whole: np.ndarray
+    bonded: np.ndarray
+    stressless: np.ndarray
+
+
+#: A contact before its first touch, in touch, and after a pull-off.
+AHEAD, CLOSED, OPEN = 0, 1, 2

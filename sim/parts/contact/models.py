@@ -5,6 +5,8 @@ or a table; ``sim.parts.contact.control`` says what a contact is under each.
 """
 
 import math
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, cast
 
 import numpy as np
@@ -12,13 +14,13 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.parts.contact.balance import Balance, Touch
+from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance, Touch
 from sim.parts.contact.control import AtDisplacement, AtLoad, Bodies, Grip
 from sim.parts.contact.crack_front import Hold, Kinetics
 from sim.parts.contact.crack_front import advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
-from sim.parts.exchange import Motion, Setting
-from sim.units.course import Course, Prescribed, Table, held, prescribed
+from sim.parts.exchange import Motion, Setting, Touching
+from sim.units.course import Course, Piece, Prescribed, Table, held, prescribed
 from sim.units.quantity import Quantity
 
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
@@ -45,6 +47,8 @@ class _Held:
     state_class: ClassVar[type[Touch]] = Touch
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
+    #: Whether the edge takes time to reach equilibrium.
+    lags: ClassVar[bool] = False
 
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
@@ -74,7 +78,7 @@ class _Held:
     def remarks(self, setting: Setting) -> list[str]:
         return []
 
-    @property
+    @cached_property
     def control(self) -> Prescribed:
         """The load, indentation or displacement over time."""
         given = next(given for given in (self.load, self.indentation, self.displacement) if given is not None)
@@ -102,7 +106,42 @@ class _Held:
         """The contact at the start, in equilibrium."""
         grip = self.grip(motion.time, duration)
         radius = self._equilibrium(grip, balance)
-        return Touch(self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape))
+        found = (grip.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
+        phases = (np.where(np.isnan(alone), AHEAD, CLOSED) for alone in found)
+        return Touch(
+            self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape), *phases
+        )
+
+    def stopped(self, touch: Touching) -> np.ndarray:
+        """Whether a trajectory has ended, with the pull-off of a contact that stops there."""
+        return np.isnan(touch.radius) & ~np.isnan(touch.detached) & (self.after_pull_off == "stop")
+
+    def reference_radius(self, phase: np.ndarray, work: np.ndarray, grip: Grip, bodies: Bodies) -> np.ndarray:
+        """Radius of a contact in equilibrium with another work of adhesion [m], 0 where it is open."""
+        return np.where(phase == CLOSED, grip.radius(work, np.zeros(1), 0.0, bodies), 0.0)
+
+    def _references(self, radius: np.ndarray, balance: Balance) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Works of adhesion of the contacts that are followed beside this one [J/m²]."""
+        whole = np.full(1, balance.reference)
+        return whole, balance.bonded, balance.work(np.nan_to_num(radius)) if self.reversible else whole
+
+    def _phases(self, touch: Touch, grip: Grip, radius: np.ndarray, balance: Balance) -> tuple[np.ndarray, ...]:
+        """Phases of these contacts after a step."""
+        phases = touch.whole, touch.bonded, touch.stressless
+        if self.control.lowest >= 0.0:
+            return phases
+        if grip.closes:
+            stay_open = self.after_pull_off != "reattach"
+            return tuple(np.where(stay_open & (phase == OPEN), OPEN, CLOSED) for phase in phases)
+        found = (grip.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
+        return tuple(
+            np.where((phase == CLOSED) & np.isnan(alone), OPEN, phase)
+            for phase, alone in zip(phases, found, strict=True)
+        )
+
+    def _touching(self, touch: Touch, grip: Grip) -> np.ndarray:
+        """Where an open contact closes if a free sphere touches: at its first touch, or wherever it reattaches."""
+        return np.isnan(touch.radius) & (np.isnan(touch.detached) | (self.after_pull_off == "reattach")) & grip.closes
 
     def _equilibrium(self, grip: Grip, balance: Balance) -> np.ndarray:
         """Largest stable radius [m], nan without one."""
@@ -155,28 +194,19 @@ class Equilibrium(_Held):
 
     def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
         grip = self.grip(motion.time, duration)
-        opened = np.isnan(touch.radius)
-        if opened.all() and (self.after_pull_off != "reattach" or not grip.closes):
-            shape = np.broadcast(touch.radius, balance.bonded, balance.fluctuating).shape
-            radius = np.full(shape, np.nan)
+        open_ = np.isnan(touch.radius) & ~self._touching(touch, grip)
+        if open_.all():
+            radius = np.full(np.broadcast(open_, balance.bonded, balance.fluctuating).shape, np.nan)
         else:
-            radius = self._equilibrium(grip, balance)
-        if self.after_pull_off != "reattach" or not grip.closes:
-            radius = np.where(opened, np.nan, radius)
-        return _after(touch, radius, self._left(radius, balance), motion.time, grip, balance, self.reversible)
-
-
-def _after(
-    touch: Touch, radius: np.ndarray, work: np.ndarray, time: float, grip: Grip, balance: Balance, reversible: float
-) -> Touch:
-    """The state after a step, with what an opening or a closing at this step has dissipated."""
-    opens, closes = ~np.isnan(touch.radius) & np.isnan(radius), np.isnan(touch.radius) & ~np.isnan(radius)
-    dissipated = touch.dissipated
-    for happens, size, sign in ((opens, touch.radius, 1.0), (closes, radius, -1.0)):
-        if happens.any():
-            over = grip.released(size, balance.gained(size, reversible), balance.bodies)
-            dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
-    return Touch(work, radius, np.where(opens, time, touch.detached), dissipated)
+            radius = np.where(open_, np.nan, self._equilibrium(grip, balance))
+        work, phases = self._left(radius, balance), self._phases(touch, grip, radius, balance)
+        opens, closes = ~np.isnan(touch.radius) & np.isnan(radius), np.isnan(touch.radius) & ~np.isnan(radius)
+        dissipated = touch.dissipated
+        for happens, size, sign in ((opens, touch.radius, 1.0), (closes, radius, -1.0)):
+            if happens.any():
+                over = grip.released(size, balance.gained(size, self.reversible), balance.bodies)
+                dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
+        return Touch(work, radius, np.where(opens, motion.time, touch.detached), dissipated, *phases)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
@@ -189,6 +219,8 @@ class RateDependent(_Held):
     Under a dead load nothing is counted as dissipated below the radius at pull-off, where the load falls.
     """
 
+    lags: ClassVar[bool] = True
+
     front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G = 2 w", "v_0", above=0)]
     front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
     heal_speed: _Healing | None = None
@@ -196,20 +228,46 @@ class RateDependent(_Held):
     model: Literal["rate_dependent"] = "rate_dependent"
 
     def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
-        before, grip = self.grip(motion.time - motion.duration, duration), self.grip(motion.time, duration)
-        after, bodies = self._left(touch.radius, balance), balance.bodies
-        seeded = self._seeded(touch.radius, before, balance)
-        radius = np.broadcast_to(seeded, np.broadcast(seeded, after).shape)
+        last = self._left(touch.radius, balance)
+        first = np.where(np.isnan(touch.radius), last, touch.work)
+        now = touch._replace(radius=np.broadcast_to(touch.radius, np.broadcast(touch.radius, last).shape))
+        pieces = self.control.pieces(motion.time - motion.duration, motion.time, duration)
+        begin, span, share = pieces[0].start, pieces[-1].stop - pieces[0].start, 0.0
+        for piece in pieces:
+            before, share = share, (piece.stop - begin) / span
+            works = [np.broadcast_to((1.0 - part) * first + part * last, now.radius.shape) for part in (before, share)]
+            now = self._moved(now, piece, motion.duration * (share - before), works, balance)
+        phases = self._phases(touch, self.grip(motion.time, duration), now.radius, balance)
+        return Touch(self._left(now.radius, balance), now.radius, now.detached, now.dissipated, *phases)
+
+    def _moved(
+        self, touch: Touch, piece: Piece, duration: float, works: Sequence[np.ndarray], balance: Balance
+    ) -> Touch:
+        """The contact after a part of a clock step over which control and work change linearly.
+
+        What is still stored where the edge opens is dissipated, and so is what a spot gains where the sphere touches.
+        """
+        before, after, bodies = self._held_at(piece.first), self._held_at(piece.last), balance.bodies
+        spot, touching = _spot(balance), self._touching(touch, before)
+        radius = np.where(touching, spot, touch.radius)
         moved = advance_front(
-            radius, (np.where(np.isnan(touch.radius), after, touch.work), after), _hold(before, grip),
-            self._kinetics(balance), motion.duration, bodies.sphere_radius, bodies.modulus, 0.5 * _spot(balance),
+            radius, works, _hold(before, after), self._kinetics(balance), duration, bodies.sphere_radius,
+            bodies.modulus, 0.5 * spot,
         )  # fmt: skip
         opens = ~np.isnan(radius) & np.isnan(moved.radius)
-        detached = np.where(opens, motion.time - motion.duration + moved.detached_at, touch.detached)
-        left = self._left(moved.radius, balance)
-        counts = isinstance(grip, AtDisplacement) | (self._held(touch.radius, after, grip, bodies) & ~opens)
+        counts = isinstance(after, AtDisplacement) | (self._held(touch.radius, works[1], after, bodies) & ~opens)
         lost = np.where(counts, moved.dissipated, 0.0)
-        return Touch(left, moved.radius, detached, touch.dissipated + lost)
+        if touching.any():
+            wide = np.fmax(spot, before.radius(np.zeros(1), np.zeros(1), 0.0, bodies))
+            gained = -before.released(wide, math.pi * wide**2 * works[0], bodies)
+            lost += np.where(touching, np.maximum(gained, 0.0), 0.0)
+        for m in np.flatnonzero(opens & counts):
+            part = moved.detached_at[m] / duration
+            grip, narrow = self._held_at((1.0 - part) * piece.first + part * piece.last), np.full(1, 0.5 * spot)
+            work = (1.0 - part) * works[0][m] + part * works[1][m]
+            lost[m] += max(grip.released(narrow, math.pi * narrow**2 * work, bodies)[0], 0.0)
+        detached = np.where(opens, piece.stop - duration + moved.detached_at, touch.detached)
+        return touch._replace(radius=moved.radius, detached=detached, dissipated=touch.dissipated + lost)
 
     def _held(self, radius: np.ndarray, work: np.ndarray, grip: Grip, bodies: Bodies) -> np.ndarray:
         """Whether a load still holds the contact: below the radius at pull-off a pulled sphere falls away.
@@ -224,12 +282,6 @@ class RateDependent(_Held):
         heals = self.front_speed if self.heal_speed is None else self.heal_speed
         exponent = self.front_exponent if self.heal_exponent is None else self.heal_exponent
         return Kinetics(balance.reference, self.front_speed, self.front_exponent, heals, exponent)
-
-    def _seeded(self, radius: np.ndarray, grip: Grip, balance: Balance) -> np.ndarray:
-        """The radius from which an edge starts: where a free sphere touches again, a spot that heals on."""
-        if self.after_pull_off != "reattach" or not grip.closes:
-            return radius
-        return np.where(np.isnan(radius), _spot(balance), radius)
 
 
 def _spot(balance: Balance) -> float:

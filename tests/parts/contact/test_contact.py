@@ -252,6 +252,23 @@ def test_a_hundred_cycles_through_pull_off_are_all_alike(policy):
         assert lost[-1] == lost[32] > 0.0
 
 
+@pytest.mark.parametrize("policy", ["stay_open", "reattach", "stop"])
+@pytest.mark.parametrize("model", [Equilibrium, RateDependent])
+@pytest.mark.parametrize("control", HELD)
+def test_a_contact_that_begins_out_of_touch_jumps_in_whatever_follows_a_pull_off(control, model, policy):
+    held = {control: {"from": -4.0, "to": 4.0, "cycles": 1}} | HELD[control][0]
+    edge = {"front_speed": 1e3} if model is RateDependent else {}
+    scenario = maugis(model(**held, **edge, after_pull_off=policy), 64)
+    radius, closed, when = course(scenario, "contact_radius", "in_contact", "detachment_time")
+    assert_array_equal(radius[:16], 0.0)
+    late = 1 if model is RateDependent else 0  # its edge begins to run where the sphere touches
+    assert_array_equal(closed[16 + late : 49], 1.0)
+    assert_array_equal(closed[56:], 0.0)
+    assert np.isnan(when[:49]).all()
+    assert np.isfinite(when[-1])
+    assert_array_equal(np.isnan(radius[56:]), policy == "stop")
+
+
 # --- dissipation ---
 
 
@@ -367,6 +384,44 @@ def test_a_fast_edge_behind_a_machine_dissipates_what_the_equilibrium_does():
     # within two steps' work of the pull-off load at most; the edge itself loses little
     assert_allclose(two[0][-1], one[0][-1], rtol=0.0, atol=2.0 * 1.5 * 8.0 / 800)
     assert_allclose(two[1][-1], one[1][-1], rtol=0.0, atol=2.0 / 800)
+
+
+KNOTS = {
+    "turns of a displacement": {"displacement": {"from": 1.0, "to": -1.2, "cycles": 3}, "stiffness": 3.0},
+    "turns of a load": {"load": {"from": 2.0, "to": -1.0, "cycles": 3}},
+    "rows of a table": {"indentation": {"time": [0.0, 0.333, 0.338, 0.777, 1.0], "value": [1.0, -0.5, 2.0, 0.3, 0.5]}},
+    "a jump": {"displacement": {"time": [0.0, 0.555, 0.555, 1.0], "value": [1.0, 0.0, 2.0, 1.0]}, "stiffness": 3.0},
+    "a jump at a step": {"indentation": {"time": [0.0, 0.5, 0.5, 1.0], "value": [1.0, 0.0, 1.0, 0.5]}},
+}
+
+
+@pytest.mark.parametrize("name", KNOTS)
+def test_an_edge_sees_where_its_control_turns_within_a_clock_step(name):
+    # the edge is good to some 1e-8 of the radius, whatever the step
+    contact = RateDependent(**KNOTS[name], front_speed=5.0, heal_speed=2.0, heal_exponent=0.5)
+    (coarse, lost), (fine, fine_lost) = (
+        course(maugis(contact, steps), "contact_radius", "dissipated_energy") for steps in (100, 10000)
+    )
+    assert np.ptp(coarse) > 0.1
+    assert_allclose(coarse, fine[::100], rtol=1e-6)
+    assert_allclose(lost, fine_lost[::100], rtol=1e-6, atol=1e-9)
+
+
+@pytest.mark.parametrize("stiffness", [0.3, 5.0, math.inf])
+@pytest.mark.parametrize("front_speed", [0.1, 30.0])
+def test_all_that_is_stored_is_dissipated_once_a_torn_contact_is_open(stiffness, front_speed):
+    """The control jumps far off, then stays: nothing goes in or out any more."""
+    far, rest = -6.0 if math.isinf(stiffness) else -40.0, 0.5
+    table = {"time": [0.0, 0.5, 0.5, 100.0], "value": [rest, rest, far, far]}
+    held = {"indentation": table} if math.isinf(stiffness) else {"displacement": table, "stiffness": stiffness}
+    scenario = maugis(RateDependent(**held, front_speed=front_speed), 200, 100.0)
+    radius, lost = course(scenario, "contact_radius", "dissipated_energy")
+    a = radius[0]
+    assert radius[-1] == 0.0
+    depth = far if math.isinf(stiffness) else (stiffness * far + 0.5 * a**3) / (stiffness + 1.5 * a)
+    spring = 0.0 if math.isinf(stiffness) else 0.5 * stiffness * (far - depth) ** 2
+    stored = elastic_energy(a, depth, scenario.bodies) + spring - math.pi * a**2 * WORK
+    assert_allclose(lost[-1], stored, rtol=1e-7)
 
 
 # --- masking ---

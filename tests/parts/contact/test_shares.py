@@ -97,16 +97,27 @@ def test_shares_are_unknown_where_there_is_no_contact_at_rest():
     assert bool(found["lost_to_bonds_mean"].isnull().all()) and math.isnan(found["area_ratio_hertz"])
 
 
-def test_shares_that_cannot_be_told_name_the_cure():
-    counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100)
-    few = scene(bonds=counted, record=Record(per_member=False))
+def test_shares_of_bonds_that_differ_need_each_member():
+    few = scene(
+        bonds=bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100), record=Record(per_member=False)
+    )
     with pytest.raises(ValueError, match="per_member = true"):
         analysis.shares(run(few))
-    controls = {"contact": [{"model": "equilibrium", "load": 1e-3}, {"model": "equilibrium", "indentation": 1e-6}]}
-    dataset = run(scene(sweep=controls))
-    with pytest.raises(ValueError, match=r"what holds the sphere.*sweep its number"):
-        analysis.shares(dataset)
-    assert len(analysis.table(dataset)) == 12  # the rest can be told
+
+
+def test_a_contact_table_that_is_swept_whole_has_the_shares_of_its_points():
+    controls = [{"model": "equilibrium", "load": 1e-3},
+                {"model": "rate_dependent", "indentation": 1e-6, "front_speed": 1.0},
+                {"model": "equilibrium", "load": {"from": 4e-3, "to": 1e-3}, "reversible": 0.02}]  # fmt: skip
+    swept = scene(sweep={"contact": controls})
+    together = run(swept)
+    for k, point in enumerate(swept.points()):
+        alone = run(point)
+        lost, left = analysis.share_observables(together).isel(contact=k), analysis.share_observables(alone)
+        for name in lost:
+            np.testing.assert_array_equal(lost[name], left.get(name, 0.0))
+        ratio = analysis.observables(together)["area_ratio"].isel(contact=k)
+        np.testing.assert_array_equal(ratio, analysis.observables(alone)["area_ratio"])
 
 
 # -- what the mean stress takes -------------------------------------------------------------------
@@ -199,10 +210,11 @@ def test_shares_of_a_moved_sphere_are_those_at_its_present_place(control):
     """Each record of a course is the same as a run at its value: the parts react at once."""
     parts = {"bonds": bonds.Steady(critical_speed=1e-2), "drive": drive.Steady(speed=3e-3)}
     parts["shear"] = shear.Mean(spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6))
-    dataset = run(scene(contact=Equilibrium(**MOVED[control]), **parts))
+    moving = Equilibrium(**MOVED[control])
+    dataset = run(scene(contact=moving, **parts))
     moved = analysis.share_observables(dataset)
     kind = next(name for name in ("load", "indentation", "displacement") if name in MOVED[control])
-    held = MOVED[control] | {kind: analysis.control(dataset).value.to_numpy()}
+    held = MOVED[control] | {kind: [moving.control.at(t, 0.4) for t in dataset["t"].to_numpy()]}
     for at in (0, 3, 10, 17, 20):
         still = run(scene(contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts))
         lost = analysis.share_observables(still)
@@ -231,7 +243,7 @@ def test_a_sphere_that_its_bonds_let_go_under_a_changing_load_stays_their_loss()
     dataset = run(scene(contact=pulled, bonds=bonds.Steady(critical_speed=1e-2), shear=shear.Uniform()))
     assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
     found = analysis.shares(dataset)
-    np.testing.assert_allclose(analysis.control(dataset).value, np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12)
+    np.testing.assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12)
     assert float(found["lost_to_bonds_mean"][-1]) == 1.0
     assert float(analysis.observables(dataset)["area_ratio"][-1]) == 0.0
 
@@ -256,14 +268,6 @@ def test_shares_of_a_moved_sphere_follow_from_its_statistics():
         )
 
 
-def test_a_load_is_read_off_statistics_where_some_contacts_are_open():
-    """An open contact counts with a load of zero."""
-    dataset = run(scene(record=Record(per_member=False), contact=Equilibrium(load={"from": 4e-3, "to": 1e-3})))
-    loads, share = dataset["normal_load_mean"], np.linspace(1.0, 0.5, 21)
-    partly = dataset.assign(in_contact_mean=("t", share), normal_load_mean=loads * share)
-    np.testing.assert_allclose(analysis.control(partly).value, np.linspace(4e-3, 1e-3, 21), rtol=1e-13)
-
-
 def test_shares_end_where_a_trajectory_stops():
     part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, after_pull_off="stop")
     dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
@@ -276,24 +280,21 @@ def test_shares_end_where_a_trajectory_stops():
         )
 
 
-def test_a_swept_table_of_courses_has_no_area_ratio():
-    """The dataset cannot tell what held the sphere, so the area at rest is no reference."""
-    controls = {"contact": [{"model": "equilibrium", "load": {"from": 4e-3, "to": 1e-3}},
-                            {"model": "equilibrium", "indentation": 1e-6}]}  # fmt: skip
-    ratio = analysis.observables(run(scene(sweep=controls, shear=shear.Uniform())))["area_ratio"]
-    assert bool(ratio[0].isnull().all()) and bool(ratio[1].notnull().all())
+@pytest.mark.parametrize("record", [Record(), Record(per_member=False)], ids=["members", "statistics"])
+def test_the_load_of_an_open_contact_stands_in_the_table(record):
+    pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.5e-3})
+    dataset = run(scene(contact=pulled, shear=shear.Uniform(), record=record))
+    np.testing.assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.5e-3, 21), rtol=1e-12)
+    assert int(dataset["in_contact"][-1]) == 0
+    rows = analysis.table(dataset, 3)
+    (name,) = (name for name in rows[0] if name.startswith("P\n"))
+    assert [float(row[name]) for row in rows] == [-100.0, -300.0, -500.0]
 
 
-@pytest.mark.parametrize("cycles", [0, 2])
 @pytest.mark.parametrize("control", ["load", "indentation", "displacement"])
-def test_control_is_that_of_the_scene(control, cycles):
-    held = {control: {"from": 1e-6, "to": 3e-6, "scale": "log", "cycles": cycles}}
-    part = Equilibrium(**held, **({"stiffness": 2e3} if control == "displacement" else {}))
-    dataset = run(scene(contact=part, clock=Clock(duration=0.4, step=0.02)))
+def test_control_is_that_of_the_scene(control):
+    held = {control: {"from": 1e-6, "to": 3e-6}} | ({"stiffness": 2e3} if control == "displacement" else {})
+    dataset = run(scene(contact=Equilibrium(**held), clock=Clock(duration=0.4, step=0.02)))
     found = analysis.control(dataset)
-    exact = [
-        getattr(grip, "load", getattr(grip, "place", None)) for grip in (part.grip(t, 0.4) for t in dataset["t"].values)
-    ]
-    assert found.kind == control and found.changes
-    np.testing.assert_allclose(found.value, exact, rtol=1e-12)
-    assert not analysis.is_stationary(dataset) and math.isinf(found.stiffness) == (control != "displacement")
+    assert found.kind == control and math.isinf(found.stiffness) == (control != "displacement")
+    assert not analysis.is_stationary(dataset)
