@@ -4,6 +4,7 @@ Everything is read from the file. A number of the scenario is a variable, a swep
 resolved scenario stands among the attributes.
 """
 
+import contextlib
 import json
 from typing import Any, NamedTuple
 
@@ -137,8 +138,11 @@ def _given(dataset: xr.Dataset, kind: str) -> bool:
 def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     """Whether what holds the sphere stays the same in time, at each point of the sweep.
 
-    It does where the contacts with all adhesion and with none, which depend on nothing else, stay.
+    It does not where the scenario gives one course for all points; else where the contacts with all adhesion and
+    with none, which depend on nothing more, change.
     """
-    radii = dataset[["jkr_radius", "hertz_radius"]]
+    radii, moves = dataset[["jkr_radius", "hertz_radius"]], False
+    with contextlib.suppress(KeyError):
+        moves = isinstance(told(dataset, f"contact.{control(dataset).kind}"), dict)
     still = (radii == radii.isel(t=0)).all("t")
-    return (still["jkr_radius"] & still["hertz_radius"]).broadcast_like(dataset["contact_modulus"])
+    return (still["jkr_radius"] & still["hertz_radius"] & (not moves)).broadcast_like(dataset["contact_modulus"])

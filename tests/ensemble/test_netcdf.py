@@ -19,6 +19,7 @@ from sim.engine import march
 from sim.ensemble import plan as plans
 from sim.ensemble import simulate as ensemble
 from sim.ensemble.netcdf import variable_name
+from sim.ensemble.plan import Plan
 from sim.ensemble.recorded import VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
@@ -39,7 +40,7 @@ def test_the_dataset_is_what_the_engine_marched():
     scenario = sample()
     dataset = ensemble.run(scenario)
     for record, state in enumerate(march(scenario, np.arange(5))):
-        for variable in VARIABLES:
+        for variable in Plan.of(scenario).variables:
             found = dataset[variable.name].isel(t=record).values
             assert np.array_equal(np.atleast_1d(found), variable.read(scenario, state), equal_nan=True), variable.name
 
@@ -78,7 +79,7 @@ def test_parts_of_any_shape_give_the_same_numbers(monkeypatch):
 def test_recording_seldom_gives_the_same_numbers():
     often = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3)))
     seldom = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3, record=3e-3)))
-    for variable in VARIABLES:
+    for variable in Plan.of(sample()).variables:
         assert np.array_equal(
             often[variable.name].isel(t=[0, 3, 6]).values, seldom[variable.name].values, equal_nan=True
         )
@@ -235,7 +236,7 @@ def test_datasets_can_be_pickled(tmp_path):
 
 
 def test_runs_join_along_a_key_by_xarrays_own_means():
-    base, names = sample(), [variable.name for variable in VARIABLES]
+    base, names = sample(), [variable.name for variable in Plan.of(sample()).variables]
     swept = replace(base, sweep=read_sweep({"contact.load": [1e-3, 2e-3, 4e-3]}))
     whole = ensemble.run(swept)
     runs = [ensemble.run(point).set_coords("contact_load") for point in swept.points()]
@@ -260,3 +261,18 @@ def test_reading_one_map_reads_one_map(tmp_path):
     path = ensemble.run(sample(shear=MAPPED, record=Record(maps=(2e-3, 4e-3), map_members=2)), tmp_path / "out.nc")
     with netCDF4.Dataset(path) as file:
         assert file["shear_map"].chunking() == [1, 1, 12, 12]
+
+
+def test_a_variable_is_there_where_its_condition_holds():
+    scenes = {
+        "": sample(),
+        "fluctuations_radius": sample(contact=CONTACTS["partly reversible"]),
+        "equilibrium_radius": sample(contact=CONTACTS["rate_dependent"]),
+        "applied_load": sample(contact=CONTACTS["load there and back"]),
+    }
+    some = {name for name in scenes if name}
+    assert some == {variable.name for variable in VARIABLES if variable.condition}
+    for name, scenario in scenes.items():
+        found = set(ensemble.run(scenario).variables)
+        assert found & some == {name} - {""}
+        assert {variable.name for variable in VARIABLES if not variable.condition} <= found
