@@ -6,7 +6,8 @@ A depth is a frozen recipe; with the solid and the cell it becomes a *process* w
 
 import functools
 import math
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+from dataclasses import fields, replace
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -23,6 +24,7 @@ from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.modes import cell_variance, modes
 from sim.parts.shear.process import SmoothProcess
 from sim.spectrum.families import Spectrum
+from sim.spectrum.family import Family
 from sim.units.quantity import Quantity
 
 _Paid = Annotated[
@@ -205,52 +207,39 @@ class Banded(_Fluctuating):
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
         side = cell if self.cell is None else self.cell
-        recipe = _BandRecipe(
-            self.spectrum,
-            side,
-            self.points,
-            shear_modulus,
-            poisson_ratio,
-            self.correlation.power,
-            self.tolerance,
-            self.amplitude.relaxing,
-        )
-        bands, errors = _grouped(recipe)
+        spectrum, size = _of_unit_size(self.spectrum)
+        power, relaxing = self.correlation.power, self.amplitude.relaxing
+        unit, errors = _grouped(spectrum, side, self.points, poisson_ratio, power, self.tolerance, relaxing)
+        bands = replace(unit, weight=unit.weight * (size / shear_modulus))
         if self.mode_amplitudes == "fixed":
             return SmoothProcess(bands.mean, self.amplitude)
         return BandedProcess(bands, errors, self.correlation, self.amplitude)
 
 
-class _BandRecipe(NamedTuple):
-    """All that a grouping depends on."""
-
-    spectrum: Any
-    cell: float
-    points: int | None
-    shear_modulus: float
-    poisson_ratio: float
-    power: int
-    tolerance: float
-    relaxing: bool
+def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
+    """The spectrum at an rms of 1 Pa with the factor of its density; as it is with 1 where no key sets its rms."""
+    keys = {item.name for item in fields(spectrum)}  # type: ignore[arg-type]
+    return (replace(spectrum, rms=1.0), spectrum.variance) if "rms" in keys else (spectrum, 1.0)  # type: ignore[type-var]
 
 
-@functools.lru_cache(maxsize=16)  # a sweep over anything else asks for the same bands again and again
-def _grouped(recipe: _BandRecipe) -> tuple[Bands, dict[str, float]]:
-    """The bands of a cell, and the cell's own errors against the infinite plane."""
-    spectrum = recipe.spectrum
-    pairs = cell_pairs(spectrum, recipe.cell, recipe.points, recipe.shear_modulus, recipe.poisson_ratio)
+@functools.lru_cache(maxsize=20_000)  # as many as a sweep has points, each a few kilobytes
+def _grouped(
+    spectrum: Family, cell: float, points: int | None, poisson_ratio: float,
+    power: int, tolerance: float, relaxing: bool,
+) -> tuple[Bands, dict[str, float]]:  # fmt: skip
+    """The bands of a cell at a shear modulus of 1 Pa, and the cell's own errors against the infinite plane."""
+    pairs = cell_pairs(spectrum, cell, points, 1.0, poisson_ratio)
     energy = float(np.sum(pairs.count * pairs.weight))
-    infinite = float(np.asarray(spectrum.surface_energy(recipe.shear_modulus, recipe.poisson_ratio)))
+    infinite = float(np.asarray(spectrum.surface_energy(1.0, poisson_ratio)))
     spread = math.sqrt(float(np.sum(pairs.count * pairs.weight**2)))
+    variance = spectrum.variance
     errors = {
-        "cell_error_variance": cell_variance(spectrum, recipe.cell, recipe.points) / spectrum.variance - 1.0
-        if spectrum.variance
-        else 0.0,
+        "cell_error_variance": cell_variance(spectrum, cell, points) / variance - 1.0 if variance else 0.0,
         "cell_error_energy": energy / infinite - 1.0 if infinite else 0.0,
         "realization_spread_energy": spread / energy if energy else 0.0,
         "mode_pairs": float(np.sum(pairs.count)),
     }
-    return group(pairs, recipe.power, recipe.tolerance, recipe.relaxing), errors
+    return group(pairs, power, tolerance, relaxing), errors
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

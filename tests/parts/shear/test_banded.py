@@ -412,6 +412,28 @@ def test_the_state_holds_one_number_a_band():
     assert_allclose(state.energy, state.values @ (0.5 * process.bands.weight), rtol=1e-14, atol=0)
 
 
+def test_bands_are_grouped_once_for_all_sizes_and_moduli_and_kept_for_a_whole_sweep(monkeypatch):
+    calls, group = [], shear.group
+    monkeypatch.setattr(shear, "group", lambda *arguments: calls.append(arguments) or group(*arguments))
+    shear._grouped.cache_clear()
+
+    def bands(rms=2e5, modulus=1e6, cell=CELL):
+        part = shear.Banded(
+            spectrum=Gaussian(rms=rms, length=1e-5), cell=cell, points=64, correlation=Slip(length=1e-6)
+        )
+        return part.process(modulus, 0.5, cell).bands
+
+    one = bands()
+    for rms, modulus in itertools.product((1e-3, 3.7e5), (1e6, 5e9)):
+        other = bands(rms, modulus)
+        assert_allclose(other.weight, one.weight * (rms / 2e5) ** 2 * (1e6 / modulus), rtol=1e-14)
+        assert (other.freedom is one.freedom, other.errors) == (True, one.errors)
+    assert len(calls) == 1
+    for cell in 2 * [CELL * (1.0 + k / 40.0) for k in range(40)]:
+        bands(cell=cell)
+    assert len(calls) == 40
+
+
 def test_a_ripple_of_no_amplitude_stores_nothing():
     part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, correlation=Slip(length=1e-6))
     _, found = march_energies(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=1e-3))
