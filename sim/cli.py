@@ -79,7 +79,7 @@ def run(
     target = output or Path("outputs") / f"{scenario.stem}.nc"
     from sim.scenario.reader import load
 
-    scene = load(scenario, _overrides(changes, seed, members))
+    scene = load(scenario, _overrides(changes, seed, members), option="--set")
     if target.is_dir() or (target.exists() and target.samefile(scenario)):
         _fail(f"{target} is {'a folder' if target.is_dir() else 'the scenario'}; name a file with -o", BAD_INPUT)
     if target.exists() and not force:
@@ -193,7 +193,7 @@ def check(scenario: Path, changes: tuple[str, ...]) -> None:
     from sim.ensemble.preview import preview
     from sim.scenario.reader import load
 
-    click.echo(preview(load(scenario, _overrides(changes))))
+    click.echo(preview(load(scenario, _overrides(changes), option="--set")))
 
 
 @cli.command()
@@ -270,14 +270,14 @@ def _opened(path: Path) -> Iterator[Any]:
 def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[str, ...]) -> None:
     """Speed against error for this scene: every admissible depth, tolerance and clock step against the exact answer."""
     from sim.scenario.reader import load
-    from sim.scenario.toml_text import BadInput
     from sim.units.quantity import Quantity
+    from sim.units.refusals import BadInput
 
     try:
         seconds = Quantity("s", "budget", above=0).read(budget)
     except ValueError as fault:
         raise BadInput([f"--budget {budget}: {fault}"]) from None
-    scene = load(scenario, _overrides(changes))
+    scene = load(scenario, _overrides(changes), option="--set")
     from sim.numerics.files import explained
     from sim.study import converge as convergence
 

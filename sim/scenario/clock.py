@@ -4,7 +4,7 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
@@ -77,7 +77,7 @@ def _require_multiple(name: str, long: float, other: str, short: float) -> None:
 class Ensemble:
     """Independent members of the ensemble, which share everything but their noise."""
 
-    members: Annotated[int, Field(ge=1, le=10**7, description="members of the ensemble")] = 1
+    members: Annotated[int, Quantity("1", "members of the ensemble", at_least=1, at_most=10**7, whole=True)] = 1
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -86,5 +86,5 @@ class Record:
 
     per_member: bool = True
     maps: tuple[Annotated[float, Quantity("s", "time of a stress map", "t", at_least=0)], ...] = ()
-    map_members: Annotated[int, Field(ge=1, le=10**4, description="members whose maps are kept")] = 1
+    map_members: Annotated[int, Quantity("1", "members whose maps are kept", at_least=1, at_most=10**4, whole=True)] = 1
     precision: Literal["float64", "float32"] = "float64"

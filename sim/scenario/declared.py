@@ -1,30 +1,96 @@
-"""Quantities that the parts of a scenario declare."""
+"""What the tables of a scenario declare: their keys, their models, and the values of a scenario with their units."""
 
+import functools
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any
+from typing import Any, NamedTuple, get_args
+
+from pydantic import Tag
+from pydantic.fields import FieldInfo
 
 from sim.scenario.source import Source
 from sim.units.quantity import Quantity
 
 
-def quantities(part: Any, prefix: str = "") -> dict[str, tuple[Quantity, float]]:
-    """Every number of a scenario with its declaration, by its dotted key in a scenario file."""
-    found: dict[str, tuple[Quantity, float]] = {}
-    for item in fields(part):
-        value = getattr(part, item.name)
-        declared = getattr(type(part), "__pydantic_fields__", {}).get(item.name)
-        key = prefix + ((declared and declared.alias) or item.name)
-        if is_dataclass(value) and not isinstance(value, type) and not isinstance(value, Source):
-            found |= quantities(value, f"{key}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool) and declared is not None:
-            meaning = declared.description or item.name.replace("_", " ")
-            found[key] = (declaration(declared) or Quantity("1", meaning), value)
+def keys(table: type) -> dict[str, FieldInfo]:
+    """The keys of a table as they are written in a file, with their declarations."""
+    declared: dict[str, FieldInfo] = getattr(table, "__pydantic_fields__", {})
+    return {field.alias or name: field for name, field in declared.items() if not field.exclude}
+
+
+def model(table: type) -> str | None:
+    """The name of a table's model; None where there is only one."""
+    return keys(table)["model"].default if "model" in keys(table) else None
+
+
+def tables(annotation: Any, tag: str = "") -> dict[str, type]:
+    """The tables that an annotation admits, by the name that pydantic gives each; "" where there is only one."""
+    tag = next((note.tag for note in getattr(annotation, "__metadata__", ()) if isinstance(note, Tag)), tag)
+    if isinstance(annotation, type) and is_dataclass(annotation):
+        return {tag or model(annotation) or "": annotation}
+    return {name: table for option in get_args(annotation) for name, table in tables(option, tag).items()}
+
+
+@functools.cache
+def all_tables(root: type) -> list[tuple[tuple[str, ...], FieldInfo]]:
+    """The path and declaration of every table in a scenario, outer ones first."""
+    found: list[tuple[tuple[str, ...], FieldInfo]] = [((), FieldInfo(annotation=root))]
+    for path, field in found:  # grows on the way
+        inner = {key: held for table in tables(field.annotation).values() for key, held in keys(table).items()}
+        found += [((*path, key), held) for key, held in inner.items() if tables(held.annotation)]
     return found
 
 
+def with_models(table: type, given: Any) -> Any:
+    """A table as given, with the model of each inner table that leaves it out.
+
+    That is the simplest model, unless a key that is there belongs to other models only: no model is guessed from keys.
+    """
+    if not isinstance(given, dict):
+        return given
+    found = dict(given)
+    for key, field in keys(table).items():
+        inner, options = given.get(key), list(tables(field.annotation).values())
+        if not isinstance(inner, dict):
+            continue
+        if len(options) > 1 and "model" not in inner and field.default_factory in options:
+            simplest: Any = field.default_factory
+            others = {word for option in options for word in keys(option)} - keys(simplest).keys()
+            inner = inner if others & inner.keys() else {"model": model(simplest), **inner}
+        chosen = [option for option in options if model(option) == inner.get("model")]
+        found[key] = with_models(chosen[0], inner) if chosen else inner
+    return found
+
+
+class Entry(NamedTuple):
+    """A value of a scenario by its dotted ``key`` in a file, with its declaration if it is a number."""
+
+    key: str
+    value: Any
+    quantity: Quantity | None
+
+
+def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
+    """Every value of a scenario or one of its parts, table by table; the model of a table comes first."""
+    declared = getattr(type(part), "__pydantic_fields__", {})
+    for item in sorted(fields(part), key=lambda item: item.name != "model"):
+        value, field = getattr(part, item.name), declared.get(item.name)
+        key = prefix + ((field and field.alias) or item.name)
+        if is_dataclass(value) and not isinstance(value, Source):
+            yield from entries(value, f"{key}.")
+        elif field is not None and not isinstance(value, Source):
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            meaning = field.description or item.name.replace("_", " ")
+            yield Entry(key, value, declaration(field) or Quantity("1", meaning) if number else None)
+
+
+def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:
+    """Every number of a scenario with its declaration, by its dotted key in a scenario file."""
+    return {key: (quantity, value) for key, value, quantity in entries(part) if quantity is not None}
+
+
 def declaration(declared: Any) -> Quantity | None:
-    """What a field of a part is declared to be, None where it is no quantity."""
+    """What a key is declared to be, None where it is no quantity."""
     notes = (*declared.metadata, *_noted(declared.annotation))
     return next((item for item in notes if isinstance(item, Quantity)), None)
 

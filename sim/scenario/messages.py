@@ -1,31 +1,39 @@
-"""Faults of a scenario in words: what is wrong and the cure, in the terms of the file.
+"""Faults of a scenario in words: the place in the file, what is wrong, and the cure."""
 
-Two sources: the keys of the document are held against the JSON schema of scenarios, and the errors
-that pydantic finds in the values are told without its vocabulary.
-"""
-
+import contextlib
 import difflib
+import functools
 import re
-from collections.abc import Iterator
-from typing import Any, NamedTuple, get_args
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeVar, cast, get_args
 
-from pydantic_core import core_schema
+from pydantic import ValidationError
+from pydantic.fields import FieldInfo
+from pydantic_core import ErrorDetails, core_schema
 
+from sim.scenario.declared import all_tables, declaration, keys, model, tables, with_models
+from sim.scenario.toml_lines import key_lines
 from sim.units.quantity import in_words
+from sim.units.refusals import BadInput, renamed
 
 Path = tuple[str | int, ...]
-Node = dict[str, Any]
+Tables = dict[str, type]
+T = TypeVar("T")
 
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+_MISSING = ("missing", "missing_argument")
+_NO_TABLE = ("dataclass_type", "dataclass_exact_type", "model_attributes_type", "dict_type", "union_tag_not_found")
 _BUILT_IN = frozenset(get_args(core_schema.ErrorType)) - {"value_error"}
-_TABLES = ("dataclass_type", "dataclass_exact_type", "model_attributes_type", "dict_type", "model_type")
 _FILES = ("table", "bad_table", "no_table", "file_unreadable", "file_not_text")
 _EXCLUSIVE = ("control", "one_modulus")
-_WHOLE = ("int_type", "int_parsing", "int_from_float", "int_parsing_size", "finite_number")
-_BOUNDS = {
-    "greater_than_equal": ("at least", "ge"),
-    "less_than_equal": ("at most", "le"),
-    "greater_than": ("above", "gt"),
-    "less_than": ("below", "lt"),
+_KINDS = {
+    "bool_type": "true or false, without quotes",
+    "bool_parsing": "true or false, without quotes",
+    "string_type": "text in quotes",
+    "string_unicode": "text in quotes",
+    "tuple_type": 'a list such as ["1 s", "2 s"]',
+    "list_type": 'a list such as ["1 s", "2 s"]',
 }
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -33,7 +41,7 @@ _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 class Fault(NamedTuple):
     """What is wrong at a key.
 
-    ``kind`` is "unknown", "foreign" (a key of another model), "missing", "exclusive" (one key of
+    ``kind`` is "unknown", "renamed", "foreign" (a key of another model), "missing", "exclusive" (one key of
     several) or "value"; ``near`` the key probably meant.
     """
 
@@ -43,192 +51,173 @@ class Fault(NamedTuple):
     near: Path = ()
 
 
+class _Spot(NamedTuple):
+    """A place in a scenario: its ``path`` and declaration, the tables ``admitted`` there and those ``chosen`` of them.
+
+    ``around`` are the tables chosen around it.
+    """
+
+    path: Path
+    field: FieldInfo | None
+    admitted: Tables
+    chosen: Tables
+    around: Tables
+
+
 def dotted(path: Path) -> str:
     """A key's path as it is written in a file, places in lists left out."""
     words = [word if _PLAIN_KEY.fullmatch(word) else f'"{word}"' for word in path if isinstance(word, str)]
     return ".".join(word[:60] for word in words)
 
 
-class Shape:
-    """The tables and keys that a scenario may have, from its JSON schema."""
+def faults(root: type, invalid: ValidationError, document: dict[str, Any]) -> list[Fault]:
+    """The errors that pydantic found in a document, in the words of a scenario; one for each place.
 
-    def __init__(self, schema: Node) -> None:
-        self.schema = schema
+    A key that is missing because it was misspelt, or has another name now, is not a fault of its own.
+    """
+    errors = invalid.errors(include_url=False)
+    found = [_unknown(root, error, document) if error["type"] in _UNKNOWN else _worded(root, error) for error in errors]
+    meant = {fault.near for fault in found} | {fault.path for fault in found if fault.kind != "missing"}
+    found = [fault for fault in found if fault.kind != "missing" or fault.path not in meant]
+    return list({fault.path: fault for fault in reversed(found)}.values())[::-1]
 
-    def faults(self, document: dict[str, Any]) -> Iterator[Fault]:
-        """Unknown keys, and true or false where a number is due."""
-        return self._walk([self.schema], document, ())
 
-    def _walk(self, nodes: list[Node], value: Any, path: Path) -> Iterator[Fault]:
-        options = self._options(nodes)
-        if isinstance(value, bool) and _types(options) == {"integer"}:
-            yield Fault(path, f"must be a whole number such as 64, not {in_words(value)}")
-        if not isinstance(value, dict) or not any("properties" in option for option in options):
-            return
-        chosen = self._chosen(options, value)
-        known = self._keys(chosen)
-        for key, inner in value.items():
-            if key in known:
-                yield from self._walk(known[key], inner, (*path, key))
-            else:
-                yield self._unknown((*path, key), known, value, options, chosen)
+@contextlib.contextmanager
+def in_plain_words(root: type, document: dict[str, Any]) -> Iterator[None]:
+    """A context in which what pydantic finds wrong with a document is raised as ``BadInput``."""
+    try:
+        yield
+    except ValidationError as invalid:
+        raise BadInput(Place("", "", {}).problems(faults(root, invalid, document))) from None
 
-    def _unknown(
-        self, path: Path, known: dict[str, list[Node]], given: Node, options: list[Node], chosen: list[Node]
-    ) -> Fault:
-        key = str(path[-1])
-        if key in self._keys(options):
-            having = [option for option in options if key in option.get("properties", {})]
-            model, others = _tag(chosen[0]), _either(list(map(_tag, having)))
-            if model in map(_tag, having):
-                other = next((name for name in given if name in known and name not in having[0]["properties"]), "model")
-                return Fault(path, f"does not go with {other}; leave one of them out", "foreign")
-            return Fault(path, f'is not a key of model = "{model}"; remove it, or choose model = {others}', "foreign")
-        elsewhere = [table for table in self._tables() if key in self._keys(self._at(table))]
-        closest = [table for table in elsewhere if table[:-1] == path[:-1] or path[: len(table)] == table] or elsewhere
-        if len(closest) == 1:
-            meant = (*closest[0], key)
-            return Fault(path, f'is not a key here; did you mean "{dotted(meant)}"?', "unknown", meant)
-        near = difflib.get_close_matches(key, self._keys(options) if _tag(chosen[0]) is None else known, 1, 0.6)
-        if near:
-            return Fault(path, f'is not a key; did you mean "{near[0]}"?', "unknown", (*path[:-1], near[0]))
-        return Fault(path, f"is not a key; known: {', '.join(known)}", "unknown")
 
-    def _tables(self) -> Iterator[Path]:
-        """The paths of all tables, outer ones first."""
-        waiting: list[Path] = [()]
-        while waiting:
-            path = waiting.pop(0)
-            yield path
-            inner = self._keys(self._at(path))
-            waiting += [(*path, name) for name, nodes in inner.items() if self._keys(self._options(nodes))]
+def plain_spoken(cls: type[T]) -> type[T]:
+    """Let a class of a scenario's tables raise ``BadInput`` where its values cannot be used."""
+    made: Callable[..., None] = cls.__init__
 
-    def _at(self, path: Path) -> list[Node]:
-        options = self._options([self.schema])
-        for word in path:
-            options = self._options(self._keys(options).get(str(word), []))
-        return options
+    @functools.wraps(made)
+    def init(self: T, *args: Any, **values: Any) -> None:
+        with in_plain_words(cls, values):
+            made(self, *args, **with_models(cls, values))
 
-    def _place(self, location: tuple) -> tuple[Path, list[Node], list[Node]]:
-        """The path in the file of a place in pydantic's terms, which name the models passed.
+    cls.__init__ = init  # type: ignore[method-assign, assignment]
+    return cls
 
-        With it the alternatives there and those of the table around it.
-        """
-        path: Path = ()
-        around: list[Node] = []
-        options = self._options([self.schema])
-        for word in location:
-            tagged = [option for option in options if _tag(option) == word]
-            keys = self._keys(options)
-            if tagged and len(options) > 1:
-                options = tagged
-            elif isinstance(word, int):
-                path, around, options = (*path, word), options, []
-            elif word in keys or not re.search(r"[\[\](]", word):
-                path, around, options = (*path, word), options, self._options(keys.get(word, []))
-        return path, options, around
 
-    def _example(self, path: Path, options: list[Node]) -> str:
-        """How a missing key may be added to a file."""
-        for option in options:
-            if option.get("examples"):
-                value = option["examples"][0]
-                written = f'"{value}"' if isinstance(value, str) else f"{value:g}"
-                return f"for example {path[-1]} = {written}"
-        models = [_tag(option) for option in options if _tag(option)]
-        if len(models) > 1:
-            return f"the table [{dotted(path)}] with model = {_either(models)}"
-        if any("properties" in option for option in options):
-            required = options[0].get("required", [])
-            return f"the table [{dotted(path)}]" + (f" with {' and '.join(required)}" if required else "")
-        simple = {"integer": "64", "boolean": "true", "array": "[...]", "string": '"..."'}
-        return f"for example {path[-1]} = " + next((simple[kind] for kind in _types(options) if kind in simple), "...")
+def _spot(root: type, location: tuple[str | int, ...]) -> _Spot:
+    """The place that pydantic's location names, which holds the names of the tables passed."""
+    spot = _Spot((), None, {"": root}, {"": root}, {})
+    for word in location:
+        known = _keys(spot.chosen)
+        if len(spot.chosen) > 1 and word in spot.chosen:
+            spot = spot._replace(chosen={str(word): spot.chosen[str(word)]})
+        elif isinstance(word, int):
+            spot = spot._replace(path=(*spot.path, word))
+        elif word in known or "[" not in word:
+            inner = tables(known[word].annotation) if word in known else {}
+            spot = _Spot((*spot.path, word), known.get(word), inner, inner, spot.chosen)
+    return spot
 
-    def _options(self, nodes: list[Node]) -> list[Node]:
-        """The alternatives of nodes, references and unions opened."""
-        found: list[Node] = []
-        for node in nodes:
-            if "$ref" in node:
-                found += self._options([self.schema["$defs"][node["$ref"].rsplit("/", 1)[-1]]])
-            elif "oneOf" in node or ("anyOf" in node and "properties" not in node):
-                found += self._options(node.get("oneOf", []) + node.get("anyOf", []))
-            elif node.get("type") != "null":
-                found.append(node)
-        return found
 
-    def _chosen(self, options: list[Node], value: dict[str, Any]) -> list[Node]:
-        """The alternative that a table's model names, all of them where it names none."""
-        named = [option for option in options if _tag(option) == value.get("model", "")]
-        if not named and "model" not in value:  # the model that a table without one is
-            named = [option for option in options if _tag(option) and "model" not in option.get("required", ())]
-        named = named or options
-        if len({_tag(option) for option in named}) > 1:
-            return named
-        # several tables of one name: the one that takes most of the keys
-        named = [option for option in named if "properties" in option] or named
-        return [max(named, key=lambda option: len(option.get("properties", {}).keys() & value.keys()))]
+def _keys(options: Tables) -> dict[str, FieldInfo]:
+    return {key: field for table in options.values() for key, field in keys(table).items()}
 
-    def _keys(self, options: list[Node]) -> dict[str, list[Node]]:
-        keys: dict[str, list[Node]] = {}
-        for option in options:
-            for key, node in option.get("properties", {}).items():
-                keys.setdefault(key, []).append(node)
-        return keys
 
-    def worded(self, error: Any) -> Fault:
-        """One error of pydantic's in the terms of the file."""
-        kind, context, given = error["type"], error.get("ctx", {}), error.get("input")
-        path, options, around = self._place(error["loc"])
-        if kind in ("missing", "missing_argument"):
-            tables = [option["properties"] for option in around if "properties" in option]
-            if path[-1] != "file" and any("file" in table and path[-1] in table for table in tables):
-                said = 'is missing; name a CSV file such as file = "data.csv"'
-                return Fault((*path[:-1], "file"), said, "missing")
-            return Fault(path, f"is missing; add {self._example(path, options)}", "missing")
-        models = [_tag(option) for option in options]
-        if kind == "union_tag_not_found" and not isinstance(given, dict):
-            return Fault(path, _no_table(path, given, models))
-        if kind == "union_tag_not_found":
-            return Fault((*path, "model"), f"is missing; choose {_either(models)}", "missing")
-        if kind == "union_tag_invalid":
-            return Fault((*path, "model"), _choice(given.get("model") if isinstance(given, dict) else None, models))
-        if kind == "literal_error":
-            return Fault(path, _choice(given, re.findall(r"'([^']*)'", context["expected"])))
-        if kind in _TABLES:
-            return Fault(path, _no_table(path, given, models))
-        if kind in _FILES and "file" in self._keys(options):
-            path = (*path, "file")
-        said = _value_fault(kind, context, given, error["msg"])
-        return Fault(path, said, "exclusive" if kind in _EXCLUSIVE else "value")
+def _unknown(root: type, error: ErrorDetails, document: dict[str, Any]) -> Fault:
+    """A key that its table does not have: an old name, a key of another model or table, or a misspelt one."""
+    *outer, key = error["loc"]
+    place = _spot(root, tuple(outer))
+    path, known, word = (*place.path, str(key)), _keys(place.chosen), str(key)
+    now = renamed(word)
+    if now in _keys(place.admitted):
+        return Fault(path, f'is now called "{now}"', "renamed", (*place.path, str(now)))
+    having = [table for table in place.admitted.values() if word in keys(table)]
+    if having:
+        names = [model(table) for table in having]
+        own = model(next(iter(place.chosen.values())))
+        if own not in names:
+            said = f'is not a key of model = "{own}"; remove it, or choose model = {_either(names)}'
+            return Fault(path, said, "foreign")
+        given: Any = functools.reduce(lambda table, step: table[step], place.path, cast(Any, document))
+        other = next((name for name in given if name in known and name not in keys(having[0])), "model")
+        return Fault(path, f"does not go with {other}; leave one of them out", "foreign")
+    elsewhere: list[Path] = list(
+        dict.fromkeys(table for table, field in all_tables(root) if word in _keys(tables(field.annotation)))
+    )
+    closest = [table for table in elsewhere if table[:-1] == path[:-1] or path[: len(table)] == table] or elsewhere
+    if len(closest) == 1:
+        meant = (*closest[0], word)
+        return Fault(path, f'is not a key here; did you mean "{dotted(meant)}"?', "unknown", meant)
+    near = difflib.get_close_matches(word, known, 1, 0.6)
+    if near:
+        return Fault(path, f'is not a key; did you mean "{near[0]}"?', "unknown", (*path[:-1], near[0]))
+    return Fault(path, f"is not a key; known: {', '.join(known)}", "unknown")
+
+
+def _worded(root: type, error: ErrorDetails) -> Fault:
+    """A value that cannot be used, or a key that is missing."""
+    kind, given = error["type"], error.get("input")
+    spot = _spot(root, error["loc"])
+    path, names = spot.path, [model(table) for table in spot.admitted.values()]
+    if kind in _MISSING:
+        if path[-1] != "file" and "file" in _keys(spot.around):
+            said = 'is missing; name a CSV file such as file = "data.csv"'
+            return Fault((*path[:-1], "file"), said, "missing")
+        return Fault(path, f"is missing; add {_example(spot)}", "missing")
+    if kind == "union_tag_not_found" and isinstance(given, dict):
+        misspelt = difflib.get_close_matches("model", map(str, given), 1, 0.6)
+        if misspelt:
+            return Fault((*path, misspelt[0]), 'is not a key; did you mean "model"?', "unknown", (*path, "model"))
+        fitting = [
+            name
+            for name, table in zip(names, spot.admitted.values(), strict=True)
+            if given.keys() <= keys(table).keys()
+        ]
+        return Fault((*path, "model"), f"is missing; choose {_either(fitting or names)}", "missing")
+    if kind == "union_tag_invalid":
+        return Fault((*path, "model"), _choice(given.get("model") if isinstance(given, dict) else None, names))
+    if kind == "literal_error":
+        return Fault(path, _choice(given, re.findall(r"'([^']*)'", error["ctx"]["expected"])))
+    if kind in _NO_TABLE:
+        return Fault(path, _no_table(path, given, names))
+    if kind in _FILES and "file" in _keys(spot.chosen):
+        path = (*path, "file")
+    return Fault(path, _value_fault(error), "exclusive" if kind in _EXCLUSIVE else "value")
+
+
+def _value_fault(error: ErrorDetails) -> str:
+    """What is wrong with a plain value; kinds that are not pydantic's own come with their words."""
+    kind = error["type"]
+    if kind in _KINDS:
+        return f"must be {_KINDS[kind]}, not {shown(error['input'])}"
+    if kind == "string_too_long":
+        return f"is longer than {error['ctx']['max_length']} characters; shorten it"
+    if kind in _BUILT_IN:
+        return "has a value that cannot be used here; `sim schema` lists what can"
+    return error["msg"].removeprefix("Value error, ")
+
+
+def _example(spot: _Spot) -> str:
+    """How a missing key may be added to a file."""
+    name, options = spot.path[-1], list(spot.admitted.values())
+    quantity = spot.field and declaration(spot.field)
+    if quantity is not None:
+        return f"for example {name} = {quantity.example}"
+    if len(options) > 1:
+        return f"the table [{dotted(spot.path)}] with model = {_either(list(map(model, options)))}"
+    if options:
+        needed = [key for key, field in keys(options[0]).items() if field.is_required()]
+        return f"the table [{dotted(spot.path)}]" + (f" with {' and '.join(needed)}" if needed else "")
+    return f'for example {name} = "..."'
 
 
 def _no_table(path: Path, given: Any, models: list[str | None]) -> str:
     """What is wrong where a table is due."""
-    if given in models:
+    if isinstance(given, str) and given in models:
         return f'must be a table, not text; write {path[-1]} = {{ model = "{given}" }}'
     if isinstance(given, list):
         return f"must be one table, not a list; write [{dotted(path)}] once, in single brackets"
     return f"must be a table, not {in_words(given)}; write [{dotted(path)}] and its keys below"
-
-
-def _value_fault(kind: str, context: dict[str, Any], given: Any, message: str) -> str:
-    """What is wrong with a plain value."""
-    if kind not in _BUILT_IN:
-        return message.removeprefix("Value error, ")
-    if kind in _WHOLE:
-        return f"must be a whole number such as 64, not {shown(given)}"
-    if kind in _BOUNDS:
-        words, bound = _BOUNDS[kind]
-        return f"must be {words} {context[bound]}, not {shown(given)}"
-    if kind in ("bool_type", "bool_parsing"):
-        return f"must be true or false, without quotes, not {shown(given)}"
-    if kind in ("string_type", "string_unicode"):
-        return f"must be text in quotes, not {shown(given)}"
-    if kind == "string_too_long":
-        return f"is longer than {context['max_length']} characters; shorten it"
-    if kind in ("tuple_type", "list_type"):
-        return f'must be a list such as ["1 s", "2 s"], not {shown(given)}'
-    return "has a value that cannot be used here; `sim schema` tells what can"
 
 
 def shown(value: Any) -> str:
@@ -239,15 +228,9 @@ def shown(value: Any) -> str:
         return f'"{value[:40]}"' if len(value) <= 40 else f'"{value[:40]}..."'
     if isinstance(value, dict) and "model" in value:
         return f"{{ model = {shown(value['model'])} }}"
+    if isinstance(value, int) and not isinstance(value, bool):
+        return str(value) if abs(value) < 10**40 else "a number of many digits"
     return in_words(value) if isinstance(value, bool | dict | list | tuple) or value is None else str(value)[:40]
-
-
-def _types(options: list[Node]) -> set[str]:
-    return {str(option.get("type")) for option in options}
-
-
-def _tag(option: Node) -> str | None:
-    return option.get("properties", {}).get("model", {}).get("const")
 
 
 def _either(names: list[str | None]) -> str:
@@ -257,7 +240,72 @@ def _either(names: list[str | None]) -> str:
 
 def _choice(given: Any, known: list) -> str:
     """A word that is none of those known."""
-    near = difflib.get_close_matches(given, known, 1, 0.6) if isinstance(given, str) else []
+    now = renamed(given) if isinstance(given, str) else None
+    if now in known:
+        return f'{shown(given)} is now called "{now}"'
+    near = difflib.get_close_matches(given, [word for word in known if word], 1, 0.6) if isinstance(given, str) else []
     if near:
         return f'must not be {shown(given)}; did you mean "{near[0]}"?'
     return f"must be {_either(known)}, not {shown(given)}"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Words faults with the line of their key in a TOML text, or with the override that set it.
+
+    ``option`` is the option of a command that the overrides came by; without one they are an argument.
+    """
+
+    file: str
+    text: str
+    overrides: dict[tuple[str, ...], Any]
+    option: str = ""
+
+    def problems(self, faults: list[Fault]) -> list[str]:
+        """One line for each fault, in the order of the file."""
+        lines = key_lines(self.text.replace("\r\n", "\n"))
+        ordered = sorted(faults, key=lambda fault: self._number(fault.path, lines) or 0)
+        return list(dict.fromkeys(one_line(self._line(fault, lines)) for fault in ordered))
+
+    def _line(self, fault: Fault, lines: dict[Path, int]) -> str:
+        """``file:line: table.key: what is wrong``, or the override in place of the line."""
+        at, place = dotted(fault.path), fault.path[-1] if fault.path else ""
+        said = f"value {place + 1}: {fault.said}" if isinstance(place, int) and fault.path[0] != "sweep" else fault.said
+        for words in self.overrides:
+            if fault.path[: len(words)] == words:
+                return f"{self._named(at)}: {said}{self._cure(words) if fault.kind == 'foreign' else ''}"
+        inside = [words for words in self.overrides if words[: len(fault.path)] == fault.path and fault.path]
+        if inside and fault.kind in ("unknown", "renamed") and fault.path not in lines:
+            return f"{self._named(dotted(inside[0]))}: {at} {said}"
+        number = self._number(fault.path, lines)
+        where = f"{self.file}:{number}" if number else self.file
+        cure = self._cure(inside[0]) if inside and fault.kind == "exclusive" else ""
+        return ": ".join(filter(None, (where, at, f"{said}{cure}")))
+
+    def _named(self, key: str) -> str:
+        """An override as it was given."""
+        return f"{self.option} {key}" if self.option else f'overrides["{key}"]'
+
+    def _cure(self, words: tuple[str, ...]) -> str:
+        """How to replace a whole table, where one of its keys was set beside others of the file."""
+        if len(words) < 2 or words[0] == "sweep":
+            return ""
+        value, table = self.overrides[words], dotted(words[:-1])
+        written = shown(value) if isinstance(value, str | int | float) else "..."
+        if not self.option:
+            return f'; replace the whole table by overrides={{"{table}": {{"{words[-1]}": {written}}}}}'
+        return f"; replace the whole table by {self.option} '{table}={{ {words[-1]} = {written} }}'"
+
+    def _number(self, path: Path, lines: dict[Path, int]) -> int | None:
+        """The line of the key, else of the nearest table above it that the file names."""
+        apart = tuple(word for whole in path for word in (whole.split(".") if isinstance(whole, str) else [whole]))
+        for wanted in (path, apart, tuple(word for word in path if isinstance(word, str))):
+            for length in range(len(wanted), 1 if wanted[:1] == ("sweep",) else 0, -1):
+                if wanted[:length] in lines:
+                    return lines[wanted[:length]]
+        return lines.get(path[:1])
+
+
+def one_line(problem: str) -> str:
+    """A problem on one line that no terminal takes for a command."""
+    return "".join(c if c.isprintable() else "?" if c.isspace() else repr(c)[1:-1] for c in problem)

@@ -1,35 +1,43 @@
-"""From a TOML file to a scenario. Every fault in one pass, each with file, line, key and cure."""
+"""From a TOML file or a dictionary to a scenario. Every fault in one pass, each with its place and the cure."""
 
+import copy
 import functools
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter, ValidationError
-from pydantic_core import PydanticCustomError
 
 from sim.scenario.checks import CHECKED, faults_across
-from sim.scenario.messages import Fault, dotted, shown
+from sim.scenario.declared import with_models
+from sim.scenario.messages import Fault, Place, dotted, faults, shown
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import scenario_shape
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import Axis, set_key, sweep_axes
-from sim.scenario.toml_text import BadInput, Place, Words, monsters, parse, put, read_text, words_of
+from sim.scenario.toml_lines import words_of
+from sim.scenario.toml_text import parse, put, read_text
 from sim.units.quantity import number_and_unit
+from sim.units.refusals import BadInput
+
+__all__ = ["BadInput", "load"]
 
 _DECLARED: dict[str, Any] = getattr(Scenario, "__pydantic_fields__", {})
-_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
+Words = tuple[str | int, ...]
 
 
-def load(path: str | Path, overrides: dict[str, Any] | None = None) -> Scenario:
-    """Read a scenario from a TOML file.
+def load(
+    scenario: str | Path | dict[str, Any], overrides: dict[str, Any] | None = None, *, option: str = ""
+) -> Scenario:
+    """Read a scenario from a TOML file or a dictionary of the same tables and keys.
 
     Parameters
     ----------
-    path : path
-        The file.
+    scenario : path or dict
+        The file, or ``{"clock": {"duration": "1 s", ...}, ...}``.
     overrides : dict, optional
-        Values by dotted key that replace those of the file, ``{"contact.load": "2 mN"}``.
+        Values by dotted key that replace those of the scenario, ``{"contact.load": "2 mN"}``.
+    option : str
+        Other arguments: the option of a command by which the overrides came, for messages.
 
     Returns
     -------
@@ -39,54 +47,49 @@ def load(path: str | Path, overrides: dict[str, Any] | None = None) -> Scenario:
     Raises
     ------
     BadInput
-        With every fault of the file: one syntax fault, or all faults of its values.
+        With every fault: one syntax fault, or all faults of the values.
     """
     overrides = dict(overrides or {})
-    text = read_text(Path(path))
-    document = parse(text, str(path))
-    place = Place(str(path), text, {words_of(key): value for key, value in overrides.items()})
+    if isinstance(scenario, dict):
+        file, text, folder, document = "", "", Path(), copy.deepcopy(scenario)
+    else:
+        file, text, folder = str(scenario), read_text(Path(scenario)), Path(scenario).parent
+        document = parse(text, file)
+    place = Place(file, text, {words_of(key): value for key, value in overrides.items()}, option)
     astray = put(document, place.overrides)
-    if choking := monsters(document):
-        raise BadInput(place.problems(choking))
-    files = Files(Path(path).parent)
+    files = Files(folder)
     sweep = document.pop("sweep", {})
     axes, unfit = sweep_axes(sweep)
-    source = Source(str(path), text, overrides, files.texts)
-    scenario, faults = _validated(document, files, axes, source)
-    faults = astray + _under_new_models(faults, place.overrides)
-    faults += [Fault(("sweep", *where), said) for where, said in unfit]
-    faults += _row_faults(document, files, axes, faults, zipped=isinstance(sweep, list))
-    if scenario is not None and not faults:
-        faults = _point_faults(scenario)
-    if scenario is None or faults:
-        raise BadInput(place.problems(faults))
-    return scenario
+    source = Source(file, text, overrides, files.texts)
+    found, wrong = _validated(document, files, axes, source)
+    wrong = astray + _under_new_models(wrong, place.overrides)
+    wrong += [Fault(("sweep", *where), said) for where, said in unfit]
+    wrong += _row_faults(document, files, axes, wrong, zipped=isinstance(sweep, list))
+    if found is not None and not wrong:
+        wrong = _point_faults(found)
+    if found is None or wrong:
+        raise BadInput(place.problems(wrong))
+    return found
 
 
 def _validated(
     document: dict[str, Any], files: Files, axes: tuple[Axis, ...] = (), source: Source | None = None
 ) -> tuple[Scenario | None, list[Fault]]:
     """The scenario of a document, or all faults of its keys and values."""
-    shape = scenario_shape()
-    faults = list(shape.faults(document))
-    more = {"sweep": axes, "source": source or Source()}
+    document = with_models(Scenario, document)
+    strange = [Fault(("source",), "is not a key", "unknown")] if "source" in document else []
+    made = {**document, "sweep": axes, "source": source or Source()}
     try:
-        return _scenario_type().validate_python({**document, **more}, context={"files": files}), faults
+        scenario = _type(Scenario).validate_python(made, context={"files": files}, by_alias=True, by_name=False)
     except ValidationError as invalid:
-        errors = invalid.errors(include_url=False)
-    unknown = {fault.path for fault in faults if fault.kind in ("unknown", "foreign")}
-    wrong = [shape.worded(error) for error in errors if error["type"] not in _UNKNOWN]
-    meant = {fault.near for fault in faults} | {fault.path for fault in wrong if fault.kind != "missing"}
-    for fault in wrong:
-        told = any(fault.path[:length] in unknown for length in range(1, len(fault.path) + 1))
-        if not told and not (fault.kind == "missing" and fault.path in meant):
-            faults.append(fault)
-    if not any(error["type"] == "across" for error in errors):
-        faults += _faults_between_sound_parts(document, files)
-    return None, list({fault.path: fault for fault in reversed(faults)}.values())[::-1]
+        found = strange + faults(Scenario, invalid, document)
+        if not any(error["type"] == "across" for error in invalid.errors(include_url=False)):
+            found += _faults_between_sound_parts(document, files)
+        return None, list({fault.path: fault for fault in reversed(found)}.values())[::-1]
+    return scenario, strange
 
 
-def _under_new_models(faults: list[Fault], overrides: dict[Words, Any]) -> list[Fault]:
+def _under_new_models(faults: list[Fault], overrides: dict[tuple[str, ...], Any]) -> list[Fault]:
     """One fault for all keys of the file that a model chosen by an override does not take."""
     for words in (words for words in overrides if words[-1:] == ("model",)):
         others = [fault for fault in faults if fault.kind == "foreign" and fault.path[:-1] == words[:-1]]
@@ -104,7 +107,8 @@ def _faults_between_sound_parts(document: dict[str, Any], files: Files) -> list[
         declared = _DECLARED[name]
         try:
             if name in document:
-                parts[name] = _part_type(name).validate_python(document[name], context={"files": files})
+                context = {"files": files}
+                parts[name] = _part(name).validate_python(document[name], context=context, by_alias=True, by_name=False)
             elif not declared.is_required():
                 parts[name] = declared.get_default(call_default_factory=True)
         except ValidationError:
@@ -140,10 +144,14 @@ def _swept(fault: Fault, axis: Axis, places: list[int], zipped: bool) -> Fault:
         key for key, path in paths.items() if fault.path[: len(path)] == path or path[: len(fault.path)] == fault.path
     )
     key = next(inside, axis.keys[0])
-    if fault.kind == "unknown" and paths[key][: len(fault.path)] == fault.path:
+    if fault.kind in ("unknown", "renamed") and paths[key][: len(fault.path)] == fault.path:
         meant = (*fault.near, *paths[key][len(fault.path) :])
-        said = f'is not a key; did you mean "{dotted(meant)}"?' if fault.near else fault.said
-        return Fault(("sweep", key), said, "unknown")
+        asked = (
+            f'is now called "{dotted(meant)}"'
+            if fault.kind == "renamed"
+            else f'is not a key; did you mean "{dotted(meant)}"?'
+        )
+        return Fault(("sweep", key), asked if fault.near else fault.said, fault.kind)
     value = axis.values[places[0]][axis.keys.index(key)]
     split = number_and_unit(value)
     written = f"{split[0]:g} {split[1]}".strip() if split else shown(value)
@@ -157,23 +165,17 @@ def _point_faults(scenario: Scenario) -> list[Fault]:
     """What goes wrong only where values of several axes meet."""
     try:
         scenario.points()
-    except ValidationError as errors:
-        return [
-            Fault(("sweep",), f"some values do not go together: {dotted(fault.path)}: {fault.said}")
-            for fault in map(scenario_shape().worded, errors.errors(include_url=False))
-        ]
-    except PydanticCustomError as fault:
-        return [Fault(("sweep",), fault.message())]
+    except BadInput as fault:
+        return [Fault(("sweep",), said) for said in fault.problems]
     return []
 
 
 @functools.cache
-def _scenario_type() -> TypeAdapter:
-    return TypeAdapter(Scenario)
+def _type(kind: Any) -> TypeAdapter:
+    return TypeAdapter(kind)
 
 
-@functools.cache
-def _part_type(name: str) -> TypeAdapter:
+def _part(name: str) -> TypeAdapter:
     declared = _DECLARED[name]
     kind: Any = declared.annotation
-    return TypeAdapter(Annotated[kind, Field(discriminator=declared.discriminator)] if declared.discriminator else kind)
+    return _type(Annotated[kind, Field(discriminator=declared.discriminator)] if declared.discriminator else kind)

@@ -26,14 +26,19 @@ from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import SmoothProcess
 from sim.scenario.checks import CHECKED, _reads_forces, _rest_radius, faults_across
 from sim.scenario.clock import Clock, Ensemble, Record
+from sim.scenario.declared import with_models
+from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import read_sweep, set_key
 from sim.spectrum.finite_contact import Margin
+from sim.units.quantity import Quantity
+from sim.units.refusals import BadInput
 
 #: Columns that a part has read from its file, read anew where its table changes.
 _FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
 
 
+@plain_spoken
 @dataclass(frozen=True, config={"extra": "forbid", "arbitrary_types_allowed": True})
 class Scenario:
     """One sliding contact, ready to run. Parts left out are the shallowest: at rest, unbroken bonds, uniform stress.
@@ -66,7 +71,7 @@ class Scenario:
     record: Record = Field(default_factory=Record)
     sweep: Annotated[tuple[Any, ...], BeforeValidator(lambda sweep: read_sweep(sweep))] = ()
     name: Annotated[str, Field(max_length=200)] = "sliding contact"
-    seed: Annotated[int, Field(ge=0, le=2**64 - 1, description="seed of the run")] = 0
+    seed: Annotated[int, Quantity("1", "seed of the run", at_least=0, at_most=2**64 - 1, whole=True)] = 0
     source: Annotated[Any, Field(exclude=True)] = Source()
 
     @model_validator(mode="after")
@@ -185,7 +190,7 @@ class Scenario:
 
         Raises
         ------
-        pydantic.ValidationError
+        BadInput
             If a key is unknown or a value is not admissible.
         """
         document = TypeAdapter(Scenario).dump_python(self, by_alias=True, exclude={"source", "sweep"})
@@ -194,26 +199,30 @@ class Scenario:
             _forget_file(document, key)
         document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
         files = Files(Path(self.source.path).parent, self.source.files)
-        return TypeAdapter(Scenario).validate_python(document, context={"files": files})
+        with in_plain_words(Scenario, document):
+            return TypeAdapter(Scenario).validate_python(with_models(Scenario, document), context={"files": files})
 
     def points(self) -> list["Scenario"]:
         """The scenario at each point of its sweep, the last axis fastest; one point where there is none.
 
         Raises
         ------
-        ValueError
+        BadInput
             If values do not go together, or points would not fit into one dataset.
         """
         values: list[dict[str, Any]] = [{}]
         for axis in self.sweep:
             values = [{**point, **dict(zip(axis.keys, row, strict=True))} for point in values for row in axis.values]
-        points = [self.with_values(point) for point in values]
+        try:
+            points = [self.with_values(point) for point in values]
+        except BadInput as fault:
+            raise BadInput([f"some values do not go together: {said}" for said in fault.problems]) from None
         for what, found in (
             ("records; give clock.record", {point.clock.records for point in points}),
             ("maps; run once for each cell and number of points", set(map(_map_size, points))),
         ):
             if len(found) > 1:
-                raise PydanticCustomError("unlike_points", f"the points of the sweep would have different {what}")
+                raise BadInput([f"the points of the sweep would have different {what}"])
         return points
 
 

@@ -1,18 +1,12 @@
 """JSON schema of scenario files."""
 
-import functools
 from typing import Any
 
 from pydantic import TypeAdapter
 
-from sim.scenario.messages import Shape
+from sim.parts.contact import Equilibrium
+from sim.scenario.declared import all_tables, keys, model
 from sim.scenario.scenario import Scenario
-
-
-@functools.cache
-def scenario_shape() -> Shape:
-    """The keys that a scenario file may have."""
-    return Shape(scenario_schema())
 
 
 def scenario_schema() -> dict[str, Any]:
@@ -21,9 +15,12 @@ def scenario_schema() -> dict[str, Any]:
     for table in schema["$defs"].values():
         if "file" in table["properties"] and "file" not in table.get("required", ()):
             table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
-    for name in _in_unions(schema):  # there the model tells the tables apart, so it cannot be left out
+    simplest = [field.default_factory or Equilibrium for _, field in all_tables(Scenario)]
+    optional = [(model(table), keys(table).keys()) for table in simplest if isinstance(table, type)]
+    for name in _in_unions(schema):  # there the model tells the tables apart; only the simplest may leave it out
         table = schema["$defs"][name]
-        if "model" in table["properties"] and name != "Equilibrium":  # which a contact without a model is
+        own = table["properties"].get("model", {}).get("const")
+        if own is not None and (own, table["properties"].keys()) not in optional:
             table["required"] = ["model", *table.get("required", ())]
     schema["properties"].pop("source", None)
     schema["properties"]["sweep"] = {

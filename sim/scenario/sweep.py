@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from sim.units.quantity import number_and_unit
+from sim.units.quantity import number_and_unit, same_unit
 
 _SHARED = ("clock", "clock.duration", "clock.record", "name", "ensemble", "record")
 _RANGE = ("from", "to", "count", "scale")
@@ -147,9 +147,9 @@ def _range_fault(values: dict[str, Any]) -> str | None:
     ends = [number_and_unit(values[end]) for end in ("from", "to")]
     if ends[0] is None or ends[1] is None:
         return "the range needs finite numbers, with or without a unit, as from and to"
-    if ends[0][1] != ends[1][1]:
+    if same_unit(values["from"], values["to"]) is None:
         given = [f'"{unit}"' if unit else "no unit" for _, unit in (ends[0], ends[1])]
-        return f"the range goes from {given[0]} to {given[1]}; write both ends in the same unit"
+        return f"the range goes from {given[0]} to {given[1]}; write both ends in units of one dimension"
     if type(values["count"]) is not int or not 2 <= values["count"] <= _MOST_POINTS:
         return f"the count of the range must be a whole number from 2 to {_MOST_POINTS:,}"
     scale = values.get("scale", "linear")
@@ -162,7 +162,7 @@ def _range_fault(values: dict[str, Any]) -> str | None:
 
 def _spaced(values: dict[str, Any]) -> list[Any]:
     """Evenly spaced values of a sound range, linearly or logarithmically."""
-    (first, unit), (last, _) = (number_and_unit(values[end]) for end in ("from", "to"))  # type: ignore[misc]
+    first, last, unit = same_unit(values["from"], values["to"])  # type: ignore[misc]
     spacing = np.geomspace if values.get("scale") == "log" else np.linspace
     numbers = spacing(first, last, values["count"]).tolist()
-    return [f"{number!r} {unit}" for number in numbers] if unit else numbers
+    return numbers if unit is None else [f"{number!r} {unit}".strip() for number in numbers]

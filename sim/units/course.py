@@ -18,6 +18,7 @@ from sim.units.quantity import Quantity
 from sim.units.table import TableError, columns, file_text
 
 _TIME = Quantity("s", "time", "t")
+_CYCLES = Quantity("1", "cycles there and back; 0: one way", at_least=0, at_most=10**6, whole=True)
 #: Times nearer than this share of the run are meant to be the same.
 _SAME = 1e-9
 
@@ -253,7 +254,7 @@ def held(unit: Quantity, name: str) -> Any:
 
         start: Annotated[float, unit, Field(alias="from")]
         stop: Annotated[float, unit, Field(alias="to")]
-        cycles: Annotated[int, Field(ge=0, le=10**6, description="cycles there and back; 0: one way")] = 0  # type: ignore[misc]
+        cycles: Annotated[int, _CYCLES] = 0  # type: ignore[misc]
 
     @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
     class _Table(Table):

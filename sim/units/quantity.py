@@ -55,6 +55,13 @@ def _units() -> Any:
         return pint.UnitRegistry()
 
 
+def _written(unit: str) -> str:
+    """A unit's text as pint reads it; ValueError for what is no product of names with small powers."""
+    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        raise ValueError(unit)
+    return re.sub(r"^/", "1/", _POWER.sub(r"\1^\2", unit))
+
+
 @functools.lru_cache(maxsize=1024)
 def _scale(unit: str, target: str) -> float | None:
     """Factor from ``unit`` to ``target``; None where the dimensions differ, ValueError if unknown."""
@@ -106,6 +113,13 @@ def number_and_unit(value: Any) -> tuple[float, str] | None:
     return (number, (match and match["unit"]) or "") if math.isfinite(number) else None
 
 
+def _digits(number: float) -> str:
+    """A number for a message."""
+    if isinstance(number, int) and abs(number) < 10**40:
+        return str(number)
+    return f"{_finite(number):g}"
+
+
 def _finite(value: Any) -> float:
     """A number as a float, nan where it is too large for one."""
     try:
@@ -114,13 +128,36 @@ def _finite(value: Any) -> float:
         return math.nan
 
 
+def same_unit(first: Any, last: Any) -> tuple[float, float, str | None] | None:
+    """Two numbers in the unit of the first, and that unit's text: None of bare numbers, "" of texts without one.
+
+    None if they are not of one dimension.
+
+    >>> same_unit("10 um/s", "3 mm/s")
+    (10.0, 3000.0, 'um/s')
+    """
+    start, stop = number_and_unit(first), number_and_unit(last)
+    if start is None or stop is None or isinstance(first, str) != isinstance(last, str):
+        return None
+    (low, unit), (high, other) = start, stop
+    if unit != other:
+        try:
+            scale = _scale(_written(other), _written(unit)) if unit and other else None
+        except ValueError:
+            scale = None
+        if scale is None:
+            return None
+        high = _times(high, scale)
+    return low, high, unit if isinstance(first, str) else None
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Declaration of a number: its SI ``unit``, ``meaning``, ``symbol`` and bounds.
 
     ``above`` and ``below`` exclude the bound, ``at_least`` and ``at_most`` include it. Beside its
     own bounds no number may exceed 1e60, nor one that excludes zero fall below 1e-60. Messages show
-    ``typical`` as an example, without it a usual value of the unit.
+    ``typical`` as an example, without it a usual value of the unit. A ``whole`` number is read as an int.
 
     Examples
     --------
@@ -137,6 +174,7 @@ class Quantity:
     below: float = math.inf
     at_most: float = math.inf
     typical: str = ""
+    whole: bool = False
 
     def read(self, value: Any) -> float:
         """The value in SI from a number or a string such as ``"42 mJ/m^2"``.
@@ -144,14 +182,26 @@ class Quantity:
         Raises
         ------
         PydanticCustomError
-            (a ValueError) if it is not a number, has the wrong dimension, is not finite or lies
-            outside the bounds; the message names the cure.
+            (a ValueError) if it is not a number, is text without a unit, has the wrong dimension, is not
+            finite or lies outside the bounds; the message names the cure.
         """
+        if self.whole:
+            return self._integer(value)
         number = self._parse(value) if isinstance(value, str) else self._number(value)
         if not math.isfinite(number):
             raise PydanticCustomError("not_finite", "must be finite; write for example {example}", self._about())
         self._check(number)
         return number
+
+    def _integer(self, value: Any) -> int:
+        whole = hasattr(value, "__index__") or (isinstance(value, float) and value.is_integer())
+        if isinstance(value, bool) or not whole:
+            given = f"{value:g}" if isinstance(value, float) else in_words(value)
+            about = {"given": f'"{value[:40]}"' if isinstance(value, str) else given, **self._about()}
+            text = "must be a whole number such as {example}, not {given}"
+            raise PydanticCustomError("not_a_quantity", text, about)
+        self._check(int(value))
+        return int(value)
 
     def _number(self, value: Any) -> float:
         if isinstance(value, bool) or not hasattr(value, "__float__"):
@@ -174,15 +224,18 @@ class Quantity:
                 {"text": text[:40], "cure": cure, **self._about()},
             )
         number = float(match["number"])
-        return number if match["unit"] is None else _times(number, self._factor(match["unit"]))
+        if match["unit"] is not None:
+            return _times(number, self._factor(match["unit"]))
+        if self.unit != "1" and math.isfinite(number):
+            said = "is text without a unit; write for example {example}, or a bare number in {wanted}"
+            raise PydanticCustomError("no_unit", said, {"wanted": self.wanted, **self._about()})
+        return number
 
     def _factor(self, given: str) -> float:
         """Factor from a unit's text to SI."""
         about = {"given": given[:40], "wanted": self.wanted, **self._about()}
         try:
-            if len(given) > _LONGEST_UNIT or not _UNIT.fullmatch(given):
-                raise ValueError(given)
-            scale = _scale(re.sub(r"^/", "1/", _POWER.sub(r"\1^\2", given)), self.unit)
+            scale = _scale(_written(given), self.unit)
         except ValueError:
             near = self._near(given)
             if near:
@@ -214,7 +267,7 @@ class Quantity:
                 raise PydanticCustomError(
                     "out_of_bounds",
                     "must be {text} {bound}{unit}, not {number}{unit}",
-                    {"text": text, "bound": f"{bound:g}", "number": f"{number:g}", **self._about()},
+                    {"text": text, "bound": _digits(bound), "number": _digits(number), **self._about()},
                 )
         if abs(number) > _LARGEST or (self.above >= 0.0 and number < _SMALLEST):
             size = "large" if abs(number) > 1.0 else "small"
@@ -240,6 +293,8 @@ class Quantity:
         """An admissible value as it is written in a scenario file."""
         if self.typical:
             return f'"{self.typical}"'
+        if self.whole:
+            return "64"
         if self.unit in _TYPICAL and self._holds(1e-6) and self._holds(1e6):
             return f'"{_TYPICAL[self.unit]}"'
         usual = (0.5, 1.0) if math.isfinite(min(self.below, self.at_most)) else (1.0, 0.5)
@@ -251,12 +306,15 @@ class Quantity:
         return self.above < number < self.below and self.at_least <= number <= self.at_most
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        kind = int if self.whole else float
         return core_schema.no_info_plain_validator_function(
-            self.read, serialization=core_schema.plain_serializer_function_ser_schema(float)
+            self.read, serialization=core_schema.plain_serializer_function_ser_schema(kind)
         )
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict:
         described: dict[str, Any] = {"type": ["number", "string"], "description": f"{self.meaning} [{self.unit}]"}
+        if self.whole:
+            described = {"type": "integer", "description": self.meaning}
         bounds = {
             "exclusiveMinimum": self.above,
             "minimum": self.at_least,
@@ -264,4 +322,5 @@ class Quantity:
             "maximum": self.at_most,
         }
         described |= {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
-        return described | {"examples": [self.example.strip('"') if self.unit != "1" else float(self.example)]}
+        example: Any = self.example.strip('"')
+        return described | {"examples": [64 if self.whole else float(example) if self.unit == "1" else example]}

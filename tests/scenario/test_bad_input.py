@@ -1,4 +1,8 @@
-"""What a scenario file can get wrong: each fault is told once, with its line, its key and the cure."""
+"""What a scenario file can get wrong: each fault once, at its line and key, with the cure.
+
+The tests hold a fault's place and the words that carry its kind and cure; the sentences themselves are golden
+only in GOLDEN.
+"""
 
 import os
 import re
@@ -70,27 +74,57 @@ def line_of(text):
 
 @pytest.fixture
 def refusal(tmp_path, monkeypatch):
-    """Load a text, or the lens with parts replaced, and give the problems with "x" for the file."""
+    """Load the lens with parts replaced, or another text, and give the problems with "x" for the file."""
     monkeypatch.chdir(tmp_path)
 
-    def refused(text=None, overrides=None, **replaced):
-        if text is None:
-            text = LENS
-            for old, new in replaced.pop("edits", ()):
-                assert old in text, old
-                text = text.replace(old, new, 1)
+    def refused(*edits, text=LENS, overrides=None):
+        for old, new in edits:
+            assert old in text, old
+            text = text.replace(old, new, 1)
         before = set(tmp_path.iterdir())
         Path("x").write_bytes(text if isinstance(text, bytes) else text.encode())
         with pytest.raises(BadInput) as fault:
-            load("x", overrides)
+            load("x", overrides, option="--set")
         assert set(tmp_path.iterdir()) == before | {tmp_path / "x"}
         return fault.value.problems
 
     return refused
 
 
-def edited(*edits):
-    return {"edits": edits}
+def told(problem, line, key, words):
+    """Whether a problem is told at a line and key with some words, parted by `...`."""
+    start = f"x:{line}: {key}: " if line else f"{key}: "
+    return problem.startswith(start) and all(word in problem[len(start) :] for word in words.split("..."))
+
+
+# --- some sentences as they are ---
+
+GOLDEN = [
+    ('rms = "150 kPa"', 'rsm = "150 kPa"', 'shear.spectrum.rsm: is not a key; did you mean "rms"?'),
+    ('step = "5 ms"', 'step = "5 ms"\nload = 1', 'clock.load: is not a key here; did you mean "contact.load"?'),
+    ("members = 4", "members = 4\nxyz = 1", "ensemble.xyz: is not a key; known: members"),
+    ('rebinding_rate = "500 1/s"', 'healing = "500 1/s"', 'bonds.healing: is now called "rebinding_rate"'),
+    ('model = "rate"', 'model = "steady"', 'bonds.rebinding_rate: is not a key of model = "steady"; remove it, or '
+     'choose model = "rate", "cohort", "counted", "tracked" or "auto"'),
+    ('model = "modal"', 'model = "modl"', 'shear.model: must not be "modl"; did you mean "modal"?'),
+    ('model = "slip"', 'model = "magnetic"', 'shear.correlation.model: must be "time", "slip", "wave" or "diffusion", '
+     'not "magnetic"'),
+    ('work = "42 mJ/m^2"', 'work = "42 mJ"', 'adhesion.work: has the unit "mJ", which is not a unit of J/m^2; write '
+     'for example "42 mJ/m^2"'),
+    ('radius = "2 mm"', 'radius = "9.4"', 'sphere.radius: is text without a unit; write for example "2 mm", or '
+     "a bare number in m"),
+    ('radius = "2 mm"', 'radius = "-2 mm"', "sphere.radius: must be above 0 m, not -0.002 m"),
+    ('[sphere]\nradius = "2 mm"', "[sphere]", 'sphere.radius: is missing; add for example radius = "2 mm"'),
+    ("members = 4", "members = 4.5", "ensemble.members: must be a whole number such as 64, not 4.5"),
+    ('step = "5 ms"', 'step = "3 ms"', "clock: duration (2 s) must be a whole multiple of step (0.003 s), such as "
+     "1.998 s or 2.001 s"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "said"), GOLDEN, ids=[row[2].split(":")[0] for row in GOLDEN])
+def test_a_fault_is_one_sentence_with_place_and_cure(refusal, old, new, said):
+    (problem,) = refusal((old, new))
+    assert re.fullmatch(r"x:\d+: " + re.escape(said), problem), problem
 
 
 # --- keys ---
@@ -99,59 +133,81 @@ def edited(*edits):
 @pytest.mark.parametrize(
     ("line", "wrong", "key", "meant"),
     [
-        ('rms = "150 kPa"', 'rsm = "150 kPa"', "shear.spectrum.rsm", "rms"),
         ('step = "5 ms"', 'stpe = "5 ms"', "clock.stpe", "step"),
         ("seed = 7", "sede = 7", "sede", "seed"),
         ('critical_speed = "10 mm/s"', 'crit_speed = "10 mm/s"', "bonds.crit_speed", "critical_speed"),
         ("[sphere]", "[shpere]", "shpere", "sphere"),
         ("[shear.correlation]", "[shear.corelation]", "shear.corelation", "correlation"),
         ("members = 4", "member = 4", "ensemble.member", "members"),
+        ('model = "slip"', 'modle = "slip"', "shear.correlation.modle", "model"),
+        ('model = "ramp"', 'modle = "ramp"', "drive.modle", "model"),
+        ('model = "ramp"\nfrom', 'model = "ramp"\nfrm', "drive.frm", "from"),
     ],
 )
 def test_a_misspelt_key_is_told_once_with_the_one_meant(refusal, line, wrong, key, meant):
-    assert refusal(**edited((line, wrong))) == [f'x:{line_of(line)}: {key}: is not a key; did you mean "{meant}"?']
-
-
-def test_a_misspelt_key_of_an_inline_table_is_told_with_the_one_meant(refusal):
-    body = 'counter_body = { youngs_modulus = "1 GPa", poison = 0.3 }'
-    assert refusal(**edited(("[solid]", f"[solid]\n{body}"))) == [
-        f'x:{line_of("[solid]") + 1}: solid.counter_body.poison: is not a key; did you mean "poisson_ratio"?'
-    ]
+    (problem,) = refusal((line, wrong))
+    at = line_of(line.split("\n")[-1]) if "\n" not in line else line_of('from = "10 um/s"')
+    assert told(problem, at, key, f'did you mean "{meant}"')
 
 
 @pytest.mark.parametrize(
-    ("line", "added", "key", "meant"),
+    ("added", "key", "meant"),
     [
-        ('step = "5 ms"', 'load = "1 mN"', "clock.load", "contact.load"),
-        ("points = 32", 'rms = "1 kPa"', "shear.rms", "shear.spectrum.rms"),
-        ("hurst = 0.8", 'cell = "1 mm"', "shear.spectrum.cell", "shear.cell"),
-        ("seed = 7", "members = 3", "members", "ensemble.members"),
+        ('counter_body = { youngs_modulus = "1 GPa", poison = 0.3 }', "solid.counter_body.poison", "poisson_ratio"),
+        ('load = "1 mN"', "solid.load", "contact.load"),
+        ("members = 3", "solid.members", "ensemble.members"),
+        ('rms = "1 kPa"', "solid.rms", "shear.spectrum.rms"),
+        ('cell = "1 mm"', "solid.cell", "shear.cell"),
     ],
 )
-def test_a_key_in_the_wrong_table_is_told_with_the_right_one(refusal, line, added, key, meant):
-    found = refusal(**edited((line, f"{line}\n{added}")))
-    assert found == [f'x:{line_of(line) + 1}: {key}: is not a key here; did you mean "{meant}"?']
-
-
-def test_a_key_of_another_model_is_told_with_the_models_that_have_it(refusal):
-    at = line_of('rebinding_rate = "500 1/s"')
-    assert refusal(**edited(('model = "rate"', 'model = "steady"'))) == [
-        f'x:{at}: bonds.rebinding_rate: is not a key of model = "steady";'
-        ' remove it, or choose model = "rate", "cohort", "counted", "tracked" or "auto"'
-    ]
-
-
-def test_a_key_like_none_is_told_with_those_there_are(refusal):
-    assert refusal(**edited(("members = 4", "members = 4\nxyz = 1"))) == [
-        f"x:{END + 1}: ensemble.xyz: is not a key; known: members"
-    ]
+def test_a_key_of_another_table_or_of_an_inline_one_is_told_with_the_one_meant(refusal, added, key, meant):
+    (problem,) = refusal(("[solid]", f"[solid]\n{added}"))
+    assert told(problem, line_of("[solid]") + 1, key, f'did you mean "{meant}"')
 
 
 def test_strange_keys_stay_on_one_line_and_reach_no_terminal(refusal):
-    for problem in refusal('"" = 1\n"a b" = 2\n"\\u001b[31m" = 3\n"x\\ny" = 4\n' + LENS):
-        assert problem.isprintable()
-    first = refusal('"" = 1\n' + LENS)
-    assert first[0].startswith('x:1: "": is not a key; known: clock, ')
+    found = refusal(text='"" = 1\n"a b" = 2\n"\\u001b[31m" = 3\n"x\\ny" = 4\nsource = 5\n' + LENS)
+    assert len(found) == 5
+    assert all(problem.isprintable() for problem in found)
+
+
+#: Every name of 0.1.0 that a scenario could hold: what it stood in, and its present name.
+OLD = [
+    ('rebinding_rate = "500 1/s"', 'healing = "500 1/s"', "bonds.healing", "rebinding_rate"),
+    ("[shear.correlation]", "[shear.memory]", "shear.memory", "correlation"),
+    ("[contact]", '[shear.growth]\nmodel = "constant"\n[contact]', "shear.growth", "amplitude"),
+    ("points = 32", 'amplitudes = "fixed"', "shear.amplitudes", "mode_amplitudes"),
+    ('load = "4 mN"', 'load = "4 mN"\non_detach = "stop"', "contact.on_detach", "after_pull_off"),
+    ('load = "4 mN"', 'travel = "1 um"\nstiffness = 1', "contact.travel", "displacement"),
+    ('load = "4 mN"', "load = { from = 1, to = 2, trips = 2 }", "contact.load.trips", "cycles"),
+    ('load = "4 mN"', 'load = 1\nmodel = "lagging"', "contact.model", "rate_dependent"),
+    ('critical_speed = "10 mm/s"', 'hazard = { model = "bell" }', "bonds.hazard", "rupture"),
+    ('rms = "150 kPa"\nhurst = 0.8\nlongest = "60 um"\nrolloff = "24 um"\nshortest = "16 um"',
+     'wavenumbers = [1, 2]\ndensities = [1, 1]\nconvention = "menga"', "shear.spectrum.convention", "normalization"),
+    ('rms = "150 kPa"\nhurst = 0.8\nlongest = "60 um"\nrolloff = "24 um"\nshortest = "16 um"',
+     'wavenumbers = [1, 2]\ndensities = [1, 1]\nnormalization = "persson"', "shear.spectrum.normalization",
+     "in_density"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "key", "now"), OLD, ids=[row[2] for row in OLD])
+def test_an_old_key_or_word_is_answered_with_its_present_name(refusal, old, new, key, now):
+    edits = [('model = "self_affine"', 'model = "tabulated"')] if "wavenumbers" in new else []
+    problems = refusal(*edits, (old, new))
+    (problem,) = [problem for problem in problems if "is now called" in problem]
+    text = LENS.replace(*edits[0]) if edits else LENS
+    lines = text.replace(old, new, 1).splitlines()
+    at = int(problem.split(":")[1])
+    assert told(problem, at, key, f'is now called "{now}"')
+    assert re.search(rf"\b{key.split('.')[-1]}\b", lines[at - 1])
+    assert not any(f".{now}: is missing" in other for other in problems)
+
+
+def test_an_old_key_of_a_sweep_or_of_an_override_is_answered_too(refusal):
+    (problem,) = refusal(text=LENS + '[sweep]\n"contact.travel" = [1, 2]\n')
+    assert told(problem, END + 2, 'sweep."contact.travel"', 'is now called "contact.displacement"')
+    (problem,) = refusal(overrides={"shear.memory.length": 1})
+    assert told(problem, 0, "--set shear.memory.length", 'shear.memory is now called "correlation"')
 
 
 # --- missing ---
@@ -160,79 +216,89 @@ def test_strange_keys_stay_on_one_line_and_reach_no_terminal(refusal):
 def test_missing_keys_and_tables_are_told_with_an_example(refusal):
     text = '[clock]\nduration = "1 s"\n[solid]\n[contact]\nload = 0\n'
     text += '[bonds]\nmodel = "counted"\n[shear]\nmodel = "modal"\n'
-    found = refusal(text)
-    assert found[:2] == [
-        "x: sphere: is missing; add the table [sphere] with radius",
-        "x: adhesion: is missing; add the table [adhesion] with work",
-    ]
-    assert 'x:1: clock.step: is missing; add for example step = "10 ms"' in found
-    assert 'x:6: bonds.rebinding_rate: is missing; add for example rebinding_rate = "500 1/s"' in found
-    assert "x:6: bonds.sites: is missing; add for example sites = 64" in found
-    correlation = 'the table [shear.correlation] with model = "time", "slip", "wave" or "diffusion"'
-    assert f"x:8: shear.correlation: is missing; add {correlation}" in found
-    solid = next(problem for problem in found if problem.startswith("x:3: solid: "))
-    assert 'shear_modulus = "1.6 MPa" or youngs_modulus = "4.8 MPa"' in solid
+    found = refusal(text=text)
+    for line, key, words in (
+        (0, "sphere", "is missing...[sphere] with radius"),
+        (0, "adhesion", "is missing...[adhesion] with work"),
+        (1, "clock.step", 'is missing...step = "10 ms"'),
+        (3, "solid", 'shear_modulus = "1.6 MPa" or youngs_modulus = "4.8 MPa"'),
+        (6, "bonds.rebinding_rate", 'is missing...rebinding_rate = "500 1/s"'),
+        (6, "bonds.sites", "is missing...sites = 64"),
+        (8, "shear.spectrum", 'is missing...[shear.spectrum] with model = "ripple", '),
+        (8, "shear.correlation", 'is missing...model = "time", "slip", "wave" or "diffusion"'),
+    ):
+        key = key if line else f"x: {key}"
+        assert any(told(problem, line, key, words) for problem in found), key
 
 
-def test_a_missing_model_is_told_with_the_choices(refusal):
-    assert refusal(**edited(('[bonds]\nmodel = "rate"', "[bonds]"))) == [
-        f"x:{line_of('[bonds]')}: bonds.model: is missing;"
-        ' choose "none", "steady", "rate", "cohort", "counted", "tracked" or "auto"'
-    ]
+@pytest.mark.parametrize(
+    ("old", "new", "key", "words"),
+    [
+        ('[bonds]\nmodel = "rate"', "[bonds]", "bonds.model", 'choose "rate", "counted" or "auto"'),
+        ('model = "ramp"\n', "", "drive.model", 'choose "ramp"'),
+        ('model = "modal"\n', "", "shear.model", 'choose "banded", "modal", "mapped" or "auto"'),
+        ('model = "slip"\n', "", "shear.correlation.model", 'choose "slip"'),
+        ('model = "self_affine"\n', "", "shear.spectrum.model", 'choose "self_affine"'),
+    ],
+)
+def test_a_model_that_cannot_be_known_is_told_with_those_that_have_the_keys(refusal, old, new, key, words):
+    (problem,) = refusal((old, new))
+    assert told(problem, line_of(f"[{key.removesuffix('.model')}]"), key, f"is missing...{words}")
 
 
-def test_a_misspelt_model_is_told_with_the_one_meant_or_all(refusal):
-    assert refusal(**edited(('model = "modal"', 'model = "modl"'))) == [
-        f'x:{line_of("[shear]") + 1}: shear.model: must not be "modl"; did you mean "modal"?'
-    ]
-    assert refusal(**edited(('model = "slip"', 'model = "magnetic"'))) == [
-        f"x:{line_of('[shear.correlation]') + 1}: shear.correlation.model:"
-        ' must be "time", "slip", "wave" or "diffusion", not "magnetic"'
-    ]
+def test_a_table_of_text_is_told_how_it_is_written(refusal):
+    text = 'drive = "steady"\n' + re.sub(r"(?s)\[drive\].*?\n\n", "", LENS)
+    (problem,) = refusal(text=text)
+    assert told(problem, 1, "drive", 'must be a table...drive = { model = "steady" }')
+    for old, new, words in (
+        ('[sphere]\nradius = "2 mm"', 'sphere = "2 mm"', "must be a table...[sphere]"),
+        ("[ensemble]\nmembers = 4", "ensemble = 4", "must be a table...[ensemble]"),
+    ):
+        (problem,) = refusal(text=f"{new}\n{LENS.replace(old, '')}")
+        assert told(problem, 1, new.split(" ")[0], words)
+    (problem,) = refusal(("[sphere]", "[[sphere]]"))
+    assert told(problem, line_of("[sphere]"), "sphere", "one table...[sphere]")
 
 
 # --- values ---
 
 
 @pytest.mark.parametrize(
-    ("line", "wrong", "said"),
+    ("line", "wrong", "words"),
     [
-        ('work = "42 mJ/m^2"', 'work = "42 mJ"', 'has the unit "mJ", which is not a unit of J/m^2; write for example'),
-        ('work = "42 mJ/m^2"', 'work = "42 mJx/m^2"', 'has the unknown unit "mJx/m^2"; did you mean "mJ/m^2"?'),
-        (
-            'radius = "2 mm"',
-            'radius = "2 MPa"',
-            'has the unit "MPa", which is not a unit of m; write for example "2 mm"',
-        ),
-        ('radius = "2 mm"', "radius = nan", 'must be finite; write for example "2 mm"'),
-        ('radius = "2 mm"', "radius = -inf", 'must be finite; write for example "2 mm"'),
-        ('radius = "2 mm"', 'radius = "-2 mm"', "must be above 0 m, not -0.002 m"),
-        ('radius = "2 mm"', "radius = 0", "must be above 0 m, not 0 m"),
-        ('radius = "2 mm"', 'radius = ""', 'cannot be read: ""; write a number and a unit, such as "2 mm"'),
-        ('radius = "2 mm"', "radius = true", 'must be a number or text with a unit such as "2 mm", not true'),
-        ('radius = "2 mm"', "radius = [2]", 'must be a number or text with a unit such as "2 mm", not a list'),
-        ('radius = "2 mm"', "radius = { a = 1 }", 'must be a number or text with a unit such as "2 mm", not a table'),
-        ('radius = "2 mm"', "radius = 1979-05-27", 'must be a number or text with a unit such as "2 mm", not a date'),
-        ("hurst = 0.8", "hurst = 1.5", "must be at most 1, not 1.5"),
-        ("hurst = 0.8", "hurst = false", "must be a number such as 0.5, not false"),
-        ("members = 4", "members = 0", "must be at least 1, not 0"),
-        ("members = 4", "members = 4.5", "must be a whole number such as 64, not 4.5"),
-        ("members = 4", 'members = "many"', 'must be a whole number such as 64, not "many"'),
-        ("members = 4", "members = true", "must be a whole number such as 64, not true"),
-        ("points = 32", "points = true", "must be a whole number such as 64, not true"),
-        ("seed = 7", "seed = -1", "must be at least 0, not -1"),
-        ("seed = 7", "seed = 18446744073709551616", "must be at most 18446744073709551615, not 18446744073709551616"),
-        ('name = "lens"', "name = 5", "must be text in quotes, not 5"),
-        ('name = "lens"', f'name = "{"x" * 201}"', "is longer than 200 characters; shorten it"),
-        ('scale = "log"', 'scale = "logarithmic"', 'must be "linear" or "log", not "logarithmic"'),
-        ('scale = "log"', 'scale = "lin"', 'must not be "lin"; did you mean "linear"?'),
+        ('work = "42 mJ/m^2"', 'work = "42 mJx/m^2"', 'unknown unit "mJx/m^2"...did you mean "mJ/m^2"'),
+        ('radius = "2 mm"', 'radius = "2 MPa"', 'unit "MPa"...not a unit of m'),
+        ('radius = "2 mm"', 'radius = "0"', "without a unit"),
+        ('radius = "2 mm"', "radius = nan", "finite"),
+        ('radius = "2 mm"', "radius = -inf", "finite"),
+        ('radius = "2 mm"', "radius = 0", "above 0 m"),
+        ('radius = "2 mm"', 'radius = ""', 'such as "2 mm"'),
+        ('radius = "2 mm"', "radius = true", "must be a number...not true"),
+        ('radius = "2 mm"', "radius = [2]", "must be a number...not a list"),
+        ('radius = "2 mm"', "radius = { a = 1 }", "must be a number...not a table"),
+        ('radius = "2 mm"', "radius = 1979-05-27", "must be a number...not a date"),
+        ('radius = "2 mm"', "radius = 0x" + "1" * 5000, "too large"),
+        ("hurst = 0.8", "hurst = 1.5", "at most 1"),
+        ("hurst = 0.8", "hurst = false", "must be a number...not false"),
+        ("members = 4", "members = 0", "at least 1"),
+        ("members = 4", 'members = "many"', 'whole number...not "many"'),
+        ("members = 4", "members = true", "whole number...not true"),
+        ("members = 4", "members = 0x" + "1" * 5000, "at most 10000000"),
+        ("points = 32", "points = true", "whole number...not true"),
+        ("seed = 7", "seed = -1", "at least 0"),
+        ("seed = 7", "seed = 18446744073709551616", "at most 18446744073709551615, not 18446744073709551616"),
+        ('name = "lens"', "name = 5", "text in quotes...not 5"),
+        ('name = "lens"', "name = 0x" + "1" * 5000, "text in quotes...many digits"),
+        ('name = "lens"', f'name = "{"x" * 201}"', "longer than 200 characters"),
+        ('scale = "log"', 'scale = "logarithmic"', 'must be "linear" or "log"'),
+        ('scale = "log"', 'scale = "lin"', 'did you mean "linear"'),
     ],
 )
-def test_a_bad_value_is_told_with_its_key_and_the_cure(refusal, line, wrong, said):
-    (problem,) = refusal(**edited((line, wrong)))
+def test_a_bad_value_is_told_with_its_key_and_the_cure(refusal, line, wrong, words):
+    (problem,) = refusal((line, wrong))
     table = next((text for text in reversed(LINES[: line_of(line)]) if text.startswith("[")), "")
     key = ".".join(filter(None, (table.strip("[]"), wrong.partition(" ")[0])))
-    assert problem.startswith(f"x:{line_of(line)}: {key}: {said}")
+    assert told(problem, line_of(line), key, words)
 
 
 @pytest.mark.parametrize(
@@ -240,149 +306,82 @@ def test_a_bad_value_is_told_with_its_key_and_the_cure(refusal, line, wrong, sai
 )
 def test_nothing_that_divides_may_be_zero(refusal, zero):
     line = next(line for line in LINES if line.startswith(f"{zero} = "))
-    (problem,) = refusal(**edited((line, f"{zero} = 0")))
+    (problem,) = refusal((line, f"{zero} = 0"))
     assert f"{zero}: must be above 0 " in problem
 
 
-@pytest.mark.parametrize(
-    ("line", "wrong", "said"),
-    [
-        (
-            '[sphere]\nradius = "2 mm"',
-            'sphere = "2 mm"',
-            "sphere: must be a table, not text; write [sphere] and its keys below",
-        ),
-        ("[ensemble]\nmembers = 4", "ensemble = 4", "ensemble: must be a table, not a whole number; write [ensemble]"),
-        ("[sphere]", "[[sphere]]", "sphere: must be one table, not a list; write [sphere] once, in single brackets"),
-    ],
-)
-def test_what_is_no_table_is_told(refusal, line, wrong, said):
-    text = LENS.replace(line, "")
-    if wrong.startswith("["):
-        text = LENS.replace(line, wrong)
-    else:
-        text = f"{wrong}\n{text}"
-    assert any(said in problem for problem in refusal(text))
-
-
-def test_a_model_given_as_text_is_told_as_a_table(refusal):
-    text = 'drive = "steady"\n' + re.sub(r"(?s)\[drive\].*?\n\n", "", LENS)
-    assert refusal(text) == ['x:1: drive: must be a table, not text; write drive = { model = "steady" }']
-
-
 def test_lists_and_choices_of_the_record_are_checked(refusal):
-    text = LENS + '[record]\nper_member = "maybe"\nmaps = "1 s"\nprecision = "double"\nmap_members = 0\n'
-    assert refusal(text) == [
-        f'x:{END + 2}: record.per_member: must be true or false, without quotes, not "maybe"',
-        f'x:{END + 3}: record.maps: must be a list such as ["1 s", "2 s"], not "1 s"',
-        f'x:{END + 4}: record.precision: must be "float64" or "float32", not "double"',
-        f"x:{END + 5}: record.map_members: must be at least 1, not 0",
-    ]
-    assert refusal(LENS + '[record]\nmaps = ["1 s",\n  "2 kg"]\n') == [
-        f'x:{END + 3}: record.maps: value 2: has the unit "kg", which is not a unit of s; write for example "10 ms"'
-    ]
+    text = '[record]\nper_member = "maybe"\nmaps = "1 s"\nprecision = "double"\nmap_members = 0\n'
+    found = refusal(text=LENS + text)
+    for line, (key, words) in enumerate(
+        (
+            ("per_member", "true or false"),
+            ("maps", 'a list such as ["1 s", "2 s"]'),
+            ("precision", '"float64" or "float32"'),
+            ("map_members", "at least 1"),
+        ),
+        start=END + 2,
+    ):
+        assert told(found[line - END - 2], line, f"record.{key}", words)
+    (problem,) = refusal(text=LENS + '[record]\nmaps = ["1 s", "2 kg"]\n')
+    assert told(problem, END + 2, "record.maps", 'value 2: ...unit "kg"')
 
 
 # --- what does not go together ---
 
 
-def test_a_contact_is_held_by_exactly_one_of_load_and_indentation(refusal):
-    at = line_of("[contact]")
-    for edit in (('load = "4 mN"', 'load = "4 mN"\nindentation = "1 um"'), ('load = "4 mN"', "")):
-        (problem,) = refusal(**edited(edit))
-        assert problem.startswith(f"x:{at}: contact: ")
-        assert "load" in problem and "indentation" in problem and ("give" in problem or "leave" in problem)
-
-
-def test_a_solid_has_exactly_one_modulus(refusal):
-    at, line = line_of("[solid]"), 'shear_modulus = "1.6 MPa"'
-    for edit, found in (((line, ""), "none is"), ((line, f'{line}\nyoungs_modulus = "1 MPa"'), "both are")):
-        (problem,) = refusal(**edited(edit))
-        assert problem.startswith(f"x:{at}: solid: needs exactly one modulus, but {found} given")
-
-
 @pytest.mark.parametrize(
-    ("new", "said"),
+    ("edits", "table", "words"),
     [
-        ('step = "3 ms"', "duration (2 s) must be a whole multiple of step (0.003 s), such as 1.998 s or 2.001 s"),
-        ('step = "5 s"', "duration (2 s) must be a whole multiple of step (5 s), such as 5 s"),
-        ('step = "5 ms"\nrecord = "7 ms"', "record (0.007 s) must be a whole multiple of step (0.005 s), such as"),
-        ('step = "5 ms"\nrecord = "0.3 s"', "duration (2 s) must be a whole multiple of record (0.3 s), such as 1.8 s"),
-        ('step = "1 ns"', "asks for more than 1,000,000,000 steps; make step longer"),
-        ('step = "100 ns"', "asks for more than 10,000,000 records; give a longer record"),
+        ([('load = "4 mN"', 'load = "4 mN"\nindentation = "1 um"')], "contact", "load...indentation...leave one"),
+        ([('load = "4 mN"', "")], "contact", "load...indentation...give"),
+        ([('shear_modulus = "1.6 MPa"', "")], "solid", "exactly one modulus...none is"),
+        ([('shear_modulus = "1.6 MPa"', "shear_modulus = 1\nyoungs_modulus = 1")], "solid", "one modulus...both are"),
+        ([('step = "5 ms"', 'step = "5 ms"\nrecord = "7 ms"')], "clock", "record...whole multiple of step"),
+        ([('step = "5 ms"', 'step = "5 ms"\nrecord = "0.3 s"')], "clock", "duration...multiple of record...1.8 s"),
+        ([('step = "5 ms"', 'step = "1 ns"')], "clock", "1,000,000,000 steps...longer"),
+        ([('step = "5 ms"', 'step = "100 ns"')], "clock", "10,000,000 records...record"),
+        ([("points = 32", "points = 8")], "shear", "at least 31 points...more points"),
+        ([('cell = "0.24 mm"', 'cell = "24 mm"'), ("points = 32\n", "")], "shear", "modes...2.1e+06"),
+        ([('cell = "0.24 mm"', 'cell = "240 km"'), ("points = 32\n", "")], "shear", "waves along a side"),
+        ([('cell = "0.24 mm"', 'cell = "1 um"')], "shear", "no wave...cell"),
+        ([('longest = "60 um"', 'longest = "6 um"')], "shear.spectrum", "longest (6e-06 m) is shorter than rolloff"),
+        ([('from = "10 um/s"', "from = 0")], "drive", "logarithmic...zero"),
     ],
 )
-def test_a_clock_that_does_not_come_out_even_is_told_with_one_that_does(refusal, new, said):
-    (problem,) = refusal(**edited(('step = "5 ms"', new)))
-    assert problem.startswith(f"x:{line_of('[clock]')}: clock: {said}")
+def test_what_does_not_go_together_is_told_at_its_table(refusal, edits, table, words):
+    (problem,) = refusal(*edits)
+    assert told(problem, line_of(f"[{table}]"), table, words)
 
 
 def test_faults_between_parts_are_told_beside_those_of_values(refusal):
     text = LENS.replace('"42 mJ/m^2"', '"42 mJ"') + '[record]\nmaps = ["1 s"]\nmap_members = 5\n'
-    assert refusal(text) == [
-        f'x:{line_of("[adhesion]") + 1}: adhesion.work: has the unit "mJ", which is not a unit of J/m^2;'
-        ' write for example "42 mJ/m^2"',
-        f'x:{END + 2}: record.maps: needs shear.model = "mapped"; choose it or leave the maps out',
-        f"x:{END + 3}: record.map_members: is more than ensemble.members (4); lower it or add members",
-    ]
+    one, two, three = refusal(text=text)
+    assert told(one, line_of("[adhesion]") + 1, "adhesion.work", 'unit "mJ"')
+    assert told(two, END + 2, "record.maps", 'shear.model = "mapped"')
+    assert told(three, END + 3, "record.map_members", "ensemble.members (4)")
 
 
 def test_maps_are_drawn_at_recorded_times_only(refusal):
     text = LENS.replace('model = "modal"', 'model = "mapped"') + '[record]\nmaps = ["1 s", "3 ms"]\n'
-    assert refusal(text) == [
-        f"x:{END + 2}: record.maps: 0.003 s is none of the recorded times; choose whole multiples of 0.005 s up to 2 s"
-    ]
+    (problem,) = refusal(text=text)
+    assert told(problem, END + 2, "record.maps", "0.003 s...whole multiples of 0.005 s up to 2 s")
 
 
-def test_a_amplitude_with_the_stress_needs_a_stress(refusal):
-    text = LENS + '[shear.amplitude]\nmodel = "stress"\nreference = "1 MPa"\n'
-    (problem,) = refusal(text)
-    assert problem.startswith(f"x:{END + 1}: shear.amplitude: ")
-    assert "bonds.stress" in problem
-
-
-@pytest.mark.parametrize(
-    ("edits", "said"),
-    [
-        ([("points = 32", "points = 8")], "the shortest wavelength needs at least 31 points, not 8; give more points"),
-        (
-            [('cell = "0.24 mm"', 'cell = "24 mm"'), ("points = 32\n", "")],
-            "Fourier modes, of which 2.1e+06 can be kept",
-        ),
-        ([('cell = "0.24 mm"', 'cell = "240 km"'), ("points = 32\n", "")], "of the shortest waves along a side; take"),
-        ([('cell = "0.24 mm"', 'cell = "1 um"')], "no wave of the spectrum fits the cell of 1e-06 m; make the cell"),
-        (
-            [('cell = "0.24 mm"\n', ""), ('"4 mN"', '"-1 N"')],
-            "there is no contact at rest to set the cell by; give a cell",
-        ),
-    ],
-)
-def test_a_cell_that_cannot_hold_the_spectrum_is_refused_before_it_is_made(refusal, edits, said):
-    (problem,) = refusal(**edited(*edits))
-    assert problem.startswith(f"x:{line_of('[shear]')}: shear: ")
-    assert said in problem
-
-
-def test_cut_offs_out_of_order_and_logarithms_of_zero_are_told(refusal):
-    (problem,) = refusal(**edited(('longest = "60 um"', 'longest = "6 um"')))
-    assert problem.startswith(
-        f"x:{line_of('[shear.spectrum]')}: shear.spectrum: longest (6e-06 m) is shorter than rolloff"
-    )
-    (problem,) = refusal(**edited(('from = "10 um/s"', "from = 0")))
-    assert problem.startswith(f"x:{line_of('[drive]')}: drive: a logarithmic course cannot reach or pass zero")
+def test_an_amplitude_with_the_stress_needs_a_stress(refusal):
+    (problem,) = refusal(text=LENS + '[shear.amplitude]\nmodel = "stress"\nreference = "1 MPa"\n')
+    assert told(problem, END + 1, "shear.amplitude", "bonds.stress")
 
 
 def test_all_faults_come_in_one_pass_in_the_order_of_the_file(refusal):
     found = refusal(
-        **edited(
-            ('duration = "2 s"', 'duration = "2 m"'),
-            ('shear_modulus = "1.6 MPa"', "shear_modulus = -1"),
-            ("[drive]", "[drvie]"),
-            ('rms = "150 kPa"', "rms = nan"),
-            ('length = "5 um"', 'lenght = "5 um"'),
-            ('load = "4 mN"', 'load = "4 mN"\nindentation = "1 um"'),
-            ("members = 4", "members = 0"),
-        )
+        ('duration = "2 s"', 'duration = "2 m"'),
+        ('shear_modulus = "1.6 MPa"', "shear_modulus = -1"),
+        ("[drive]", "[drvie]"),
+        ('rms = "150 kPa"', "rms = nan"),
+        ('length = "5 um"', 'lenght = "5 um"'),
+        ('load = "4 mN"', 'load = "4 mN"\nindentation = "1 um"'),
+        ("members = 4", "members = 0"),
     )
     keys = [problem.split(": ")[1] for problem in found]
     wanted = ["clock.duration", "solid.shear_modulus", "drvie", "shear.spectrum.rms", "shear.correlation.lenght"]
@@ -393,11 +392,10 @@ def test_all_faults_come_in_one_pass_in_the_order_of_the_file(refusal):
 
 # --- bonds with a stretch ---
 
-HAZARD = 'rupture = { model = "bell", zero_force_rate = "200 1/s", bell_force = "4 pN" }'
-STRETCHED = [HAZARD, 'bond_stiffness = "0.4 uN/m"', 'rebinding_rate = "400 1/s"', 'site_density = "1e17 1/m^2"']
+BELL = 'rupture = { model = "bell", zero_force_rate = "200 1/s", bell_force = "4 pN" }'
+STRETCHED = [BELL, 'bond_stiffness = "0.4 uN/m"', 'rebinding_rate = "400 1/s"', 'site_density = "1e17 1/m^2"']
 LINEAR = ['critical_speed = "10 mm/s"', 'rebinding_rate = "500 1/s"']
 BONDS = line_of("[bonds]")
-NEEDS = "give either critical_speed and rebinding_rate, or rupture, bond_stiffness, rebinding_rate and site_density"
 
 
 def bonded(model, *lines, shear=None):
@@ -411,89 +409,90 @@ def bonded(model, *lines, shear=None):
 @pytest.mark.parametrize("model", ["rate", "cohort", "tracked"])
 def test_bonds_with_a_stretch_are_told_which_keys_they_lack(refusal, model):
     sites = ["sites = 50"] if model == "tracked" else []
-    tables = 'the table [bonds.rupture] with model = "constant", "bell" or "cut_off"'
-    assert refusal(bonded(model, *STRETCHED[1:], *sites)) == [f"x:{BONDS}: bonds.rupture: is missing; add {tables}"]
-    lacking = [problem.split(" for example")[0] for problem in refusal(bonded(model, HAZARD, *sites))]
-    assert lacking == [
-        f"x:{BONDS}: bonds.{key}: is missing; add" for key in ("bond_stiffness", "rebinding_rate", "site_density")
-    ]
+    (problem,) = refusal(text=bonded(model, *STRETCHED[1:], *sites))
+    assert told(problem, BONDS, "bonds.rupture", 'is missing...[bonds.rupture]..."bell"')
+    found = refusal(text=bonded(model, BELL, *sites))
+    lacking = ("bond_stiffness", "rebinding_rate", "site_density")
+    assert all(told(said, BONDS, f"bonds.{key}", "is missing") for said, key in zip(found, lacking, strict=True))
 
 
 @pytest.mark.parametrize(
-    ("rupture", "key", "said"),
+    ("rupture", "key", "words"),
     [
-        ('{ model = "bel", bell_force = 1 }', "rupture.model", 'must not be "bel"; did you mean "bell"?'),
-        ('{ model = "arrhenius" }', "rupture.model", 'must be "constant", "bell" or "cut_off", not "arrhenius"'),
-        ("{ rate = 1 }", "rupture.model", 'is missing; choose "constant", "bell" or "cut_off"'),
-        ('"bell"', "rupture", 'must be a table, not text; write rupture = { model = "bell" }'),
-        ('{ model = "bell", zero_force_rate = 1 }', "rupture.bell_force", "is missing; add for example bell_force = "),
-        ('{ model = "constant" }', "rupture.rate", "is missing; add for example rate = "),
-        ('{ model = "cut_off" }', "rupture.stretch", "is missing; add for example stretch = "),
-        ('{ model = "bell", zero_force_rate = 1, bell_force = "4 pN/m" }', "rupture.bell_force",
-         'has the unit "pN/m", which is not a unit of N; write for example "'),
-        ('{ model = "bell", zero_force_rate = 0, bell_force = 1 }', "rupture.zero_force_rate", "must be above 0 1/s"),
-        ('{ model = "cut_off", stretch = "-1 nm" }', "rupture.stretch", "must be above 0 m, not -1e-09 m"),
-        ('{ model = "cut_off", stretch = 1, rate = -1 }', "rupture.rate", "must be at least 0 1/s, not -1 1/s"),
+        ('{ model = "bel", bell_force = 1 }', "rupture.model", 'did you mean "bell"'),
+        ('{ model = "arrhenius" }', "rupture.model", '"constant"..."bell"..."cut_off"'),
+        ("{ rate = 1 }", "rupture.model", 'is missing; choose "constant" or "cut_off"'),
+        ('"bell"', "rupture", 'must be a table...rupture = { model = "bell" }'),
+        ('{ model = "bell", zero_force_rate = 1 }', "rupture.bell_force", "is missing"),
+        ('{ model = "constant" }', "rupture.rate", "is missing"),
+        ('{ model = "cut_off" }', "rupture.stretch", "is missing"),
+        ('{ model = "bell", zero_force_rate = 1, bell_force = "4 pN/m" }', "rupture.bell_force", "not a unit of N"),
+        ('{ model = "bell", zero_force_rate = 0, bell_force = 1 }', "rupture.zero_force_rate", "above 0"),
+        ('{ model = "cut_off", stretch = "-1 nm" }', "rupture.stretch", "above 0"),
+        ('{ model = "cut_off", stretch = 1, rate = -1 }', "rupture.rate", "at least 0"),
         ('{ model = "bell", zero_force_rate = 1, bell_force = 1, stretch = 1 }', "rupture.stretch",
-         'is not a key of model = "bell"; remove it, or choose model = "cut_off"'),
+         'not a key of model = "bell"..."cut_off"'),
     ],
 )  # fmt: skip
 @pytest.mark.parametrize("model", ["rate", "cohort", "auto"])
-def test_a_bad_rupture_is_told_with_its_key_and_the_cure(refusal, model, rupture, key, said):
-    (problem,) = refusal(bonded(model, f"rupture = {rupture}", *STRETCHED[1:]))
-    assert problem.startswith(f"x:{BONDS + 2}: bonds.{key}: {said}")
+def test_a_bad_rupture_is_told_with_its_key_and_the_cure(refusal, model, rupture, key, words):
+    (problem,) = refusal(text=bonded(model, f"rupture = {rupture}", *STRETCHED[1:]))
+    assert told(problem, BONDS + 2, f"bonds.{key}", words)
 
 
 @pytest.mark.parametrize(
-    ("model", "added", "said"),
+    ("model", "added", "words"),
     [
-        ("rate", 'critical_speed = "1 mm/s"', "critical_speed: does not go with rupture; leave one of them out"),
-        ("rate", 'stress = "1 MPa"', "stress: does not go with rupture; leave one of them out"),
-        ("rate", "tolerance = 0.1", 'tolerance: is not a key of model = "rate"; remove it, or choose model = "cohort"'),
-        ("cohort", 'critical_speed = "1 mm/s"', 'critical_speed: is not a key of model = "cohort"; remove it, or'),
-        ("cohort", 'stress = "1 MPa"', 'stress: is not a key of model = "cohort"; remove it, or choose model = "n'),
-        ("cohort", "sites = 5", 'sites: is not a key of model = "cohort"; remove it, or choose model = "counted", "t'),
-        ("cohort", "tolerance = 0", "tolerance: must be at least 1e-12, not 0"),
-        ("cohort", "tolerance = 0.1", "tolerance: must be below 0.1, not 0.1"),
-        ("cohort", "tolerance = -1e-3", "tolerance: must be at least 1e-12, not -0.001"),
-        ("cohort", 'area = "carry"', 'area: must not be "carry"; did you mean "carried"?'),
-        ("cohort", 'area = "old"', 'area: must be "present" or "carried", not "old"'),
-        ("cohort", 'start = "resting"', 'start: must be "steady", "bonded" or "empty", not "resting"'),
-        ("tracked", "sites = 0", "sites: must be at least 1, not 0"),
-        ("tracked", "sites = 10_000_000", "sites: must be at most 1000000, not 10000000"),
-        ("tracked", "sites = 2.5", "sites: must be a whole number such as 64, not 2.5"),
-        ("tracked", "sites = true", "sites: must be a whole number such as 64, not true"),
-        ("auto", "sites = 0", "sites: must be at least 1, not 0"),
-        ("auto", "tolerance = 0", "tolerance: must be above 0, not 0"),
-        ("auto", "tolerance = 1", "tolerance: must be below 1, not 1"),
+        ("rate", 'critical_speed = "1 mm/s"', "does not go with rupture"),
+        ("rate", 'stress = "1 MPa"', "does not go with rupture"),
+        ("rate", "tolerance = 0.1", 'not a key of model = "rate"..."cohort"'),
+        ("cohort", 'critical_speed = "1 mm/s"', 'not a key of model = "cohort"..."rate"'),
+        ("cohort", 'stress = "1 MPa"', 'not a key of model = "cohort"'),
+        ("cohort", "sites = 5", 'not a key of model = "cohort"..."tracked"'),
+        ("cohort", "tolerance = 0", "at least 1e-12"),
+        ("cohort", "tolerance = 0.1", "below 0.1"),
+        ("cohort", 'area = "carry"', 'did you mean "carried"'),
+        ("cohort", 'area = "old"', '"present" or "carried"'),
+        ("cohort", 'start = "resting"', '"steady", "bonded" or "empty"'),
+        ("tracked", "sites = 0", "at least 1"),
+        ("tracked", "sites = 10_000_000", "at most 1000000"),
+        ("tracked", "sites = 2.5", "whole number"),
+        ("auto", "sites = 0", "at least 1"),
+        ("auto", "tolerance = 0", "above 0"),
+        ("auto", "tolerance = 1", "below 1"),
     ],
-)  # fmt: skip
-def test_a_bad_key_of_bonds_with_a_stretch_is_told_with_the_cure(refusal, model, added, said):
-    (problem,) = refusal(bonded(model, *STRETCHED, added))
-    assert problem.startswith(f"x:{BONDS + 6}: bonds.{said}")
+)
+def test_a_bad_key_of_bonds_with_a_stretch_is_told_with_the_cure(refusal, model, added, words):
+    (problem,) = refusal(text=bonded(model, *STRETCHED, added))
+    assert told(problem, BONDS + 6, f"bonds.{added.split(' ')[0]}", words)
 
 
 def test_tracked_bonds_without_a_number_or_with_an_area_are_told(refusal):
-    assert refusal(bonded("tracked", *STRETCHED)) == [f"x:{BONDS}: bonds.sites: is missing; add for example sites = 64"]
-    (problem,) = refusal(bonded("tracked", *STRETCHED, "sites = 5", 'area = "carried"'))
-    assert problem.startswith(f'x:{BONDS + 7}: bonds.area: is not a key of model = "tracked"; remove it, or choose')
+    (problem,) = refusal(text=bonded("tracked", *STRETCHED))
+    assert told(problem, BONDS, "bonds.sites", "is missing...sites = 64")
+    (problem,) = refusal(text=bonded("tracked", *STRETCHED, "sites = 5", 'area = "carried"'))
+    assert told(problem, BONDS + 7, "bonds.area", 'not a key of model = "tracked"')
+
+
+EITHER = "either critical_speed and rebinding_rate, or rupture, bond_stiffness, rebinding_rate and site_density"
 
 
 @pytest.mark.parametrize(
-    ("lines", "said"),
+    ("lines", "words"),
     [
-        ([], NEEDS),
-        (["sites = 3"], NEEDS),
-        ([LINEAR[0], *STRETCHED], NEEDS),
-        ([LINEAR[0], STRETCHED[1]], NEEDS),
-        (LINEAR[:1], "rebinding_rate is missing, which bonds like these need"),
-        (LINEAR[1:], NEEDS),
-        (STRETCHED[:3], "site_density is missing, which bonds like these need"),
-        ([*STRETCHED, 'stress = "1 MPa"'], "bonds with a rupture make their own stress; leave stress out"),
+        ([], EITHER),
+        (["sites = 3"], EITHER),
+        ([LINEAR[0], *STRETCHED], EITHER),
+        ([LINEAR[0], STRETCHED[1]], EITHER),
+        (LINEAR[:1], "rebinding_rate is missing"),
+        (LINEAR[1:], EITHER),
+        (STRETCHED[:3], "site_density is missing"),
+        ([*STRETCHED, 'stress = "1 MPa"'], "leave stress out"),
     ],
 )
-def test_bonds_left_open_take_the_keys_of_one_kind(refusal, lines, said):
-    assert refusal(bonded("auto", *lines)) == [f"x:{BONDS}: bonds: {said}"]
+def test_bonds_left_open_take_the_keys_of_one_kind(refusal, lines, words):
+    (problem,) = refusal(text=bonded("auto", *lines))
+    assert told(problem, BONDS, "bonds", words)
 
 
 MADE = ['model = "mean"', 'spectrum = { model = "bonds", footprint = "10 um" }']
@@ -501,26 +500,23 @@ CELLED = [MADE[1], 'correlation = { model = "time", time = "1 ms" }', 'cell = "0
 
 
 @pytest.mark.parametrize(
-    ("shear", "key", "said"),
+    ("shear", "key", "words"),
     [
-        ([MADE[0], 'spectrum = { model = "bonds" }'], "shear.spectrum.footprint", "is missing; add for example foot"),
-        ([MADE[0], 'spectrum = { model = "bonds", footprint = 0 }'], "shear.spectrum.footprint", "must be above 0 m"),
+        ([MADE[0], 'spectrum = { model = "bonds" }'], "shear.spectrum.footprint", "is missing"),
+        ([MADE[0], 'spectrum = { model = "bonds", footprint = 0 }'], "shear.spectrum.footprint", "above 0 m"),
         ([MADE[0], 'spectrum = { model = "bonds", footprint = "1 um", rms = 1 }'], "shear.spectrum.rms",
-         'is not a key of model = "bonds"; remove it, or choose model = "band", '),
-        ([*MADE, 'amplitude = { model = "onset", speed = 1, width = 0.1 }'], "shear",
-         "the bonds set the size of the field they make; leave amplitude out"),
-        (['model = "banded"', *CELLED], "shear", "the frozen part of a field that bonds make has no bands; use mod"),
-        (['model = "modal"', *CELLED, "points = 32", 'mode_amplitudes = "fixed"'], "shear",
-         'bonds at random places make mode_amplitudes = "gaussian"; leave it out'),
-        (['model = "modal"', *CELLED], "shear", "the spectrum has no shortest wavelength; give points (such as points"),
+         'not a key of model = "bonds"'),
+        ([*MADE, 'amplitude = { model = "onset", speed = 1, width = 0.1 }'], "shear", "leave amplitude out"),
+        (['model = "banded"', *CELLED], "shear", "bonds...bands"),
+        (['model = "modal"', *CELLED, "points = 32", 'mode_amplitudes = "fixed"'], "shear", '"gaussian"'),
+        (['model = "modal"', *CELLED], "shear", "shortest wavelength...give points"),
         ([MADE[0], 'spectrum = { model = "bonds", footprint = "10 fm" }'], "bonds.bond_stiffness",
-         "the half-space under a bond of this footprint yields with 7.9e-08 N/m, in series with the bond: give at mo"),
+         "7.9e-08 N/m...shear.spectrum.footprint"),
     ],
 )  # fmt: skip
-def test_a_field_that_bonds_cannot_make_is_told(refusal, shear, key, said):
-    (problem,) = refusal(bonded("cohort", *STRETCHED, shear=shear))
-    assert re.match(r"x:\d+: ", problem)
-    assert problem.split(": ", 1)[1].startswith(f"{key}: {said}")
+def test_a_field_that_bonds_cannot_make_is_told(refusal, shear, key, words):
+    (problem,) = refusal(text=bonded("cohort", *STRETCHED, shear=shear))
+    assert told(problem, int(problem.split(":")[1]), key, words)
 
 
 @pytest.mark.parametrize(
@@ -530,165 +526,154 @@ def test_a_field_that_bonds_cannot_make_is_told(refusal, shear, key, said):
         ("rate", [*LINEAR, 'stress = "1 MPa"']),
         ("counted", [*LINEAR, 'stress = "1 MPa"', "sites = 5"]),
         ("auto", [*LINEAR, 'stress = "1 MPa"']),
-        ("rate", LINEAR),
-        ("auto", LINEAR),
         ("rate", STRETCHED),
     ],
 )
-def test_a_field_of_bonds_whose_forces_are_not_known_is_told_with_the_depths_that_know(refusal, model, lines):
-    (problem,) = refusal(bonded(model, *lines, shear=MADE))
-    assert problem.endswith(
-        ": shear.spectrum: the spectrum that bonds make needs the force of each bond;"
-        ' use bonds.model = "cohort" or "tracked"'
-    )
+def test_a_field_of_bonds_whose_forces_are_not_known_is_told_with_the_models_that_know(refusal, model, lines):
+    (problem,) = refusal(text=bonded(model, *lines, shear=MADE))
+    assert told(problem, int(problem.split(":")[1]), "shear.spectrum", 'bonds.model = "cohort" or "tracked"')
 
 
 @pytest.mark.parametrize(
-    ("lines", "at", "said"),
+    ("lines", "at", "key", "words"),
     [
-        (['rest = "-1 s"', "speed = 1"], 2, "rest: must be at least 0 s, not -1 s"),
-        (['rest = "1 m"', "speed = 1"], 2, 'rest: has the unit "m", which is not a unit of s; write for example'),
-        (["rest = 1", 'speed = "1 N"'], 3, 'speed: has the unit "N", which is not a unit of m/s; write for example'),
-        (["speed = 1"], 0, "rest: is missing; add for example rest = "),
-        (["rest = 1"], 0, "speed: is missing; add for example speed = "),
-        (["rest = 1", "speed = 1", "to = 3"], 4, 'to: is not a key of model = "start"; remove it, or choose model'),
+        (['rest = "-1 s"', "speed = 1"], 2, "rest", "at least 0 s"),
+        (["rest = 1", 'speed = "1 N"'], 3, "speed", "not a unit of m/s"),
+        (["speed = 1"], 0, "rest", "is missing"),
+        (["rest = 1", "speed = 1", "to = 3"], 4, "to", 'not a key of model = "start"..."ramp"'),
     ],
-)  # fmt: skip
-def test_a_bad_start_is_told(refusal, lines, at, said):
+)
+def test_a_bad_start_is_told(refusal, lines, at, key, words):
     drive = "\n".join(["[drive]", 'model = "start"', *lines, "", ""])
-    (problem,) = refusal(re.sub(r"(?s)\[drive\].*?(?=\[bonds\])", drive, LENS))
-    assert problem.startswith(f"x:{line_of('[drive]') + at}: drive.{said}")
+    (problem,) = refusal(text=re.sub(r"(?s)\[drive\].*?(?=\[bonds\])", drive, LENS))
+    assert told(problem, line_of("[drive]") + at, f"drive.{key}", words)
 
 
 # --- files that a scenario names ---
 
-FILE = line_of("[drive]") + 2
 TABLE = ('model = "ramp"\nfrom = "10 um/s"\nto = "100 mm/s"\nscale = "log"', 'model = "table"\nfile = "v.csv"')
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "words"),
     [
-        (None, "v.csv cannot be read (No such file or directory); give a path relative to the scenario"),
-        ("", "v.csv: the table is empty; begin with a header"),
-        ("time [s]\n0\n", 'v.csv: line 1: column "speed" is missing (found: time); write the header as'),
-        ("time [s], speed [kg]\n0, 1\n", 'v.csv: line 1: column "speed" has the unit "kg", which is not a unit of m/s'),
-        (
-            "time [s], speed [m/s]\n0, 1\n2, fast\n",
-            'v.csv: line 3: speed is "fast", not a number; write a plain number',
-        ),
-        ("time [s], speed [m/s]\n0, 1\n2\n", "v.csv: line 3: 1 cells where the header has 2"),
-        ("time [s], speed [m/s]\n0, 1\n1, 1\n", "the table ends at 1 s, before clock.duration (2 s)"),
-        ("time [s], speed [m/s]\n2, 1\n1, 1\n", "times must start at 0 s"),
-        (b"time [s], speed [m/s]\n0, \xff\n", "v.csv is not UTF-8 text; save it as plain CSV in UTF-8"),
+        (None, "cannot be read (No such file or directory)...relative to the scenario"),
+        ("", "the table is empty...header"),
+        ("time [s]\n0\n", 'line 1: column "speed" is missing...header'),
+        ("time [s], speed [kg]\n0, 1\n", 'line 1: column "speed"...not a unit of m/s'),
+        ("time [s], speed [m/s]\n0, 1\n2, fast\n", 'line 3: speed is "fast"...plain number'),
+        ("time [s], speed [m/s]\n0, 1\n2\n", "line 3: 1 cells...2"),
+        (b"time [s], speed [m/s]\n0, \xff\n", "UTF-8"),
     ],
 )
-def test_a_broken_table_is_told_with_its_file_and_line(refusal, tmp_path, content, said):
+def test_a_broken_table_is_told_with_its_file_and_line(refusal, tmp_path, content, words):
     if content is not None:
         (tmp_path / "v.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
-    (problem,) = refusal(**edited(TABLE))
-    assert problem.startswith(f"x:{line_of('[drive]')}: drive: " if "v.csv" not in said else f"x:{FILE}: drive.file: ")
-    assert said in problem
+    (problem,) = refusal(TABLE)
+    assert told(problem, line_of("[drive]") + 2, "drive.file", f"v.csv...{words}")
+
+
+def test_times_of_a_table_cover_the_run_in_order(refusal, tmp_path):
+    for content, words in (
+        ("time [s], speed [m/s]\n0, 1\n1, 1\n", "ends at 1 s...clock.duration (2 s)"),
+        ("time [s], speed [m/s]\n2, 1\n1, 1\n", "start at 0 s"),
+    ):
+        (tmp_path / "v.csv").write_text(content)
+        (problem,) = refusal(TABLE)
+        assert told(problem, line_of("[drive]"), "drive", words)
 
 
 def test_a_table_without_its_file_is_told(refusal):
-    assert refusal(**edited((TABLE[0], 'model = "table"'))) == [
-        f'x:{line_of("[drive]")}: drive.file: is missing; name a CSV file such as file = "data.csv"'
-    ]
-    (problem,) = refusal(**edited((TABLE[0], 'model = "table"\nfile = 5')))
-    assert problem == f"x:{FILE}: drive.file: must be text in quotes, not 5"
+    (problem,) = refusal((TABLE[0], 'model = "table"'))
+    assert told(problem, line_of("[drive]"), "drive.file", 'is missing...file = "data.csv"')
+    (problem,) = refusal((TABLE[0], 'model = "table"\nfile = 5'))
+    assert told(problem, line_of("[drive]") + 2, "drive.file", "text in quotes")
 
 
 @pytest.mark.parametrize("name", ["/dev/zero", ".", "a\\u0000b"])
 def test_only_plain_files_are_read(refusal, name):
-    (problem,) = refusal(**edited((TABLE[0], f'model = "table"\nfile = "{name}"')))
+    (problem,) = refusal((TABLE[0], f'model = "table"\nfile = "{name}"'))
     assert "cannot be read (" in problem
 
 
 # --- sweeps ---
 
-
-def swept(text):
-    return {"text": LENS + "[sweep]\n" + text}
+LOAD = 'sweep."contact.load"'
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "key", "words"),
     [
-        ('"contact.lod" = ["1 mN"]', 'sweep."contact.lod": is not a key; did you mean "contact.load"?'),
-        ('"contcat.load" = ["1 mN"]', 'sweep."contcat.load": is not a key; did you mean "contact.load"?'),
-        ('contact.lod = ["1 mN"]', 'sweep."contact.lod": is not a key; did you mean "contact.load"?'),
-        ('"contact.load" = []', 'sweep."contact.load": must not be an empty list; write ["1 mN", "4 mN"] or { from,'),
-        ('"contact.load" = "1 mN"', 'sweep."contact.load": must be a list of values; write ["1 mN", "4'),
-        ('"contact.load" = { from = "1 mN", to = "2 uN", count = 3 }',
-         'sweep."contact.load": the range goes from "mN" to "uN"; write both ends in the same unit'),
-        ('"contact.load" = { from = 1, to = "2 uN", count = 3 }', 'the range goes from no unit to "uN"; write both'),
-        ('"contact.load" = { from = 1, to = 2 }', "the range lacks count; write { from = ..., to = ..., count = ... }"),
-        ('"contact.load" = { from = 1, to = 2, cout = 3 }', 'the range has the unknown key "cout"; it takes from, to,'),
-        ('"contact.load" = { from = 1, to = nan, count = 3 }', "the range needs finite numbers"),
-        ('"contact.load" = { from = 1, to = 2, count = 1 }', "the count of the range must be a whole number"),
-        ('"contact.load" = { from = 1, to = 2, count = 2.5 }', "the count of the range must be a whole number"),
-        ('"contact.load" = { from = 1, to = 2, count = 3, scale = "ln" }', 'of the range must be "linear" or "log"'),
-        ('"contact.load" = { from = 0, to = 2, count = 3, scale = "log" }', 'scale = "log" needs both ends above zero'),
-        ("seed = [1, 2]", "sweep.seed: cannot be swept; members differ in their noise already, so raise ensemble.mem"),
-        ('name = ["a"]', "sweep.name: cannot be swept, since all points of a sweep share it; run the scenario once"),
-        ('"clock.duration" = ["1 s"]', 'sweep."clock.duration": cannot be swept, since all points'),
-        ('"ensemble.members" = [1]', 'sweep."ensemble.members": cannot be swept, since all points'),
-        ('"bonds.model" = ["none", "rate"]', 'a model is swept as a whole table: "bonds" = [{ model = ... }, { model'),
-        ('bonds = [{ model = "none" }]\n"bonds.stress" = [1]', 'sweep."bonds.stress": is swept twice; take it out'),
-        ('"clock.step" = ["5 ms", "10 ms"]', "the points of the sweep would have different records; give clock.record"),
+        ('"contact.lod" = ["1 mN"]', 'sweep."contact.lod"', 'did you mean "contact.load"'),
+        ('"contcat.load" = ["1 mN"]', 'sweep."contcat.load"', 'did you mean "contact.load"'),
+        ('contact.lod = ["1 mN"]', 'sweep."contact.lod"', 'did you mean "contact.load"'),
+        ('"contact.load" = []', LOAD, 'empty list...["1 mN", "4 mN"]'),
+        ('"contact.load" = "1 mN"', LOAD, 'list of values...["1 mN", "4 mN"]'),
+        ('"contact.load" = { from = "1 mN", to = "2 um", count = 3 }', LOAD, '"mN" to "um"...one dimension'),
+        ('"contact.load" = { from = "1 mN", to = "2 uF", count = 3 }', LOAD, '"mN" to "uF"...one dimension'),
+        ('"contact.load" = { from = 1, to = "2 uN", count = 3 }', LOAD, 'no unit to "uN"...one dimension'),
+        ('"contact.load" = { from = "1", to = "2", count = 2 }', LOAD, "value 1 (1) and 1 more...without a unit"),
+        ('"contact.load" = { from = 1, to = 2 }', LOAD, "lacks count"),
+        ('"contact.load" = { from = 1, to = 2, cout = 3 }', LOAD, '"cout"...from, to, count'),
+        ('"contact.load" = { from = 1, to = nan, count = 3 }', LOAD, "finite numbers"),
+        ('"contact.load" = { from = 1, to = 2, count = 1 }', LOAD, "count...whole number"),
+        ('"contact.load" = { from = 1, to = 2, count = 2.5 }', LOAD, "count...whole number"),
+        ('"contact.load" = { from = 1, to = 2, count = 3, scale = "ln" }', LOAD, '"linear" or "log"'),
+        ('"contact.load" = { from = 0, to = 2, count = 3, scale = "log" }', LOAD, "above zero"),
+        ("seed = [1, 2]", "sweep.seed", "ensemble.members"),
+        ('name = ["a"]', "sweep.name", "cannot be swept...once for each value"),
+        ('"clock.duration" = ["1 s"]', 'sweep."clock.duration"', "cannot be swept"),
+        ('"ensemble.members" = [1]', 'sweep."ensemble.members"', "cannot be swept"),
+        ('"bonds.model" = ["none", "rate"]', 'sweep."bonds.model"', 'whole table: "bonds" = [{ model'),
+        ('bonds = [{ model = "none" }]\n"bonds.stress" = [1]', 'sweep."bonds.stress"', "swept twice"),
+        ('"clock.step" = ["5 ms", "10 ms"]', "sweep", "different records...clock.record"),
     ],
-)  # fmt: skip
-def test_a_sweep_that_cannot_be_is_told_with_the_cure(refusal, text, said):
-    (problem,) = refusal(**swept(text))
-    assert re.match(rf"x:({END + 1}|{END + 2}|{END + 3}): sweep", problem)
-    assert said in problem
+)
+def test_a_sweep_that_cannot_be_is_told_with_the_cure(refusal, text, key, words):
+    (problem,) = refusal(text=f"{LENS}[sweep]\n{text}")
+    at = END + 1 if key == "sweep" else END + 1 + len(text.splitlines())
+    assert told(problem, at, key, words)
 
 
-def test_a_bad_value_of_a_sweep_is_told_with_its_place_and_line(refusal):
-    assert refusal(**swept('"shear.spectrum.rms" = ["1 kPa", "2 kg",\n  -3, "4 kPa"]')) == [
-        f'x:{END + 2}: sweep."shear.spectrum.rms": value 2 (2 kg): has the unit "kg", which is not a unit of Pa;'
-        ' write for example "1.6 MPa"',
-        f'x:{END + 3}: sweep."shear.spectrum.rms": value 3 (-3): must be above 0 Pa, not -3 Pa',
-    ]
+def test_a_bad_value_of_a_sweep_is_told_with_its_place(refusal):
+    one, two = refusal(text=LENS + '[sweep]\n"shear.spectrum.rms" = ["1 kPa", "2 kg", -3, "4 kPa"]')
+    assert told(one, END + 2, 'sweep."shear.spectrum.rms"', 'value 2 (2 kg): ...unit "kg"')
+    assert told(two, END + 2, 'sweep."shear.spectrum.rms"', "value 3 (-3): ...above 0 Pa")
 
 
 def test_a_fault_shared_by_many_values_is_told_once(refusal):
-    (problem,) = refusal(**swept('"contact.load" = { from = "1 kg", to = "2 kg", count = 50 }'))
-    assert problem.startswith(f'x:{END + 2}: sweep."contact.load": value 1 (1 kg) and 49 more: has the unit "kg"')
+    (problem,) = refusal(text=LENS + '[sweep]\n"contact.load" = { from = "1 kg", to = "2 kg", count = 50 }')
+    assert told(problem, END + 2, LOAD, 'value 1 (1 kg) and 49 more: ...unit "kg"')
 
 
 def test_a_sweep_of_tables_is_told_what_each_lacks(refusal):
-    found = refusal(**swept('bonds = [{ model = "none" }, { model = "steady" }, { modle = "rate" }]'))
-    assert found == [
-        f'x:{END + 2}: sweep.bonds: value 2 ({{ model = "steady" }}): bonds.critical_speed: is missing;'
-        ' add for example critical_speed = "1 mm/s"',
-        f'x:{END + 2}: sweep.bonds: value 3 (a table): bonds.modle: is not a key; did you mean "model"?',
-    ]
+    one, two = refusal(
+        text=LENS + '[sweep]\nbonds = [{ model = "none" }, { model = "steady" }, { modle = "rate" }, { stress = 1 }]'
+    )
+    assert told(one, END + 2, "sweep.bonds", 'value 2 ({ model = "steady" }): bonds.critical_speed: is missing')
+    assert told(two, END + 2, "sweep.bonds", 'value 3 (a table): bonds.modle: ...did you mean "model"')
 
 
 def test_zipped_tables_have_the_same_keys(refusal):
     rows = '[[sweep]]\n"contact.load" = 1\n[[sweep]]\n"contact.lad" = 1\n'
-    (problem,) = refusal(LENS + rows)
-    assert problem.startswith(f'x:{END + 3}: sweep: has other keys than the first table of the sweep ("contact.lad")')
+    (problem,) = refusal(text=LENS + rows)
+    assert told(problem, END + 3, "sweep", '"contact.lad"...same keys')
     rows = '[[sweep]]\n"contact.load" = 1\n"solid.poisson_ratio" = 0.4\n'
     rows += '[[sweep]]\n"contact.load" = "1 kg"\n"solid.poisson_ratio" = 0.8\n'
-    assert refusal(LENS + rows) == [
-        f'x:{END + 5}: sweep."contact.load": value 2 (1 kg): has the unit "kg", which is not a unit of N;'
-        ' write for example "4 mN"',
-        f'x:{END + 6}: sweep."solid.poisson_ratio": value 2 (0.8): must be at most 0.5, not 0.8',
-    ]
+    one, two = refusal(text=LENS + rows)
+    assert told(one, END + 5, LOAD, 'value 2 (1 kg): ...unit "kg"')
+    assert told(two, END + 6, 'sweep."solid.poisson_ratio"', "value 2 (0.8): ...at most 0.5")
 
 
 @pytest.mark.parametrize("sweep", ["5", '"x"', "[]", "[1]", "[{}]"])
 def test_what_is_no_sweep_is_told(refusal, sweep):
-    (problem,) = refusal(f"sweep = {sweep}\n{LENS}")
-    assert problem.startswith("x:1: sweep: must be a ")
+    (problem,) = refusal(text=f"sweep = {sweep}\n{LENS}")
+    assert told(problem, 1, "sweep", "must be a ")
 
 
 def test_a_sweep_is_checked_even_where_other_tables_are_faulty(refusal):
     text = LENS.replace('"2 mm"', '"2 kg"') + '[sweep]\n"contact.load" = ["1 mN", "1 s"]\n"clock.stp" = [1]\n'
-    assert [problem.split(": ")[1] for problem in refusal(text)] == [
+    assert [problem.split(": ")[1] for problem in refusal(text=text)] == [
         "sphere.radius",
         'sweep."contact.load"',
         'sweep."clock.stp"',
@@ -698,138 +683,117 @@ def test_a_sweep_is_checked_even_where_other_tables_are_faulty(refusal):
 def test_values_of_two_axes_that_do_not_go_together_are_told(refusal):
     text = LENS.replace("points = 32", "points = 40")
     sweep = '[sweep]\n"shear.cell" = ["0.2 mm", "0.3 mm"]\n"shear.points" = [32, 40]\n'
-    (problem,) = refusal(text + sweep)
-    assert problem.startswith(
-        f"x:{END + 1}: sweep: some values do not go together: shear: the shortest wavelength needs"
-    )
+    (problem,) = refusal(text=text + sweep)
+    assert told(problem, END + 1, "sweep", "do not go together: shear: ...shortest wavelength")
 
 
 def test_points_whose_maps_differ_in_size_do_not_fit_into_one_dataset(refusal):
     text = LENS.replace('model = "modal"', 'model = "mapped"') + '[record]\nmaps = ["1 s"]\n'
-    (problem,) = refusal(text + '[sweep]\n"shear.points" = [32, 40]\n')
-    assert problem == (
-        f"x:{END + 3}: sweep: the points of the sweep would have different maps;"
-        " run once for each cell and number of points"
-    )
+    (problem,) = refusal(text=text + '[sweep]\n"shear.points" = [32, 40]\n')
+    assert told(problem, END + 3, "sweep", "different maps...run once for each cell and number of points")
 
 
 def test_a_sweep_of_far_too_many_points_is_refused_before_it_is_made(refusal):
     rows = "".join(f'"{key}" = {{ from = 1, to = 2, count = 9999 }}\n' for key in ("drive.to", "contact.load"))
-    (problem,) = refusal(**swept(rows))
-    assert problem == f"x:{END + 1}: sweep: asks for more than 20,000 points; take fewer values, or several runs"
+    (problem,) = refusal(text=f"{LENS}[sweep]\n{rows}")
+    assert told(problem, END + 1, "sweep", "20,000 points")
 
 
 # --- overrides ---
 
 
 @pytest.mark.parametrize(
-    ("overrides", "said"),
+    ("overrides", "words"),
     [
-        ({"contact.lod": 1}, '--set contact.lod: is not a key; did you mean "load"?'),
-        ({"nope.x.y": 3}, "--set nope.x.y: nope is not a key; known: clock, "),
-        (
-            {"contact.load": "1 kg"},
-            '--set contact.load: has the unit "kg", which is not a unit of N; write for example',
-        ),
-        ({"contact": 5}, "--set contact: must be a table, not a whole number; write [contact] and its keys below"),
-        ({"seed": True}, "--set seed: must be a whole number such as 64, not true"),
-        ({"name.x": 1}, '--set name.x: needs a table, but "name" is "lens" in the file'),
-        ({"": 1}, '--set "": is not a key; known: clock'),
-        ({"shear.spectrum.rsm": 1}, '--set shear.spectrum.rsm: is not a key; did you mean "rms"?'),
-        ({'sweep."contact.load"': [1, "2 mm"]}, '--set sweep."contact.load": value 2 (2 mm): has the unit "mm", which'),
+        ({"contact.lod": 1}, 'did you mean "load"'),
+        ({"nope.x.y": 3}, "nope is not a key; known: clock, "),
+        ({"contact.load": "1 kg"}, 'unit "kg"'),
+        ({"contact": 5}, "must be a table"),
+        ({"seed": True}, "whole number"),
+        ({"name.x": 1}, 'needs a table, but "name" is "lens"'),
+        ({'""': 1}, "is not a key; known: clock"),
+        ({"shear.spectrum.rsm": 1}, 'did you mean "rms"'),
+        ({'sweep."contact.load"': [1, "2 mm"]}, 'value 2 (2 mm): ...unit "mm"'),
     ],
 )
-def test_a_bad_override_is_told_as_such(refusal, overrides, said):
-    (problem,) = refusal(LENS, overrides)
-    assert problem.startswith(said)
+def test_a_bad_override_is_told_by_the_way_it_came(refusal, tmp_path, overrides, words):
+    (key,) = overrides
+    (problem,) = refusal(overrides=overrides)
+    assert told(problem, 0, f"--set {key}", words)
+    with pytest.raises(BadInput) as fault:
+        load("x", overrides)
+    assert told(fault.value.problems[0], 0, f'overrides["{key}"]', words)
 
 
 def test_an_override_that_contradicts_the_file_is_told_how_to_replace_the_table(refusal):
-    (problem,) = refusal(LENS, {"contact.indentation": "1 um"})
-    assert problem.startswith(f"x:{line_of('[contact]')}: contact: ")
-    assert problem.endswith("""; replace the whole table by --set 'contact={ indentation = "1 um" }'""")
+    (problem,) = refusal(overrides={"contact.indentation": "1 um"})
+    assert told(problem, line_of("[contact]"), "contact", """--set 'contact={ indentation = "1 um" }'""")
+    with pytest.raises(BadInput, match=r'overrides=\{"contact": \{"indentation": "1 um"\}\}'):
+        load("x", {"contact.indentation": "1 um"})
 
 
 def test_a_model_chosen_by_an_override_is_told_which_keys_are_in_its_way(refusal):
-    assert refusal(LENS, {"shear.model": "uniform"}) == [
-        "--set shear.model: shear holds keys that this model does not take (cell, points, spectrum, correlation);"
-        """ replace the whole table by --set 'shear={ model = "uniform" }'"""
-    ]
+    (problem,) = refusal(overrides={"shear.model": "uniform"})
+    words = """(cell, points, spectrum, correlation)...--set 'shear={ model = "uniform" }'"""
+    assert told(problem, 0, "--set shear.model", words)
 
 
 # --- files that are no scenarios ---
 
+TOO_MUCH = "nested too deeply, or holds a number too long"
+
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    ("text", "line", "words"),
     [
-        ("", "x: is empty; `sim new` writes a starter scenario"),
-        ("# nothing but a question?\n", "x: is empty; `sim new` writes a starter scenario"),
-        (b"\x00" * 40, "x:1: is not TOML: "),
-        (b"PK\x03\x04\x14\x00", "x:1: is not TOML: "),
-        (LENS.encode("utf-16"), "x:1: is not UTF-8 text; save the file as UTF-8"),
-        (LENS.encode() + b"\n# caf\xe9\n", f"x:{END + 2}: is not UTF-8 text; save the file as UTF-8"),
-        (
-            LENS.replace("[drive]", "[drive"),
-            "x:17: is not TOML: expected ']' at the end of a table declaration; close the",
-        ),
-        (
-            LENS.replace('"4 mN"', "4 mN"),
-            'after a statement; put a value with its unit in quotes, such as load = "4 mN"',
-        ),
-        (
-            LENS.replace('"rate"', "rate"),
-            'x:24: is not TOML: invalid value; put text in quotes, such as model = "rate"',
-        ),
-        (
-            LENS.replace("seed = 7", "seed 7"),
-            "x:2: is not TOML: expected '=' after a key in a key/value pair; write key =",
-        ),
-        (
-            LENS + "[clock]\n",
-            f"x:{END + 1}: is not TOML: cannot declare clock twice; the table is there twice, so merge",
-        ),
-        ("seed = 1\n" + LENS, "x:3: is not TOML: cannot overwrite a value; the key is there twice, so keep one"),
-        (
-            LENS.replace('"lens"', '"lens'),
-            "x:1: is not TOML: illegal character '\\n'; close the quotes on the same line",
-        ),
-        (LENS + 'text = """never closed\n', "is not TOML: unterminated string; close its quotes"),
-        ("a = [1, 2\n", "is not TOML: unclosed array; close its bracket ]"),
-        ("a = 2024-02-31\n", "x:1: is not TOML: invalid date or datetime"),
-        ("a = " + "[" * 10_000, "x:1: is nested too deeply; a scenario nests four deep at most"),
-        ("a = " + "[" * 10_000 + "]" * 10_000, "x:1: is nested too deeply; a scenario nests four deep at most"),
-        (
-            "a = " + "{ b = " * 10_000 + "1" + " }" * 10_000,
-            "x:1: is nested too deeply; a scenario nests four deep",
-        ),
-        ("a = 1\nb = [\n" + "[\n" * 10_000, "x:18: is nested too deeply; a scenario nests four deep at most"),
-        ("a = " + "[" * 100 + "]" * 100, "x:1: a: is nested too deeply; a scenario nests four deep at most"),
-        ("\n[" + "a." * 30 + "a]\n", "x:2: a.a.a.a: is nested too deeply; a scenario nests four deep at most"),
-        ("[" + "a." * 10_000 + "a]\n", "x:1: has a key of 40 words or more; a scenario needs four at most"),
-        ("x = 1\n\ny = " + "1" * 5000, "x:3: holds a number of thousands of digits; shorten it"),
-        ("\ny = 0x" + "1" * 5000, "x:2: y: is a number of hundreds of digits; shorten it"),
-        ("#" * 2**21, "x: is larger than 1 MiB; put long tables into CSV files and name those"),
+        ("", 0, "is empty; `sim new`"),
+        ("# nothing but a question?\n", 0, "is empty; `sim new`"),
+        (b"\x00" * 40, 1, "is not TOML"),
+        (b"PK\x03\x04\x14\x00", 1, "is not TOML"),
+        (b"\x89HDF\r\n\x1a\n" + b"\x00" * 99, 0, "is a dataset"),
+        (LENS.encode("utf-16"), 1, "is not UTF-8 text"),
+        (LENS.encode() + b"\n# caf\xe9\n", END + 2, "is not UTF-8 text"),
+        (LENS.replace("[drive]", "[drive"), 17, "is not TOML...close the bracket"),
+        (LENS.replace('"4 mN"', "4 mN"), 46, 'is not TOML...unit in quotes, such as load = "4 mN"'),
+        (LENS.replace('"rate"', "rate"), 24, 'is not TOML...text in quotes, such as model = "rate"'),
+        (LENS.replace("seed = 7", "seed 7"), 2, "is not TOML...write key = value"),
+        (LENS + "[clock]\n", END + 1, "is not TOML...merge both"),
+        ("seed = 1\n" + LENS, 3, "is not TOML...twice, so keep one"),
+        (LENS.replace('"lens"', '"lens'), 1, "is not TOML...close the quotes on the same line"),
+        (LENS + 'text = """never closed\n', END + 2, "is not TOML...close its quotes"),
+        ("a = [1, 2\n", 2, "is not TOML...close its bracket"),
+        ("a = 2024-02-31\n", 1, "is not TOML"),
+        ("a = " + "[" * 10_000, 0, TOO_MUCH),
+        ("a = " + "{ b = " * 10_000 + "1" + " }" * 10_000, 0, TOO_MUCH),
+        ("x = 1\n\ny = " + "1" * 5000, 0, TOO_MUCH),
+        ("#" * 2**21, 0, "larger than 1 MiB"),
     ],
 )
-def test_what_is_no_scenario_is_told_in_one_line(refusal, text, said):
-    (problem,) = refusal(text)
-    assert problem.startswith("x")
-    assert said in problem
+def test_what_is_no_scenario_is_told_in_one_line(refusal, text, line, words):
+    (problem,) = refusal(text=text)
+    start = f"x:{line}: " if line else "x: "
+    assert problem.startswith(start)
+    assert all(word in problem for word in words.split("..."))
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 100 + "]" * 100, "\n[" + "a." * 300 + "a]\n", "y = 0x" + "1" * 5000])
+def test_a_monster_that_the_parser_takes_is_an_unknown_key(refusal, text):
+    found = refusal(text=text)
+    assert "is not a key" in found[-1]
 
 
 def test_a_missing_file_a_folder_and_a_broken_name_are_told(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for name, said in (
-        ("nope.toml", "nope.toml: there is no such file; `sim new` writes a starter"),
-        (".", ".: cannot be read (Is a directory); name a TOML file"),
-        ("a\0b", "a\\x00b: cannot be read (embedded null byte); name a TOML file"),
-        ("x" * 300, "cannot be read (File name too long); name a TOML file"),
+    for name, words in (
+        ("nope.toml", "no such file...`sim new`"),
+        (".", "cannot be read (Is a directory)"),
+        ("a\0b", "a\\x00b: cannot be read"),
+        ("x" * 300, "cannot be read (File name too long)"),
     ):
         with pytest.raises(BadInput) as fault:
             load(name)
         (problem,) = fault.value.problems
-        assert said in problem
+        assert all(word in problem for word in words.split("..."))
     assert not os.listdir(tmp_path)
 
 

@@ -228,12 +228,12 @@ def test_without_damage_all_are_scenarios(tmp_path):
         assert isinstance(load(tmp_path / "x.toml"), Scenario)
 
 
-def test_500_damaged_files_are_read_or_refused_in_plain_lines(tmp_path):
-    for seed in range(500):
+def test_100_damaged_files_are_read_or_refused_in_plain_lines(tmp_path):
+    for seed in range(100):
         check(seed, tmp_path)
 
 
 @pytest.mark.verify
-def test_20_000_damaged_files_are_read_or_refused_in_plain_lines(tmp_path):
-    for seed in range(500, 20_500):
+def test_500_damaged_files_are_read_or_refused_in_plain_lines(tmp_path):
+    for seed in range(100, 600):
         check(seed, tmp_path)

@@ -5,6 +5,7 @@ import os
 import pickle
 from typing import Annotated
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.units import quantity
-from sim.units.quantity import Quantity, number_and_unit
+from sim.units.quantity import Quantity, number_and_unit, same_unit
 
 LENGTH = Quantity("m", "length", "l", above=0)
 STRESS = Quantity("Pa", "stress", "tau", at_least=0)
@@ -57,8 +58,28 @@ def test_a_decimal_prefix_costs_no_digit(number, unit):
 
 
 @given(st.floats(1e-50, 1e50))
-def test_a_bare_number_is_si_as_number_or_text(number):
-    assert LENGTH.read(number) == number == LENGTH.read(repr(number))
+def test_a_bare_number_is_si_and_text_needs_a_unit(number):
+    assert LENGTH.read(number) == number == LENGTH.read(f"{number!r} m")
+    with pytest.raises(PydanticCustomError, match="without a unit"):
+        LENGTH.read(repr(number))
+    assert Quantity("1", "share").read(repr(number)) == number
+
+
+def test_a_whole_number_is_read_from_whole_numbers_only():
+    count = Quantity("1", "members", at_least=1, at_most=10**7, whole=True)
+    assert [count.read(value) for value in (7, 7.0, np.int64(7))] == [7, 7, 7]
+    assert all(type(count.read(value)) is int for value in (7, 7.0, np.int64(7)))
+    for value in (0, 7.5, "7", True, math.nan, math.inf, None, 10**400):
+        with pytest.raises(PydanticCustomError):
+            count.read(value)
+
+
+def test_two_numbers_come_in_the_unit_of_the_first():
+    assert same_unit("10 um/s", "30 mm/s") == (10.0, 30000.0, "um/s")
+    assert same_unit("1", "2") == (1.0, 2.0, "")
+    assert same_unit(1, 2) == (1.0, 2.0, None)
+    for first, last in (("1 m", "1 s"), (1, "1 m"), ("1 m", "1"), ("1 m", "1 foo"), ("x", "1 m")):
+        assert same_unit(first, last) is None
 
 
 @given(st.text(max_size=80))

@@ -9,7 +9,6 @@ from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 import sim.parts.bonds.cohorts as cohorts
@@ -214,7 +213,9 @@ class Tracked(_Stretched):
     bond_stiffness: Stiffness
     rebinding_rate: Rebinding
     site_density: Density
-    sites: Annotated[int, Field(ge=1, le=10**6, description="number of bond sites that are followed")]
+    sites: Annotated[
+        int, Quantity("1", "number of bond sites that are followed", at_least=1, at_most=10**6, whole=True)
+    ]
     start_from: Start = "steady"
     model: Literal["tracked"] = "tracked"
 

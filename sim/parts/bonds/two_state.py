@@ -23,7 +23,7 @@ Start = Annotated[
     Literal["steady", "bonded", "empty"],
     Field(alias="start", description="bonds at the start, bonded being those of rest"),
 ]
-Sites = Annotated[int, Field(ge=1, le=10**9, description="number of bond sites of the contact")]
+Sites = Annotated[int, Quantity("1", "number of bond sites of the contact", at_least=1, at_most=10**9, whole=True)]
 
 
 class Population(NamedTuple):

@@ -36,7 +36,7 @@ _Contact = Annotated[
     Literal["plane", "disc"],
     Field(description='"disc": the energy that a contact of finite size pays when it grows, instead of the plane\'s'),
 ]
-_Points = Annotated[int, Field(ge=2, le=2**14, description="grid points along a side of the cell")]
+_Points = Annotated[int, Quantity("1", "grid points along a side of the cell", at_least=2, at_most=2**14, whole=True)]
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
