@@ -14,6 +14,12 @@ import click
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, STOPPED, INTERRUPTED = 0, 1, 2, 73, 74, 75, 130
 
 _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of the file.")
+_WHERE = click.option(
+    "--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key, as load='4 mN'."
+)
+
+#: Rows of a table on the terminal.
+_ROWS = 12
 
 
 def main() -> None:
@@ -157,14 +163,16 @@ def _show_table(path: Path) -> None:
         _print_tables(dataset)
 
 
-def _print_tables(dataset: Any) -> None:
-    """The statistics of a dataset, and what stands out in it."""
+def _print_tables(dataset: Any, most: int = _ROWS) -> None:
+    """Statistics of a dataset over time and sweep, of each whole run, and what the numbers mean."""
     from sim import analysis
 
-    _print_rows(analysis.table(dataset))
-    if told := analysis.highlights(dataset):
+    rows, once = analysis.table(dataset, most), analysis.highlights(dataset, most)
+    for shown in filter(None, (rows, once)):
+        _print_rows(shown)
         click.echo()
-        _print_rows(told)
+    for note in analysis.notes(dataset, rows, once):
+        click.echo(note)
 
 
 def _print_rows(rows: list[dict[str, str]]) -> None:
@@ -198,14 +206,16 @@ def check(scenario: Path, changes: tuple[str, ...]) -> None:
 
 @cli.command()
 @click.argument("output", type=click.Path(path_type=Path))
+@_WHERE
+@click.option("--all", "whole", is_flag=True, help="Every row: all times and sweep values.")
 @click.option("--csv", type=click.Path(path_type=Path), help="Also write every time and sweep value to this CSV file.")
-def stats(output: Path, csv: Path | None) -> None:
+def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None) -> None:
     """Ensemble statistics over time and sweep."""
     from sim import analysis
     from sim.numerics.files import explained
 
-    with _opened(output) as dataset:
-        _print_tables(dataset)
+    with _opened(output, chosen) as dataset:
+        _print_tables(dataset, sys.maxsize if whole else _ROWS)
         if csv is not None:
             with explained(csv.parent):
                 csv.parent.mkdir(parents=True, exist_ok=True)
@@ -213,19 +223,27 @@ def stats(output: Path, csv: Path | None) -> None:
             click.echo(str(csv))
 
 
-@cli.command()
+class _Plot(click.Command):
+    """The command whose help lists the kinds of figures."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from sim.plots.kinds import KINDS
+
+        with formatter.section("Kinds"):
+            formatter.write_dl([(name, kind.shows) for name, kind in KINDS.items()])
+
+
+@cli.command(cls=_Plot)
 @click.argument("output", type=click.Path(path_type=Path))
 @click.argument("kind", required=False)
 @click.option("-o", "--picture", type=click.Path(path_type=Path), help="The picture; default beside the dataset.")
-def plot(output: Path, kind: str | None, picture: Path | None) -> None:
-    """Draw a figure; without a KIND the one that fits.
-
-    KIND is curve, time, sweep, map, spectrum, friction, theories, profile or loop.
-    """
+@_WHERE
+def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str, ...]) -> None:
+    """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset."""
     from sim.numerics.files import explained
     from sim.plots import kinds as plots
 
-    with _opened(output) as dataset:
+    with _opened(output, chosen) as dataset:
         target = picture or output.with_name(f"{output.stem}{'-' + kind if kind else ''}.png")
         try:
             figure = plots.draw(dataset, kind)
@@ -238,8 +256,8 @@ def plot(output: Path, kind: str | None, picture: Path | None) -> None:
 
 
 @contextlib.contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """A dataset of ours, or one message."""
+def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
+    """A dataset of ours, at chosen values of its sweep, or one message."""
     import xarray
 
     if not path.is_file():
@@ -253,11 +271,21 @@ def _opened(path: Path) -> Iterator[Any]:
         if "sim_version" not in dataset.attrs:
             _fail(f"{path}: was not written by `sim run`; name one of its outputs", BAD_INPUT)
         try:
-            yield dataset
+            yield _chosen(path, dataset, chosen) if chosen else dataset
         except RuntimeError as trouble:
             if "NetCDF" not in str(trouble):
                 raise
             _fail(broken, BAD_INPUT)
+
+
+def _chosen(path: Path, dataset: Any, chosen: tuple[str, ...]) -> Any:
+    """The dataset where its swept keys have the values of --where."""
+    from sim import analysis
+
+    try:
+        return analysis.where(dataset, {key: value for key, _, value in (text.partition("=") for text in chosen)})
+    except ValueError as fault:
+        _fail(f"{path}: --where {fault}", BAD_INPUT)
 
 
 @cli.command()

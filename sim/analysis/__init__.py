@@ -17,14 +17,15 @@ from sim.analysis.observables import (
     share_observables,
 )
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, sweep_dims
-from sim.analysis.statistics import QUANTILES, shares, statistics, summary
-from sim.analysis.tables import highlights, table, to_csv
+from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary, where
+from sim.analysis.tables import highlights, notes, table, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
     "QUANTILES",
     "Control",
     "IntegralTime",
+    "averaging",
     "bond_work",
     "concise",
     "control",
@@ -36,6 +37,7 @@ __all__ = [
     "is_stationary",
     "is_steady",
     "loop_energy",
+    "notes",
     "observables",
     "peaks",
     "reference_radii",
@@ -49,4 +51,5 @@ __all__ = [
     "sweep_dims",
     "table",
     "to_csv",
+    "where",
 ]

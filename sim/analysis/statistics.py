@@ -1,15 +1,76 @@
 """Statistics over the members of an ensemble, at each time and sweep value."""
 
 import warnings
+from collections.abc import Mapping
+from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import KEPT, observables, reference_radii, share_observables
-from sim.analysis.scene import MEMBERS
+from sim.analysis.scene import MEMBERS, sweep_dims
+from sim.units.notation import engineering
+from sim.units.quantity import Quantity
 
 QUANTILES = (0.05, 0.5, 0.95)
+
+#: How far from a swept value, in parts of it, one may be chosen: as far as rounding to three digits.
+_NEAR = 5e-3
+
+
+def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
+    """Choose values of swept keys.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    chosen : dict
+        Swept keys (``"contact.load"``, or ``"load"`` where that is one only), each with a value: a number in SI,
+        a text with a unit (``"4 mN"``) or a name. The nearest swept value, within half a percent.
+
+    Returns
+    -------
+    xarray.Dataset
+        The dataset at these values; their dimensions stay, of length one.
+
+    Raises
+    ------
+    ValueError
+        If a key is not swept, or has no such value; says which there are.
+    """
+    for key, value in chosen.items():
+        dims = sweep_dims(dataset)
+        full = key.replace(".", "_")
+        fitting = [n for n in dims if n == full] or [n for n in dims if n.endswith(f"_{full}")]
+        if len(fitting) != 1:
+            raise ValueError(f"{key} is not swept; swept: {', '.join(dims) or 'nothing'}")
+        name = fitting[0]
+        swept = dataset[name]
+        if swept.dtype.kind in "fi":
+            unit = swept.attrs.get("units", "1")
+            wanted = Quantity(unit, key).read(value)
+            near = int(np.abs(swept.to_numpy() - wanted).argmin())
+            there = abs(float(swept[near]) - wanted) <= _NEAR * abs(wanted)
+            known = [engineering(float(f"{number:.4g}"), unit) for number in swept.to_numpy()]
+        else:
+            known = [str(text) for text in swept.to_numpy()]
+            there, near = value in known, known.index(value) if value in known else 0
+        if not there:
+            raise ValueError(f"{key} has no value {value}; there are: {', '.join(known)}")
+        dataset = dataset.isel({name: [near]})
+    return dataset
+
+
+def averaging(dataset: xr.Dataset, late: bool) -> str:
+    """What a mean is over, in words: the second half of the run where it is of that, and the members that differ."""
+    over = ["second half of the run"] if late and dataset.sizes["t"] > 2 else []
+    members = dataset.sizes.get(MEMBERS, dataset.attrs.get("members", 1))
+    differ = MEMBERS in dataset.sizes or any(str(name).endswith("_sem") for name in dataset.data_vars)
+    over += [f"{members} members"] if differ and members > 1 else []
+    return f"mean over the {' and '.join(over)}" if over else ""
 
 
 def summary(trajectories: xr.Dataset) -> xr.Dataset:

@@ -5,6 +5,7 @@ import csv
 import io
 import math
 import os
+import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,8 +16,8 @@ import xarray as xr
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import observables, settled, share_observables
-from sim.analysis.scene import is_stationary, stays_held, sweep_dims, word
-from sim.analysis.statistics import QUANTILES, shares, statistics, summary
+from sim.analysis.scene import is_stationary, setting, stays_held, sweep_dims, word
+from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary
 from sim.numerics.files import write_whole
 from sim.units.notation import concise, scaled
 
@@ -30,34 +31,37 @@ class _Column(NamedTuple):
     heading: str
     dull: float = 0.0
     changing: bool = False  # only in rows over time of a contact whose control changes
+    meaning: str = ""
 
 
 _COLUMNS = (
-    _Column("speed", "V", math.nan),
+    _Column("speed", "V"),
     _Column("normal_load", "P", changing=True),
-    _Column("displacement", "Δ", changing=True),
+    _Column("displacement", "Δ", changing=True, meaning="displacement of the base, without one the indentation"),
     _Column("bond_fraction", "N/N0", 1.0),
     _Column("fluctuation_energy", "ΔΓ"),
     _Column("work_of_adhesion", "w", math.nan),
     _Column("contact_radius", "a", math.nan),
-    _Column("area_ratio", "A/A_JKR"),
-    _Column("lost_to_bonds", "lost to\nbonds"),
+    _Column("area_ratio", "A/A_JKR", meaning="contact area over that with the full work of adhesion"),
+    _Column("lost_to_bonds", "lost to\nbonds", meaning="share of A_JKR, bonds charged first"),
     _Column("lost_to_fluctuations", "lost to\nfluct."),
     _Column("lost_to_mean_stress", "lost to\nstress"),
     _Column("lost_to_lag", "lost to\nlag"),
     _Column("friction_force", "F"),
     _Column("fraction_detached", "open"),
-    _Column("fraction_masked", "masked"),
-    _Column("dissipated_energy", "W", changing=True),
+    _Column("fraction_masked", "masked", meaning="closed contacts without any work of adhesion left"),
+    _Column("dissipated_energy", "W", changing=True, meaning="energy dissipated so far by opening and closing"),
 )
 
 _EVENTS = (
     _Column("time_masked", "masked,\nof the time"),
     _Column("ever_detached", "detached,\nof members"),
     _Column("first_detachment", "first\ndetached"),
-    _Column("loop_energy", "∮P dΔ,\na cycle"),
-    _Column("loop_dissipation", "jumps,\na cycle"),
-    _Column("total_dissipated", "jumps,\nin all"),
+    _Column("loop_energy", "∮P dΔ,\na cycle", meaning="work put in over a cycle"),
+    _Column("loop_dissipation", "dissipated,\na cycle"),
+    _Column("total_dissipated", "dissipated,\nin all"),
+    _Column("pull_off_load", "pull-off\nload"),
+    _Column("pull_off_time", "pull-off\nafter", math.nan),
     _Column("peak_stress", "peak of\nstress"),
     _Column("peak_speed", "at V", math.nan),
     _Column("peak_time", "after", math.nan),
@@ -65,6 +69,9 @@ _EVENTS = (
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
 )
+
+#: Heading and meaning of the correlation time.
+_MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time of ΔΓ")
 
 #: Shares below it are nothing.
 _ROUNDING = 1e-13
@@ -90,8 +97,9 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     Returns
     -------
     list of dict
-        Cells by heading (of two lines, with the unit of the column). A number in brackets is the standard error in the
-        last digits; columns that tell nothing (a friction of zero, no open contacts) are left out.
+        Cells by heading (of two lines, with the unit of the column): means over the members, of a swept steady run
+        over its second half, too; ``averaging`` says which. A number in brackets is the standard error in the last
+        digits; columns that are zero or constant throughout (no friction, no open contacts) are left out.
         "lost to bonds" and "lost to fluct." are the shares of JKR's area that each mechanism takes.
     """
     found, points = _tabulated(dataset, rows)
@@ -102,18 +110,45 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         if name != "t" or not whole:
             heading, texts = _cells(name, found[name].attrs.get("units", "1"), found[name][index].to_numpy())
             cells[heading] = texts
-    cells |= _told(found, points, [column for column in _COLUMNS if changing or not column.changing])
+    same = whole and any(named in points for named in _dims_of(dataset, "drive.speed"))  # V is a column already
+    left_out = {"speed"} if same else set()
+    columns = [c for c in _COLUMNS if (changing or not c.changing) and c.name not in left_out]
+    cells |= _shown(found, points, columns)
     where = {name: index for name, index in points.items() if name != "t"}
     known = (found[name].isel(where).to_numpy() for name in ("correlation_time", "correlation_time_sem"))
     times, errors, _ = np.broadcast_arrays(*known, points["t"])
     if np.any(np.isfinite(times)):
-        heading, texts = _cells("t_c", "s", times, errors)
+        heading, texts = _cells(_MEMORY.heading, "s", times, errors)
         cells[heading] = texts
     return _rows(cells)
 
 
+def _dims_of(dataset: xr.Dataset, key: str) -> tuple[Any, ...]:
+    """Dimensions of a number of the scenario, none where it is not one."""
+    with contextlib.suppress(KeyError):
+        return setting(dataset, key).dims
+    return ()
+
+
+def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]]) -> list[str]:
+    """What stands in the rows of ``table`` and ``highlights``: means over what, how many rows, and symbols in words."""
+    whole = is_stationary(dataset) and bool(sweep_dims(dataset))
+    points = math.prod(dataset.sizes[name] for name in sweep_dims(dataset))
+    said = [words] if (words := averaging(dataset, whole)) else []
+    if any("(" in cell for row in rows for cell in row.values()):
+        said.append("in brackets the standard error in the last digits")
+    lines = ["; ".join(said)] if said else []
+    for shown, total in ((rows, points if whole else points * dataset.sizes["t"]), (once, points)):
+        if 0 < len(shown) < total:
+            lines.append(f"{len(shown)} of {total} rows shown; all: --all, or --csv FILE; chosen: --where KEY=VALUE")
+    headings = {re.sub(r"[ \n]\([^()]*\)$", "", heading) for row in (*rows[:1], *once[:1]) for heading in row}
+    known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
+    words = "; ".join(f"{' '.join(column.heading.split())}: {column.meaning}" for column in known)
+    return [*dict.fromkeys(lines), *filter(None, [words])]
+
+
 def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
-    """What each point of the sweep tells once of its whole run, in a dozen rows at most; none where it tells nothing.
+    """What each point of the sweep has once in its whole run, in a dozen rows at most; none where there is nothing.
 
     Parameters
     ----------
@@ -132,7 +167,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     found = summary(events(dataset))
     counts = _thinned({name: dataset.sizes[name] for name in sweep_dims(dataset)}, rows)
     points = _points(dataset.sizes, counts)
-    told = _told(found, points, [column for column in _EVENTS if _of_drive(dataset, column.name)])
+    told = _shown(found, points, [column for column in _EVENTS if _of_drive(dataset, column.name)])
     if not told:
         return []
     cells: Columns = {}
@@ -163,14 +198,14 @@ def _range(quantiles: xr.DataArray, points: dict[str, xr.DataArray], count: int)
     largest = np.nanmax(ends[1])
     factor, shown = scaled(float(largest), "s")
     texts = [f"{concise(factor * low, 0.0)} to {concise(factor * high, 0.0)}" for low, high in zip(*ends, strict=True)]
-    return {f"5 to 95 %\n({shown})": texts}
+    return {f"5 to 95 %\nof members ({shown})": texts}
 
 
-def _told(found: xr.Dataset, points: dict[str, xr.DataArray], columns: Iterable[_Column]) -> Columns:
-    """The columns that tell something at these points."""
+def _shown(found: xr.Dataset, points: dict[str, xr.DataArray], columns: Iterable[_Column]) -> Columns:
+    """The columns that are not constant at their dull value at these points."""
     cells: Columns = {}
     count = next(iter(points.values())).size if points else 1
-    for name, heading, dull, _ in columns:
+    for name, heading, dull, *_ in columns:
         if f"{name}_mean" not in found:
             continue
         mean, sem = (_at(found, f"{name}_{kind}", points, count) for kind in ("mean", "sem"))
@@ -254,9 +289,9 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     dataset : xarray.Dataset
         As ``sim run`` writes it.
     path : path
-        The file: a comment line of provenance, a header with SI units in brackets, one row for each
-        sweep value and time; what is told once of a run stands in all of its rows. A file is there whole or,
-        in trouble, as it was before.
+        The file: a header with SI units in brackets, then one row for each sweep value and time, with the mean,
+        standard deviation, standard error and quantiles over the members at that time; what a whole run has once
+        stands in all of its rows. A file is there whole or, in trouble, as it was before.
     """
     found = statistics(dataset)
     with contextlib.suppress(ValueError):  # where the shares cannot be told the rest can
@@ -264,10 +299,7 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     long = _flat(found)
     units = {str(name): variable.attrs.get("units", "1") for name, variable in long.variables.items()}
     frame = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
-    about = dataset.attrs
-    told = (about.get("title", ""), f"sliding-sim {about.get('sim_version', '')}", about.get("history", ""))
     text = io.StringIO()
-    text.write("# " + " ".join("; ".join([*told, f"seed {about.get('seed', '')}"]).split()) + "\n")
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([name if units[name] == "1" else f"{name} [{units[name]}]" for name in frame])
     writer.writerows(frame.itertuples(index=False, name=None))

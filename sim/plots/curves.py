@@ -1,4 +1,4 @@
-"""Statistics of a dataset as curves: of time, or of a swept key, one for each other point of the sweep."""
+"""Statistics of a dataset as curves: over time, or over a swept key, one for each other point of the sweep."""
 
 import contextlib
 from typing import Any, NamedTuple
@@ -7,16 +7,29 @@ import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.cm import ScalarMappable
 
-from sim.analysis import bond_work, is_steady, observables, settled, share_observables, summary, sweep_dims
-from sim.plots.style import BOTH, LINES, REFERENCE, fill, told
+from sim.analysis import (
+    averaging,
+    bond_work,
+    is_stationary,
+    is_steady,
+    observables,
+    reference_radii,
+    settled,
+    share_observables,
+    summary,
+    sweep_dims,
+)
+from sim.plots.style import BOTH, LINES, Unit, axis_scale, fill, label, swept_value, symbol
 
 #: Points up to which each carries a marker.
 MARKED = 25
 
-#: What is nothing while the contact is open: lines break there.
+#: Curves that a figure holds at most: named in a legend, and along a colour bar.
+NAMED, MOST = 10, 20
+
+#: Zero while the contact is open: lines break there.
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
 
 #: Markers that stand for line styles where points are not joined.
@@ -28,9 +41,15 @@ _UNDERNEATH, _FEW = 2.8, 3
 #: Width that the curves of a category share.
 _CATEGORY = 0.6
 
+#: A speed jumps between two records if it changes by more than this many times what it does before and after.
+_JUMP = 4.0
+
+_CROSS: Any = {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3}
+_RING: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "mew": 0.8, "linestyle": "none", "zorder": 3}
+
 
 class Line(NamedTuple):
-    """One curve of a panel: a point of the sweep, with what it is called."""
+    """One curve of a panel: a point of the sweep, its name, "" where a colour bar names it, and its colour."""
 
     number: int
     point: dict[str, int]
@@ -38,25 +57,42 @@ class Line(NamedTuple):
     colour: str
 
 
-class Scene(NamedTuple):
-    """Statistics laid out for panels: along a dimension, which may be time, one curve for each other point.
+class Bar(NamedTuple):
+    """A colour bar in place of the names of many curves."""
 
-    ``x`` has shape (curves, points), in the unit of the axis. Points that are categories are not ``joined``.
+    colours: ScalarMappable
+    words: str
+
+
+class Scene(NamedTuple):
+    """Statistics laid out for panels: along time or a swept key, one curve for each other point of the sweep.
+
+    ``x`` has shape (curves, points), in the unit of the axis. Points that are categories are not ``joined``;
+    where the speed jumps lines are ``broken``. ``averaged`` says what the curves are means over.
     """
 
     found: xr.Dataset
     along: str
     lines: list[Line]
+    averaged: str
+    spread: str
+    bar: Bar | None = None
     x: np.ndarray = np.empty((0, 0))
     joined: bool = True
+    broken: bool = False
 
     @property
     def single(self) -> bool:
         return len(self.lines) == 1
 
-    def placed(self, x: np.ndarray) -> "Scene":
+    @property
+    def title(self) -> str:
+        """What several curves are means over; a single one says so itself."""
+        return "" if self.single else self.averaged
+
+    def placed(self, x: np.ndarray, broken: bool = False) -> "Scene":
         """With x values: (points,) the same for all curves, or (curves, points)."""
-        return self._replace(x=np.broadcast_to(x, (len(self.lines), self.found.sizes[self.along])))
+        return self._replace(x=np.broadcast_to(x, (len(self.lines), self.found.sizes[self.along])), broken=broken)
 
     def apart(self) -> "Scene":
         """With points that are categories, the curves of each side by side."""
@@ -72,9 +108,25 @@ class Scene(NamedTuple):
         """Width of a curve's place within a category."""
         return _CATEGORY / len(self.lines)
 
+    def look(self, style: Any) -> dict[str, Any]:
+        """A line style, or the marker that stands for it where points are not joined."""
+        return (
+            {"linestyle": style} if self.joined else {"linestyle": "none", "marker": _MARKS[style], "markersize": 3.5}
+        )
+
     def opened(self, line: Line) -> np.ndarray:
         """Where the contacts of all members are open."""
         return self.values("fraction_detached_mean", line) >= 1.0
+
+    def pulled_off(self, line: Line) -> np.ndarray:
+        """Records after which the contact opens; none in a sweep, whose points follow no time."""
+        gone = self.opened(line)
+        return np.flatnonzero(~gone[:-1] & gone[1:]) if self.along == "t" else np.empty(0, dtype=int)
+
+    def jumped_in(self, line: Line) -> np.ndarray:
+        """Records at which an open contact has closed."""
+        gone = self.opened(line)
+        return np.flatnonzero(gone[:-1] & ~gone[1:]) + 1 if self.along == "t" else np.empty(0, dtype=int)
 
     def values(self, name: str, line: Line) -> np.ndarray:
         """A statistic along the x axis; nan where it is not known."""
@@ -98,25 +150,43 @@ class Scene(NamedTuple):
     def drawn(self, name: str, line: Line) -> list[np.ndarray]:
         """Mean, its standard error, and both sides of the band; nan where there is no contact that it is of."""
         known = [self.values(f"{name}_mean", line), self.values(f"{name}_sem", line), *self.band(name, line)]
-        if name not in _OF_CONTACT:
-            return known
-        gone = self.opened(line)
+        gone = self.opened(line) if name in _OF_CONTACT else False
         return [np.where(gone, np.nan, values) for values in known]
 
-    def fluctuates(self, name: str) -> bool:
-        """Whether members differ, so that there is a band to draw."""
-        return any(bool(np.any(np.diff(self.band(name, line), axis=0) > 0.0)) for line in self.lines)
+    def parted(self, line: Line, *several: np.ndarray) -> list[np.ndarray]:
+        """The x values of a curve and values over them, with a nan in each where lines break."""
+        at = jumps(self.values("speed_mean", line)) if self.broken else np.empty(0, dtype=int)
+        return [np.insert(values, at, np.nan) for values in (self.x[line.number], *several)]
 
-    def tells(self, name: str) -> bool:
+    def varies(self, name: str) -> bool:
         """Whether the observable is there and changes along the axis or between the curves."""
-        values = self.all(f"{name}_mean")
-        known = values[np.isfinite(values)]
-        return known.size > 0 and bool(np.ptp(known) > 1e-12 * np.max(np.abs(known)))
+        return _changes(self.all(f"{name}_mean"))
+
+    def moves(self, name: str) -> bool:
+        """Whether the observable changes along the axis."""
+        return any(_changes(values) for values in self.all(f"{name}_mean"))
+
+
+def _changes(values: np.ndarray) -> bool:
+    known = values[np.isfinite(values)]
+    return known.size > 0 and bool(np.ptp(known) > 1e-12 * np.max(np.abs(known)))
+
+
+def jumps(speed: np.ndarray) -> np.ndarray:
+    """Records before which the speed has jumped: its change stands out from those before and after.
+
+    >>> jumps(np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]))
+    array([3])
+    >>> jumps(np.geomspace(1e-5, 1e-1, 5))
+    array([], dtype=int64)
+    """
+    change = np.abs(np.diff(speed))
+    return np.flatnonzero(change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:])) + 2
 
 
 def _stated(dataset: xr.Dataset) -> xr.Dataset:
-    """Observables of all panels, with the shares where they can be told."""
-    found = observables(dataset)
+    """Observables of all panels, with the shares of the lost area where they are known."""
+    found = observables(dataset).merge(reference_radii(dataset))
     with contextlib.suppress(ValueError):
         found = found.merge(share_observables(dataset))
     with contextlib.suppress(KeyError):
@@ -125,64 +195,95 @@ def _stated(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def scene_along(dataset: xr.Dataset, along: str) -> Scene:
-    """Statistics along time (``"t"``) or along a dimension of the sweep, where they are of the second half."""
-    stated = _stated(dataset)
-    if along != "t":
-        late = settled(stated) if is_steady(dataset) else stated.isel(t=slice(-1, None))
-        stated = late.isel(t=0, drop=True)
-    found = summary(stated)
-    rest, hertz = dataset["radius_at_rest"], dataset["radius_without_adhesion"]
-    found["radius_jkr"], found["radius_hertz"] = rest, hertz
+    """Statistics along time (``"t"``), or along a dimension of the sweep.
+
+    Along the sweep they are of the means over the second half of the run where neither speed nor control change,
+    else of the last record.
+    """
     others = [name for name in sweep_dims(dataset) if name != along]
-    return Scene(found, along, _lines_of(dataset, others))
+    lines, bar = _lines_of(dataset, others)
+    late, stated = along != "t" and is_stationary(dataset), _stated(dataset)
+    if along != "t":
+        stated = (settled(stated) if late else stated.isel(t=slice(-1, None))).isel(t=0, drop=True)
+    found = summary(stated)
+    words = averaging(dataset, late)
+    if len(lines) == 1:
+        lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
+    spread = "5–95 % of members" if "contact_radius_quantile" in found else "± 1 std. dev. of members"
+    return Scene(found, along, lines, words, f"{spread}' means" if late else spread, bar)
 
 
-def _lines_of(dataset: xr.Dataset, dims: list[str]) -> list[Line]:
+def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], Bar | None]:
+    """One curve for each point of some dimensions, and a colour bar where they are many along one number."""
     points = [dict(zip(dims, at, strict=True)) for at in np.ndindex(*(dataset.sizes[name] for name in dims))]
-    colours = list(LINES)
+    dims = [name for name in dims if dataset.sizes[name] > 1]
+    keyed = len(points) > len(LINES) and len(dims) == 1 and dataset[dims[0]].dtype.kind in "fi"
+    if len(points) > (MOST if keyed else NAMED):
+        sizes = " × ".join(f"{dataset.sizes[name]} of {name}" for name in dims)
+        cure = f'choose by --where, such as --where {dims[0]}="{swept_value(dataset, dims[0], 0).partition("= ")[2]}"'
+        raise ValueError(f"{len(points)} curves ({sizes}) are too many to tell apart; {cure}")
+    if keyed:
+        bar, colours = _bar(dataset[dims[0]])
+        return [Line(k, at, "", colour) for k, (at, colour) in enumerate(zip(points, colours, strict=True))], bar
+    shades: tuple[str, ...] = LINES
     if len(points) > len(LINES):
-        colours = [mpl.colors.to_hex(c) for c in mpl.colormaps["viridis"](np.linspace(0.0, 0.92, len(points)))]
-    names = [", ".join(told(dataset, name, at[name]) for name in dims) for at in points]
-    return [Line(k, at, name, colours[k]) for k, (at, name) in enumerate(zip(points, names, strict=True))]
+        shades = tuple(mpl.colors.to_hex(c) for c in mpl.colormaps["turbo"](np.linspace(0.05, 0.95, len(points))))
+    names = [", ".join(swept_value(dataset, name, at[name]) for name in dims) for at in points]
+    return [Line(k, at, names[k], shades[k]) for k, at in enumerate(points)], None
 
 
-def handle(scene: Scene, colour: str, text: str, style: Any = "-") -> Line2D:
-    """A legend entry: a line, or a mark where points are not joined."""
-    if scene.joined:
-        return Line2D([], [], color=colour, linestyle=style, label=text)
-    return Line2D([], [], color=colour, linestyle="none", marker=_MARKS[style], markersize=3.5, label=text)
-
-
-def line_handles(scene: Scene, alone: str = "mean") -> list[Line2D]:
-    """Legend entries of the curves, six at most, evenly chosen; a single one is called ``alone``."""
-    if scene.single:
-        return [handle(scene, BOTH, alone)]
-    chosen = scene.lines
-    if len(chosen) > 6:
-        chosen = [chosen[k] for k in np.rint(np.linspace(0, len(chosen) - 1, 6)).astype(int)]
-    return [handle(scene, line.colour, line.label) for line in chosen]
+def _bar(key: xr.DataArray) -> tuple[Bar, list[str]]:
+    """A colour bar over the values of a swept number, and the colours of them."""
+    values = key.to_numpy().astype(float)
+    logarithmic = axis_scale(values) == "log"
+    unit = Unit.of(values, key.attrs.get("units", "1"), logarithmic)
+    values = unit.factor * values
+    norm = (mpl.colors.LogNorm if logarithmic else mpl.colors.Normalize)(values.min(), values.max())
+    shades = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
+    colours = ScalarMappable(norm, shades)
+    words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
+    return Bar(colours, label(words, unit.name)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
 
 
 def curve(
-    panel: Axes, scene: Scene, name: str, line: Line, factor: float, colour: str, style: Any = "-", wide: bool = False
-) -> None:
+    panel: Axes, scene: Scene, name: str, line: Line, factor: float, colour: str = "", style: Any = "-",
+    label: str = "", spread: str = "", wide: bool = False,
+) -> None:  # fmt: skip
     """The mean with its standard error, and the band of the members; ``wide`` where a later curve lies upon it."""
-    x, width = scene.x[line.number], _UNDERNEATH if wide else None
-    mean, sem, low, high = (factor * values for values in scene.drawn(name, line))
-    band = bool(np.any(high > low))
-    if not scene.joined:
-        if band:
-            panel.vlines(x, low, high, color=colour, alpha=0.18, linewidth=5.0)
-        panel.plot(x, mean, linestyle="none", marker=_MARKS[style], markersize=3.5, color=colour)
+    colour = colour or line.colour
+    x, mean, sem, low, high = scene.parted(line, *(factor * values for values in scene.drawn(name, line)))
+    shade: Any = {"color": colour, "alpha": 0.18, "label": spread}
+    if not np.any(high > low):
+        pass
+    elif scene.joined:
+        fill(panel, x, low, high, **shade)
     else:
-        if band:
-            fill(panel, x, low, high, colour, 0.18)
-        dots: Any = {"marker": "o", "markersize": 2.6} if scene.along != "t" and len(x) <= MARKED else {}
-        panel.plot(x, mean, linestyle=style, color=colour, linewidth=width, **dots)
+        panel.vlines(x, low, high, linewidth=5.0, **shade)
+    dots: Any = {"marker": "o", "markersize": 2.6} if scene.along != "t" and len(x) <= MARKED else {}
+    width = {"linewidth": _UNDERNEATH} if wide and scene.joined else {}
+    panel.plot(x, mean, color=colour, label=label, **(dots | scene.look(style) | width))
     if scene.along == "t":
-        fill(panel, x, mean - sem, mean + sem, colour, 0.45)
+        fill(panel, x, mean - sem, mean + sem, color=colour, alpha=0.45)
     elif np.any(sem > 0.0):
         panel.errorbar(x, mean, np.nan_to_num(sem), fmt="none", ecolor=colour, elinewidth=0.8, capsize=1.5)
+
+
+def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
+    """Curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
+    for line, wide in zip(scene.lines, covered(scene, name, scene.lines), strict=True):
+        curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread, wide=wide)
+        if name in _OF_CONTACT:
+            mark_jumps(panel, scene, name, line, factor)
+    if name in _OF_CONTACT and all(np.all(scene.opened(line)) for line in scene.lines):
+        panel.text(0.5, 0.5, "the contact is open", transform=panel.transAxes, ha="center", va="center", fontsize=7)
+
+
+def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, named: bool = True) -> None:
+    """A cross at each pull-off and a ring at each jump-in of a curve."""
+    x, mean = scene.x[line.number], factor * scene.values(f"{name}_mean", line)
+    for words, at, sign in (("pull-off", scene.pulled_off(line), _CROSS), ("jump-in", scene.jumped_in(line), _RING)):
+        if at.size:
+            panel.plot(x[at], mean[at], color=line.colour, label=words if named else "", **sign)
 
 
 def covered(scene: Scene, name: str, lines: list[Line]) -> list[bool]:
@@ -194,27 +295,12 @@ def covered(scene: Scene, name: str, lines: list[Line]) -> list[bool]:
     return [any(np.all(np.abs(later - own) <= near) for later in values[k + 1 :]) for k, own in enumerate(values)]
 
 
-def last_closed(scene: Scene, line: Line) -> np.ndarray:
-    """Records after which the contact comes off; none in a sweep, whose points follow no time."""
-    gone = scene.opened(line)
-    return np.flatnonzero(~gone[:-1] & gone[1:]) if scene.along == "t" else np.empty(0, dtype=int)
-
-
-def opening_handles(scene: Scene) -> list[Line2D]:
-    """A legend entry for the cross, where there is one."""
-    if not any(last_closed(scene, line).size for line in scene.lines):
-        return []
-    colour = BOTH if scene.single else REFERENCE
-    return [Line2D([], [], linestyle="none", marker="x", markersize=4, color=colour, label="comes off")]
-
-
-def spread_handles(scene: Scene, name: str) -> list[Patch]:
-    """A legend entry for the band, where there is one."""
-    if not scene.fluctuates(name):
-        return []
-    of_members = "5–95 % of members" if scene.single else "5–95 % band"
-    text = of_members if f"{name}_quantile" in scene.found else "± 1 std. dev."
-    return [Patch(facecolor=BOTH, alpha=0.18, label=text)]
+def distinct(scene: Scene, name: str) -> list[Line]:
+    """Curves that do not lie on an earlier one."""
+    kept: dict[bytes, Line] = {}
+    for line in scene.lines:
+        kept.setdefault(np.ascontiguousarray(scene.values(name, line), dtype=float).tobytes(), line)
+    return list(kept.values())
 
 
 def room_of(scene: Scene) -> float:
@@ -229,8 +315,10 @@ def speed_dim(dataset: xr.Dataset) -> str | None:
     return next(varying, None)
 
 
-def swept_whole(dataset: xr.Dataset, table: str) -> bool:
-    """Whether the model of a table is swept, so that the scenario's own one says nothing of the points."""
-    named = (dataset[name] for name in sweep_dims(dataset))
-    told_of = [key.attrs.get("long_name", "") for key in named if key.dtype.kind not in "fi"]
-    return any(text.split(".")[0] == f"swept {table}" for text in told_of)
+def over_speed(dataset: xr.Dataset) -> tuple[Scene, str, Unit]:
+    """Statistics over the sliding speed, of a ramp or of steady speeds; with the scale and the unit of its axis."""
+    scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
+    speeds = scene.all("speed_mean")
+    scale = axis_scale(speeds)
+    unit = Unit.of(speeds, "m/s", scale == "log")
+    return scene.placed(unit.factor * speeds, broken=scene.along == "t"), scale, unit

@@ -8,20 +8,31 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 from pydantic import TypeAdapter
 from scipy.signal import resample
 
-from sim.analysis import engineering, setting, sweep_dims
+from sim.analysis import engineering, setting
 from sim.analysis.scene import word
 from sim.laws.halfspace import displacement
 from sim.numerics.grid import Grid
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.modes import Modes, modes
-from sim.plots.curves import swept_whole
-from sim.plots.style import BOTH, FLUCTUATIONS, WIDE, Unit, across, label, legend, letter, picture, plain_ticks, rows
+from sim.plots.style import (
+    BOTH,
+    FLUCTUATIONS,
+    WIDE,
+    Unit,
+    across,
+    first_point,
+    label,
+    legend,
+    letter,
+    picture,
+    plain_ticks,
+    rows,
+)
 from sim.spectrum.families import Spectrum
 from sim.spectrum.periodogram import periodogram, radial_average
 
@@ -29,17 +40,21 @@ from sim.spectrum.periodogram import periodogram, radial_average
 PIXELS = 384
 
 
-def maps_of(dataset: xr.Dataset) -> xr.DataArray:
+def needs_maps(dataset: xr.Dataset) -> None:
+    """Refuse a dataset without stress maps."""
     if "shear_map" not in dataset:
         raise ValueError('there are no stress maps; record some: [shear] model = "mapped" and [record] maps = ["1 s"]')
-    return dataset["shear_map"].transpose(..., "x", "y")
+
+
+def _maps_of(dataset: xr.Dataset, at: dict[str, int]) -> xr.DataArray:
+    """The last maps at a point of the sweep, those of all members that have them."""
+    return dataset["shear_map"].isel(at).isel(map_time=-1).transpose("map_member", "x", "y")
 
 
 def map_figure(dataset: xr.Dataset) -> Figure:
-    """The last stress map of the first member and its displacement, around the contact circle."""
-    stress = maps_of(dataset)
-    at = dict.fromkeys(sweep_dims(dataset), 0)
-    stress = stress.isel(at).isel(map_member=0, map_time=-1)
+    """The last stress map of the first member and the displacement that it makes."""
+    at, point = first_point(dataset)
+    stress = _maps_of(dataset, at).isel(map_member=0)
     cell = _cell_of(stress)
     modulus, ratio = (float(dataset[f"effective_{n}"].isel(at)) for n in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), cell, modulus, ratio)
@@ -63,7 +78,7 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     axes[0].set_ylabel(label("$y$", length.name))
     letter(list(axes))
     then = f"$t$ = {engineering(float(stress['map_time']), 's')}, $V$ = {engineering(speed_then, 'm/s')}"
-    axes[0].set_title(then.replace("-", "−"))
+    axes[0].set_title(", ".join(filter(None, [point, then.replace("-", "−")])))
     return figure
 
 
@@ -110,18 +125,18 @@ def _refined(field: np.ndarray) -> np.ndarray:
     return resample(resample(field, fine, axis=0), fine, axis=1)
 
 
-class _Asked(NamedTuple):
-    """The spectrum of a map as the scenario wants it, with the factor by which the speed raises its density."""
+class _Target(NamedTuple):
+    """The scenario's spectrum of a map, with the factor by which the amplitude raises its density."""
 
     spectrum: Any
     raised: float
     words: str
 
 
-def _asked_for(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _Asked:
+def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _Target:
     """Spectrum and amplitude at a point of the sweep, rebuilt from the scenario that the dataset carries."""
     shear = json.loads(dataset.attrs["scenario_resolved"])["shear"]
-    if swept_whole(dataset, "shear"):
+    if word(dataset, "shear.model", "").ndim:
         raise ValueError("the spectrum is swept as a whole table; run the one of interest on its own")
     for table in ("spectrum", "amplitude"):
         for key in shear[table]:
@@ -132,12 +147,12 @@ def _asked_for(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) ->
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
     if shear["amplitude"].get("relaxing"):  # the field lags behind its amplitude: only the shape can be compared
         cells = modes(spectrum, _cell_of(stress), stress.sizes["x"])
-        return _Asked(spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "asked, scaled")
+        return _Target(spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled")
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
     time = {"t": float(stress["map_time"])}
     names = ("speed", "shear_stress" if "shear_stress" in dataset else "shear_stress_mean")
     now = [dataset[name].isel(at, missing_dims="ignore").sel(time, method="nearest").to_numpy() for name in names]
-    return _Asked(spectrum, float(np.mean(amplitude.factor(*now) ** 2)), "asked for")
+    return _Target(spectrum, float(np.mean(amplitude.factor(*now) ** 2)), "target")
 
 
 def _cell_of(stress: xr.DataArray) -> float:
@@ -155,21 +170,20 @@ def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
 
 
 def spectrum_figure(dataset: xr.Dataset) -> Figure:
-    """The radially averaged spectrum of the last maps against the one asked for, and their ratio."""
-    stress = maps_of(dataset)
-    at = dict.fromkeys(sweep_dims(dataset), 0)
-    stress = stress.isel(at).isel(map_time=-1).transpose("map_member", "x", "y")
+    """Power spectrum of the last stress maps: target, discretised on the cell, and realised."""
+    at, point = first_point(dataset)
+    stress = _maps_of(dataset, at)
     if not np.any(stress.to_numpy()):
         raise ValueError("the last map holds no stress; record one where fluctuations have grown")
     if word(dataset, "shear.spectrum.model", "") == "bonds":
         raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
-    asked = _asked_for(dataset, stress, at)
+    target = _target(dataset, stress, at)
     grid = Grid(_cell_of(stress), stress.sizes["x"])
-    wanted = mode_density(modes(asked.spectrum, grid.cell, grid.points), grid)
-    expected = asked.raised * radial_average(wanted, grid).density
+    wanted = mode_density(modes(target.spectrum, grid.cell, grid.points), grid)
+    expected = target.raised * radial_average(wanted, grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
     fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)
-    density = asked.raised * _radial_density(asked.spectrum, fine)
+    density = target.raised * _radial_density(target.spectrum, fine)
     least = np.min(density[density > 0.0], initial=np.max(expected))
     held = expected > max(0.2 * least, 1e-12 * np.max(expected))  # not where a ring only touches the spectrum
     q, expected = rings[0].q[held], expected[held]
@@ -181,18 +195,17 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     dots: Any = {"fmt": "o", "color": BOTH, "markersize": 2.2, "elinewidth": 0.7}
     ring: Any = {"marker": "o", "linestyle": "none", "markersize": 4.5, "markerfacecolor": "none"}
     ring |= {"color": FLUCTUATIONS, "markeredgewidth": 0.7}
-    panel.loglog(fine / length.factor, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS)
-    panel.plot(q / length.factor, expected, **ring)
-    panel.errorbar(q / length.factor, measured, error, **dots)
+    panel.loglog(fine / length.factor, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS, label=target.words)
+    panel.plot(q / length.factor, expected, label="discretised", **ring)
+    count = f"{len(rings)} maps" if len(rings) > 1 else "1 map"
+    panel.errorbar(q / length.factor, measured, error, label=f"realised, {count}", **dots)
     panel.set_ylabel("spectral density $C$ (Pa² m²)")
     if np.max(measured) < 100.0 * np.min(measured):
         plain_ticks(panel.yaxis)
-    handles = [Line2D([], [], color=FLUCTUATIONS, label=asked.words), Line2D([], [], **ring, label="on the cell")]
-    count = f"{len(rings)} map" + ("s" if len(rings) > 1 else "")
-    legend(panel, [*handles, Line2D([], [], color=BOTH, marker="o", markersize=2.2, linewidth=0.7, label=count)])
+    legend(panel, point)
     below.axhline(1.0, color=FLUCTUATIONS, linewidth=1.2)
     below.errorbar(q / length.factor, measured / expected, error / expected, **dots)
-    below.set_ylabel("measured/asked")
+    below.set_ylabel("realised/discretised")
     across(below, q / length.factor, "log", "wavenumber $q$", f"rad/{length.name}", room=0.03)
     return figure
 

@@ -1,144 +1,44 @@
-"""Figures of what bonds bear: friction over speed with its maximum, and the static peak after a rest."""
-
-from typing import Any
+"""The figure of the friction force: over time, and as a loop over the position of the slider."""
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from sim.analysis import is_steady
-from sim.plots.bond_laws import Steady, rest_of, steady_laws
-from sim.plots.curves import Line, Scene, covered, curve, line_handles, room_of, scene_along, speed_dim, spread_handles
-from sim.plots.panels import stacked
-from sim.plots.static_friction import start_figure
-from sim.plots.style import BOTH, REFERENCE, Unit, across, axis_scale, label, legend, rounded
-
-#: Speeds at which a closed form is drawn.
-_FINE = 600
-
-#: Grey that shows on a black line and beside it.
-_PALE = "#BBBBBB"
-
-_RING: Any = {"marker": "o", "markersize": 5.0, "markerfacecolor": "none", "markeredgewidth": 0.9, "zorder": 4}
+from sim.plots.bond_laws import rest_of
+from sim.plots.curves import scene_along
+from sim.plots.panels import friction_panel
+from sim.plots.style import REFERENCE, Unit, across, legend, rows
 
 
-def needs_stress(dataset: xr.Dataset) -> None:
-    """Refuse a dataset without shear stress, or with one speed only."""
-    stress = dataset["shear_stress" if "shear_stress" in dataset else "shear_stress_mean"]
-    if not bool((stress != 0.0).any()):
-        raise ValueError('the bonds bear no shear stress; give them one, such as [bonds] stress = "0.3 MPa"')
-    rest = rest_of(dataset)
-    if rest is not None and not bool((dataset["t"] > rest).any()):
-        raise ValueError("the run ends before the slider starts; make clock.duration longer than drive.rest")
-    if rest is None and is_steady(dataset) and speed_dim(dataset) is None:
-        raise ValueError(
-            'friction is drawn over the speed, which neither changes nor is swept; ramp it: [drive] model = "ramp", '
-            'or rest and start: [drive] model = "start"'
-        )
+def turns(dataset: xr.Dataset) -> bool:
+    """Whether the speed does not only rise, or only fall, in time: a curve over it would lie on itself."""
+    change = dataset["speed"].diff("t")
+    return rest_of(dataset) is None and bool(((change > 0.0).any("t") & (change < 0.0).any("t")).any())
+
+
+def needs_friction(dataset: xr.Dataset) -> None:
+    """Refuse a dataset without friction, or whose slider does not move."""
+    force = dataset["friction_force" if "friction_force" in dataset else "friction_force_mean"]
+    if not bool((force != 0.0).any()):
+        raise ValueError('there is no friction; give the bonds a stress, such as [bonds] stress = "0.3 MPa"')
+    if not bool((dataset["slider_position"] != 0.0).any()):
+        raise ValueError('the slider does not move; let it: [drive] speed = "1 mm/s"')
 
 
 def friction_figure(dataset: xr.Dataset) -> Figure:
-    """Shear stress and bonds over speed, or for a slider that rests and starts the static peak."""
-    needs_stress(dataset)
-    if rest_of(dataset) is not None:
-        return start_figure(dataset)
-    along = "t" if not is_steady(dataset) else str(speed_dim(dataset))
-    scene = scene_along(dataset, along)
-    speeds = scene.all("speed_mean")
-    scale = axis_scale(speeds)
-    unit = Unit.of(speeds, "m/s", scale == "log")
-    scene = scene.placed(unit.factor * speeds)
-    laws = {line.number: _laws_of(dataset, scene, line, scale) for line in scene.lines}
-
-    def stress_panel(panel: Axes, scene: Scene) -> None:
-        _stress_panel(panel, scene, laws, unit.factor)
-
-    def fraction_panel(panel: Axes, scene: Scene) -> None:
-        for line in scene.lines:
-            for speed, law in laws[line.number]:
-                _law_line(panel, unit.factor * speed, law.fraction, law.style)
-        _data(panel, scene, "bond_fraction", 1.0)
-        panel.set_ylabel("bond fraction $N/N_0$")
-
-    figure = stacked(scene, [(2.1, stress_panel), *([(1.3, fraction_panel)] if scene.tells("bond_fraction") else [])])
-    across(figure.axes[-1], scene.x, scale, "sliding speed $V$", unit.name, room_of(scene))
+    """Friction force over time and over the slider's position: the friction loop."""
+    scene = scene_along(dataset, "t")
+    figure, axes = rows([1.7, 2.1], shared=False)
+    for panel, x, words, si in (
+        (axes[0], scene.found["t"].to_numpy(), "time $t$", "s"),
+        (axes[1], scene.all("slider_position_mean"), "slider position $x$", "m"),
+    ):
+        unit = Unit.of(np.asarray(x), si)
+        placed = scene.placed(unit.factor * x, broken=True)
+        friction_panel(panel, placed)
+        panel.axhline(0.0, color=REFERENCE, linewidth=0.5, zorder=1)
+        across(panel, placed.x, "linear", words, unit.name, 0.0 if si == "s" else 0.03)
+    legend(axes[0], scene.title)
+    if scene.bar:
+        figure.colorbar(scene.bar.colours, ax=axes, label=scene.bar.words, aspect=45, pad=0.02)
     return figure
-
-
-def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line, scale: str) -> list[tuple[np.ndarray, Steady]]:
-    """Closed forms over the speeds of a curve, each with the speeds [m/s]."""
-    speeds = scene.values("speed_mean", line)
-    low, high = float(np.min(speeds)), float(np.max(speeds))
-    fine = np.linspace(low, high, _FINE)
-    if scale == "log":
-        fine = np.geomspace(low, high, _FINE)
-    elif scale == "symlog":
-        fine = np.append(0.0, np.geomspace(np.min(speeds[speeds > 0.0]), high, _FINE - 1))
-    return [(fine, law) for law in steady_laws(dataset, line.point, fine)]
-
-
-def _data(panel: Axes, scene: Scene, name: str, factor: float) -> None:
-    for line, wide in zip(scene.lines, covered(scene, name, scene.lines), strict=True):
-        curve(panel, scene, name, line, factor, line.colour, wide=wide)
-
-
-def _law_line(panel: Axes, x: np.ndarray, values: np.ndarray, style: str) -> None:
-    """A thin grey line: what is exact upon the data, which it would vanish beneath, the rest below them."""
-    panel.plot(x, values, **_thin(style))
-
-
-def _thin(style: str) -> dict[str, Any]:
-    exact = style == "-"
-    colour, height = (_PALE, 3) if exact else (REFERENCE, 1.5)
-    return {"linestyle": style, "color": colour, "linewidth": 0.7, "zorder": height}
-
-
-def _stress_panel(panel: Axes, scene: Scene, laws: dict[int, list[tuple[np.ndarray, Steady]]], pace: float) -> None:
-    """Stress of the dataset over that of closed forms, with the largest of each curve."""
-    unit = Unit.of(scene.all("shear_stress_mean"), "Pa")
-    for line in scene.lines:
-        for speed, law in laws[line.number]:
-            _law_line(panel, pace * speed, unit.factor * law.stress, law.style)
-    _data(panel, scene, "shear_stress", unit.factor)
-    told = [_mark_maximum(panel, scene, line, unit.factor) for line in scene.lines]
-    handles: list[Any] = line_handles(scene, "simulated")
-    if scene.single and told[0]:
-        ring: Any = _RING | {"color": BOTH, "linestyle": "none"}
-        handles.append(Line2D([], [], **ring, label=f"maximum: {told[0]}"))
-    elif len(handles) == len(told):
-        for entry, words in zip(handles, told, strict=True):
-            entry.set_label(f"{entry.get_label()}: {words}" if words else entry.get_label())
-    handles += spread_handles(scene, "shear_stress")
-    styles = dict.fromkeys((law.words, law.style) for line in scene.lines for _, law in laws[line.number])
-    handles += [Line2D([], [], label=words, **_thin(s)) for words, s in styles]
-    legend(panel, handles)
-    panel.set_ylabel(label(r"shear stress $\tau_0$", unit.name))
-
-
-def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
-    """Index of the friction maximum: where the size of the stress is largest; None at the ends of the speeds.
-
-    >>> maximum_of(np.array([1.0, 2.0, 3.0]), np.array([1.0, 4.0, 2.0]))
-    1
-    >>> maximum_of(np.array([1.0, 2.0, 3.0]), np.array([1.0, 2.0, 4.0])) is None
-    True
-    """
-    known = np.isfinite(stress)
-    if not np.any(known):
-        return None
-    at = int(np.nanargmax(np.abs(stress)))
-    size = np.abs(speed)
-    inside = np.min(size[known]) < size[at] < np.max(size[known])
-    return at if inside else None
-
-
-def _mark_maximum(panel: Axes, scene: Scene, line: Line, factor: float) -> str:
-    """Mark the friction maximum with a ring and tell it in words; "" without one."""
-    speed, stress = scene.values("speed_mean", line), scene.values("shear_stress_mean", line)
-    at = maximum_of(speed, stress)
-    if at is None:
-        return ""
-    panel.plot(scene.x[line.number][at], factor * stress[at], color=line.colour, **_RING)
-    return f"{rounded(float(stress[at]), 'Pa')} at {rounded(float(speed[at]), 'm/s')}"

@@ -1,142 +1,56 @@
-"""Figures of a dataset, in the width of a journal's column.
+"""The kinds of figures, each a module of its own, and the choice between them.
 
-``draw`` gives a matplotlib Figure with a canvas of its own: nothing here needs a display or touches
-pyplot. How pictures look is in ``pictures``, what the common ones are made of in ``panels``.
+``draw`` gives a matplotlib Figure with a canvas of its own: nothing here needs a display or touches pyplot.
 """
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import matplotlib as mpl
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
-from sim.analysis import engineering, is_steady, sweep_dims
-from sim.analysis.scene import stays_held
+from sim.analysis import sweep_dims
 from sim.plots.bond_laws import rest_of
-from sim.plots.curves import Scene, line_handles, opening_handles, room_of, scene_along, speed_dim, spread_handles
-from sim.plots.field import map_figure, maps_of, spectrum_figure
-from sim.plots.friction import friction_figure, needs_stress
+from sim.plots.field import map_figure, needs_maps, spectrum_figure
+from sim.plots.friction import friction_figure, needs_friction, turns
 from sim.plots.loop import loop_figure, needs_course
-from sim.plots.panels import (
-    area_panel,
-    energy_panel,
-    further_panels,
-    radius_panel,
-    reference_handles,
-    share_panel,
-    stacked,
-)
+from sim.plots.panels import curve_figure, needs_speeds, needs_sweep, sweep_figure, time_figure
 from sim.plots.profile import needs_contact, profile_figure
-from sim.plots.style import STYLE, Unit, across, axis_scale, legend, symbol
-from sim.plots.theories import needs_control, theories_figure
+from sim.plots.stress import needs_stress, stress_figure
+from sim.plots.style import STYLE, swept_value
+from sim.plots.theories import needs_control, sweeps_theories, theories_figure
 
 
-def _needs_speeds(dataset: xr.Dataset) -> None:
-    if rest_of(dataset) is not None:
-        raise ValueError("a rest and a start have two speeds only; draw the kind friction")
-    if is_steady(dataset) and speed_dim(dataset) is None:
-        raise ValueError('the speed neither changes in time nor is swept; ramp it: [drive] model = "ramp"')
+class Kind(NamedTuple):
+    """A kind of figure: what draws it, what refuses a dataset that lacks something, and which datasets it fits best."""
+
+    draw: Callable[[xr.Dataset], Figure]
+    needs: Callable[[xr.Dataset], object] = lambda dataset: None
+    fits: Callable[[xr.Dataset], bool] = lambda dataset: False
+
+    @property
+    def shows(self) -> str:
+        """What the figure shows, in a line."""
+        return (self.draw.__doc__ or "").partition("\n")[0]
 
 
-def _curve_figure(dataset: xr.Dataset) -> Figure:
-    """Area, energies and friction over the sliding speed: of a ramp, or of a sweep of steady speeds."""
-    scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
-    speeds = scene.all("speed_mean")
-    scale = axis_scale(speeds)
-    unit = Unit.of(speeds, "m/s", scale == "log")
-    scene = scene.placed(unit.factor * speeds)
-    figure = stacked(scene, [(1.9, share_panel), *further_panels(scene)])
-    across(figure.axes[-1], scene.x, scale, "sliding speed $V$", unit.name, room_of(scene))
-    return figure
+def _always(dataset: xr.Dataset) -> bool:
+    return True
 
 
-def _time_figure(dataset: xr.Dataset) -> Figure:
-    """Radius, area and energies over time; JKR's and Hertz's contacts only where what holds the sphere stays."""
-    unit = Unit.of(dataset["t"].to_numpy(), "s")
-    stays = stays_held(dataset)
-    scene = _without_rest(scene_along(dataset, "t"), stays)
-    scene = scene.placed(unit.factor * dataset["t"].to_numpy())
-    figure = stacked(scene, [(1.5, radius_panel), (1.3, area_panel), (1.6, energy_panel)])
-    closing = [*spread_handles(scene, "contact_radius"), *opening_handles(scene)]
-    closing += reference_handles() if bool(stays.any()) else []
-    legend(figure.axes[0], [*line_handles(scene), *closing])
-    across(figure.axes[-1], scene.x, "linear", "time $t$", unit.name)
-    return figure
-
-
-def _without_rest(scene: Scene, stays: xr.DataArray) -> Scene:
-    """Without the radii at rest of spheres that are moved: they are those at the start only.
-
-    One record of them stays, at the largest radius reached: a point alone draws no line, and tells the panels
-    the size of their unit.
-    """
-    largest = scene.found["contact_radius_mean"].max("t")
-    first = xr.DataArray(np.arange(scene.found.sizes["t"]) == 0, dims="t")
-    moved = {name: xr.where(stays, scene.found[name], largest.where(first)) for name in ("radius_jkr", "radius_hertz")}
-    return scene._replace(found=scene.found.assign(moved)) if not bool(stays.all()) else scene
-
-
-def _needs_sweep(dataset: xr.Dataset) -> None:
-    if not sweep_dims(dataset):
-        raise ValueError('nothing is swept; sweep a key: [sweep] "contact.load" = ["1 mN", "4 mN"]')
-
-
-def _sweep_figure(dataset: xr.Dataset) -> Figure:
-    """Radius, energies and friction against the swept key, one curve for each value of further keys.
-
-    Means over the second half of the run where the speed is steady, else the values at its end.
-    """
-    key = dataset[sweep_dims(dataset)[0]]
-    labels = key.dtype.kind not in "fi"
-    values = np.arange(key.size, dtype=float) if labels else key.to_numpy().astype(float)
-    scale = axis_scale(values) if not labels else "linear"
-    unit = Unit(1.0, "") if labels else Unit.of(values, key.attrs["units"], scale == "log")
-    scene = scene_along(dataset, str(key.name)).placed(unit.factor * values)
-    if labels:
-        scene = scene.apart()
-    figure = stacked(scene, [(1.7, radius_panel), *further_panels(scene)])
-    handles = [*line_handles(scene, "simulated"), *spread_handles(scene, "contact_radius"), *reference_handles()]
-    legend(figure.axes[0], handles, "" if is_steady(dataset) else _at_the_end(dataset))
-    words = f"{key.attrs.get('long_name', key.name)} {symbol(key)}".strip()
-    beside = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
-    across(figure.axes[-1], scene.x, scale, words, unit.name, beside if labels else room_of(scene))
-    if labels:
-        figure.axes[-1].set_xticks(values, [str(value) for value in key.to_numpy()])
-    return figure
-
-
-def _at_the_end(dataset: xr.Dataset) -> str:
-    """The last time and the speed then, which may differ between the points of the sweep."""
-    speed = dataset["speed" if "speed" in dataset else "speed_mean"].isel(t=-1)
-    ends = dict.fromkeys(engineering(float(end), "m/s") for end in (speed.min(), speed.max()))
-    words = f"at the end: $t$ = {engineering(float(dataset['t'][-1]), 's')}, $V$ = {' to '.join(ends)}"
-    return words.replace("-", "−")
-
-
-#: What can be drawn, by name.
-KINDS: dict[str, Callable[[xr.Dataset], Figure]] = {
-    "curve": _curve_figure,
-    "time": _time_figure,
-    "sweep": _sweep_figure,
-    "map": map_figure,
-    "spectrum": spectrum_figure,
-    "friction": friction_figure,
-    "theories": theories_figure,
-    "profile": profile_figure,
-    "loop": loop_figure,
-}
-
-#: What a kind needs of a dataset: each raises ValueError with the cure where it is not there.
-_NEEDS: dict[str, Callable[[xr.Dataset], object]] = {
-    "curve": _needs_speeds,
-    "sweep": _needs_sweep,
-    "map": maps_of,
-    "spectrum": maps_of,
-    "friction": needs_stress,
-    "theories": needs_control,
-    "profile": needs_contact,
-    "loop": needs_course,
+#: What can be drawn, by name; the first line of what draws it is its help. The default is the first kind that fits.
+KINDS: dict[str, Kind] = {
+    "loop": Kind(loop_figure, needs_course, _always),
+    "theories": Kind(theories_figure, needs_control, sweeps_theories),
+    "stress": Kind(stress_figure, needs_stress, lambda dataset: rest_of(dataset) is not None),
+    "friction": Kind(friction_figure, needs_friction, turns),
+    "curve": Kind(curve_figure, needs_speeds, lambda dataset: not turns(dataset)),
+    "sweep": Kind(sweep_figure, needs_sweep, _always),
+    "time": Kind(time_figure, fits=_always),
+    "map": Kind(map_figure, needs_maps),
+    "spectrum": Kind(spectrum_figure, needs_maps),
+    "profile": Kind(profile_figure, needs_contact),
 }
 
 
@@ -148,22 +62,10 @@ def drawable(dataset: xr.Dataset) -> list[str]:
 def _missing(dataset: xr.Dataset, kind: str) -> str:
     """What a dataset lacks for a kind of figure, with the cure; "" for nothing."""
     try:
-        if kind in _NEEDS:
-            _NEEDS[kind](dataset)
+        KINDS[kind].needs(dataset)
     except ValueError as fault:
         return str(fault)
     return ""
-
-
-def _fitting(dataset: xr.Dataset) -> str:
-    """The kind of figure that fits a dataset best."""
-    if not _missing(dataset, "loop"):
-        return "loop"
-    if rest_of(dataset) is not None and not _missing(dataset, "friction"):
-        return "friction"
-    if not _missing(dataset, "curve"):
-        return "curve"
-    return "sweep" if sweep_dims(dataset) else "time"
 
 
 def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
@@ -172,17 +74,9 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
     Parameters
     ----------
     dataset : xarray.Dataset
-        As ``sim run`` writes it.
+        As ``sim run`` writes it; ``sim.analysis.where`` chooses values of its sweep.
     kind : str, optional
-        One of ``KINDS``: "curve" (area with what each mechanism takes, energies and friction over
-        speed), "time" (radius, area and energies over time), "loop" (load and radius over the displacement of
-        what holds the sphere, where that moves), "sweep" (radius, energies and friction
-        against the swept key), "map" (a stress map and its displacement), "spectrum" (measured
-        against asked-for spectral density), "friction" (shear stress over speed with its maximum, or
-        the static peak of a slider that rests and starts), "theories" (contact area by every theory over
-        the shear stress), "profile" (pressure, surfaces and displacement across the contact). Without
-        it "loop" where what holds the sphere moves, "friction" for a slider that rests and starts, "curve" where
-        the speed changes or is swept, else "sweep" where something is, else "time".
+        One of ``KINDS``, whose ``shows`` says what it is; without it the one that fits the dataset best.
 
     Returns
     -------
@@ -195,11 +89,15 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
     ValueError
         For an unknown kind, or one that the dataset cannot serve, with the cure and the kinds that it can.
     """
-    kind = kind or _fitting(dataset)
+    kind = kind or next(name for name, k in KINDS.items() if k.fits(dataset) and not _missing(dataset, name))
     if kind not in KINDS:
         raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')
     missing = _missing(dataset, kind)
     if missing:
         raise ValueError(f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}")
     with mpl.rc_context(STYLE):
-        return KINDS[kind](dataset)
+        figure = KINDS[kind].draw(dataset)
+        fixed = [swept_value(dataset, name, 0) for name in sweep_dims(dataset) if dataset.sizes[name] == 1]
+        if fixed:
+            figure.suptitle(", ".join(fixed), fontsize=mpl.rcParams["axes.titlesize"])
+        return figure

@@ -1,18 +1,17 @@
 """The figure of a loop: load and contact radius over the displacement of what holds the sphere, and the energy lost."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from sim.analysis import control, loop_energy, setting
 from sim.analysis.scene import stays_held
 from sim.laws import jkr
-from sim.plots.curves import Line, Scene, last_closed, line_handles, scene_along, spread_handles
-from sim.plots.style import BOTH, REFERENCE, Unit, across, fill, label, legend, rows
+from sim.plots.curves import Line, Scene, mark_jumps, scene_along
+from sim.plots.style import REFERENCE, Unit, across, fill, label, legend, rows
 
 #: Radii at which the equilibrium curve is evaluated.
 _FINE = 600
@@ -94,7 +93,7 @@ def _theory(dataset: xr.Dataset, held: Held, line: Line) -> Theory:
 
 
 def loop_figure(dataset: xr.Dataset) -> Figure:
-    """Load and contact radius over displacement, or over indentation where there is no machine.
+    """Load and contact radius over displacement or indentation, and the energy lost in a cycle.
 
     A line is broken while the contact is open; there the load is a thin line at zero. Grey is JKR's contact at
     the full work of adhesion: every equilibrium, the unstable ones as well, and the loads at which a dead load and
@@ -105,67 +104,56 @@ def loop_figure(dataset: xr.Dataset) -> Figure:
     unit = Unit.of(displacement, "m")
     scene = scene.placed(unit.factor * displacement)
     theories = [_theory(dataset, held, line) for line in scene.lines]
-    entries = _entries(dataset, scene, held)
+    named = scene._replace(lines=_named(dataset, scene, held))
     figure, (loads, radii) = rows([2.3, 1.6])
     force, length = Unit.of(scene.all("normal_load_mean"), "N"), Unit.of(scene.all("contact_radius_mean"), "m")
-    for line in scene.lines:
-        _cycle(loads, scene, "normal_load", line, force.factor, held)
-        _cycle(radii, scene, "contact_radius", line, length.factor, held)
-    known = _equilibria(loads, radii, scene, theories, (unit.factor, force.factor, length.factor))
+    for panel, shown, name, factor in (
+        (loads, named, "normal_load", force.factor), (radii, scene, "contact_radius", length.factor)
+    ):  # fmt: skip
+        for line in shown.lines:
+            _cycle(panel, shown, name, line, factor, held)
+    _equilibria(loads, radii, scene, theories, (unit.factor, force.factor, length.factor))
     _levels(loads, theories, force.factor)
     loads.set_ylabel(label("normal load $P$", force.name))
     radii.set_ylabel(label("contact radius $a$", length.name))
     radii.set_ylim(bottom=0.0)
-    loads.legend(
-        handles=entries, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handletextpad=0.5,
-        labelspacing=0.25, title=_title(dataset, held), title_fontsize=7.0, alignment="left",
-    )  # fmt: skip
-    closing = [*_signs(scene, held, known), *spread_handles(scene, "contact_radius")]
-    if closing:
-        legend(radii, closing)
+    legend(loads, _title(dataset, held), columns=1)
+    legend(radii)
+    if scene.bar:
+        figure.colorbar(scene.bar.colours, ax=[loads, radii], label=scene.bar.words, aspect=45, pad=0.02)
     across(radii, scene.x, "linear", held.words, unit.name, 0.03)
     return figure
 
 
-def _closings(scene: Scene, line: Line) -> np.ndarray:
-    """Records at which an open contact has closed."""
-    gone = scene.opened(line)
-    return np.flatnonzero(gone[:-1] & ~gone[1:]) + 1
-
-
 def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, held: Held) -> None:
-    """One curve with its jumps: a cross where the contact comes off, a ring where it jumps in."""
-    x, gone = scene.x[line.number], scene.opened(line)
+    """One curve with its jumps: a cross at each pull-off, a ring at each jump-in."""
+    x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
     mean, _, low, high = (np.where(gone, np.nan, factor * values) for values in scene.drawn(name, line))
     if np.any(high > low):
-        fill(panel, x, low, high, line.colour, 0.18)
-    panel.plot(x, mean, color=line.colour)
-    if name == "normal_load":
+        fill(panel, x, low, high, color=line.colour, alpha=0.18, label="" if loads else scene.spread)
+    panel.plot(x, mean, color=line.colour, label=line.label if loads else "")
+    if loads:
         colour = line.colour if scene.single else REFERENCE  # the open spheres of all curves lie on each other
         panel.plot(x, np.where(gone, 0.0, np.nan), color=colour, linewidth=0.4)
-    off, on = last_closed(scene, line), _closings(scene, line)
     if held.kind != "load":  # under a dead load the sphere leaves: no place to draw a jump to
-        jumps = np.concatenate([off, on])
+        jumps = np.concatenate([scene.pulled_off(line), scene.jumped_in(line)])
         panel.vlines(x[jumps], 0.0, mean[jumps], colors=line.colour, linestyles="dotted", linewidth=0.8)
-    marks: Any = {"linestyle": "none", "markersize": 4, "color": line.colour, "zorder": 3}
-    panel.plot(x[off], mean[off], marker="x", **marks)
-    panel.plot(x[on], mean[on], marker="o", mfc="white", mew=0.8, **marks | {"markersize": 3.5})
+    mark_jumps(panel, scene, name, line, factor, named=not loads)
 
 
 def _equilibria(
     loads: Axes, radii: Axes, scene: Scene, theories: list[Theory], factors: tuple[float, float, float]
-) -> bool:  # fmt: skip
-    """JKR's equilibria, each different curve once, as far as its contacts reached; whether there is any."""
+) -> None:
+    """JKR's equilibria, each different curve once, as far as its contacts reached."""
     reached: dict[Theory, float] = {}
     for line, theory in zip(scene.lines, theories, strict=True):
         most = float(np.nanmax(np.nan_to_num(scene.values("contact_radius_mean", line))))
         reached[theory] = max(reached.get(theory, 0.0), most)
-    drawn = {theory: most for theory, most in reached.items() if most > 0.0 and not np.isnan(theory.stiffness)}
-    for theory, most in drawn.items():
-        displacement, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
-        for panel, values in ((loads, load), (radii, radius)):
-            panel.plot(displacement, values, "--", color=REFERENCE, linewidth=0.9, zorder=1.5)
-    return bool(drawn)
+    for theory, most in reached.items():
+        if most > 0.0 and not np.isnan(theory.stiffness):
+            x, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
+            for panel, values, words in ((loads, load, ""), (radii, radius, "JKR, stable and unstable")):
+                panel.plot(x, values, "--", color=REFERENCE, linewidth=0.9, zorder=1.5, label=words)
 
 
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
@@ -225,30 +213,17 @@ def _title(dataset: xr.Dataset, held: Held) -> str:
     return "per cycle: dissipated $W$, and the loop enclosed"
 
 
-def _entries(dataset: xr.Dataset, scene: Scene, held: Held) -> list[Line2D]:
-    """Legend entries of the curves, each with its energies."""
+def _named(dataset: xr.Dataset, scene: Scene, held: Held) -> list[Line]:
+    """The curves, each named with its energies."""
     spent, loop = lost_energy(dataset)
-    entries, lines = line_handles(scene, "simulated"), {line.label: line for line in scene.lines}
     unit = Unit.of(np.append(spent, [] if loop is None else loop), "J")
-    integral = rf"$\oint\,P\,\mathrm{{d}}{held.symbol}$"
-    for entry in entries:
-        line = scene.lines[0] if scene.single else lines[str(entry.get_label())]
-        told = []
-        for words, energies in (("$W$", spent), (integral, loop)):
+    named = []
+    for line in scene.lines:
+        parts = []
+        for words, energies in (("$W$", spent), (rf"$\oint P\,\mathrm{{d}}{held.symbol}$", loop)):
             value = np.nan if energies is None else float(energies.isel(line.point, missing_dims="ignore"))
-            told += [f"{words} = {unit.factor * value:.3g} {unit.name}".replace("-", "−")] if np.isfinite(value) else []
-        entry.set_label(f"{entry.get_label()}: {', '.join(told)}")
-    return entries
-
-
-def _signs(scene: Scene, held: Held, known: bool) -> list[Line2D]:
-    """Legend entries of what is the same for all curves."""
-    colour, signs = BOTH if scene.single else REFERENCE, []
-    if known:
-        signs.append(Line2D([], [], color=REFERENCE, linestyle="--", linewidth=0.9, label="JKR at rest"))
-    if any(last_closed(scene, line).size for line in scene.lines):
-        signs.append(Line2D([], [], linestyle="none", marker="x", markersize=4, color=colour, label="comes off"))
-    if any(_closings(scene, line).size for line in scene.lines):
-        ring: Any = {"linestyle": "none", "marker": "o", "markersize": 3.5, "mfc": "white", "mew": 0.8}
-        signs.append(Line2D([], [], color=colour, label="jumps in", **ring))
-    return signs
+            parts += (
+                [f"{words} = {unit.factor * value:.3g} {unit.name}".replace("-", "−")] if np.isfinite(value) else []
+            )
+        named.append(line._replace(label=f"{line.label}: {', '.join(parts)}" if line.label else ""))
+    return named

@@ -1,70 +1,91 @@
-"""The panels that several figures are made of, each drawing one observable of all curves."""
+"""Panels of one observable each, and the figures that are stacked of them: over speed, over time, over a swept key."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
+from sim.analysis import engineering, is_stationary, is_steady, sweep_dims
+from sim.analysis.scene import stays_held
+from sim.plots.bond_laws import rest_of
 from sim.plots.curves import (
-    Line,
     Scene,
+    contact_curves,
     covered,
     curve,
-    handle,
-    last_closed,
-    line_handles,
-    opening_handles,
-    spread_handles,
+    distinct,
+    over_speed,
+    room_of,
+    scene_along,
+    speed_dim,
 )
-from sim.plots.style import BONDS, BOTH, FLUCTUATIONS, REFERENCE, Unit, fill, label, legend, rows
+from sim.plots.style import (
+    BONDS,
+    BOTH,
+    FLUCTUATIONS,
+    REFERENCE,
+    Unit,
+    across,
+    axis_scale,
+    fill,
+    label,
+    legend,
+    rows,
+    symbol,
+)
 
-#: Share of the largest energy below which the fluctuations' own is told in a panel of its own.
+Panel = Callable[[Axes, Scene], None]
+
+#: Share of the largest energy below which the fluctuations' own has a panel of its own.
 _SMALL = 0.02
 
 #: Opacity of the shades that show what a mechanism takes.
 _SHADE = 0.35
 
+_THIN: Any = {"linewidth": 0.9, "zorder": 1.5}
 
-def _contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
-    """Curves of a contact: each ends with a cross where the last member has come off."""
-    for line, wide in zip(scene.lines, covered(scene, name, scene.lines), strict=True):
-        curve(panel, scene, name, line, factor, line.colour, wide=wide)
-        last = last_closed(scene, line)
-        mean = factor * scene.values(f"{name}_mean", line)
-        panel.plot(
-            scene.x[line.number][last], mean[last], linestyle="none", marker="x", markersize=4, color=line.colour
-        )
-    if all(np.all(scene.opened(line)) for line in scene.lines):
-        panel.text(0.5, 0.5, "the contact is open", transform=panel.transAxes, ha="center", va="center", fontsize=7)
+
+def series(name: str, words: str, si: str) -> Panel:
+    """A panel of one observable."""
+
+    def panel_of(panel: Axes, scene: Scene) -> None:
+        unit = Unit.of(scene.all(f"{name}_mean"), si)
+        contact_curves(panel, scene, name, unit.factor)
+        panel.set_ylabel(label(words, unit.name))
+
+    return panel_of
+
+
+friction_panel = series("friction_force", "friction $F$", "N")
 
 
 def radius_panel(panel: Axes, scene: Scene) -> None:
     """Contact radius between Hertz's and JKR's."""
-    unit = Unit.of(scene.all("contact_radius_mean", "radius_jkr"), "m")
-    _references(panel, scene, "radius", unit.factor)
-    _contact_curves(panel, scene, "contact_radius", unit.factor)
+    unit = Unit.of(scene.all("contact_radius_mean", "radius_jkr_mean"), "m")
+    contact_curves(panel, scene, "contact_radius", unit.factor)
+    for which, style in (("JKR", "--"), ("Hertz", ":")):
+        name = f"radius_{which.lower()}_mean"
+        _reference(panel, scene, unit.factor * scene.all(name), style, which)
     panel.set_ylabel(label("contact radius $a$", unit.name))
 
 
-def _references(panel: Axes, scene: Scene, name: str, factor: float, power: int = 1) -> None:
-    """JKR's and Hertz's values: grey lines, in the curves' colours where there are several."""
-    for line in scene.lines:
-        for which, style in (("jkr", "--"), ("hertz", ":")):
-            values = _broken(factor * scene.values(f"{name}_{which}", line) ** power)
-            _reference(panel, values, style, scene, line)
-
-
-def _reference(panel: Axes, values: np.ndarray, style: Any, scene: Scene, line: Line) -> None:
-    colour, x = REFERENCE if scene.single else line.colour, scene.x[line.number]
-    if not scene.joined:  # a short line for each category
-        half = 0.5 * scene.category
-        x, values = np.stack([x - half, x + half, x], axis=1).ravel(), np.repeat(values, 3)
-        values[2::3] = np.nan
-    panel.plot(x, values, linestyle=style, color=colour, linewidth=0.9, zorder=1.5)
+def _reference(panel: Axes, scene: Scene, values: np.ndarray, style: Any, name: str) -> None:
+    """Lines of a closed form: one grey one where all curves have the same, else in their colours."""
+    known = [_broken(own) for own in values]
+    same = scene.joined and all(np.array_equal(own, known[0], equal_nan=True) for own in known)
+    if not np.any(np.isfinite(known)):
+        return
+    for line, own in zip(scene.lines[:1] if same else scene.lines, known, strict=False):
+        x, y = scene.parted(line, own)
+        if not scene.joined:  # a short line for each category
+            half = 0.5 * scene.category
+            x, y = np.stack([x - half, x + half, x], axis=1).ravel(), np.repeat(y, 3)
+            y[2::3] = np.nan
+        panel.plot(x, y, linestyle=style, color=REFERENCE if same else line.colour, **_THIN)
+    panel.plot([], [], linestyle=style, color=REFERENCE, label=name, **_THIN)
 
 
 def _broken(values: np.ndarray) -> np.ndarray:
@@ -72,11 +93,6 @@ def _broken(values: np.ndarray) -> np.ndarray:
     none = ~(values > 0.0)
     alone = none & np.append(True, none[:-1]) & np.append(none[1:], True)
     return np.where(alone, np.nan, values)
-
-
-def reference_handles() -> list[Line2D]:
-    styles: Any = (("--", "JKR"), (":", "Hertz"))
-    return [Line2D([], [], color=REFERENCE, linewidth=0.9, linestyle=style, label=label) for style, label in styles]
 
 
 _ENERGIES: Any = (
@@ -87,7 +103,7 @@ _ENERGIES: Any = (
 
 
 def energy_panel(panel: Axes, scene: Scene) -> None:
-    """Work of the bonds left, fluctuation energy, and what both leave to the contact."""
+    """Work of adhesion of the bonds left, fluctuation energy, and what both leave to the contact."""
     drawn = [entry for entry in _ENERGIES if np.any(np.nan_to_num(scene.all(f"{entry[0]}_mean")))]
     if _small_fluctuations(scene):
         drawn = [entry for entry in drawn if entry[0] != "fluctuation_energy"]
@@ -95,109 +111,154 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
         drawn = [entry for entry in drawn if entry[0] != "bond_work"]
     values = scene.all(*(f"{name}_mean" for name, *_ in drawn))
     unit = Unit.of(values, "J/m^2")
-    handles = []
     for name, text, own, style in drawn:
-        curves = _distinct(scene, f"{name}_mean")
+        curves = distinct(scene, f"{name}_mean")
         placed = scene.middle() if len(curves) == 1 else scene
         for line, wide in zip(curves, covered(scene, name, curves), strict=True):
             colour = own if scene.single else REFERENCE if len(curves) == 1 else line.colour
-            curve(panel, placed, name, line, unit.factor, colour, style, wide)
-        handles.append(handle(scene, own if scene.single else REFERENCE, text, style))
+            curve(panel, placed, name, line, unit.factor, colour, style, wide=wide)
+        panel.plot([], [], color=own if scene.single else REFERENCE, label=text, **scene.look(style))
     if np.any(values <= 0.0):
         panel.axhline(0.0, color=REFERENCE, linewidth=0.5, zorder=1)
     panel.set_ylabel(label("energy per area", unit.name))
-    legend(panel, handles)
+    legend(panel)
 
 
 def _small_fluctuations(scene: Scene) -> bool:
     """Whether the fluctuation energy changes, but would be a line at zero beside the work left to the contact."""
     most, work = (float(np.nanmax(scene.all(f"{n}_mean"))) for n in ("fluctuation_energy", "work_of_adhesion"))
-    return 0.0 < most < _SMALL * work and scene.tells("fluctuation_energy")
+    return 0.0 < most < _SMALL * work and scene.varies("fluctuation_energy")
 
 
 def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
     """Fluctuation energy where it is small."""
     unit = Unit.of(scene.all("fluctuation_energy_mean"), "J/m^2")
-    for line in _distinct(scene, "fluctuation_energy_mean"):
-        curve(
-            panel, scene, "fluctuation_energy", line, unit.factor, FLUCTUATIONS if scene.single else line.colour, "--"
-        )
+    for line in distinct(scene, "fluctuation_energy_mean"):
+        colour = FLUCTUATIONS if scene.single else line.colour
+        curve(panel, scene, "fluctuation_energy", line, unit.factor, colour, "--")
     panel.set_ylim(bottom=0.0)
     panel.set_ylabel(label(r"fluctuations $\Delta\Gamma$", unit.name))
 
 
-def _distinct(scene: Scene, name: str) -> list[Line]:
-    """Curves that do not lie on an earlier one."""
-    kept: list[Line] = []
-    for line in scene.lines:
-        values = scene.values(name, line)
-        if not any(np.array_equal(values, scene.values(name, other), equal_nan=True) for other in kept):
-            kept.append(line)
-    return kept
-
-
-def friction_panel(panel: Axes, scene: Scene) -> None:
-    """Friction force."""
-    unit = Unit.of(scene.all("friction_force_mean"), "N")
-    _contact_curves(panel, scene, "friction_force", unit.factor)
-    panel.set_ylabel(label("friction $F$", unit.name))
-
-
-def area_panel(panel: Axes, scene: Scene) -> None:
-    """Contact area between Hertz's and JKR's."""
-    unit = Unit.of(np.pi * scene.all("radius_jkr") ** 2, "m^2")
-    _references(panel, scene, "radius", np.pi * unit.factor, power=2)
-    _contact_curves(panel, scene, "contact_area", unit.factor)
-    panel.set_ylabel(label("contact area $A$", unit.name))
-
-
 def share_panel(panel: Axes, scene: Scene) -> None:
-    """A/A_JKR over speed; for a single curve what each mechanism takes, stacked from JKR's line down."""
-    panel.axhline(1.0, linestyle="--", color=REFERENCE, linewidth=0.9, zorder=1.5)
-    handles: list[Any] = line_handles(scene)
-    if scene.single and (scene.tells("lost_to_bonds") or scene.tells("lost_to_fluctuations")):
-        handles += _stacked_shares(panel, scene)
-    for line in scene.lines:
-        hertz = (scene.values("radius_hertz", line) / scene.values("radius_jkr", line)) ** 2
-        _reference(panel, _broken(hertz), ":", scene, line)
-    _contact_curves(panel, scene, "area_ratio", 1.0)
-    closing = [*spread_handles(scene, "area_ratio"), *opening_handles(scene), *reference_handles()]
-    legend(panel, [*handles, *closing])
+    """A/A_JKR; for a single curve what each mechanism takes, stacked from JKR's line down."""
+    if scene.single:
+        _stacked_shares(panel, scene)
+    contact_curves(panel, scene, "area_ratio", 1.0)
+    panel.axhline(1.0, linestyle="--", color=REFERENCE, label="JKR", **_THIN)
+    hertz, jkr = (scene.all(f"radius_{name}_mean") for name in ("hertz", "jkr"))
+    _reference(panel, scene, (hertz / jkr) ** 2, ":", "Hertz")
+    legend(panel, scene.title)
     panel.set_ylabel(r"contact area $A/A_\mathrm{JKR}$")
 
 
-def _stacked_shares(panel: Axes, scene: Scene) -> list[Any]:
-    """What each mechanism takes of JKR's area, as stacked shades; returns their legend entries."""
-    line, x = scene.lines[0], scene.x[0]
+def _stacked_shares(panel: Axes, scene: Scene) -> None:
+    """What each mechanism takes of JKR's area, as stacked shades."""
+    line = scene.lines[0]
     bonds, ratio = 1.0 - scene.values("lost_to_bonds_mean", line), scene.values("area_ratio_mean", line)
+    x, bonds, ratio = scene.parted(line, bonds, ratio)
     steps = np.diff(x)
     if not (np.all(steps >= 0.0) or np.all(steps <= 0.0)):  # shades of there and back would lie on each other
-        panel.plot(x, bonds, "-.", color=BONDS)
-        return [Line2D([], [], color=BONDS, linestyle="-.", label="with the bonds left alone")]
-    fill(panel, x, bonds, np.ones_like(bonds), BONDS, _SHADE)
-    fill(panel, x, ratio, bonds, FLUCTUATIONS, _SHADE)
-    return [
-        Patch(facecolor=BONDS, alpha=_SHADE, label="lost to broken bonds"),
-        Patch(facecolor=FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations"),
-    ]
+        if scene.varies("lost_to_bonds"):
+            panel.plot(x, bonds, "-.", color=BONDS, label="with the bonds left alone")
+        return
+    if scene.varies("lost_to_bonds"):
+        fill(panel, x, bonds, np.ones_like(bonds), color=BONDS, alpha=_SHADE, label="lost to broken bonds")
+    if scene.varies("lost_to_fluctuations"):
+        fill(panel, x, ratio, bonds, color=FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
 
 
-def stacked(scene: Scene, panels: list[tuple[float, Callable[[Axes, Scene], None]]]) -> Figure:
-    """Panels of given heights [in] above each other that share their x axis, lettered."""
-    heights = [height for height, _ in panels]
-    figure, axes = rows(heights)
+def stacked(scene: Scene, panels: list[tuple[float, Panel]]) -> tuple[Figure, list[Axes]]:
+    """Panels of given heights [in] above each other that share their x axis, lettered, with the colour bar if any."""
+    figure, axes = rows([height for height, _ in panels])
     for panel, (_, drawing) in zip(axes, panels, strict=True):
         drawing(panel, scene)
-    return figure
+    if scene.bar:
+        figure.colorbar(scene.bar.colours, ax=axes, label=scene.bar.words, aspect=45, pad=0.02)
+    return figure, axes
 
 
-def further_panels(scene: Scene) -> list[tuple[float, Callable[[Axes, Scene], None]]]:
-    """Energies and friction, where they have something to tell."""
-    panels: list[tuple[float, Callable[[Axes, Scene], None]]] = []
-    if scene.tells("work_of_adhesion") or scene.tells("fluctuation_energy"):
+def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
+    """Energies and friction, where they change."""
+    panels: list[tuple[float, Panel]] = []
+    if scene.varies("work_of_adhesion") or scene.varies("fluctuation_energy"):
         panels.append((1.6, energy_panel))
         if _small_fluctuations(scene):
             panels.append((1.2, _fluctuation_panel))
-    if scene.tells("friction_force"):
+    if scene.varies("friction_force"):
         panels.append((1.2, friction_panel))
     return panels
+
+
+def needs_speeds(dataset: xr.Dataset) -> None:
+    if rest_of(dataset) is not None:
+        raise ValueError("a rest and a start have two speeds only; draw the kind stress")
+    if is_steady(dataset) and speed_dim(dataset) is None:
+        raise ValueError('the speed neither changes in time nor is swept; ramp it: [drive] model = "ramp"')
+
+
+def curve_figure(dataset: xr.Dataset) -> Figure:
+    """Contact area with what each mechanism takes of it, energies and friction, over speed."""
+    scene, scale, unit = over_speed(dataset)
+    figure, axes = stacked(scene, [(1.9, share_panel), *further_panels(scene)])
+    across(axes[-1], scene.x, scale, "sliding speed $V$", unit.name, room_of(scene))
+    return figure
+
+
+#: What drives a contact, drawn over time where it changes.
+_DRIVEN = {
+    "speed": ("speed $V$", "m/s"),
+    "normal_load": ("load $P$", "N"),
+    "displacement": (r"base $\Delta$", "m"),
+}
+
+
+def time_figure(dataset: xr.Dataset) -> Figure:
+    """Contact radius, energies, friction, and speed, load and displacement that change, over time."""
+    unit = Unit.of(dataset["t"].to_numpy(), "s")
+    scene = scene_along(dataset, "t").placed(unit.factor * dataset["t"].to_numpy())
+    moved = not bool(stays_held(dataset).all())
+    shown = [name for name in _DRIVEN if scene.moves(name) and (name != "displacement" or moved)]
+    driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
+    figure, axes = stacked(scene, [(1.6, radius_panel), *further_panels(scene), *driven])
+    legend(axes[0], scene.title)
+    across(axes[-1], scene.x, "linear", "time $t$", unit.name)
+    return figure
+
+
+def needs_sweep(dataset: xr.Dataset) -> None:
+    if not _swept(dataset):
+        raise ValueError('nothing is swept; sweep a key: [sweep] "contact.load" = ["1 mN", "4 mN"]')
+
+
+def _swept(dataset: xr.Dataset) -> list[str]:
+    """Dimensions of the sweep with more than one value."""
+    return [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
+
+
+def sweep_figure(dataset: xr.Dataset) -> Figure:
+    """Contact radius, energies and friction over the first swept key; further keys make curves."""
+    key = dataset[_swept(dataset)[0]]
+    named = key.dtype.kind not in "fi"
+    values = np.arange(key.size, dtype=float) if named else key.to_numpy().astype(float)
+    scale = "linear" if named else axis_scale(values)
+    unit = Unit(1.0, "") if named else Unit.of(values, key.attrs["units"], scale == "log")
+    scene = scene_along(dataset, str(key.name)).placed(unit.factor * values)
+    if named:
+        scene = scene.apart()
+    figure, axes = stacked(scene, [(1.7, radius_panel), *further_panels(scene)])
+    legend(axes[0], scene.title if is_stationary(dataset) else _at_the_end(dataset, scene.title))
+    words = f"{key.attrs.get('long_name', key.name)} {symbol(key)}".strip()
+    beside = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
+    across(axes[-1], scene.x, scale, words, unit.name, beside if named else room_of(scene))
+    if named:
+        axes[-1].set_xticks(values, [str(value) for value in key.to_numpy()])
+    return figure
+
+
+def _at_the_end(dataset: xr.Dataset, averaged: str) -> str:
+    """The last time and the speed then, which may differ between the points of the sweep, and what a mean is over."""
+    speed = dataset["speed" if "speed" in dataset else "speed_mean"].isel(t=-1)
+    ends = dict.fromkeys(engineering(float(end), "m/s") for end in (speed.min(), speed.max()))
+    words = f"at the end: $t$ = {engineering(float(dataset['t'][-1]), 's')}, $V$ = {' to '.join(ends)}"
+    return ", ".join(filter(None, [words.replace("-", "−"), averaged]))

@@ -6,13 +6,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
 
-from sim.analysis import engineering, setting, sweep_dims
+from sim.analysis import engineering, setting
 from sim.laws import jkr, profiles
-from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, label, legend, letter, picture, told
+from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, first_point, label, legend, letter, picture
 
 #: Points of a profile on one side, and how far it goes in contact radii.
 _POINTS, _REACH = 1500, 2.0
@@ -47,12 +46,8 @@ class Shape(NamedTuple):
 
 def needs_contact(dataset: xr.Dataset) -> None:
     """Refuse a dataset whose first member is never in contact."""
-    if not bool(np.any(_member(dataset, "contact_radius", _first(dataset)) > 0.0)):
+    if not bool(np.any(_member(dataset, "contact_radius", first_point(dataset)[0]) > 0.0)):
         raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
-
-
-def _first(dataset: xr.Dataset) -> dict[str, int]:
-    return dict.fromkeys(sweep_dims(dataset), 0)
 
 
 def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
@@ -72,7 +67,7 @@ class _Drawn(NamedTuple):
 
 def shapes_of(dataset: xr.Dataset) -> _Drawn:
     """Contacts of the first member at the first point of the sweep: the last closed one, and at rest."""
-    at = _first(dataset)
+    at = first_point(dataset)[0]
     radius, depth, stress, speed = (
         _member(dataset, name, at) for name in ("contact_radius", "indentation", "shear_stress", "speed")
     )
@@ -90,7 +85,7 @@ def shapes_of(dataset: xr.Dataset) -> _Drawn:
 
 
 def profile_figure(dataset: xr.Dataset) -> Figure:
-    """Pressure and surfaces at rest and at the last time, and the displacement that the shear stress makes.
+    """Pressure, surfaces and tangential displacement across the contact at the last time.
 
     The surfaces are cut along the axis of the sphere; heights are not to the scale of the lengths. The
     shear stress is the mean one, uniform over the contact; without any its displacement is left out.
@@ -107,12 +102,13 @@ def profile_figure(dataset: xr.Dataset) -> Figure:
     if rows == 2:
         _displacement_panel(axes[2], drawn.last, reach, length)
         _map_panel(figure, axes[3], drawn.last, reach, length)
-    words = [told(dataset, name, 0) for name in sweep_dims(dataset)]
-    words += [f"$t$ = {engineering(drawn.time, 's')}", f"$V$ = {engineering(drawn.speed, 'm/s')}"]
-    handles = [Line2D([], [], color=BOTH, label=", ".join(words).replace("-", "−"))]
+    words = [first_point(dataset)[1], f"$t$ = {engineering(drawn.time, 's')}"]
+    if "$V$" not in words[0]:
+        words.append(f"$V$ = {engineering(drawn.speed, 'm/s')}")
+    axes[0].plot([], [], color=BOTH, label=", ".join(filter(None, words)).replace("-", "−"))
     if drawn.rest is not None:
-        handles.append(Line2D([], [], color=REFERENCE, linestyle="--", linewidth=0.9, label="at rest (JKR)"))
-    legend(axes[0], handles)
+        axes[0].plot([], [], color=REFERENCE, linestyle="--", linewidth=0.9, label="at rest (JKR)")
+    legend(axes[0])
     return figure
 
 
@@ -189,7 +185,7 @@ def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: Unit) -
         panel.plot(length.factor * distance, unit.factor * values, style, color=BOTH, label=words)
     for edge in (-shape.radius, shape.radius):
         panel.axvline(length.factor * edge, color=REFERENCE, linewidth=0.5, zorder=1)
-    legend(panel, panel.get_lines()[:2])
+    legend(panel)
     panel.set_ylabel(label("tangential displacement", unit.name))
     _lengthwise(panel, reach, length, "distance from the axis")
 

@@ -7,7 +7,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from sim.analysis import engineering, setting, sweep_dims
 from sim.plots.bond_laws import start_peak, steady_laws
@@ -23,7 +22,7 @@ from sim.plots.style import (
     plain_ticks,
     rounded,
     span,
-    told,
+    swept_value,
 )
 
 _MARKERS = "osD^vP"
@@ -96,10 +95,9 @@ def start_figure(dataset: xr.Dataset) -> Figure:
         letter(axes)
         _peak_panel(axes[1], dataset, starts, over, unit)
     _time_panel(axes[0], longest, unit)
-    fixed = [told(dataset, name, 0) for name in sweep_dims(dataset) if name not in _varied(dataset)]
+    others = [name for name in sweep_dims(dataset) if name not in _varied(dataset) and dataset.sizes[name] > 1]
     after = f"after {engineering(longest[0].rest, 's')} at rest, sliding at"
-    handles = [Line2D([], [], color=colour, label=rounded(s.speed, "m/s")) for s, colour in _coloured(longest)]
-    legend(axes[0], handles, ", ".join([*fixed, after]))
+    legend(axes[0], ", ".join([*(swept_value(dataset, name, 0) for name in others), after]))
     return figure
 
 
@@ -115,7 +113,7 @@ def _time_panel(panel: Axes, starts: list[Start], unit: Unit) -> None:
     length = Unit.of(np.concatenate([start.time for start in starts]), "s", several)
     for start, colour in _coloured(starts):
         time, stress = length.factor * start.time, unit.factor * start.stress
-        panel.plot(time, stress, color=colour)
+        panel.plot(time, stress, color=colour, label=rounded(start.speed, "m/s"))
         if start.seen:
             panel.plot(time[start.peak], stress[start.peak], "o", markersize=3, color=colour)
     first, last = (length.factor * float(starts[0].time[k]) for k in (0, -1))
@@ -135,53 +133,35 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over: str
     values = np.array([abs(getattr(start, over)) for start in starts])
     pace = Unit.of(values, "m/s" if over == "speed" else "s", logarithmic=True)
     groups = sorted({start.rest for start in starts}) if over == "speed" else [None]
-    handles = []
     for k, rest in enumerate(groups):
         own = sorted((s for s in starts if rest in (s.rest, None)), key=lambda s: abs(getattr(s, over)))
         own = [s for s in own if getattr(s, over) != 0.0]
         shade = mpl.colors.to_hex((0.65 * (1.0 - (k + 1) / len(groups)),) * 3)
         x, y = np.array([(abs(getattr(s, over)), s.stress[s.peak]) for s in own]).T
         line: Any = {"color": shade, "marker": _MARKERS[k % len(_MARKERS)], "markersize": 3.5}
-        panel.plot(pace.factor * x, unit.factor * y, **line)
+        panel.plot(pace.factor * x, unit.factor * y, label=f"{engineering(rest, 's')} at rest" if rest else "", **line)
         rising = np.array([not s.seen for s in own])
         panel.plot(pace.factor * x[rising], unit.factor * y[rising], **(line | {"linestyle": "none", "mfc": "white"}))
-        if rest is not None:
-            handles.append(Line2D([], [], **line, label=f"{engineering(rest, 's')} at rest"))
     if not all(start.seen for start in starts):
-        handles.append(
-            Line2D(
-                [],
-                [],
-                color=REFERENCE,
-                marker="o",
-                mfc="white",
-                linestyle="none",
-                label="not resolved",
-            )
-        )
+        panel.plot([], [], "o", color=REFERENCE, mfc="white", label="not resolved")
     if over == "speed":
-        handles += _closed_forms(panel, dataset, starts, pace, unit)
+        _closed_forms(panel, dataset, starts, pace, unit)
     panel.set_xscale("log")
     if values.max() < 100.0 * np.min(values[values > 0.0]):
         plain_ticks(panel.xaxis)
     panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
     words = "sliding speed $V$" if over == "speed" else "time at rest"
     panel.set_xlabel(label(words, pace.name))
-    legend(panel, handles, "peak of the stress")
+    legend(panel, "peak of the stress")
 
 
-def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: Unit, unit: Unit) -> list[Line2D]:
-    """Thin lines of what is known in closed form, with their legend entries."""
+def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: Unit, unit: Unit) -> None:
+    """Thin lines of what is known in closed form."""
     speeds = np.array([abs(start.speed) for start in starts if start.speed != 0.0])
     fine = np.geomspace(speeds.min(), speeds.max(), _FINE)
     thin: Any = {"color": REFERENCE, "linewidth": 0.7, "zorder": 1.5}
-    handles = []
     peaks = [start_peak(dataset, start.at, fine, start.fraction) for start in {s.rest: s for s in starts}.values()]
     for peak in (peak for peak in peaks if peak is not None):
-        panel.plot(pace.factor * fine, unit.factor * peak, linestyle=":", **thin)
-    if any(peak is not None for peak in peaks):
-        handles.append(Line2D([], [], linestyle=":", **thin, label="none rebinds"))
+        panel.plot(pace.factor * fine, unit.factor * peak, linestyle=":", label="none rebinds", **thin)
     for law in steady_laws(dataset, starts[0].at, fine)[:1]:
-        panel.plot(pace.factor * fine, unit.factor * law.stress, linestyle="-", **thin)
-        handles.append(Line2D([], [], **thin, label="steady sliding"))
-    return handles
+        panel.plot(pace.factor * fine, unit.factor * law.stress, label="steady sliding", **thin)

@@ -7,6 +7,7 @@ do, black the contact with both; grey lines are closed forms, such as JKR's and 
 import itertools
 import re
 import textwrap
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -18,7 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from sim.analysis import engineering, scaled
+from sim.analysis import engineering, scaled, sweep_dims
 
 COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
 
@@ -50,6 +51,7 @@ STYLE: Any = {
     "legend.handlelength": 1.6,
     "legend.columnspacing": 1.2,
     "axes.formatter.use_mathtext": True,
+    "axes.formatter.useoffset": False,
     "figure.constrained_layout.h_pad": 0.03,
     "figure.constrained_layout.w_pad": 0.03,
     "pdf.fonttype": 42,
@@ -74,8 +76,8 @@ def picture(width: float, height: float) -> Picture:
     return empty
 
 
-def told(dataset: xr.Dataset, name: str, at: int) -> str:
-    """A swept value in words, in the unit of the whole axis: ``P = 4 mN``."""
+def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
+    """A swept value with its symbol, in the unit of the whole axis: ``P = 4 mN``."""
     coordinate = dataset[name]
     value = coordinate[at].item()
     if isinstance(value, str):
@@ -85,12 +87,18 @@ def told(dataset: xr.Dataset, name: str, at: int) -> str:
     return f"{symbol(coordinate) or name.replace('_', ' ')} = {number}"
 
 
+def first_point(dataset: xr.Dataset) -> tuple[dict[str, int], str]:
+    """The first point of a sweep, by index and in words."""
+    dims = sweep_dims(dataset)
+    return dict.fromkeys(dims, 0), ", ".join(swept_value(dataset, n, 0) for n in dims if dataset.sizes[n] > 1)
+
+
 def rounded(value: float, unit: str) -> str:
     """A number with its unit in three digits: ``305 kPa``."""
     return engineering(float(f"{value:.3g}"), unit).replace("-", "−")
 
 
-_GREEK = re.compile(r"(?<![A-Za-z])(tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma)(?![A-Za-z])")
+_GREEK = re.compile(r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma)(?![A-Za-z])")
 
 
 def symbol(variable: xr.DataArray) -> str:
@@ -141,28 +149,33 @@ def letter(axes: list[Axes]) -> None:
         )  # fmt: skip
 
 
-def legend(panel: Axes, handles: list[Any], title: str = "") -> None:
-    """A legend above the panel, where no data are, under a line in words."""
-    longest = max(len(handle.get_label().replace("$", "")) for handle in handles)
+def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any] = ()) -> None:
+    """A legend above the panel, where no data are: what carries a label, or handles; each label once."""
+    entries: dict[str, Any] = {}
+    for handle in handles or panel.get_legend_handles_labels()[0]:
+        entries.setdefault(str(handle.get_label()), handle)
+    if not entries and not title:
+        return
+    longest = max((len(text.replace("$", "")) for text in entries), default=0)
     panel.legend(
-        handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3 if longest <= 16 else 2,
-        borderaxespad=0.2, handletextpad=0.5, labelspacing=0.25, title=title or None, title_fontsize=7.0,
-        alignment="left",
+        entries.values(), entries, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handletextpad=0.5,
+        ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1), labelspacing=0.25,
+        title="\n".join(textwrap.wrap(title, 62)) or None, title_fontsize=7.0, alignment="left",
     )  # fmt: skip
 
 
-def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, colour: str, alpha: float) -> None:
+def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: Any) -> None:
     """A shaded band; there and back one for each way, as a polygon that turns back hides itself."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
     for first, last in itertools.pairwise([0, *turns, len(x) - 1]):
         part = slice(first, last + 1)
-        panel.fill_between(x[part], low[part], high[part], color=colour, alpha=alpha, linewidth=0)
+        panel.fill_between(x[part], low[part], high[part], linewidth=0, **look)
 
 
-def rows(heights: list[float]) -> tuple[Figure, list[Axes]]:
-    """A picture of one column: panels of given heights [in] above each other that share their x axis, lettered."""
+def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
+    """A picture of one column: panels of given heights [in] above each other, lettered; with one x axis if shared."""
     figure = picture(COLUMN, 0.45 + sum(heights))
-    axes = list(figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0])
+    axes = list(figure.subplots(len(heights), 1, sharex=shared, squeeze=False, height_ratios=heights)[:, 0])
     if len(axes) > 1:
         letter(axes)
     figure.align_ylabels(axes)

@@ -81,6 +81,12 @@ def needs_control(dataset: xr.Dataset) -> str:
     raise ValueError(f"{why}, and the theories need a load or an indentation that stays; {cure}")
 
 
+def sweeps_theories(dataset: xr.Dataset) -> bool:
+    """Whether the reversible fraction, on which the theories differ, is swept."""
+    found = _number(dataset, "contact.reversible")
+    return found is not None and found.size > 1
+
+
 def _scenario(dataset: xr.Dataset) -> dict[str, Any]:
     """The scenario of the dataset with all defaults."""
     return json.loads(dataset.attrs.get("scenario_resolved", "{}"))
@@ -174,7 +180,7 @@ def points_of(dataset: xr.Dataset, at: dict[str, int]) -> tuple[np.ndarray, np.n
 
 
 def theories_figure(dataset: xr.Dataset) -> Figure:
-    """Contact area by every theory, over the shear stress and over the tangential force that it makes."""
+    """Contact area by every theory, and simulated, over shear stress and tangential force."""
     case = case_of(dataset)
     stress, area = points_of(dataset, case.at)
     sheared = stress[stress > 0.0]

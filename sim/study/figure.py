@@ -73,7 +73,7 @@ def figure(dataset: xr.Dataset) -> Figure:
             panel.yaxis.set_major_formatter(FuncFormatter(_decade))
             panel.set_ylabel(words)
         drawn.axes[-1].set_xlabel("CPU time per member-step of the scene (µs)")
-        legend(axes[0], _handles(lines))
+        legend(axes[0], handles=_handles(lines))
     return drawn
 
 
@@ -102,7 +102,7 @@ def _draw_bonds(panel: Axes, dataset: xr.Dataset) -> None:
         )  # fmt: skip
     panel.axhline(float(dataset.attrs["bonds_tolerance_asked"]), color=REFERENCE, linestyle="--", linewidth=0.8)
     panel.set_ylabel("error of the bonds' " + ("stress" if which == 0 else "fraction"))
-    legend(panel, panel.get_legend_handles_labels()[0])
+    legend(panel)
 
 
 def _tells(dataset: xr.Dataset, quantity: int) -> bool:

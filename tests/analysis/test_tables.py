@@ -1,5 +1,6 @@
 """Rows for the terminal and the CSV: what tells something, and nothing else."""
 
+import csv
 import itertools
 import re
 
@@ -83,8 +84,8 @@ def test_csv_reads_back_as_the_statistics(ramp, tmp_path):
     np.testing.assert_array_equal(read["contact_radius_sem"], found["contact_radius_sem"])
     np.testing.assert_array_equal(read["contact_radius_q95"], found["contact_radius_quantile"].sel(quantile=0.95))
     np.testing.assert_array_equal(read["lost_to_fluctuations_mean"], analysis.shares(ramp)["lost_to_fluctuations_mean"])
-    first = text.splitlines()[0]
-    assert first.startswith("# sliding contact; sliding-sim ") and first.endswith("seed 2003")
+    rows = list(csv.reader(text.splitlines()))  # the header is first, and every row is as long
+    assert rows[0][0] == "t [s]" and {len(row) for row in rows} == {len(rows[0])} and len(rows) == 22
 
 
 def test_csv_has_a_row_for_each_point_and_time(tmp_path):
@@ -150,4 +151,37 @@ def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
     (tmp_path / "far.csv").write_text("older")
     (tmp_path / "out.csv").symlink_to(tmp_path / "far.csv")
     analysis.to_csv(ramp, tmp_path / "out.csv")
-    assert (tmp_path / "out.csv").is_symlink() and (tmp_path / "far.csv").read_text().startswith("# sliding contact")
+    assert (tmp_path / "out.csv").is_symlink() and (tmp_path / "far.csv").read_text().startswith("t [s],")
+
+
+def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mean(ramp):
+    rows = analysis.table(ramp)
+    said = analysis.notes(ramp, rows, analysis.highlights(ramp))
+    assert said[0] == "mean over the 6 members; in brackets the standard error in the last digits"
+    assert said[1].startswith("12 of 21 rows shown") and "--where" in said[1] and "A/A_JKR: " in said[2]
+    whole = analysis.table(ramp, rows=10**9)
+    assert len(whole) == 21 and not any("shown" in line for line in analysis.notes(ramp, whole, []))
+
+
+def test_steady_sweeps_say_that_the_second_half_counts_and_show_their_speed_once():
+    dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep={"drive.speed": list(np.geomspace(1e-4, 1e-1, 16))}))
+    rows = analysis.table(dataset)
+    assert analysis.notes(dataset, rows, [])[0].startswith("mean over the second half of the run and 6 members")
+    assert analysis.notes(dataset, rows, [])[1].startswith("12 of 16 rows shown")
+    assert [heading for heading in rows[0] if heading.endswith("(mm/s)")] == ["drive_speed\n(mm/s)"]
+
+
+def test_a_value_of_a_swept_key_is_chosen_by_its_text_and_refused_with_what_there_is():
+    sweep = {"contact.load": ["1 mN", "4 mN"], "bonds": [{"model": "none"}, {"model": "none", "stress": 3e5}]}
+    dataset = run(scene(drive=drive.Steady(speed=1e-2), shear=shear.Uniform(), sweep=sweep))
+    for key in ("load", "contact.load"):
+        found = analysis.where(dataset, {key: "4 mN", "bonds": "none 2"})
+        assert found.sizes["contact_load"] == found.sizes["bonds"] == 1 and float(found["contact_load"][0]) == 4e-3
+    for chosen, words in (
+        ({"load": "2 mN"}, "no value 2 mN; there are: 1 mN, 4 mN"),
+        ({"load": "2 mm"}, "unit"),
+        ({"radius": "2 mm"}, "not swept; swept: contact_load, bonds"),
+        ({"bonds": "rate"}, "no value rate; there are: none"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            analysis.where(dataset, chosen)

@@ -23,7 +23,18 @@ def field(kind=shear.Modal, spectrum=None, **changes):
     return kind(spectrum=spectrum, **(options | changes))
 
 
+_RUNS = {}
+
+
 def simulated(**changes):
+    """A small run, made once for all tests: change a copy of it."""
+    key = repr(sorted(changes.items()))
+    if key not in _RUNS:
+        _RUNS[key] = _simulated(changes)
+    return _RUNS[key]
+
+
+def _simulated(changes):
     parts = {
         "clock": Clock(duration=0.4, step=0.02),
         "solid": Solid(shear_modulus=1.6e6),
@@ -46,9 +57,19 @@ def mapped(members=1, spectrum=None, **changes):
 
 
 def drawn(panel, colour, style="-"):
-    """Data of the line of a colour and a style."""
-    (line,) = (line for line in panel.lines if line.get_color() == colour and line.get_linestyle() == style)
+    """Data of the line of a colour and a style; what stands in the legend alone has none."""
+    (line,) = (
+        line
+        for line in panel.lines
+        if (line.get_color(), line.get_linestyle()) == (colour, style) and len(line.get_xdata())
+    )
     return line.get_data()
+
+
+def legend_of(panel):
+    """Entries of a legend, and its title."""
+    legend = panel.get_legend()
+    return [text.get_text() for text in legend.get_texts()], legend.get_title().get_text()
 
 
 def rendered(figure):

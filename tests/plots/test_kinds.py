@@ -6,7 +6,7 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
-from helpers.pictured import STEADY, drawn, field, mapped, rendered, simulated
+from helpers.pictured import STEADY, drawn, field, legend_of, mapped, rendered, simulated
 
 from sim import analysis
 from sim.parts.bonds import models as bonds
@@ -17,6 +17,8 @@ from sim.plots import kinds as plots
 from sim.plots import style as pictures
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.spectrum.families import Band
+
+REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.3, 0.3, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3))
 
 
 @pytest.fixture(scope="module")
@@ -62,17 +64,27 @@ def test_bands_reach_from_the_5_to_the_95_percent_quantile(ramp):
     assert band[:, 1].max() == quantiles.sel(quantile=0.95).max()
 
 
-def test_time_shows_radius_area_and_energies(ramp):
+def test_time_shows_radius_energies_friction_and_the_speed(ramp):
     figure = rendered(plots.draw(ramp, "time"))
     found = analysis.statistics(ramp)
-    for panel, name, factor in zip(figure.axes, ("contact_radius", "contact_area"), (1e6, 1e6), strict=False):
-        time, mean = drawn(panel, pictures.BOTH)
+    shown = {0: ("contact_radius", 1e6), 2: ("friction_force", 1e3), 3: ("speed", 1e3)}
+    for panel, (name, factor) in shown.items():
+        time, mean = drawn(figure.axes[panel], pictures.BOTH)
         np.testing.assert_allclose(time, 1e3 * ramp["t"], rtol=1e-14)
         np.testing.assert_allclose(mean, factor * found[f"{name}_mean"], rtol=1e-14)
     labels = [panel.get_ylabel() for panel in figure.axes]
-    assert labels == ["contact radius $a$ (µm)", "contact area $A$ (mm²)", "energy per area (mJ/m²)"]
-    jkr = drawn(figure.axes[1], pictures.REFERENCE, "--")[1]
-    np.testing.assert_allclose(jkr, 1e6 * np.pi * float(ramp["radius_at_rest"]) ** 2, rtol=1e-14)
+    assert labels[:2] == ["contact radius $a$ (µm)", "energy per area (mJ/m²)"] and len(labels) == 4
+    jkr = drawn(figure.axes[0], pictures.REFERENCE, "--")[1]
+    np.testing.assert_allclose(jkr, 1e6 * float(ramp["radius_at_rest"]), rtol=1e-14)
+
+
+def test_what_a_mean_is_over_is_said(ramp):
+    assert "mean over the 6 members" in legend_of(plots.draw(ramp, "curve").axes[0])[0]
+    swept = simulated(drive=STEADY, sweep={"contact.load": ["1 mN", "4 mN", "16 mN"]})
+    names, _ = legend_of(plots.draw(swept, "sweep").axes[0])
+    assert "mean over the second half of the run and 6 members" in names and "5–95 % of members' means" in names
+    both = simulated(drive=STEADY, sweep={"contact.load": ["1 mN", "4 mN"], "sphere.radius": ["1 mm", "2 mm"]})
+    assert legend_of(plots.draw(both, "sweep").axes[0])[1] == "mean over the second half of the run and 6 members"
 
 
 def test_sweep_shows_the_second_half_against_the_swept_key():
@@ -94,8 +106,7 @@ def test_further_swept_keys_are_further_curves_with_their_values():
         drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": [0.0, 4e-3], "sphere.radius": ["1 mm", "2 mm"]}
     )
     panel = plots.draw(dataset).axes[0]
-    labels = [text.get_text() for text in panel.get_legend().get_texts()]
-    assert labels == ["$R$ = 1 mm", "$R$ = 2 mm", "JKR", "Hertz"]
+    assert legend_of(panel)[0] == ["$R$ = 1 mm", "$R$ = 2 mm", "JKR", "Hertz"]
     np.testing.assert_allclose(
         drawn(panel, pictures.LINES[1])[1], 1e6 * dataset["contact_radius"].isel(sphere_radius=1, t=-1), rtol=1e-14
     )
@@ -122,8 +133,7 @@ def test_lines_break_where_the_contact_is_open_and_a_cross_tells_where():
     (cross,) = (line.get_data() for line in panel.lines if line.get_marker() == "x")
     at = [1e3 * dataset["t"][last], 1e6 * dataset["contact_radius"][last]]
     np.testing.assert_allclose(np.ravel(cross), at, rtol=1e-14)
-    assert "comes off" in [text.get_text() for text in panel.get_legend().get_texts()]
-    assert not np.any(np.isfinite(drawn(panel, pictures.REFERENCE, ":")[1]))  # a pulled contact has no Hertz's
+    assert "pull-off" in legend_of(panel)[0] and "Hertz" not in legend_of(panel)[0]
 
 
 def test_a_contact_that_is_never_closed_is_told_in_words():
@@ -163,13 +173,13 @@ def test_swept_models_are_marks_that_no_line_joins():
 
 def test_values_at_the_end_of_a_ramp_say_when_and_how_fast():
     dataset = simulated(sweep={"contact.load": [1e-3, 4e-3]})
-    title = plots.draw(dataset, "sweep").axes[0].get_legend().get_title().get_text()
-    assert title == "at the end: $t$ = 400 ms, $V$ = 100 mm/s"
+    _, title = legend_of(plots.draw(dataset, "sweep").axes[0])
+    assert title.replace("\n", " ") == "at the end: $t$ = 400 ms, $V$ = 100 mm/s"
     dataset = simulated(sweep={"drive.to": ["10 mm/s", "100 mm/s"]})
-    title = plots.draw(dataset, "sweep").axes[0].get_legend().get_title().get_text()
+    _, title = legend_of(plots.draw(dataset, "sweep").axes[0])
     assert title == "at the end: $t$ = 400 ms, $V$ = 10 mm/s to 100 mm/s"
     steady = simulated(drive=STEADY, sweep={"contact.load": [1e-3, 4e-3]})
-    assert not plots.draw(steady, "sweep").axes[0].get_legend().get_title().get_text()
+    assert not legend_of(plots.draw(steady, "sweep").axes[0])[1]
 
 
 def test_a_curve_beneath_another_is_wide_enough_to_be_seen():
@@ -210,7 +220,10 @@ def test_a_fluctuation_energy_too_small_to_see_has_a_panel_of_its_own(ramp):
             },
             "loop",
         ),
-        ({"drive": drive.Start(rest=0.1, speed=1e-3)}, "friction"),
+        ({"drive": drive.Start(rest=0.1, speed=1e-3)}, "stress"),
+        ({"drive": REVERSING}, "friction"),
+        ({"drive": REVERSING, "bonds": bonds.Unbroken()}, "time"),
+        ({"drive": STEADY, "sweep": {"contact.reversible": [0.0, 0.1], "contact.load": [1e-3, 4e-3]}}, "theories"),
         ({"drive": drive.Start(rest=0.1, speed=1e-3), "bonds": bonds.Unbroken()}, "time"),
     ],
 )
@@ -224,18 +237,55 @@ def test_default_figure_fits_the_dataset(changes, kind):
 
 def test_an_unknown_kind_names_the_known_ones(ramp):
     with pytest.raises(
-        ValueError, match='no figure "histogram"; known: curve, time, sweep, map, spectrum, friction, theories, profile'
+        ValueError, match='no figure "histogram"; known: loop, theories, stress, friction, curve, sweep, time, map'
     ):
         plots.draw(ramp, "histogram")
 
 
 def test_figures_that_need_a_sweep_or_a_ramp_say_so(ramp):
     with pytest.raises(
-        ValueError, match=r"nothing is swept; .*\[sweep\].*drawn as: curve, time, friction, theories, profile"
+        ValueError, match=r"nothing is swept; .*\[sweep\].*drawn as: theories, stress, friction, curve, time, profile"
     ):
         plots.draw(ramp, "sweep")
     with pytest.raises(ValueError, match=r'ramp it: \[drive\] model = "ramp"'):
         plots.draw(simulated(drive=STEADY, shear=shear.Uniform()), "curve")
+
+
+def test_every_kind_says_in_a_line_what_it_shows():
+    lines = [kind.shows for kind in plots.KINDS.values()]
+    assert len(set(lines)) == len(lines) and all(30 < len(line) < 100 and line.endswith(".") for line in lines)
+
+
+# -- many curves, jumps of the speed ----------------------------------------------------------
+
+
+def test_many_curves_along_one_number_have_a_colour_bar_in_place_of_names():
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": list(np.linspace(1e-3, 9e-3, 9))})
+    panel, *_, bar = rendered(plots.draw(dataset, "time")).axes
+    assert bar.get_ylabel() == "normal load $P$ (mN)" and not any("$P$" in name for name in legend_of(panel)[0])
+    colours = [line.get_color() for line in panel.lines if line.get_linestyle() == "-"]
+    assert len(colours) == 9 and colours == sorted(colours, key=lambda c: sum(mpl.colors.to_rgb(c)[:2]))
+
+
+@pytest.mark.parametrize("sweep", [{"contact.load": 21}, {"contact.load": 4, "sphere.radius": 3}])
+def test_too_many_curves_are_refused_with_the_cure(sweep):
+    axes = {key: {"from": 1e-3, "to": 2e-3, "count": count} for key, count in sweep.items()}
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=axes, clock=Clock(duration=0.04, step=0.02))
+    with pytest.raises(ValueError, match=r"too many.*--where contact_load="):
+        plots.draw(dataset, "time")
+    chosen = plots.draw(analysis.where(dataset, {"contact.load": "1 mN"}), "time")
+    assert chosen.get_suptitle() == "$P$ = 1 mN"
+
+
+def test_no_line_joins_speeds_before_and_after_a_jump():
+    dataset = simulated(drive=REVERSING, shear=shear.Uniform())
+    speed = dataset["speed"].to_numpy()
+    for kind in ("curve", "friction", "stress"):
+        for panel in plots.draw(dataset, kind).axes:
+            for line in (line for line in panel.lines if np.size(line.get_ydata()) > 10):
+                x = np.asarray(line.get_xdata(), float)
+                speeds = np.insert(speed, np.flatnonzero(np.diff(speed)) + 1, np.nan)
+                assert len(x) == len(speeds) and np.all(np.isnan(x) == np.isnan(speeds)), kind
 
 
 THERE_AND_BACK = drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.02, 0.0))
@@ -252,8 +302,8 @@ CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equil
         {"drive": THERE_AND_BACK},
         {"contact": Equilibrium(load=-3e-4)},
         {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform()},
-        {"contact": Equilibrium(indentation=1e-6), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=9, sites=9),
-         "record": Record(per_member=False)},
+        {"contact": Equilibrium(indentation=1e-6), "record": Record(per_member=False),
+         "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9)},
         {"sweep": CONTACTS},
         {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
         {"drive": STEADY, "sweep": {"shear": [{"model": "uniform"}] * 2, "contact.load": [0.0, 1e-3]}},
@@ -266,7 +316,7 @@ CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equil
 def test_every_shape_of_dataset_can_be_drawn(changes):
     dataset = simulated(**changes)
     for figure in (plots.draw(dataset), plots.draw(dataset, "time")):
-        assert all(panel.get_ylabel() for panel in figure.axes) and figure.axes[-1].get_xlabel()
+        assert all(panel.get_ylabel() for panel in figure.axes) and any(panel.get_xlabel() for panel in figure.axes)
 
 
 @pytest.mark.parametrize("load", [-1.0, -3e-4], ids=["never closed", "pulled off"])

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.pictured import STEADY, drawn, rendered, simulated
+from helpers.pictured import STEADY, drawn, legend_of, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.analysis import loop_energy
@@ -149,7 +149,7 @@ def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
     assert_allclose(loop, spent, rtol=0, atol=2 * 0.5 * 1.5 * np.pi * 42e-3 * 2e-3 * RECORD)
     (entry,) = plots.draw(machine, "loop").axes[0].get_legend().get_texts()
     assert entry.get_text() == (
-        rf"simulated: $W$ = {1e12 * float(spent):.3g} pJ, $\oint\,P\,\mathrm{{d}}\Delta$ = {1e12 * float(loop):.3g} pJ"
+        rf"simulated: $W$ = {1e12 * float(spent):.3g} pJ, $\oint P\,\mathrm{{d}}\Delta$ = {1e12 * float(loop):.3g} pJ"
     )
 
 
@@ -205,16 +205,15 @@ def test_loop_is_what_fits_where_the_sphere_is_moved_and_refused_where_it_stays(
     assert [p.get_xlabel() for p in default.axes] == [p.get_xlabel() for p in named.axes]
     stays = moved(Equilibrium(load=4e-3))
     assert "loop" not in plots.drawable(stays) and "loop" in plots.drawable(grips)
-    cure = r'no loop; move it: \[contact\] indentation = \{ from = "2 um", .*drawn as: time'
+    cure = r'no loop; move it: \[contact\] indentation = \{ from = "2 um", .*drawn as: theories, time'
     with pytest.raises(ValueError, match=cure):
         plots.draw(stays, "loop")
 
 
-def test_over_time_no_contact_at_rest_is_drawn_for_a_sphere_that_moves(grips):
-    figure = rendered(plots.draw(grips, "time"))
-    for panel in figure.axes[:2]:
-        for style in ("--", ":"):
-            _, values = drawn(panel, pictures.REFERENCE, style)
-            assert np.count_nonzero(np.isfinite(values)) <= 1  # a point alone is not seen
-    assert figure.axes[1].get_ylabel() == "contact area $A$ (mm²)"
-    assert "JKR" not in [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+def test_over_time_the_contacts_of_the_moment_are_drawn_for_a_sphere_that_moves(grips):
+    radii, loads, base = rendered(plots.draw(grips, "time")).axes
+    _, hertz = drawn(radii, pictures.REFERENCE, ":")
+    pressed = grips["indentation"].to_numpy() > 0.0
+    assert_allclose(hertz[pressed], 1e6 * np.sqrt(2e-3 * grips["indentation"].to_numpy()[pressed]), rtol=1e-9)
+    assert [loads.get_ylabel(), base.get_ylabel()] == ["load $P$ (µN)", r"base $\Delta$ (µm)"]
+    assert {"pull-off", "jump-in"} <= set(legend_of(radii)[0])
