@@ -32,12 +32,12 @@ _RING: Any = {
 
 def needs_stress(dataset: xr.Dataset) -> None:
     """Refuse a dataset without shear stress, or with one speed only."""
-    stress = dataset["shear_stress" if "shear_stress" in dataset else "shear_stress_mean"]
-    if not bool((stress != 0.0).any()):
-        raise ValueError('the bonds bear no shear stress; give them one, such as [bonds] stress = "0.3 MPa"')
     rest = rest_of(dataset)
     if rest is not None and not bool((dataset["t"] > rest).any()):
         raise ValueError("the run ends before the slider starts; make clock.duration longer than drive.rest")
+    stress = dataset["shear_stress" if "shear_stress" in dataset else "shear_stress_mean"]
+    if not bool((stress != 0.0).any()):
+        raise ValueError('the bonds bear no shear stress; give them one, such as [bonds] stress = "0.3 MPa"')
     if rest is None and is_steady(dataset) and speed_dim(dataset) is None:
         raise ValueError(
             'stress is drawn over the speed, which neither changes nor is swept; ramp it: [drive] model = "ramp", '
