@@ -378,51 +378,44 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
     jkr               1.7371 1.7371
     hertz             0.9787 0.9787
     uncorrected       1.7371 2.0640
+    sahli             nan nan
     savkoor_briggs    1.7371 1.6333
     reversible_force  1.7371 1.6249
     reversible_stress 1.7371 1.3975
     fraction          1.7371 1.7036
-    sahli             nan nan
     """
-    stress = np.asarray(stress, dtype=float)
+    rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz = _at_load(load, work, sphere_radius, modulus)
-    rest = (sphere_radius, modulus, poisson_ratio)
-
-    def shrunk(fraction, held):
-        return shrunk_at_load(jkr, hertz, load, work, stress, fraction, held, *rest)
-
-    return _together(
+    return _by_theory(
+        lambda fraction, held: shrunk_at_load(jkr, hertz, load, work, stress, fraction, held, *rest),
+        reversible,
         jkr=jkr,
         hertz=hertz,
         uncorrected=uncorrected_at_load(load, work, stress, *rest),
-        savkoor_briggs=shrunk(_AS_STICK, 4.0),
-        reversible_force=shrunk(_AS_UNIFORM, 4.0),
-        reversible_stress=shrunk(1.0, 0.0),
-        fraction=shrunk(reversible, 0.0),
         sahli=_measured_at_stress(jkr, hertz, shrinkage, stress),
     )
 
 
 def compare_at_indentation(stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1):
     """Contact radius [m] at an indentation by theory, as ``compare_at_load`` but for ``"sahli"``, measured at loads."""
-    stress = np.asarray(stress, dtype=float)
+    rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
-    rest = (sphere_radius, modulus, poisson_ratio)
-
-    def shrunk(fraction, held):
-        return shrunk_at_displacement(jkr, hertz, indentation, math.inf, work, stress, fraction, held, *rest)
-
-    return _together(
+    held_at = (jkr, hertz, indentation, math.inf, work, stress)
+    return _by_theory(
+        lambda fraction, held: shrunk_at_displacement(*held_at, fraction, held, *rest),
+        reversible,
         jkr=jkr,
         hertz=hertz,
         uncorrected=uncorrected_at_indentation(indentation, work, stress, *rest),
-        savkoor_briggs=shrunk(_AS_STICK, 4.0),
-        reversible_force=shrunk(_AS_UNIFORM, 4.0),
-        reversible_stress=shrunk(1.0, 0.0),
-        fraction=shrunk(reversible, 0.0),
     )
 
 
-def _together(**radii):
-    """The radii broadcast to one shape."""
+def _by_theory(shrunk, reversible, **radii):
+    """Radii by theory, broadcast to one shape; ``shrunk`` gives those of a reversible share and what is held."""
+    radii |= {
+        "savkoor_briggs": shrunk(_AS_STICK, 4.0),
+        "reversible_force": shrunk(_AS_UNIFORM, 4.0),
+        "reversible_stress": shrunk(1.0, 0.0),
+        "fraction": shrunk(reversible, 0.0),
+    }
     return dict(zip(radii, (np.array(a) for a in np.broadcast_arrays(*radii.values())), strict=True))

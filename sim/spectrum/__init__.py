@@ -16,18 +16,6 @@ from sim.spectrum.periodogram import periodogram, radial_average
 from sim.spectrum.tabulated import Tabulated
 
 __all__ = [
-    "AnisotropicGaussian",
-    "Band",
-    "BondMade",
-    "Gaussian",
-    "Measured",
-    "Ripple",
-    "SelfAffine",
-    "Spectrum",
-    "Tabulated",
-    "VonKarman",
-    "disc_energy",
-    "marginal_energy",
-    "periodogram",
-    "radial_average",
-]
+    "AnisotropicGaussian", "Band", "BondMade", "Gaussian", "Measured", "Ripple", "SelfAffine", "Spectrum",
+    "Tabulated", "VonKarman", "disc_energy", "marginal_energy", "periodogram", "radial_average",
+]  # fmt: skip
