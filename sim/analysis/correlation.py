@@ -1,4 +1,4 @@
-"""How long the fluctuations of a stationary run remember: integral correlation times."""
+"""Integral correlation times of the fluctuations in a stationary run."""
 
 import math
 from typing import NamedTuple
@@ -11,13 +11,18 @@ from sim.analysis.scene import MEMBERS, sweep_dims
 
 #: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
 _WINDOW = 6.0
+#: Records that a correlation time must span: Simpson's rule is then right to (1/2)^4/180, 0.03 %.
+_FEWEST = 2.0
+#: How many of its standard errors the correlation of neighbouring records is below that of ``_FEWEST``.
+_SURELY = 4.0
 
 
 class IntegralTime(NamedTuple):
-    """An integral correlation time and its standard error [s]."""
+    """An integral correlation time and its standard error [s]; if records are too coarse, what it is below [s]."""
 
     time: float
     sem: float
+    below: float = math.nan
 
 
 def integral_time(values: np.ndarray, step: float) -> IntegralTime:
@@ -33,31 +38,35 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     Returns
     -------
     IntegralTime
-        In seconds. nan where nothing fluctuates, where neighbouring records are correlated by less
-        than 1/e (record more often), and where the run is shorter than the window (run longer, or
-        with more members).
+        In seconds. nan where nothing fluctuates, where the run is shorter than the window (run longer, or
+        with more members), and where the time spans less than two records, so that no sum over records
+        is right: then ``below`` is two records, if the records show it beyond their noise (record more often).
 
     Notes
     -----
     The autocovariance is averaged over members and times, of the deviations from the ensemble mean
-    at each time (unbiased; for a single member from its own mean in time). Its integral
-    ``T(W) = step (1/2 + sum of rho_k, k = 1 ... W)`` is cut at the smallest W >= 6 T(W)/step
-    (A. Sokal, Monte Carlo Methods in Statistical Mechanics, 1997), which leaves out e^-6 of an
-    exponential memory; the trapezoidal sum adds (step/T)^2/12. The standard error ``T sqrt(2 (2W +
-    1)/n)``, n the number of free values, is Madras and Sokal's for a Gaussian process (J. Stat.
-    Phys. 50 (1988) 109).
+    at each time (unbiased; for a single member from its own mean in time). Its integral is summed up to
+    the smallest W at which ``W step >= 6 T(W)`` (A. Sokal, Monte Carlo Methods in Statistical Mechanics,
+    1997), which leaves out e^-6 of an exponential memory, by Simpson's rule, which adds (step/T)^4/180 of it
+    (the trapezoidal rule would add (step/T)^2/12). The standard error ``T sqrt(2 (2W + 1)/n)``, n the number
+    of free values, is Madras and Sokal's for a Gaussian process (J. Stat. Phys. 50 (1988) 109).
 
     Examples
     --------
-    Values that forget by half from one record to the next:
+    Values that forget a fifth from one record to the next, ``exp(-1/T) = 0.8``:
 
     >>> rng = np.random.default_rng(5)
     >>> x = np.zeros((64, 4000))
     >>> for k in range(1, 4000):
-    ...     x[:, k] = 0.5 * x[:, k - 1] + rng.normal(size=64)
-    >>> time, sem = integral_time(x, step=1.0)
-    >>> print(f"{0.5 + 0.5 / (1 - 0.5):.2f} {abs(time - 1.5) < 5 * sem} {sem < 0.03}")
-    1.50 True True
+    ...     x[:, k] = 0.8 * x[:, k - 1] + rng.normal(size=64)
+    >>> time, sem, _ = integral_time(x, step=1.0)
+    >>> print(f"{-1 / math.log(0.8):.2f} {abs(time - 4.48) < 5 * sem} {sem < 0.1}")
+    4.48 True True
+
+    Every tenth record tells only that the time is shorter than two of them:
+
+    >>> integral_time(x[:, ::10], step=10.0)
+    IntegralTime(time=nan, sem=nan, below=20.0)
     """
     members, records = values.shape
     nothing = IntegralTime(math.nan, math.nan)
@@ -71,9 +80,15 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     if not covariance[0] > (1e-10 * np.max(np.abs(values))) ** 2:
         return nothing
     correlation = covariance / covariance[0]
-    sums = 0.5 + np.concatenate([[0.0], np.cumsum(correlation[1:])])
+    coarse = math.exp(-1.0 / _FEWEST)
+    if correlation[1] < coarse:
+        sure = correlation[1] < coarse - _SURELY / math.sqrt(free * records)
+        return IntegralTime(math.nan, math.nan, _FEWEST * step if sure else math.nan)
+    weights = np.where(np.arange(records) % 2, 4.0, 2.0) / 3.0
+    weights[0] /= 2.0
+    sums = np.cumsum(weights * correlation)
     windows = np.flatnonzero(np.arange(records) >= _WINDOW * sums)
-    if correlation[1] < math.exp(-1.0) or len(windows) == 0:
+    if len(windows) == 0:
         return nothing
     window = int(windows[0])
     time = step * float(sums[window])
@@ -83,18 +98,19 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
     """Integral correlation time of the fluctuation energy ΔΓ(t) at each point of the sweep.
 
-    It has a meaning only while the process is stationary: it is nan wherever the speed changes
-    during the run, and where ``integral_time`` says so.
+    Defined only for a stationary process: nan wherever the speed changes during the run, and where
+    ``integral_time`` gives none.
 
     Returns
     -------
     xarray.Dataset
-        ``correlation_time`` and ``correlation_time_sem`` [s] with the sweep's dimensions.
+        ``correlation_time``, ``correlation_time_sem`` and, where records are too coarse for a number,
+        ``correlation_time_below`` [s] with the sweep's dimensions.
     """
     energy, speed = dataset.get("fluctuation_energy"), dataset["speed"]
     dims = sweep_dims(dataset)
     shape = tuple(dataset.sizes[name] for name in dims)
-    times = np.full((2, *shape), np.nan)
+    times = np.full((3, *shape), np.nan)
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
         steady = (speed == speed.isel(t=0)).all("t").broadcast_like(dataset["contact_modulus"])
@@ -109,6 +125,7 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         {
             "correlation_time": (dims, times[0], {"units": "s", "long_name": about, "symbol": "t_c"}),
             "correlation_time_sem": (dims, times[1], {"units": "s", "long_name": f"standard error of the {about}"}),
+            "correlation_time_below": (dims, times[2], {"units": "s", "long_name": f"what the {about} is below"}),
         },
         coordinates,
     )

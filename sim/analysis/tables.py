@@ -115,11 +115,11 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     columns = [c for c in _COLUMNS if (changing or not c.changing) and c.name not in left_out]
     cells |= _shown(found, points, columns)
     where = {name: index for name, index in points.items() if name != "t"}
-    known = (found[name].isel(where).to_numpy() for name in ("correlation_time", "correlation_time_sem"))
-    times, errors, _ = np.broadcast_arrays(*known, points["t"])
-    if np.any(np.isfinite(times)):
-        heading, texts = _cells(_MEMORY.heading, "s", times, errors)
-        cells[heading] = texts
+    known = (found[f"correlation_time{name}"].isel(where).to_numpy() for name in ("", "_sem", "_below"))
+    times, errors, below, _ = np.broadcast_arrays(*known, points["t"])
+    if np.any(np.isfinite(times) | np.isfinite(below)):
+        heading, texts = _cells(_MEMORY.heading, "s", np.where(np.isnan(times), below, times), errors)
+        cells[heading] = [f"<{text}" if math.isfinite(most) else text for text, most in zip(texts, below, strict=True)]
     return _rows(cells)
 
 

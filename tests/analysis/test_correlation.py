@@ -27,8 +27,8 @@ def squared_ornstein_uhlenbeck(rng, members, records, keep, pairs=5):
 
 
 def exact_time(keep, step):
-    """Trapezoidal integral of keep^(2 lag)."""
-    return step * 0.5 * (1.0 + keep**2) / (1.0 - keep**2)
+    """Integral of keep^(2 lag)."""
+    return -0.5 * step / math.log(keep)
 
 
 @pytest.mark.parametrize(
@@ -36,7 +36,7 @@ def exact_time(keep, step):
 )
 def test_correlation_time_is_within_five_of_its_standard_errors(members, records, keep):
     energy = squared_ornstein_uhlenbeck(np.random.default_rng(7), members, records, keep)
-    time, sem = analysis.integral_time(energy, step=0.01)
+    time, sem, _ = analysis.integral_time(energy, step=0.01)
     assert abs(time - exact_time(keep, 0.01)) < 5.0 * sem
     assert sem < 0.3 * time
 
@@ -71,7 +71,33 @@ def test_correlation_time_does_not_see_a_drift_that_members_share():
     ids=["constant", "rounding", "frozen", "white", "one record", "nan"],
 )
 def test_there_is_no_correlation_time_where_nothing_decays_visibly(energy):
-    assert all(math.isnan(number) for number in analysis.integral_time(energy, 0.1))
+    assert all(math.isnan(number) for number in analysis.integral_time(energy, 0.1)[:2])
+
+
+@pytest.mark.parametrize("records_a_time", [0.3, 1.0, 1.6, 2.4, 4.0])
+def test_records_that_are_too_coarse_give_a_bound_and_no_number(records_a_time):
+    keep = math.exp(-0.5 / records_a_time)
+    for seed in range(20):
+        energy = squared_ornstein_uhlenbeck(np.random.default_rng(seed), 64, 400, keep)
+        time, sem, below = analysis.integral_time(energy, step=0.01)
+        if records_a_time < 2.0:
+            assert math.isnan(time) and below == 0.02
+        else:
+            # Simpson's rule is off by 1/(180 2.4^4) = 2e-4 and the window by e^-6, each far below the error
+            assert abs(time - 0.01 * records_a_time) < 4.0 * sem and math.isnan(below)
+
+
+def test_few_values_tell_neither_a_time_nor_a_bound():
+    energy = squared_ornstein_uhlenbeck(np.random.default_rng(4), 2, 12, 0.1)
+    assert all(math.isnan(number) for number in analysis.integral_time(energy, 1.0))
+
+
+def test_a_run_recorded_too_seldom_says_so_in_its_table():
+    field = shear.Banded(correlation=Time(time=0.02), **FIELD)
+    coarse = run(scene(drive=drive.Steady(speed=1e-3), shear=field, clock=Clock(duration=4.0, step=0.02),
+                       ensemble=Ensemble(members=16)))  # fmt: skip
+    assert float(analysis.statistics(coarse)["correlation_time_below"]) == 0.04
+    assert {row["t_c\n(ms)"] for row in analysis.table(coarse)} == {"<40"}
 
 
 def test_a_run_shorter_than_its_memory_has_no_correlation_time():
@@ -85,7 +111,6 @@ def test_energy_forgets_twice_as_fast_as_its_amplitudes():
     steady = scene(drive=drive.Steady(speed=1e-3), shear=field, clock=Clock(duration=0.4, step=0.001),
                    ensemble=Ensemble(members=128))  # fmt: skip
     found = analysis.statistics(run(steady))
-    # the trapezoidal sum over steps of a tenth of the time adds 1/1200, far below the error
     assert abs(float(found["correlation_time"]) - 0.01) < 5.0 * float(found["correlation_time_sem"])
     assert float(found["correlation_time_sem"]) < 1e-3
 
@@ -99,7 +124,7 @@ def test_scores_of_the_correlation_time_are_standard_normal():
     scores = []
     for seed in range(300):
         energy = squared_ornstein_uhlenbeck(np.random.default_rng(seed), 16, 500, 0.9)
-        time, sem = analysis.integral_time(energy, 1.0)
+        time, sem, _ = analysis.integral_time(energy, 1.0)
         scores.append((time - exact_time(0.9, 1.0)) / sem)
     # the window cuts e^-6 off and the error is Gaussian theory: mean and spread to a third of a unit
     assert abs(np.mean(scores)) < 0.33 and 0.67 < np.std(scores) < 1.33
