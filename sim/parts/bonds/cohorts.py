@@ -165,6 +165,20 @@ def moments(cohorts: Cohorts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return bound(cohorts), first_moment(cohorts), second_moment(cohorts)
 
 
+def at_limit(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> np.ndarray:
+    """Density of the stretch at the rupture's limit times that limit, ℓ ρ(ℓ) [1], shape (rows,); 0 without a limit.
+
+    The mean over the outermost of the cells that are merged, which is what the tolerance resolves.
+    """
+    if rupture.limit == math.inf:
+        return np.zeros(1)
+    inner, half = rupture.limit - _cell(rupture, tolerance), 0.5 * cohorts.width
+    size = np.abs(cohorts.stretch)
+    inside = np.minimum(size + half, rupture.limit) - np.maximum(size - half, inner)
+    share = np.divide(np.maximum(inside, 0.0), cohorts.width, out=np.zeros(size.shape), where=cohorts.width > 0.0)
+    return rupture.limit / (rupture.limit - inner) * np.sum(cohorts.weight * share, axis=1)
+
+
 def _check(rupture: RuptureRate, tolerance: float) -> None:
     if not 1e-12 <= tolerance <= 0.1:
         raise ValueError(f"a tolerance of {tolerance:g} is out of range: give 1e-12 to 0.1")
@@ -193,11 +207,12 @@ def _numbers(rupture: RuptureRate, rebinding_rate: float, tolerance: float, larg
     by d²/8 of them. A cell that contains zero averages a rupture with a kink and errs by 0.015 of its
     width times its share at most.
     """
-    if rupture.limit < math.inf:
-        cell = rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
-    elif rupture.softness > 0.0:
-        cell = (432.0 * tolerance) ** 0.25 / rupture.softness
-    else:
-        cell = math.inf
-    most = _most(rupture, tolerance)
+    cell, most = _cell(rupture, tolerance), _most(rupture, tolerance)
     return np.array([*rupture, rebinding_rate, tolerance, largest, cell, _KINK * tolerance, most], dtype=float)
+
+
+def _cell(rupture: RuptureRate, tolerance: float) -> float:
+    """Width of the cells within which cohorts are merged [m]."""
+    if rupture.limit < math.inf:
+        return rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
+    return (432.0 * tolerance) ** 0.25 / rupture.softness if rupture.softness > 0.0 else math.inf

@@ -49,17 +49,19 @@ class _Stretched:
         """Share of sites that are bound at rest [1]."""
         return self.rebinding_rate / (self.rebinding_rate + self.law.rate)
 
-    def _bonding(self, bound: np.ndarray, stretch: np.ndarray, square: np.ndarray) -> Bonding:
+    def _bonding(self, bound: np.ndarray, stretch: np.ndarray, square: np.ndarray, breaking: np.ndarray) -> Bonding:
         """Readings of a population of these moments per site.
 
-        The stress is n κ x̄; with f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²).
+        The stress is n κ x̄; with f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²). Slip stretches all
+        bonds and breaks, at a limit ℓ of the stretch, the share ``breaking`` of the sites for each ℓ of slip.
         """
         frozen, scale = stretch**2, self.site_density * self.bond_stiffness**2
         varying = np.maximum(square - frozen, 0.0)  # nan stays nan
         per_stretch = self.site_density * self.bond_stiffness
         stress = per_stretch * stretch
         fraction = bound / self.bound_at_rest
-        return Bonding(fraction, stress, np.abs(stress), per_stretch * bound, scale * frozen, scale * varying)
+        stiffness = per_stretch * (bound - breaking)
+        return Bonding(fraction, stress, np.abs(stress), stiffness, scale * frozen, scale * varying)
 
     def remarks(self, setting: Setting) -> list[str]:
         return []
@@ -123,14 +125,14 @@ class FirstMoment(OverArea, _Stretched):
         return state
 
     def bonding(self, state: Stretches) -> Bonding:
-        return self._bonding(*self.moments(state))
+        return self._bonding(*self.moments(state), 2.0 * np.abs(state.stretch) / self.law.limit)
 
     def moments(self, state: Stretches) -> Moments:
         """Share of sites bound [1] and mean stretch [m] per site; the mean square stretch is not known."""
         return state.bound, state.stretch, _UNKNOWN
 
     def steady(self, speed: np.ndarray) -> Bonding:
-        return self._bonding(*first_moment.steady(speed, self.law, self.rebinding_rate), _UNKNOWN)
+        return self.bonding(Stretches(*first_moment.steady(speed, self.law, self.rebinding_rate)))
 
 
 class Ages(NamedTuple):
@@ -190,7 +192,7 @@ class Cohort(OverArea, _Stretched):
         return state
 
     def bonding(self, state: Ages) -> Bonding:
-        return self._bonding(*self.moments(state))
+        return self._bonding(*self.moments(state), cohorts.at_limit(state.cohorts, self.law, self.tolerance))
 
     def moments(self, state: Ages) -> Moments:
         """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""
@@ -198,7 +200,8 @@ class Cohort(OverArea, _Stretched):
 
     def steady(self, speed: np.ndarray) -> Bonding:
         rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]
-        return self._bonding(*np.concatenate([cohorts.moments(row) for row in rows], axis=1))
+        found = [self.bonding(Ages(row)) for row in rows]
+        return Bonding(*(np.concatenate(values) for values in zip(*found, strict=True)))
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -248,7 +251,7 @@ class Tracked(_Stretched):
         return state.copy()
 
     def bonding(self, state: Tracks) -> Bonding:
-        return self._bonding(*self.moments(state))
+        return self._bonding(*self.moments(state), np.zeros(1))  # one bond after the other breaks at a limit
 
     def moments(self, state: Tracks) -> Moments:
         """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""
