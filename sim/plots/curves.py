@@ -15,7 +15,6 @@ from sim.analysis import (
     is_stationary,
     is_steady,
     observables,
-    reference_radii,
     settled,
     share_observables,
     summary,
@@ -186,7 +185,7 @@ def jumps(speed: np.ndarray) -> np.ndarray:
 
 def _stated(dataset: xr.Dataset) -> xr.Dataset:
     """Observables of all panels, with the shares of the lost area where they are known."""
-    found = observables(dataset).merge(reference_radii(dataset))
+    found = observables(dataset)
     with contextlib.suppress(ValueError):
         found = found.merge(share_observables(dataset))
     with contextlib.suppress(KeyError):

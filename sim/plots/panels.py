@@ -64,10 +64,10 @@ friction_panel = series("friction_force", "friction $F$", "N")
 
 def radius_panel(panel: Axes, scene: Scene) -> None:
     """Contact radius between Hertz's and JKR's."""
-    unit = Unit.of(scene.all("contact_radius_mean", "radius_jkr_mean"), "m")
+    unit = Unit.of(scene.all("contact_radius_mean", "jkr_radius_mean"), "m")
     contact_curves(panel, scene, "contact_radius", unit.factor)
     for which, style in (("JKR", "--"), ("Hertz", ":")):
-        name = f"radius_{which.lower()}_mean"
+        name = f"{which.lower()}_radius_mean"
         _reference(panel, scene, unit.factor * scene.all(name), style, which)
     panel.set_ylabel(label("contact radius $a$", unit.name))
 
@@ -146,8 +146,8 @@ def share_panel(panel: Axes, scene: Scene) -> None:
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
     panel.axhline(1.0, linestyle="--", color=REFERENCE, label="JKR", **_THIN)
-    hertz, jkr = (scene.all(f"radius_{name}_mean") for name in ("hertz", "jkr"))
-    _reference(panel, scene, (hertz / jkr) ** 2, ":", "Hertz")
+    hertz, jkr = (scene.all(f"{name}_radius_mean") for name in ("hertz", "jkr"))
+    _reference(panel, scene, (hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2, ":", "Hertz")
     legend(panel, scene.title)
     panel.set_ylabel(r"contact area $A/A_\mathrm{JKR}$")
 
