@@ -17,10 +17,10 @@ CLOSE = 2 * 11 * 40 * 2.0**-53
 
 
 def exact_tails(number, trials, chance):
-    """Both tails by whole fractions, without any rounding."""
-    p, total = Fraction(chance), Fraction(0)
-    for k in range(number + 1):
-        total += math.comb(trials, k) * p**k * (1 - p) ** (trials - k)
+    """Both tails by whole numbers over a common denominator, without any rounding."""
+    p, whole = Fraction(chance).as_integer_ratio()
+    ways = sum(math.comb(trials, k) * p**k * (whole - p) ** (trials - k) for k in range(number + 1))
+    total = Fraction(ways, whole**trials)
     return total, 1 - total
 
 
