@@ -6,25 +6,38 @@ EXTRAS ?= test,lint
 STAMP = $(VENV)/.installed-$(subst $(comma),-,$(EXTRAS))
 comma := ,
 
-.PHONY: run test verify bench lint clean
+.PHONY: run test verify bench lint lines clean
 
 run: $(STAMP)
 	$(BIN)/sim run scenarios/pdms_lens.toml --force
 	$(BIN)/sim plot outputs/pdms_lens.nc
 
 test: $(STAMP)
-	$(BIN)/python -m pytest -n 2
-	$(BIN)/python -m pytest --doctest-modules sim --ignore=sim/__main__.py
+	$(BIN)/python -m pytest $(PARALLEL) --doctest-modules --ignore=sim/__main__.py sim tests
+
+PARALLEL = -n 2 --dist worksteal
+
+# `make verify` runs all groups with their long checks, `make verify GROUP=bonds` one of them.
+GROUP ?= laws fields bonds contacts runs
+laws = --doctest-modules --ignore=sim/__main__.py sim tests/laws tests/numerics tests/units
+fields = tests/spectrum tests/parts/shear
+bonds = tests/parts/bonds
+contacts = tests/parts/contact tests/parts/drive
+rooms = $(filter-out tests/parts tests/helpers tests/__pycache__, $(patsubst %/,%,$(wildcard tests/*/)))
+runs = $(filter-out $(laws) $(fields), $(rooms)) $(wildcard tests/test_*.py)
 
 verify:
-	$(MAKE) EXTRAS=test,lint,verify .verify
+	$(MAKE) EXTRAS=test,lint,verify $(GROUP:%=.verify-%)
 
-.PHONY: .verify
-.verify: $(STAMP)
-	$(BIN)/python -m pytest -n 2 -m "verify or not verify" --timeout=3600
+.PHONY: .verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs
+.verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs: .verify-%: $(STAMP)
+	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
 bench: $(STAMP)
 	$(BIN)/python benchmarks/run.py
+
+lines:
+	$(PYTHON) benchmarks/lines.py
 
 lint: $(STAMP)
 	$(BIN)/ruff check .

@@ -203,7 +203,10 @@ class Tree:
         """CPU time of a row."""
         assert self.process.stdin and self.process.stdout
         print(json.dumps([row, repeats]), file=self.process.stdin, flush=True)
-        return float(self.process.stdout.readline())
+        answer = self.process.stdout.readline()
+        if not answer:
+            sys.exit(f"{self.process.args[-1]}: no answer for {row!r}")
+        return float(answer)
 
     def close(self) -> None:
         """End the process."""

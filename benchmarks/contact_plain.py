@@ -1,8 +1,7 @@
 """The contact radius as users of numpy and scipy would compute it, beside ours: speed and error.
 
-``rows(compare)`` gives the rows for ``make bench``; ``python benchmarks/contact_plain.py`` prints them
-alone, with millions of radii per second. Errors are the largest relative ones of 200 of the states, against
-fifty digits.
+``rows(compare)`` gives the rows for ``make bench``. Errors are the largest relative ones of 200 of the states,
+against fifty digits.
 """
 
 from collections.abc import Callable
@@ -145,16 +144,3 @@ def behind_machine(compare: Callable) -> list:
 def rows(compare: Callable) -> list:
     """All comparisons; the number in brackets is the largest relative error of the radius."""
     return at_load(compare) + behind_machine(compare)
-
-
-def main() -> None:
-    """Print the rows and the speed of ours."""
-    import run
-
-    for row in rows(run.compare):
-        count = int(row.ours.split(", ")[1].split(" ")[0].replace(",", ""))
-        print(*row.texts[:5], f"{count / row.seconds / 1e6:.1f} million radii/s", sep=" | ")
-
-
-if __name__ == "__main__":
-    main()

@@ -1,10 +1,13 @@
 """Speed against plain numpy, as ratios of two programs that take turns in one run: ``make bench``.
 
+Names of groups as arguments run these alone: ``python benchmarks/run.py modal contact``.
+
 Every ratio is the median over the turns of (time of the other) / (time of ours), with the span of
 the middle half of the turns; absolute times are only as seen. Machines are noisy, so compare ratios.
 """
 
 import itertools
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -93,7 +96,7 @@ def mean_field() -> list[Row]:
         "shear": shear.Modal(
             spectrum=SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=16e-6),
             cell=0.24e-3,
-            memory=Slip(length=5e-6),
+            correlation=Slip(length=5e-6),
         )
     }
 
@@ -114,7 +117,7 @@ def mean_field() -> list[Row]:
 def modal() -> list[Row]:
     """One Ornstein-Uhlenbeck step of all modes of a 256² grid and its energy."""
     points, cell, exponent = 256, 0.24e-3, 0.1
-    recipe = shear.Modal(spectrum=SPECTRUM, cell=cell, points=points, memory=Slip(length=5e-6))
+    recipe = shear.Modal(spectrum=SPECTRUM, cell=cell, points=points, correlation=Slip(length=5e-6))
     scenario = scene(1, shear=recipe)
     process, noise = scenario.process, Noise(1, "shear", np.arange(1))
     motion = scenario.drive.motion(0, 0.0, 0.0, 0.2)
@@ -144,7 +147,7 @@ def modal() -> list[Row]:
 
 def step() -> list[Row]:
     """What a step of the whole engine costs beside its modes."""
-    recipe = shear.Modal(spectrum=SPECTRUM, cell=0.24e-3, points=256, memory=Slip(length=5e-6))
+    recipe = shear.Modal(spectrum=SPECTRUM, cell=0.24e-3, points=256, correlation=Slip(length=5e-6))
     scenario = scene(1, shear=recipe, bonds=bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0))
     dice = Dice.of(1, np.arange(1))
     state = {"now": start(scenario, dice)}
@@ -183,9 +186,9 @@ def lens(exponent: float, points: int, members: int, recipe: shear.Modal | shear
 
 
 def depths() -> list[Row]:
-    """The same ensemble of ΔΓ on a 512² cell, self-affine with a roll-off and slip memory, per member-step."""
+    """The same ensemble of ΔΓ on a 512² cell, self-affine with a roll-off and slip correlation, per member-step."""
     exponent, points = 0.1, 512
-    recipe = {"spectrum": LENS, "cell": 0.24e-3, "memory": Slip(length=5e-6), "points": points}
+    recipe = {"spectrum": LENS, "cell": 0.24e-3, "correlation": Slip(length=5e-6), "points": points}
     half = plain.HalfSpectrumModes(points, 0.24e-3, LENS.radial_density, 1.6e6, 1)
     real = plain.RealSpaceMap(points, 0.24e-3, LENS.radial_density, 1.6e6, 1)
     rows = []
@@ -220,7 +223,9 @@ def depths() -> list[Row]:
 def maps() -> list[Row]:
     """A stress map on 256² points: a step and its map, beside its numbers and transform, and a public package."""
     points, cell, spectrum = 256, 0.24e-3, Gaussian(rms=1e5, length=12e-6)
-    recipe = shear.Mapped(spectrum=VonKarman(rms=1e5, length=12e-6, hurst=0.8), cell=cell, points=points, memory=SLIP)
+    recipe = shear.Mapped(
+        spectrum=VonKarman(rms=1e5, length=12e-6, hurst=0.8), cell=cell, points=points, correlation=SLIP
+    )
     process, noise = recipe.process(1.6e6, 0.5, cell), Noise(1, "shear", np.arange(1))
     rest, stress = drive.Steady(speed=0.0).motion(0, 0.0, 0.0, 1.0), Bonding(np.ones(1), np.zeros(1), np.zeros(1))
     state, counter = [process.start(rest, stress, noise)], itertools.count(1)
@@ -257,7 +262,7 @@ def sizes() -> list[Row]:
         spectrum = SelfAffine(
             rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=0.24e-3 / (points // 2 - 1) * 1.001
         )
-        recipe = shear.Banded(spectrum=spectrum, cell=0.24e-3, memory=Slip(length=5e-6), points=points)
+        recipe = shear.Banded(spectrum=spectrum, cell=0.24e-3, correlation=Slip(length=5e-6), points=points)
         return lens(exponent, points, 64, recipe)
 
     smallest = program(64)
@@ -408,7 +413,8 @@ def contact() -> list[Row]:
 def main() -> None:
     """Print all rows."""
     table = Table("ours", "beside", "ratio", "middle half", "promised", "ours, as seen", box=None)
-    for rows in (mean_field, modal, step, depths, maps, sizes, tracked, tracked_as_exactly, counted, cohorts, contact):
+    known = (mean_field, modal, step, depths, maps, sizes, tracked, tracked_as_exactly, counted, cohorts, contact)
+    for rows in [rows for rows in known if not sys.argv[1:] or rows.__name__ in sys.argv[1:]]:
         for row in rows():
             table.add_row(*row.texts)
     Console(width=140).print(table)

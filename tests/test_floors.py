@@ -1,6 +1,7 @@
 """The house: folders are floors, and a module imports only from floors below its own."""
 
 import ast
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,9 @@ import pytest
 import sim
 
 ROOT = Path(sim.__file__).parent
+#: What is no part of the package but of the tree, by the name under which its modules import each other.
+BESIDE = {path.stem: path for folder in ("benchmarks", "docs") for path in sorted((ROOT.parent / folder).glob("*.py"))}
+BESIDE |= {f"helpers.{path.stem}": path for path in sorted((ROOT.parent / "tests" / "helpers").glob("*.py"))}
 
 #: The folders and the two modules beside them, lowest first.
 FLOORS = ("units", "numerics", "laws", "spectrum", "parts", "scenario", "engine", "ensemble")
@@ -28,16 +32,21 @@ def is_module(name):
     return path.with_suffix(".py").exists() or (path / "__init__.py").exists()
 
 
-def imported(path):
-    """Names of our own modules that a file imports, wherever in it."""
+def imports(path):
+    """Names of modules, and of what is taken from them, that a file imports, wherever in it."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names if alias.name.split(".")[0] == "sim"}
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.split(".")[0] == "sim":
-            inner = [f"{node.module}.{alias.name}" for alias in node.names]
-            found |= {name if is_module(name) else node.module for name in inner}
-    return {name.removeprefix("sim").lstrip(".") for name in found}
+            found |= {alias.name for alias in node.names}
+        if isinstance(node, ast.ImportFrom) and node.module:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if is_module(name) or name in BESIDE else node.module for name in inner}
+    return found
+
+
+def imported(path):
+    """Names of the package's modules that a file imports, wherever in it."""
+    return {name.removeprefix("sim").lstrip(".") for name in imports(path) if name.split(".")[0] == "sim"}
 
 
 MODULES = {module_name(path): path for path in sorted(ROOT.rglob("*.py")) if path != ROOT / "__init__.py"}
@@ -76,19 +85,10 @@ def test_a_part_reads_no_other_part(name):
             assert other == "parts.exchange" or other.split(".")[1] == part, f"{name} imports {other}"
 
 
-def test_nothing_imports_in_a_circle():
-    graph = {name: imported(path) & set(MODULES) for name, path in MODULES.items()}
-    done: set[str] = set()
-
-    def visit(name, trail):
-        assert name not in trail, " -> ".join([*trail, name])
-        if name not in done:
-            for other in graph[name]:
-                visit(other, [*trail, name])
-            done.add(name)
-
-    for name in graph:
-        visit(name, [])
+def test_nothing_imports_in_a_circle_benchmarks_and_tests_included():
+    graph = {f"sim.{name}": path for name, path in MODULES.items()} | BESIDE
+    # raises a CycleError that names the circle
+    assert tuple(TopologicalSorter({name: imports(path) for name, path in graph.items()}).static_order())
 
 
 def test_public_names_are_all_there():
