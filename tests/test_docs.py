@@ -18,7 +18,7 @@ def maker_of(page):
     return maker
 
 
-@pytest.mark.parametrize("page", ["keys", "api"])
+@pytest.mark.parametrize("page", ["keys", "api", "dataset"])
 def test_a_page_made_from_the_code_is_up_to_date(page):
     found = (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8")
     assert found == maker_of(page).text(), f"run python docs/make_{page}.py"

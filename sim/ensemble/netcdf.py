@@ -17,17 +17,12 @@ from pydantic import TypeAdapter
 
 from sim.ensemble.part_files import Parts
 from sim.ensemble.plan import Plan, part_name
-from sim.ensemble.recorded import Variable
-from sim.laws import jkr
+from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
 from sim.scenario.sweep import Axis, written
 
-_DISC_ENERGIES = (
-    ("disc_energy", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
-    ("cross_energy", "energy of the map in the field of the mean stress, per area of the disc", "DeltaGamma_x"),
-)
 #: What HDF5 keeps of a variable in memory [byte]; its own 64 MiB hold every variable of a usual run whole.
 _CHUNK_CACHE = 4 * 2**20
 _FLAGS = "detached in_contact"
@@ -207,34 +202,18 @@ def _scenario_variables(file: File, plan: Plan) -> None:
 
 def _derived_variables(file: File, plan: Plan) -> None:
     """What readers of the file need beside the trajectories, at each point of the sweep."""
-    derived: dict[str, tuple[str, str, str, list[float]]] = {}
-
-    def add(name: str, unit: str, long_name: str, symbol: str, value: float) -> None:
-        derived.setdefault(name, (unit, long_name, symbol, []))[3].append(value)
-
+    described = {number.name: (number.unit, number.long_name, number.symbol) for number in NUMBERS}
+    described |= {name: ("1", text, "") for name, text in KNOWN_ERRORS.items()}
+    found: dict[str, list[float]] = {}
     for point in plan.points:
-        modulus, (shear_modulus, poisson_ratio) = point.solid.contact_modulus, point.solid.effective
-        hertz = point.contact.equilibrium_radius(np.zeros(1), point.sphere.radius, modulus)[0]
-        add("contact_modulus", "Pa", "contact modulus", "E*", modulus)
-        add("effective_shear_modulus", "Pa", "shear modulus of the tangential compliance", "G", shear_modulus)
-        add("effective_poisson_ratio", "1", "Poisson ratio of the tangential compliance", "nu", poisson_ratio)
-        add("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", point.rest_radius)
-        add("radius_without_adhesion", "m", "Hertz radius", "a_H", hertz)
-        if point.contact.load is not None:
-            pull_off = jkr.pull_off_load(point.adhesion.work, point.sphere.radius)
-            add(
-                "pull_off_load",
-                "N",
-                "load at pull-off with the full work of adhesion",
-                "P_c",
-                float(pull_off),
-            )
-        for name, value in point.process.known_errors().items():
-            add(name, "1", name.replace("_", " "), "", value)
+        own = {number.name: number.read(point) for number in NUMBERS if number.there(point)}
+        for name, value in (own | point.process.known_errors()).items():
+            found.setdefault(name, []).append(float(value))
         point.release()
-    complete = {n: entry for n, entry in derived.items() if len(entry[3]) == len(plan.points)}
-    for name, (unit, long_name, symbol, values) in complete.items():
-        variable = _variable(file, name, "f8", _sweep_names(plan), unit, long_name, symbol)
+    for name, values in found.items():
+        if len(values) < len(plan.points):
+            continue
+        variable = _variable(file, name, "f8", _sweep_names(plan), *described[name])
         variable[...] = np.reshape(values, _sweep_shape(plan)) if _sweep_names(plan) else values[0]
         if "error" in name:
             file.setncatts({name: max(values, key=abs)})
@@ -317,10 +296,10 @@ def _maps(file: File, plan: Plan, parts: Parts) -> None:
         variable[:] = np.arange(points) * (cell / points)
     names = (*_sweep_names(plan), "map_member", "map_time", "x", "y")
     chunks = (1,) * (len(names) - 2) + (points, points)
-    variable = _variable(file, "shear_map", "f8", names, "Pa", "shear-stress fluctuation", "tau_1", chunks)
+    variable = _variable(file, MAP[0], "f8", names, *MAP[1:], chunks)
     energies = [
-        _variable(file, name, "f8", names[:-2], "J/m^2", text, symbol)
-        for name, text, symbol in _DISC_ENERGIES
+        _variable(file, name, "f8", names[:-2], unit, text, symbol)
+        for name, unit, text, symbol in DISC_ENERGIES
         if all(point.margin is not None for point in plan.points)
     ]
     for number, point in enumerate(plan.points):

@@ -1,11 +1,13 @@
-"""What can be read off a state, each with unit, long name and symbol."""
+"""Quantities of a dataset: recorded at each time, known of each scene, drawn as maps; with unit, name and symbol."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.engine import State, balance
+from sim.laws import jkr
 from sim.parts.contact.control import Grip
 from sim.scenario.scenario import Scenario
 
@@ -141,3 +143,57 @@ VARIABLES = (
     Variable("applied_load", "N", "load applied to the sphere, in contact or not", "P_a", "drive", _applied_load,
           lambda scene: scene.contact.load is not None and scene.contact.changes, "a contact.load that changes"),
 )  # fmt: skip
+
+
+class Number(NamedTuple):
+    """A number of a scene, written for each point of the sweep; ``there`` and ``condition`` as of ``Variable``."""
+
+    name: str
+    unit: str
+    long_name: str
+    symbol: str
+    read: Callable[[Scenario], float]
+    there: Callable[[Scenario], bool] = lambda scene: True
+    condition: str = ""
+
+
+NUMBERS = (
+    Number("contact_modulus", "Pa", "contact modulus", "E*", lambda scene: scene.solid.contact_modulus),
+    Number("effective_shear_modulus", "Pa", "shear modulus of the tangential compliance", "G",
+           lambda scene: scene.solid.effective[0]),
+    Number("effective_poisson_ratio", "1", "Poisson ratio of the tangential compliance", "nu",
+           lambda scene: scene.solid.effective[1]),
+    Number("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", lambda scene: scene.rest_radius),
+    Number("radius_without_adhesion", "m", "Hertz radius", "a_H", lambda scene: scene.contact.equilibrium_radius(
+        np.zeros(1), scene.sphere.radius, scene.solid.contact_modulus)[0]),
+    Number("pull_off_load", "N", "load at pull-off with the full work of adhesion", "P_c",
+           lambda scene: jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius),
+           lambda scene: scene.contact.load is not None, "contact.load"),
+)  # fmt: skip
+
+#: Long names of what a process knows of its errors and spreads before the run, all relative but for two counts.
+KNOWN_ERRORS = {
+    "cell_error_variance": "error of the cell's variance of the stress against the infinite plane's",
+    "cell_error_energy": "error of the cell's mean fluctuation energy against the infinite plane's",
+    "realization_spread_variance": "standard deviation of one realization's variance over its mean",
+    "realization_spread_energy": "standard deviation of one realization's fluctuation energy over its mean",
+    "mode_pairs": "number of mode pairs of the cell",
+    "bands": "number of bands",
+    "banded_error_third_cumulant": "error of the energy's third cumulant by banding",
+    "banded_error_fourth_cumulant": "error of the energy's fourth cumulant by banding",
+    "banded_error_correlation_time": "error of the energy's integral correlation time by banding",
+    "banded_error_autocorrelation": "largest error of the energy's autocorrelation by banding",
+    "banded_error_relaxing_mean": "largest error of the mean energy by banding while the amplitude relaxes",
+}
+
+#: Name, unit, long name and symbol of what is recorded with each stress map.
+MAP = ("shear_map", "Pa", "shear-stress fluctuation", "tau_1")
+DISC_ENERGIES = (
+    ("disc_energy", "J/m^2", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
+    (
+        "cross_energy",
+        "J/m^2",
+        "energy of the map in the field of the mean stress, per area of the disc",
+        "DeltaGamma_x",
+    ),
+)

@@ -45,9 +45,13 @@ def test_the_dataset_is_what_the_engine_marched():
             assert np.array_equal(np.atleast_1d(found), variable.read(scenario, state), equal_nan=True), variable.name
 
 
-def test_every_variable_has_unit_and_long_name():
-    dataset = ensemble.run(sample(shear=MAPPED, record=Record(maps=(2e-3,))))
+def test_every_variable_has_unit_and_long_name_and_stands_on_its_page():
+    scenario = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
+    dataset = ensemble.run(scenario)
+    page = Path(__file__).parents[2].joinpath("docs", "dataset.md").read_text(encoding="utf-8")
+    given = {variable_name(key) for key in quantities(scenario)}
     for name, variable in dataset.variables.items():
+        assert name in given or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.recorded"
         assert variable.attrs["long_name"], name
         assert "units" in variable.attrs or "flag_values" in variable.attrs, name
     assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}

@@ -1,0 +1,67 @@
+"""Writes docs/dataset.md, every variable of a dataset, from the declarations in the code."""
+
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+
+from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, VARIABLES
+
+TARGET = Path(__file__).with_name("dataset.md")
+HEAD = """# The variables of a dataset
+
+Made by `python docs/make_dataset.py` from the declarations in the code. All numbers are in SI units; each variable has
+the attributes `units`, `long_name` and `symbol`. *Sweep* stands for the dimensions of the sweep, each named as its key
+with an underscore for each dot (`contact_load`); a run without a sweep has none.
+"""
+SECTIONS = {
+    "Coordinates": "",
+    "Recorded at each time": """A variable that differs between members has the dimension `member`, too. With
+`per_member = false` it becomes `<name>_mean`, `<name>_std` and `<name>_sem` instead: mean, standard deviation and
+standard error of the mean over the members.
+""",
+    "Numbers of the scene": "Every quantity of the scenario is a variable, too, named as its key with underscores.\n",
+    "Known before the run": "As far as the model of `[shear]` has them. The largest errors are attributes, too.\n",
+    "Stress maps": "",
+}
+MAPS = "record.maps"
+COORDINATES = (
+    ("t", "s", "t", "time since the start", ""),
+    ("member", "1", "member", "number of the ensemble member", "members differ and record.per_member"),
+    ("map_member", "1", "map_member", "member of a map", MAPS),
+    ("map_time", "s", "map_time", "time of a map", MAPS),
+    ("x", "m", "x", "position along the sliding direction", MAPS),
+    ("y", "m", "y", "position across the sliding direction", MAPS),
+)
+
+
+def text() -> str:
+    """The page."""
+    where = "*sweep*, map_member, map_time"
+    tables: tuple[Iterable[tuple[str, ...]], ...] = (
+        COORDINATES,
+        ((v.name, v.unit, "*sweep*, t", v.long_name, v.condition) for v in VARIABLES),
+        ((n.name, n.unit, "*sweep*", n.long_name, n.condition) for n in NUMBERS),
+        ((name, "1", "*sweep*", meaning, "") for name, meaning in KNOWN_ERRORS.items()),
+        [
+            (MAP[0], MAP[1], f"{where}, x, y", MAP[2], MAPS),
+            *(
+                (name, unit, where, meaning, f'{MAPS}, shear.contact = "disc"')
+                for name, unit, meaning, _ in DISC_ENERGIES
+            ),
+        ],
+    )
+    lines = [HEAD]
+    for (title, note), rows in zip(SECTIONS.items(), tables, strict=True):
+        lines += [
+            f"\n## {title}\n",
+            *([note] if note else []),
+            "| name | unit | dimensions | meaning | there if |",
+            "| --- " * 5 + "|",
+        ]
+        lines += [f"| `{name}` | {unit} | {dims} | {meaning} | {there} |" for name, unit, dims, meaning, there in rows]
+    return "\n".join(lines) + "\n"
+
+
+if __name__ == "__main__":
+    TARGET.write_text(text(), encoding="utf-8")
+    sys.stdout.write(f"{TARGET}\n")
