@@ -11,7 +11,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
+from helpers.scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
 from numpy.testing import assert_allclose
 
 from sim import cli
@@ -25,8 +25,8 @@ from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Record
-from sim.scenario.declared import quantities
-from sim.scenario.scenario import read_sweep
+from sim.scenario.declared import all_tables, keys, quantities, tables
+from sim.scenario.scenario import Scenario, read_sweep
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
 
@@ -255,10 +255,13 @@ def test_runs_join_along_a_key_by_xarrays_own_means():
 def test_no_variable_that_is_recorded_has_the_name_of_a_key():
     mapped = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
     own = {variable_name(key) for key in quantities(mapped)}
-    tables = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
-    found = [quantities(part, f"{name}.") for name, parts in tables.items() for part in parts.values()]
-    keys = {variable_name(key) for keys in found for key in keys}
-    assert len(keys) > 50 and not keys & (set(ensemble.run(mapped).variables) - own)
+    found = {
+        variable_name(".".join((*path, key)))
+        for path, field in all_tables(Scenario)
+        for table in tables(field.annotation).values()
+        for key in keys(table)
+    }
+    assert len(found) > 50 and not found & (set(ensemble.run(mapped).variables) - own)
 
 
 def test_reading_one_map_reads_one_map(tmp_path):
