@@ -1,34 +1,187 @@
 """Adhesive sliding interfaces: a smooth sphere slides on a soft half-space.
 
+A scenario is a TOML file, a dictionary of the same tables and keys, or a ``Scenario``; it is run into an
+``xarray.Dataset`` in SI units with named dimensions. What cannot be used raises ``BadInput``, all faults at once.
+
 >>> import sim
->>> scene = sim.load("scenarios/pdms_lens.toml")  # doctest: +SKIP
->>> dataset = sim.run(scene)  # doctest: +SKIP
+>>> scene = sim.Scenario(
+...     clock=dict(duration="1 s", step="0.1 s"),
+...     solid=dict(shear_modulus="1.6 MPa"),
+...     sphere=dict(radius="2 mm"),
+...     adhesion=dict(work="42 mJ/m^2"),
+...     contact=dict(load="4 mN"),
+...     drive=dict(model="ramp", start="0 mm/s", stop="10 mm/s"),
+...     bonds=dict(model="steady", critical_speed="10 mm/s", stress="0.3 MPa"),
+... )
+>>> dataset = sim.run(scene)
+>>> dataset.contact_radius.isel(t=[0, -1]).round(6).values.tolist()
+[0.00012, 0.000113]
+>>> scene.with_values({"contact.lod": "2 mN"})
+Traceback (most recent call last):
+sim.units.refusals.BadInput: contact.lod: is not a key; did you mean "load"?
 """
 
+import contextlib
 import importlib
-from typing import Any
+import os
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-_PUBLIC = {
-    "load": "sim.scenario.reader",
-    "BadInput": "sim.scenario.reader",
-    "run": "sim.ensemble.simulate",
-    "open": "sim.ensemble.simulate",
+if TYPE_CHECKING:  # what a function needs is imported where it is called, so that importing the package costs nothing
+    import pandas
+    import xarray
+    from matplotlib.figure import Figure
+
+    from sim.scenario.scenario import Scenario
+
+Path = str | os.PathLike[str]
+_FROM = {
+    "BadInput": "sim.units.refusals",
     "Scenario": "sim.scenario.scenario",
-    "laws": "",
-    "spectrum": "",
-    "analysis": "",
-    "plots": "",
+    "load": "sim.scenario.reader",
+    "open": "sim.analysis.scene",
 }
-__all__ = sorted(_PUBLIC)
+_FOLDERS = ("analysis", "laws", "plots", "spectrum")
+__all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "plot", "run", "stats"])
+
+
+def run(
+    scenario: "Scenario | Path | dict[str, Any]",
+    to: Path | None = None,
+    *,
+    replace: bool = False,
+    progress: bool | Callable[[int], None] = False,
+) -> Any:
+    """Run a scenario with its ensemble and its sweep.
+
+    Parameters
+    ----------
+    scenario : Scenario, path or dict
+        What to run.
+    to : path, optional
+        The netCDF file to make; without it everything stays in memory.
+    replace : bool
+        Whether an existing file may be replaced.
+    progress : bool or callable
+        True shows a bar; a function is called with the number of member-steps done since its last call.
+
+    Returns
+    -------
+    xarray.Dataset or pathlib.Path
+        The dataset, or the path of the file.
+
+    Raises
+    ------
+    BadInput
+        If the scenario cannot be used, or the file is there and ``replace`` is False.
+    """
+    from sim.cli import progress_bar
+    from sim.ensemble import simulate
+    from sim.ensemble.plan import Plan, work
+    from sim.units.refusals import BadInput
+
+    scene = _scene(scenario)
+    shown = progress_bar(work(Plan.of(scene))) if progress is True else contextlib.nullcontext(progress or None)
+    try:
+        with shown as advance:
+            return simulate.run(scene, to, replace=replace, progress=advance)
+    except simulate.OutputExists:
+        raise BadInput([f"{to}: is there already; give replace=True or another path"]) from None
+
+
+def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
+    """What a scenario would run: every quantity in SI, models, errors known beforehand, time, memory, file size."""
+    from sim.ensemble.preview import preview
+
+    return Text(preview(_scene(scenario)))
+
+
+def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None) -> "pandas.DataFrame":
+    """Ensemble statistics of a run in SI units, one row for each sweep value and time; ``attrs`` holds the units.
+
+    ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
+    """
+    from sim.analysis.tables import frame
+
+    return _plainly(frame, dataset, where)
+
+
+def plot(
+    dataset: "xarray.Dataset | Path",
+    kind: str | None = None,
+    to: Path | None = None,
+    where: dict[str, Any] | None = None,
+) -> "Figure":
+    """Draw a figure of a run, of the kind that fits or one of ``sim.plots.KINDS``, and save it if ``to`` is a file.
+
+    ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
+    """
+    from sim.plots import draw
+
+    figure = _plainly(lambda found: draw(found, kind), dataset, where)
+    if to is not None:
+        figure.savefig(to)
+    return figure
+
+
+def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str = "60 s") -> "xarray.Dataset":
+    """Speed against error of the models and settings that a scenario admits, in about ``budget`` [s] of computing."""
+    from sim.study.converge import converge as study
+    from sim.units.quantity import Quantity
+    from sim.units.refusals import BadInput
+
+    try:
+        seconds = Quantity("s", "budget", above=0).read(budget)
+    except ValueError as fault:
+        raise BadInput([f"budget: {fault}"]) from None
+    return study(_scene(scenario), seconds)
+
+
+class Text(str):
+    """A text that a prompt shows as it reads."""
+
+    __slots__ = ()
+
+    def __repr__(self) -> str:
+        return str(self)
+
+
+def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
+    from sim.scenario.reader import load
+    from sim.scenario.scenario import Scenario
+
+    return scenario if isinstance(scenario, Scenario) else load(scenario)
+
+
+def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", where: dict[str, Any] | None) -> Any:
+    """What a function makes of a dataset, or of the file that holds it; ``BadInput`` for what it cannot use."""
+    from sim.analysis.scene import open as opened
+    from sim.analysis.statistics import where as chosen
+    from sim.units.refusals import BadInput, refuse_old
+
+    try:
+        if isinstance(dataset, str | os.PathLike):
+            with opened(dataset) as found:
+                return function(chosen(found, where or {}))
+        refuse_old("the dataset", [*dataset.variables, *dataset.dims])
+        return function(chosen(dataset, where or {}))
+    except BadInput:
+        raise
+    except ValueError as fault:
+        raise BadInput([str(fault)]) from None
 
 
 def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used, so that importing the package costs nothing."""
-    if name not in _PUBLIC:
-        raise AttributeError(f"module 'sim' has no attribute {name!r}")
-    if not _PUBLIC[name]:
+    """Import a public name when it is first used."""
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("sliding-sim")
+    if name in _FOLDERS:
         return importlib.import_module(f"sim.{name}")
-    return getattr(importlib.import_module(_PUBLIC[name]), name)
+    if name not in _FROM:
+        raise AttributeError(f"module 'sim' has no attribute {name!r}")
+    return getattr(importlib.import_module(_FROM[name]), name)
 
 
 def __dir__() -> list[str]:

@@ -98,7 +98,7 @@ def run(
     plan = plans.Plan.of(scene)
     for remark in [] if quiet else preview.remarks(plan):
         click.echo(f"note: {remark}", err=True)
-    with _progress(plans.work(plan), quiet) as advance:
+    with contextlib.nullcontext() if quiet else progress_bar(plans.work(plan)) as advance:
         simulate.run(scene, target, replace=force, progress=advance)
     simulate.write_log(target, began, sys.argv[1:])
     if not quiet:
@@ -106,20 +106,26 @@ def run(
         click.echo(str(target))
 
 
-def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> dict[str, Any]:
-    """The values of --set, each read as TOML, else taken as a string."""
+def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
+    """The values that an option gives to keys, each read as TOML, else taken as a string."""
     import tomllib
 
-    overrides: dict[str, Any] = {}
-    for change in changes:
-        key, sign, text = change.partition("=")
+    found: dict[str, Any] = {}
+    for pair in pairs:
+        key, sign, text = pair.partition("=")
         if not sign or not key.strip():
-            raise click.UsageError(f'--set takes TABLE.KEY=VALUE, such as contact.load="2 mN", not {change!r}')
+            raise click.UsageError(f'{option} takes TABLE.KEY=VALUE, such as contact.load="2 mN", not {pair!r}')
         try:
             document = tomllib.loads(f"value = {text}")
         except (ValueError, RecursionError):
             document = {}
-        overrides[key.strip()] = document["value"] if len(document) == 1 else text.strip()
+        found[key.strip()] = document["value"] if len(document) == 1 else text.strip()
+    return found
+
+
+def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> dict[str, Any]:
+    """The values of --set, --seed and --members."""
+    overrides = _values(changes, "--set")
     if seed is not None:
         overrides["seed"] = seed
     if members is not None:
@@ -127,7 +133,7 @@ def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int |
     return overrides
 
 
-def _progress(total: int, quiet: bool) -> Any:
+def progress_bar(total: int) -> Any:
     """A context that gives a callback taking member-steps: a bar on a terminal, else a line every half minute."""
 
     @contextlib.contextmanager
@@ -151,8 +157,6 @@ def _progress(total: int, quiet: bool) -> Any:
 
         yield advance
 
-    if quiet:
-        return contextlib.nullcontext()
     return bar() if sys.stderr.isatty() and sys.stdout.isatty() else lines()
 
 
@@ -258,24 +262,16 @@ def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str
 @contextlib.contextmanager
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """A dataset of ours, at chosen values of its sweep, or one message."""
-    import xarray
+    from sim.analysis import scene
+    from sim.units.refusals import BadInput
 
-    if not path.is_file():
-        _fail(f"{path}: {'is a folder' if path.is_dir() else 'there is no such file'}; name a dataset", BAD_INPUT)
-    broken = f"{path}: is not a netCDF file, or is cut short; run the scenario again"
-    try:
-        dataset = xarray.open_dataset(path, engine="netcdf4")
-    except (OSError, ValueError, RuntimeError):
-        _fail(broken, BAD_INPUT)
-    with dataset:
-        if "sim_version" not in dataset.attrs:
-            _fail(f"{path}: was not written by `sim run`; name one of its outputs", BAD_INPUT)
+    with scene.open(path) as dataset:
         try:
             yield _chosen(path, dataset, chosen) if chosen else dataset
         except RuntimeError as trouble:
             if "NetCDF" not in str(trouble):
                 raise
-            _fail(broken, BAD_INPUT)
+            raise BadInput([f"{path}: {scene.BROKEN}"]) from None
 
 
 def _chosen(path: Path, dataset: Any, chosen: tuple[str, ...]) -> Any:
@@ -283,7 +279,7 @@ def _chosen(path: Path, dataset: Any, chosen: tuple[str, ...]) -> Any:
     from sim import analysis
 
     try:
-        return analysis.where(dataset, {key: value for key, _, value in (text.partition("=") for text in chosen)})
+        return analysis.where(dataset, _values(chosen, "--where"))
     except ValueError as fault:
         _fail(f"{path}: --where {fault}", BAD_INPUT)
 

@@ -6,14 +6,43 @@ resolved scenario stands among the attributes.
 
 import contextlib
 import json
+import os
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
+from sim.numerics.files import HDF5
+from sim.units.refusals import BadInput, refuse_old
+
 MEMBERS = "member"
+#: What is said of a file that cannot be read.
+BROKEN = "is not a netCDF file, or is cut short; run the scenario again"
 
 _CONTROLS = ("load", "indentation", "displacement")
+
+
+def open(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Open the dataset of a run lazily, with named dimensions and units.
+
+    Raises
+    ------
+    BadInput
+        If there is no such file, or it is none of our datasets.
+    """
+    if not os.path.isfile(path):
+        what = "is a folder" if os.path.isdir(path) else "there is no such file"
+        raise BadInput([f"{path}: {what}; name a dataset"])
+    try:
+        with HDF5:
+            dataset = xr.open_dataset(path, engine="netcdf4", lock=HDF5)
+    except (OSError, ValueError, RuntimeError):
+        raise BadInput([f"{path}: {BROKEN}"]) from None
+    if "sim_version" not in dataset.attrs:
+        dataset.close()
+        raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
+    refuse_old(path, [*dataset.variables, *dataset.dims])
+    return dataset
 
 
 def sweep_dims(dataset: xr.Dataset) -> tuple[str, ...]:

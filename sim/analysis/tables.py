@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from sim.analysis.correlation import correlation_time
@@ -293,17 +294,24 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         standard deviation, standard error and quantiles over the members at that time; what a whole run has once
         stands in all of its rows. A file is there whole or, in trouble, as it was before.
     """
+    long = frame(dataset)
+    units = long.attrs["units"]
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([name if units[name] == "1" else f"{name} [{units[name]}]" for name in long])
+    writer.writerows(long.itertuples(index=False, name=None))
+    _write(Path(path), text.getvalue().encode())
+
+
+def frame(dataset: xr.Dataset) -> pd.DataFrame:
+    """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
     found = statistics(dataset)
     with contextlib.suppress(ValueError):  # where the shares cannot be told the rest can
         found = found.merge(shares(dataset))
     long = _flat(found)
-    units = {str(name): variable.attrs.get("units", "1") for name, variable in long.variables.items()}
-    frame = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([name if units[name] == "1" else f"{name} [{units[name]}]" for name in frame])
-    writer.writerows(frame.itertuples(index=False, name=None))
-    _write(Path(path), text.getvalue().encode())
+    table = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
+    table.attrs["units"] = {str(name): each.attrs.get("units", "1") for name, each in long.variables.items()}
+    return table
 
 
 def _flat(found: xr.Dataset) -> xr.Dataset:

@@ -76,9 +76,9 @@ def run(
         return _in_memory(plan, progress)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
-        raise OutputExists(f"{target} is no plain file; name another output (-o)")
+        raise OutputExists(f"{target} is no plain file; name another output")
     if target.exists() and not replace:
-        raise OutputExists(f"{target} exists; replace it (--force) or name another output (-o)")
+        raise OutputExists(f"{target} exists; replace it or name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
     with _held(target) as folder:
@@ -195,14 +195,6 @@ def _held(target: Path) -> Iterator[Path]:
         lock.close()
 
 
-def open(path: str | os.PathLike) -> Any:
-    """Open the dataset of a finished run lazily: an ``xarray.Dataset`` with named dimensions and units."""
-    import xarray
-
-    with HDF5:
-        return xarray.open_dataset(path, engine="netcdf4", lock=HDF5)
-
-
 def write_log(target: Path, began: float, arguments: list[str]) -> None:
     """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments."""
     entry = {
@@ -216,4 +208,4 @@ def write_log(target: Path, began: float, arguments: list[str]) -> None:
         log.write(json.dumps(entry) + "\n")
 
 
-__all__ = ["OutputBusy", "OutputExists", "StoreTrouble", "open", "run", "simulate", "work", "write_log"]
+__all__ = ["OutputBusy", "OutputExists", "StoreTrouble", "run", "simulate", "work", "write_log"]

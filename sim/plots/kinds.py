@@ -20,6 +20,7 @@ from sim.plots.profile import needs_contact, profile_figure
 from sim.plots.stress import needs_stress, stress_figure
 from sim.plots.style import STYLE, swept_value
 from sim.plots.theories import needs_control, sweeps_theories, theories_figure
+from sim.units.refusals import renamed
 
 
 class Kind(NamedTuple):
@@ -90,6 +91,8 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
         For an unknown kind, or one that the dataset cannot serve, with the cure and the kinds that it can.
     """
     kind = kind or next(name for name, k in KINDS.items() if k.fits(dataset) and not _missing(dataset, name))
+    if renamed(kind) in KINDS:
+        raise ValueError(f'the figure "{kind}" is now called "{renamed(kind)}"')
     if kind not in KINDS:
         raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')
     missing = _missing(dataset, kind)

@@ -1,7 +1,8 @@
 """What the tables of a scenario declare: their keys, their models, and the values of a scenario with their units."""
 
 import functools
-from collections.abc import Iterator
+import html
+from collections.abc import Iterable, Iterator
 from dataclasses import fields, is_dataclass
 from typing import Any, NamedTuple, get_args
 
@@ -82,6 +83,18 @@ def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
             number = isinstance(value, int | float) and not isinstance(value, bool)
             meaning = field.description or item.name.replace("_", " ")
             yield Entry(key, value, declaration(field) or Quantity("1", meaning) if number else None)
+
+
+def as_html(title: str, listed: Iterable[Entry]) -> str:
+    """A table of keys with their values, units and meanings; what is left out is left out."""
+    rows = []
+    for key, value, quantity in listed:
+        unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
+        shown = f"{len(value)} values" if isinstance(value, tuple) else f"{value} {unit}"
+        if value not in (None, "", ()):
+            cells = (key, shown, quantity.meaning if quantity else "")
+            rows.append("".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in cells))
+    return f"<b>{html.escape(title)}</b><table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
 
 
 def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:

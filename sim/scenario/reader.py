@@ -2,6 +2,7 @@
 
 import copy
 import functools
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
@@ -26,7 +27,7 @@ Words = tuple[str | int, ...]
 
 
 def load(
-    scenario: str | Path | dict[str, Any], overrides: dict[str, Any] | None = None, *, option: str = ""
+    scenario: str | os.PathLike[str] | dict[str, Any], overrides: dict[str, Any] | None = None, *, option: str = ""
 ) -> Scenario:
     """Read a scenario from a TOML file or a dictionary of the same tables and keys.
 

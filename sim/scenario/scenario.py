@@ -26,7 +26,7 @@ from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import SmoothProcess
 from sim.scenario.checks import CHECKED, _reads_forces, _rest_radius, faults_across
 from sim.scenario.clock import Clock, Ensemble, Record
-from sim.scenario.declared import with_models
+from sim.scenario.declared import as_html, entries, with_models
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import read_sweep, set_key
@@ -73,6 +73,15 @@ class Scenario:
     name: Annotated[str, Field(max_length=200)] = "sliding contact"
     seed: Annotated[int, Quantity("1", "seed of the run", at_least=0, at_most=2**64 - 1, whole=True)] = 0
     source: Annotated[Any, Field(exclude=True)] = Source()
+
+    def __repr__(self) -> str:
+        models = ", ".join(f"{name} {getattr(self, name).model}" for name in ("drive", "bonds", "shear", "contact"))
+        points = math.prod(len(axis.values) for axis in self.sweep)
+        return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
+
+    def _repr_html_(self) -> str:
+        """Every key with its value, for notebooks."""
+        return as_html(self.name, entries(self))
 
     @model_validator(mode="after")
     def _across_parts(self) -> "Scenario":

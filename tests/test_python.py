@@ -1,0 +1,200 @@
+"""The package as it is used from Python: scenes, runs, statistics and figures; every fault as ``BadInput``."""
+
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+import sim
+from sim.cli import cli
+
+SCENE = {
+    "name": "a <scene>",
+    "clock": {"duration": "1 s", "step": "0.1 s"},
+    "solid": {"shear_modulus": "1.6 MPa"},
+    "sphere": {"radius": "2 mm"},
+    "adhesion": {"work": "42 mJ/m^2"},
+    "contact": {"load": "4 mN"},
+    "drive": {"model": "ramp", "from": "0 mm/s", "to": "10 mm/s"},
+    "bonds": {"model": "steady", "critical_speed": "10 mm/s", "stress": "0.3 MPa"},
+}
+TEXT = "\n".join(
+    f"[{table}]\n{''.join(f'{key} = {chr(34)}{value}{chr(34)}{chr(10)}' for key, value in keys.items())}"
+    for table, keys in SCENE.items()
+    if isinstance(keys, dict)
+)
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return sim.run(SCENE)
+
+
+@pytest.fixture
+def file(dataset, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return sim.run(SCENE, to="out.nc")
+
+
+def test_importing_the_package_imports_nothing_heavy():
+    heavy = "{'numpy', 'pydantic', 'xarray', 'matplotlib', 'click'}"
+    code = f"import sys, sim; sim.run, sim.check, sim.stats, dir(sim); sys.exit(len({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
+
+
+def test_a_scene_is_a_path_a_dictionary_or_keywords(dataset, tmp_path):
+    path = tmp_path / "x.toml"
+    path.write_text(TEXT)
+    keywords = sim.Scenario(**{**SCENE, "drive": {"model": "ramp", "start": "0 mm/s", "stop": "10 mm/s"}})
+    for scene in (path, str(path), sim.load(SCENE), keywords):
+        np.testing.assert_array_equal(sim.run(scene).contact_radius, dataset.contact_radius)
+
+
+def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset):
+    with sim.open(file) as found:
+        np.testing.assert_array_equal(found.contact_radius, dataset.contact_radius)
+    with pytest.raises(sim.BadInput, match=r"out\.nc: is there already; give replace=True or another path"):
+        sim.run(SCENE, to="out.nc")
+    assert sim.run(SCENE, to="out.nc", replace=True) == file
+
+
+def test_progress_is_told_to_a_function_or_shown(capsys, monkeypatch):
+    done = []
+    sim.run(SCENE, progress=done.append)
+    assert sum(done) == 11
+    monkeypatch.setattr("time.monotonic", iter(range(0, 10_000, 31)).__next__)
+    sim.run(SCENE, progress=True)
+    assert "100 % of 11 member-steps" in capsys.readouterr().err
+
+
+def test_check_reads_as_the_command_prints(tmp_path):
+    found = sim.check(SCENE)
+    assert repr(found) == str(found)
+    assert "sphere.radius" in found
+    (tmp_path / "x.toml").write_text(TEXT)
+    printed = CliRunner().invoke(cli, ["check", str(tmp_path / "x.toml")]).stdout
+    assert printed == f"{sim.check(tmp_path / 'x.toml')}\n"
+
+
+def test_stats_are_a_data_frame_in_si(file, dataset):
+    for source in (file, str(file), dataset):
+        found = sim.stats(source)
+        np.testing.assert_array_equal(found["contact_radius_mean"], dataset.contact_radius.to_numpy().ravel())
+        assert found.attrs["units"]["contact_radius_mean"] == "m"
+
+
+def test_a_value_of_a_sweep_is_chosen_by_its_key():
+    dataset = sim.run({**SCENE, "sweep": {"contact.load": ["1 mN", "4 mN"]}})
+    for value in ("4 mN", 4e-3):
+        found = sim.stats(dataset, where={"contact.load": value})
+        assert len(found) == dataset.sizes["t"]
+        assert set(found["contact_load"]) == {4e-3}
+    for where, words in (({"contact.travel": 1}, "now called"), ({"contact.load": 1.0}, "there are: 1 mN, 4 mN")):
+        with pytest.raises(sim.BadInput, match=words):
+            sim.plot(dataset, where=where)
+
+
+def test_plot_draws_and_saves(file, dataset, tmp_path):
+    assert sim.plot(dataset).axes
+    sim.plot(file, "time", to=tmp_path / "time.png")
+    assert (tmp_path / "time.png").stat().st_size > 1000
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [("rivals", 'now called "theories"'), ("nothing", "known: curve"), ("map", "can be drawn as")],
+)
+def test_what_cannot_be_drawn_is_bad_input(dataset, kind, words):
+    with pytest.raises(sim.BadInput, match=words):
+        sim.plot(dataset, kind)
+
+
+def test_converge_takes_a_budget_as_text(monkeypatch):
+    monkeypatch.setattr("sim.study.converge.converge", lambda scene, seconds: (scene.name, seconds))
+    assert sim.converge(SCENE, "2 min") == (SCENE["name"], 120.0)
+    with pytest.raises(sim.BadInput, match=r"^budget: .*without a unit"):
+        sim.converge(SCENE, "60")
+
+
+def test_the_version_is_that_of_the_distribution():
+    assert sim.__version__ == version("sliding-sim")
+    with pytest.raises(AttributeError, match="nothing"):
+        sim.nothing  # noqa: B018
+
+
+def swapped(**tables):
+    return {**SCENE, **tables}
+
+
+@pytest.mark.parametrize(
+    ("use", "said"),
+    [
+        (lambda: sim.Scenario(**swapped(sphere={"raduis": 1})), 'sphere.raduis: is not a key; did you mean "radius"?'),
+        (lambda: sim.Scenario(**swapped(sphre={})), 'sphre: is not a key; did you mean "sphere"?'),
+        (lambda: sim.load(swapped(sphere={"radius": "2"})), "sphere.radius: is text without a unit; write for example "
+         '"2 mm", or a bare number in m'),
+        (lambda: sim.run(swapped(bonds={"model": "rate", "healing": 1, "critical_speed": 1})),
+         'bonds.healing: is now called "rebinding_rate"'),
+        (lambda: sim.check(swapped(contact={"load": 1, "model": "lagging"})),
+         'contact.model: "lagging" is now called "rate_dependent"'),
+        (lambda: sim.load(SCENE, {"sphere.raduis": 1}), 'overrides["sphere.raduis"]: is not a key; did you mean '
+         '"radius"?'),
+        (lambda: sim.load(SCENE).with_values({"contact.lod": 1}), 'contact.lod: is not a key; did you mean "load"?'),
+        (lambda: sim.load(SCENE).with_values({"solid.poisson_ratio": 2}), "solid.poisson_ratio: must be at most 0.5, "
+         "not 2"),
+    ],
+)  # fmt: skip
+def test_a_fault_of_a_scene_is_bad_input_in_plain_words(use, said):
+    with pytest.raises(sim.BadInput) as fault:
+        use()
+    assert fault.value.problems == [said]
+
+
+def test_a_fault_between_parts_and_one_of_a_sweep_are_bad_input_too():
+    with pytest.raises(sim.BadInput, match=r"^record.maps: .*mapped"):
+        sim.Scenario(**SCENE, record={"maps": ["0.5 s"]})
+    with pytest.raises(sim.BadInput, match=r'did you mean "contact.load"'):
+        sim.load({**SCENE, "sweep": {"contact.lod": [1]}})
+    with pytest.raises(sim.BadInput, match=r"^sweep: .*list of values"):
+        sim.Scenario(**SCENE, sweep={"contact.load": 1})
+    swept = sim.Scenario(**SCENE, sweep={"clock.step": ["0.1 s", "0.2 s"]})
+    with pytest.raises(sim.BadInput, match=r"different records; give clock\.record"):
+        swept.points()
+
+
+def test_a_scene_is_shown_in_a_line_and_as_a_table():
+    scene = sim.load(SCENE, {"sweep": {"contact.load": [1e-3, 2e-3]}, "ensemble.members": 3})
+    assert repr(scene) == (
+        '<Scenario "a <scene>": drive ramp, bonds steady, shear uniform, contact equilibrium; members 3, points 2>'
+    )
+    table = scene._repr_html_()
+    assert "<b>a &lt;scene&gt;</b>" in table
+    assert "sphere.radius" in table
+    assert "0.002 m" in table
+
+
+@pytest.mark.parametrize("command", ["stats", "plot"])
+def test_a_dataset_of_0_1_0_is_refused_in_one_sentence(file, dataset, command):
+    with netCDF4.Dataset("out.nc", "a") as old:
+        old.renameVariable("displacement", "travel")
+    said = "out.nc: was written by version 0.1.0, whose names have changed; run its scenario again"
+    done = CliRunner().invoke(cli, [command, "out.nc"])
+    assert said in str(done.exception)
+    for use in (sim.open, sim.stats, sim.plot):
+        with pytest.raises(sim.BadInput, match=said):
+            use("out.nc")
+    with pytest.raises(sim.BadInput, match=r"^the dataset: was written by version 0\.1\.0"):
+        sim.stats(dataset.rename(displacement="travel"))
+
+
+def test_what_is_no_dataset_is_bad_input(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("x.nc").write_text("nothing")
+    for name, words in (("no.nc", "no such file"), (".", "is a folder"), ("x.nc", "not a netCDF file")):
+        with pytest.raises(sim.BadInput, match=words):
+            sim.open(name)
