@@ -289,30 +289,28 @@ def _chosen(path: Path, dataset: Any, chosen: tuple[str, ...]) -> Any:
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="The netCDF file; default outputs/<name>-converge.nc."
 )
-@click.option("--budget", default="60 s", show_default=True, help="Computing time to share over the rows.")
+@click.option("--budget", default="60 s", show_default=True, help="Computing time to share over the settings.")
+@click.option("--tolerance", help="Error that is accepted, such as 1 %; default that of the scene.")
 @_SET
-def converge(scenario: Path, output: Path | None, budget: str, changes: tuple[str, ...]) -> None:
-    """Speed against error for this scene: every admissible depth, tolerance and clock step against the exact answer."""
+def converge(scenario: Path, output: Path | None, budget: str, tolerance: str | None, changes: tuple[str, ...]) -> None:
+    """Speed against error for this scene: models, tolerances and clock steps, and which to choose."""
     from sim.scenario.reader import load
     from sim.units.quantity import Quantity
     from sim.units.refusals import BadInput
 
     try:
         seconds = Quantity("s", "budget", above=0).read(budget)
+        accepted = None if tolerance is None else Quantity("1", "tolerance", above=0, below=1).read(tolerance)
     except ValueError as fault:
-        raise BadInput([f"--budget {budget}: {fault}"]) from None
+        raise BadInput([f"--budget {budget}, --tolerance {tolerance}: {fault}"]) from None
     scene = load(scenario, _overrides(changes), option="--set")
     from sim.numerics.files import explained
     from sim.study import converge as convergence
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
-    found = convergence.converge(scene, seconds)
+    found = convergence.converge(scene, seconds, accepted)
     _print_rows(convergence.table(found))
-    click.echo(convergence.recommendation(found))
-    if "bonds_error" in found:
-        _print_rows(convergence.bond_table(found))
-        click.echo(f"{found.attrs['bonds_comment']}; against {found.attrs['bonds_reference']}; * is the scene's own")
-        click.echo(convergence.bond_advice(found))
+    click.echo(f"{convergence.explanation(found)}\n\n{convergence.recommendation(found)}\n")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
         found.to_netcdf(target)

@@ -1,244 +1,393 @@
 """Speed against error for one scene: ``sim converge``.
 
-Every admissible setting (``sim.study.settings``) is run within a shared budget and set against the
-closed form where there is one, else against the best of its own kind. Three errors stand side by
-side: what was known before the run, what was measured, and the standard error of the measurement.
+Every setting (``sim.study.settings``) changes one thing of the scene: the shear model, the bond model, the clock
+step or the grid. Its error follows without sampling from closed forms and a march without noise
+(``sim.study.exact_law``); samples check that, and stand in where there is no law. Errors of several changes add up.
 """
 
+import importlib.metadata
+import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sim.engine import march
-from sim.ensemble.recorded import VARIABLES
-from sim.parts.shear.modal import ModalProcess
+from sim.analysis import engineering
+from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
-from sim.study.bond_verdicts import bond_advice, bond_table
-from sim.study.bonds import converge_bonds, has_bond_depths
-from sim.study.errors import QUANTITIES, Laws, Run, assembled, filled
-from sim.study.estimates import Lags, estimates
-from sim.study.exact_law import Terms
+from sim.study.estimates import Estimate, estimates
+from sim.study.exact_law import QUANTITIES, STATISTICS, Terms, Walk
 from sim.study.figure import figure
-from sim.study.settings import Setting, settings
-from sim.study.stated_times import Moment, stated_times
-from sim.study.verdicts import recommendation, table
+from sim.study.samples import Times, affordable, coupled, fluctuates, sampled, timed
+from sim.study.settings import Setting, at_step, number_of_sites, plain, settings, tolerance_of
+from sim.study.verdicts import explanation, recommendation, table
+
+__all__ = ["converge", "explanation", "figure", "recommendation", "table"]
 
 Array = NDArray[np.float64]
-Progress = Callable[[float], None]
 
-_READ = {variable.name: variable.read for variable in VARIABLES}
-
-#: Members advanced together, as in a run, and the numbers that their state may hold.
-_BATCH, _STATE_NUMBERS = 64, 2**25
-
-#: Fewest members of a row that is sampled at all; the most values of each quantity that one row keeps.
-_FEWEST, _MOST_VALUES = 16, 2**21
-
-#: Share of the budget left to pilots and statistics, and how long a pilot takes [s].
-_ASIDE, _PILOT = 0.2, 0.1
-
-#: Share of the budget for the depths of the bonds, where they have some to compare.
-_FOR_BONDS = 1.0 / 3.0
+#: Shares of the budget: runs without noise, times, samples.
+_WALKS, _TIMES, _SAMPLES = 0.4, 0.2, 0.4
+#: Times at which a run is sampled; those of a stationary one, which are pooled, and the most steps of that.
+_STATED, _POOLED, _LONG_ENOUGH = 6, 32, 512
+#: Finest clock step over the scene's, and over that of coupled samples; change over tolerance that ends the halving.
+_FINEST, _FINEST_SAMPLED, _FINE = 2.0**-12, 0.25, 0.1
+#: Standard errors beyond which a deviation is more than chance, and by which an error may be larger than it was found.
+_SURE = 2.0
+#: Error of the finest sampled step over its difference from the next: of half an order, as of first passages.
+_REST = 1.0 / (math.sqrt(2.0) - 1.0)
 
 
-def converge(scenario: Scenario, budget_seconds: float, progress: Progress | None = None) -> xr.Dataset:
-    """Run a scene at every admissible setting and say how far each is from the truth.
+_UNTIMED = Times(math.nan, math.nan, math.nan)
+
+
+@dataclass
+class Row:
+    """A setting and what was found of it.
+
+    Attributes
+    ----------
+    setting : Setting
+        What is changed.
+    error : array, shape (quantities, statistics)
+        Largest error over the run, in units of the yardsticks; nan where it is not known.
+    bound : array, shape (quantities, statistics)
+        What it is at most, where it is known from samples only; else nan.
+    times : Times
+        CPU time of the scene's run.
+    members : int
+        Members sampled; 0 where the budget was too small, or nothing is to be sampled.
+    law : array, shape (records, quantities, 3)
+        What a sample should give [SI].
+    value, deviation, standard_error : array, shape (times, quantities, 3)
+        A sample [SI], less the law or the fullest model, and the standard error of that, in units of the yardsticks.
+    """
+
+    setting: Setting
+    error: Array = field(default_factory=lambda: np.full((4, 4), np.nan))
+    bound: Array = field(default_factory=lambda: np.full((4, 4), np.nan))
+    times: Times = _UNTIMED
+    members: int = 0
+    law: Array | None = None
+    value: Array | None = None
+    deviation: Array | None = None
+    standard_error: Array | None = None
+
+
+def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None = None) -> xr.Dataset:
+    """Run a scene at every admissible setting, and say what each costs and how far it is from the truth.
 
     Parameters
     ----------
     scenario : Scenario
         The scene, without its sweep: at the values that its tables give.
     budget_seconds : float
-        Time to sample for, shared equally by the settings; grouping bands and closed forms come on top.
-    progress : callable, optional
-        Called with the share of the work done since the last call; the shares add up to 1.
+        Computing time to spend [s]. Each run without noise is made once at least.
+    tolerance : float, optional
+        Error that is accepted, by default that of the scene.
 
     Returns
     -------
     xarray.Dataset
-        Dimensions ``row``, ``t`` (the stated times), ``quantity`` and ``statistic``, with ``value``,
-        ``reference``, ``error``, ``standard_error``, ``known_error`` in units of a yardstick: the
-        reference's own value for mean, standard deviation and correlation time, its mean for
-        quantiles, and the skewness of ΔΓ for both skewnesses (1 where ΔΓ has none). Along ``row`` also
-        the costs, members and TOML lines, and the measured statistics in SI. Where the bonds have a
-        rupture or are counted, also what ``sim.study.bonds.converge_bonds`` gives.
+        Along ``row``: the CPU time of the scene's run at each setting, its largest ``error`` for each ``quantity`` and
+        ``statistic`` in units of the ``yardstick``, and at the stated times ``t`` the ``value`` in a sample, its
+        ``deviation`` from what is expected and the ``standard_error`` of that.
 
     Notes
     -----
-    Closed form: ΔΓ is a sum of independent gamma numbers at any time, and the radius of a contact
-    that cannot open a function of it; clock steps are judged against sixteen times finer ones. Where
-    bonds are counted or the contact may open, and for the correlation time of the radius, a depth is
-    set against the deepest of those whose known and standard errors together are about the least, a
-    clock step against the finest and a grid against the finest; the correlation time of the radius is
-    known to be as far off as that of ΔΓ, to first order in ΔΓ. A grid is judged by the same cell on a grid
-    eight times as fine as the finest. Members are the same in all settings: shared noise counts in the
-    standard errors.
+    Truth: all modes of the cell (of a grid eight times as fine as the finest that is tried, where the spectrum has no
+    end), cohorts to 1e-6 or the linear rate equation, and the limit of short steps. The clock step is halved until
+    two steps agree; the finest differs from the limit by no more than from the one before, if its error is of first
+    order or better. Yardsticks are largest values over the run: of the mean for means and for the spread of bonds,
+    of the spread for spreads, of the skewness for that of ΔΓ; that of the rest is not judged.
     """
-    chosen, left_out = settings(scenario)
-    base = scenario.with_values({"record": {}})
-    truth = Terms.of_cell(base)
-    coarsest = round(max([1.0, *(setting.ratio for setting in chosen)]))
-    moments = stated_times(base, truth, coarsest)
-    runs, order = _distinct(chosen)
-    with_bonds = has_bond_depths(base)
-    _spend(runs, moments, budget_seconds * (1.0 - _FOR_BONDS * with_bonds), progress)
-    laws = Laws(base, truth, moments, chosen)
-    numbers = filled(chosen, [runs[k] for k in order], moments, laws)
-    found = assembled(scenario, chosen, [runs[k] for k in order], moments, numbers, left_out)
-    return joined(found, converge_bonds(scenario, _FOR_BONDS * budget_seconds)) if with_bonds else found
+    left_out: list[str] = []
+    base = plain(scenario)
+    accepted = tolerance_of(scenario) if tolerance is None else tolerance
+    sites = number_of_sites(scenario)
+    study = _Study(base, settings(base, left_out), sites if accepted**2 * sites < 1.0 else math.inf)
+    study.judge_models()
+    study.judge_bonds()
+    study.judge_steps(accepted, _WALKS * budget_seconds)
+    share = _TIMES * budget_seconds / len(study.rows)
+    as_written = timed(base, 2.0 * share)
+    for row in study.rows:
+        row.times = as_written if row.setting.own else timed(row.setting.scenario, share)
+    study.sample(_SAMPLES * budget_seconds)
+    return _assembled(scenario, study, accepted, left_out)
 
 
-def joined(found: xr.Dataset, of_bonds: xr.Dataset) -> xr.Dataset:
-    """Both comparisons in one dataset; they share no name."""
-    return found.assign_coords(of_bonds.coords).assign(of_bonds.data_vars).assign_attrs(of_bonds.attrs)
+class _Study:
+    """The rows of one scene and the runs without noise that they are judged by.
 
-
-def _distinct(chosen: Sequence[Setting]) -> tuple[list[Run], list[int]]:
-    """The scenes to sample, and which one each setting takes."""
-    runs: list[Run] = []
-    order = []
-    for setting in chosen:
-        place = next((k for k, run in enumerate(runs) if run.scenario == setting.scenario), len(runs))
-        if place == len(runs):
-            most = _STATE_NUMBERS // max(2 * setting.scenario.process.pairs, 1)
-            runs.append(Run(setting.scenario, setting.ratio, min(_BATCH, max(1, most))))
-        order.append(place)
-    return runs, order
-
-
-def _spend(runs: list[Run], moments: list[Moment], budget: float, progress: Progress | None) -> None:
-    """Sample every run within the budget."""
-    last = max(max(moment.needed) for moment in moments)
-    records = len(set().union(*(moment.needed for moment in moments)))
-    for run in runs:
-        _pilot(run, round(last / run.ratio))
-    steps = [round(last / run.ratio) + 1 for run in runs]
-    twins = [run.scenario.process.pairs if isinstance(run.scenario.process, ModalProcess) else -1 - k
-             for k, run in enumerate(runs)]  # fmt: skip
-    caps = [max(_MOST_VALUES // records, _BATCH) if any(run.scenario.varies.values()) else _BATCH for run in runs]
-    shares = plan_members(
-        [run.cost for run in runs], steps, [run.batch for run in runs], caps, (1.0 - _ASIDE) * budget, twins
-    )
-    total = sum(run.cost * members * count for run, members, count in zip(runs, shares, steps, strict=True))
-    for run, members, count in zip(runs, shares, steps, strict=True):
-        if members:
-            _sample(run, members, moments, progress, run.cost * count / total)
-    if progress is not None and total == 0.0:
-        progress(1.0)
-
-
-def plan_members(
-    costs: Sequence[float], steps: Sequence[int], batches: Sequence[int], caps: Sequence[int], budget: float,
-    twins: Sequence[int] | None = None,
-) -> list[int]:  # fmt: skip
-    """How many members each run gets for an equal share of the budget.
-
-    Parameters
-    ----------
-    costs : sequence of float
-        Time per member-step of each run [s].
-    steps : sequence of int
-        Steps of each run.
-    batches, caps : sequence of int
-        Members advanced together, and the most that are of use.
-    budget : float
-        Time of all runs together [s].
-    twins : sequence of int, optional
-        Runs of the same number draw the same noise and get equally many members.
-
-    Returns
-    -------
-    list of int
-        Whole batches where more than one is affordable; 0 where not even sixteen members are. What a
-        run cannot use is left to the others.
-
-    Examples
-    --------
-    >>> plan_members([1e-6, 1e-3], [100, 100], [64, 64], [10**6, 10**6], 20.0)
-    [99968, 64]
+    ``sites`` is the number of bond sites whose noise counts, infinite if none does.
     """
-    needs = [cost * count for cost, count in zip(costs, steps, strict=True)]
-    out: set[int] = set()
-    while True:
-        open_runs = [k for k in range(len(needs)) if k not in out]
-        share, left = 0.0, budget
-        for place, k in enumerate(sorted(open_runs, key=lambda k: needs[k] * caps[k])):
-            share = left / (len(open_runs) - place)
-            left -= min(share, needs[k] * caps[k])
-        unaffordable = [k for k in open_runs if needs[k] * min(_FEWEST, caps[k]) > share]
-        if not unaffordable:
-            break
-        out.add(max(unaffordable, key=lambda k: needs[k]))
-    members = [0 if k in out else min(int(share / needs[k] + 1e-9), caps[k]) for k in range(len(needs))]
-    if twins is not None:
-        members = [min(members[j] for j in range(len(needs)) if twins[j] == twins[k]) for k in range(len(needs))]
-    return [count - count % batch if count > batch else count for count, batch in zip(members, batches, strict=True)]
 
+    def __init__(self, base: Scenario, chosen: Sequence[Setting], sites: float) -> None:
+        self.base, self.sites, self.rows = base, sites, [Row(setting) for setting in chosen]
+        self.own_sites = Setting("", "", base, "").sites
+        points = [row.setting.points for row in self.of("grid")]
+        grids = [*points, 8 * max(points)] if points else []
+        self.terms = [Terms.of_cell(base), Terms.of_model(base)]
+        self.terms += [Terms.of_model(row.setting.scenario) for row in self.of("shear")]
+        self.terms += [Terms.of_cell(base, count) for count in grids]
+        self.began = time.process_time()
+        self.walk = Walk.of(base, self.terms)
+        law = self.walk.statistics(-1 if grids else 0, sites)
+        #: Where there is a law of each statistic.
+        self.lawful: NDArray[np.bool_] = np.all(np.isfinite(law), axis=0)
+        self.lawful[0] |= not self.walk.stretched
+        self.lawful[[0, 1, 3], 2] = True  # the skewness is judged of ΔΓ alone
+        self.yard = _yardsticks(self._meant(law, self.walk))
 
-def _pilot(run: Run, last: int) -> None:
-    """Time per member-step of a batch, measured once everything is compiled and loaded."""
-    members = np.arange(run.batch)
-    for state in march(run.scenario, members):
-        if state.step == min(2, last):
-            break
-    wall, cpu, done = time.perf_counter(), time.process_time(), 0
-    for state in march(run.scenario, members):
-        _read(run.scenario, state)
-        done += run.batch
-        if state.step >= last or time.perf_counter() - wall > _PILOT:
-            break
-    run.wall, run.cpu = (time.perf_counter() - wall) / done, (time.process_time() - cpu) / done
-    run.cost = run.wall
+    def of(self, part: str) -> list[Row]:
+        """The rows that change one part."""
+        return [row for row in self.rows if row.setting.part == part]
 
+    def _largest(self, difference: Array) -> Array:
+        """Largest difference over the records in units of the yardsticks, shape (quantities, 3)."""
+        return np.max(_over(np.abs(difference), self.yard), axis=0)
 
-def _read(scenario: Scenario, state: Any) -> list[Array]:
-    return [_READ[name](scenario, state) for name in QUANTITIES]
+    @staticmethod
+    def _meant(statistics: Array, walk: Walk) -> Array:
+        """Statistics with means of a run without noise where they have no law."""
+        mean = statistics[:, 1:, 0]
+        statistics[:, 1:, 0] = np.where(np.isnan(mean), walk.means[:, 1:], mean)
+        return statistics
 
+    def judge_models(self) -> None:
+        """Errors of shear models and of grids, by the terms of ΔΓ that they draw."""
+        truth = self.walk.statistics(0, self.sites)
+        part: Any = self.base.fluctuations
+        power = part.correlation.power if part.per_member else 0
+        memory = self.terms[0].memory(power)
+        rows = self.of("shear")
+        for which, row in enumerate(rows, 2):
+            row.law = self.walk.statistics(which, self.own_sites)
+            row.error[:, :3] = self._largest(self.walk.statistics(which, self.sites) - truth)
+            row.error[2, 3] = abs(self.terms[which].memory(power) / memory - 1.0)
+        for which, row in enumerate(self.of("grid"), 2 + len(rows)):
+            row.error[:, :3] = self._largest(
+                self.walk.statistics(which, self.sites) - self.walk.statistics(-1, self.sites)
+            )
 
-def _sample(run: Run, members: int, moments: list[Moment], progress: Progress | None, worth: float) -> None:
-    """March all members of a run, keep what the moments need and estimate from it."""
-    needed = sorted(
-        step for step in set().union(*(moment.needed for moment in moments)) if not step % max(1, run.ratio)
-    )
-    columns = {round(step / run.ratio): k for k, step in enumerate(needed)}
-    values, last = np.empty((len(QUANTITIES), members, len(needed))), max(columns)
-    wall = cpu = 0.0
-    for first in range(0, members, run.batch):
-        batch = np.arange(first, min(first + run.batch, members))
-        began = time.perf_counter(), time.process_time()
-        for state in march(run.scenario, batch):
-            if state.step in columns:
-                for kept, now in zip(values, _read(run.scenario, state), strict=True):
-                    kept[batch, columns[state.step]] = now
-            if state.step == last:
+    def judge_bonds(self) -> None:
+        """Errors of bond models at the scene's clock step; the last without a number of sites is exact."""
+        rows = self.of("bonds")
+        walks = [self.walk if row.setting.own else Walk.of(row.setting.scenario, self.terms[:2])
+                 for row in rows if math.isinf(row.setting.sites)]  # fmt: skip
+        walks += walks[-1:] * (len(rows) - len(walks))
+        for row, walk in zip(rows, walks, strict=True):
+            sites = row.setting.sites
+            row.law = walk.statistics(1, sites)
+            exact = self._meant(walks[-1].statistics(0, self.sites), walks[-1])
+            row.error[:, :3] = self._largest(self._meant(walk.statistics(0, sites), walk) - exact)
+
+    def judge_steps(self, tolerance: float, seconds: float) -> None:
+        """Errors of clock steps: halved until two agree or the time is up, and longer ones if the records allow."""
+        found = [self._at(1.0, self.walk)]
+        spent = 0.0
+        while True:
+            began = time.process_time()
+            found.append(self._at(0.5 * found[-1][0].setting.ratio))
+            rest = self._largest(found[-1][1] - found[-2][1])
+            spent = time.process_time() - began
+            late = time.process_time() + 2.0 * spent > self.began + seconds
+            if late or np.nanmax(rest) <= _FINE * tolerance or found[-1][0].setting.ratio <= _FINEST:
                 break
-        wall, cpu = wall + time.perf_counter() - began[0], cpu + time.process_time() - began[1]
-        if progress is not None:
-            progress(len(batch) * worth)
-    run.members, run.wall, run.cpu = members, wall / (members * (last + 1)), cpu / (members * (last + 1))
-    places = {step: k for k, step in enumerate(needed)}
-    for number, moment in enumerate(moments):
-        for stride in {moment.stride(ratio) for ratio in (0.5, 1.0, 2.0, 4.0) if ratio >= run.ratio}:
-            ends, lags = _columns(moment, stride, places, run.scenario.clock.step / run.ratio)
-            run.found[number, stride] = [estimates(kept, ends, lags) for kept in values]
+        finest = found[-1][1]
+        found += [self._at(ratio) for ratio in (2.0, 4.0) if not self.base.clock.stride % round(ratio)]
+        for row, statistics in found:
+            row.error[:, :3] = self._largest(statistics - finest) + rest
+        self.rows += sorted((row for row, _ in found), key=lambda row: -row.setting.ratio)
+
+    def _at(self, ratio: float, walk: Walk | None = None) -> tuple[Row, Array]:
+        setting = at_step(self.base, ratio)
+        walk = walk or Walk.of(setting.scenario, self.terms[:2])
+        return Row(setting), self._meant(walk.statistics(0, self.own_sites), walk)
+
+    def sample(self, seconds: float) -> None:
+        """Sample shear and bond models that fluctuate; where there is no law also clock steps, under the same noise."""
+        lawless = not self.lawful[1:, 0].all()
+        own = self.walk.statistics(1, self.own_sites)[:, 1:, :2]
+        pooled = not lawless and bool(np.all(np.ptp(own, axis=0) <= 1e-9 * self.yard[1:, :2]))
+        records = self.walk.steps[self.walk.steps <= _LONG_ENOUGH] if pooled else self.walk.steps
+        count = min(_POOLED if pooled else _STATED, len(records) - 1)
+        self.stated = np.unique(np.rint(np.linspace(len(records) - 1, 0, count, endpoint=False)).astype(int))
+        self.pooled = pooled
+        rows = [row for row in self.rows if row.setting.part in ("shear", "bonds") and self._worth(row, lawless)]
+        steps = [row for row in self.of("step")[::-1] if row.setting.ratio >= _FINEST_SAMPLED]
+        steps = steps if lawless and fluctuates(self.base) else []
+        share = seconds / max(len(rows) + len(steps), 1)
+        drawn = [(row, self._estimates(row, share)) for row in rows]
+        for part in ("shear", "bonds"):
+            self._compare([(row, found) for row, found in drawn if found and row.setting.part == part])
+        if steps:
+            self._couple(steps, share * len(steps))
+
+    def _worth(self, row: Row, lawless: bool) -> bool:
+        if row.setting.part == "bonds":
+            return math.isfinite(row.setting.sites)
+        return lawless or fluctuates(row.setting.scenario)
+
+    def _estimates(self, row: Row, seconds: float) -> list[list[list[Estimate]]]:
+        """Estimates of a sample by time, quantity and statistic; none where the budget is too small."""
+        scene, steps = row.setting.scenario, self.walk.steps[self.stated]
+        row.members = affordable(scene, int(steps[-1]), seconds, len(steps))
+        return self._of_values(sampled(scene, row.members, steps.tolist())) if row.members else []
+
+    def _of_values(self, values: Array) -> list[list[list[Estimate]]]:
+        times = [slice(None)] if self.pooled else [slice(k, k + 1) for k in range(values.shape[2])]
+        return [[estimates(kept[:, now]) for kept in values] for now in times]
+
+    def _compare(self, drawn: list[tuple[Row, list[list[list[Estimate]]]]]) -> None:
+        """Samples of one part against their laws, else against the fullest model among them."""
+        if not drawn:
+            return
+        fullest, best = drawn[-1]
+        spread = np.fmax.reduce([[of[1].value for of in now] for now in best])
+        self.yard[:, 1] = np.where(np.isnan(self.yard[:, 1]), spread, self.yard[:, 1])
+        shape = (len(best), len(QUANTITIES), 3)
+        for row, found in drawn:
+            row.value, row.deviation, row.standard_error = (np.full(shape, np.nan) for _ in range(3))
+            for t, q, s in np.ndindex(shape):
+                one = found[t][q][s]
+                assert row.law is not None
+                expected = float(row.law[self.stated[t], q, s])
+                row.value[t, q, s] = one.value
+                if (q == 0 and not self.walk.stretched) or (q != 2 and s == 2):
+                    continue
+                if self.lawful[q, s] and math.isfinite(expected):
+                    row.deviation[t, q, s], row.standard_error[t, q, s] = one.value - expected, one.standard_error
+                elif row is not fullest:
+                    row.deviation[t, q, s], row.standard_error[t, q, s] = one.less(best[t][q][s])
+            row.deviation, row.standard_error = _over(row.deviation, self.yard), _over(row.standard_error, self.yard)
+            if row is fullest:
+                self._take(row, np.zeros((2, *shape[1:])))
+            else:
+                self._take(row, _sampled_error(row.deviation, row.standard_error, _SURE))
+
+    def _take(self, row: Row, found: Array) -> None:
+        """Errors of a sample and their bounds, shape (2, quantities, 3), where no law gives them."""
+        only = ~self.lawful & np.isfinite(found[1])
+        for kept, new in zip((row.error[:, :3], row.bound[:, :3]), found, strict=True):
+            kept[only] = np.fmax(row.error[:, :3], new)[only]
+
+    def _couple(self, rows: Sequence[Row], seconds: float) -> None:
+        """Sampled errors of clock steps, finest first, under the same fluctuations."""
+        finest = rows[0].setting
+        steps = np.rint(self.walk.steps[self.stated] / finest.ratio).astype(int)
+        members = affordable(finest.scenario, int(steps[-1]), seconds / 2.0, len(rows) * len(steps))
+        if not members:
+            return
+        found = [self._of_values(v) for v in coupled([r.setting.scenario for r in rows], members, steps.tolist())]
+        errors = []
+        for one in found:
+            less = np.array([[[a.less(b) for a, b in zip(x, y, strict=True)] for x, y in zip(now, then, strict=True)]
+                             for now, then in zip(one, found[0], strict=True)])  # fmt: skip
+            errors.append(_sampled_error(_over(less[..., 0], self.yard), _over(less[..., 1], self.yard), 0.0))
+        rest = _REST * errors[1]
+        for row, error in zip(rows, errors, strict=True):
+            row.members = members
+            self._take(row, error + rest)
+        for row in self.of("step"):
+            if row.setting.ratio < finest.ratio:
+                self._take(row, rest)
 
 
-def _columns(moment: Moment, stride: int, places: dict[int, int], step: float) -> tuple[NDArray[np.intp], Lags | None]:
-    """Columns of a moment's values, and the pairs of columns of each lag."""
-    ends = [end for end in moment.ends if not moment.pooled or not end % stride]
-    shown = np.array([places[end] for end in ends if end in places], np.intp)
-    if moment.lags(stride) < 1:
-        return shown, None
-    earlier, later = [], []
-    for lag in range(1, moment.lags(stride) + 1):
-        pairs = [(end - lag * stride, end) for end in ends if end - lag * stride in places]
-        earlier.append(np.array([places[one] for one, _ in pairs], np.intp))
-        later.append(np.array([places[other] for _, other in pairs], np.intp))
-    return shown, Lags(earlier, later, stride * step, moment.pooled)
+def _over(numbers: Array, yard: Array) -> Array:
+    """Numbers in units of the yardsticks; 0 where both are 0."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = numbers / yard
+    return np.where((numbers == 0.0) & (yard == 0.0), 0.0, found)
 
 
-__all__ = ["bond_advice", "bond_table", "converge", "figure", "plan_members", "recommendation", "table"]
+def _sampled_error(deviation: Array, sem: Array, least: float) -> Array:
+    """Largest deviation of at least so many standard errors, and what it may be at most, shape (2, quantities, 3)."""
+    size = np.abs(deviation)
+    return np.stack([np.fmax.reduce(np.where(size >= least * sem, size, 0.0)), np.fmax.reduce(size + _SURE * sem)])
+
+
+def _yardsticks(statistics: Array) -> Array:
+    """Units of errors, shape (quantities, 3): largest values of a run, nan of a spread that is not known."""
+    yard = np.max(np.abs(statistics), axis=0)
+    yard[:2, 1] = yard[:2, 0]
+    yard[:, 2] = yard[2, 2] if yard[2, 2] > 0.0 else 1.0
+    return yard
+
+
+_LONG = ("mean shear stress", "bonds over bonds at rest", "energy of the fluctuations per area", "contact radius")
+_UNITS = ("Pa", "1", "J/m^2", "m")
+
+
+def _assembled(scenario: Scenario, study: _Study, tolerance: float, left_out: list[str]) -> xr.Dataset:
+    """Everything that was found, with units and long names."""
+    rows, clock = study.rows, study.base.clock
+    stated = study.walk.steps[study.stated[-1:] if study.pooled else study.stated]
+    empty = np.full((len(stated), len(QUANTITIES), 3), np.nan)
+    along: dict[str, tuple[list[Any], str, str]] = {
+        "part": ([row.setting.part for row in rows], "", "what the setting changes"),
+        "toml": ([row.setting.toml for row in rows], "", "lines of the scenario file that choose the setting"),
+        "own": ([int(row.setting.own) for row in rows], "1", "1 where the scene has this setting as it is written"),
+        "time": ([row.times.median for row in rows], "s", "CPU time of the scene's run, median of the repeats"),
+        "time_low": ([row.times.low for row in rows], "s", "CPU time of the scene's run, least of the repeats"),
+        "time_high": ([row.times.high for row in rows], "s", "CPU time of the scene's run, largest of the repeats"),
+        "members": ([row.members for row in rows], "1", "members sampled"),
+        "clock_step": ([row.setting.scenario.clock.step for row in rows], "s", "clock step"),
+    }
+    variables: dict[str, Any] = {
+        name: ("row", values, {"long_name": text} | ({"units": unit} if unit else {}))
+        for name, (values, unit, text) in along.items()
+    }
+    dims = ("row", "t", "quantity", "statistic")
+    for name, unit, text in (
+        ("value", "", "sampled statistic, in SI units"),
+        ("deviation", "1", "sampled statistic less what is expected, in units of the yardstick"),
+        ("standard_error", "1", "standard error of the deviation, in units of the yardstick"),
+    ):
+        values = [empty if getattr(row, name) is None else getattr(row, name) for row in rows]
+        variables[name] = (dims, _padded(np.array(values)), {"long_name": text} | ({"units": unit} if unit else {}))
+    for name, text in (
+        ("error", "largest error over the run, in units of the yardstick"),
+        ("bound", "what the error is at most, where it is known from samples only, in units of the yardstick"),
+    ):
+        numbers = np.array([getattr(row, name) for row in rows])
+        variables[name] = (("row", *dims[2:]), numbers, {"units": "1", "long_name": text})
+    variables["yardstick"] = (dims[2:], _padded(study.yard), {"long_name": "unit of errors, in SI units"})
+    coordinates = {
+        "row": ("row", [row.setting.label for row in rows], {"long_name": "setting"}),
+        "t": ("t", [clock.time(int(step)) for step in stated], {"units": "s", "long_name": "time of the statistics"}),
+        "quantity": ("quantity", list(QUANTITIES), {"long_name": "; ".join(_LONG), "comment": ", ".join(_UNITS)}),
+        "statistic": ("statistic", list(STATISTICS), {"long_name": "statistic"}),
+    }
+    version = importlib.metadata.version("sliding-sim")
+    members = scenario.ensemble.members if fluctuates(study.base) else 1
+    dataset = xr.Dataset(variables, coordinates, {
+        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}",
+        "history": f"sim converge; sliding-sim {version}", "sim_version": version, "seed": str(scenario.seed),
+        "tolerance": tolerance, "clock_step": clock.step, "steps": clock.steps,
+        "members_of_run": members, "fluctuates": int(fluctuates(study.base)), "pooled": int(study.pooled),
+        "sites": study.sites, "point": _point(scenario), "left_out": "\n".join(left_out),
+    })  # fmt: skip
+    dataset["t"].encoding["_FillValue"] = None  # the conventions allow a coordinate none
+    return dataset
+
+
+def _padded(numbers: Array) -> Array:
+    """Room for the correlation time, which is never sampled."""
+    return np.concatenate([numbers, np.full((*numbers.shape[:-1], 1), np.nan)], axis=-1)
+
+
+def _point(scenario: Scenario) -> str:
+    """Which point of a sweep is studied, and how to choose another."""
+    if not scenario.sweep:
+        return ""
+    declared = quantities(scenario)
+    keys = [key for axis in scenario.sweep for key in axis.keys]
+    at = [f"{key} = {engineering(declared[key][1], declared[key][0].unit)}" if key in declared
+          else f"{key} as its table has it" for key in keys]  # fmt: skip
+    return f"{', '.join(at)}; choose another point of the sweep by --set {keys[0]}=…"

@@ -1,35 +1,44 @@
-"""What ΔΓ and the contact radius of a scenario are, in closed form: their law at given steps, without noise.
+"""Statistics of a scene without sampling: means marched without noise, spreads by closed cumulants.
 
-All members share the drive and, but for counted bonds, the bonds; ΔΓ is then a weighted sum of gamma
-numbers at every time, and the radius of a contact in equilibrium is a function of it.
+ΔΓ of a cell is a weighted sum of independent gamma numbers at any time, whose n-th cumulant is
+``(n − 1)! Σ shape wⁿ``. Sites of bonds are independent, so the variance of N of them follows from that of one.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
+from scipy.special import gammainccinv, gammaincinv, ndtr
 
-from sim.parts.bonds import Cohort, Counted, Rate, Steady, Tracked, Unbroken
-from sim.parts.shear.amplitude import Constant
-from sim.parts.shear.banded import BandedProcess
-from sim.parts.shear.modal import FixedProcess, ModalProcess
+from sim.engine import State, balance, march
+from sim.ensemble.recorded import VARIABLES
+from sim.numerics.noise import Noise
+from sim.parts.exchange import Bonding, Motion
+from sim.parts.shear.amplitude import Amplitude
+from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.mode_pairs import cell_pairs
-from sim.parts.shear.process import SmoothProcess
+from sim.parts.shear.process import Fluctuation, _Renewing
 from sim.scenario.scenario import Scenario
-from sim.study.estimates import RARE
-from sim.study.gamma_sum import GammaSum
+from sim.study.settings import REFERENCE, table
 
 Array = NDArray[np.float64]
-Steps = NDArray[np.int64]
 
-#: Terms beyond which those of nearly equal weight and wavenumber are taken together, and how near.
-_MOST_TERMS, _WIDTH = 20_000, 0.005
+QUANTITIES = ("shear_stress", "bond_fraction", "fluctuation_energy", "contact_radius")
+STATISTICS = ("mean", "standard deviation", "skewness", "correlation time")
 
-#: Values by which the number of counted bonds is represented.
-_MOST_COUNTS = 200
+READ = {variable.name: variable.read for variable in VARIABLES}
+
+#: Most records of a run that are compared.
+_MOST_RECORDS = 1000
+#: Wavenumbers that differ by less than this share renew at one rate.
+_WIDTH = 0.005
+#: Values by which ΔΓ and a bond fraction are represented, and the probability that may be without a contact.
+_ENERGIES, _FRACTIONS, _RARE = 281, 15, 1e-9
+#: Skewness below which a gamma number is normal.
+_SYMMETRIC = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,293 +63,251 @@ class Terms:
     constant: float = 0.0
 
     @classmethod
-    def of_process(cls, process: Any) -> "Terms | None":
-        """What a depth draws; None of a process that is not known."""
-        if isinstance(process, SmoothProcess):
-            return cls.still(process.energy)
-        if isinstance(process, BandedProcess):
-            return cls(process.bands.weight, 0.5 * process.bands.freedom, process.bands.wavenumber)
-        if isinstance(process, FixedProcess):
-            return cls.still(2.0 * float(np.sum(process.weights)))
-        if isinstance(process, ModalProcess):
-            return cls(2.0 * process.weights, np.ones(process.pairs), process.wavenumber)._merged()
-        return None
+    def of_model(cls, scenario: Scenario) -> "Terms":
+        """Terms that the scene's shear model draws."""
+        process: Any = scenario.process
+        if not scenario.fluctuations.per_member:
+            none = np.zeros(1)
+            still = Motion(0, 0.0, 0.0, none, none, none, none)
+            started = process.start(still, scenario.population.steady(np.zeros(1)), Noise(0, "shear", np.arange(1)))
+            empty = np.empty(0)
+            return cls(empty, empty, empty, float(started.energy[0] / started.amplitude[0] ** 2))
+        if scenario.fluctuations.model == "banded":
+            return cls(process.bands.weight, 0.5 * process.bands.freedom, process.wavenumber)
+        return cls(2.0 * process.weights, np.ones(process.pairs), process.wavenumber)
 
     @classmethod
     def of_cell(cls, scenario: Scenario, points: int | None = None) -> "Terms":
-        """All mode pairs of a scenario's cell, on its own grid or one of so many points; its energy without a cell."""
+        """All mode pairs of the scene's cell, on its own grid or one of so many points; its model's without a cell."""
         part: Any = scenario.fluctuations
-        solid = scenario.solid.effective
-        if not hasattr(part, "cell"):
-            return cls.still(part.process(*solid, math.nan).energy)
+        if not part.per_member:
+            return cls.of_model(scenario)
         cell = part.cell or math.sqrt(math.pi) * scenario.rest_radius
-        pairs = cell_pairs(part.spectrum, cell, points or part.points, *solid)
+        pairs = cell_pairs(part.spectrum, cell, points or part.points, *scenario.solid.effective)
         weight, shape, wavenumber = np.broadcast_arrays(pairs.weight, pairs.count, pairs.wavenumber)
-        if part.mode_amplitudes == "fixed":
-            return cls.still(float(np.sum(weight * shape)))
-        return cls(weight, shape.astype(float), wavenumber)._merged()
+        return cls(weight, shape.astype(float), wavenumber)
+
+    def memory(self, power: int) -> float:
+        """Integral correlation time over that of a mode of 1 rad/m, whose rate goes with \\|q\\| to a power."""
+        share = self.shape * self.weight**2
+        return float(np.sum(share * self.wavenumber ** (-float(power))) / np.sum(share)) if share.size else math.nan
+
+
+@dataclass(frozen=True)
+class Expected(_Renewing):
+    """Ensemble mean of a renewing process, of which the state holds the variance of its modes.
+
+    ``tables`` has for each set of terms ``(n − 1)! Σ shape wⁿ`` for n = 1, 2, 3 at each ``wavenumber``; the mean that
+    is handed on is that of the first.
+    """
+
+    wavenumber: Array
+    tables: tuple[Array, ...]
+    constants: tuple[float, ...]
+    correlation: Correlation
+    amplitude: Amplitude
 
     @classmethod
-    def still(cls, energy: float) -> "Terms":
-        """An energy without any fluctuation."""
-        return cls(np.empty(0), np.empty(0), np.empty(0), energy)
+    def of(cls, sets: Sequence[Terms], correlation: Correlation, amplitude: Amplitude) -> "Expected":
+        """The process for one amplitude of all terms, or where it relaxes one for each wavenumber."""
+        waves = np.concatenate([terms.wavenumber for terms in sets])
+        near = np.floor(np.log(waves / waves.max()) / _WIDTH) if amplitude.relaxing else np.zeros(waves.size)
+        _, place = np.unique(near, return_inverse=True)
+        kinds = int(place.max()) + 1
+        tables, done = [], 0
+        for terms in sets:
+            here = place[done : done + terms.weight.size]
+            done += terms.weight.size
+            sums = [np.bincount(here, terms.shape * terms.weight**n, kinds) for n in (1, 2, 3)]
+            tables.append(np.array([sums[0], sums[1], 2.0 * sums[2]]))
+        mean = np.bincount(place, waves) / np.bincount(place)
+        return cls(mean, tuple(tables), tuple(terms.constant for terms in sets), correlation, amplitude)
 
-    def _merged(self) -> "Terms":
-        """Terms of nearly equal weight and wavenumber as one; mean and variance stay exact."""
-        if self.weight.size <= _MOST_TERMS:
-            return self
-        places = [np.floor(np.log(x / x.max()) / _WIDTH).astype(np.int64) for x in (self.weight, self.wavenumber)]
-        _, place = np.unique(places[0] * 2**32 + places[1], return_inverse=True)
-        first = np.bincount(place, self.shape * self.weight)
-        second = np.bincount(place, self.shape * self.weight**2)
-        wavenumber = np.bincount(place, self.shape * self.weight**2 * self.wavenumber) / second
-        return Terms(second / first, first * (first / second), wavenumber, self.constant)
+    def _empty(self, members: int) -> Array:
+        return np.zeros(self.wavenumber.size)
 
+    def _renewed(
+        self, values: Array, keep: Array, renew: Array, size: Array, amplitude: Array, step: int, noise: Noise
+    ) -> Fluctuation:  # fmt: skip
+        after = keep**2 * values + (renew * size) ** 2
+        return Fluctuation(self._sized(after, amplitude)[0, :1], amplitude, after)
 
-@dataclass(frozen=True, eq=False)
-class Course:
-    """What all members share, at chosen clock steps; arrays of shape (steps,) or (steps, terms).
+    def cumulants(self, state: Fluctuation) -> Array:
+        """First three cumulants of ΔΓ for each set, shape (sets, 3)."""
+        return self._sized(state.values, state.amplitude)
 
-    ``fraction`` is that of the bonds (of counted ones their mean), ``amplitude`` the factor g,
-    ``exponent`` the integral of the rate of a mode of 1 rad/m since t = 0, ``renewal`` that of the rate
-    at which counted bonds forget, and ``size`` the variance of each term's amplitude over that at amplitude 1.
-    """
-
-    steps: Steps
-    fraction: Array
-    amplitude: Array
-    exponent: Array
-    renewal: Array
-    size: Array
-
-
-def course(scenario: Scenario, terms: Terms, steps: Steps, refine: int = 1) -> Course:
-    """Walk through a scenario without noise.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Its clock counts the ``steps``.
-    terms : Terms
-        Whose sizes are followed where amplitude relaxes.
-    steps : array of int
-        Increasing clock steps to report.
-    refine : int
-        Into how many each clock step is divided: the error of a step is of second order.
-
-    Returns
-    -------
-    Course
-        Where nothing relaxes, the walk goes straight from one of the steps to the next.
-    """
-    part: Any = scenario.fluctuations
-    amplitude, correlation = getattr(part, "amplitude", Constant()), getattr(part, "correlation", None)
-    bonds, clock = _mean_bonds(scenario.population), scenario.clock
-    power = correlation.power if correlation is not None else 0
-    walked = _walked(steps, refine, amplitude.relaxing or not isinstance(bonds, Unbroken | Steady))
-    wanted = set((steps * refine).tolist())
-    rows: list[tuple[float, float, float, float, Array]] = []
-    before, exponent, renewal, size, population = 0, 0.0, 0.0, np.ones(1), None
-    factor = np.ones(1)
-    for step in walked:
-        began, ended = (clock.duration * (k / (clock.steps * refine)) for k in (before, step))
-        motion = scenario.drive.motion(step, began, ended, clock.duration)
-        none: Any = None  # the bonds here draw nothing
-        if population is None:
-            population = bonds.start(motion, none)
-        else:
-            population = bonds.advance(population, motion, np.ones(1), none)
-        bonding = bonds.bonding(population)
-        last, factor = factor, amplitude.factor(motion.speed, bonding.strength)
-        passed = float(correlation.exponents(np.ones(1), motion)[0]) if correlation is not None else 0.0
-        if not amplitude.relaxing or step == 0:
-            size = factor**2
-        else:
-            decay = 2.0 * passed * terms.wavenumber**power
-            size = size * np.exp(-decay) - np.expm1(-decay) * 0.5 * (factor**2 + last**2)
-        exponent += passed
-        if isinstance(bonds, Rate):
-            renewal += bonds.rebinding_rate * (motion.duration + float(motion.path[0]) / bonds.critical_speed)
-        before = step
-        if step in wanted:
-            rows.append((float(bonding.fraction[0]), float(factor[0]), exponent, renewal, size))
-    fraction, growths, exponents, renewals = np.array([row[:4] for row in rows]).T
-    widest = max(row[4].size for row in rows)
-    sizes = np.stack([np.broadcast_to(row[4], widest) for row in rows])
-    return Course(steps, fraction, growths, exponents, renewals, sizes)
+    def _sized(self, variance: Array, amplitude: Array) -> Array:
+        size = variance if self.amplitude.relaxing else amplitude**2 * variance
+        found = np.array([[of_order @ size**n for n, of_order in enumerate(table, 1)] for table in self.tables])
+        found[:, 0] += amplitude[0] ** 2 * np.array(self.constants)
+        return found
 
 
-def _mean_bonds(bonds: Any) -> Any:
-    """Bonds whose fraction is the ensemble mean: rate equation and cohorts give that of finite numbers."""
-    if isinstance(bonds, Counted):
-        shared = ("critical_speed", "rebinding_rate", "stress", "start_from")
-        return Rate(**{name: getattr(bonds, name) for name in shared})
-    if isinstance(bonds, Tracked):
-        stretched = ("rupture", "bond_stiffness", "rebinding_rate", "site_density", "start_from")
-        return Cohort(**{name: getattr(bonds, name) for name in stretched})
-    return bonds
-
-
-def _walked(steps: Steps, refine: int, all_of_them: bool) -> list[int]:
-    if all_of_them:
-        return list(range(int(steps[-1]) * refine + 1))
-    return sorted({0, *(steps * refine).tolist()})
+def quiet(scenario: Scenario, sets: Sequence[Terms]) -> Scenario:
+    """A scene whose bonds and fluctuations are their ensemble means: cohorts or a rate equation, and cumulants."""
+    bonds, part = table(scenario.population), cast("Any", scenario.fluctuations)
+    changes: dict[str, Any] = {}
+    if "sites" in bonds:
+        del bonds["sites"]
+        mean = {"model": "cohort", "tolerance": REFERENCE} if "rupture" in bonds else {"model": "rate"}
+        changes["bonds"] = bonds | mean
+    if part.per_member and part.spectrum.bond_made:
+        kept = ("spectrum", "paid_by_adhesion", "contact")
+        changes["shear"] = {key: value for key, value in table(part).items() if key in kept} | {"model": "mean"}
+    found = scenario.with_values(changes)
+    if found.fluctuations.per_member:
+        found.__dict__["process"] = Expected.of(sets, part.correlation, part.amplitude)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
-class Expectation:
-    """The law of ΔΓ and of the radius at the steps of a course.
+class Walk:
+    """A run without noise at its records.
 
     Attributes
     ----------
-    scenario : Scenario
-        Whose law it is.
-    terms : Terms
-        What ΔΓ is made of.
-    course : Course
-        What the members share.
+    scenario, calm : Scenario
+        The scene, and the one that was marched.
+    sets : sequence of Terms
+        Terms of ΔΓ whose cumulants are followed.
+    steps : array of int, shape (records,)
+        Clock steps of the records.
+    means : array, shape (records, 4)
+        The ``QUANTITIES`` without noise, in SI.
+    strength : array, shape (records,)
+        Strength of the bonds [Pa].
+    noise : array, shape (records, 2)
+        Variances of shear stress and bond fraction of a single site, in SI; nan where they are not known.
+    cumulants : array, shape (sets, records, 3)
+        First three cumulants of ΔΓ for each set of terms.
     """
 
     scenario: Scenario
-    terms: Terms
-    course: Course
+    calm: Scenario
+    sets: Sequence[Terms]
+    steps: NDArray[np.int_]
+    means: Array
+    strength: Array
+    noise: Array
+    cumulants: Array
 
-    @cached_property
-    def tells_energy(self) -> bool:
-        """Whether ΔΓ has this law: not where its amplitude follows bonds that differ between members."""
-        follows = getattr(getattr(self.scenario.fluctuations, "spectrum", None), "bond_made", False)
-        return not follows and not (self.scenario.fluctuations.reads_stress and self.scenario.population.per_member)
+    @classmethod
+    def of(cls, scenario: Scenario, sets: Sequence[Terms]) -> "Walk":
+        """March a scene without noise."""
+        calm, clock = quiet(scenario, sets), scenario.clock
+        every = clock.stride * max(1, -(-clock.records // _MOST_RECORDS))
+        states = [state for state in march(calm, np.arange(1)) if not state.step % every or state.step == clock.steps]
+        means = [[READ[name](calm, state)[0] for name in QUANTITIES] for state in states]
+        steps = np.array([state.step for state in states])
+        cumulants = [_cumulants(calm.process, state.shear, len(sets)) for state in states]
+        strength = np.array([state.bonding.strength[0] for state in states])
+        noise = _of_sites(calm, states, np.array(means)[:, 1])
+        return cls(scenario, calm, sets, steps, np.array(means), strength, noise, np.stack(cumulants, axis=1))
 
-    @cached_property
-    def tells_radius(self) -> bool:
-        """Whether the radius is a function of ΔΓ and the bonds at one time: not where a contact may open for good."""
-        known = not self.scenario.population.per_member or isinstance(self.scenario.population, Counted)
-        contact = self.scenario.contact
-        plain = not contact.changes and contact.reversible == 0.0 and self.scenario.margin is None
-        return self.tells_energy and known and plain and never_opens(self.scenario)
+    @property
+    def stretched(self) -> bool:
+        """Whether bonds have a stretch, so that their stress is more than their fraction."""
+        return "rupture" in table(self.calm.population)
 
-    def energy(self, step: int) -> GammaSum:
-        """The law of ΔΓ at a step [J/m^2]."""
-        place = self._place(step)
-        if self.course.size.shape[1] == 1:  # all terms have grown alike
-            return self._unit.scaled(float(self.course.size[place, 0]))
-        return GammaSum(self.terms.weight * self.course.size[place], self.terms.shape)
+    def statistics(self, which: int, sites: float) -> Array:
+        """Mean, standard deviation and skewness of the ``QUANTITIES`` at each record, shape (records, 4, 3), in SI.
 
-    @cached_property
-    def _unit(self) -> GammaSum:
-        """The law of ΔΓ at amplitude 1."""
-        return GammaSum(self.terms.weight, self.terms.shape, self.terms.constant)
+        Parameters
+        ----------
+        which : int
+            Set of terms of ΔΓ.
+        sites : float
+            Number of bond sites of a member, infinite for none.
 
-    def _place(self, step: int) -> int:
-        place = int(np.searchsorted(self.course.steps, step))
-        if place >= self.course.steps.size or self.course.steps[place] != step:
-            raise KeyError(f"step {step} is none of the course")
-        return place
-
-    def fraction(self, step: int) -> tuple[Array, Array]:
-        """Values of the bond fraction at a step and their probabilities, shape (values,) each.
-
-        Counted sites are independent, so their number is binomial at every time.
+        Returns
+        -------
+        array
+            nan where there is no law: the stress of bonds without a stretch, which is their fraction's; the
+            skewness of all but ΔΓ; where bonds or ΔΓ follow what differs between members; and a radius that depends on
+            the past of a fluctuating energy.
         """
-        mean, bonds = float(self.course.fraction[self._place(step)]), self.scenario.population
-        if not isinstance(bonds, Counted):
-            return np.array([mean]), np.ones(1)
-        from scipy.stats import binom  # heavy, and only counted bonds need it
-
-        law = binom(bonds.sites, mean)
-        reach = 8.0 * law.std() + 8.0
-        low, high = max(0, math.floor(law.mean() - reach)), min(bonds.sites, math.ceil(law.mean() + reach))
-        edges = np.unique(np.rint(np.linspace(low - 1, high, min(high - low + 2, _MOST_COUNTS))))
-        middle = 0.5 * (edges[1:] + edges[:-1] + 1.0)
-        return middle / bonds.sites, np.diff(law.cdf(edges))
-
-    def radius(self, step: int, energy: Array, fraction: ArrayLike | None = None) -> Array:
-        """Equilibrium radius for values of ΔΓ [m], with the step's mean bond fraction or others; 0 where it is open."""
-        scene = self.scenario
-        bonded = scene.adhesion.work_of_bonds(
-            self.course.fraction[self._place(step)] if fraction is None else np.asarray(fraction)
-        )
-        work = np.asarray(bonded - scene.fluctuations.paid_by_adhesion * energy, float)
-        found = scene.contact.equilibrium_radius(work, scene.sphere.radius, scene.solid.contact_modulus)
-        return np.nan_to_num(found, nan=0.0)
-
-    def radius_spread(self, step: int) -> float:
-        """Roughly the standard deviation of the radius [m], counted bonds included: to see where it is largest."""
-        law, bonds = self.energy(step), self.scenario.population
-        low, high = self.radius(step, law.mean + law.std * np.array([1.0, -1.0]))
-        spread = 0.5 * (high - low)
-        if isinstance(bonds, Counted):
-            part = float(self.course.fraction[self._place(step)])
-            off = math.sqrt(part * (1.0 - part) / bonds.sites)
-            low, high = self.radius(step, np.full(2, law.mean), [part - off, part + off])
-            spread = math.hypot(spread, 0.5 * (high - low))
-        return float(spread)
-
-    def statistics(self, step: int, lag: int, window: int) -> Array:
-        """The six statistics of ΔΓ and of the radius at a step, shape (2, 6) in SI; nan where there is no closed form.
-
-        The correlation time is the trapezoidal sum over ``window`` lags of ``lag`` steps back from the
-        step; it is not told where a lag forgets all but 1/e.
-        """
-        found = np.full((2, 6), np.nan)
-        if not self.tells_energy:
-            return found
-        law = self.energy(step)
-        found[0, :5] = law.mean, law.std, law.skewness, law.quantile(0.01), law.quantile(0.99)
-        correlation = [self.correlation(step - j * lag, step) for j in range(1, window + 1)] if law.fluctuates else []
-        if correlation and correlation[0] > math.exp(-1.0):
-            found[0, 5] = lag * self.scenario.clock.step * (0.5 + math.fsum(correlation) - 0.5 * correlation[-1])
-        if self.tells_radius:
-            energy, held = law.cells
-            fraction, share = self.fraction(step)
-            values = self.radius(step, energy[:, np.newaxis], fraction).ravel()
-            chance = np.multiply.outer(held, share).ravel()
-            found[1, :3] = _moments(values, chance)
-            if fraction.size == 1:
-                found[1, 3:5] = self.radius(step, found[0, [4, 3]])
-            else:
-                order = np.argsort(values)
-                places = np.searchsorted(np.cumsum(chance[order]), [0.01, 0.99])
-                found[1, 3:5] = values[order][np.minimum(places, values.size - 1)]
+        part, finite = self.scenario.fluctuations, math.isfinite(sites)
+        mean, variance, third = self.cumulants[which].T
+        spread = np.sqrt(variance)
+        skewness = np.divide(third, spread**3, out=np.zeros(spread.shape), where=spread > 0.0)
+        found = np.full((self.steps.size, 4, 3), np.nan)
+        carried = part.per_member and self.calm.population.feeds_back  # with a contact that fluctuates
+        if not carried:
+            found[:, :2, 0] = self.means[:, :2]
+            found[:, :2, 1] = np.sqrt(self.noise / sites) if finite else 0.0
+        if not self.stretched:
+            found[:, 0] = np.nan
+        follows = (finite or carried) and part.reads_stress
+        if not follows and part.per_member == self.calm.fluctuations.per_member:
+            found[:, 2] = np.stack([mean, spread, skewness], axis=1)
+            found[:, 3, :2] = np.nan if carried else self._radii(found[:, 2], found[:, 1, :2])
         return found
 
-    @cached_property
-    def _spreads(self) -> Array:
-        """Standard deviation of ΔΓ at each step of the course [J/m^2]."""
-        return np.sqrt(np.sum(self.terms.shape * (self.terms.weight * self.course.size) ** 2, axis=1))
+    def _radii(self, energy: Array, fraction: Array) -> Array:
+        """Mean and standard deviation of the radius at each record, shape (records, 2)."""
+        still = np.zeros(self.steps.size)
+        if not np.any(energy[:, 1]) and not np.any(fraction[:, 1]):
+            return np.stack([self.means[:, 3], still], axis=1)
+        found = np.full((self.steps.size, 2), np.nan)
+        if self.scenario.contact.lags:
+            return found
+        for k, (mean, spread, skewness) in enumerate(energy):
+            x, share = gamma_nodes(skewness, _ENERGIES if spread > 0.0 else 1)
+            y, other = gamma_nodes(0.0, _FRACTIONS if fraction[k, 1] > 0.0 else 1)
+            bonded = np.repeat(fraction[k, 0] + fraction[k, 1] * y, x.size)
+            radius = self._equilibrium(k, np.tile(mean + spread * x, y.size), bonded)
+            held = np.outer(other, share).ravel()
+            if held[~(radius > 0.0)].sum() > _RARE:
+                return np.full(found.shape, np.nan)
+            radius = np.nan_to_num(radius)
+            center = float(held @ radius)
+            found[k] = center, math.sqrt(float(held @ (radius - center) ** 2))
+        return found
 
-    def correlation(self, earlier: int, later: int) -> float:
-        """Correlation of ΔΓ at two steps; 0 where either does not fluctuate.
-
-        The covariance is ``Σ shape w² e^(−2∫λdt)`` times the sizes of both, or where amplitude relaxes the
-        square of the earlier size: what was renewed since is independent.
-        """
-        i, j = self._place(earlier), self._place(later)
-        part: Any = self.scenario.fluctuations
-        correlation = getattr(part, "correlation", None)
-        spreads = self._spreads[i] * self._spreads[j]
-        if correlation is None or not spreads > 0.0:
-            return 0.0
-        passed = (self.course.exponent[j] - self.course.exponent[i]) * self.terms.wavenumber**correlation.power
-        kept = np.exp(-2.0 * passed)
-        kept = kept * self.course.size[i] * self.course.size[i if part.amplitude.relaxing else j]
-        return float(np.sum(self.terms.shape * self.terms.weight**2 * kept)) / spreads
+    def _equilibrium(self, record: int, energy: Array, fraction: Array) -> Array:
+        """Equilibrium radius for values of ΔΓ and of the bond fraction [m]; nan without one."""
+        scene, none = self.calm, np.zeros(1)
+        strength = self.strength[record : record + 1]
+        terms = balance(
+            scene,
+            Bonding(np.maximum(fraction, 0.0), strength, strength),
+            Fluctuation(np.maximum(energy, 0.0), none, none),
+        )
+        motion = Motion(0, scene.times.at(int(self.steps[record])), 0.0, none, none, none, none)
+        return scene.contact.start(motion, scene.times.duration, terms).radius
 
 
-def never_opens(scenario: Scenario) -> bool:
-    """Whether the contact has an equilibrium however much of its adhesion is lost."""
-    radius = scenario.contact.equilibrium_radius(np.zeros(1), scenario.sphere.radius, scenario.solid.contact_modulus)
-    return scenario.contact.model == "equilibrium" and bool(np.isfinite(radius[0]))
+def _cumulants(process: Any, state: Any, sets: int) -> Array:
+    """First three cumulants of ΔΓ for each set of terms, shape (sets, 3)."""
+    if isinstance(process, Expected):
+        return process.cumulants(state)
+    return np.outer(np.ones(sets), [float(state.energy[0]), 0.0, 0.0])
 
 
-def _moments(values: Array, held: Array) -> tuple[float, float, float]:
-    """Mean, standard deviation and skewness of values with their probabilities; rare exceptions do not count."""
-    mean = float(values @ held)
-    deviation = values - mean
-    spread = math.sqrt(float(deviation**2 @ held))
-    order = np.argsort(values)
-    common = values[order][min(int(np.searchsorted(np.cumsum(held[order]), 0.5)), values.size - 1)]
-    differing = float(held[np.abs(values - common) > 1e-9 * abs(common)].sum())
-    if differing < RARE or not spread > 1e-12 * abs(mean):
-        return mean, 0.0, math.nan
-    return mean, spread, float((deviation / spread) ** 3 @ held)
+def _of_sites(calm: Scenario, states: Sequence[State], fraction: Array) -> Array:
+    """Variances of the shear stress [Pa²] and bond fraction [1] of a single site, shape (records, 2)."""
+    bonds: Any = calm.population
+    given = table(bonds)
+    density, rest = (given["site_density"], bonds.bound_at_rest) if "rupture" in given else (math.nan, 1.0)
+    varying = np.array([state.bonding.varying[0] for state in states])
+    share = np.clip(fraction * rest, 0.0, 1.0)
+    return np.stack([density * varying, share * (1.0 - share) / rest**2], axis=1)
+
+
+def gamma_nodes(skewness: float, count: int) -> tuple[Array, Array]:
+    """Values and probabilities of a shifted gamma number of mean 0, variance 1 and a skewness of at least 0.
+
+    Equal steps of the normal number of the same rank: for smooth functions the error falls exponentially with
+    ``count``.
+
+    >>> x, share = gamma_nodes(2.0, 200)
+    >>> print([f"{share @ x**n:.6f}" for n in (0, 2, 3)])
+    ['1.000000', '1.000000', '2.000000']
+    """
+    z = np.linspace(-7.0, 7.0, count) if count > 1 else np.zeros(1)
+    share = np.exp(-0.5 * z**2)
+    if skewness > _SYMMETRIC:
+        shape = 4.0 / skewness**2
+        lower, upper = gammaincinv(shape, ndtr(np.minimum(z, 0.0))), gammainccinv(shape, ndtr(-np.maximum(z, 0.0)))
+        z = (np.where(z < 0.0, lower, upper) - shape) / math.sqrt(shape)
+    return z, share / share.sum()

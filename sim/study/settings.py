@@ -1,143 +1,172 @@
-"""The settings at which a scene could run: depths and tolerances, clock steps, grids.
+"""Settings at which a scene could run: models and tolerances of shear and bonds, clock steps, grids.
 
-A setting that a scene does not admit (a map of waves that do not fit the cell, a mean of fluctuations
-that relax) is left out with the reason.
+Each setting changes one thing of the scene. One that the scene does not admit (a map of waves that do not fit the
+cell, a mean of fluctuations that relax) is left out with the reason.
 """
 
+import functools
+import itertools
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from pydantic import TypeAdapter
 
 from sim.analysis import engineering
+from sim.parts.bonds import Cohort, Counted, FirstMoment, Rate, Steady, Tracked
 from sim.parts.shear import Banded, Mapped, Mean, Modal
-from sim.parts.shear.banded import BandedProcess
-from sim.parts.shear.process import SmoothProcess
 from sim.scenario.scenario import Scenario
 
-TOLERANCES = (0.3, 0.1, 0.03, 0.01, 0.003)
+#: Tolerance of cohorts whose answer stands for the exact one.
+REFERENCE = 1e-6
 
-#: A scene's tolerance where it gives none.
-USUAL_TOLERANCE = 0.01
-
-_MODELS: dict[str, Any] = {"mean": Mean, "banded": Banded, "modal": Modal, "mapped": Mapped}
-_RATIOS = (4.0, 2.0, 1.0, 0.5)
+_SHEARS: dict[str, Any] = {"mean": Mean, "banded": Banded, "modal": Modal, "mapped": Mapped}
+_STRETCHED: dict[str, Any] = {"rate": FirstMoment, "cohort": Cohort, "tracked": Tracked}
+_TWO_STATE: dict[str, Any] = {"steady": Steady, "rate": Rate, "counted": Counted}
+_BANDS = (0.3, 0.1, 0.03, 0.01, 0.003)
+_COHORTS = (1e-2, 1e-3, 1e-4, 1e-5)
+#: Most sites of a model that holds a number of them.
+_MOST_SITES = {"tracked": 1e5, "counted": 1e9}
 _MOST_POINTS = 2**14
+_USUAL_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
 class Setting:
-    """One row of the comparison.
+    """One row of the study.
 
     Attributes
     ----------
-    label, line : str
-        What it is called, and the line it belongs to: a depth, ``"clock step"`` or ``"grid"``.
+    label : str
+        Its name.
+    part : str
+        What it changes: ``"shear"``, ``"bonds"``, ``"step"`` or ``"grid"``.
     scenario : Scenario
         The scene at this setting, without sweep and maps.
     toml : str
-        What to write into the scenario file.
+        Lines of the scenario file that choose it, below the header of their table.
+    own : bool
+        Whether the scene has this setting as it is written.
     ratio : float
         Its clock step over the scene's.
-    tolerance : float
-        Of its bands; nan where there are none.
-    points : int
-        Points of the grid along a side; 0 where there is none.
     """
 
     label: str
-    line: str
+    part: str
     scenario: Scenario
     toml: str
+    own: bool = False
     ratio: float = 1.0
-    tolerance: float = math.nan
-    points: int = 0
+
+    @property
+    def sites(self) -> float:
+        """Number of bond sites of a member; infinite where bonds have a density only."""
+        return float(table(self.scenario.population).get("sites", math.inf))
+
+    @property
+    def points(self) -> int:
+        """Points of the grid along a side; 0 where the spectrum sets them."""
+        return int(table(self.scenario.shear).get("points") or 0)
+
+
+def table(part: Any) -> dict[str, Any]:
+    """A part as its table in a scenario file."""
+    kind: Any = type(part)
+    return dict(_adapter(kind).dump_python(part, by_alias=True))
+
+
+@functools.cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def plain(scenario: Scenario) -> Scenario:
+    """A scene without sweep and maps, its open choices of models settled."""
+    settled = scenario.with_values({"record": {}})
+    return settled.with_values({"shear": table(settled.fluctuations), "bonds": table(settled.population)})
 
 
 def tolerance_of(scenario: Scenario) -> float:
-    """The scene's tolerance, 1 % where it gives none."""
-    return float(getattr(scenario.shear, "tolerance", USUAL_TOLERANCE))
+    """Error that a scene accepts: the tolerance of its shear, else that by which its bonds are chosen, else 1 %."""
+    chosen = table(scenario.bonds) if scenario.bonds.model == "auto" else {}
+    return float(table(scenario.shear).get("tolerance") or chosen.get("tolerance") or _USUAL_TOLERANCE)
 
 
-def settings(scenario: Scenario) -> tuple[list[Setting], list[str]]:
-    """All admissible settings of a scene, shallow depths first, and what was left out with the reasons.
-
-    Tolerances that lead to the same bands are one setting. Clock steps and grids are varied at the
-    scene's own tolerance, or at its own depth where that has no cell.
-    """
-    plain = scenario.with_values({"record": {}})
-    left_out: list[str] = []
-    found = _depths(plain, left_out)
-    own = next((s for s in found if s.line == "banded" and s.tolerance == tolerance_of(plain)), found[0])
-    return [*found, *_clocks(own, left_out), *_grids(own, left_out)], left_out
+def number_of_sites(scenario: Scenario) -> float:
+    """Sites of the contact: as given, else by their density and the area at rest, else infinite."""
+    bonds, area = table(scenario.bonds), math.pi * scenario.rest_radius**2
+    if bonds.get("sites"):
+        return float(bonds["sites"])
+    return float(bonds["site_density"] * area) if bonds.get("site_density") and area > 0.0 else math.inf
 
 
-def _depths(scenario: Scenario, left_out: list[str]) -> list[Setting]:
-    given: Any = scenario.fluctuations
-    if not hasattr(given, "cell"):
-        return [Setting(given.model, given.model, scenario, f'[shear]\nmodel = "{given.model}"')]
-    own = tolerance_of(scenario)
-    tried = [("mean", math.nan), *(("banded", t) for t in sorted({*TOLERANCES, own}, reverse=True))]
-    tried += [("modal", math.nan), ("mapped", math.nan)]
-    found: list[Setting] = []
-    for model, tolerance in tried:
-        changes = {} if math.isnan(tolerance) else {"tolerance": tolerance}
+def settings(scenario: Scenario, left_out: list[str]) -> list[Setting]:
+    """All settings of a plain scene but clock steps, simple models first; reasons go to ``left_out``."""
+    return [*_shears(scenario, left_out), *_bonds(scenario, left_out), *_grids(scenario, left_out)]
+
+
+def _shears(scenario: Scenario, left_out: list[str]) -> list[Setting]:
+    given = table(scenario.shear)
+    if "cell" not in given:
+        return []
+    tried: list[tuple[str, dict[str, Any]]] = [("mean", {})]
+    tried += [("banded", {"tolerance": each}) for each in sorted({*_BANDS, tolerance_of(scenario)}, reverse=True)]
+    found = _models("shear", scenario, _SHEARS, [*tried, ("modal", {}), ("mapped", {})], left_out)
+    pairs = itertools.zip_longest(found, found[1:])
+    return [row for row, after in pairs if row.own or after is None or not _alike(row, after)]
+
+
+def _alike(row: Setting, after: Setting) -> bool:
+    """Whether two tolerances lead to the same bands, so that the coarser is no setting of its own."""
+    models = {row.scenario.shear.model, after.scenario.shear.model}
+    return models == {"banded"} and row.scenario.process.known_errors() == after.scenario.process.known_errors()
+
+
+def _bonds(scenario: Scenario, left_out: list[str]) -> list[Setting]:
+    given, models = table(scenario.bonds), _TWO_STATE
+    if "rebinding_rate" not in given:
+        return []
+    tried: list[tuple[str, dict[str, Any]]] = [("steady", {}), ("rate", {})]
+    if "rupture" in given:
+        models, own = _STRETCHED, given.get("tolerance", REFERENCE)
+        tried = [("rate", {}), *(("cohort", {"tolerance": each}) for each in sorted({*_COHORTS, REFERENCE, own})[::-1])]
+    last = list(models)[-1]
+    own_sites = given.get("sites", math.inf)
+    numbers = [own_sites] if math.isfinite(own_sites) else []
+    numbers += [each for each in [number_of_sites(scenario)] if each <= _MOST_SITES[last] and each != own_sites]
+    tried += [(last, {"sites": round(each)}) for each in sorted(numbers)]
+    if given.get("area") == "carried":
+        left_out.append(f"{last}: a number of sites cannot be carried with the area")
+        tried = [row for row in tried if row[0] not in (last, "steady")]
+    return _models("bonds", scenario, models, tried, left_out)
+
+
+def _models(
+    part: str, scenario: Scenario, models: dict[str, Any], tried: Iterable[tuple[str, dict[str, Any]]],
+    left_out: list[str],
+) -> list[Setting]:  # fmt: skip
+    """The scene with other models of one part, which keep as many of its keys as they take."""
+    given = table(getattr(scenario, part))
+    found = []
+    for model, changes in tried:
+        label = " ".join([model, *(f"{value:,}" for value in changes.values())])
+        taken = {item.alias or name for name, item in models[model].__pydantic_fields__.items()}
+        values = {key: value for key, value in given.items() if key in taken and value is not None}
         try:
-            changed = scenario.with_values({"shear": _table(scenario, model) | changes})
-            points = int(getattr(changed.shear, "points", None) or 0)
-            label = model if math.isnan(tolerance) else f"{model} {tolerance:g}"
-            setting = Setting(label, model, changed, _shear_lines(scenario, model, changes), 1.0, tolerance, points)
-            same = found and model == "banded" == found[-1].line and _alike(found[-1].scenario, changed)
+            changed = scenario.with_values({part: values | changes | {"model": model}})
+            changed.process  # noqa: B018 - some models are refused only when their modes are made
         except ValueError as fault:
-            left_out.append(f"{model}: {_reason(fault)}")
+            left_out.append(f"{label}: {_reason(fault)}")
             continue
-        if not same:
-            found.append(setting)
-        elif tolerance == own or found[-1].tolerance != own:
-            found[-1] = _joined(found[-1], setting, setting if tolerance == own else found[-1])
-        else:
-            found[-1] = _joined(found[-1], setting, found[-1])
+        lines = [f'model = "{model}"', *(f"{key} = {value}" for key, value in changes.items())]
+        kept = {*taken, "tolerance", "points", "sites"}
+        lost = [key for key, value in given.items() if key not in kept and value is not None]
+        if lost:
+            lines[0] += f"    # without {', '.join(lost)}"
+        own = given["model"] == model and all(given.get(key) == value for key, value in changes.items())
+        found.append(Setting(label, part, changed, "\n".join(lines), own))
     return found
-
-
-def _joined(first: Setting, last: Setting, kept: Setting) -> Setting:
-    """Several tolerances that lead to the same bands."""
-    coarsest = first.label.partition(" to ")[0]
-    label = f"{coarsest} to {last.tolerance:g}"
-    return Setting(label, kept.line, kept.scenario, kept.toml, 1.0, kept.tolerance, kept.points)
-
-
-def _alike(one: Scenario, other: Scenario) -> bool:
-    """Whether two banded scenes have the same bands."""
-    a, b = one.process, other.process
-    if isinstance(a, BandedProcess) and isinstance(b, BandedProcess):
-        return np.array_equal(a.bands.weight, b.bands.weight) and np.array_equal(a.bands.freedom, b.bands.freedom)
-    return (
-        isinstance(a, SmoothProcess)
-        and isinstance(b, SmoothProcess)
-        and math.isclose(a.energy, b.energy, rel_tol=1e-12)
-    )
-
-
-def _table(scenario: Scenario, model: str) -> dict[str, Any]:
-    """The scene's table [shear] as another depth takes it."""
-    dumped = TypeAdapter(Scenario).dump_python(scenario, by_alias=True, exclude={"source", "sweep"})["shear"]
-    known = _MODELS[model].__pydantic_fields__
-    return {key: value for key, value in dumped.items() if key in known and value is not None} | {"model": model}
-
-
-def _shear_lines(scenario: Scenario, model: str, changes: dict[str, Any]) -> str:
-    """The lines of [shear] that choose a depth, with a word on keys that it does not take."""
-    part: Any = scenario.shear
-    fields = type(part).__pydantic_fields__
-    unknown = [
-        key for key in fields
-        if key not in _MODELS[model].__pydantic_fields__ and getattr(part, key) not in (None, fields[key].default)
-    ]  # fmt: skip
-    left = f"    # without {', '.join(unknown)}" if unknown else ""
-    return "\n".join(["[shear]", f'model = "{model}"{left}', *(f"{key} = {value:g}" for key, value in changes.items())])
 
 
 def _reason(fault: ValueError) -> str:
@@ -145,40 +174,28 @@ def _reason(fault: ValueError) -> str:
     return str(fault).partition("\n")[0]
 
 
-def _clocks(own: Setting, left_out: list[str]) -> list[Setting]:
-    """Other clock steps whose whole multiples the records are; the scene's own among them, none if it is alone."""
-    clock = own.scenario.clock
-    record = clock.stride * clock.step
-    found = []
-    for ratio in _RATIOS:
-        if ratio > 1.0 and clock.stride % round(ratio):
-            continue
-        step = clock.step * ratio
-        lines = [own.toml, "", "[clock]", f'step = "{step:.12g} s"', f'record = "{record:.12g} s"']
-        try:
-            table = {"duration": clock.duration, "step": step, "record": record}
-            scenario = own.scenario if ratio == 1.0 else own.scenario.with_values({"clock": table})
-        except ValueError as fault:
-            left_out.append(f"clock step of {step:g} s: {_reason(fault)}")
-            continue
-        label = f"{own.label}, step {engineering(step, 's')}"
-        found.append(Setting(label, "clock step", scenario, "\n".join(lines), ratio, own.tolerance, own.points))
-    return found if len(found) > 1 else []
+def at_step(scenario: Scenario, ratio: float) -> Setting:
+    """The scene with its clock step times a power of two."""
+    clock = scenario.clock
+    step, record = clock.step * ratio, clock.stride * clock.step
+    changed = scenario.with_values({"clock": {"duration": clock.duration, "step": step, "record": record}})
+    lines = f'step = "{step:.12g} s"\nrecord = "{record:.12g} s"'
+    return Setting(f"step {engineering(float(f'{step:.4g}'), 's')}", "step", changed, lines, ratio == 1.0, ratio)
 
 
-def _grids(own: Setting, left_out: list[str]) -> list[Setting]:
+def _grids(scenario: Scenario, left_out: list[str]) -> list[Setting]:
     """Half and twice the points, where the spectrum has no shortest wave of its own to set them."""
-    part: Any = own.scenario.shear
-    endless = math.isinf(getattr(getattr(part, "spectrum", None), "support", (0.0, 0.0))[1])
-    if not (own.points and endless):
+    own = Setting("", "grid", scenario, "", own=True)
+    part: Any = scenario.fluctuations
+    if not own.points or math.isfinite(part.spectrum.support[1]):
         return []
     found = []
     for points in (own.points // 2, own.points, min(2 * own.points, _MOST_POINTS)):
         try:
-            scenario = own.scenario if points == own.points else own.scenario.with_values({"shear.points": points})
+            changed = scenario.with_values({"shear.points": points})
         except ValueError as fault:
             left_out.append(f"{points} points: {_reason(fault)}")
             continue
-        toml = f"{own.toml}\npoints = {points}"
-        found.append(Setting(f"{own.label}, {points} points", "grid", scenario, toml, 1.0, own.tolerance, points))
+        line = f"points = {points}"
+        found.append(replace(own, label=f"{points} points", scenario=changed, toml=line, own=points == own.points))
     return found

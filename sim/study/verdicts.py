@@ -1,8 +1,9 @@
-"""What ``sim converge`` found, in words: a table for the terminal and a closing sentence.
+"""What ``sim converge`` found, in words: a table for the terminal, its explanation and a recommendation.
 
 Everything is read from the dataset.
 """
 
+import itertools
 import math
 from typing import NamedTuple
 
@@ -10,79 +11,66 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from sim.analysis import concise, engineering
+from sim.analysis import engineering
 
-Mask = NDArray[np.bool_]
+Array = NDArray[np.float64]
 
-#: Standard errors beyond which an error is real, and beyond which it contradicts what was known beforehand.
-_REAL, _CONTRADICTS = 4.0, 5.0
+#: Standard errors by which a sample differs from what is expected for a reason other than chance.
+_DIFFERS = 5.0
+#: Errors and differences below this are of the closed forms, which stand for distributions by a few values.
+_SMALL = 2e-3
+#: Errors below this are roundings.
+_ROUNDING = 1e-9
 
-#: Standard errors within which an error may still be at the tolerance.
-_WITHIN = 2.0
-
-#: Errors below this are not told: the closed forms are not exact to more.
-_TOLD = 1e-4
-
-#: Costs that differ by less than this share count as equal.
-_SAME_COST = 0.15
-
-_SHORT = ("mean", "sd", "skew", "q01", "q99", "t_c")
-_SYMBOLS = ("ΔΓ", "a")
-_OF = ("ΔΓ", "the radius")
+_SHORT = ("mean", "spread", "skewness", "correlation time")
+_CELLS = ("mean", "spread", "skew", "memory")
+_SYMBOLS = ("stress", "bonds", "ΔΓ", "radius")
+_OF = ("the shear stress", "the bond fraction", "ΔΓ", "the radius")
 
 
-def real(dataset: xr.Dataset) -> Mask:
-    """Where a measured error cannot be sampling, shape (rows, times, quantities, statistics)."""
-    error, sem = np.abs(dataset["error"].to_numpy()), dataset["standard_error"].to_numpy()
-    return (error > _REAL * sem) & (error > _TOLD)
-
-
-def contradicted(dataset: xr.Dataset) -> Mask:
-    """Where a measured error is not the one known beforehand: a fault of the program."""
-    off = np.abs(dataset["error"].to_numpy() - dataset["known_error"].to_numpy())
-    found = (off > _CONTRADICTS * dataset["standard_error"].to_numpy()) & (off > _TOLD)
-    found[:, :, 1, 5] = False  # the correlation time of the radius is known to first order only
-    return found
-
-
-def cost(dataset: xr.Dataset) -> NDArray[np.float64]:
-    """CPU time of each row per member and clock step *of the scene*, so that coarser steps count for more [s]."""
-    return (dataset["cpu_time"] * dataset.attrs["clock_step"] / dataset["clock_step"]).to_numpy()
-
-
-class Worst(NamedTuple):
-    """The largest of some errors and what it is of; nan and nothing where none is known."""
+class Largest(NamedTuple):
+    """The largest of some errors and what it is of; nan where none is known."""
 
     error: float
-    statistic: str
     quantity: int
+    statistic: int
 
     def __str__(self) -> str:
-        return f"{percent(abs(self.error))} ({self.statistic} of {_OF[self.quantity]})"
+        if not self.error > _ROUNDING:
+            return "0 %"
+        return f"{percent(self.error)} ({_SHORT[self.statistic]} of {_OF[self.quantity]})"
 
 
-def worst(errors: NDArray[np.float64], names: tuple[str, ...]) -> Worst:
-    """The largest of errors of shape (times, quantities, statistics) by size."""
-    sizes = np.abs(errors)
-    if not np.any(np.isfinite(sizes)):
-        return Worst(math.nan, "", 0)
-    place = np.unravel_index(int(np.nanargmax(sizes)), sizes.shape)
-    return Worst(float(errors[place]), names[place[2]], int(place[1]))
+def largest(errors: Array) -> Largest:
+    """The largest of errors of shape (quantities, statistics)."""
+    if not np.any(np.isfinite(errors)):
+        return Largest(math.nan, 0, 0)
+    quantity, statistic = np.unravel_index(int(np.nanargmax(errors)), errors.shape)
+    return Largest(float(errors[quantity, statistic]), int(quantity), int(statistic))
 
 
 def percent(error: float) -> str:
-    """A relative error to two digits.
+    """A relative error in percent, two digits.
 
-    >>> print(percent(-0.0123), percent(2e-6), percent(1.0))
-    -1.2 % 0 % 100 %
+    >>> print(percent(0.0123), percent(2e-6), percent(0.0), percent(1.0))
+    1.2 % 0.0002 % 0 % 100 %
     """
-    if abs(error) < _TOLD:
-        return "0 %"
-    return f"{float(f'{100.0 * error:.2g}'):g} %"
+    return f"{float(f'{100.0 * error:.2g}'):.4g} %" if error > _ROUNDING else "0 %"
+
+
+def differing(dataset: xr.Dataset) -> NDArray[np.bool_]:
+    """Where a sample is not what is expected, for whatever reason but chance; shape as ``deviation``."""
+    off = np.abs(dataset["deviation"].to_numpy()) - _SMALL
+    return off > _DIFFERS * dataset["standard_error"].to_numpy()
+
+
+def _lawful(dataset: xr.Dataset) -> NDArray[np.bool_]:
+    """Errors that a law gives, shape (rows, 1, quantities, statistics)."""
+    return np.isnan(dataset["bound"].to_numpy()[:, np.newaxis])
 
 
 def table(dataset: xr.Dataset) -> list[dict[str, str]]:
-    """Two rows for each setting, of ΔΓ and of the radius, for the terminal.
+    """A row for each setting, for the terminal; ``explanation`` says what its columns are.
 
     Parameters
     ----------
@@ -92,226 +80,221 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
     Returns
     -------
     list of dict
-        Cells by heading. Errors are in percent of their yardsticks with the standard error of the last
-        digits in brackets, at the first stated time; "known" is the largest error known beforehand,
-        and the verdict names the statistics whose errors are real (more than four standard errors),
-        at any of the stated times.
+        Cells by heading.
     """
-    when = engineering(float(dataset["t"][0]), "s")
-    found, wrong = real(dataset), contradicted(dataset)
+    shown = np.flatnonzero(np.isfinite(dataset["error"].to_numpy()).any(axis=(0, 2)))
+    wrong = np.any(differing(dataset) & _lawful(dataset), axis=(1, 2, 3))
     rows = []
     for row in range(dataset.sizes["row"]):
         here = dataset.isel(row=row)
-        about = [str(here["row"].values), _count(here["terms"]), _micro(here["cpu_time"]), _micro(here["wall_time"])]
-        about.append(_count(here["members"]))
-        for q, symbol in enumerate(_SYMBOLS):
-            numbers = here.isel(quantity=q, t=0)
-            errors, sems = (100.0 * numbers[name].to_numpy() for name in ("error", "standard_error"))
-            texts = [_cell(error, sem) for error, sem in zip(errors, sems, strict=True)]
-            known = worst(here["known_error"].to_numpy()[:, [q]], _SHORT)
-            verdict = _verdict(here.isel(quantity=q), found[row, :, q], wrong[row, :, q])
-            headings = ("setting", "terms", "CPU\n(µs)", "wall\n(µs)", "members")
-            cells = dict(zip(headings, about if q == 0 else [""] * len(about), strict=True)) | {f"at\n{when}": symbol}
-            cells |= {f"{name}\n(%)": text for name, text in zip(_SHORT, texts, strict=True)}
-            cells["known\nat most"] = _largest(known)
-            rows.append(cells | {"verdict": verdict})
+        cells = {"changed": str(here["part"].values), "setting": str(here["row"].values) + " *" * int(here["own"])}
+        cells["time of the run"] = _time(*(float(here[name]) for name in ("time", "time_low", "time_high")))
+        for q in shown:
+            cells[f"{_SYMBOLS[q]}\n(%)"] = _error_cell(here["error"].to_numpy()[q], here["bound"].to_numpy()[q])
+        members = int(here["members"])
+        cells["members\nsampled"] = f"{members:,}" if members else "–"
+        cells["sample"] = "DIFFERS" if wrong[row] else "agrees" if members else "–"
+        rows.append(cells)
     return rows
 
 
-def _largest(known: Worst) -> str:
-    """A known error without its sign, and what it is of."""
-    if math.isnan(known.error):
+def _error_cell(errors: Array, bounds: Array) -> str:
+    """The largest error of a quantity in percent, or its bound, with its statistic unless that is the mean."""
+    found = largest(np.fmax(errors, bounds)[np.newaxis])
+    if math.isnan(found.error):
         return "–"
-    size = percent(abs(known.error))
-    return size if size == "0 %" else f"{size} {known.statistic}"
+    size = percent(found.error).removesuffix(" %")
+    of = "" if found.statistic == 0 or size == "0" else f" {_CELLS[found.statistic]}"
+    return ("≤ " if np.isfinite(bounds[found.statistic]) and size != "0" else "") + size + of
 
 
-def _count(number: xr.DataArray) -> str:
-    return f"{int(number):,}"
+def _time(median: float, low: float, high: float) -> str:
+    """A time with the range of its repeats, all in one unit.
 
-
-def _micro(seconds: xr.DataArray) -> str:
-    return f"{1e6 * float(seconds):.3g}"
-
-
-def _cell(error: float, sem: float) -> str:
-    """An error with its standard error, or without where it has none."""
-    if math.isnan(error):
-        return "–"
-    return "0" if abs(error) < 1e-6 and not sem > 1e-6 else concise(error, sem).replace("-", "−")
-
-
-def _verdict(here: xr.Dataset, found: Mask, wrong: Mask) -> str:
-    """Which errors of a row are real, over its statistics and times."""
-    if not int(here["members"]):
-        return "over budget"
-    errors = here["error"].to_numpy()
-    if not np.any(np.isfinite(errors)):
-        return "the reference"
-    if np.any(wrong):
-        return f"NOT AS KNOWN: {_named(wrong)}"
-    if np.any(found):
-        return f"real: {_named(found)}"
-    return "not separated" if np.nanmax(here["standard_error"].to_numpy()) > 0.0 else "exact"
-
-
-def _named(which: Mask) -> str:
-    return " ".join(name for number, name in enumerate(_SHORT) if np.any(which[:, number]))
-
-
-def unknown(dataset: xr.Dataset) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Measured errors that are not known beforehand, by size, and their standard errors; nan where they are known.
-
-    The finest clock step, which nothing finer judges, errs at most as the next one differs from it; and
-    what is not known of the scene's own clock step is not known of any depth at that step.
+    >>> print(_time(0.0123, 0.012, 0.014))
+    12 (12–14) ms
     """
-    known = dataset["known_error"].to_numpy()
-    error, sem = (
-        np.where(np.isnan(known), np.abs(dataset[name].to_numpy()), np.nan) for name in ("error", "standard_error")
-    )
-    line, step = dataset["line"].to_numpy(), dataset["clock_step"].to_numpy()
-    clocks = sorted(np.flatnonzero(line == "clock step"), key=lambda row: step[row])
-    if clocks:
-        finest, coarser = clocks[:2]
-        itself = np.isnan(error[finest])
-        error[finest], sem[finest] = (np.where(itself, a[coarser], a[finest]) for a in (error, sem))
-        own = next((row for row in clocks if step[row] == dataset.attrs["clock_step"]), finest)
-        depths = (line != "clock step") & (line != "grid")
-        error[depths], sem[depths] = (np.fmax(a[depths], a[own]) for a in (error, sem))
-    return error, sem
+    factor, unit = (1e3, "ms") if median < 0.1 else (1.0, "s")
+    first, second, third = (f"{float(f'{factor * each:.2g}'):.4g}" for each in (median, low, high))
+    return f"{first} ({second}–{third}) {unit}"
 
 
-def within(dataset: xr.Dataset, tolerance: float) -> Mask:
-    """Which rows keep a tolerance, shape (rows,).
+def explanation(dataset: xr.Dataset) -> str:
+    """What was studied and what the columns of the table are, in sentences."""
+    members, steps = int(dataset.attrs["members_of_run"]), int(dataset.attrs["steps"])
+    run = f"{members:,} member{'s' if members > 1 else ''}, {steps:,} steps of {_step(dataset.attrs['clock_step'])}"
+    said = [f"Studied: {dataset.attrs['point']}."] if dataset.attrs["point"] else []
+    said += [
+        "Each row changes one thing of the scene; * is what the scene has.",
+        f"time of the run: CPU time of the whole run ({run}) on one core, median and range of five repeats.",
+        "stress, bonds, ΔΓ, radius: largest error over the run in percent, of the mean unless said otherwise: of means "
+        "in units of the largest mean, of the spread (standard deviation) and the skewness over members in units of "
+        "their own largest value, memory that of the correlation time. Most are known from closed forms and runs "
+        "without noise; ≤ marks those that only samples show, with two standard errors added.",
+        "sample: whether the members sampled are what is expected, within five standard errors; if one DIFFERS, the "
+        "program is at fault.",
+    ]
+    if dataset.attrs["left_out"]:
+        said.append("Left out: " + "; ".join(dataset.attrs["left_out"].split("\n")) + ".")
+    return "\n".join(said)
 
-    All errors known beforehand do, no measured one is beyond by more than two standard errors unless
-    it is the known one within four, and none that is ``unknown``.
+
+def _step(seconds: float) -> str:
+    return engineering(float(f"{seconds:.4g}"), "s")
+
+
+class Choice(NamedTuple):
+    """One row of each part, with the time of the run and the errors that they make together."""
+
+    rows: tuple[int, ...]
+    time: float
+    low: float
+    high: float
+    error: Array
+    bound: Array
+
+    @property
+    def off(self) -> float:
+        """The largest error, by which combinations are chosen."""
+        return float(np.nanmax(self.error, initial=0.0))
+
+
+def choices(dataset: xr.Dataset) -> list[Choice]:
+    """All combinations of one setting a part, that of the scene first.
+
+    Errors add up, and so does what each change adds to the time of a step; clock steps multiply it.
     """
-    known, error, sem = (dataset[name].to_numpy() for name in ("known_error", "error", "standard_error"))
-    explained = np.abs(error - known) <= _REAL * sem + _TOLD
-    beyond = (np.abs(error) - _WITHIN * sem > tolerance + _TOLD) & ~explained
-    error, sem = unknown(dataset)
-    beyond |= error - _WITHIN * sem > tolerance + _TOLD
-    promised = ~(np.abs(known) > tolerance * (1.0 + 1e-9))
-    return (promised & ~beyond).all(axis=(1, 2, 3)) & (dataset["members"].to_numpy() > 0)
+    part, own = dataset["part"].to_numpy(), dataset["own"].to_numpy().astype(bool)
+    error = np.nan_to_num(dataset["error"].to_numpy())
+    bound = np.fmax(error, dataset["bound"].to_numpy())
+    kinds = [np.flatnonzero(part == kind) for kind in ("shear", "bonds", "grid", "step")]
+    groups = [sorted(rows.tolist(), key=lambda row: not own[row]) for rows in kinds if rows.size]
+    median, low, high = (dataset[name].to_numpy() for name in ("time", "time_low", "time_high"))
+    found = []
+    for rows in itertools.product(*groups):
+        time, timed = _together(median, rows, groups[-1][0]), [row for row in rows if not own[row]] or rows[-1:]
+        shares = (low / median)[list(timed)].min(), (high / median)[list(timed)].max()
+        found.append(
+            Choice(
+                rows, time, time * shares[0], time * shares[1], *(of[list(rows)].sum(axis=0) for of in (error, bound))
+            )
+        )
+    return found
+
+
+def _together(times: Array, rows: tuple[int, ...], own: int) -> float:
+    """Time of a run with several changes; the last row is a clock step."""
+    changed = [float(times[row]) for row in rows[:-1]]
+    summed = float(times[own]) + sum(time - float(times[own]) for time in changed)
+    return max(summed, 0.2 * min([float(times[own]), *changed])) * float(times[rows[-1]] / times[own])
+
+
+def chosen(tried: list[Choice], tolerance: float) -> tuple[Choice, int]:
+    """The combination to take, and of how many that take as long; the nearest and 0 where none keeps the tolerance."""
+    good = [choice for choice in tried if choice.off <= tolerance * (1.0 + 1e-9)]
+    if not good:
+        return min(tried, key=lambda choice: choice.off), 0
+    cheapest = min(good, key=lambda choice: choice.time)
+    equal = [choice for choice in good if choice.low <= cheapest.high]
+    return min(equal, key=lambda choice: choice.off), len(equal)
 
 
 def recommendation(dataset: xr.Dataset) -> str:
-    """The cheapest setting that keeps the scene's tolerance, in words and with the lines to write.
+    """The cheapest combination that keeps the accepted error, in words and with the lines to write.
+
+    Of combinations whose ranges of time overlap the most accurate is taken.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As ``sim.study.converge.converge`` gives it.
     """
-    tolerance, line = float(dataset.attrs["asked_tolerance"]), dataset["line"].to_numpy()
-    paid, kept = cost(dataset), within(dataset, tolerance)
-    open_to_all = line != "grid"
-    size = np.array([_reached(dataset, row) for row in range(len(line))])
-    candidates = np.flatnonzero(kept & open_to_all)
-    if candidates.size:
-        cheap = candidates[paid[candidates] <= (1.0 + _SAME_COST) * paid[candidates].min()]
-        row = int(cheap[np.argmin(size[cheap])])
-        said = [_praise(dataset, row, tolerance)]
+    tolerance = float(dataset.attrs["tolerance"])
+    tried = choices(dataset)
+    own, (best, equal) = tried[0], chosen(tried, tolerance)
+    said = [_as_written(dataset, own)]
+    if equal:
+        same = f"; {equal - 1} more take as long within the spread of the times, this is the most accurate"
+        said.append(
+            f"{'It' if best is own else f'“{_named(dataset, best)}”'} is the cheapest combination that keeps "
+            f"{percent(tolerance)}: off by at most {largest(best.error)}, {_time(best.time, best.low, best.high)} of "
+            f"CPU time{same if equal > 1 else ''}."
+        )
     else:
-        tried = np.flatnonzero(open_to_all & (dataset["members"].to_numpy() > 0))
-        if not tried.size:
-            return "The budget is too small to sample any setting; the table tells what is known beforehand."
-        row = int(tried[np.argmin(size[tried])])
-        said = [_nearest(dataset, row, tolerance)]
-    grid, points = _grid_advice(dataset, row, tolerance)
-    said += [*grid, *_warnings(dataset)]
-    shear, *others = str(dataset["toml"].values[row]).split("\n\n")
-    return "\n\n".join([f"{' '.join(said)} Write:", shear + points, *others])
+        said.append(
+            f"No combination keeps {percent(tolerance)}: “{_named(dataset, best)}” comes nearest, off by "
+            f"at most {largest(best.error)}. {_shorter(dataset, best, tolerance)}".rstrip()
+        )
+    said.append(_sight(dataset, best))
+    text = "\n".join(said)
+    return text if best is own else f"{text}\nWrite:\n\n{_toml(dataset, best, own)}"
 
 
-def _reached(dataset: xr.Dataset, row: int) -> float:
-    """The largest error of a row."""
-    return float(np.nanmax(np.abs(_sizes(dataset, row)), initial=0.0))
+def _named(dataset: xr.Dataset, choice: Choice) -> str:
+    return ", ".join(str(dataset["row"].values[row]) for row in choice.rows)
 
 
-def _sizes(dataset: xr.Dataset, row: int) -> NDArray[np.float64]:
-    """Errors of a row: as known, where nothing is known as far as measured beyond two standard errors."""
-    known = dataset["known_error"].to_numpy()[row]
-    error, sem = (numbers[row] for numbers in unknown(dataset))
-    return np.where(np.isfinite(known), known, np.maximum(error - _WITHIN * sem, 0.0))
+_PARTS = {"shear": "shear model", "bonds": "bond model", "grid": "grid", "step": "clock step"}
 
 
-def _praise(dataset: xr.Dataset, row: int, tolerance: float) -> str:
-    """What a setting that keeps the tolerance costs and errs."""
-    here = dataset.isel(row=row)
-    names = tuple(dataset["statistic"].to_numpy())
-    known = worst(here["known_error"].to_numpy(), names)
-    spent = f"{float(f'{1e6 * cost(dataset)[row]:.2g}'):g} µs of CPU time per member and step"
-    spent += "" if float(here["clock_step"]) == dataset.attrs["clock_step"] else " of the scene"
-    if not np.any(dataset["standard_error"].to_numpy() > 0.0):
-        if max(np.nanmax(np.abs(dataset[name].to_numpy()), initial=0.0) for name in ("known_error", "error")) < _TOLD:
-            return (
-                "Nothing fluctuates here and nothing depends on the clock step: every setting gives the exact answer, "
-                f"and “{here['row'].values}” is the cheapest, with {spent}."
-            )
+#: Tables of the scenario file that hold what the parts of another name change.
+_TABLES = {"grid": "shear", "step": "clock"}
+
+
+def _as_written(dataset: xr.Dataset, own: Choice) -> str:
+    """Error of the scene as it is, and what it comes from."""
+    found = largest(own.error)
+    if not found.error > _ROUNDING:
+        return "As it is written the scene is exact: nothing in it errs by its models, its clock step or its grid."
+    shares = dataset["error"].to_numpy()[list(own.rows), found.quantity, found.statistic]
+    parts = [_PARTS[str(dataset["part"].values[row])] for row in own.rows]
+    ordered = sorted(zip(shares, parts, strict=True), key=lambda share: -np.nan_to_num(share[0]))
+    of = ", ".join(f"{percent(share)} by its {part}" for share, part in ordered if share > _ROUNDING)
+    return f"As it is written the scene is off by at most {found}: {of}."
+
+
+def _shorter(dataset: xr.Dataset, chosen: Choice, tolerance: float) -> str:
+    """Which step might do where the finest that was tried does not."""
+    step = chosen.rows[-1]
+    errors = dataset["error"].to_numpy()[step]
+    if not np.nanmax(errors, initial=0.0) > 0.5 * tolerance:
+        return ""
+    guess = float(dataset["clock_step"][step]) * 0.5 * tolerance / float(np.nanmax(errors))
+    return (
+        f"The clock step rules: by its trend about {_step(float(f'{guess:.1g}'))} would do; a larger budget tries it."
+    )
+
+
+def _sight(dataset: xr.Dataset, best: Choice) -> str:
+    """What the samples can tell."""
+    wrong = differing(dataset) & _lawful(dataset)
+    if wrong.any():
+        rows = dataset["row"].to_numpy()[wrong.any(axis=(1, 2, 3))]
+        return f"Beware: samples of {', '.join(map(str, rows))} are not what is expected: a fault of the program."
+    sem = dataset["standard_error"].to_numpy()
+    if not np.any(np.isfinite(sem)):
+        small = bool(dataset.attrs["fluctuates"])
         return (
-            f"Nothing fluctuates here. “{here['row'].values}” is the cheapest that keeps "
-            f"{percent(tolerance)}: its largest error is {worst(_sizes(dataset, row), names)}."
+            "The budget is too small for samples." if small else "Nothing fluctuates here; there is nothing to sample."
         )
-    unseen = worst(_WITHIN * unknown(dataset)[1][row], names)
-    doubtful = unseen.error > tolerance
-    told = ", as far as sampling tells, keeps" if doubtful else " keeps"
-    text = f"“{here['row'].values}” is the cheapest setting that{told} {percent(tolerance)}: {spent}"
-    faster = _times_modal(dataset, row)
-    text += f", {float(f'{faster:.2g}'):g} times as fast as the modal depth" if faster > 1.2 else ""
-    if math.isfinite(known.error):
-        text += (
-            f". Its largest error known beforehand is {known}"
-            if abs(known.error) > _TOLD
-            else ". It is exact in what is known beforehand"
-        )
-    if doubtful:
-        text += f"; what is not known beforehand was measured to {unseen} only: a larger budget tells more"
-    return text + "."
+    open_ = largest(np.where(best.bound > best.error * (1.0 + 1e-9), best.bound, np.nan))
+    if open_.error > 0.0:
+        return f"Where there is no law, samples leave errors of up to {open_} open; a larger budget narrows that."
+    quantity = 3 if np.any(np.isfinite(sem[:, :, 3])) else 1
+    least = np.where(sem > 0.0, sem, -np.inf)[:, :, quantity].max(axis=1)
+    least = np.where(least > 0.0, least, np.inf).min(axis=0)
+    seen = [f"the {name} to {percent(2.0 * size)}" for name, size in zip(_SHORT, least, strict=True) if size < math.inf]
+    return (
+        "Measured differences are all below what this budget can see, which of "
+        f"{_OF[quantity]} is {', '.join(seen)} in the row that was sampled best."
+    )
 
 
-def _times_modal(dataset: xr.Dataset, row: int) -> float:
-    """How many times cheaper than the modal depth a row is; nan without one."""
-    modal = np.flatnonzero(dataset["line"].to_numpy() == "modal")
-    paid = cost(dataset)
-    return float(paid[modal[0]] / paid[row]) if modal.size else math.nan
-
-
-def _nearest(dataset: xr.Dataset, row: int, tolerance: float) -> str:
-    """What comes nearest where nothing keeps the tolerance."""
-    here = dataset.isel(row=row)
-    far = worst(_sizes(dataset, row), tuple(dataset["statistic"].to_numpy()))
-    text = f"No setting keeps {percent(tolerance)}; “{here['row'].values}” comes nearest, off by {far}"
-    clock = dataset["line"].to_numpy() == "clock step"
-    finer = bool(clock[row]) and float(here["clock_step"]) == float(dataset["clock_step"].min())
-    return text + (": a still shorter clock step would come nearer." if finer else ".")
-
-
-def _grid_advice(dataset: xr.Dataset, row: int, tolerance: float) -> tuple[list[str], str]:
-    """What the grid leaves out, where it does, and the line that cures it."""
-    grids = np.flatnonzero((dataset["line"] == "grid").to_numpy())
-    own = [k for k in grids if int(dataset["points"][k]) == int(dataset["points"][row])]
-    if not own:
-        return [], ""
-    known = worst(dataset["known_error"].to_numpy()[own[0]], tuple(dataset["statistic"].to_numpy()))
-    if not abs(known.error) > tolerance:
-        return [], ""
-    enough = [k for k in grids if within(dataset, tolerance)[k]]
-    count = int(dataset["points"][enough[0]]) if enough else 0
-    cure = f"{count} points keep the tolerance" if enough else "take more points still"
-    said = f"But the grid of {int(dataset['points'][row])} points leaves short waves out and errs by {known}: {cure}."
-    return [said], f"\npoints = {count}" if enough else ""
-
-
-def _warnings(dataset: xr.Dataset) -> list[str]:
-    """Measured errors that contradict what is known beforehand."""
-    wrong = contradicted(dataset)
-    rows = [str(dataset["row"].values[k]) for k in np.flatnonzero(wrong.any(axis=(1, 2, 3)))]
-    if not rows:
-        return []
-    names = f"“{rows[0]}”" + (f" and {len(rows) - 1} more" if len(rows) > 1 else "")
-    return [
-        f"Beware: {names} differ by more than five standard errors from what is known beforehand: "
-        "a fault of the program."
-    ]
+def _toml(dataset: xr.Dataset, chosen: Choice, own: Choice) -> str:
+    """Lines to write into the scenario file."""
+    tables: dict[str, list[str]] = {}
+    for row, before in zip(chosen.rows, own.rows, strict=True):
+        if row != before:
+            part = str(dataset["part"].values[row])
+            tables.setdefault(_TABLES.get(part, part), []).append(str(dataset["toml"].values[row]))
+    return "\n\n".join("\n".join([f"[{name}]", *lines]) for name, lines in tables.items())
