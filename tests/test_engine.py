@@ -80,8 +80,8 @@ def check_waist(scenario, state, members):
         assert value.shape == ((members,) if scenario.varies[part] else (1,)), part
     work = balance_of(scenario, state)
     assert_allclose(state.contact.work, np.broadcast_to(work, state.contact.work.shape), rtol=1e-13, atol=1e-16)
-    grip = scenario.contact.grip(scenario.clock.time(state.step), scenario.clock.duration)
-    hertz = grip.radius(np.zeros(1), np.zeros(1), 0.0, scenario.bodies)
+    control = scenario.contact.control(scenario.clock.time(state.step), scenario.clock.duration)
+    hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, scenario.bodies)
     closed = np.isfinite(state.contact.radius)
     if np.isfinite(hertz[0]):
         assert np.all(state.contact.radius[closed] >= hertz * (1 - 1e-12))

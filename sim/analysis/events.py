@@ -1,4 +1,4 @@
-"""What a whole run says of a member once: when it opened, how long it was masked, its friction peak, its losses."""
+"""Events of a run, once per member: first pull-off, time masked, friction peak, energy dissipated."""
 
 import contextlib
 
@@ -16,7 +16,7 @@ _ERRORS = 5.0
 
 
 def events(dataset: xr.Dataset) -> xr.Dataset:
-    """What is told once of each member, or once of all where they agree.
+    """Events of a run, once per member, or once for all where they agree.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Energies of a contact that is cycled: the loop of load over displacement, and what opening and closing dissipate."""
+"""Energies of a cycled contact: the loop of load over displacement, and the dissipation of opening and closing."""
 
 import numpy as np
 import xarray as xr
@@ -10,7 +10,7 @@ _ROUNDING = 1e-12
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
-    """Work that goes into the contact over each cycle there and back, and what it dissipates meanwhile.
+    """Work put into the contact in each cycle there and back, and the energy it dissipates meanwhile.
 
     Parameters
     ----------
@@ -31,13 +31,13 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
 
     Notes
     -----
-    ``loop_energy`` is the closed integral of P dΔ with Δ the displacement of what holds the sphere (its indentation,
+    ``loop_energy`` is the closed integral of P dΔ with Δ the displacement of the base (the indentation,
     where that or a load is prescribed), by the trapezoidal rule over the records. A jump between two records is
     drawn as a straight line, so each costs up to half its load times the displacement of one record;
     elsewhere the error falls with the square of the time between records.
 
-    ``loop_dissipation`` is the amplitude of ``dissipated_energy``. Where the work of adhesion stays what it is and the
-    contact follows equilibrium it is the whole loop: all that is put in is lost in jumps. With
+    ``loop_dissipation`` is the growth of ``dissipated_energy``. Where the work of adhesion stays what it is and the
+    contact follows equilibrium it is the whole loop: all the work is dissipated in jumps. With
     bonds that break and heal, or fluctuations, the work of adhesion itself does work over a cycle.
     """
     cycles = _cycles(dataset)
@@ -77,7 +77,7 @@ def _cycles(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _per_cycle(series: xr.DataArray, period: xr.DataArray, times: xr.DataArray, count: int) -> xr.DataArray:
-    """How much a growing series gains in each cycle; nan beyond the last one."""
+    """Growth of a series in each cycle; nan beyond the last one."""
     ends = period * xr.DataArray(np.arange(count + 1), dims="end")
     ends = ends.where(ends <= times[-1] + 1e-6 * period)
     at = xr.apply_ufunc(

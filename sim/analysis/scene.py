@@ -1,7 +1,6 @@
-"""What a dataset says about its scenario: swept keys, numbers, words, and what holds the sphere.
+"""Scenario of a dataset: swept keys, numbers, words, and the control of the contact, read back from the file.
 
-Everything is read from the file. A number of the scenario is a variable, a swept one a coordinate, and the
-resolved scenario stands among the attributes.
+A number of the scenario is a variable, a swept one a coordinate; the resolved scenario is among the attributes.
 """
 
 import contextlib
@@ -51,13 +50,13 @@ def sweep_dims(dataset: xr.Dataset) -> tuple[str, ...]:
 
 
 def is_steady(dataset: xr.Dataset) -> bool:
-    """Whether the speed stays what it was at the start, at every point of the sweep."""
+    """True if the speed is constant in time at every point of the sweep."""
     speed = dataset["speed"]
     return bool((speed == speed.isel(t=0)).all())
 
 
 def is_stationary(dataset: xr.Dataset) -> bool:
-    """Whether neither the speed nor what holds the sphere changes in time, at any point of the sweep."""
+    """True if speed and control of the contact are constant in time at every point of the sweep."""
     return is_steady(dataset) and bool(stays_held(dataset).all())
 
 
@@ -95,18 +94,18 @@ def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
         # labels that would be alike carry a number
         return label.copy(data=np.array([str(text).split(" ")[0] for text in label.to_numpy()]))
     try:
-        return xr.DataArray(str(told(dataset, key)))
+        return xr.DataArray(str(resolved(dataset, key)))
     except KeyError:
         return xr.DataArray(default)
 
 
-def told(dataset: xr.Dataset, key: str) -> Any:
-    """What the resolved scenario says for a dotted key: a number, a word, a table as a dict, None.
+def resolved(dataset: xr.Dataset, key: str) -> Any:
+    """Value of a dotted key in the resolved scenario: a number, a word, a table as a dict, or None.
 
     Raises
     ------
     KeyError
-        If it does not say it, or the key or a table that holds it is swept: then it says it of one point only.
+        If there is no such key, or it or a table that holds it is swept: the scenario is resolved for one point only.
     """
     words = key.split(".")
     if any(_label(dataset, ".".join(words[:count])) is not None for count in range(1, len(words) + 1)):
@@ -128,7 +127,7 @@ def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
 
 
 class Control(NamedTuple):
-    """What holds the sphere: ``kind`` is ``"load"``, ``"indentation"`` or ``"displacement"``.
+    """Control of the contact: ``kind`` is ``"load"``, ``"indentation"`` or ``"displacement"``.
 
     ``stiffness`` [N/m] is that behind a displacement, with the sweep's dimensions; infinite without one.
     """
@@ -138,7 +137,7 @@ class Control(NamedTuple):
 
 
 def control(dataset: xr.Dataset) -> Control:
-    """What holds the sphere.
+    """Control of the contact.
 
     Raises
     ------
@@ -153,25 +152,25 @@ def control(dataset: xr.Dataset) -> Control:
 
 
 def _given(dataset: xr.Dataset, kind: str) -> bool:
-    """Whether the scenario gives such a control, as a number or as a course."""
+    """True if the scenario gives such a control, as a number, a course or a table."""
     try:
         setting(dataset, f"contact.{kind}")
     except KeyError:
         try:
-            return told(dataset, "contact").get(kind) is not None
+            return resolved(dataset, "contact").get(kind) is not None
         except KeyError:
             return False
     return True
 
 
 def stays_held(dataset: xr.Dataset) -> xr.DataArray:
-    """Whether what holds the sphere stays the same in time, at each point of the sweep.
+    """True at the points of the sweep where the control of the contact is constant in time.
 
-    It does not where the scenario gives one course for all points; else where the contacts with all adhesion and
-    with none, which depend on nothing more, change.
+    It is not where the scenario gives one course for all points, nor where the contacts with all adhesion and with
+    none change, which depend on nothing else.
     """
     radii, moves = dataset[["jkr_radius", "hertz_radius"]], False
     with contextlib.suppress(KeyError):
-        moves = isinstance(told(dataset, f"contact.{control(dataset).kind}"), dict)
+        moves = isinstance(resolved(dataset, f"contact.{control(dataset).kind}"), dict)
     still = (radii == radii.isel(t=0)).all("t")
     return (still["jkr_radius"] & still["hertz_radius"] & (not moves)).broadcast_like(dataset["contact_modulus"])

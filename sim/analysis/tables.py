@@ -58,8 +58,8 @@ _EVENTS = (
     _Column("time_masked", "masked,\nof the time"),
     _Column("ever_detached", "detached,\nof members"),
     _Column("first_detachment", "first\ndetached"),
-    _Column("loop_energy", "∮P dΔ,\na cycle", meaning="work put in over a cycle"),
-    _Column("loop_dissipation", "dissipated,\na cycle"),
+    _Column("loop_energy", "∮P dΔ,\nper cycle", meaning="work put in over a cycle"),
+    _Column("loop_dissipation", "dissipated,\nper cycle"),
     _Column("total_dissipated", "dissipated,\nin all"),
     _Column("pull_off_load", "pull-off\nload"),
     _Column("pull_off_time", "pull-off\nafter", math.nan),
@@ -163,7 +163,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     list of dict
         Cells by heading, as those of ``table``: how long adhesion was masked, how many members detached and when
         (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
-        what jumps dissipated, and the friction peak of a start or a ramp.
+        how much it dissipated, and the friction peak of a start or a ramp.
     """
     found = summary(events(dataset))
     counts = _thinned({name: dataset.sizes[name] for name in sweep_dims(dataset)}, rows)

@@ -304,7 +304,7 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
             said.append(
                 f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
             )
-        if point.contact.control.lowest < 0.0 and point.varies["shear"]:
+        if point.contact.course.lowest < 0.0 and point.varies["shear"]:
             said.append("under tension detachment is a first passage: take clock steps well below the correlation")
         spectrum = getattr(point.fluctuations, "spectrum", None)
         smallest = spectrum.support[0] if spectrum is not None and spectrum.wavevector is None else 0.0

@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.engine import State, balance
 from sim.laws import jkr
-from sim.parts.contact.control import Grip
+from sim.parts.contact.control import Control
 from sim.scenario.scenario import Scenario
 
 
@@ -48,54 +48,54 @@ def _stress(scene: Scenario, state: State) -> np.ndarray:
     return state.bonding.stress
 
 
-def _grip(scene: Scenario, state: State) -> Grip:
-    return scene.contact.grip(scene.clock.time(state.step), scene.clock.duration)
+def _control(scene: Scenario, state: State) -> Control:
+    return scene.contact.control(scene.clock.time(state.step), scene.clock.duration)
 
 
 def _load(scene: Scenario, state: State) -> np.ndarray:
-    return _grip(scene, state).normal_load(state.contact.radius, scene.bodies)
+    return _control(scene, state).normal_load(state.contact.radius, scene.bodies)
 
 
 def _indentation(scene: Scenario, state: State) -> np.ndarray:
-    return _grip(scene, state).depth(state.contact.radius, scene.bodies)
+    return _control(scene, state).indentation(state.contact.radius, scene.bodies)
 
 
 def _displacement(scene: Scenario, state: State) -> np.ndarray:
-    return _grip(scene, state).displacement(state.contact.radius, scene.bodies)
+    return _control(scene, state).displacement(state.contact.radius, scene.bodies)
 
 
 def _applied_load(scene: Scenario, state: State) -> np.ndarray:
     load = scene.contact.load
     return np.full(
-        1, np.nan if load is None else scene.contact.control.at(scene.clock.time(state.step), scene.clock.duration)
+        1, np.nan if load is None else scene.contact.course.at(scene.clock.time(state.step), scene.clock.duration)
     )
 
 
 def _hertz_radius(scene: Scenario, state: State) -> np.ndarray:
-    return np.nan_to_num(_grip(scene, state).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
+    return np.nan_to_num(_control(scene, state).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
 
 
 def _jkr_radius(scene: Scenario, state: State) -> np.ndarray:
-    work, grip = np.full(1, scene.adhesion.work), _grip(scene, state)
-    return scene.contact.reference_radius(state.contact.whole, work, grip, scene.bodies)
+    work, control = np.full(1, scene.adhesion.work), _control(scene, state)
+    return scene.contact.reference_radius(state.contact.whole, work, control, scene.bodies)
 
 
 def _bonds_radius(scene: Scenario, state: State) -> np.ndarray:
     work = balance(scene, state.bonding, state.shear).bonded
-    return scene.contact.reference_radius(state.contact.bonded, work, _grip(scene, state), scene.bodies)
+    return scene.contact.reference_radius(state.contact.bonded, work, _control(scene, state), scene.bodies)
 
 
 def _stressless_radius(scene: Scenario, state: State) -> np.ndarray:
     if not scene.contact.reversible:
         return _equilibrium_radius(scene, state)
     work = balance(scene, state.bonding, state.shear).work(_radius(scene, state))
-    return scene.contact.reference_radius(state.contact.stressless, work, _grip(scene, state), scene.bodies)
+    return scene.contact.reference_radius(state.contact.stressless, work, _control(scene, state), scene.bodies)
 
 
 def _equilibrium_radius(scene: Scenario, state: State) -> np.ndarray:
     if not scene.contact.lags:
         return _radius(scene, state)
-    found = _grip(scene, state).radius(state.contact.work, np.zeros(1), 0.0, scene.bodies)
+    found = _control(scene, state).radius(state.contact.work, np.zeros(1), 0.0, scene.bodies)
     return np.where(state.contact.radius > 0.0, np.nan_to_num(found), 0.0)
 
 

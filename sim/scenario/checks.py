@@ -71,13 +71,12 @@ def _reads_forces(shear: Any) -> bool:
 
 
 def _control_too_short(contact: Contact, clock: Clock) -> Faults:
-    name = next(name for name in ("load", "indentation", "displacement") if getattr(contact, name) is not None)
-    if contact.control.end < clock.duration * (1 - 1e-9):
-        said = f"the table ends at {contact.control.end:g} s, before clock.duration ({clock.duration:g} s)"
-        return [(("contact", name), f"{said}; add rows or shorten the run")]
-    if clock.steps < _STEPS_A_CYCLE * contact.control.cycles:
+    if contact.course.end < clock.duration * (1 - 1e-9):
+        said = f"the table ends at {contact.course.end:g} s, before clock.duration ({clock.duration:g} s)"
+        return [(("contact", contact.kind), f"{said}; add rows or shorten the run")]
+    if clock.steps < _STEPS_A_CYCLE * contact.course.cycles:
         said = f"fewer than {_STEPS_A_CYCLE} of the {clock.steps} clock steps for a cycle"
-        return [(("contact", name, "cycles"), f"{said}; make fewer cycles or shorter steps")]
+        return [(("contact", contact.kind, "cycles"), f"{said}; make fewer cycles or shorter steps")]
     return []
 
 

@@ -55,6 +55,10 @@ class Prescribed(Protocol):
     def lowest(self) -> float:
         """The least value of the run."""
 
+    @property
+    def highest(self) -> float:
+        """The largest value of the run."""
+
     def at(self, time: float, duration: float) -> float:
         """The value at a time [s]; where it jumps, that after the jump."""
 
@@ -81,6 +85,10 @@ class Number(NamedTuple):
 
     @property
     def lowest(self) -> float:
+        return self.value
+
+    @property
+    def highest(self) -> float:
         return self.value
 
     def at(self, time: float, duration: float) -> float:
@@ -118,6 +126,10 @@ class Course:
     @property
     def lowest(self) -> float:
         return min(self.start, self.stop)
+
+    @property
+    def highest(self) -> float:
+        return max(self.start, self.stop)
 
     def at(self, time: float, duration: float) -> float:
         part = time / duration if duration > 0.0 else 0.0
@@ -225,6 +237,10 @@ class Table:
     @property
     def lowest(self) -> float:
         return min(self.values)
+
+    @property
+    def highest(self) -> float:
+        return max(self.values)
 
     @property
     def end(self) -> float:

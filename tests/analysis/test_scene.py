@@ -4,7 +4,7 @@ import pytest
 from helpers.lens import RADIUS, scene
 
 from sim import analysis
-from sim.analysis.scene import told, word
+from sim.analysis.scene import resolved, word
 from sim.ensemble.simulate import run
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
@@ -38,7 +38,7 @@ def test_a_table_that_is_swept_whole_is_known_by_its_models():
     dataset = run(scene(shear=shear.Uniform(), sweep={"drive": drives}))
     assert word(dataset, "drive.model", "").to_numpy().tolist() == ["ramp", "start"]
     with pytest.raises(KeyError, match="swept"):
-        told(dataset, "drive.model")
+        resolved(dataset, "drive.model")
 
 
 def test_a_run_is_stationary_where_neither_speed_nor_control_changes():

@@ -72,7 +72,7 @@ NOTHING += "or a displacement with a stiffness"
             "load = 1\ndisplacement = 1\nstiffness = 1",
             "a load and a displacement cannot both hold the sphere; leave one of them",
         ),
-        ('displacement = "1 um"', 'a displacement needs the stiffness of the machine, such as "1 kN/m"'),
+        ('displacement = "1 um"', 'a displacement needs the stiffness between base and sphere, such as "1 kN/m"'),
         (
             'load = "4 mN"\nstiffness = 3',
             "a stiffness belongs to a displacement; give contact.displacement, or leave it out",

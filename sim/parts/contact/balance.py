@@ -11,22 +11,22 @@ from sim.spectrum.finite_contact import Margin
 
 
 class Balance(NamedTuple):
-    """What the contact is told at a step.
+    """Inputs of the contact at one step.
 
     Attributes
     ----------
     bonded : array
         Work of adhesion of the bonds left, Δγ(fraction) [J/m²].
     fluctuating : array
-        What fluctuations of the shear stress take of it where waves are short beside the contact, χ ΔΓ [J/m²].
+        Energy of the shear-stress fluctuations that adhesion pays, waves being short beside the contact: χ ΔΓ [J/m²].
     stress : array
-        Mean shear stress τ0 [Pa].
+        Magnitude of the mean shear stress τ0 [Pa].
     margin : Margin, optional
         Share of ``fluctuating`` that a contact of finite radius [m] pays when it grows [1].
     bodies : Bodies
-        What touches.
+        Sphere and half-space.
     reference : float
-        Work of adhesion at rest [J/m²], by which crack fronts measure their drive.
+        Work of adhesion at rest [J/m²], the unit of G − w in crack-front kinetics.
     """
 
     bonded: np.ndarray
@@ -37,7 +37,7 @@ class Balance(NamedTuple):
     reference: float
 
     def work(self, radius: np.ndarray) -> np.ndarray:
-        """Work of adhesion left at a radius but for what the mean stress takes [J/m²]."""
+        """Work of adhesion left at a radius, before the mean stress takes its share [J/m²]."""
         if self.margin is None:
             return self.bonded - self.fluctuating
         return self.bonded - self.fluctuating * self.margin(radius)
@@ -51,23 +51,23 @@ class Balance(NamedTuple):
         return np.asarray(mean_stress_energy(radius, self.stress, modulus, poisson_ratio))
 
     def gained(self, radius: np.ndarray, reversible: float) -> np.ndarray:
-        """What adhesion has given for the area of a contact, the work left at each radius over it [J]."""
+        """Energy that adhesion has given for the area of a contact: ∫ w dA over its radii [J]."""
         share = 1.0 if self.margin is None else self.margin.mean(radius)
         mean = 2.0 / 3.0 * reversible * self.reversible(radius)
         return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
 
 
-class Touch(NamedTuple):
+class ContactState(NamedTuple):
     """State of the contact.
 
     Attributes
     ----------
     work : array
-        Work of adhesion left at this radius [J/m²].
+        Work of adhesion left at this radius, w [J/m²].
     radius : array
         Contact radius [m], nan where it is open.
     detached : array
-        When it last opened [s], nan if never.
+        Time of the last pull-off [s], nan if never.
     dissipated : array
         Energy dissipated so far by the opening and closing of the contact [J].
     whole, bonded, stressless : array

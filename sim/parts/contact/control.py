@@ -1,7 +1,7 @@
-"""How a sphere is held at one time, and what its contact is then: at a load, an indentation, or behind a machine.
+"""Load control, displacement control, or displacement behind a stiffness at one time; and the JKR contact under each.
 
-Each grip gives the stable equilibrium for a work of adhesion and, for any radius, the load, the indentation
-and the potential. Radii are arrays, shape (1,) or (members,), nan where the contact is open.
+Each control gives the stable equilibrium for a work of adhesion and, for any radius, the load, the indentation
+and the energy. Radii are arrays, shape (1,) or (members,), nan where the contact is open.
 """
 
 import math
@@ -38,14 +38,14 @@ def elastic_energy(radius: np.ndarray, indentation: np.ndarray, bodies: Bodies) 
 
 
 @dataclass(frozen=True)
-class AtLoad:
-    """A dead load, compression positive [N]."""
+class LoadControl:
+    """Dead load, compression positive [N]."""
 
     load: float
 
     @property
     def closes(self) -> bool:
-        """Whether a sphere that is free touches the half-space: wherever it is not pulled."""
+        """True if a detached sphere comes back into contact: where the load is not tensile."""
         return self.load >= 0.0
 
     def radius(self, work: np.ndarray, stress: np.ndarray, reversible: float, bodies: Bodies) -> np.ndarray:
@@ -55,7 +55,7 @@ class AtLoad:
             return np.asarray(jkr.radius_at_load(self.load, work, size, modulus))
         return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio))
 
-    def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def release_rate(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
         size, modulus, _ = bodies
         missing = 4.0 / 3.0 * modulus * radius**3 / size - self.load
@@ -65,84 +65,88 @@ class AtLoad:
         """Load on the sphere [N]; 0 where the contact is open."""
         return np.where(np.isnan(radius), 0.0, self.load)
 
-    def depth(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Indentation [m]; nan where an open contact leaves the sphere without a place."""
+    def indentation(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Indentation [m]; nan where the contact is open, since a dead load does not place the sphere."""
         return np.asarray(jkr.indentation_under_load(radius, self.load, bodies.sphere_radius, bodies.modulus))
 
     def displacement(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Travel of what holds the sphere [m]: its indentation, as nothing yields between."""
-        return self.depth(radius, bodies)
+        """Displacement of the base [m]: the indentation, without a spring between."""
+        return self.indentation(radius, bodies)
 
-    def released(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Energy of this contact over that of a free sphere that just touches [J]: elastic, of the load, of adhesion.
+    def energy(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy of this contact above that of a free sphere that just touches [J]: elastic, of the load, of adhesion.
 
-        Not known under a pull: the free sphere flies away.
+        0 under tension, where it is not defined: the free sphere moves away.
         """
-        depth = self.depth(radius, bodies)
-        return elastic_energy(radius, depth, bodies) - self.load * depth - gained if self.closes else 0.0 * radius
+        indentation = self.indentation(radius, bodies)
+        return (
+            elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
+            if self.closes
+            else 0.0 * radius
+        )
 
 
 @dataclass(frozen=True)
-class AtDisplacement:
-    """A displacement [m] behind a machine stiffness [N/m]; an infinite one is an indentation."""
+class DisplacementControl:
+    """Displacement of the base [m] behind a stiffness [N/m]; an infinite stiffness makes it the indentation."""
 
-    place: float
+    base: float
     stiffness: float = math.inf
 
     @property
     def closes(self) -> bool:
-        """Whether a sphere that is free touches the half-space."""
-        return self.place >= 0.0
+        """True if a detached sphere comes back into contact: at a displacement of zero or more."""
+        return self.base >= 0.0
 
     def radius(self, work: np.ndarray, stress: np.ndarray, reversible: float, bodies: Bodies) -> np.ndarray:
         """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
         size, modulus, poisson_ratio = bodies
         if math.isinf(self.stiffness):
             if reversible == 0.0:
-                return np.asarray(jkr.radius_at_indentation(self.place, work, size, modulus))
+                return np.asarray(jkr.radius_at_indentation(self.base, work, size, modulus))
             law = radius_at_indentation_reversible
-            return np.asarray(law(self.place, work, stress, reversible, size, modulus, poisson_ratio))
+            return np.asarray(law(self.base, work, stress, reversible, size, modulus, poisson_ratio))
         if reversible == 0.0:
-            return np.asarray(jkr.radius_at_displacement(self.place, self.stiffness, work, size, modulus))
-        held = (self.place, self.stiffness)
+            return np.asarray(jkr.radius_at_displacement(self.base, self.stiffness, work, size, modulus))
+        held = (self.base, self.stiffness)
         return np.asarray(
             radius_at_displacement_reversible(*held, work, stress, reversible, size, modulus, poisson_ratio)
         )
 
-    def pull(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def release_rate(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
         size, modulus, _ = bodies
         missing = radius**2 / size - jkr.indentation_under_displacement(
-            radius, self.place, self.stiffness, size, modulus
+            radius, self.base, self.stiffness, size, modulus
         )
-        rate = jkr.energy_release_rate_at_displacement(radius, self.place, self.stiffness, size, modulus)
+        rate = jkr.energy_release_rate_at_displacement(radius, self.base, self.stiffness, size, modulus)
         return np.copysign(rate, missing)
 
     def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
         """Load on the sphere [N]; 0 where the contact is open."""
         size, modulus, _ = bodies
         if math.isinf(self.stiffness):
-            load = jkr.load_under_indentation(radius, self.place, size, modulus)
+            load = jkr.load_under_indentation(radius, self.base, size, modulus)
         else:
-            load = jkr.load_under_displacement(radius, self.place, self.stiffness, size, modulus)
+            load = jkr.load_under_displacement(radius, self.base, self.stiffness, size, modulus)
         return np.where(np.isnan(radius), 0.0, load)
 
-    def depth(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Indentation [m]; the displacement where the contact is open and nothing loads the machine."""
+    def indentation(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Indentation [m]; the displacement of the base where the contact is open and the spring unloaded."""
         if math.isinf(self.stiffness):
-            return np.full(radius.shape, self.place)
-        found = jkr.indentation_under_displacement(radius, self.place, self.stiffness, *bodies[:2])
-        return np.where(np.isnan(radius), self.place, found)
+            return np.full(radius.shape, self.base)
+        found = jkr.indentation_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
+        return np.where(np.isnan(radius), self.base, found)
 
     def displacement(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Travel of the machine [m]."""
-        return np.full(radius.shape, self.place)
+        """Displacement of the base [m]."""
+        return np.full(radius.shape, self.base)
 
-    def released(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
-        """Energy of this contact over that of an open one [J]: elastic, of the machine, and of adhesion."""
-        depth = self.depth(radius, bodies)
-        machine = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.place - depth) ** 2
-        return elastic_energy(radius, depth, bodies) + machine - gained
+    def energy(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
+        """Energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""
+        indentation = self.indentation(radius, bodies)
+        spring = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.base - indentation) ** 2
+        return elastic_energy(radius, indentation, bodies) + spring - gained
 
 
-Grip = AtLoad | AtDisplacement
+Control = LoadControl | DisplacementControl

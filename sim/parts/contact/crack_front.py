@@ -1,13 +1,13 @@
-"""How fast the edge of an adhesive contact moves: crack-front kinetics, one clock step at a time.
+"""Crack-front kinetics: motion of the edge of an adhesive contact over one clock step.
 
-The edge of a contact of radius a moves at the speed at which its surplus of elastic energy is used
-up, ``G - w = work (v/speed)^exponent sgn(v)``, v = -da/dt, opening where the energy release rate
+The edge of a contact of radius a moves at the speed at which its excess of energy release rate is
+dissipated, ``G - w = work (v/speed)^exponent sgn(v)``, v = -da/dt, opening where the energy release rate
 G exceeds the work of adhesion w and healing, with a speed and an exponent of its own, where it
 falls short (after Maugis & Barquins). Unlike the form with G/w this one stays finite and defined
 for w <= 0, where stress fluctuations outweigh adhesion. Limits: infinite speed is the JKR
 equilibrium, zero speed a frozen edge.
 
-One formula serves every control. A machine pushes with ``P = load + stiffness (displacement - delta)``:
+One formula serves every control. The sphere is pressed with ``P = load + stiffness (displacement - delta)``:
 stiffness 0 is a load, an infinite one an indentation. With ``lambda = stiffness/(stiffness + 2 E* a)``
 and ``mu = 1/(stiffness + 2 E* a)`` the indentation missing from Hertz's at this radius is
 
@@ -20,8 +20,8 @@ which is smooth to the end. Control and work change linearly over the clock step
 the work or the force on the bare contact changes sign.
 
 The contact never falls below Hertz's (y = 0): pressing alone makes that area, and linear
-elasticity has no smaller one. An edge that opens against w <= 0 stops there, and one that heals more
-slowly than the press pushes rides on it.
+elasticity has no smaller one. An edge that opens with w <= 0 stops there, and one that heals more
+slowly than Hertz's contact grows follows it.
 """
 
 import math
@@ -51,7 +51,7 @@ _LONGEST = 0.2
 
 
 class Hold(NamedTuple):
-    """What presses the sphere during a clock step: P = load + stiffness (displacement - delta), each linear in time.
+    """Control of the sphere during a clock step: P = load + stiffness (displacement - delta), each linear in time.
 
     ``stiffness`` 0 is a load and an infinite one an indentation, namely ``displacement``.
     """
@@ -74,7 +74,7 @@ class Kinetics(NamedTuple):
 
 
 class Advance(NamedTuple):
-    """What a clock step did to each member."""
+    """Result of a clock step for each member."""
 
     radius: np.ndarray
     detached_at: np.ndarray
@@ -90,15 +90,15 @@ def _excess(t, a, scene):
     """
     modulus, curvature, stiffness, load, load_rate, displacement, displacement_rate, work, work_rate, scale = scene
     if stiffness == math.inf:
-        machine, yielding = 1.0, 0.0
+        spring, yielding = 1.0, 0.0
     else:
         yielding = 1.0 / (stiffness + 2.0 * modulus * a)
-        machine = stiffness * yielding
+        spring = stiffness * yielding
     hertz = a * a * curvature
-    y = machine * (hertz - displacement - displacement_rate * t)
+    y = spring * (hertz - displacement - displacement_rate * t)
     y += yielding * (4.0 / 3.0 * modulus * a * hertz - load - load_rate * t)
     y_a = 2.0 * a * curvature - 2.0 * modulus * yielding * y
-    y_t = -machine * displacement_rate - yielding * load_rate
+    y_t = -spring * displacement_rate - yielding * load_rate
     unit = modulus * abs(y) / (2.0 * math.pi * a * scale)
     s = unit * y - (work + work_rate * t) / scale
     return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
@@ -219,7 +219,7 @@ def _radau(running, x, y, h, size, first, start, scene, front):
 
 @device
 def _bare_force(t, scene):
-    """What the control presses with on a contact of no size: N, or m where the stiffness is infinite."""
+    """Force of the control on a contact of vanishing radius [N]; the indentation [m] if the stiffness is infinite."""
     _, _, stiffness, load, load_rate, displacement, displacement_rate, _, _, _ = scene
     if stiffness == math.inf:
         return displacement + displacement_rate * t
@@ -259,7 +259,7 @@ def _hertz(t, scene):
 
 @device
 def _pushed(t, scene, front):
-    """Whether Hertz's contact at t outruns the edge, and its radius."""
+    """True if Hertz's contact at t grows faster than the edge heals; and its radius."""
     a = _hertz(t, scene)
     modulus, curvature, stiffness, _, load_rate, _, displacement_rate, work, work_rate, scale = scene
     rate, _ = _speed(-(work + work_rate * t) / scale, front)
@@ -300,10 +300,10 @@ def _ride(t, a, end, least, scene, front):
 
 
 @device
-def _resign(t, a, stop, least, scene, front):
-    """One implicit Euler step to ``stop``, for what the adaptive steps cannot finish.
+def _fallback(t, a, stop, least, scene, front):
+    """Fallback when the adaptive steps are used up: one implicit Euler step to ``stop``.
 
-    Of its solutions the first that the edge meets on its way, found by a walk and bisection.
+    Takes the root nearest to the present radius, bracketed by stepping, then bisected.
     """
     _, s, _, _ = _excess(stop, a, scene)
     rate, _ = _speed(s, front)
@@ -328,7 +328,7 @@ def _resign(t, a, stop, least, scene, front):
 
 @device
 def _runs(a, rate, bend, s_a, s_t, left):
-    """Whether the edge runs open: it would lose much of the radius in the time left, without slowing down soon."""
+    """True if the edge runs open: it loses much of the radius in the time left, without slowing down soon."""
     if not -rate * left > 0.1 * a:
         return False
     growth = bend / rate
@@ -422,7 +422,7 @@ def _member(a, duration, least, scene, front):
             t, a, more, tries = _piece(t, a, stop, least, tries, scene, front)
             energy += more
             if a > 0.0 and t < stop:
-                a, more = _resign(t, a, stop, least, scene, front)
+                a, more = _fallback(t, a, stop, least, scene, front)
                 t, energy = stop, energy + more
                 if a <= least:
                     a = 0.0
@@ -461,8 +461,8 @@ def _advance(rows, out):
         speed = min(speed, a * per * min(_ROUNDING**-power, 1e250))
         heal_speed = min(heal_speed, a * per * min(_ROUNDING**-heal_power, 1e250))
         front = speed, power, heal_speed, heal_power
-        machine = modulus, 1.0 / sphere_radius, stiffness, load0, (load1 - load0) * per
-        scene = machine + (displacement0, (displacement1 - displacement0) * per, w0, (w1 - w0) * per, scale)
+        held = modulus, 1.0 / sphere_radius, stiffness, load0, (load1 - load0) * per
+        scene = held + (displacement0, (displacement1 - displacement0) * per, w0, (w1 - w0) * per, scale)
         end, opened, energy = _member(a, duration, max(least, _LEAST * a), scene, front)
         if energy < math.inf and end != math.inf:
             out[m, 0], out[m, 1], out[m, 2] = end, opened, energy
@@ -474,11 +474,11 @@ def advance(radius, work, hold, kinetics, duration, sphere_radius, modulus, deta
     Parameters
     ----------
     radius : array, shape (members,)
-        a at the start [m]; nan is an open contact, which stays open.
+        a at the start [m]; nan for an open contact, which stays open.
     work : pair of arrays
         Work of adhesion w at the start and at the end [J/m^2], of any sign.
     hold : Hold
-        Load [N], displacement [m] and stiffness [N/m] of what presses.
+        Load [N], displacement of the base [m] and stiffness [N/m].
     kinetics : Kinetics
         Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
         freezes the edge or leaves it in equilibrium.
@@ -498,17 +498,17 @@ def advance(radius, work, hold, kinetics, duration, sphere_radius, modulus, deta
     Advance
         ``radius`` [m], nan where open; ``detached_at``, the time since the start of the step at which
         it opened [s], nan where it did not; ``dissipated``, int \\|G - w\\| 2 pi a \\|da\\| [J] up to there.
-        Where a number that matters is nan or senseless all three are nan.
+        Where an input is nan or invalid all three are nan.
 
     Notes
     -----
     Exponents above 1, whose edge is infinitely mobile at rest, cost much and lose digits in stiff
-    cases. A radius below Hertz's starts as Hertz's. Where pressing pushes the edge against w > 0 faster
-    than it heals, w dA is dissipated; against w <= 0 nothing is.
+    cases. A radius below Hertz's starts as Hertz's. Where pressing advances the edge faster than it heals,
+    w dA is dissipated if w > 0, and nothing if w <= 0.
 
     Examples
     --------
-    Pulled with twice its pull-off load, a sphere lets go the later the slower its edge can run:
+    Pulled with twice its pull-off load, a sphere detaches the later the slower its edge:
 
     >>> rest, pull = np.full(3, 7.2e-5), Hold(-8e-4, -8e-4)
     >>> edge = Kinetics(0.042, np.array([1e-6, 1e-5, 1e-4]), 0.6, 1e-6, 0.6)

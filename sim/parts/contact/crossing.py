@@ -1,4 +1,4 @@
-"""The widest place at which a function of the radius comes down through zero, for many members at once."""
+"""Inward root search: the largest radius at which a function falls through zero, for many members at once."""
 
 import math
 from collections.abc import Callable

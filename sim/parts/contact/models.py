@@ -1,35 +1,38 @@
-"""The contact: its radius at the work of adhesion that is left. Simple to full: equilibrium, rate-dependent.
+"""Models of the contact, whose radius follows from the work of adhesion left: equilibrium, rate-dependent.
 
-Every depth is held at a load, at an indentation or at a displacement behind a machine, each a number, a course
-or a table; ``sim.parts.contact.control`` says what a contact is under each.
+Either is under a load, an indentation, or a displacement of the base behind a stiffness, each a number, a course
+or a table; ``sim.parts.contact.control`` has the contact under each.
 """
 
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance, Touch
-from sim.parts.contact.control import AtDisplacement, AtLoad, Bodies, Grip
+from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance, ContactState
+from sim.parts.contact.control import Bodies, Control, DisplacementControl, LoadControl
 from sim.parts.contact.crack_front import Hold, Kinetics
 from sim.parts.contact.crack_front import advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
 from sim.parts.exchange import Motion, Setting, Touching
-from sim.units.course import Course, Piece, Prescribed, Table, held, prescribed
+from sim.units.course import Piece, Prescribed, held, prescribed
 from sim.units.quantity import Quantity
 
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
 _SPOT = 1e-3
+#: Radius of the contact over that of the sphere above which a parabola is a poor sphere.
+_LARGEST_SHARE = 0.3
+_KINDS = ("load", "indentation", "displacement")
 
 _Load = held(Quantity("N", "normal load, compression positive", "P"), "load")
 _Indentation = held(Quantity("m", "indentation of the sphere", "delta"), "indentation")
-_Displacement = held(Quantity("m", "displacement of the machine that holds the sphere", "Delta"), "displacement")
-_Stiffness = Annotated[float, Quantity("N/m", "stiffness of the machine", "k", above=0)]
+_Displacement = held(Quantity("m", "displacement of the base that holds the sphere", "Delta"), "displacement")
+_Stiffness = Annotated[float, Quantity("N/m", "stiffness between base and sphere", "k", above=0)]
 _Reversible = Annotated[
     float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)
 ]
@@ -37,14 +40,14 @@ _Healing = Annotated[float, Quantity("m/s", "speed of a healing edge, left out t
 _HealingExponent = Annotated[
     float, Quantity("1", "exponent of healing, left out that of opening", "n_h", above=0, at_most=1)
 ]
-_Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description="what follows a detachment")]
+_Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description="what follows a pull-off")]
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class _Held:
-    """What holds the sphere: a load, an indentation, or a displacement with a stiffness."""
+class _Controlled:
+    """A contact under a load, an indentation, or a displacement with a stiffness."""
 
-    state_class: ClassVar[type[Touch]] = Touch
+    state_class: ClassVar[type[ContactState]] = ContactState
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
     #: Whether the edge takes time to reach equilibrium.
@@ -58,8 +61,8 @@ class _Held:
     after_pull_off: _Policy = "stay_open"
 
     @model_validator(mode="after")
-    def _one_control(self) -> "_Held":
-        given = [name for name in ("load", "indentation", "displacement") if getattr(self, name) is not None]
+    def _one_control(self) -> "_Controlled":
+        given = [name for name in _KINDS if getattr(self, name) is not None]
         if not given:
             raise PydanticCustomError(
                 "control",
@@ -70,105 +73,124 @@ class _Held:
             names = " and ".join(f"an {name}" if name == "indentation" else f"a {name}" for name in given)
             raise PydanticCustomError("control", f"{names} cannot both hold the sphere; leave one of them out")
         if (self.displacement is None) != (self.stiffness is None):
-            said = 'a displacement needs the stiffness of the machine, such as "1 kN/m"'
+            said = 'a displacement needs the stiffness between base and sphere, such as "1 kN/m"'
             other = "a stiffness belongs to a displacement; give contact.displacement, or leave it out"
             raise PydanticCustomError("control", said if self.stiffness is None else other)
         return self
 
     def remarks(self, setting: Setting) -> list[str]:
-        return []
+        said = []
+        if setting.rest_radius > _LARGEST_SHARE * setting.sphere_radius:
+            said.append(
+                f"the contact exceeds {_LARGEST_SHARE} of the sphere's radius: the theory is for small contacts"
+            )
+        if math.isnan(setting.rest_radius):
+            never = (
+                f"the contact is open for the whole run: raise contact.{self.kind} to zero, where the sphere touches"
+            )
+            jumps = f"the contact begins open and jumps in where contact.{self.kind} first reaches zero"
+            said.append(jumps if self.course.highest >= 0.0 else never)
+        return said
 
     @cached_property
-    def control(self) -> Prescribed:
+    def kind(self) -> str:
+        """Which of load, indentation and displacement is prescribed."""
+        return next(name for name in _KINDS if getattr(self, name) is not None)
+
+    @cached_property
+    def course(self) -> Prescribed:
         """The load, indentation or displacement over time."""
-        given = next(given for given in (self.load, self.indentation, self.displacement) if given is not None)
-        return prescribed(cast(float | Course | Table, given))
+        return prescribed(getattr(self, self.kind))
 
-    def grip(self, time: float, duration: float) -> Grip:
-        """How the sphere is held at a time of a run of ``duration`` [s]."""
-        return self._held_at(self.control.at(time, duration))
+    def control(self, time: float, duration: float) -> Control:
+        """The control at a time of a run of ``duration`` [s]."""
+        return self._control(self.course.at(time, duration))
 
-    def _held_at(self, value: float) -> Grip:
+    def _control(self, value: float) -> Control:
         if self.load is not None:
-            return AtLoad(value)
-        return AtDisplacement(value, self.stiffness or math.inf)
+            return LoadControl(value)
+        return DisplacementControl(value, self.stiffness or math.inf)
 
     @property
     def changes(self) -> bool:
-        """Whether what holds the sphere changes in time."""
-        return self.control.changes
+        """Whether the control changes in time."""
+        return self.course.changes
 
     def equilibrium_radius(self, work: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
         """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
-        return self.grip(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
+        return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
 
-    def start(self, motion: Motion, duration: float, balance: Balance) -> Touch:
+    def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:
         """The contact at the start, in equilibrium."""
-        grip = self.grip(motion.time, duration)
-        radius = self._equilibrium(grip, balance)
-        found = (grip.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
+        control = self.control(motion.time, duration)
+        radius = self._equilibrium(control, balance)
+        found = (control.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
         phases = (np.where(np.isnan(alone), AHEAD, CLOSED) for alone in found)
-        return Touch(
+        return ContactState(
             self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape), *phases
         )
 
-    def stopped(self, touch: Touching) -> np.ndarray:
-        """Whether a trajectory has ended, with the pull-off of a contact that stops there."""
-        return np.isnan(touch.radius) & ~np.isnan(touch.detached) & (self.after_pull_off == "stop")
+    def stopped(self, state: Touching) -> np.ndarray:
+        """True where a trajectory has ended, at the pull-off of a contact that stops there."""
+        return np.isnan(state.radius) & ~np.isnan(state.detached) & (self.after_pull_off == "stop")
 
-    def reference_radius(self, phase: np.ndarray, work: np.ndarray, grip: Grip, bodies: Bodies) -> np.ndarray:
+    def reference_radius(self, phase: np.ndarray, work: np.ndarray, control: Control, bodies: Bodies) -> np.ndarray:
         """Radius of a contact in equilibrium with another work of adhesion [m], 0 where it is open."""
-        return np.where(phase == CLOSED, grip.radius(work, np.zeros(1), 0.0, bodies), 0.0)
+        return np.where(phase == CLOSED, control.radius(work, np.zeros(1), 0.0, bodies), 0.0)
 
     def _references(self, radius: np.ndarray, balance: Balance) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Works of adhesion of the contacts that are followed beside this one [J/m²]."""
+        """Works of adhesion of the three reference contacts [J/m²]."""
         whole = np.full(1, balance.reference)
         return whole, balance.bonded, balance.work(np.nan_to_num(radius)) if self.reversible else whole
 
-    def _phases(self, touch: Touch, grip: Grip, radius: np.ndarray, balance: Balance) -> tuple[np.ndarray, ...]:
-        """Phases of these contacts after a step."""
-        phases = touch.whole, touch.bonded, touch.stressless
-        if self.control.lowest >= 0.0:
+    def _phases(
+        self, state: ContactState, control: Control, radius: np.ndarray, balance: Balance
+    ) -> tuple[np.ndarray, ...]:
+        """Phases of the reference contacts after a step."""
+        phases = state.whole, state.bonded, state.stressless
+        if self.course.lowest >= 0.0:
             return phases
-        if grip.closes:
+        if control.closes:
             stay_open = self.after_pull_off != "reattach"
             return tuple(np.where(stay_open & (phase == OPEN), OPEN, CLOSED) for phase in phases)
-        found = (grip.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
+        found = (control.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
         return tuple(
             np.where((phase == CLOSED) & np.isnan(alone), OPEN, phase)
             for phase, alone in zip(phases, found, strict=True)
         )
 
-    def _touching(self, touch: Touch, grip: Grip) -> np.ndarray:
-        """Where an open contact closes if a free sphere touches: at its first touch, or wherever it reattaches."""
-        return np.isnan(touch.radius) & (np.isnan(touch.detached) | (self.after_pull_off == "reattach")) & grip.closes
+    def _touching(self, state: ContactState, control: Control) -> np.ndarray:
+        """True where an open contact closes: at its first touch, or wherever it reattaches."""
+        return (
+            np.isnan(state.radius) & (np.isnan(state.detached) | (self.after_pull_off == "reattach")) & control.closes
+        )
 
-    def _equilibrium(self, grip: Grip, balance: Balance) -> np.ndarray:
+    def _equilibrium(self, control: Control, balance: Balance) -> np.ndarray:
         """Largest stable radius [m], nan without one."""
         bodies, alpha = balance.bodies, self.reversible
         if balance.margin is None:
-            return grip.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
-        return self._on_disc(grip, balance)
+            return control.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
+        return self._on_disc(control, balance)
 
-    def _on_disc(self, grip: Grip, balance: Balance) -> np.ndarray:
-        """Widest radius at which the pull on the edge falls to the work left: a walk inwards, then halving.
+    def _on_disc(self, control: Control, balance: Balance) -> np.ndarray:
+        """Widest radius at which the energy release rate falls to the work left: a search inwards, then bisection.
 
-        What a disc pays is no convex function of its radius, so neither Newton's method nor going back and forth
-        between radius and work is safe. The walk starts where the fluctuations take nothing.
+        The share of ΔΓ that a disc pays is not convex in its radius, so neither Newton's method nor a fixed-point
+        iteration is safe. The search starts from the radius without fluctuations.
         """
         bodies = balance.bodies
-        wide = grip.radius(balance.bonded + 0.0 * balance.fluctuating, balance.stress, self.reversible, bodies)
-        hertz = np.nan_to_num(grip.radius(np.zeros(1), np.zeros(1), 0.0, bodies))[:, None]
+        wide = control.radius(balance.bonded + 0.0 * balance.fluctuating, balance.stress, self.reversible, bodies)
+        hertz = np.nan_to_num(control.radius(np.zeros(1), np.zeros(1), 0.0, bodies))[:, None]
 
         def surplus(radius: np.ndarray) -> np.ndarray:
             column = Balance(
                 balance.bonded[:, None], balance.fluctuating[:, None], balance.stress[:, None], balance.margin,
                 bodies, balance.reference,
             )  # fmt: skip
-            return grip.pull(radius, bodies) - self._left(radius, column)
+            return control.release_rate(radius, bodies) - self._left(radius, column)
 
         found, closed, at_once = widest_crossing(surplus, wide[:, None], hertz)
-        edge = np.where(closed, np.maximum(found, hertz), hertz if grip.closes else np.nan)
+        edge = np.where(closed, np.maximum(found, hertz), hertz if control.closes else np.nan)
         edge = np.where(at_once | (balance.fluctuating[:, None] == 0.0), wide[:, None], edge)  # nothing is taken
         return np.where(np.isnan(wide), np.nan, edge[:, 0])
 
@@ -182,41 +204,42 @@ class _Held:
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Equilibrium(_Held):
+class Equilibrium(_Controlled):
     """The contact is in JKR equilibrium with the work of adhesion at every step, on its stable branch.
 
-    Where no equilibrium is left it detaches. ``after_pull_off`` says what follows: it stays open; it reattaches as
-    soon as the free sphere would touch (at a load that is not negative, at a displacement of zero or more), where it
-    jumps into equilibrium; or the member's trajectory stops there.
+    Where no equilibrium is left it pulls off. Then, by ``after_pull_off``, it stays open, or reattaches as soon as the
+    free sphere touches (at a load or a displacement of zero or more), where it jumps into equilibrium, or the
+    member's trajectory stops. A contact that begins open jumps in at its first touch in any case.
     """
 
     model: Literal["equilibrium"] = "equilibrium"
 
-    def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
-        grip = self.grip(motion.time, duration)
-        open_ = np.isnan(touch.radius) & ~self._touching(touch, grip)
+    def advance(self, state: ContactState, motion: Motion, duration: float, balance: Balance) -> ContactState:
+        control = self.control(motion.time, duration)
+        open_ = np.isnan(state.radius) & ~self._touching(state, control)
         if open_.all():
             radius = np.full(np.broadcast(open_, balance.bonded, balance.fluctuating).shape, np.nan)
         else:
-            radius = np.where(open_, np.nan, self._equilibrium(grip, balance))
-        work, phases = self._left(radius, balance), self._phases(touch, grip, radius, balance)
-        opens, closes = ~np.isnan(touch.radius) & np.isnan(radius), np.isnan(touch.radius) & ~np.isnan(radius)
-        dissipated = touch.dissipated
-        for happens, size, sign in ((opens, touch.radius, 1.0), (closes, radius, -1.0)):
+            radius = np.where(open_, np.nan, self._equilibrium(control, balance))
+        work, phases = self._left(radius, balance), self._phases(state, control, radius, balance)
+        opens, closes = ~np.isnan(state.radius) & np.isnan(radius), np.isnan(state.radius) & ~np.isnan(radius)
+        dissipated = state.dissipated
+        for happens, size, sign in ((opens, state.radius, 1.0), (closes, radius, -1.0)):
             if happens.any():
-                over = grip.released(size, balance.gained(size, self.reversible), balance.bodies)
+                over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
                 dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
-        return Touch(work, radius, np.where(opens, motion.time, touch.detached), dissipated, *phases)
+        return ContactState(work, radius, np.where(opens, motion.time, state.detached), dissipated, *phases)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
-class RateDependent(_Held):
-    """The edge of the contact runs with a finite speed: G − w = work (v/v0)ⁿ. Limit: equilibrium as v0 -> infinity.
+class RateDependent(_Controlled):
+    """The edge of the contact has a finite speed: G − w = work (v/v0)ⁿ. Limit: equilibrium as v0 -> infinity.
 
     It opens where the energy release rate G exceeds the work of adhesion w that is left, and heals, with a
-    speed and an exponent of its own, where it falls short; within a clock step as exactly as 1e-8. What the
-    work loses with the radius itself (a disc, ``reversible``) is taken at the radius of the step's start.
-    Under a dead load nothing is counted as dissipated below the radius at pull-off, where the load falls.
+    speed and an exponent of its own, where it falls short. A clock step is integrated to 1e-8, in parts between
+    which the control turns or jumps. The part of the work that depends on the radius itself (a disc, ``reversible``)
+    is taken at the start of the step. Under a dead load no dissipation is counted below the radius at pull-off,
+    where the load falls freely.
     """
 
     lags: ClassVar[bool] = True
@@ -227,56 +250,63 @@ class RateDependent(_Held):
     heal_exponent: _HealingExponent | None = None
     model: Literal["rate_dependent"] = "rate_dependent"
 
-    def advance(self, touch: Touch, motion: Motion, duration: float, balance: Balance) -> Touch:
-        last = self._left(touch.radius, balance)
-        first = np.where(np.isnan(touch.radius), last, touch.work)
-        now = touch._replace(radius=np.broadcast_to(touch.radius, np.broadcast(touch.radius, last).shape))
-        pieces = self.control.pieces(motion.time - motion.duration, motion.time, duration)
+    def advance(self, state: ContactState, motion: Motion, duration: float, balance: Balance) -> ContactState:
+        last = self._left(state.radius, balance)
+        first = np.where(np.isnan(state.radius), last, state.work)
+        now = state._replace(radius=np.broadcast_to(state.radius, np.broadcast(state.radius, last).shape))
+        pieces = self.course.pieces(motion.time - motion.duration, motion.time, duration)
         begin, span, share = pieces[0].start, pieces[-1].stop - pieces[0].start, 0.0
         for piece in pieces:
             before, share = share, (piece.stop - begin) / span
             works = [np.broadcast_to((1.0 - part) * first + part * last, now.radius.shape) for part in (before, share)]
             now = self._moved(now, piece, motion.duration * (share - before), works, balance)
-        phases = self._phases(touch, self.grip(motion.time, duration), now.radius, balance)
-        return Touch(self._left(now.radius, balance), now.radius, now.detached, now.dissipated, *phases)
+        phases = self._phases(state, self.control(motion.time, duration), now.radius, balance)
+        return ContactState(self._left(now.radius, balance), now.radius, now.detached, now.dissipated, *phases)
 
     def _moved(
-        self, touch: Touch, piece: Piece, duration: float, works: Sequence[np.ndarray], balance: Balance
-    ) -> Touch:
-        """The contact after a part of a clock step over which control and work change linearly.
+        self, state: ContactState, piece: Piece, duration: float, works: Sequence[np.ndarray], balance: Balance
+    ) -> ContactState:
+        """The contact after a part of a clock step in which control and work change linearly.
 
-        What is still stored where the edge opens is dissipated, and so is what a spot gains where the sphere touches.
+        Energy still stored where the edge opens counts as dissipated, and so does what a spot gains at a touch.
         """
-        before, after, bodies = self._held_at(piece.first), self._held_at(piece.last), balance.bodies
-        spot, touching = _spot(balance), self._touching(touch, before)
-        radius = np.where(touching, spot, touch.radius)
+        before, after, bodies = self._control(piece.first), self._control(piece.last), balance.bodies
+        spot, touching = _spot(balance), self._touching(state, before)
+        radius = np.where(touching, spot, state.radius)
         moved = advance_front(
-            radius, works, _hold(before, after), self._kinetics(balance), duration, bodies.sphere_radius,
-            bodies.modulus, 0.5 * spot,
+            radius, works, self._hold(piece), self._kinetics(balance), duration, bodies.sphere_radius, bodies.modulus,
+            0.5 * spot,
         )  # fmt: skip
         opens = ~np.isnan(radius) & np.isnan(moved.radius)
-        counts = isinstance(after, AtDisplacement) | (self._held(touch.radius, works[1], after, bodies) & ~opens)
+        counts = (self.load is None) | (self._bears(state.radius, works[1], after, bodies) & ~opens)
         lost = np.where(counts, moved.dissipated, 0.0)
         if touching.any():
             wide = np.fmax(spot, before.radius(np.zeros(1), np.zeros(1), 0.0, bodies))
-            gained = -before.released(wide, math.pi * wide**2 * works[0], bodies)
+            gained = -before.energy(wide, math.pi * wide**2 * works[0], bodies)
             lost += np.where(touching, np.maximum(gained, 0.0), 0.0)
         for m in np.flatnonzero(opens & counts):
             part = moved.detached_at[m] / duration
-            grip, narrow = self._held_at((1.0 - part) * piece.first + part * piece.last), np.full(1, 0.5 * spot)
+            control, narrow = self._control((1.0 - part) * piece.first + part * piece.last), np.full(1, 0.5 * spot)
             work = (1.0 - part) * works[0][m] + part * works[1][m]
-            lost[m] += max(grip.released(narrow, math.pi * narrow**2 * work, bodies)[0], 0.0)
-        detached = np.where(opens, piece.stop - duration + moved.detached_at, touch.detached)
-        return touch._replace(radius=moved.radius, detached=detached, dissipated=touch.dissipated + lost)
+            lost[m] += max(control.energy(narrow, math.pi * narrow**2 * work, bodies)[0], 0.0)
+        detached = np.where(opens, piece.stop - duration + moved.detached_at, state.detached)
+        return state._replace(radius=moved.radius, detached=detached, dissipated=state.dissipated + lost)
 
-    def _held(self, radius: np.ndarray, work: np.ndarray, grip: Grip, bodies: Bodies) -> np.ndarray:
-        """Whether a load still holds the contact: below the radius at pull-off a pulled sphere falls away.
+    def _bears(self, radius: np.ndarray, work: np.ndarray, control: Control, bodies: Bodies) -> np.ndarray:
+        """True where a load still has an equilibrium below: under tension not at radii below that at pull-off.
 
-        What the falling load does there grows without end as the radius vanishes; it is not counted.
+        The work of the falling load diverges there as the radius vanishes, and is not counted.
         """
         size, modulus, _ = bodies
         fold = np.cbrt(9.0 * math.pi * np.maximum(work, 0.0) * size**2 / (8.0 * modulus))
-        return np.asarray(grip.closes | np.isnan(radius) | (radius >= fold))
+        return np.asarray(control.closes | np.isnan(radius) | (radius >= fold))
+
+    def _hold(self, piece: Piece) -> Hold:
+        """Control during a part of a clock step."""
+        if self.load is not None:
+            return Hold(load_before=piece.first, load_after=piece.last)
+        stiffness = self.stiffness or math.inf
+        return Hold(displacement_before=piece.first, displacement_after=piece.last, stiffness=stiffness)
 
     def _kinetics(self, balance: Balance) -> Kinetics:
         heals = self.front_speed if self.heal_speed is None else self.heal_speed
@@ -285,23 +315,13 @@ class RateDependent(_Held):
 
 
 def _spot(balance: Balance) -> float:
-    """Radius [m] from which an edge heals when the sphere touches; at half of it a shrinking contact counts as open."""
+    """Radius at which a touch begins [m]; a shrinking contact counts as open below half of it."""
     size, modulus, _ = balance.bodies
     return _SPOT * math.cbrt(balance.reference * size**2 / modulus)
 
 
-def _hold(before: Grip, after: Grip) -> Hold:
-    """What presses during a step."""
-    if isinstance(before, AtLoad) and isinstance(after, AtLoad):
-        return Hold(load_before=before.load, load_after=after.load)
-    assert isinstance(before, AtDisplacement) and isinstance(
-        after, AtDisplacement
-    )  # one control holds for the whole run
-    return Hold(displacement_before=before.place, displacement_after=after.place, stiffness=after.stiffness)
-
-
-def _model(value: Any) -> Any:
-    """The model of a contact; equilibrium where none is named."""
+def _model(value: object) -> object:
+    """Name of a contact's model; equilibrium where none is given."""
     return value.get("model", "equilibrium") if isinstance(value, dict) else getattr(value, "model", None)
 
 

@@ -444,13 +444,13 @@ def test_work_that_falls_through_zero_leaves_hertz_and_comes_back(held):
     scenario = pulse(Equilibrium(**held))
     radius, work, masked = course(scenario, "contact_radius", "work_of_adhesion", "masked")
     bodies = scenario.bodies
-    hertz = scenario.contact.grip(0.0, 1.0).radius(np.zeros(1), np.zeros(1), 0.0, bodies)[0]
+    hertz = scenario.contact.control(0.0, 1.0).radius(np.zeros(1), np.zeros(1), 0.0, bodies)[0]
     assert_array_equal(masked, work <= 0.0)
     assert 10 < masked.sum() < 390
     assert_array_equal(radius[work <= 0.0], hertz)
     assert np.all(radius[work > 0.0] >= hertz)
     # continuous in the work: near Hertz's radius it grows like its root, a - a_H <= C sqrt(w) with C at 42 mJ/m^2
-    wide = scenario.contact.grip(0.0, 1.0).radius(np.array([0.042]), np.zeros(1), 0.0, bodies)[0]
+    wide = scenario.contact.control(0.0, 1.0).radius(np.array([0.042]), np.zeros(1), 0.0, bodies)[0]
     over = np.maximum(work, 0.0)
     assert np.all(radius - hertz <= 1.5 * (wide - hertz) * np.sqrt(over / 0.042) + 1e-18)
     assert radius[0] == radius[-1] > 1.2 * hertz
@@ -496,7 +496,7 @@ def test_a_field_for_which_adhesion_does_not_pay_leaves_jkr_to_the_bit(name):
 def test_a_uniform_stress_that_the_drive_pays_leaves_jkr_to_the_bit(held, stress):
     scenario = scene(1, 4, contact=Equilibrium(**held), bonds=bonds.Unbroken(stress=stress))
     (radius,) = course(scenario, "contact_radius")
-    plain = scenario.contact.grip(0.0, 1.0).radius(np.array([42e-3]), np.zeros(1), 0.0, scenario.bodies)
+    plain = scenario.contact.control(0.0, 1.0).radius(np.array([42e-3]), np.zeros(1), 0.0, scenario.bodies)
     assert_array_equal(radius, plain[0])
     fluctuating = scene(1, 4, contact=Equilibrium(**held, reversible=0.7), bonds=bonds.Unbroken(stress=0.0))
     assert_array_equal(course(fluctuating, "contact_radius")[0], plain[0])
@@ -612,3 +612,23 @@ def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():
     # one step of healing from nothing, and nothing again once the area is seen
     assert np.all(fraction[closing] <= 2.0 * 1e-3 * (1.0 + 1e-9))
     assert np.all(radius[closing] < 0.5 * np.nanmax(radius))
+
+
+# --- remarks ---
+
+
+@pytest.mark.parametrize(
+    ("held", "words"),
+    [
+        ({"load": 4e-3}, []),
+        ({"load": -1e-3}, ["open for the whole run", "contact.load"]),
+        ({"indentation": {"from": -1e-4, "to": -5e-5}}, ["open for the whole run", "contact.indentation"]),
+        ({"displacement": {"from": -1e-4, "to": 1e-6}, "stiffness": 1e3}, ["begins open", "contact.displacement"]),
+        ({"load": 40.0}, ["0.3 of the sphere"]),
+    ],
+)
+def test_a_contact_remarks_on_a_start_out_of_touch_and_on_a_large_area(held, words):
+    scenario = scene(1, 2, contact=Equilibrium(**held))
+    said = scenario.contact.remarks(scenario.setting)
+    assert len(said) == bool(words)
+    assert all(word in said[0] for word in words)

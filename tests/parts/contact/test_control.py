@@ -1,4 +1,4 @@
-"""What a contact is under each grip: energies along a path, limits of a machine, never below Hertz, any number."""
+"""What a contact is under each control: energies along a path, limits of a machine, never below Hertz, any number."""
 
 import math
 
@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sim.laws import jkr
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.balance import Balance
-from sim.parts.contact.control import AtDisplacement, AtLoad, Bodies, elastic_energy
+from sim.parts.contact.control import Bodies, DisplacementControl, LoadControl, elastic_energy
 from sim.spectrum.families import Gaussian
 from sim.spectrum.finite_contact import Margin, disc_energy
 
@@ -36,22 +36,22 @@ class Path:
         self.stress = np.array([0.25])
 
     def state(self, part):
-        """Grip, balance and radius on the way, in equilibrium."""
+        """Control, balance and radius on the way, in equilibrium."""
         low, high = self.ends
         value = low + (high - low) * part
         bonded = np.array([WORK * (1.0 + self.changing * drift(part)[0])])
         balance = Balance(bonded, np.array([self.fluctuating * WORK]), self.stress, self.margin, MAUGIS, WORK)
         contact = Equilibrium(**self.control(value), reversible=self.reversible)
-        grip = contact.grip(0.0, 1.0)
-        return grip, balance, contact._equilibrium(grip, balance)
+        control = contact.control(0.0, 1.0)
+        return control, balance, contact._equilibrium(control, balance)
 
     def stored(self, part):
         """Energy of the contact and its machine, adhesion included: int w dA in closed form."""
-        grip, balance, a = self.state(part)
-        depth = grip.depth(a, MAUGIS)
+        control, balance, a = self.state(part)
+        depth = control.indentation(a, MAUGIS)
         machine = 0.0
-        if isinstance(grip, AtDisplacement) and math.isfinite(grip.stiffness):
-            machine = 0.5 * grip.stiffness * (grip.place - depth) ** 2
+        if isinstance(control, DisplacementControl) and math.isfinite(control.stiffness):
+            machine = 0.5 * control.stiffness * (control.base - depth) ** 2
         area = math.pi * a**2
         plane = float(PATCHES.surface_energy(SHEAR_MODULUS))
         share = disc_energy(PATCHES, a, SHEAR_MODULUS) / plane if self.fluctuating else 0.0
@@ -63,16 +63,16 @@ class Path:
         """int P d(displacement) - int A dw over the path, by Gauss's nodes; at a load by parts."""
         total = 0.0
         for node, weight in zip(0.5 * (1.0 + NODES), 0.5 * WEIGHTS, strict=True):
-            grip, _, a = self.state(node)
+            control, _, a = self.state(node)
             rate = (self.ends[1] - self.ends[0]) * (
-                -grip.displacement(a, MAUGIS) if isinstance(grip, AtLoad) else grip.normal_load(a, MAUGIS)
+                -control.displacement(a, MAUGIS) if isinstance(control, LoadControl) else control.normal_load(a, MAUGIS)
             )
             rate = rate - math.pi * a**2 * WORK * self.changing * drift(node)[1]
             total += weight * rate[0]
         if "load" in self.control(1.0):
             for part, sign in ((1.0, 1.0), (0.0, -1.0)):
-                grip, _, a = self.state(part)
-                total += sign * (grip.load * grip.displacement(a, MAUGIS))[0]
+                control, _, a = self.state(part)
+                total += sign * (control.load * control.displacement(a, MAUGIS))[0]
         return total
 
 
@@ -105,12 +105,12 @@ def test_the_work_done_on_a_contact_is_what_it_stores(control, paid):
 @pytest.mark.parametrize("control", CONTROLS)
 def test_energies_slope_to_the_load_and_to_the_energy_release_rate(control):
     make, (low, _) = CONTROLS[control]
-    grip = Equilibrium(**make(low)).grip(0.0, 1.0)
+    control = Equilibrium(**make(low)).control(0.0, 1.0)
     a = np.array([1.3])
-    depth = grip.depth(a, MAUGIS)
+    depth = control.indentation(a, MAUGIS)
     # a complex step has no rounding of differences
     slope = elastic_energy(a, depth + 1e-30j, MAUGIS).imag / 1e-30
-    assert_allclose(slope, grip.normal_load(a, MAUGIS), rtol=1e-13)
+    assert_allclose(slope, control.normal_load(a, MAUGIS), rtol=1e-13)
     rate = elastic_energy(a + 1e-30j, depth, MAUGIS).imag / 1e-30 / (2.0 * math.pi * a)
     assert_allclose(-rate, -jkr.energy_release_rate_at_indentation(a, depth, 1.0, 0.75), rtol=1e-13)
 
@@ -119,44 +119,44 @@ def test_energies_slope_to_the_load_and_to_the_energy_release_rate(control):
 def test_a_soft_machine_far_away_is_a_load(load):
     # the load changes by k delta: a relative change of 1e-12 delta, magnified by 1/sqrt(distance from the fold)
     k = 1e-12
-    soft = AtDisplacement(load / k, k).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
-    held = AtLoad(load).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+    soft = DisplacementControl(load / k, k).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+    held = LoadControl(load).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
     assert_allclose(soft, held, rtol=1e-10)
-    assert_allclose(AtDisplacement(load / k, k).normal_load(soft, MAUGIS), load, rtol=1e-10)
+    assert_allclose(DisplacementControl(load / k, k).normal_load(soft, MAUGIS), load, rtol=1e-10)
 
 
 @pytest.mark.parametrize("place", [3.0, 0.0, -0.5, -0.9])
 def test_a_stiff_machine_is_an_indentation(place):
     for stiffness in (1e13, 1e30, math.inf):
-        found = AtDisplacement(place, stiffness)
+        found = DisplacementControl(place, stiffness)
         radius = found.radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
-        held = AtDisplacement(place).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
+        held = DisplacementControl(place).radius(WORK * np.ones(1), np.zeros(1), 0.0, MAUGIS)
         assert_allclose(radius, held, rtol=1e-11)
-        assert_allclose(found.depth(radius, MAUGIS), place, rtol=0.0, atol=1e-11)
+        assert_allclose(found.indentation(radius, MAUGIS), place, rtol=0.0, atol=1e-11)
 
 
 def test_load_indentation_and_displacement_of_any_radius_go_together():
     rng = np.random.default_rng(7)
     a = rng.uniform(0.1, 3.0, 200)
-    for grip in (AtLoad(-0.7), AtDisplacement(0.4), AtDisplacement(0.4, 3.0)):
-        load, depth = grip.normal_load(a, MAUGIS), grip.depth(a, MAUGIS)
+    for control in (LoadControl(-0.7), DisplacementControl(0.4), DisplacementControl(0.4, 3.0)):
+        load, depth = control.normal_load(a, MAUGIS), control.indentation(a, MAUGIS)
         assert_allclose(load, 2.0 * 0.75 * a * (depth - a**2 / 3.0), rtol=0.0, atol=1e-13)
-        yielded = load / 3.0 if getattr(grip, "stiffness", math.inf) == 3.0 else 0.0
-        assert_allclose(grip.displacement(a, MAUGIS), depth + yielded, rtol=0.0, atol=1e-14)
+        yielded = load / 3.0 if getattr(control, "stiffness", math.inf) == 3.0 else 0.0
+        assert_allclose(control.displacement(a, MAUGIS), depth + yielded, rtol=0.0, atol=1e-14)
 
 
 def test_an_open_contact_bears_no_load():
     gone = np.array([math.nan])
-    for grip in (AtLoad(-3.0), AtDisplacement(-2.0), AtDisplacement(-2.0, 5.0)):
-        assert_array_equal(grip.normal_load(gone, MAUGIS), 0.0)
-        assert not grip.closes
-    assert math.isnan(AtLoad(-3.0).depth(gone, MAUGIS)[0])  # a free sphere is anywhere
-    assert_array_equal(AtDisplacement(-2.0, 5.0).depth(gone, MAUGIS), -2.0)
+    for control in (LoadControl(-3.0), DisplacementControl(-2.0), DisplacementControl(-2.0, 5.0)):
+        assert_array_equal(control.normal_load(gone, MAUGIS), 0.0)
+        assert not control.closes
+    assert math.isnan(LoadControl(-3.0).indentation(gone, MAUGIS)[0])  # a free sphere is anywhere
+    assert_array_equal(DisplacementControl(-2.0, 5.0).indentation(gone, MAUGIS), -2.0)
 
 
-@pytest.mark.parametrize("grip", [AtLoad(0.0), AtDisplacement(0.0), AtDisplacement(0.0, 5.0)])
-def test_a_free_sphere_closes_from_zero_on(grip):
-    assert grip.closes
+@pytest.mark.parametrize("control", [LoadControl(0.0), DisplacementControl(0.0), DisplacementControl(0.0, 5.0)])
+def test_a_free_sphere_closes_from_zero_on(control):
+    assert control.closes
 
 
 def random_balance(rng, size, margin):
@@ -180,16 +180,16 @@ def test_no_contact_is_smaller_than_hertz_and_each_balances(kind, margin, revers
     rng = np.random.default_rng(11)
     for _ in range(60):
         contact, balance = random_contact(rng, kind, reversible), random_balance(rng, 40, margin)
-        grip = contact.grip(0.0, 1.0)
-        a = contact._equilibrium(grip, balance)
+        control = contact.control(0.0, 1.0)
+        a = contact._equilibrium(control, balance)
         left = contact._left(a, balance)
-        hertz = grip.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)
+        hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)
         closed = np.isfinite(a)
-        if grip.closes:
+        if control.closes:
             assert closed.all()
             assert np.all(a >= hertz * (1.0 - 4e-16))
-        pulled = closed & (a > hertz * (1.0 + 1e-9)) if grip.closes else closed
-        rate = jkr.energy_release_rate_at_indentation(a, grip.depth(a, MAUGIS), 1.0, 0.75)
+        pulled = closed & (a > hertz * (1.0 + 1e-9)) if control.closes else closed
+        rate = jkr.energy_release_rate_at_indentation(a, control.indentation(a, MAUGIS), 1.0, 0.75)
         # G is a square whose root has lost digits to the difference of a^2 and delta; the scale is w at rest
         assert_allclose(rate[pulled], left[pulled], rtol=1e-9, atol=1e-12 * WORK)
         masked = closed & ~pulled
@@ -205,26 +205,26 @@ def test_the_contact_on_a_disc_is_the_widest_that_balances(kind):
     wrong = 0
     for _ in range(20):
         contact, balance = random_contact(rng, kind, 0.0), random_balance(rng, 30, margin)
-        grip = contact.grip(0.0, 1.0)
-        a = contact._equilibrium(grip, balance)
-        depth = grip.depth(places, MAUGIS)
+        control = contact.control(0.0, 1.0)
+        a = contact._equilibrium(control, balance)
+        depth = control.indentation(places, MAUGIS)
         rate = jkr.energy_release_rate_at_indentation(places, depth, 1.0, 0.75)
         pull = np.where(places**2 > depth, rate, -rate)
         below = pull <= balance.bonded - balance.fluctuating * margin(places)
         crossed = below.any(0)
         widest = places[np.argmax(below, 0), 0]
-        hertz = np.nan_to_num(grip.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS))
-        expected = np.where(crossed, np.maximum(widest, hertz), hertz if grip.closes else math.nan)
+        hertz = np.nan_to_num(control.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS))
+        expected = np.where(crossed, np.maximum(widest, hertz), hertz if control.closes else math.nan)
         step = places[0, 0] / places[1, 0]
         off = np.isnan(a) != np.isnan(expected)
         off |= ~np.isnan(a + expected) & ((a < expected / step) | (a > expected * step * (1.0 + 1e-12)))
         # two crossings between neighbouring places are a contact that the walk does not see
-        wrong += np.count_nonzero(off & ~(np.isnan(expected) & ~np.isnan(a) & balances(grip, a, balance)))
+        wrong += np.count_nonzero(off & ~(np.isnan(expected) & ~np.isnan(a) & balances(control, a, balance)))
     assert wrong == 0
 
 
-def balances(grip, a, balance):
-    rate = jkr.energy_release_rate_at_indentation(a, grip.depth(a, MAUGIS), 1.0, 0.75)
+def balances(control, a, balance):
+    rate = jkr.energy_release_rate_at_indentation(a, control.indentation(a, MAUGIS), 1.0, 0.75)
     return np.abs(rate - balance.work(a)) <= 1e-9 * WORK
 
 
@@ -235,20 +235,20 @@ def test_no_number_raises_or_hangs_or_makes_a_contact_smaller_than_hertz(reversi
     works = np.array([0.0, -1.0, *numbers, math.inf, -math.inf, math.nan])
     for size in numbers:
         for value in (size, -size):
-            for grip in (
-                AtLoad(value),
-                AtDisplacement(value),
-                *(AtDisplacement(value, k) for k in (5e-324, 1e-30, 1.0, 1e30, 1e308)),
+            for control in (
+                LoadControl(value),
+                DisplacementControl(value),
+                *(DisplacementControl(value, k) for k in (5e-324, 1e-30, 1.0, 1e30, 1e308)),
             ):
                 for stress in (0.0, 1.0, 1e150):
-                    a = grip.radius(works, np.full(works.shape, stress), reversible, MAUGIS)
-                    hertz = grip.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)[0]
+                    a = control.radius(works, np.full(works.shape, stress), reversible, MAUGIS)
+                    hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)[0]
                     closed = np.isfinite(a) & (a > 0.0)
                     if value >= 0.0 and math.isfinite(hertz):
                         assert np.all(a[closed] >= hertz * (1.0 - 1e-13))
                     if value < 0.0:
                         assert np.all(np.isnan(a[:2]))
-                    for read in (grip.normal_load, grip.depth, grip.displacement):
+                    for read in (control.normal_load, control.indentation, control.displacement):
                         assert read(a, MAUGIS).shape == a.shape
 
 
@@ -256,9 +256,9 @@ def test_without_work_a_contact_is_hertz_to_the_bit():
     for work in (0.0, -0.0, -1e-300, -WORK, -math.inf):
         one = np.full(1, work)
         for load in (0.0, 5e-324, 0.3, 7.0):
-            assert AtLoad(load).radius(one, np.ones(1), 0.5, MAUGIS) == jkr.hertz_radius_at_load(load, 1.0, 0.75)
-            assert AtDisplacement(load).radius(one, np.ones(1), 0.5, MAUGIS) == math.sqrt(load)
-            a = AtDisplacement(load, 5.0).radius(one, np.ones(1), 0.5, MAUGIS)[0]
+            assert LoadControl(load).radius(one, np.ones(1), 0.5, MAUGIS) == jkr.hertz_radius_at_load(load, 1.0, 0.75)
+            assert DisplacementControl(load).radius(one, np.ones(1), 0.5, MAUGIS) == math.sqrt(load)
+            a = DisplacementControl(load, 5.0).radius(one, np.ones(1), 0.5, MAUGIS)[0]
             assert_allclose(a**2 + a**3 / 5.0, load, rtol=1e-14, atol=0.0)
 
 
@@ -266,7 +266,7 @@ def test_nothing_reversible_is_jkr_to_the_bit_at_any_stress():
     rng = np.random.default_rng(17)
     works = WORK * rng.uniform(-0.2, 1.0, 100)
     for value in rng.uniform(-1.5, 3.0, 20):
-        for grip in (AtLoad(value), AtDisplacement(value), AtDisplacement(value, 0.7)):
-            plain = grip.radius(works, np.zeros(1), 0.0, MAUGIS)
-            assert_array_equal(grip.radius(works, 10.0 ** rng.uniform(-9, 9, 100), 0.0, MAUGIS), plain)
-            assert_array_equal(grip.radius(works, np.zeros(1), 0.5, MAUGIS), plain)
+        for control in (LoadControl(value), DisplacementControl(value), DisplacementControl(value, 0.7)):
+            plain = control.radius(works, np.zeros(1), 0.0, MAUGIS)
+            assert_array_equal(control.radius(works, 10.0 ** rng.uniform(-9, 9, 100), 0.0, MAUGIS), plain)
+            assert_array_equal(control.radius(works, np.zeros(1), 0.5, MAUGIS), plain)
