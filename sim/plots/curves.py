@@ -8,6 +8,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.figure import Figure
 
 from sim.analysis import (
     averaging,
@@ -20,7 +21,7 @@ from sim.analysis import (
     summary,
     sweep_dims,
 )
-from sim.plots.style import BOTH, LINES, Unit, axis_scale, fill, label, swept_value, symbol
+from sim.plots.style import BOTH, LINES, Unit, axis_scale, fill, swept_value, symbol
 
 #: Points up to which each carries a marker.
 MARKED = 25
@@ -219,8 +220,7 @@ def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], Bar | N
     keyed = len(points) > len(LINES) and len(dims) == 1 and dataset[dims[0]].dtype.kind in "fi"
     if len(points) > (MOST if keyed else NAMED):
         sizes = " × ".join(f"{dataset.sizes[name]} of {name}" for name in dims)
-        cure = f'choose by --where, such as --where {dims[0]}="{swept_value(dataset, dims[0], 0).partition("= ")[2]}"'
-        raise ValueError(f"{len(points)} curves ({sizes}) are too many to tell apart; {cure}")
+        raise ValueError(f"{len(points)} curves ({sizes}) are too many to tell apart; {choice(dataset, dims[0])}")
     if keyed:
         bar, colours = _bar(dataset[dims[0]])
         return [Line(k, at, "", colour) for k, (at, colour) in enumerate(zip(points, colours, strict=True))], bar
@@ -229,6 +229,12 @@ def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], Bar | N
         shades = tuple(mpl.colors.to_hex(c) for c in mpl.colormaps["turbo"](np.linspace(0.05, 0.95, len(points))))
     names = [", ".join(swept_value(dataset, name, at[name]) for name in dims) for at in points]
     return [Line(k, at, names[k], shades[k]) for k, at in enumerate(points)], None
+
+
+def choice(dataset: xr.Dataset, dim: str) -> str:
+    """The cure for too many values of a swept key."""
+    value = swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
+    return f'choose by --where, such as --where {dim}="{value}"'
 
 
 def _bar(key: xr.DataArray) -> tuple[Bar, list[str]]:
@@ -241,7 +247,13 @@ def _bar(key: xr.DataArray) -> tuple[Bar, list[str]]:
     shades = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
     colours = ScalarMappable(norm, shades)
     words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
-    return Bar(colours, label(words, unit.name)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
+    return Bar(colours, unit.label(words)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
+
+
+def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
+    """The colour bar beside panels, where the curves have one."""
+    if scene.bar:
+        figure.colorbar(scene.bar.colours, ax=axes, label=scene.bar.words, aspect=45, pad=0.02)
 
 
 def curve(

@@ -26,7 +26,6 @@ from sim.plots.style import (
     Unit,
     across,
     first_point,
-    label,
     legend,
     letter,
     picture,
@@ -75,7 +74,7 @@ def map_figure(dataset: xr.Dataset) -> Figure:
             0.04, 0.05, arrow[float(np.sign(speed_then))], transform=panel.transAxes, fontsize=7,
             bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0},
         )  # fmt: skip
-    axes[0].set_ylabel(label("$y$", length.name))
+    axes[0].set_ylabel(length.label("$y$"))
     letter(list(axes))
     then = f"$t$ = {engineering(float(stress['map_time']), 's')}, $V$ = {engineering(speed_then, 'm/s')}"
     axes[0].set_title(", ".join(filter(None, [point, then.replace("-", "−")])))
@@ -108,7 +107,7 @@ def _draw_map(
         extent=(-reach, reach, -reach, reach), interpolation="nearest",
     )  # fmt: skip
     bar = figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)))
-    bar.set_label(label(words, unit.name))
+    bar.set_label(unit.label(words))
     if 0.0 < radius < 1.5 * cell:
         circle = Circle((0.0, 0.0), radius * length.factor, fill=False, linewidth=1.0, color=BOTH)
         circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
@@ -116,7 +115,7 @@ def _draw_map(
     limit = 0.5 * side * length.factor
     panel.set_xlim(-limit, limit)
     panel.set_ylim(-limit, limit)
-    panel.set_xlabel(label("$x$", length.name))
+    panel.set_xlabel(length.label("$x$"))
 
 
 def _refined(field: np.ndarray) -> np.ndarray:
@@ -206,7 +205,7 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     below.axhline(1.0, color=FLUCTUATIONS, linewidth=1.2)
     below.errorbar(q / length.factor, measured / expected, error / expected, **dots)
     below.set_ylabel("realised/discretised")
-    across(below, q / length.factor, "log", "wavenumber $q$", f"rad/{length.name}", room=0.03)
+    across(below, q / length.factor, "log", f"wavenumber $q$ (rad/{length.name})", 0.03)
     return figure
 
 

@@ -5,7 +5,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sim.plots.bond_laws import rest_of
-from sim.plots.curves import scene_along
+from sim.plots.curves import colour_bar, scene_along
 from sim.plots.panels import friction_panel
 from sim.plots.style import REFERENCE, Unit, across, legend, rows
 
@@ -37,8 +37,7 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
         placed = scene.placed(unit.factor * x, broken=True)
         friction_panel(panel, placed)
         panel.axhline(0.0, color=REFERENCE, linewidth=0.5, zorder=1)
-        across(panel, placed.x, "linear", words, unit.name, 0.0 if si == "s" else 0.03)
+        across(panel, placed.x, "linear", unit.label(words), 0.0 if si == "s" else 0.03)
     legend(axes[0], scene.title)
-    if scene.bar:
-        figure.colorbar(scene.bar.colours, ax=axes, label=scene.bar.words, aspect=45, pad=0.02)
+    colour_bar(figure, axes, scene)
     return figure

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from sim.analysis import control, loop_energy, setting
 from sim.analysis.scene import stays_held
 from sim.laws import jkr
-from sim.plots.curves import Line, Scene, mark_jumps, scene_along
-from sim.plots.style import REFERENCE, Unit, across, fill, label, legend, rows
+from sim.plots.curves import Line, Scene, colour_bar, mark_jumps, scene_along
+from sim.plots.style import REFERENCE, Unit, across, fill, legend, rows
 
 #: Radii at which the equilibrium curve is evaluated.
 _FINE = 600
@@ -114,14 +114,13 @@ def loop_figure(dataset: xr.Dataset) -> Figure:
             _cycle(panel, shown, name, line, factor, held)
     _equilibria(loads, radii, scene, theories, (unit.factor, force.factor, length.factor))
     _levels(loads, theories, force.factor)
-    loads.set_ylabel(label("normal load $P$", force.name))
-    radii.set_ylabel(label("contact radius $a$", length.name))
+    loads.set_ylabel(force.label("normal load $P$"))
+    radii.set_ylabel(length.label("contact radius $a$"))
     radii.set_ylim(bottom=0.0)
     legend(loads, _title(dataset, held), columns=1)
     legend(radii)
-    if scene.bar:
-        figure.colorbar(scene.bar.colours, ax=[loads, radii], label=scene.bar.words, aspect=45, pad=0.02)
-    across(radii, scene.x, "linear", held.words, unit.name, 0.03)
+    colour_bar(figure, [loads, radii], scene)
+    across(radii, scene.x, "linear", unit.label(held.words), 0.03)
     return figure
 
 

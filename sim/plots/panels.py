@@ -13,6 +13,7 @@ from sim.analysis.scene import stays_held
 from sim.plots.bond_laws import rest_of
 from sim.plots.curves import (
     Scene,
+    colour_bar,
     contact_curves,
     covered,
     curve,
@@ -31,7 +32,6 @@ from sim.plots.style import (
     across,
     axis_scale,
     fill,
-    label,
     legend,
     rows,
     symbol,
@@ -54,7 +54,7 @@ def series(name: str, words: str, si: str) -> Panel:
     def panel_of(panel: Axes, scene: Scene) -> None:
         unit = Unit.of(scene.all(f"{name}_mean"), si)
         contact_curves(panel, scene, name, unit.factor)
-        panel.set_ylabel(label(words, unit.name))
+        panel.set_ylabel(unit.label(words))
 
     return panel_of
 
@@ -69,7 +69,7 @@ def radius_panel(panel: Axes, scene: Scene) -> None:
     for which, style in (("JKR", "--"), ("Hertz", ":")):
         name = f"{which.lower()}_radius_mean"
         _reference(panel, scene, unit.factor * scene.all(name), style, which)
-    panel.set_ylabel(label("contact radius $a$", unit.name))
+    panel.set_ylabel(unit.label("contact radius $a$"))
 
 
 def _reference(panel: Axes, scene: Scene, values: np.ndarray, style: Any, name: str) -> None:
@@ -120,7 +120,7 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
         panel.plot([], [], color=own if scene.single else REFERENCE, label=text, **scene.look(style))
     if np.any(values <= 0.0):
         panel.axhline(0.0, color=REFERENCE, linewidth=0.5, zorder=1)
-    panel.set_ylabel(label("energy per area", unit.name))
+    panel.set_ylabel(unit.label("energy per area"))
     legend(panel)
 
 
@@ -137,7 +137,7 @@ def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
         colour = FLUCTUATIONS if scene.single else line.colour
         curve(panel, scene, "fluctuation_energy", line, unit.factor, colour, "--")
     panel.set_ylim(bottom=0.0)
-    panel.set_ylabel(label(r"fluctuations $\Delta\Gamma$", unit.name))
+    panel.set_ylabel(unit.label(r"fluctuations $\Delta\Gamma$"))
 
 
 def share_panel(panel: Axes, scene: Scene) -> None:
@@ -173,8 +173,7 @@ def stacked(scene: Scene, panels: list[tuple[float, Panel]]) -> tuple[Figure, li
     figure, axes = rows([height for height, _ in panels])
     for panel, (_, drawing) in zip(axes, panels, strict=True):
         drawing(panel, scene)
-    if scene.bar:
-        figure.colorbar(scene.bar.colours, ax=axes, label=scene.bar.words, aspect=45, pad=0.02)
+    colour_bar(figure, axes, scene)
     return figure, axes
 
 
@@ -201,7 +200,7 @@ def curve_figure(dataset: xr.Dataset) -> Figure:
     """Contact area with what each mechanism takes of it, energies and friction, over speed."""
     scene, scale, unit = over_speed(dataset)
     figure, axes = stacked(scene, [(1.9, share_panel), *further_panels(scene)])
-    across(axes[-1], scene.x, scale, "sliding speed $V$", unit.name, room_of(scene))
+    across(axes[-1], scene.x, scale, unit.label("sliding speed $V$"), room_of(scene))
     return figure
 
 
@@ -222,7 +221,7 @@ def time_figure(dataset: xr.Dataset) -> Figure:
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
     figure, axes = stacked(scene, [(1.6, radius_panel), *further_panels(scene), *driven])
     legend(axes[0], scene.title)
-    across(axes[-1], scene.x, "linear", "time $t$", unit.name)
+    across(axes[-1], scene.x, "linear", unit.label("time $t$"))
     return figure
 
 
@@ -250,7 +249,7 @@ def sweep_figure(dataset: xr.Dataset) -> Figure:
     legend(axes[0], scene.title if is_stationary(dataset) else _at_the_end(dataset, scene.title))
     words = f"{key.attrs.get('long_name', key.name)} {symbol(key)}".strip()
     beside = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
-    across(axes[-1], scene.x, scale, words, unit.name, beside if named else room_of(scene))
+    across(axes[-1], scene.x, scale, unit.label(words), beside if named else room_of(scene))
     if named:
         axes[-1].set_xticks(values, [str(value) for value in key.to_numpy()])
     return figure

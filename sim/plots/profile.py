@@ -11,7 +11,7 @@ from matplotlib.patheffects import withStroke
 
 from sim.analysis import engineering, setting
 from sim.laws import jkr, profiles
-from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, first_point, label, legend, letter, picture
+from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, first_point, legend, letter, picture
 
 #: Points of a profile on one side, and how far it goes in contact radii.
 _POINTS, _REACH = 1500, 2.0
@@ -143,13 +143,13 @@ def _pressure_panel(panel: Axes, drawn: _Drawn, reach: float, length: Unit) -> N
         panel.plot(length.factor * x, unit.factor * p, **line)
     size = unit.factor * abs(middle)
     panel.set_ylim((-1.6 * size, 1.15 * size) if middle > 0.0 else (-4.0 * size, 0.5 * size))
-    panel.set_ylabel(label("normal pressure $p$", unit.name))
+    panel.set_ylabel(unit.label("normal pressure $p$"))
     _lengthwise(panel, reach, length, "distance from the axis $r$")
 
 
 def _lengthwise(panel: Axes, reach: float, length: Unit, words: str) -> None:
     panel.set_xlim(-length.factor * reach, length.factor * reach)
-    panel.set_xlabel(label(words, length.name))
+    panel.set_xlabel(length.label(words))
 
 
 def _surface_panel(panel: Axes, drawn: _Drawn, reach: float, length: Unit) -> None:
@@ -170,7 +170,7 @@ def _surface_panel(panel: Axes, drawn: _Drawn, reach: float, length: Unit) -> No
             panel.set_ylim(bottom, float(np.max(ball)))
     panel.text(0.5, 0.8, "sphere", transform=panel.transAxes, ha="center", fontsize=7)
     panel.text(0.5, 0.06, "half-space", transform=panel.transAxes, ha="center", fontsize=7)
-    panel.set_ylabel(label("height $z$", unit.name))
+    panel.set_ylabel(unit.label("height $z$"))
     _lengthwise(panel, reach, length, "distance from the axis $r$")
 
 
@@ -186,7 +186,7 @@ def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: Unit) -
     for edge in (-shape.radius, shape.radius):
         panel.axvline(length.factor * edge, color=REFERENCE, linewidth=0.5, zorder=1)
     legend(panel)
-    panel.set_ylabel(label("tangential displacement", unit.name))
+    panel.set_ylabel(unit.label("tangential displacement"))
     _lengthwise(panel, reach, length, "distance from the axis")
 
 
@@ -203,9 +203,9 @@ def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: 
     levels = np.linspace(np.min(moved), np.max(moved), 8)[1:-1]
     at = length.factor * x
     panel.contour(at, at, unit.factor * moved.T, unit.factor * levels, colors="white", linewidths=0.4, linestyles="-")
-    figure.colorbar(image, ax=panel, pad=0.02).set_label(label("displacement along $x$", unit.name))
+    figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$"))
     circle = Circle((0.0, 0.0), length.factor * shape.radius, fill=False, linewidth=1.0, color=BOTH)
     circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
     panel.add_patch(circle)
-    panel.set_xlabel(label("$x$", length.name))
-    panel.set_ylabel(label("$y$", length.name))
+    panel.set_xlabel(length.label("$x$"))
+    panel.set_ylabel(length.label("$y$"))

@@ -15,7 +15,6 @@ from sim.plots.style import (
     REFERENCE,
     WIDE,
     Unit,
-    label,
     legend,
     letter,
     picture,
@@ -121,8 +120,8 @@ def _time_panel(panel: Axes, starts: list[Start], unit: Unit) -> None:
         span(panel, first, last)
     else:
         panel.set_xlim(0.0, last)
-    panel.set_ylabel(label(r"shear stress $\tau_0$", unit.name))
-    panel.set_xlabel(label("time since the start", length.name))
+    panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
+    panel.set_xlabel(length.label("time since the start"))
 
 
 def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over: str, unit: Unit) -> None:
@@ -151,7 +150,7 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over: str
         plain_ticks(panel.xaxis)
     panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
     words = "sliding speed $V$" if over == "speed" else "time at rest"
-    panel.set_xlabel(label(words, pace.name))
+    panel.set_xlabel(pace.label(words))
     legend(panel, "peak of the stress")
 
 

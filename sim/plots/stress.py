@@ -12,7 +12,7 @@ from sim.plots.bond_laws import Steady, rest_of, steady_laws
 from sim.plots.curves import Line, Scene, contact_curves, over_speed, room_of, speed_dim
 from sim.plots.panels import stacked
 from sim.plots.static_friction import start_figure
-from sim.plots.style import REFERENCE, Unit, across, label, legend, rounded
+from sim.plots.style import REFERENCE, Unit, across, legend, rounded
 
 #: Speeds at which a closed form is drawn.
 _FINE = 600
@@ -65,7 +65,7 @@ def stress_figure(dataset: xr.Dataset) -> Figure:
 
     further = [(1.3, fraction_panel)] if scene.varies("bond_fraction") else []
     figure, axes = stacked(scene, [(2.1, stress_panel), *further])
-    across(axes[-1], scene.x, scale, "sliding speed $V$", unit.name, room_of(scene))
+    across(axes[-1], scene.x, scale, unit.label("sliding speed $V$"), room_of(scene))
     return figure
 
 
@@ -99,7 +99,7 @@ def _stress_panel(panel: Axes, scene: Scene, laws: dict[int, list[tuple[np.ndarr
         for speed, law in laws[line.number]:
             panel.plot(pace * speed, unit.factor * law.stress, label=law.words, **_thin(law.style))
     legend(panel, scene.title)
-    panel.set_ylabel(label(r"shear stress $\tau_0$", unit.name))
+    panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
 
 
 def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:

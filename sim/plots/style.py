@@ -110,16 +110,15 @@ def symbol(variable: xr.DataArray) -> str:
     return f"${text}$" if text else ""
 
 
-def label(words: str, unit: str) -> str:
-    """Words with their unit in brackets, if there is one."""
-    return f"{words} ({unit})" if unit else words
-
-
 class Unit(NamedTuple):
     """A factor from SI and the unit it leads to."""
 
     factor: float
     name: str
+
+    def label(self, words: str) -> str:
+        """Words with the unit in brackets, if there is one."""
+        return f"{words} ({self.name})" if self.name else words
 
     @classmethod
     def of(cls, values: np.ndarray, unit: str, logarithmic: bool = False) -> "Unit":
@@ -182,7 +181,7 @@ def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]
     return figure, axes
 
 
-def across(panel: Axes, x: np.ndarray, scale: str, words: str, unit: str, room: float = 0.0) -> None:
+def across(panel: Axes, x: np.ndarray, scale: str, words: str, room: float = 0.0) -> None:
     """The x axis that the panels share, with some ``room`` for markers at its ends."""
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
     if scale == "symlog":
@@ -195,7 +194,7 @@ def across(panel: Axes, x: np.ndarray, scale: str, words: str, unit: str, room: 
         ends = np.log([known.min(), known.max()]) if scale == "log" else np.array([known.min(), known.max()])
         ends = ends + np.array([-room, room]) * (ends[1] - ends[0])
         panel.set_xlim(*(np.exp(ends) if scale == "log" else ends))
-    panel.set_xlabel("\n".join(textwrap.wrap(label(words, unit), 64)))
+    panel.set_xlabel("\n".join(textwrap.wrap(words, 64)))
 
 
 def span(panel: Axes, low: float, high: float) -> None:

@@ -1,6 +1,5 @@
 """The figure of the competing theories: contact area under shear by each of them, and what was simulated."""
 
-import json
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,9 +8,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from sim.analysis import engineering, is_steady, setting, settled, sweep_dims
+from sim.analysis import control, engineering, is_steady, setting, settled
 from sim.laws.theories import compare_at_indentation, compare_at_load
-from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, label, letter, picture, span
+from sim.plots.curves import choice
+from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, letter, picture, span
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
@@ -37,7 +37,6 @@ _POINTS = 40
 class Case(NamedTuple):
     """What the theories need of a scene: ``held`` is "load" [N] or "indentation" [m], rest as in ``laws.theories``."""
 
-    at: dict[str, int]
     held: str
     value: float
     work: float
@@ -59,114 +58,64 @@ class Case(NamedTuple):
         return float(np.sqrt(np.pi * self.modulus * self.work / (6.0 * radius)))
 
 
-def needs_control(dataset: xr.Dataset) -> str:
-    """What holds the sphere at a number, "load" or "indentation"; refuse a dataset without.
-
-    Raises
-    ------
-    ValueError
-        For a sphere behind a machine stiffness, or held at a value that varies or is swept as a table.
-    """
-    contact = _scenario(dataset).get("contact", {})
-    why = "the sphere is not held at one number"
-    if contact.get("displacement") is not None:
-        why = "the sphere is behind a machine stiffness"
-    elif is_moved(dataset):
-        why = "what holds the sphere varies in time"
-    else:
-        for held in ("load", "indentation"):
-            if _number(dataset, f"contact.{held}") is not None:
-                return _with_contact(dataset, held)
-    cure = 'run it with [contact] load = "4 mN", or with an indentation'
-    raise ValueError(f"{why}, and the theories need a load or an indentation that stays; {cure}")
+def needs_control(dataset: xr.Dataset) -> None:
+    """Refuse a dataset whose sphere is not held at one load or indentation, with adhesion and in contact."""
+    found = _numbers(dataset)
+    if not float(found["work"].max()) > 0.0:
+        raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
+    if not bool((dataset["radius_at_rest"] > 0.0).any()):
+        raise ValueError("there is no contact at rest; raise the load or the indentation")
+    for values in found.values():
+        if float(values.min()) < float(values.max()):
+            raise ValueError(f"theories are of one contact; {choice(dataset, str(values.dims[0]))}")
 
 
 def sweeps_theories(dataset: xr.Dataset) -> bool:
     """Whether the reversible fraction, on which the theories differ, is swept."""
-    found = _number(dataset, "contact.reversible")
-    return found is not None and found.size > 1
+    return _fractions(dataset).size > 1
 
 
-def _scenario(dataset: xr.Dataset) -> dict[str, Any]:
-    """The scenario of the dataset with all defaults."""
-    return json.loads(dataset.attrs.get("scenario_resolved", "{}"))
-
-
-def is_moved(dataset: xr.Dataset) -> bool:
-    """Whether what holds the sphere varies in time."""
-    contact = _scenario(dataset).get("contact", {})
-    return any(isinstance(contact.get(key), dict) for key in ("load", "indentation", "displacement"))
-
-
-def _with_contact(dataset: xr.Dataset, held: str) -> str:
-    if not float(setting(dataset, "adhesion.work").max()) > 0.0:
-        raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
-    if not bool((dataset["radius_at_rest"] > 0.0).any()):
-        raise ValueError("there is no contact at rest; raise the load or the indentation")
-    return held
-
-
-def _number(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
+def _fractions(dataset: xr.Dataset) -> np.ndarray:
     try:
-        return setting(dataset, key)
+        return setting(dataset, "contact.reversible").to_numpy().ravel()
+    except KeyError:  # the whole table is swept
+        return np.empty(0)
+
+
+def _numbers(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
+    """What the theories need, with the sweep's dimensions."""
+    try:
+        held = control(dataset).kind
+        value = setting(dataset, f"contact.{held}")
     except KeyError:
-        return None
-
-
-def case_of(dataset: xr.Dataset) -> Case:
-    """The scene of the theories; of swept loads, works or bodies the one that the scenario itself names."""
-    held = needs_control(dataset)
-    wanted = {
-        "value": setting(dataset, f"contact.{held}"),
+        held = ""
+    if held not in ("load", "indentation"):
+        cure = 'run it with [contact] load = "4 mN", or with an indentation'
+        raise ValueError(f"theories need a load or an indentation that stays; {cure}")
+    return {
+        "value": value,
         "work": setting(dataset, "adhesion.work"),
         "sphere_radius": setting(dataset, "sphere.radius"),
         "modulus": dataset["contact_modulus"],
         "poisson_ratio": dataset["effective_poisson_ratio"],
     }
-    own = _scenario(dataset)
-    at = {name: _chosen(dataset, name, own) for name in _theory_dims(dataset, wanted)}
-    point = dict.fromkeys(sweep_dims(dataset), 0) | at
-    numbers = {key: float(found.isel(point, missing_dims="ignore")) for key, found in wanted.items()}
-    return Case(at, held, reversible=_fraction(dataset), **numbers)
 
 
-def _fraction(dataset: xr.Dataset) -> float:
-    """The reversible fraction to draw: the first of the dataset's own that no other theory stands for."""
-    own = _number(dataset, "contact.reversible")
-    shares = [] if own is None else [float(share) for share in own.to_numpy().ravel() if 0.0 < share != 1.0]
-    return shares[0] if shares else _FRACTION
+def case_of(dataset: xr.Dataset) -> Case:
+    """The scene of the theories, with the first reversible fraction of the dataset that no other theory stands for."""
+    shares = [share for share in _fractions(dataset) if 0.0 < share != 1.0]
+    numbers = {key: float(found.max()) for key, found in _numbers(dataset).items()}
+    return Case(control(dataset).kind, reversible=float(shares[0]) if shares else _FRACTION, **numbers)
 
 
-def _theory_dims(dataset: xr.Dataset, wanted: dict[str, xr.DataArray]) -> list[str]:
-    """Dimensions of the sweep along which the theories change."""
-    named = [name for name in sweep_dims(dataset) if any(name in found.dims for found in wanted.values())]
-    changes = {
-        name: any(name in v.dims and bool((v != v.isel({name: 0})).any()) for v in wanted.values()) for name in named
-    }
-    return [name for name in named if changes[name]]
-
-
-def _chosen(dataset: xr.Dataset, name: str, own: dict[str, Any]) -> int:
-    """Index along a dimension: the scenario's own value where it is among them, else the first with a contact."""
-    keys = (("contact", "load"), ("contact", "indentation"), ("adhesion", "work"), ("sphere", "radius"))
-    for table, key in keys:
-        swept, value = _number(dataset, f"{table}.{key}"), own.get(table, {}).get(key)
-        if swept is not None and swept.dims == (name,) and isinstance(value, float):
-            near = np.abs(swept.to_numpy() - value)
-            if near.min() <= 1e-9 * abs(value):
-                return int(near.argmin())
-    others = [dim for dim in dataset["radius_at_rest"].dims if dim != name]
-    return int((dataset["radius_at_rest"] > 0.0).any(others).to_numpy().argmax())
-
-
-def points_of(dataset: xr.Dataset, at: dict[str, int]) -> tuple[np.ndarray, np.ndarray]:
+def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Shear stress [Pa] and contact area [m^2] of closed contacts, means over the members.
 
     Of steady sliding the mean over the second half of the run at each point of the sweep, else records
     spread evenly over the run.
     """
     names = [name if name in dataset else f"{name}_mean" for name in ("shear_stress", "contact_area")]
-    found = dataset[names].isel({n: k for n, k in at.items() if n in dataset[names].dims})
+    found = dataset[names]
     if is_steady(dataset):
         found = settled(found)
     else:
@@ -182,7 +131,7 @@ def points_of(dataset: xr.Dataset, at: dict[str, int]) -> tuple[np.ndarray, np.n
 def theories_figure(dataset: xr.Dataset) -> Figure:
     """Contact area by every theory, and simulated, over shear stress and tangential force."""
     case = case_of(dataset)
-    stress, area = points_of(dataset, case.at)
+    stress, area = points_of(dataset)
     sheared = stress[stress > 0.0]
     low, high = 0.1 * case.scale, max(3.0 * case.scale, 1.3 * float(np.max(sheared, initial=0.0)))
     low = max(0.01 * case.scale, 0.7 * float(np.min(sheared, initial=low / 0.7)))
@@ -196,9 +145,9 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     _panel(axes[0], dict.fromkeys(areas, pace.factor * fine), areas, (pace.factor * stress, area), unit)
     forces = {name: force.factor * values * fine for name, values in areas.items()}
     _panel(axes[1], forces, areas, (force.factor * stress * area, area), unit)
-    axes[0].set_ylabel(label("contact area $A$", unit.name))
-    axes[0].set_xlabel(label(r"shear stress $\tau$", pace.name))
-    axes[1].set_xlabel(label(r"tangential force $T = \tau A$", force.name))
+    axes[0].set_ylabel(unit.label("contact area $A$"))
+    axes[0].set_xlabel(pace.label(r"shear stress $\tau$"))
+    axes[1].set_xlabel(force.label(r"tangential force $T = \tau A$"))
     span(axes[0], pace.factor * low, pace.factor * high)
     span(axes[1], *(force.factor * stress * areas["jkr"][0] for stress in (low, high)))
     _limit(axes[0], areas, area, unit)

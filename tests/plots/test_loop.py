@@ -69,7 +69,7 @@ def test_load_and_radius_stand_over_the_indentation_and_break_where_the_contact_
 
 
 def test_behind_a_machine_the_axis_is_its_displacement(machine):
-    loads, radii = rendered(plots.draw(machine, "loop")).axes
+    loads, radii = plots.draw(machine, "loop").axes
     assert radii.get_xlabel() == r"displacement $\Delta$ (µm)"
     assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
 
@@ -133,7 +133,7 @@ def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine
 
 def test_a_dead_load_has_no_jump_to_draw_but_a_cross():
     dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}))
-    loads, radii = rendered(plots.draw(dataset, "loop")).axes
+    loads, radii = plots.draw(dataset, "loop").axes
     assert radii.get_xlabel() == r"indentation $\delta$ (µm)"
     assert not loads.collections and len(marks(loads, "x")) == 1 and not marks(loads, "o")
 
@@ -163,18 +163,18 @@ def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
         spent, loop = lost_energy(dataset)
         assert loop is None and float(spent) > 0.0
         assert_allclose(spent, dataset["dissipated_energy"].max(), rtol=1e-14)
-        legend = rendered(plots.draw(dataset, "loop")).axes[0].get_legend()
+        legend = plots.draw(dataset, "loop").axes[0].get_legend()
         assert legend.get_title().get_text() == "dissipated in all: $W$"
 
 
 def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
     dataset = moved(MACHINE, sweep={"contact.stiffness": [100.0, 1e3]})
-    loads, radii = rendered(plots.draw(dataset)).axes
+    loads, radii = plots.draw(dataset).axes
     assert [line.get_color() for line in radii.lines if line.get_linestyle() == "--"] == [pictures.REFERENCE] * 2
     words = [text.get_text() for text in loads.get_legend().get_texts()]
     assert [text.split(":")[0] for text in words] == ["$k$ = 0.1 kN/m", "$k$ = 1 kN/m"]
     # of works of adhesion each has its folds, which then no name fits
-    panel = rendered(plots.draw(moved(sweep={"adhesion.work": [0.0, 21e-3, 42e-3]}))).axes[0]
+    panel = plots.draw(moved(sweep={"adhesion.work": [0.0, 21e-3, 42e-3]})).axes[0]
     assert sum(line.get_linewidth() == 0.5 for line in panel.lines) == 4
     assert not any("pi" in text.get_text() for text in panel.texts)
 
@@ -194,7 +194,7 @@ def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
 def test_every_shape_of_dataset_can_be_drawn(changes):
     dataset = moved(**changes)
     for kind in ("loop", "time"):
-        rendered(plots.draw(dataset, kind))
+        plots.draw(dataset, kind)
 
 
 # -- which figure -----------------------------------------------------------------------------
@@ -211,7 +211,7 @@ def test_loop_is_what_fits_where_the_sphere_is_moved_and_refused_where_it_stays(
 
 
 def test_over_time_the_contacts_of_the_moment_are_drawn_for_a_sphere_that_moves(grips):
-    radii, loads, base = rendered(plots.draw(grips, "time")).axes
+    radii, loads, base = plots.draw(grips, "time").axes
     _, hertz = drawn(radii, pictures.REFERENCE, ":")
     pressed = grips["indentation"].to_numpy() > 0.0
     assert_allclose(hertz[pressed], 1e6 * np.sqrt(2e-3 * grips["indentation"].to_numpy()[pressed]), rtol=1e-9)

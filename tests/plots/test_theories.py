@@ -1,13 +1,12 @@
 """The figure of the theories shows what each theory says, and the figure of profiles the fields of the contact."""
 
-import json
-
 import numpy as np
 import pytest
 from helpers.pictured import RAMP, STEADY, rendered, simulated
 from matplotlib.patches import Circle
 from numpy.testing import assert_allclose
 
+from sim.analysis import where
 from sim.laws import jkr, profiles, theories
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
@@ -52,7 +51,7 @@ def curve_of(panel, name):
     ids=["load", "indentation", "pulled"],
 )
 def test_every_theory_is_drawn_as_far_as_adhesion_holds(contact, law, value):
-    stresses, forces = rendered(plots.draw(plain(contact=contact), "theories")).axes
+    stresses, forces = plots.draw(plain(contact=contact), "theories").axes
     for name in ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction"):
         stress, area = curve_of(stresses, name)
         factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
@@ -88,24 +87,21 @@ def test_jkr_and_hertz_stand_whatever_the_shear():
 
 
 def test_the_datasets_points_are_means_over_members_and_the_second_half():
-    dataset = plain(sweep={"bonds.stress": [0.0, 1e5, 1e6], "contact.load": [1e-3, 4e-3]})
-    stress, area = rival_figures.points_of(dataset, {"contact_load": 1})
+    dataset = plain(sweep={"bonds.stress": [0.0, 1e5, 1e6]})
+    stress, area = rival_figures.points_of(dataset)
     assert_allclose(stress, [0.0, 1e5, 1e6], rtol=1e-14)
-    assert_allclose(area, dataset["contact_area"].isel(contact_load=1, t=-1), rtol=1e-14)
+    assert_allclose(area, dataset["contact_area"].isel(t=-1), rtol=1e-14)
     members = simulated(drive=STEADY, ensemble=Ensemble(members=5))
     late = members["contact_area"].isel(t=slice(members.sizes["t"] // 2, None))
-    assert_allclose(rival_figures.points_of(members, {})[1], [late.mean()], rtol=1e-13)
+    assert_allclose(rival_figures.points_of(members)[1], [late.mean()], rtol=1e-13)
 
 
-def test_of_swept_loads_the_scenarios_own_is_drawn():
+def test_of_swept_loads_one_must_be_chosen():
     dataset = plain(sweep={"contact.load": [-3e-4, 1e-3, 4e-3]})
-    case = rival_figures.case_of(dataset)
-    assert (case.at, case.value) == ({"contact_load": 2}, 4e-3)
-    assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in [
-        text for p in plots.draw(dataset, "theories").axes for text in [p.get_title("right")]
-    ]
-    others = plain(sweep={"contact.load": [-1.0, 1e-3]})
-    assert rival_figures.case_of(others).value == 1e-3  # the first with a contact
+    with pytest.raises(ValueError, match=r"of one contact.*--where contact_load="):
+        plots.draw(dataset, "theories")
+    figure = plots.draw(where(dataset, {"load": "4 mN"}), "theories")
+    assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in [panel.get_title("right") for panel in figure.axes]
 
 
 def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
@@ -113,7 +109,7 @@ def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
     dataset = plain(contact=contact, sweep={"contact.reversible": [0.0, 0.02, 1.0], "bonds.stress": [1e4, 3e4]})
     case = rival_figures.case_of(dataset)
     assert case.reversible == 0.02 and rival_figures.case_of(plain()).reversible == 0.1
-    stress, area = rival_figures.points_of(dataset, case.at)
+    stress, area = rival_figures.points_of(dataset)
     theories = case.radii(np.array([1e4, 3e4]))
     exact = np.concatenate([np.pi * theories[name] ** 2 for name in ("jkr", "fraction", "reversible_stress")])
     assert_allclose(np.sort(area), np.sort(exact), rtol=1e-9)
@@ -121,26 +117,20 @@ def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
 
 
 def test_theories_are_named():
-    (legend,) = plots.draw(plain(), "theories").legends
+    (legend,) = rendered(plots.draw(plain(), "theories")).legends
     names = [text.get_text() for text in legend.get_texts()]
     assert len(names) == len(set(names)) == 8
     assert names[-1] == "simulated" and "a fraction 0.1 reversible" in names
 
 
 @pytest.mark.parametrize(
-    ("contact", "why"),
-    [
-        ({"displacement": 1e-6, "stiffness": 100.0, "load": None}, "behind a machine stiffness"),
-        ({"load": {"start": 0.0, "stop": 4e-3}}, "varies in time"),
-        ({"load": None}, "not held at one number"),
-    ],
+    "contact",
+    [Equilibrium(displacement=1e-6, stiffness=100.0), Equilibrium(load={"from": 0.0, "to": 4e-3})],
+    ids=["behind a stiffness", "a course"],
 )
-def test_a_sphere_that_is_not_held_at_a_number_is_refused_with_the_cure(contact, why):
-    dataset = plain().drop_vars("contact_load").copy()
-    told = json.loads(dataset.attrs["scenario_resolved"])
-    dataset.attrs["scenario_resolved"] = json.dumps(told | {"contact": told["contact"] | contact})
-    with pytest.raises(ValueError, match=rf"{why}.*load = .4 mN., or with an indentation; .*drawn as: .*time, profile"):
-        plots.draw(dataset, "theories")
+def test_a_sphere_that_is_not_held_at_a_number_is_refused_with_the_cure(contact):
+    with pytest.raises(ValueError, match=r"load = .4 mN., or with an indentation; .*drawn as: .*time, profile"):
+        plots.draw(plain(contact=contact), "theories")
 
 
 def test_without_adhesion_or_contact_there_is_nothing_to_compare():
@@ -156,12 +146,11 @@ def test_without_adhesion_or_contact_there_is_nothing_to_compare():
         {"drive": RAMP},
         {"bonds": bonds.Unbroken()},
         {"drive": RAMP, "record": Record(per_member=False)},
-        {"sweep": {"solid.shear_modulus": [1e6, 2e6], "sphere.radius": [1e-3, 2e-3]}},
     ],
-    ids=["ramp", "no stress", "statistics only", "swept bodies"],
+    ids=["ramp", "no stress", "statistics only"],
 )
 def test_every_scene_at_a_load_can_be_compared(changes):
-    rendered(plots.draw(plain(**changes), "theories"))
+    plots.draw(plain(**changes), "theories")
 
 
 # -- profiles ---------------------------------------------------------------------------------
@@ -215,7 +204,7 @@ def test_tangential_displacement_is_that_of_the_uniform_stress(slid):
 
 
 def test_without_shear_stress_only_the_normal_fields_are_drawn():
-    figure = rendered(plots.draw(plain(bonds=bonds.Unbroken()), "profile"))
+    figure = plots.draw(plain(bonds=bonds.Unbroken()), "profile")
     assert [panel.get_ylabel() for panel in figure.axes] == ["normal pressure $p$ (kPa)", "height $z$ (µm)"]
 
 
@@ -226,7 +215,7 @@ def test_a_contact_that_came_off_is_drawn_as_it_last_was():
     drawn = shapes_of(ramp)
     assert drawn.time == float(ramp["t"][closed[-1]])
     assert drawn.last.radius == float(ramp["contact_radius"][closed[-1]])
-    rendered(plots.draw(ramp, "profile"))
+    plots.draw(ramp, "profile")
     with pytest.raises(ValueError, match=r"never closed; raise the load.*drawn as: stress, curve, time"):
         plots.draw(simulated(contact=Equilibrium(load=-1.0), shear=shear.Uniform()), "profile")
 
@@ -243,4 +232,4 @@ def test_a_contact_that_came_off_is_drawn_as_it_last_was():
     ids=["lifted", "Hertz", "backwards", "statistics only", "sweep"],
 )
 def test_every_contact_has_profiles(changes):
-    rendered(plots.draw(plain(**changes), "profile"))
+    plots.draw(plain(**changes), "profile")
