@@ -70,6 +70,10 @@ class Noise:
     members: np.ndarray
     _kept: dict = field(default_factory=dict, repr=False, compare=False)
 
+    def address(self) -> tuple[int, np.ndarray]:
+        """Seed and members, for compiled loops whose draws depend on a state: they address words by themselves."""
+        return self.seed, self.members
+
     def normals(self, step: int, count: int) -> np.ndarray:
         """Standard normals of one step, shape (members, count)."""
         return self._numbers(_normals, step, count)
@@ -126,7 +130,7 @@ def _unit(word):
 
 
 @device
-def _logarithm(x):
+def logarithm(x):
     """ln x for normal x > 0, to one unit in the last place; the minimax polynomial of fdlibm's ``log``."""
     bits = np.float64(x).view(np.int64)
     exponent = (bits - np.int64(0x3FE6A09E00000000)) >> np.int64(52)
@@ -168,7 +172,7 @@ def _cosine_and_sine(turn):
 def _box_muller(words_u, words_v, x, y):
     """Two standard normals from each two words; the largest is 8.5."""
     for i in range(words_u.size):
-        radius = math.sqrt(-2.0 * _logarithm(2.0 - _unit(words_u[i])))
+        radius = math.sqrt(-2.0 * logarithm(2.0 - _unit(words_u[i])))
         cosine, sine = _cosine_and_sine(_unit(words_v[i]) - 1.0)
         x[i] = radius * cosine
         y[i] = radius * sine
@@ -212,8 +216,8 @@ def _gamma(d, c, x, word):
     v = 1.0 + c * x
     v = v * v * v
     positive = v if v > 0.0 else 1.0
-    bound = 0.5 * x * x + d * (1.0 - v + _logarithm(positive))
-    accepted = (_logarithm(2.0 - _unit(word)) < bound) & (v > 0.0)
+    bound = 0.5 * x * x + d * (1.0 - v + logarithm(positive))
+    accepted = (logarithm(2.0 - _unit(word)) < bound) & (v > 0.0)
     return d * v if accepted else -1.0
 
 
@@ -252,7 +256,7 @@ def _gammas(seed, part, block, members, lane, shapes, numbers):
                 if law[i] == 0.5:
                     y[i] *= u * u
                 elif law[i] < 1.0:
-                    y[i] *= math.exp(_logarithm(u) / law[i])
+                    y[i] *= math.exp(logarithm(u) / law[i])
                 numbers[m, first + i] = y[i]
 
 
@@ -271,7 +275,7 @@ def words_at(seed, part, c0, c1, c2, c3):
 @device
 def exponential(word):
     """A standard exponential number from a word, 0 to 36.04."""
-    return -_logarithm(2.0 - _unit(word))
+    return -logarithm(2.0 - _unit(word))
 
 
 @device

@@ -57,7 +57,7 @@ def _merge(weight, stretch, width, count, travelled, cell, finest, rules):
             inside += weight[last]
             last += 1
         parts = 1
-        while parts < finest and cell * rules.softness * inside > rules.heavy * whole * parts * parts:
+        while parts < finest and cell * rules.steepness * inside > rules.heavy * whole * parts * parts:
             parts *= 2
         left = _merge_cell(weight, stretch, width, first, last, left, travelled, cell / parts, rules.limit < math.inf)
         first = last

@@ -7,28 +7,27 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohort_merging import settle
-from sim.parts.bonds.rupture import rupture_integral, time_to_rupture
+from sim.parts.bonds.rupture import fresh_integral, growth, hazard_integral, hazard_time
 
 
 class Rules(NamedTuple):
-    """What all rows of a population share."""
+    """Numbers that all rows of a population share."""
 
-    rate: float
-    softness: float
-    limit: float
+    law: tuple[float, float, float, float, float]  # RuptureRate
+    limit: float  # its limit [m]
+    steepness: float  # largest relative change of the rupture rate per stretch [1/m]
     rebinding: float
     tolerance: float
     largest: float  # longest step of its own [s]
     cell: float  # width of a merging cell [m]
-    heavy: float  # width × share of a cell allowed, in units of 1/softness
+    heavy: float  # width × share of a cell allowed, in units of 1/steepness
     most: float  # cohorts left by merging
 
 
 @device
-def spent(age, pace, rate):
-    """∫k dt of a fresh bond, pace = \\|V\\| × softness; its analytic continuation at a negative age."""
-    change = pace * age
-    return rate * age * (math.expm1(change) / change if change != 0.0 else 1.0)
+def _rules(numbers):
+    law = (numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
+    return Rules(law, numbers[2], numbers[5], numbers[6], numbers[7], numbers[8], numbers[9], numbers[10], numbers[11])
 
 
 @device
@@ -41,18 +40,18 @@ def _inside(stretch, width, limit):
 
 
 @device
-def _survive(pool, count, move, pace, step, rules):
+def _survive(pool, count, move, speed, step, rules):
     """Bonds that outlive a third of a step and all of it; pool[4] gets what outlives it, cohort by cohort."""
     weight, stretch, width, steepness, kept = pool[0], pool[1], pool[2], pool[3], pool[4]
     early, short = step / 3.0, move / 3.0
-    soon, late = spent(early, pace, rules.rate), spent(step, pace, rules.rate)
+    soon, late = fresh_integral(early, speed, rules.law), fresh_integral(step, speed, rules.law)
     at_early, at_end = 0.0, 0.0
     for i in range(count):
         if steepness[i] > 0.0:
             one, two = math.exp(-steepness[i] * soon), math.exp(-steepness[i] * late)
         else:
-            one = math.exp(-rupture_integral(stretch[i], short, early, rules.rate, rules.softness))
-            two = math.exp(-rupture_integral(stretch[i], move, step, rules.rate, rules.softness))
+            one = math.exp(-hazard_integral(stretch[i], short, early, rules.law))
+            two = math.exp(-hazard_integral(stretch[i], move, step, rules.law))
         if rules.limit < math.inf:
             one *= _inside(stretch[i] + short, width[i], rules.limit)
             two *= _inside(stretch[i] + move, width[i], rules.limit)
@@ -63,15 +62,14 @@ def _survive(pool, count, move, pace, step, rules):
 
 
 @device
-def _steepen(pool, count, slip, softness):
-    """pool[3]: k/k0 of each bond that slides away from zero; 0 marks the others."""
+def _steepen(pool, count, slip, rules):
+    """pool[3]: ∫k dt of each bond over that of a fresh one, where such a factor exists; 0 marks the others."""
     for i in range(count):
-        forward = pool[1, i] * slip >= 0.0
-        pool[3, i] = math.exp(min(math.fabs(pool[1, i]) * softness, 690.0)) if forward else 0.0
+        pool[3, i] = growth(pool[1, i], slip, rules.law)
 
 
 @device
-def _births(free, early, late, step, pace, rules):
+def _births(free, early, late, step, speed, rules):
     """Births of a step by Radau IIA: weights at its third and at its end, free sites then, and the error.
 
     F(t) = 1 − R(t) − ∫k_on F(s) S(t − s)ds at t = h/3 and h, R = ``early`` and ``late``, the integral by the
@@ -79,13 +77,13 @@ def _births(free, early, late, step, pace, rules):
     trapezoidal rule.
     """
     z = rules.rebinding * step
-    before = math.exp(-spent(-2.0 / 3.0 * step, pace, rules.rate))
-    after = math.exp(-spent(2.0 / 3.0 * step, pace, rules.rate))
+    before = math.exp(-fresh_integral(-2.0 / 3.0 * step, speed, rules.law))
+    after = math.exp(-fresh_integral(2.0 / 3.0 * step, speed, rules.law))
     a, b, c, d = 1.0 + 5.0 / 12.0 * z, -z / 12.0 * before, 0.75 * z * after, 1.0 + 0.25 * z
     p, q = max(0.0, 1.0 - early), max(0.0, 1.0 - late)
     whole = a * d - b * c
     first, last = (p * d - b * q) / whole, (a * q - c * p) / whole
-    other = 0.5 * z * free * math.exp(-spent(step, pace, rules.rate))
+    other = 0.5 * z * free * math.exp(-fresh_integral(step, speed, rules.law))
     error = math.fabs(other + 0.25 * z * last - c * first)
     if min(first, last) >= 0.0:
         return c * first, 0.25 * z * last, 0.0, error
@@ -123,12 +121,12 @@ def _carry(pool, count, move, one, two, rules):
 
 
 @device
-def _try(pool, count, move, pace, step, free, rules):
+def _try(pool, count, move, speed, step, free, rules):
     """One step tried: births at its two stages, and the factor by which the step should change; < 1 refuses it."""
-    early, late = _survive(pool, count, move, pace, step, rules)
+    early, late = _survive(pool, count, move, speed, step, rules)
     if rules.rebinding == 0.0:
         return 0.0, 0.0, 4.0
-    one, two, lowest, error = _births(free, early, late, step, pace, rules)
+    one, two, lowest, error = _births(free, early, late, step, speed, rules)
     if lowest < -1e-14:
         return one, two, 0.2
     allowed = rules.tolerance / 3.0 * (late + one + two + 1e-9 * (1.0 - free)) + 1e-15 * (1.0 + rules.rebinding * step)
@@ -144,7 +142,7 @@ def _forgets(pool, other, count, speed, duration, rules):
     if rules.rebinding == 0.0:
         return 0, 0.0
     depth = math.log(100.0 / rules.tolerance)
-    typical = time_to_rupture(0.0, speed, 1.0, rules.rate, rules.softness, rules.limit)
+    typical = hazard_time(0.0, speed, 1.0, rules.law)
     if not duration > depth * typical:
         return 0, 0.0
     found, life, square = fill_steady(other, speed, rules)
@@ -155,8 +153,7 @@ def _forgets(pool, other, count, speed, duration, rules):
     rest = duration - lives * life
     if rest <= 0.0:
         return 0, 0.0
-    pace = math.fabs(speed) * rules.softness
-    _, left = _survive(pool, count, speed * rest, pace, rest, rules)
+    _, left = _survive(pool, count, speed * rest, speed, rest, rules)
     return (found if left <= 1e-3 * rules.tolerance * (life / cycle) else 0), life
 
 
@@ -164,16 +161,15 @@ def _forgets(pool, other, count, speed, duration, rules):
 def _step_row(pool, count, travelled, settled, slip, duration, rules):
     """Advance one population by a clock step in steps of its own; cohorts, slider position and settled number."""
     speed = min(max(slip / duration, -1e200), 1e200) if duration > 0.0 else 0.0
-    pace = math.fabs(speed) * rules.softness
     direction = -1.0 if slip < 0.0 else 1.0
-    _steepen(pool, count, slip, rules.softness)
+    _steepen(pool, count, slip, rules)
     found, _ = _forgets(pool, pool[5:], count, speed, duration, rules)
     if found > 0:
         for k in range(3):
             pool[k, :found] = pool[5 + k, :found]
         left = settle(pool[0], pool[1], pool[2], found, direction, 0.0, rules)
         return left, 0.0, left
-    typical = time_to_rupture(0.0, speed, 1.0, rules.rate, rules.softness, rules.limit)
+    typical = hazard_time(0.0, speed, 1.0, rules.law)
     longest = min(rules.largest, typical * (7.0 * rules.tolerance) ** (1.0 / 3.0))
     shortest = 1e-13 * duration
     if speed != 0.0:
@@ -192,7 +188,7 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
         for i in range(count):
             bound += pool[0, i]
         move = speed * step if done > 0.0 or going else slip
-        one, two, factor = _try(pool, count, move, pace, step, max(0.0, 1.0 - bound), rules)
+        one, two, factor = _try(pool, count, move, speed, step, max(0.0, 1.0 - bound), rules)
         if factor < 1.0 and step > shortest:
             step, going = max(step * factor, shortest), True
             continue
@@ -204,7 +200,7 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
             count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
             settled = count
         if going:
-            _steepen(pool, count, slip, rules.softness)
+            _steepen(pool, count, slip, rules)
     return count, travelled, settled
 
 
@@ -216,9 +212,7 @@ def step_rows(
     weight, stretch, width, lattice, slip, duration, numbers, new_weight, new_stretch, new_width, new_lattice
 ):
     """Advance all rows, each by itself."""
-    rules = Rules(
-        numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8]
-    )
+    rules = _rules(numbers)
     rows, capacity = new_weight.shape
     wide = new_width.shape[1] == capacity
     pool = np.empty((8, capacity + 520))
@@ -252,9 +246,7 @@ def step_rows(
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
 def settle_steady(speed, numbers, weight, stretch, width, lattice):
     """The merged steady state of one row; the arrays are zero before."""
-    rules = Rules(
-        numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7], numbers[8]
-    )
+    rules = _rules(numbers)
     pool = np.empty((3, weight.shape[1] + 520))
     count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
     count = settle(pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules)
@@ -283,9 +275,9 @@ def fill_steady(room, speed, rules):
     Bonds of age a have survived with S(a) and are stretched by V a, so that weights are k_on F S(a)da, F = 1/(1 +
     k_on⟨T⟩). Five Gauss nodes on panels in which neither ln S nor the rupture changes by much.
     """
-    oldest = time_to_rupture(0.0, speed, 42.0, rules.rate, rules.softness, rules.limit)
-    panel = 0.7 * time_to_rupture(0.0, speed, 1.0, rules.rate, rules.softness, rules.limit)
-    pace = math.fabs(speed) * rules.softness
+    oldest = hazard_time(0.0, speed, 42.0, rules.law)
+    panel = 0.7 * hazard_time(0.0, speed, 1.0, rules.law)
+    pace = math.fabs(speed) * rules.steepness
     segments = rules.limit < math.inf
     if pace > 0.0:
         panel = min(panel, 0.5 / pace)
@@ -298,7 +290,7 @@ def fill_steady(room, speed, rules):
         mass, mean, spread = 0.0, 0.0, 0.0
         for node, share in zip(_NODES, _SHARES):  # noqa: B905 - compiled
             age = (k + node) * panel
-            survivors = share * panel * math.exp(-rupture_integral(0.0, speed * age, age, rules.rate, rules.softness))
+            survivors = share * panel * math.exp(-hazard_integral(0.0, speed * age, age, rules.law))
             mass += survivors
             mean += survivors * age
             spread += survivors * age * age

@@ -57,7 +57,7 @@ def resting(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> Co
     """
     rest = empty(rupture, tolerance)
     if rebinding_rate > 0.0:
-        rest.weight[0, 0] = rebinding_rate / (rebinding_rate + rupture.rate)
+        rest.weight[0, 0] = rebinding_rate / (rebinding_rate + rupture.at_rest)
     return rest
 
 
@@ -182,7 +182,7 @@ def at_limit(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> np.nda
 def _check(rupture: RuptureRate, tolerance: float) -> None:
     if not 1e-12 <= tolerance <= 0.1:
         raise ValueError(f"a tolerance of {tolerance:g} is out of range: give 1e-12 to 0.1")
-    if rupture.limit < math.inf and rupture.softness != 0.0:
+    if rupture.limit < math.inf and rupture.steepness != 0.0:
         raise ValueError("a rupture that grows with the stretch and ends at a limit is not built: leave out one")
 
 
@@ -190,7 +190,7 @@ def _most(rupture: RuptureRate, tolerance: float) -> int:
     """Cohorts left by merging, at most."""
     if rupture.limit < math.inf:
         return int(min(4096.0, 2.2 / math.sqrt(tolerance) + 64.0))
-    if rupture.softness == 0.0:
+    if rupture.steepness == 0.0:
         return 8
     cell = (432.0 * tolerance) ** 0.25
     return int(min(4096.0, 40.0 / cell + 2.0 * math.sqrt(10.0 / (_KINK * tolerance)) + 16.0))
@@ -208,11 +208,13 @@ def _numbers(rupture: RuptureRate, rebinding_rate: float, tolerance: float, larg
     width times its share at most.
     """
     cell, most = _cell(rupture, tolerance), _most(rupture, tolerance)
-    return np.array([*rupture, rebinding_rate, tolerance, largest, cell, _KINK * tolerance, most], dtype=float)
+    return np.array(
+        [*rupture, rupture.steepness, rebinding_rate, tolerance, largest, cell, _KINK * tolerance, most], dtype=float
+    )
 
 
 def _cell(rupture: RuptureRate, tolerance: float) -> float:
     """Width of the cells within which cohorts are merged [m]."""
     if rupture.limit < math.inf:
         return rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
-    return (432.0 * tolerance) ** 0.25 / rupture.softness if rupture.softness > 0.0 else math.inf
+    return (432.0 * tolerance) ** 0.25 / rupture.steepness if rupture.steepness > 0.0 else math.inf

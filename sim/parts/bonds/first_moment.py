@@ -92,7 +92,7 @@ def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding
     if any(array.size not in (1, rows) for array in given):
         raise ValueError("bound, moment, slip and path need one entry, or one for every row")
     bound, moment = np.empty(rows), np.empty(rows)
-    _advance(*given, duration, *rupture, rebinding_rate, bound, moment)
+    _advance(*given, duration, *rupture[:3], rebinding_rate, bound, moment)
     return bound, moment
 
 

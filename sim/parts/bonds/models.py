@@ -1,18 +1,18 @@
-"""Bond populations: which depths there are, and the choice between them.
+"""Bond populations: the models there are, and the choice between them.
 
-Shallow to deep: none, steady, rate, counted without a stretch; rate, cohort, tracked with one. Both
-kinds of rate equation are called ``rate``: a rupture tells them apart.
+Simple to full: none, steady, rate, counted without a stretch; rate, cohort, tracked with one. Both
+kinds of rate equation are called ``rate``: a rupture law tells them apart.
 """
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, cast
 
 from pydantic import Discriminator, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.parts.bonds.area import Area
-from sim.parts.bonds.rupture import Constant, Rupture
+from sim.parts.bonds.rupture import Rupture
 from sim.parts.bonds.stretched import Cohort, Density, FirstMoment, Rebinding, Stiffness, Tracked
 from sim.parts.bonds.two_state import (
     Counted,
@@ -34,16 +34,16 @@ _WITHOUT = ("critical_speed", "rebinding_rate")
 _WITH = ("rupture", "bond_stiffness", "rebinding_rate", "site_density")
 _STRETCHED = ("rupture", "bond_stiffness", "site_density")
 
-#: A depth, chosen.
+#: A model that can be advanced.
 Model = Unbroken | Steady | Rate | Counted | FirstMoment | Cohort | Tracked
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
 class Auto:
-    """The shallowest depth that is good to ``tolerance``; it takes the keys of all of them.
+    """The simplest model that is good to ``tolerance``; it takes the keys of all of them.
 
     A finite number N of bonds fluctuates by 1/√N: where that is above the tolerance they are counted, or
-    tracked if they have a rupture. Otherwise the rate equation answers, or cohorts where the rupture depends
+    tracked if they have a rupture law. Otherwise it is the rate equation, or cohorts where the rupture rate depends
     on the stretch.
     """
 
@@ -80,55 +80,50 @@ class Auto:
         return math.inf if self.site_density is None or not area > 0.0 else max(1.0, round(self.site_density * area))
 
     def chosen(self, area: float, forces: bool) -> Model:
-        """The depth for a contact of this ``area`` [m²] whose shear part reads the bonds' ``forces`` or not."""
-        number = self.number(area)
+        """The model for a contact of this ``area`` [m²] whose field reads the bonds' ``forces`` or not."""
+        number, start = self.number(area), self.start_from
         noisy = self.tolerance**2 * number < 1.0 and self.area == "present"
-        common: dict[str, Any] = {"start_from": self.start_from}
         if self.rupture is None:
-            common |= {
-                "critical_speed": self.critical_speed,
-                "rebinding_rate": self.rebinding_rate,
-                "stress": self.stress,
-            }
-            return Counted(**common, sites=int(number)) if noisy else Rate(**common, area=self.area)
-        common |= {name: getattr(self, name) for name in _WITH}
-        if noisy and number <= _MOST_TRACKED:
-            return Tracked(**common, sites=int(number))
-        if isinstance(self.rupture, Constant) and not forces:
-            return FirstMoment(**common, area=self.area)
-        return Cohort(**common, area=self.area, tolerance=max(1e-12, min(1e-4, 0.1 * self.tolerance)))
+            plain = cast(tuple[float, float], (self.critical_speed, self.rebinding_rate))
+            if noisy:
+                return Counted(*plain, sites=int(number), stress=self.stress, start_from=start)
+            return Rate(*plain, stress=self.stress, start_from=start, area=self.area)
+        rest = cast(tuple[float, float, float], (self.bond_stiffness, self.rebinding_rate, self.site_density))
+        if noisy and number <= _MOST_TRACKED and self.rupture.separable:
+            return Tracked(self.rupture, *rest, sites=int(number), start_from=start)
+        if not self.rupture.depends_on_stretch and not forces:
+            return FirstMoment(self.rupture, *rest, start_from=start, area=self.area)
+        tolerance = max(1e-12, min(1e-4, 0.1 * self.tolerance))
+        return Cohort(self.rupture, *rest, tolerance=tolerance, start_from=start, area=self.area)
 
     def why(self, area: float, forces: bool) -> str:
         """The reason for the choice, in words."""
-        number, depth = self.number(area), self.chosen(area, forces)
+        number, model = self.number(area), self.chosen(area, forces).model
         if math.isinf(number):
             size = "no number of sites is given"
         else:
             noise = 1.0 / math.sqrt(number)
             size = f"1/√N of {number:,.0f} site{'' if number == 1 else 's'} is {noise:.3g}, "
             size += f"{'above' if noise > self.tolerance else 'within'} the tolerance of {self.tolerance:g}"
-        if isinstance(depth, Counted | Tracked):
+        if model in ("counted", "tracked"):
             return size
         if self.area == "carried":
             size += "; a number of sites cannot be carried with the area"
-        elif self.tolerance**2 * number < 1.0:
+        elif self.tolerance**2 * number < 1.0 and number > _MOST_TRACKED:
             size += f"; more than {_MOST_TRACKED:,} bonds are not followed one by one"
-        if isinstance(depth, Cohort):
+        if model == "cohort":
             return f"{size}; {'the forces of the bonds are read' if forces else 'the rupture depends on the stretch'}"
         return f"{size}; the rupture rate does not depend on the stretch"
 
 
-def _tag(value: Any) -> str | None:
-    """Which class a table or a part belongs to: both rate equations have one name."""
-    read = value.get if isinstance(value, dict) else lambda name, other=None: getattr(value, name, other)
-    model = read("model", None)
+def _tag(value: object) -> str | None:
+    """Class of a table or a part: both rate equations have one name."""
+    given = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", *_STRETCHED)}
+    model = given.get("model")
     if not isinstance(model, str):
         return None
-    return "rate[rupture]" if model == "rate" and _stretched(read) else model
-
-
-def _stretched(read: Any) -> bool:
-    return any(read(name, None) is not None for name in _STRETCHED)
+    with_stretch = any(given.get(name) is not None for name in _STRETCHED)
+    return "rate[rupture]" if model == "rate" and with_stretch else model
 
 
 Bonds = Annotated[

@@ -1,41 +1,93 @@
-"""How fast a bond of a given stretch breaks: constant, Bell, constant with a cut-off stretch.
+"""Rupture rate of a bond of a given stretch: constant, Bell, constant with a cut-off stretch.
 
-All three are one law of three numbers: the rupture is rate × exp(\\|x\\| softness) for a stretch below
-``limit`` and infinite beyond it. The compiled helpers know nothing else.
+All are one law of a few numbers, ``RuptureRate``. Compiled steps use a law through device functions alone: the
+integral of the rate along a motion, the same of a fresh bond, the time to rupture.
 """
 
 import math
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple
 
+from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from sim.laws.schallamach import (
+    SiteMoments,
+    bell_moments,
+    bell_peak,
+    constant_moments,
+    cut_off_moments,
+    first_moment_peak,
+)
 from sim.numerics.jit import device
 from sim.units.quantity import Quantity
 
 
 class RuptureRate(NamedTuple):
-    """Rupture rate of a bond: ``rate`` [1/s] × exp(\\|x\\| ``softness`` [1/m]) up to the stretch ``limit`` [m]."""
+    """Rupture rate of a bond of stretch x.
+
+    ``rate`` [1/s] × exp(\\|x\\| ``softness`` [1/m]) + ``catch`` [1/s] × exp(−\\|x\\| ``relief`` [1/m]) up to the
+    stretch ``limit`` [m], infinite beyond it.
+    """
 
     rate: float
     softness: float
     limit: float
+    catch: float = 0.0
+    relief: float = 0.0
+
+    @property
+    def at_rest(self) -> float:
+        """Rupture rate of an unstretched bond [1/s]."""
+        return self.rate + self.catch
+
+    @property
+    def steepness(self) -> float:
+        """Largest relative change of the rate per stretch [1/m]."""
+        return max(self.softness, self.relief if self.catch > 0.0 else 0.0)
+
+
+class _Law:
+    """Attributes of all rupture laws.
+
+    ``depends_on_stretch``: the rate, below any limit, does. ``separable``: ∫k dt of a bond is a factor of its own
+    times a clock common to all, on which the first moment and tracked bonds rest.
+    """
+
+    depends_on_stretch: ClassVar[bool] = True
+    separable: ClassVar[bool] = True
+
+    def law(self, bond_stiffness: float) -> RuptureRate:
+        """Numbers of this law for bonds of a stiffness [N/m]."""
+        raise NotImplementedError
+
+    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+        """Share bound [1], mean force [N] and mean square force [N²] per site in steady sliding at speeds [m/s]."""
+        raise NotImplementedError
+
+    def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
+        """Relative error of the friction maximum if every bond is taken at the mean stretch [1]."""
+        return 0.0
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Constant:
+class Constant(_Law):
     """Bonds open by themselves at one rate, however stretched they are."""
+
+    depends_on_stretch: ClassVar[bool] = False
 
     rate: Annotated[float, Quantity("1/s", "rupture rate of a bond", "k_0", above=0)]
     model: Literal["constant"] = "constant"
 
     def law(self, bond_stiffness: float) -> RuptureRate:
-        """The three numbers of this rupture for bonds of a stiffness [N/m]."""
         return RuptureRate(self.rate, 0.0, math.inf)
+
+    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+        return constant_moments(speed, self.rate, bond_stiffness, rebinding_rate)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Bell:
+class Bell(_Law):
     """Force helps heat to open a bond: k = k0 exp(f/f_b) (Bell 1978). Limit: ``Constant`` as f_b -> infinity."""
 
     zero_force_rate: Annotated[
@@ -49,9 +101,16 @@ class Bell:
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.zero_force_rate, bond_stiffness / self.bell_force, math.inf)
 
+    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+        return bell_moments(speed, self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate)
+
+    def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
+        recipe = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
+        return float(first_moment_peak(*recipe, 1.0).stress / bell_peak(*recipe, 1.0).stress - 1.0)
+
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class CutOff:
+class CutOff(_Law):
     """A bond opens by itself at one rate and breaks at a stretch for certain (after Chernyak & Leonov)."""
 
     stretch: Annotated[float, Quantity("m", "stretch at which a bond breaks", "l", above=0, typical="30 nm")]
@@ -60,6 +119,9 @@ class CutOff:
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, self.stretch)
+
+    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+        return cut_off_moments(speed, self.rate, self.stretch, bond_stiffness, rebinding_rate)
 
 
 Rupture = Annotated[Constant | Bell | CutOff, Field(discriminator="model")]
@@ -109,4 +171,71 @@ def time_to_rupture(stretch, speed, threshold, rate, softness, limit):
     if speed != 0.0 and limit < math.inf:
         ahead = stretch if speed > 0.0 else -stretch
         time = min(time, (limit - ahead) / math.fabs(speed)) if time == time else (limit - ahead) / math.fabs(speed)
+    return time
+
+
+@device
+def _relieved_integral(stretch, slip, duration, rate, relief):
+    """As ``rupture_integral`` for a rate that falls as e^(−\\|x\\| ``relief``)."""
+    before, change = stretch * relief, slip * relief
+    after = before + change
+    if before * after >= 0.0:
+        distance = math.fabs(change)
+        mean = 1.0 if distance == 0.0 else -math.expm1(-distance) / distance
+        return rate * duration * math.exp(-min(math.fabs(before), math.fabs(after))) * mean
+    before, after = math.fabs(before), math.fabs(after)
+    return -rate * duration * (math.expm1(-before) + math.expm1(-after)) / (before + after)
+
+
+@device
+def hazard_integral(stretch, slip, duration, law):
+    """∫k dt of a bond under a ``RuptureRate`` whose stretch goes from ``stretch`` by ``slip`` at constant speed."""
+    rate, softness, _, catch, relief = law
+    slipping = rupture_integral(stretch, slip, duration, rate, softness)
+    return slipping + _relieved_integral(stretch, slip, duration, catch, relief) if catch > 0.0 else slipping
+
+
+@device
+def fresh_integral(age, speed, law):
+    """∫k dt of a bond born unstretched, up to an ``age``; its analytic continuation at a negative age."""
+    rate, softness, _, catch, relief = law
+    change = math.fabs(speed) * softness * age
+    slipping = rate * age * (math.expm1(change) / change if change != 0.0 else 1.0)
+    if catch == 0.0:
+        return slipping
+    change = -math.fabs(speed) * relief * age
+    return slipping + catch * age * (math.expm1(change) / change if change != 0.0 else 1.0)
+
+
+@device
+def growth(stretch, slip, law):
+    """Factor by which ∫k dt of a bond exceeds that of a fresh one over any motion along ``slip``; 0 where none does."""
+    along = stretch * slip >= 0.0 and law[3] == 0.0
+    return math.exp(min(math.fabs(stretch) * law[1], 690.0)) if along else 0.0
+
+
+@device
+def hazard_time(stretch, speed, threshold, law):
+    """Time after which ∫k dt has reached ``threshold`` or the stretch its limit, at constant ``speed`` of any sign.
+
+    With a catch pathway by Newton's method within a bracket; the slip pathway alone takes longer.
+    """
+    rate, softness, limit, catch, relief = law
+    slipping = time_to_rupture(stretch, speed, threshold, rate, softness, limit)
+    if catch == 0.0:
+        return slipping
+    low, high = 0.0, min(slipping, 1e300)
+    time = min(high, threshold / (rate * math.exp(math.fabs(stretch) * softness) + catch))
+    for _ in range(200):
+        over = hazard_integral(stretch, speed * time, time, law) - threshold
+        if over > 0.0:
+            high = time
+        else:
+            low = time
+        size = math.fabs(stretch + speed * time)
+        better = time - over / (rate * math.exp(size * softness) + catch * math.exp(-size * relief))
+        better = better if low < better < high else 0.5 * (low + high)
+        if math.fabs(better - time) <= 1e-15 * time:
+            break
+        time = better
     return time

@@ -6,10 +6,12 @@ has a maximum, ages and starts with a peak; nothing of that is put in by hand.
 """
 
 from functools import cached_property
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
+from pydantic import model_validator
 from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
 
 import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.first_moment as first_moment
@@ -32,6 +34,7 @@ CohortTolerance = Annotated[float, Quantity("1", "tolerance of the cohorts", "",
 class _Stretched:
     """Attributes of models with a stretch; a subclass gives the moments of the stretch over all sites."""
 
+    stretched: ClassVar[bool] = True
     knows_forces: ClassVar[bool] = True
     carries_stress: ClassVar[bool] = True
     rupture: Rupture
@@ -47,7 +50,7 @@ class _Stretched:
     @property
     def bound_at_rest(self) -> float:
         """Share of sites that are bound at rest [1]."""
-        return self.rebinding_rate / (self.rebinding_rate + self.law.rate)
+        return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
 
     def _bonding(self, bound: np.ndarray, stretch: np.ndarray, square: np.ndarray, breaking: np.ndarray) -> Bonding:
         """Readings of a population of these moments per site.
@@ -62,6 +65,17 @@ class _Stretched:
         fraction = bound / self.bound_at_rest
         stiffness = per_stretch * (bound - breaking)
         return Bonding(fraction, stress, np.abs(stress), stiffness, scale * frozen, scale * varying)
+
+    def chosen(self, area: float, forces: bool) -> Self:
+        """The model for a contact of this ``area`` [m²] whose field reads the bonds' ``forces`` or not: this one."""
+        return self
+
+    def why(self, area: float, forces: bool) -> str:
+        return ""
+
+    def followed(self, speeds: np.ndarray, step: float) -> float:
+        """Lives of single bonds that are followed in a step of one member at speeds [m/s], on average."""
+        return 0.0
 
     def remarks(self, setting: Setting) -> list[str]:
         return []
@@ -78,8 +92,19 @@ class Stretches(NamedTuple):
     seen: np.ndarray = UNSEEN
 
 
+class _Separable(_Stretched):
+    """Models that rest on a rupture law whose ∫k dt has one clock for all bonds."""
+
+    @model_validator(mode="after")
+    def _one_clock(self) -> Self:
+        if not self.rupture.separable:
+            said = f'rupture model "{self.rupture.model}" needs the density of the stretch; use bonds.model = "cohort"'
+            raise PydanticCustomError("not_separable", said)
+        return self
+
+
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class FirstMoment(OverArea, _Stretched):
+class FirstMoment(OverArea, _Separable):
     """Rate equations of number and mean stretch, every bond taken at the mean. Limit: ``Cohort`` at a constant rate.
 
     Exact in time for a constant rupture. Under Bell's it is a mean field: it overpredicts the friction
@@ -113,6 +138,11 @@ class FirstMoment(OverArea, _Stretched):
             before.bound, before.stretch, motion.slip, motion.path, motion.duration, self.law, self.rebinding_rate
         )
         return Stretches(bound, stretch, before.seen)
+
+    def remarks(self, setting: Setting) -> list[str]:
+        excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)
+        said = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
+        return [said] if excess else []
 
     def over(self, state: Stretches, radius: np.ndarray) -> Stretches:
         """The population over a contact of this radius [m], nan where it is open."""
@@ -205,7 +235,7 @@ class Cohort(OverArea, _Stretched):
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class Tracked(_Stretched):
+class Tracked(_Separable):
     """A finite number of sites, every bond's stretch and exact rupture time. Limit: ``Cohort`` as sites -> infinity.
 
     ``sites`` are followed for each member, whatever the area: the area scales the stress, not the number.
@@ -223,6 +253,7 @@ class Tracked(_Stretched):
     model: Literal["tracked"] = "tracked"
 
     state_class: ClassVar[type[Tracks]] = Tracks
+    area: ClassVar[str] = "present"
 
     @property
     def per_member(self) -> bool:
@@ -238,14 +269,14 @@ class Tracked(_Stretched):
         return 3 * self.sites
 
     def start(self, motion: Motion, noise: Noise) -> Tracks:
-        return tracks.start(
-            self.law, self.rebinding_rate, self.sites, motion.first, self.start_from, noise.seed, noise.members
-        )
+        return tracks.start(self.law, self.rebinding_rate, self.sites, motion.first, self.start_from, *noise.address())
 
     def advance(self, state: Tracks, motion: Motion, radius: np.ndarray, noise: Noise) -> Tracks:
-        return tracks.advance(
-            state, motion.slip, motion.duration, self.law, self.rebinding_rate, noise.seed, noise.members
-        )
+        return tracks.advance(state, motion.slip, motion.duration, self.law, self.rebinding_rate, *noise.address())
+
+    def followed(self, speeds: np.ndarray, step: float) -> float:
+        lives = step / (tracks.mean_life(speeds, self.law) + 1.0 / self.rebinding_rate)
+        return float(self.sites * np.mean(np.minimum(lives, tracks.MOST_LIVES)))
 
     def copied(self, state: Tracks) -> Tracks:
         return state.copy()

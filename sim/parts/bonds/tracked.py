@@ -18,6 +18,9 @@ from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
 from sim.parts.bonds.tracked_step import ENDLESS, LONG, SPENT, draw, live
 
+#: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
+MOST_LIVES = 300.0
+
 
 class Tracks(NamedTuple):
     """State of the bonds of all members; plain arrays, so that it can be written and read back.
@@ -159,7 +162,7 @@ def advance(
     after = Tracks(tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, frame)
     said = live(
         tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, frame,
-        slip, duration, *rupture, rebinding_rate, seed, members,
+        slip, duration, *rupture[:3], rebinding_rate, seed, members,
     )  # fmt: skip
     if said == SPENT:
         raise RuntimeError("these tracks have been advanced already: go on from the newest state, or from copies")
@@ -229,7 +232,7 @@ def mean_life(speed: np.ndarray, rupture: RuptureRate) -> np.ndarray:
 
 
 def _mean_life(speed: float, rupture: RuptureRate) -> float:
-    rate, softness, limit = rupture
+    rate, softness, limit, *_ = rupture
     pace, longest = speed * softness, limit / speed if speed > 0.0 else math.inf
     if rate == 0.0:
         return longest
@@ -260,5 +263,5 @@ def _draw(tracks, chosen, speed, share, age, rupture, rebinding_rate, seed, memb
     age = np.where(np.isinf(age), 0.0, age)
     draw(
         tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, tracks.frame, chosen,
-        speed, share, age, *rupture, rebinding_rate, seed, np.asarray(members, dtype=np.uint64),
+        speed, share, age, *rupture[:3], rebinding_rate, seed, np.asarray(members, dtype=np.uint64),
     )  # fmt: skip

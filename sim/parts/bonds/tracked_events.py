@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device
-from sim.numerics.noise import PARTS, _logarithm, exponential, fill_words
+from sim.numerics.noise import PARTS, exponential, fill_words, logarithm
 
 #: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), whether bonds
 #: are asked singly, bound sites, sum of their births, of the births squared, steps done.
@@ -111,7 +111,7 @@ def _break(sites, count, birth, due, life, row, step, seed, member, drawn, words
         drawn[0, e], drawn[1, e] = exponential(words[0, e]), exponential(words[1, e])
         time = drawn[2, e] / first
         u = 1.0 + pace * time  # ln u/(u - 1) takes back what the sum has rounded: log1p
-        drawn[2, e] = time * (1.0 if u == 1.0 else _logarithm(u) / (u - 1.0))
+        drawn[2, e] = time * (1.0 if u == 1.0 else logarithm(u) / (u - 1.0))
     again, end = 0, t0 + duration
     bound, total, squares = 0.0, 0.0, 0.0
     for e in range(count):

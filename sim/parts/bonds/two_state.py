@@ -3,7 +3,7 @@
 Their strength is ``stress`` times the fraction of bonds; their shear stress is ± that, with the sign of the last slip.
 """
 
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
 import numpy as np
 from pydantic import Field
@@ -48,6 +48,7 @@ class _WithoutStretch:
     """Attributes of all models without a stretch: their strength is proportional to the fraction."""
 
     state_class: ClassVar[type[Population]] = Population
+    stretched: ClassVar[bool] = False
     knows_forces: ClassVar[bool] = False
     numbers: ClassVar[int] = 1
     stress: float
@@ -79,6 +80,15 @@ class _WithoutStretch:
     def _steady_fraction(self, speed: np.ndarray) -> np.ndarray:
         return np.ones(1)
 
+    def chosen(self, area: float, forces: bool) -> Self:
+        return self
+
+    def why(self, area: float, forces: bool) -> str:
+        return ""
+
+    def followed(self, speeds: np.ndarray, step: float) -> float:
+        return 0.0
+
     def remarks(self, setting: Setting) -> list[str]:
         return []
 
@@ -99,6 +109,9 @@ class Unbroken(_WithoutStretch):
     stress: Stress = 0.0
     model: Literal["none"] = "none"
 
+    start_from: ClassVar[str] = "steady"
+    area: ClassVar[str] = "present"
+
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(np.ones(1), _sense(motion, _STILL))
 
@@ -113,6 +126,9 @@ class Steady(_WithoutStretch):
     critical_speed: CriticalSpeed
     stress: Stress = 0.0
     model: Literal["steady"] = "steady"
+
+    start_from: ClassVar[str] = "steady"
+    area: ClassVar[str] = "present"
 
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), _sense(motion, _STILL))
@@ -180,6 +196,8 @@ class Counted(_WithoutStretch):
     stress: Stress = 0.0
     start_from: Start = "steady"
     model: Literal["counted"] = "counted"
+
+    area: ClassVar[str] = "present"
 
     @property
     def per_member(self) -> bool:

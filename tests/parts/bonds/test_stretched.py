@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from helpers.scenes import BELL, BONDS, CELL, STRETCHED, scene
 from numpy.testing import assert_allclose
-from pydantic import ValidationError
 
 from sim.engine import march
 from sim.ensemble.recorded import VARIABLES
@@ -21,6 +20,7 @@ from sim.parts.shear.correlation import Time
 from sim.scenario.clock import Clock
 from sim.spectrum.bond_made import BondMade
 from sim.spectrum.families import Band
+from sim.units.refusals import BadInput
 
 READ = {variable.name: variable.read for variable in VARIABLES}
 RATES = BELL.zero_force_rate, BELL.bell_force, STRETCHED["bond_stiffness"]
@@ -283,7 +283,7 @@ def test_a_few_bonds_give_each_member_its_own_field():
     ids=["none", "rate", "counted", "first moment"],
 )
 def test_a_field_of_bonds_without_forces_is_refused(population, said):
-    with pytest.raises(ValidationError, match=said):
+    with pytest.raises(BadInput, match=said):
         scene(bonds=population, shear=shear.Mean(spectrum=FIELD))
 
 
@@ -293,7 +293,7 @@ def test_a_bond_stiffer_than_the_half_space_under_it_is_refused_with_the_number(
         stiff = bonds.Cohort(rupture=BELL, **(STRETCHED | {"bond_stiffness": stiffness}))
         parts = {"bonds": stiff, "shear": shear.Mean(spectrum=BondMade(footprint=1e-9))}
         if refused:
-            with pytest.raises(ValidationError, match=r"yields with 0\.0079 N/m"):
+            with pytest.raises(BadInput, match=r"yields with 0\.0079 N/m"):
                 scene(**parts)
         else:
             assert scene(**parts).population == stiff
