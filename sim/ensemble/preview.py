@@ -209,7 +209,7 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
     powers = [_power(point) for point in some]
     rms = [(power * point.shear.spectrum.variance) ** 0.5 for power, point in zip(powers, some, strict=True)]
     energies = [
-        power * float(np.asarray(point.shear.spectrum.surface_energy(*point.solid.effective)))
+        power * float(point.shear.spectrum.surface_energy(*point.solid.effective))
         for power, point in zip(powers, some, strict=True)
     ]
     when = "at amplitude 1" if not any(point.shear.spectrum.bond_made for point in some) else _SETTLED
@@ -318,11 +318,11 @@ def _warnings(points: Sequence[Scenario]) -> Rows:
 
 def _on_a_disc(point: Scenario) -> list[str]:
     """By how much the plane's energy is off for a contact of this size, if that is more than the tolerance."""
-    plane = float(np.asarray(point.shear.spectrum.surface_energy(*point.solid.effective)))  # type: ignore[union-attr]
+    plane = float(point.shear.spectrum.surface_energy(*point.solid.effective))  # type: ignore[union-attr]
     if not (plane > 0.0 and point.rest_radius > 0.0):
         return []
     spectrum, tolerance = point.shear.spectrum, getattr(point.shear, "tolerance", _BANDED)  # type: ignore[union-attr]
-    paid = float(np.asarray(marginal_energy(spectrum, point.rest_radius, *point.solid.effective)))
+    paid = float(marginal_energy(spectrum, point.rest_radius, *point.solid.effective))
     if abs(paid / plane - 1.0) <= tolerance:
         return []
     long = _longest_wave(point) > 2.0 * point.rest_radius

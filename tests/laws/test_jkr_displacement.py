@@ -1,4 +1,4 @@
-"""The contact behind a machine: closed states, thirty decades of stiffness, the fold, any input.
+"""The contact behind a spring: closed states, thirty decades of stiffness, the fold, any input.
 
 Tolerances: u = 2^-53. The displacement of the fold carries some ten roundings (products, pi, a cube root, the
 two terms of F), at most 16 u. At a relative distance d from the fold, t = sqrt(|F_f| d/f_2), so that a
@@ -88,7 +88,7 @@ def bisected(function, low, high, target):
 
 
 def random_states(count, seed):
-    """Adhesive contacts behind machines, stiffness over thirty decades, displacement around and far from the fold."""
+    """Adhesive contacts behind springs of stiffness over thirty decades, displacement around and far from the fold."""
     random = np.random.default_rng(seed)
     work, sphere_radius, modulus = 10.0 ** random.uniform(-10, 10, (3, count))
     stiffness = contact_stiffness(work, sphere_radius, modulus) * 10.0 ** random.uniform(-15, 15, count)
@@ -132,7 +132,7 @@ class Wide:
 
 
 @pytest.mark.parametrize(("stiffness", "radius", "load", "indentation"), PULL_OFF)
-def test_the_last_contact_of_every_machine(stiffness, radius, load, indentation):
+def test_the_last_contact_behind_every_spring(stiffness, radius, load, indentation):
     last = jkr.pull_off_at_stiffness(stiffness, **MAUGIS)
     assert_allclose(last, (radius, load, indentation), rtol=1e-12, atol=0)
     if stiffness > 0.0:
@@ -144,13 +144,13 @@ def test_the_last_contact_of_every_machine(stiffness, radius, load, indentation)
 
 @pytest.mark.parametrize(("radius", "load", "indentation"), STATES)
 @pytest.mark.parametrize("stiffness", [1e-3, 0.1, 1.0, 5.0, 100.0, 1e6, math.inf])
-def test_radius_of_the_known_states_behind_every_machine(radius, load, indentation, stiffness):
+def test_radius_of_the_known_states_behind_every_spring(radius, load, indentation, stiffness):
     computed = jkr.radius_at_displacement(indentation + load / stiffness, stiffness, **MAUGIS)
     assert_allclose(computed, radius, rtol=1e-12, atol=0)
 
 
-def test_a_neck_that_no_load_holds_stands_behind_a_stiff_machine():
-    # the rational point (2/3, -28/27, -8/9) is the fold at stiffness 5: stable for stiffer machines only
+def test_a_neck_that_no_load_holds_stands_behind_a_stiff_spring():
+    # the rational point (2/3, -28/27, -8/9) is the fold at stiffness 5: stable for stiffer springs only
     for stiffness in (5.5, 10.0, 1e3, math.inf):
         displacement = -8.0 / 9.0 - 28.0 / 27.0 / stiffness
         assert_allclose(jkr.radius_at_displacement(displacement, stiffness, **MAUGIS), 2.0 / 3.0, rtol=1e-12, atol=0)
@@ -171,8 +171,8 @@ def test_an_infinite_stiffness_is_an_indentation():
     assert_allclose(jkr.pull_off_displacement(math.inf, work, sphere_radius, modulus), last, rtol=20 * U, atol=0)
 
 
-def test_a_soft_machine_is_a_load():
-    # kΔ kept, the indentation adds k δ/P to the load: 1e-15 of it where the machine is that soft
+def test_a_soft_spring_is_a_load():
+    # kΔ kept, the indentation adds k δ/P to the load: 1e-15 of it where the spring is that soft
     load, stiffness = np.array([-3.9e-4, -1e-4, 1e-4, 4e-3, 10.0]), 1e-16 * contact_stiffness(**LENS)
     computed = jkr.radius_at_displacement(load / stiffness, stiffness, **LENS)
     assert_allclose(computed, jkr.radius_at_load(load, **LENS), rtol=1e-13, atol=0)
@@ -257,7 +257,7 @@ def test_newton_from_the_right_never_passes_the_root():
 
 
 @pytest.mark.parametrize("work", [0.0, -0.0, -1e-12, -3.0, -1e10])
-def test_radius_at_no_or_negative_work_is_hertz_behind_the_machine(work):
+def test_radius_at_no_or_negative_work_is_hertz_behind_the_spring(work):
     radius = np.logspace(-9, -2, 60)
     for stiffness in 10.0 ** np.arange(-12, 19, 3):
         displacement = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
@@ -272,7 +272,7 @@ def test_radius_at_no_or_negative_work_is_hertz_behind_the_machine(work):
     assert jkr.pull_off_displacement(1e3, work, 2e-3, 6.4e6) == 0.0
 
 
-def test_hertz_is_the_limit_of_vanishing_work_behind_a_machine():
+def test_hertz_is_the_limit_of_vanishing_work_behind_a_spring():
     displacement = np.array([1e-9, 5e-6, 1e-3])
     hertz = jkr.radius_at_displacement(displacement, 1e3, 0.0, 2e-3, 6.4e6)
     for work in (1e-40, 1e-100, 1e-300, 5e-324):
@@ -280,7 +280,7 @@ def test_hertz_is_the_limit_of_vanishing_work_behind_a_machine():
         assert np.isnan(jkr.radius_at_displacement(-1e-6, 1e3, work, 2e-3, 6.4e6))
 
 
-def test_a_contact_of_any_radius_shares_the_displacement_with_the_machine():
+def test_a_contact_of_any_radius_shares_the_displacement_with_the_spring():
     random = np.random.default_rng(10)
     radius, displacement = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, 1e-5, 1000)
     stiffness = 10.0 ** random.uniform(-8, 18, 1000)

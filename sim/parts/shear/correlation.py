@@ -1,8 +1,7 @@
-"""How long the shear-stress fluctuations remember, and how large they grow with the speed.
+"""Laws for the correlation of the stress fluctuations in time, in slip or in both.
 
-A correlation gives each mode the integral of its rate lambda over a step: amplitudes keep the share
-exp(−∫λdt), their energy exp(−2∫λdt). A amplitude gives the factor g by which the field exceeds the
-unit field that the spectrum describes.
+Each law gives the integral of a mode's rate λ over a step: amplitudes keep the share exp(−∫λdt) of themselves,
+their energy exp(−2∫λdt).
 """
 
 from typing import Annotated, ClassVar, Literal

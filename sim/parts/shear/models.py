@@ -95,7 +95,7 @@ class Mean:
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         kind = SiteMean if self.spectrum.bond_made else SmoothProcess
-        return kind(float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))), self.amplitude)
+        return kind(float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)), self.amplitude)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -155,7 +155,7 @@ class Modal(_Fluctuating):
             modes(self.spectrum, side, self.points),
             shear_modulus,
             poisson_ratio,
-            float(np.asarray(self.spectrum.surface_energy(shear_modulus, poisson_ratio))),
+            float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)),
             float(self.spectrum.variance),
             self.correlation,
             self.amplitude,
@@ -230,7 +230,7 @@ def _grouped(
     """The bands of a cell at a shear modulus of 1 Pa, and the cell's own errors against the infinite plane."""
     pairs = cell_pairs(spectrum, cell, points, 1.0, poisson_ratio)
     energy = float(np.sum(pairs.count * pairs.weight))
-    infinite = float(np.asarray(spectrum.surface_energy(1.0, poisson_ratio)))
+    infinite = float(spectrum.surface_energy(1.0, poisson_ratio))
     spread = math.sqrt(float(np.sum(pairs.count * pairs.weight**2)))
     variance = spectrum.variance
     errors = {

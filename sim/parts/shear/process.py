@@ -1,6 +1,6 @@
-"""Fluctuations in time: each process starts and advances the energy that a shear-stress field stores.
+"""Processes: the energy of the shear-stress fluctuations in time.
 
-A process is a depth of ``parts.shear`` on a given solid and cell.
+A process is a model of ``parts.shear`` on a given solid and cell.
 """
 
 from dataclasses import dataclass

@@ -120,9 +120,9 @@ def test_every_other_error_is_the_one_told_and_within_the_tolerance(name, power)
             assert -1e-14 < lack <= tolerance
         lack = lack_of_autocorrelation(weights, rates, squares, own_rates, lags)
         assert lack.min() > -1e-14
-        told = bands.errors["banded_error_autocorrelation"]
-        assert_allclose(lack.max(), told, rtol=missed, atol=merged + 1e-14)
-        assert told <= tolerance
+        known = bands.errors["banded_error_autocorrelation"]
+        assert_allclose(lack.max(), known, rtol=missed, atol=merged + 1e-14)
+        assert known <= tolerance
         assert set(bands.errors) == {*lacks, "banded_error_autocorrelation"}
         numbers.append(len(bands.weight))
     assert numbers == sorted(numbers)
@@ -141,8 +141,8 @@ def test_under_amplitude_that_relaxes_the_mean_follows_all_modes(name, power):
         banded = np.exp(-2.0 * np.multiply.outer(lags, own_rates)) @ (0.5 * bands.weight * bands.freedom)
         lack = np.max(np.abs(exact - banded)) / math.fsum(weights)
         # rates in 4000 classes, largest value between lags as above
-        told = bands.errors.get("banded_error_relaxing_mean", 0.0)
-        assert_allclose(told, lack, rtol=1e-4, atol=(math.log(rates.max() / rates.min()) / 4000) ** 2 + 1e-14)
+        known = bands.errors.get("banded_error_relaxing_mean", 0.0)
+        assert_allclose(known, lack, rtol=1e-4, atol=(math.log(rates.max() / rates.min()) / 4000) ** 2 + 1e-14)
         assert max(bands.errors.values()) <= tolerance
         assert ("banded_error_relaxing_mean" in bands.errors) == (power > 0)
 
