@@ -11,6 +11,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from helpers.cases import some
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.laws import halfspace, jkr, reversible, theories
@@ -109,18 +110,20 @@ def assert_agrees(computed, exact, amplification):
         assert abs(computed / exact - 1) < room if exact > 0 else computed == 0.0
 
 
+@pytest.mark.parametrize("count", some([25, 80], 25))
 @pytest.mark.parametrize(("at_load", "law"), CONTROLS)
-def test_reversible_radius_against_sixty_digits(at_load, law):
-    for state in zip(*random_states(80, 41, at_load), strict=True):
+def test_reversible_radius_against_sixty_digits(at_load, law, count):
+    for state in zip(*random_states(count, 41, at_load), strict=True):
         level, work, stress, reversible, sphere_radius, modulus, poisson_ratio = map(float, state)
         line = -reversible * shear_coefficient(poisson_ratio) * stress**2 / modulus
         exact = exact_crossing(level, at_load, (work, sphere_radius, modulus), line)
         assert_agrees(float(law(*state)), *exact)
 
 
+@pytest.mark.parametrize("count", some([25, 60], 25))
 @pytest.mark.parametrize(("at_load", "law"), UNCORRECTED)
-def test_uncorrected_radius_against_sixty_digits(at_load, law):
-    for state in zip(*random_states(60, 42, at_load), strict=True):
+def test_uncorrected_radius_against_sixty_digits(at_load, law, count):
+    for state in zip(*random_states(count, 42, at_load), strict=True):
         level, work, stress, _, sphere_radius, modulus, poisson_ratio = map(float, state)
         line = shear_coefficient(poisson_ratio) * stress**2 / modulus
         exact = exact_crossing(level, at_load, (work, sphere_radius, modulus), line)

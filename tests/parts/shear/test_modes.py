@@ -60,10 +60,13 @@ def pixel_by_quadrature(spectrum, ix, iy):
 @pytest.mark.parametrize(
     ("name", "pixels"),
     [
-        ("self_affine", [(0, 2), (2, 1), (3, 3), (0, 4), (4, 2), (9, 0), (9, 2), (6, 7), (5, 5)]),
+        ("self_affine", [(0, 2), (3, 3), (4, 2), (6, 7)]),
         ("thin_band", [(0, 3), (2, 2), (3, 1)]),
-        ("wider_than_the_cell", [(0, 0), (1, 0), (1, 1), (7, 2), (3, 4)]),
-        ("steep_table", [(0, 0), (1, 0), (2, 0), (1, 2), (5, 0), (4, 4), (3, 4), (8, 0), (6, 6)]),
+        ("wider_than_the_cell", [(1, 0), (3, 4)]),
+        ("steep_table", [(1, 0), (1, 2), (6, 6)]),
+        pytest.param("self_affine", [(2, 1), (0, 4), (9, 0), (9, 2), (5, 5)], marks=pytest.mark.verify),
+        pytest.param("wider_than_the_cell", [(0, 0), (1, 1), (7, 2)], marks=pytest.mark.verify),
+        pytest.param("steep_table", [(0, 0), (2, 0), (5, 0), (4, 4), (3, 4), (8, 0)], marks=pytest.mark.verify),
     ],
 )
 def test_a_pixel_cut_by_the_cut_offs_has_the_integral_of_the_density(name, pixels):

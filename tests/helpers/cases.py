@@ -1,0 +1,12 @@
+"""Which cases of a parametrisation run in every test, and which in ``make verify`` only."""
+
+import pytest
+
+
+def some(cases, *always):
+    """All cases, of which those not in ``always`` are for ``make verify``."""
+    left = [case for case in always if case not in cases]
+    assert not left, f"{left} is none of the cases"
+    whole = [case if isinstance(case, tuple) else (case,) for case in cases]
+    return [case if case in always else pytest.param(*all_of, marks=pytest.mark.verify)
+            for case, all_of in zip(cases, whole, strict=True)]  # fmt: skip
