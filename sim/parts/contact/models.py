@@ -216,19 +216,22 @@ class Equilibrium(_Controlled):
 
     def advance(self, state: ContactState, motion: Motion, duration: float, balance: Balance) -> ContactState:
         control = self.control(motion.time, duration)
-        open_ = np.isnan(state.radius) & ~self._touching(state, control)
-        if open_.all():
+        open_ = np.isnan(state.radius)
+        stays = open_ & ~self._touching(state, control) if open_.any() else open_
+        if stays.all():
             radius = np.full(np.broadcast(open_, balance.bonded, balance.fluctuating).shape, np.nan)
         else:
-            radius = np.where(open_, np.nan, self._equilibrium(control, balance))
-        work, phases = self._left(radius, balance), self._phases(state, control, radius, balance)
-        opens, closes = ~np.isnan(state.radius) & np.isnan(radius), np.isnan(state.radius) & ~np.isnan(radius)
-        dissipated = state.dissipated
-        for happens, size, sign in ((opens, state.radius, 1.0), (closes, radius, -1.0)):
+            radius = self._equilibrium(control, balance)
+            radius = np.where(stays, np.nan, radius) if stays.any() else radius
+        opens = np.isnan(radius) & ~open_
+        detached, dissipated = state.detached, state.dissipated
+        for happens, size, sign in ((opens, state.radius, 1.0), (open_ & ~np.isnan(radius), radius, -1.0)):
             if happens.any():
                 over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
                 dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
-        return ContactState(work, radius, np.where(opens, motion.time, state.detached), dissipated, *phases)
+                detached = np.where(opens, motion.time, detached)
+        phases = self._phases(state, control, radius, balance)
+        return ContactState(self._left(radius, balance), radius, detached, dissipated, *phases)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
