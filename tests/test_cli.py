@@ -358,7 +358,7 @@ def test_stats_prints_a_table_and_writes_csv(dataset, here):
     done = sim("stats", dataset, "--csv", "new/table.csv")
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1] == "new/table.csv"
-    assert len(Path("new/table.csv").read_text().splitlines()) == 1 + 11  # about, header, records
+    assert len(Path("new/table.csv").read_text().splitlines()) == 1 + 11  # header, records
     assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
 
 

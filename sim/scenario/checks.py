@@ -7,6 +7,7 @@ import numpy as np
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
+from sim.laws import jkr
 from sim.parts.bonds import Auto as AutoBonds
 from sim.parts.bonds import Model as BondModel
 from sim.parts.contact import Contact, RateDependent
@@ -128,10 +129,10 @@ def _shear_faults(shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion
     """What keeps the shear part from being built on its solid and cell."""
     if isinstance(shear, Uniform | Mean):
         return []
-    cell = shear.cell or math.sqrt(math.pi) * _rest_radius(solid, sphere, adhesion, contact)
-    if not cell > 0.0:
-        return [(("shear",), 'there is no contact at rest to set the cell by; give a cell such as cell = "0.2 mm"')]
     radius = _rest_radius(solid, sphere, adhesion, contact)
+    cell = shear.cell or math.sqrt(math.pi) * radius
+    if not cell > 0.0:
+        return _open_at_rest(contact, sphere, adhesion)
     if shear.contact == "disc" and shear.draws_maps and not 2.0 * radius <= cell:
         said = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * radius:g} m wide at rest"
         return [(("shear", "cell"), f'{said}; give shear.cell = "{2.2e6 * radius:.3g} um" or more')]
@@ -143,6 +144,14 @@ def _shear_faults(shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion
     except PydanticCustomError as fault:
         return [(("shear",), fault.message())]
     return []
+
+
+def _open_at_rest(contact: Contact, sphere: Sphere, adhesion: Adhesion) -> Faults:
+    """What holds the sphere leaves no contact at rest, which the cell is sized by."""
+    name = next(name for name in ("load", "indentation", "displacement") if getattr(contact, name) is not None)
+    limit = f" of {jkr.pull_off_load(adhesion.work, sphere.radius):.3g} N" if name == "load" else ""
+    said = f"is beyond pull-off{limit} at the start, so that there is no contact at rest to size the cell of shear by"
+    return [(("contact", name), f'{said}; hold the sphere closer, or give shear.cell such as "0.2 mm"')]
 
 
 def _too_many_modes(shear: Any, cell: float) -> str | None:

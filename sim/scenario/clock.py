@@ -25,6 +25,10 @@ class Clock:
 
     @model_validator(mode="after")
     def _whole_multiples(self) -> "Clock":
+        for name in ("record", "step"):
+            if (getattr(self, name) or 0.0) > self.duration * (1.0 + 1e-9):
+                said = f"{name} ({getattr(self, name):g} s) is longer than duration ({self.duration:g} s)"
+                raise PydanticCustomError("clock", f"{said}; shorten it, or lengthen the run")
         if self.record is not None:
             _require_multiple("record", self.record, "step", self.step)
         word = "step" if self.record is None else "record"

@@ -339,6 +339,9 @@ def test_lists_and_choices_of_the_record_are_checked(refusal):
         ([('shear_modulus = "1.6 MPa"', "shear_modulus = 1\nyoungs_modulus = 1")], "solid", "one modulus...both are"),
         ([('step = "5 ms"', 'step = "5 ms"\nrecord = "7 ms"')], "clock", "record...whole multiple of step"),
         ([('step = "5 ms"', 'step = "5 ms"\nrecord = "0.3 s"')], "clock", "duration...multiple of record...1.8 s"),
+        ([('step = "5 ms"', 'step = "3 s"')], "clock", "step (3 s) is longer than duration (2 s)...shorten"),
+        ([('step = "5 ms"', 'step = "5 ms"\nrecord = "3 s"')], "clock", "record (3 s) is longer than duration"),
+        ([('step = "5 ms"', 'step = "1 s"\nrecord = "0.5 s"')], "clock", "record (0.5 s)...multiple of step...1 s"),
         ([('step = "5 ms"', 'step = "1 ns"')], "clock", "1,000,000,000 steps...longer"),
         ([('step = "5 ms"', 'step = "100 ns"')], "clock", "10,000,000 records...record"),
         ([("points = 32", "points = 8")], "shear", "at least 31 points...more points"),
@@ -388,6 +391,15 @@ def test_all_faults_come_in_one_pass_in_the_order_of_the_file(refusal):
     assert keys == [*wanted, "contact", "ensemble.members"]
     numbers = [int(problem.split(":")[1]) for problem in found]
     assert numbers == sorted(numbers)
+
+
+@pytest.mark.parametrize(
+    ("held", "words"),
+    [('load = "-1 N"', "beyond pull-off of -0.000396 N...shear.cell"), ('indentation = "-1 mm"', "beyond pull-off")],
+)
+def test_a_contact_that_is_open_at_rest_is_blamed_on_what_holds_it(refusal, held, words):
+    (problem,) = refusal(('cell = "0.24 mm"\n', ""), ('load = "4 mN"', held))
+    assert told(problem, line_of('load = "4 mN"') - 1, f"contact.{held.split(' ')[0]}", words)
 
 
 # --- bonds with a stretch ---
