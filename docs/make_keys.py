@@ -1,76 +1,92 @@
 """Writes docs/keys.md, every key of a scenario file, from the declarations in the code."""
 
+import re
 import sys
 import typing
 from pathlib import Path
 
-from pydantic_core import PydanticUndefined
-
-from sim.scenario.declared import declaration
+from sim.scenario.declared import all_tables, declaration, keys, model, tables
 from sim.scenario.scenario import Scenario
 
 TARGET = Path(__file__).with_name("keys.md")
 HEAD = """# Every key of a scenario file
 
-Made by `python docs/make_keys.py` from the declarations in the code. A quantity is a string with a unit (`"4 mN"`) or a
-bare number in the unit given here. A table that is left out means its first model. `[sweep]` takes any of these keys
-with a list of values, or `{from, to, count, scale}`; several keys form the outer product, a list of tables is one axis.
+Made by `python docs/make_keys.py` from the declarations in the code. A quantity is a string with a unit (`"4 mN"`) or
+a bare number in the unit given here; a unit of 1 is a pure number. The models of a table go from simple to full: a
+table that is left out is its first model, and so is one whose `model` is left out. The last column names the models
+that have a key, where not all do. `[sweep]` takes any of these keys with a list of values, or
+`{from, to, count, scale}`; several keys form the outer product, a list of tables is one axis. `sim schema` prints the
+JSON schema, by which an editor completes keys.
 """
+#: Keys of the file itself that stand before its tables.
+_FIRST = ("name", "seed")
 
 
 def text() -> str:
     """The page."""
-    _DONE.clear()
-    lines = [HEAD, *_rows("top of the file", Scenario, skip={"source", "sweep"})]
-    for name, field in Scenario.__pydantic_fields__.items():
-        for part in _classes(field.annotation):
-            if name not in ("source", "sweep"):
-                lines += _table(f"[{name}]", part)
+    sections: dict[tuple, tuple[list[str], dict[str, type]]] = {}
+    for path, field in all_tables(Scenario):
+        options = tables(field.annotation)
+        same = (path[-1:] if len(options) < 2 or "[table]" not in options else path[:1], *map(_form, options))
+        same += tuple(key for table in options.values() for key in keys(table))
+        sections.setdefault(same, ([], options))[0].append(f"[{'.'.join(path)}]" if path else "top of the file")
+    lines = [HEAD]
+    for titles, options in sections.values():
+        lines += _section(titles, options)
     return "\n".join(lines) + "\n"
 
 
-def _table(title: str, part: type) -> list[str]:
-    model = part.__pydantic_fields__.get("model")
-    named = f" model = `{model.default}`" if model is not None else ""
-    meaning = " ".join((part.__doc__ or "").split("\n\n")[0].split()).replace("\\", "")
-    lines = [f"\n## {title}{named}\n", f"{meaning}\n", *_rows(title, part)]
-    for name, field in part.__pydantic_fields__.items():
-        for inner in _classes(field.annotation):
-            heading = f"{title[:-1]}.{name}]"
-            if heading in _DONE and inner in _DONE[heading]:
-                continue
-            _DONE.setdefault(heading, []).append(inner)
-            lines += _table(heading, inner)
-    return lines
+def _section(titles: list[str], options: dict[str, type]) -> list[str]:
+    lines = [f"\n## {', '.join(titles)}\n"]
+    if len(options) > 1:
+        lines += [f"- {_form(name)}: {_meaning(table)}" for name, table in options.items()]
+        lines.append("")
+    elif titles != ["top of the file"]:
+        lines += [f"{_meaning(*options.values())}\n"]
+    rows: dict[tuple[str, ...], list[str]] = {}
+    for name, table in options.items():
+        for key, field in sorted(keys(table).items(), key=lambda item: table is Scenario and item[0] not in _FIRST):
+            if key not in ("model", "sweep"):
+                rows.setdefault((f"`{key}`", *_row(key, field, titles)), []).append(_form(name))
+    several = len(options) > 1
+    lines += ["| key | unit | meaning | default |" + (" models |" if several else "")]
+    lines += ["| --- | --- | --- | --- |" + (" --- |" if several else "")]
+    for row, having in rows.items():
+        shown = [*row, "" if len(having) == len(options) else ", ".join(having)] if several else row
+        lines.append(f"| {' | '.join(shown)} |")
+    return lines if rows else lines[:-2]
 
 
-_DONE: dict[str, list[type]] = {}
+def _row(key: str, field: typing.Any, titles: list[str]) -> tuple[str, str, str]:
+    """Unit, meaning and default of a key."""
+    quantity, inner = declaration(field), tables(field.annotation)
+    place = f"[{titles[0].strip('[]')}.{key}]" if titles[0].startswith("[") else f"[{key}]"
+    default = f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
+    if field.is_required():
+        default = "needed"
+    elif field.default_factory is not None:
+        simplest = model(field.default_factory)
+        default = f"`{simplest}`" if simplest else "its defaults"
+    elif field.default in (None, "", ()):
+        default = "not given"
+    if quantity is None and inner:
+        return "", f"the table {place}", default
+    meaning = quantity.meaning if quantity else field.description
+    words = _words(field.annotation)
+    meaning += f": {', '.join(words)}" if words else ""
+    meaning += f"; or the table {place}" if inner else ""
+    return ("" if quantity is None or quantity.whole else quantity.unit), meaning, default
 
 
-def _rows(title: str, part: type, skip: typing.Collection[str] = ()) -> list[str]:
-    rows = []
-    for name, field in part.__pydantic_fields__.items():
-        quantity = declaration(field)
-        tables = list(_classes(field.annotation))
-        if name == "model" or name in skip or (tables and quantity is None):
-            continue
-        unit = quantity.unit if quantity else ""
-        meaning = quantity.meaning if quantity else (field.description or name.replace("_", " "))
-        words = _words(field.annotation)
-        meaning += f": {', '.join(words)}" if words else ""
-        meaning += "; or a table, see below" if tables else ""
-        rows.append(f"| `{field.alias or name}` | {unit} | {meaning} | {_default(field)} |")
-    return ["| key | unit | meaning | default |", "| --- | --- | --- | --- |", *rows] if rows else []
+def _form(name: str) -> str:
+    """A model's name, or that of a form without one."""
+    model, _, form = name.partition("[")
+    return f"`{model}`" + (f" with a {form[:-1]}" if form else "") if model else f"a {form[:-1]}"
 
 
-def _default(field: typing.Any) -> str:
-    if field.default_factory is not None:
-        return "its first model"
-    if field.default is PydanticUndefined:
-        return "needed"
-    if field.default is None:
-        return "not given"
-    return f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
+def _meaning(table: type) -> str:
+    """The first paragraph of a table's description."""
+    return re.sub(r"`+", "`", " ".join((table.__doc__ or "").split("\n\n")[0].split())).replace("\\", "")
 
 
 def _words(annotation: typing.Any) -> list[str]:
@@ -78,14 +94,6 @@ def _words(annotation: typing.Any) -> list[str]:
     if typing.get_origin(annotation) is typing.Literal:
         return [f"`{word}`" for word in typing.get_args(annotation)]
     return [word for option in typing.get_args(annotation) for word in _words(option)]
-
-
-def _classes(annotation: typing.Any) -> typing.Iterator[type]:
-    """Our own dataclasses inside an annotation."""
-    if hasattr(annotation, "__pydantic_fields__"):
-        yield annotation
-    for option in typing.get_args(annotation):
-        yield from _classes(option)
 
 
 if __name__ == "__main__":

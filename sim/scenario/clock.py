@@ -4,7 +4,7 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import model_validator
+from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
@@ -88,7 +88,9 @@ class Ensemble:
 class Record:
     """What is kept: each member or the ensemble's mean, spread and standard error; maps at given times."""
 
-    per_member: bool = True
+    per_member: Annotated[
+        bool, Field(description="keep every member; false: mean, standard deviation and standard error alone")
+    ] = True
     maps: tuple[Annotated[float, Quantity("s", "time of a stress map", "t", at_least=0)], ...] = ()
     map_members: Annotated[int, Quantity("1", "members whose maps are kept", at_least=1, at_most=10**4, whole=True)] = 1
-    precision: Literal["float64", "float32"] = "float64"
+    precision: Annotated[Literal["float64", "float32"], Field(description="of trajectories in the file")] = "float64"

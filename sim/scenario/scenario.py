@@ -70,7 +70,9 @@ class Scenario:
     ensemble: Ensemble = Field(default_factory=Ensemble)
     record: Record = Field(default_factory=Record)
     sweep: Annotated[tuple[Any, ...], BeforeValidator(lambda sweep: read_sweep(sweep))] = ()
-    name: Annotated[str, Field(max_length=200)] = "sliding contact"
+    name: Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")] = (
+        "sliding contact"
+    )
     seed: Annotated[int, Quantity("1", "seed of the run", at_least=0, at_most=2**64 - 1, whole=True)] = 0
     source: Annotated[Any, Field(exclude=True)] = Source()
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationInfo, model_validator
+from pydantic import Field, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 
 from sim.numerics.files import HDF5
@@ -53,10 +53,13 @@ class Measured(Rowed):
     map and the corners beyond Nyquist are not part of the spectrum.
     """
 
-    file: str
+    file: Annotated[str, Field(description="the map: plain CSV in Pa, one row a line, or netCDF")]
     spacing: Annotated[float, _SPACING] | None = None
-    window: Literal["none", "hann"] = "none"
-    variable: str = "shear_map"
+    window: Annotated[
+        Literal["none", "hann"],
+        Field(description='taper of the map before its transform; "hann" unless it is periodic'),
+    ] = "none"
+    variable: Annotated[str, Field(description="name of the map in a netCDF file")] = "shear_map"
     wavenumbers: Wavenumbers = ()
     densities: Densities = ()
     model: Literal["measured"] = "measured"

@@ -109,7 +109,7 @@ class Course:
 
     start: Annotated[float, Field(alias="from")]
     stop: Annotated[float, Field(alias="to")]
-    scale: Literal["linear", "log"] = "linear"
+    scale: Annotated[Literal["linear", "log"], Field(description="how it goes from one end to the other")] = "linear"
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
     end: ClassVar[float] = math.inf
@@ -202,7 +202,7 @@ class Table:
     cycles: ClassVar[int] = 0
 
     time: tuple[Annotated[float, _TIME], ...]
-    file: str = ""
+    file: Annotated[str, Field(description="CSV with these columns, beside the scenario, in place of them")] = ""
 
     @model_validator(mode="before")
     @classmethod

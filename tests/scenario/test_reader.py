@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.scenario.declared import quantities
+from sim.scenario.declared import all_tables, declaration, keys, quantities, tables
 from sim.scenario.reader import BadInput, load
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import scenario_schema
@@ -430,6 +430,17 @@ def test_every_number_of_the_schema_says_its_meaning_and_unit():
     found = list(numbers(scenario_schema()))
     assert len(found) > 30
     assert all(node["description"].endswith("]") and node["examples"] for node in found)
+
+
+def test_every_key_of_every_table_has_a_meaning():
+    silent = [
+        (*path, key)
+        for path, field in all_tables(Scenario)
+        for table in tables(field.annotation).values()
+        for key, held in keys(table).items()
+        if key not in ("model", "sweep") and not (held.description or declaration(held) or tables(held.annotation))
+    ]
+    assert not silent
 
 
 # --- refusals in Python ---

@@ -97,7 +97,7 @@ class Start(_Sliding):
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
 class Ramp(Course, _Sliding):
-    """A speed that goes from ``start`` to ``stop`` over the whole run, linearly or logarithmically.
+    """A speed that goes from one value to another over the whole run, linearly or logarithmically.
 
     In a scenario file the two ends are called ``from`` and ``to``.
     """

@@ -8,6 +8,8 @@ from pydantic.dataclasses import dataclass
 
 from sim.units.quantity import Quantity
 
+Relaxing = Annotated[bool, Field(description="true: only what the correlation renews has the new size")]
+
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Constant:
@@ -37,7 +39,7 @@ class Onset:
     speed: Annotated[float, Quantity("m/s", "speed at the onset of the fluctuations", "V_0", above=0)]
     width: Annotated[float, Quantity("1", "width of the onset in the logarithm of speed", "b", above=0)]
     floor: Annotated[float, Quantity("1", "share of the rms far below the onset", "g_0", at_least=0, at_most=1)] = 0.0
-    relaxing: bool = False
+    relaxing: Relaxing = False
     model: Literal["onset"] = "onset"
 
     def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
@@ -55,7 +57,7 @@ class Stress:
     reference: Annotated[
         float, Quantity("Pa", "mean shear stress at which the rms is the spectrum's", "tau_ref", above=0)
     ]
-    relaxing: bool = False
+    relaxing: Relaxing = False
     model: Literal["stress"] = "stress"
 
     def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:

@@ -36,6 +36,9 @@ _Contact = Annotated[
     Literal["plane", "disc"],
     Field(description='"disc": the energy that a contact of finite size pays when it grows, instead of the plane\'s'),
 ]
+_ModeAmplitudes = Annotated[
+    Literal["gaussian", "fixed"], Field(description='"fixed": modes keep their modulus, so that the energy is constant')
+]
 _Points = Annotated[int, Quantity("1", "grid points along a side of the cell", at_least=2, at_most=2**14, whole=True)]
 
 
@@ -113,7 +116,7 @@ class _Fluctuating:
     amplitude: Amplitude = Field(default_factory=Constant)
     cell: _Cell | None = None
     points: _Points | None = None
-    mode_amplitudes: Literal["gaussian", "fixed"] = "gaussian"
+    mode_amplitudes: _ModeAmplitudes = "gaussian"
     paid_by_adhesion: _Paid = 1.0
     contact: _Contact = "plane"
 
@@ -251,7 +254,7 @@ class Auto:
     amplitude: Amplitude = Field(default_factory=Constant)
     cell: _Cell | None = None
     points: _Points | None = None
-    mode_amplitudes: Literal["gaussian", "fixed"] = "gaussian"
+    mode_amplitudes: _ModeAmplitudes = "gaussian"
     tolerance: _Tolerance = 0.01
     paid_by_adhesion: _Paid = 1.0
     contact: _Contact = "plane"
