@@ -18,7 +18,7 @@ test: $(STAMP)
 PARALLEL = -n 2 --dist worksteal
 
 # `make verify` runs all groups with their long checks, `make verify GROUP=bonds` one of them.
-GROUP ?= laws fields bonds contacts runs
+GROUP ?= laws fields bonds contacts runs lowest
 laws = --doctest-modules --ignore=sim/__main__.py sim tests/laws tests/numerics tests/units
 fields = tests/spectrum tests/parts/shear
 bonds = tests/parts/bonds
@@ -29,7 +29,18 @@ runs = $(filter-out $(laws) $(fields), $(rooms)) $(wildcard tests/test_*.py)
 verify:
 	$(MAKE) EXTRAS=test,lint,verify $(GROUP:%=.verify-%)
 
-.PHONY: .verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs
+# What reads and writes, with the lowest versions of all that pyproject.toml allows.
+LOWEST = .venv-lowest
+.verify-lowest: $(STAMP)
+	test -x $(LOWEST)/bin/python || $(BIN)/python -m venv $(LOWEST)
+	$(LOWEST)/bin/python -m pip install -q --disable-pip-version-check $$($(BIN)/python -c 'import tomllib; \
+	  p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
+	  print(*(r.replace(">=", "==") for r in p["dependencies"] + p["optional-dependencies"]["test"]))')
+	$(LOWEST)/bin/python -m pip install -q --disable-pip-version-check --no-deps -e .
+	$(LOWEST)/bin/python -m pytest $(PARALLEL) tests/ensemble/test_netcdf.py tests/ensemble/test_provenance.py tests/units \
+	  tests/scenario/test_reader.py tests/analysis/test_correlation.py
+
+.PHONY: .verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs .verify-lowest
 .verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs: .verify-%: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
@@ -60,4 +71,4 @@ $(STAMP): pyproject.toml constraints.txt
 	@touch $@
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(LOWEST) build dist *.egg-info .mypy_cache .ruff_cache

@@ -172,7 +172,7 @@ def test_modal_fluctuations_become_the_mean_as_the_cell_grows():
         part = shear.Modal(spectrum=spectrum, cell=side, points=round(side / 3e-6), correlation=Slip(length=1e-6))
         errors = scene(shear=part).process.known_errors()
         deficits.append(-errors["cell_error_energy"])
-        spreads.append(errors["realization_spread_energy"])
+        spreads.append(errors["member_spread_energy"])
         assert_allclose(deficits[-1], 0.2327799 * spectrum.density(0.0, 0.0) / (1.6e6 * side) / infinite, rtol=0.02)
     assert_allclose(np.divide(deficits[:-1], deficits[1:]), 2.0, rtol=0.02)
     assert np.all(np.diff(spreads) < 0.0)

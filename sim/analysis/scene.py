@@ -8,8 +8,10 @@ import json
 import os
 from typing import Any, NamedTuple
 
+import netCDF4
 import numpy as np
 import xarray as xr
+from xarray.backends import CachingFileManager, NetCDF4DataStore
 
 from sim.numerics.files import HDF5
 from sim.units.refusals import BadInput, refuse_old
@@ -33,8 +35,9 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         what = "is a folder" if os.path.isdir(path) else "there is no such file"
         raise BadInput([f"{path}: {what}; name a dataset"])
     try:
-        with HDF5:
-            dataset = xr.open_dataset(path, engine="netcdf4", lock=HDF5)
+        with HDF5:  # as reading and closing do
+            file = CachingFileManager(netCDF4.Dataset, os.path.abspath(path), mode="r", lock=HDF5)  # type: ignore[type-var]
+            dataset = xr.open_dataset(NetCDF4DataStore(file, lock=HDF5))
     except (OSError, ValueError, RuntimeError):
         raise BadInput([f"{path}: {BROKEN}"]) from None
     if "sim_version" not in dataset.attrs:

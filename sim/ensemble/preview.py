@@ -228,7 +228,7 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
     for title, start in (
         ("error of the cell", "cell_error_"),
         ("error of the bands", "banded_error_"),
-        ("spread of a member", "realization_spread_"),
+        ("spread of a member", "member_spread_"),
     ):
         found = [(name.removeprefix(start), errors.pop(name)) for name in list(errors) if name.startswith(start)]
         if found:

@@ -175,8 +175,8 @@ NUMBERS = (
 KNOWN_ERRORS = {
     "cell_error_variance": "error of the cell's variance of the stress against the infinite plane's",
     "cell_error_energy": "error of the cell's mean fluctuation energy against the infinite plane's",
-    "realization_spread_variance": "standard deviation of one realization's variance over its mean",
-    "realization_spread_energy": "standard deviation of one realization's fluctuation energy over its mean",
+    "member_spread_variance": "standard deviation of one member's variance over its mean",
+    "member_spread_energy": "standard deviation of one member's fluctuation energy over its mean",
     "mode_pairs": "number of mode pairs of the cell",
     "bands": "number of bands",
     "banded_error_third_cumulant": "error of the energy's third cumulant by banding",

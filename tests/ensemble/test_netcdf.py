@@ -14,6 +14,7 @@ import xarray as xr
 from helpers.scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
 from numpy.testing import assert_allclose
 
+import sim
 from sim import cli
 from sim.engine import march
 from sim.ensemble import plan as plans
@@ -60,7 +61,7 @@ def test_every_variable_has_unit_and_long_name_and_stands_on_its_page():
 def test_the_file_opens_lazily_and_equals_the_run_in_memory(tmp_path):
     scenario = replace(sample(), sweep=read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]}))
     path = ensemble.run(scenario, tmp_path / "out.nc")
-    with ensemble.open(path) as from_disk:
+    with sim.open(path) as from_disk:
         assert from_disk["contact_radius"].dims == ("contact_load", "adhesion_bond_share", "member", "t")
         assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
         xr.testing.assert_identical(from_disk.load(), ensemble.run(scenario))
@@ -171,7 +172,7 @@ def test_the_scenario_can_be_run_again_from_its_dataset():
 def test_an_existing_output_is_kept(tmp_path):
     path = tmp_path / "out.nc"
     path.write_text("precious")
-    with pytest.raises(ensemble.OutputExists, match="--force"):
+    with pytest.raises(ensemble.OutputExists, match="replace"):
         ensemble.run(sample(), path)
     assert path.read_text() == "precious"
     ensemble.run(sample(), path, replace=True)
@@ -221,7 +222,7 @@ def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
     alone = [ensemble.run(scenario) for scenario in scenarios]
 
     def whole(number):
-        with ensemble.open(ensemble.run(scenarios[number], tmp_path / f"{number}.nc")) as dataset:
+        with sim.open(ensemble.run(scenarios[number], tmp_path / f"{number}.nc")) as dataset:
             return ensemble.run(scenarios[number]), dataset.load()
 
     with ThreadPoolExecutor(4) as pool:
@@ -233,7 +234,7 @@ def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
 def test_datasets_can_be_pickled(tmp_path):
     dataset = ensemble.run(sample())
     xr.testing.assert_identical(pickle.loads(pickle.dumps(dataset)), dataset)
-    with ensemble.open(ensemble.run(sample(), tmp_path / "out.nc")) as lazy:
+    with sim.open(ensemble.run(sample(), tmp_path / "out.nc")) as lazy:
         again = pickle.loads(pickle.dumps(lazy))
         xr.testing.assert_identical(again.load(), dataset)
         again.close()

@@ -98,8 +98,8 @@ class ModalProcess(_Renewing):
         return {
             "cell_error_variance": self.modes.error_variance,
             "cell_error_energy": self.modes.error_energy(self.shear_modulus, self.poisson_ratio),
-            "realization_spread_variance": self.modes.variance_spread,
-            "realization_spread_energy": self.modes.energy_spread(self.poisson_ratio),
+            "member_spread_variance": self.modes.variance_spread,
+            "member_spread_energy": self.modes.energy_spread(self.poisson_ratio),
         }
 
 
@@ -125,7 +125,7 @@ class FixedProcess(ModalProcess):
         return size * np.exp(1j * state.values)
 
     def known_errors(self) -> dict[str, float]:
-        fixed = {"realization_spread_variance": 0.0, "realization_spread_energy": 0.0}
+        fixed = {"member_spread_variance": 0.0, "member_spread_energy": 0.0}
         return super().known_errors() | fixed
 
 

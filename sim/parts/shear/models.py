@@ -239,7 +239,7 @@ def _grouped(
     errors = {
         "cell_error_variance": cell_variance(spectrum, cell, points) / variance - 1.0 if variance else 0.0,
         "cell_error_energy": energy / infinite - 1.0 if infinite else 0.0,
-        "realization_spread_energy": spread / energy if energy else 0.0,
+        "member_spread_energy": spread / energy if energy else 0.0,
         "mode_pairs": float(np.sum(pairs.count)),
     }
     return group(pairs, power, tolerance, relaxing), errors

@@ -242,7 +242,7 @@ def test_the_members_mean_energy_is_that_of_the_mean_on_their_own_cell(kind, mot
     errors = scenario.process.known_errors()
     _, mean = last(bonds=COHORT, shear=shear.Mean(spectrum=FIELD), drive=motion)
     cells = mean.shear.energy[0] * (1.0 + errors["cell_error_energy"])
-    spread = errors["realization_spread_energy"] * cells
+    spread = errors["member_spread_energy"] * cells
     assert state.shear.energy.shape == (members,)
     assert abs(state.shear.energy.mean() - cells) < 5.0 * spread / math.sqrt(members)
     weights = scenario.process.weights
