@@ -7,6 +7,7 @@ From the law of Menga, Carbone & Dini to fuller ones, each with its own assumpti
 - ``bell``: a rupture rate that grows exponentially with force; exact, with the friction maximum;
 - ``first_moment``: the same in mean field, whose maximum is too high;
 - ``cut_off``: bonds that break at a stretch, whose limit without thermal rupture is ``linear``;
+- ``catch``: bonds that force first holds and then breaks;
 - ``loading``: a Bell bond pulled once: rupture forces and the static peak;
 - ``cluster``: a finite number of bonds under a shared force.
 
@@ -22,6 +23,7 @@ from sim.laws.schallamach.bell import (
     bell_peak,
     bell_stress,
 )
+from sim.laws.schallamach.catch import catch_lives, catch_moments
 from sim.laws.schallamach.cluster import cluster_lifetime
 from sim.laws.schallamach.cut_off import cut_off_fraction, cut_off_moments, cut_off_stress
 from sim.laws.schallamach.first_moment import (
@@ -55,8 +57,8 @@ from sim.laws.schallamach.renewal import (
 __all__ = [
     "Lives", "Peak", "SiteMoments", "StartUpPeak", "bell_critical_speed", "bell_fraction", "bell_lives",
     "bell_moments", "bell_peak", "bell_rupture_force", "bell_rupture_force_density", "bell_stress",
-    "cluster_lifetime", "constant_moments", "cut_off_fraction", "cut_off_moments", "cut_off_stress",
-    "first_moment_fraction", "first_moment_peak", "first_moment_stress", "first_moment_stretch", "fraction_rate",
-    "relax_fraction", "renewal", "rest_share", "start_up_force", "start_up_peak", "steady_fraction",
+    "catch_lives", "catch_moments", "cluster_lifetime", "constant_moments", "cut_off_fraction", "cut_off_moments",
+    "cut_off_stress", "first_moment_fraction", "first_moment_peak", "first_moment_stress", "first_moment_stretch",
+    "fraction_rate", "relax_fraction", "renewal", "rest_share", "start_up_force", "start_up_peak", "steady_fraction",
     "transition_probabilities",
 ]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Rupture rate of a bond of a given stretch: constant, Bell, constant with a cut-off stretch.
+"""Rupture rate of a bond of a given stretch: constant, Bell, constant with a cut-off stretch, catch.
 
 All are one law of a few numbers, ``RuptureRate``. Compiled steps use a law through device functions alone: the
 integral of the rate along a motion, the same of a fresh bond, the time to rupture.
@@ -15,6 +15,7 @@ from sim.laws.schallamach import (
     SiteMoments,
     bell_moments,
     bell_peak,
+    catch_moments,
     constant_moments,
     cut_off_moments,
     first_moment_peak,
@@ -124,7 +125,36 @@ class CutOff(_Law):
         return cut_off_moments(speed, self.rate, self.stretch, bond_stiffness, rebinding_rate)
 
 
-Rupture = Annotated[Constant | Bell | CutOff, Field(discriminator="model")]
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Catch(_Law):
+    """Force closes one pathway of rupture and opens another: k = kc exp(−f/f_c) + ks exp(f/f_s). Limit: ``Bell``."""
+
+    separable: ClassVar[bool] = False
+
+    catch_rate: Annotated[
+        float, Quantity("1/s", "rate of the pathway that force closes", "k_c", at_least=0, typical="1e5 1/s")
+    ]
+    catch_force: Annotated[
+        float, Quantity("N", "force that divides the catch rate by e", "f_c", above=0, typical="4 pN")
+    ]
+    slip_rate: Annotated[
+        float, Quantity("1/s", "rate of the pathway that force opens", "k_s", above=0, typical="1e3 1/s")
+    ]
+    slip_force: Annotated[
+        float, Quantity("N", "force that multiplies the slip rate by e", "f_s", above=0, typical="8 pN")
+    ]
+    model: Literal["catch"] = "catch"
+
+    def law(self, bond_stiffness: float) -> RuptureRate:
+        slip, catch = bond_stiffness / self.slip_force, bond_stiffness / self.catch_force
+        return RuptureRate(self.slip_rate, slip, math.inf, self.catch_rate, catch)
+
+    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+        law = self.catch_rate, self.catch_force, self.slip_rate, self.slip_force
+        return catch_moments(speed, *law, bond_stiffness, rebinding_rate)
+
+
+Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model")]
 
 
 @device

@@ -21,6 +21,7 @@ from sim.parts.bonds.area import UNSEEN, Area, OverArea, kept
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import Tracks
+from sim.parts.bonds.tracked_step import CYCLES
 from sim.parts.bonds.two_state import Start
 from sim.parts.exchange import Bonding, Motion, Setting
 from sim.units.quantity import Quantity
@@ -276,7 +277,7 @@ class Tracked(_Separable):
 
     def followed(self, speeds: np.ndarray, step: float) -> float:
         lives = step / (tracks.mean_life(speeds, self.law) + 1.0 / self.rebinding_rate)
-        return float(self.sites * np.mean(np.minimum(lives, tracks.MOST_LIVES)))
+        return float(self.sites * np.mean(np.minimum(lives, CYCLES)))
 
     def copied(self, state: Tracks) -> Tracks:
         return state.copy()

@@ -18,9 +18,6 @@ from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
 from sim.parts.bonds.tracked_step import ENDLESS, LONG, SPENT, draw, live
 
-#: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
-MOST_LIVES = 300.0
-
 
 class Tracks(NamedTuple):
     """State of the bonds of all members; plain arrays, so that it can be written and read back.

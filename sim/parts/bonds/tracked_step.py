@@ -34,7 +34,8 @@ from sim.parts.bonds.tracked_events import (
 DONE, LONG, SPENT, ENDLESS = range(4)
 
 _U = np.uint64
-_CYCLES = 300.0
+#: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
+CYCLES = 300.0
 _FAR = 16.0  # Bell forces, cut-off stretches or natural lives after which a frame is set anew
 _LEAP = 24.0  # Bell forces within a step above which bonds are asked singly, lest the clock overflow
 
@@ -151,7 +152,7 @@ def live(birth, due, life, soonest, stamp, frame, slip, duration, rate, softness
     binding, rupture = soonest.view(np.int64), soonest.view(np.uint64)
     for m in range(rows):
         row, member, step = frame[m], members[m], slip[m % slip.size]
-        if duration > _CYCLES * _cycle(step / duration, rate, softness, limit, rebinding):
+        if duration > CYCLES * _cycle(step / duration, rate, softness, limit, rebinding):
             said = LONG
             continue
         along = row[SENSE] * step

@@ -1,0 +1,139 @@
+"""Catch bonds: the law of their lives, their cohorts, and the models that cannot hold them."""
+
+import functools
+import math
+from itertools import pairwise, product
+
+import numpy as np
+import pytest
+from helpers.scenes import STRETCHED, scene
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+from sim.engine import march
+from sim.laws.schallamach import bell_moments, catch_lives, catch_moments, constant_moments
+from sim.parts.bonds import models as bonds
+from sim.parts.bonds.rupture import Catch, fresh_integral, growth, hazard_integral, hazard_time
+from sim.parts.drive import prescribed as drive
+from sim.scenario.clock import Clock
+
+#: Half of the bonds of rest are bound; force holds them up to some 12 pN and breaks them beyond.
+CATCH = Catch(catch_rate=200.0, catch_force=3e-12, slip_rate=5.0, slip_force=6e-12)
+RATES = CATCH.catch_rate, CATCH.catch_force, CATCH.slip_rate, CATCH.slip_force
+STIFFNESS, BINDING = STRETCHED["bond_stiffness"], STRETCHED["rebinding_rate"]
+SPEEDS = [1e-5, 1e-3, -4e-3, 2e-2, 0.3]
+LAW = (5.0, 0.8, math.inf, 200.0, 1.7)
+
+
+def rate(stretch, law=LAW):
+    return law[0] * math.exp(abs(stretch) * law[1]) + law[3] * math.exp(-abs(stretch) * law[4])
+
+
+@functools.cache
+def by_quadrature(speed):
+    """Moments of a site by adaptive quadrature over ln(age), the rate integrated in closed form term by term."""
+    a, b = STIFFNESS * abs(speed) / CATCH.catch_force, STIFFNESS * abs(speed) / CATCH.slip_force
+
+    def alive(age):
+        return math.exp(
+            CATCH.catch_rate * math.expm1(-a * age) / a - CATCH.slip_rate * math.expm1(min(b * age, 700.0)) / b
+        )
+
+    last = math.log(math.log1p(750.0 * b / CATCH.slip_rate) / b)
+    cuts = list(np.linspace(last - 40.0, last, 41))
+    parts = [
+        [
+            quad(lambda x, n=n: math.exp((n + 1) * x) * alive(math.exp(x)), *ends, epsabs=0.0, epsrel=1e-12)[0]
+            for n in range(3)
+        ]
+        for ends in pairwise(cuts)
+    ]
+    life, lag, square = np.sum(parts, axis=0)
+    cycle, pull = life + 1.0 / BINDING, STIFFNESS * speed
+    return np.array([life, pull * lag, pull**2 * square]) / cycle
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
+def test_the_law_is_the_renewal_integral(speed):
+    assert_allclose(np.array(catch_moments(speed, *RATES, STIFFNESS, BINDING)), by_quadrature(speed), rtol=1e-10)
+    assert_allclose(CATCH.closed_form(speed, STIFFNESS, BINDING), by_quadrature(speed), rtol=1e-10)
+
+
+def test_the_law_has_bells_and_the_constant_rate_as_limits():
+    speeds = np.array([0.0, *SPEEDS])
+    bell = bell_moments(speeds, 5.0, 6e-12, STIFFNESS, BINDING)
+    assert_allclose(catch_moments(speeds, 0.0, 3e-12, 5.0, 6e-12, STIFFNESS, BINDING), bell, rtol=1e-11)
+    found = catch_moments(speeds, 200.0, math.inf, 5.0, math.inf, STIFFNESS, BINDING)
+    assert_allclose(found, constant_moments(speeds, 205.0, STIFFNESS, BINDING), rtol=1e-11)
+    assert catch_lives(speeds, *RATES, STIFFNESS).mean.shape == speeds.shape
+
+
+def test_force_holds_catch_bonds_before_it_breaks_them():
+    bound = catch_moments(np.array([0.0, 2e-3, 1.0]), *RATES, STIFFNESS, BINDING).bound
+    assert bound[1] > 1.1 * bound[0] and bound[2] < 0.5 * bound[0]
+
+
+@pytest.mark.parametrize("speed", SPEEDS)
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
+def test_cohorts_in_steady_sliding_obey_the_law(speed, tolerance):
+    part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=tolerance)
+    found, (bound, force, square) = part.steady(np.array([speed])), by_quadrature(speed)
+    assert_allclose(found.fraction * part.bound_at_rest, bound, rtol=tolerance)
+    assert_allclose(found.stress, STRETCHED["site_density"] * force, rtol=tolerance)
+    assert_allclose(found.frozen + found.varying, STRETCHED["site_density"] * square, rtol=10.0 * tolerance)
+
+
+@pytest.mark.parametrize("speed", [1e-3, -4e-3, 2e-2])
+def test_cohorts_that_start_empty_come_to_the_law(speed):
+    part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=1e-4, start_from="empty")
+    life = catch_lives(speed, *RATES, STIFFNESS).mean
+    clock = Clock(duration=60.0 * life, step=60.0 * life / 200)
+    *_, state = march(scene(bonds=part, drive=drive.Steady(speed=speed), clock=clock), np.arange(1))
+    bound, force, _ = by_quadrature(speed)
+    assert_allclose(state.bonding.fraction * part.bound_at_rest, bound, rtol=2e-4)
+    assert_allclose(state.bonding.stress, STRETCHED["site_density"] * force, rtol=2e-4)
+
+
+def test_cohorts_do_not_depend_on_the_clock_step():
+    part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=1e-5)
+    turning = drive.Table(time=(0.0, 4e-3, 4e-3, 8e-3), speed=(8e-3, 8e-3, -6e-3, -6e-3))
+    coarse, fine = (
+        np.array(
+            [
+                state.bonding[:2]
+                for state in march(
+                    scene(bonds=part, drive=turning, clock=Clock(duration=8e-3, step=8e-3 / n)), np.arange(1)
+                )
+            ]
+        )
+        for n in (8, 80)
+    )
+    off = np.abs(fine[::10] - coarse).max(axis=(0, 2)) / np.abs(coarse).max(axis=(0, 2))
+    assert np.all(off < 1e-4)  # ten times the tolerance: one for each of the eight steps
+
+
+@pytest.mark.parametrize(("stretch", "speed"), list(product([-1.7, -0.3, 0.0, 0.2, 2.1], [-3.0, -0.4, 0.0, 0.7, 2.5])))
+def test_the_device_functions_are_the_integral_of_the_rate_and_its_inverse(stretch, speed):
+    time = 0.013
+    crossing = -stretch / speed if speed else 0.5 * time
+    cuts = sorted({0.0, min(max(crossing, 0.0), time), time})
+    exact = sum(
+        quad(lambda t: rate(stretch + speed * t), *ends, epsabs=0.0, epsrel=1e-12)[0] for ends in pairwise(cuts)
+    )
+    assert_allclose(hazard_integral(stretch, speed * time, time, LAW), exact, rtol=1e-12)
+    assert_allclose(hazard_time(stretch, speed, exact, LAW), time, rtol=1e-12)
+    if stretch == 0.0:
+        assert_allclose(fresh_integral(time, speed, LAW), exact, rtol=1e-12)
+    assert growth(stretch, speed, LAW) == 0.0  # no factor for all motions, unlike Bell's
+
+
+@pytest.mark.parametrize("model", [bonds.FirstMoment, functools.partial(bonds.Tracked, sites=10)])
+def test_models_with_one_clock_for_all_bonds_refuse_catch_bonds(model):
+    with pytest.raises(ValueError, match=r'"catch" needs .*"cohort"'):
+        model(rupture=CATCH, **STRETCHED)
+
+
+def test_bonds_left_open_are_cohorts_however_few():
+    few = bonds.Auto(rupture=CATCH, **STRETCHED, sites=20)
+    assert scene(bonds=few).population.model == "cohort"
+    assert "the rupture depends on the stretch" in scene(bonds=few).why["bonds"]
