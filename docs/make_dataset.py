@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, VARIABLES
+from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, VARIABLES
 
 TARGET = Path(__file__).with_name("dataset.md")
 HEAD = """# The variables of a dataset
@@ -40,7 +40,10 @@ def text() -> str:
     tables: tuple[Iterable[tuple[str, ...]], ...] = (
         COORDINATES,
         ((v.name, v.unit, "*sweep*, t", v.long_name, v.condition) for v in VARIABLES),
-        ((n.name, n.unit, "*sweep*", n.long_name, n.condition) for n in NUMBERS),
+        [
+            *((n.name, n.unit, "*sweep*", n.long_name, n.condition) for n in NUMBERS),
+            *((one.name, one.unit, "*sweep*, member", one.long_name, one.condition) for one in LARGEST),
+        ],
         ((name, "1", "*sweep*", meaning, "") for name, meaning in KNOWN_ERRORS.items()),
         [
             (MAP[0], MAP[1], f"{where}, x, y", MAP[2], MAPS),

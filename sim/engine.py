@@ -8,12 +8,25 @@ from typing import NamedTuple, cast, get_type_hints
 
 import numpy as np
 
+from sim.numerics import extremes
 from sim.numerics.noise import Noise
 from sim.parts.contact.balance import Balance
 from sim.parts.exchange import NO_RESISTANCE, Bonding, Resistance, Sliding, Storing, Touching
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, np.ndarray]
+
+
+class Extremes(NamedTuple):
+    """Running maxima over the clock steps, each as ``numerics.extremes`` has it, shape (rows, 4).
+
+    ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
+    is that of the tensile load of a closed contact [N], followed where the control makes the load.
+    """
+
+    stress: np.ndarray
+    friction: np.ndarray
+    pull: np.ndarray
 
 
 class State(NamedTuple):
@@ -29,6 +42,7 @@ class State(NamedTuple):
     bonding: Bonding
     shear: Storing
     contact: Touching
+    extremes: Extremes
 
 
 class Dice(NamedTuple):
@@ -50,7 +64,8 @@ def start(scenario: Scenario, dice: Dice) -> State:
     bonding = population.bonding(bonds)
     shear = process.start(motion, bonding, dice.shear)
     touch = contact.start(motion, scenario.times.duration, balance(scenario, bonding, shear))
-    return State(0, slider, bonds, bonding, shear, touch)
+    loads = _loads(scenario, bonding, touch, 0)
+    return State(0, slider, bonds, bonding, shear, touch, Extremes(*(extremes.first(values, 0.0) for values in loads)))
 
 
 def advance(scenario: Scenario, state: State, dice: Dice) -> State:
@@ -63,7 +78,9 @@ def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     bonding = population.bonding(bonds)
     shear = process.advance(state.shear, motion, bonding, dice.shear)
     touch = contact.advance(state.contact, motion, times.duration, balance(scenario, bonding, shear))
-    return State(step, slider, bonds, bonding, shear, touch)
+    time, loads = times.at(step), _loads(scenario, bonding, touch, step)
+    largest = (extremes.after(*pair, time, times.step) for pair in zip(state.extremes, loads, strict=True))
+    return State(step, slider, bonds, bonding, shear, touch, Extremes(*largest))
 
 
 def march(scenario: Scenario, members: np.ndarray, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -104,6 +121,16 @@ def balance(scenario: Scenario, bonding: Bonding, shear: Storing) -> Balance:
     return Balance(bonded, fluctuating, bonding.strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
 
 
+def _loads(scenario: Scenario, bonding: Bonding, touch: Touching, step: int) -> tuple[np.ndarray, ...]:
+    """Magnitudes of stress and friction, and the tensile load, whose maxima a run follows."""
+    stress = np.abs(bonding.stress)
+    friction = stress * (np.pi * touch.radius**2)
+    if not scenario.contact.makes_load:
+        return stress, friction, np.zeros(1)
+    control = scenario.contact.control(scenario.times.at(step), scenario.times.duration)
+    return stress, friction, -control.normal_load(touch.radius, scenario.bodies)
+
+
 def _resistance(scenario: Scenario, state: State) -> Resistance:
     """Friction of the contact as it is, its slope over slip, and the tangential stiffness 3π²Ga/(4(2 − ν))."""
     radius = np.nan_to_num(state.contact.radius, nan=0.0)
@@ -128,7 +155,8 @@ def _named(state: tuple[object, ...], kind: type) -> Iterator[tuple[str, np.ndar
 
 def unpack(scenario: Scenario, arrays: Arrays) -> State:
     """The state of a scenario that ``pack`` took apart."""
-    kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()} | {"bonding": Bonding}
+    kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()}
+    kinds |= {"bonding": Bonding, "extremes": Extremes}
     inner = {name: _assembled(kind, _within(arrays, name)) for name, kind in kinds.items()}
     return State(*cast(State, (int(arrays["step"]), *(inner[name] for name in State._fields[1:]))))
 

@@ -95,11 +95,12 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
 
     Notes
     -----
-    Peaks are read off the records, not between them. nan where there is none: the stress is largest at the last
-    record, or on a ramp at the first, or the members fall from the peak of their mean to those by less than
-    five standard errors. A start may peak at once, when the stress falls from what it was at rest. In members
-    with noise the largest value lies above the peak of their mean. Where only statistics were recorded it is
-    the peak of the ensemble mean, ``peak_stress_mean``, with the standard error at that time.
+    Peaks are those of the clock steps, refined by a parabola, where members were recorded; their speed is that of
+    the highest record. nan where there is none: the stress is largest at the last record, or on a ramp at the
+    first, or the members fall from the peak of their mean to those by less than five standard errors. A start may
+    peak at once, when the stress falls from what it was at rest. In members with noise the largest value lies above
+    the peak of their mean. Where only statistics were recorded it is the peak of the ensemble mean over the
+    records, ``peak_stress_mean``, with the standard error at that time.
     """
     drive = word(dataset, "drive.model", "")
     ramp, start = drive == "ramp", drive == "start"
@@ -114,11 +115,18 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
         at, known = _highest(size, ramp)
         known &= _stands_out(size, ramp)
         text = f"largest {dataset[source + suffix].attrs.get('long_name', source)} while sliding"
-        found[name + suffix] = _picked(size, at, known).assign_attrs(units=unit, long_name=text)
+        largest = (
+            dataset[name].where(known).drop_vars("t", errors="ignore")
+            if name in dataset and not suffix
+            else _picked(size, at, known)
+        )
+        found[name + suffix] = largest.assign_attrs(units=unit, long_name=text)
         if suffix:
             found[f"{name}_sem"] = _picked(dataset[f"{source}_sem"], at, known).assign_attrs(units=unit)
         prefix = "peak" if name == "peak_stress" else name
-        since = _picked(dataset["t"] - _beginning(dataset), at, known)
+        stepped = f"{prefix}_time" in dataset and not suffix
+        when = dataset["peak_time"].where(known) if stepped else _picked(dataset["t"], at, known)
+        since = (when - _beginning(dataset)).drop_vars("t", errors="ignore")
         found[f"{prefix}_time"] = since.assign_attrs(
             units="s", long_name=f"time from the start of sliding to the {text}"
         )

@@ -15,9 +15,10 @@ import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
+from sim.engine import Extremes
 from sim.ensemble.part_files import Parts
 from sim.ensemble.plan import Plan, part_name
-from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
+from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, Largest, Variable
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
@@ -81,6 +82,9 @@ def write_dataset(file: File, plan: Plan, parts: Parts) -> None:
     _derived_variables(file, plan)
     for variable in plan.variables:
         _trajectories(file, plan, parts, variable)
+    for largest in LARGEST:
+        if any(largest.there(point) for point in plan.points):
+            _largest(file, plan, parts, largest)
     if plan.scenario.record.maps:
         _maps(file, plan, parts)
 
@@ -258,6 +262,35 @@ def _trajectories(file: File, plan: Plan, parts: Parts, recorded: Variable) -> N
             else:
                 values = parts.load(part_name(number, 0, index), recorded.name)[recorded.name]
                 variables[recorded.name][(*where, time)] = values[0]
+
+
+def _largest(file: File, plan: Plan, parts: Parts, largest: Largest) -> None:
+    """One quantity of whole runs, from the states at their ends."""
+    names, shape = _sweep_names(plan), _sweep_shape(plan)
+    varies, each = plan.varies(largest), plan.scenario.record.per_member
+    variables = {
+        statistic: _variable(
+            file, f"{largest.name}_{statistic}" if statistic else largest.name, "f8",
+            (*names, "member") if varies and each else names, largest.unit,
+            f"{_STATISTICS[statistic]} {largest.long_name}" if statistic else largest.long_name, largest.symbol,
+        )
+        for statistic in ([""] if each or not varies else _STATISTICS)
+    }  # fmt: skip
+    for number, point in enumerate(plan.points):
+        where = np.unravel_index(number, shape) if shape else ()
+        last = len(plan.stretches(point)) - 1
+        found = []
+        for group, members in enumerate(plan.groups()):
+            beginning = "state.extremes."
+            held = parts.load(part_name(number, group, last), beginning)
+            values = largest.read(Extremes(**{key.removeprefix(beginning): array for key, array in held.items()}))
+            found.append(np.broadcast_to(values, len(members) if varies else 1)[:, None])
+        if "" in variables:
+            values = np.concatenate(found)[:, 0]
+            variables[""][where if where else ...] = values if varies else values[0]
+        else:
+            for statistic, value in pooled([moments(values) for values in found]).items():
+                variables[statistic][where if where else ...] = value[0]
 
 
 def moments(values: np.ndarray) -> np.ndarray:

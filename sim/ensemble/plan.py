@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.ensemble.recorded import VARIABLES, Variable
+from sim.ensemble.recorded import VARIABLES, Largest, Variable
 from sim.scenario.scenario import Scenario
 
 _GROUP = 64
@@ -59,8 +59,8 @@ class Plan:
         records = point.clock.records
         return [range(first, min(first + self.stretch, records)) for first in range(0, records, self.stretch)]
 
-    def varies(self, variable: Variable) -> bool:
-        """Whether the variable's variable has the member dimension."""
+    def varies(self, variable: Variable | Largest) -> bool:
+        """Whether the variable has the member dimension."""
         return any(point.varies[variable.part] for point in self.points)
 
 

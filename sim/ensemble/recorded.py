@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.engine import State, balance
+from sim.engine import Extremes, State, balance
 from sim.laws import jkr
+from sim.numerics import extremes
 from sim.parts.contact.control import Control
 from sim.scenario.scenario import Scenario
 
@@ -99,6 +100,40 @@ def _equilibrium_radius(scene: Scenario, state: State) -> np.ndarray:
     return np.where(state.contact.radius > 0.0, np.nan_to_num(found), 0.0)
 
 
+@dataclass(frozen=True)
+class Largest:
+    """One quantity of a whole run, read off the running maxima at its end; ``there`` as for a ``Variable``."""
+
+    name: str
+    unit: str
+    long_name: str
+    symbol: str
+    part: str
+    read: Callable[[Extremes], np.ndarray]
+    there: Callable[[Scenario], bool] = lambda scene: True
+    condition: str = ""
+
+
+def _pulled(found: Extremes, column: int, sign: float) -> np.ndarray:
+    """A column of the largest pull; nan for a contact that was never pulled."""
+    return np.where(found.pull[:, extremes.LARGEST] > 0.0, sign * found.pull[:, column], np.nan)
+
+
+LARGEST = (
+    Largest("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start",
+            "tau_p", "bonds", lambda found: found.stress[:, extremes.LARGEST]),
+    Largest("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
+            "F_p", "contact", lambda found: found.friction[:, extremes.LARGEST]),
+    Largest("peak_time", "s", "time of the largest shear stress", "t_p", "bonds",
+            lambda found: found.stress[:, extremes.WHEN]),
+    Largest("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
+            "contact", lambda found: _pulled(found, extremes.LARGEST, -1.0), lambda scene: scene.contact.makes_load,
+            "a load that changes"),
+    Largest("pull_off_time", "s", "time of the lowest normal load", "t_min", "contact",
+            lambda found: _pulled(found, extremes.WHEN, 1.0), lambda scene: scene.contact.makes_load,
+            "a load that changes"),
+)  # fmt: skip
+
 VARIABLES = (
     Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.drive.speed),
     Variable("slider_position", "m", "displacement of the slider", "X", "drive",
@@ -166,7 +201,7 @@ NUMBERS = (
     Number("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", lambda scene: scene.rest_radius),
     Number("radius_without_adhesion", "m", "Hertz radius", "a_H", lambda scene: scene.contact.equilibrium_radius(
         np.zeros(1), scene.sphere.radius, scene.solid.contact_modulus)[0]),
-    Number("pull_off_load", "N", "load at pull-off with the full work of adhesion", "P_c",
+    Number("jkr_pull_off_load", "N", "load at pull-off with the full work of adhesion", "P_c",
            lambda scene: jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius),
            lambda scene: scene.contact.load is not None, "contact.load"),
 )  # fmt: skip

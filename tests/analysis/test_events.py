@@ -9,6 +9,7 @@ from helpers.lens import scene
 
 from sim import analysis
 from sim.ensemble.simulate import run
+from sim.laws import jkr
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
@@ -25,7 +26,8 @@ def _ramp():
 
 
 def per_member(dataset, **values):
-    """The dataset with these numbers per member and time."""
+    """The dataset with these numbers per member and time, and no maxima of others."""
+    dataset = dataset.drop_vars(["peak_stress", "peak_friction", "peak_time"])
     shape = (dataset.sizes["member"], dataset.sizes["t"])
     return dataset.assign({name: (("member", "t"), np.broadcast_to(v, shape)) for name, v in values.items()})
 
@@ -230,13 +232,39 @@ def test_static_peak_is_timed_from_the_start_of_sliding(started):
         stress, t = started["shear_stress"][k].to_numpy(), started["t"].to_numpy()
         at = int(np.argmax(stress))
         assert stress[at] > 1.5 * stress[-1] and t[at] > rest
-        assert float(found["peak_stress"][k]) == stress[at]
-        np.testing.assert_allclose(found["peak_time"][k], t[at] - rest, rtol=1e-12)
+        assert stress[at] <= float(found["peak_stress"][k]) < 1.03 * stress[at]  # between two records it is higher
+        assert abs(float(found["peak_time"][k]) - (t[at] - rest)) < 2e-3
     assert float(found["peak_stress"][1]) > float(found["peak_stress"][0])  # more bonds after a longer rest
     rows = analysis.highlights(started)
     assert [row["drive_rest\n(ms)"] for row in rows] == ["100", "200"]
     assert {"peak of\nstress (kPa)", "peak of\nfriction (mN)", "after\n(ms)"} < set(rows[0])
     assert not any(heading.startswith("at V") for heading in rows[0])
+
+
+def test_the_static_peak_is_found_among_steps_not_records():
+    """With a record in fifty steps it is that of every step; the parabola is of third order in the step."""
+    rupture = Bell(zero_force_rate=5.0, bell_force=4e-12)
+    stretched = bonds.Cohort(rupture=rupture, bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16)
+
+    def peak(step, record):
+        clock = Clock(duration=0.5, step=step, record=record)
+        dataset = run(
+            scene(drive=drive.Start(rest=0.1, speed=5e-6), bonds=stretched, shear=shear.Uniform(), clock=clock)
+        )
+        return float(dataset["peak_stress"]), float(dataset["peak_time"])
+
+    assert peak(2e-3, 2e-3) == peak(2e-3, 0.1)
+    coarse, half, quarter, fine = (peak(step, 0.1)[0] for step in (2e-3, 1e-3, 5e-4, 5e-5))
+    assert abs(quarter / fine - 1.0) < 5e-4
+    assert abs(quarter - fine) < abs(half - fine) / 4.0 < abs(coarse - fine) / 16.0
+
+
+def test_the_lowest_load_of_a_retraction_is_that_of_pull_off():
+    contact = Equilibrium(displacement={"from": 1e-6, "to": -3e-5}, stiffness=50.0)
+    dataset = run(scene(contact=contact, drive=drive.Steady(), clock=Clock(duration=1.0, step=1e-3, record=0.1)))
+    exact = float(jkr.pull_off_load(float(dataset["adhesion_work"]), float(dataset["sphere_radius"])))
+    assert not dataset["in_contact"].isel(t=-1).any()
+    np.testing.assert_allclose(dataset["pull_off_load"], exact, rtol=2e-3)
 
 
 def test_a_start_may_peak_at_once():

@@ -112,6 +112,11 @@ class _Controlled:
         return DisplacementControl(value, self.stiffness or math.inf)
 
     @property
+    def makes_load(self) -> bool:
+        """True if the load follows from the contact or changes in time, rather than staying as given."""
+        return self.load is None or self.changes
+
+    @property
     def changes(self) -> bool:
         """Whether the control changes in time."""
         return self.course.changes
