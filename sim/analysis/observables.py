@@ -31,12 +31,13 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         ``radius_jkr`` and ``radius_hertz`` [m], without the dimension ``t`` where what holds the sphere stays at all
-        points of the sweep; nan where such a contact is open.
+        points of the sweep. The former is nan where that contact is open, the latter 0.
     """
     found = dataset[["jkr_radius", "hertz_radius"]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
     if bool(stays_held(dataset).all()):
         found = found.isel(t=0, drop=True)
-    return found.astype(float).where(found > 0.0).map(ordered)
+    found = found.astype(float).map(ordered)
+    return found.assign(radius_jkr=found["radius_jkr"].where(found["radius_jkr"] > 0.0))
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:

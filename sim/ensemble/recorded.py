@@ -96,8 +96,8 @@ def _stressless_radius(scene: Scenario, state: State) -> np.ndarray:
 def _equilibrium_radius(scene: Scenario, state: State) -> np.ndarray:
     if not scene.contact.lags:
         return _radius(scene, state)
-    found = _control(scene, state).radius(state.contact.work, np.zeros(1), 0.0, scene.bodies)
-    return np.where(state.contact.radius > 0.0, np.nan_to_num(found), 0.0)
+    control = _control(scene, state)
+    return scene.contact.reference_radius(state.contact.settled, state.contact.work, control, scene.bodies)
 
 
 @dataclass(frozen=True)
@@ -172,8 +172,8 @@ VARIABLES = (
           " before the mean stress takes its share, under the same control and rule after pull-off; 0 while that"
           " contact is open", "a_f", "contact", _stressless_radius,
           lambda scene: scene.contact.reversible > 0.0, "contact.reversible above 0"),
-    Variable("equilibrium_radius", "m", "radius in equilibrium with the work of adhesion left; 0 where the contact is"
-          " open", "a_e", "contact", _equilibrium_radius,
+    Variable("equilibrium_radius", "m", "radius in equilibrium with the work of adhesion left, under the same control"
+          " and rule after pull-off; 0 while that contact is open", "a_e", "contact", _equilibrium_radius,
           lambda scene: scene.contact.lags, 'contact.model = "rate_dependent"'),
     Variable("applied_load", "N", "load applied to the sphere, in contact or not", "P_a", "drive", _applied_load,
           lambda scene: scene.contact.load is not None and scene.contact.changes, "a contact.load that changes"),

@@ -196,6 +196,10 @@ class Touching(Protocol):
     def stressless(self) -> np.ndarray:
         """Phase of a contact with the adhesion that fluctuations leave."""
 
+    @property
+    def settled(self) -> np.ndarray:
+        """Phase of a contact in equilibrium with the work of adhesion left."""
+
 
 Own = TypeVar("Own")
 Terms = TypeVar("Terms", contravariant=True)

@@ -70,10 +70,10 @@ class ContactState(NamedTuple):
         Time of the last pull-off [s], nan if never.
     dissipated : array
         Energy dissipated so far by the opening and closing of the contact [J].
-    whole, bonded, stressless : array
-        Phases (``AHEAD``, ``CLOSED``, ``OPEN``) of three contacts in equilibrium under the same control and the same
-        rule of ``after_pull_off``: with all adhesion, with that of the bonds, and with what fluctuations leave of it
-        before the mean stress takes its share. The last is followed only where it does.
+    whole, bonded, stressless, settled : array
+        Phases (``AHEAD``, ``CLOSED``, ``OPEN``) of reference contacts, in equilibrium under the same control and rule
+        of ``after_pull_off``: with all adhesion, with that of the bonds, with what fluctuations leave of it before the
+        mean stress takes its share (followed only where it does), and with the work left (where the edge lags).
     """
 
     work: np.ndarray
@@ -83,6 +83,7 @@ class ContactState(NamedTuple):
     whole: np.ndarray
     bonded: np.ndarray
     stressless: np.ndarray
+    settled: np.ndarray
 
 
 #: A contact before its first touch, in touch, and after a pull-off.

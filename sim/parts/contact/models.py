@@ -143,16 +143,17 @@ class _Controlled:
         """Radius of a contact in equilibrium with another work of adhesion [m], 0 where it is open."""
         return np.where(phase == CLOSED, control.radius(work, np.zeros(1), 0.0, bodies), 0.0)
 
-    def _references(self, radius: np.ndarray, balance: Balance) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Works of adhesion of the three reference contacts [J/m²]."""
+    def _references(self, radius: np.ndarray, balance: Balance) -> tuple[np.ndarray, ...]:
+        """Works of adhesion of the reference contacts [J/m²]; all adhesion for those that are not followed."""
         whole = np.full(1, balance.reference)
-        return whole, balance.bonded, balance.work(np.nan_to_num(radius)) if self.reversible else whole
+        stressless = balance.work(np.nan_to_num(radius)) if self.reversible else whole
+        return whole, balance.bonded, stressless, self._left(radius, balance) if self.lags else whole
 
     def _phases(
         self, state: ContactState, control: Control, radius: np.ndarray, balance: Balance
     ) -> tuple[np.ndarray, ...]:
         """Phases of the reference contacts after a step."""
-        phases = state.whole, state.bonded, state.stressless
+        phases = state.whole, state.bonded, state.stressless, state.settled
         if self.course.lowest >= 0.0:
             return phases
         if control.closes:

@@ -174,6 +174,19 @@ def test_what_a_rate_dependent_edge_has_still_to_lose_is_no_ones_loss():
     assert "lost_to_lag_mean" not in analysis.shares(run(scene(shear=shear.Uniform())))
 
 
+def test_an_edge_that_has_still_to_close_is_its_lags_loss():
+    """A sphere laid down with a slow edge, without fluctuations: only the lag takes area, also where it touches."""
+    down = RateDependent(indentation={"from": -1e-5, "to": 1e-5}, front_speed=1e-3)
+    dataset = run(
+        scene(contact=down, bonds=bonds.Unbroken(), shear=shear.Uniform(), clock=Clock(duration=0.4, step=0.02))
+    )
+    assert dataset["in_contact"].to_numpy()[9:12].tolist() == [0, 0, 1]
+    lost = analysis.share_observables(dataset)
+    np.testing.assert_array_equal(lost["lost_to_lag"].isnull(), np.arange(21) < 10)
+    assert float(lost["lost_to_lag"][10]) == 1.0
+    np.testing.assert_array_equal(lost["lost_to_fluctuations"][10:], 0.0)
+
+
 @pytest.mark.parametrize(
     "contact", [Equilibrium(load=LOAD, reversible=0.02), RateDependent(load=LOAD, front_speed=1e-3)]
 )
