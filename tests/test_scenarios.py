@@ -87,7 +87,7 @@ def test_a_uniform_stress_changes_no_radius():
 def test_the_friction_of_the_tip_follows_the_jkr_area_into_tension():
     dataset = at("afm_tip").isel(t=-1)
     assert_allclose(dataset["friction_force"], 0.9e9 * dataset["contact_area"], rtol=1e-14)
-    open_ = dataset["contact_load"] < dataset["pull_off_load"]
+    open_ = dataset["contact_load"] < dataset["jkr_pull_off_load"]
     assert np.all(dataset["in_contact"] == ~open_)
     assert 0 < int(open_.sum()) < dataset.sizes["contact_load"] / 2
 
