@@ -201,7 +201,7 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
 @click.argument("scenario", type=click.Path(path_type=Path))
 @_SET
 def check(scenario: Path, changes: tuple[str, ...]) -> None:
-    """Say what a scenario would run: quantities in SI, depths, errors known beforehand, time, memory, file size."""
+    """Print what a scenario would run: quantities in SI, models, errors known beforehand, time, memory, file size."""
     from sim.ensemble.preview import preview
     from sim.scenario.reader import load
 

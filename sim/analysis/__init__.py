@@ -2,7 +2,7 @@
 
 Everything is read from the file; nothing of the simulation is needed. *Observables* are variables
 per member and time, some recorded, some derived from recorded ones (the share of the area lost to
-broken bonds, whether adhesion is masked); *events* are told once of a run (when it detached, its friction
+broken bonds, whether adhesion is masked); *events* come once in a run (when it detached, its friction
 peak); ``summary`` turns both into statistics over the members.
 """
 

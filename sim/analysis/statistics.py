@@ -40,7 +40,7 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
     Raises
     ------
     ValueError
-        If a key is not swept, or has no such value; says which there are.
+        If a key is not swept, or has no such value; the message lists those there are.
     """
     for key, value in chosen.items():
         dims = sweep_dims(dataset)
@@ -135,7 +135,7 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` of every trajectory (see ``summary``), the
         same of ``area_ratio`` (A/A_JKR), ``fraction_detached`` and ``fraction_masked`` (the latter is
-        known of statistics alone only while all contacts are closed), of what is told once of a whole run (see
+        known of statistics alone only while all contacts are closed), of what a whole run has once (see
         ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
         has stopped is left out from there on; ``fraction_detached`` counts it.
     """

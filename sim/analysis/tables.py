@@ -168,14 +168,14 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     found = summary(events(dataset))
     counts = _thinned({name: dataset.sizes[name] for name in sweep_dims(dataset)}, rows)
     points = _points(dataset.sizes, counts)
-    told = _shown(found, points, [column for column in _EVENTS if _of_drive(dataset, column.name)])
-    if not told:
+    shown = _shown(found, points, [column for column in _EVENTS if _of_drive(dataset, column.name)])
+    if not shown:
         return []
     cells: Columns = {}
     for name, index in points.items():
         heading, texts = _cells(name, dataset[name].attrs.get("units", "1"), dataset[name][index].to_numpy())
         cells[heading] = texts
-    for heading, texts in told.items():
+    for heading, texts in shown.items():
         cells[heading] = texts
         if heading.startswith("first\n") and "first_detachment_quantile" in found:
             cells |= _range(found["first_detachment_quantile"], points, len(texts))
@@ -183,7 +183,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
 
 
 def _of_drive(dataset: xr.Dataset, name: str) -> bool:
-    """Whether an event is told under this drive: the speed of a peak on a ramp, its time after a start."""
+    """Whether an event is shown under this drive: the speed of a peak on a ramp, its time after a start."""
     if not name.startswith("peak_"):
         return True
     drives = {"speed": "ramp", "time": "start"}
@@ -234,7 +234,7 @@ def _rows(cells: Columns) -> list[dict[str, str]]:
 def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, dict[str, xr.DataArray]]:
     """Statistics to tabulate, and the index of each row in every dimension of sweep and time."""
     trajectories = observables(dataset)
-    with contextlib.suppress(ValueError):  # where the shares cannot be told the rest can
+    with contextlib.suppress(ValueError):  # shares are not known of every dataset
         trajectories = trajectories.merge(share_observables(dataset))
     dims = sweep_dims(dataset)
     if is_stationary(dataset) and dims:
@@ -306,7 +306,7 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
     found = statistics(dataset)
-    with contextlib.suppress(ValueError):  # where the shares cannot be told the rest can
+    with contextlib.suppress(ValueError):  # shares are not known of every dataset
         found = found.merge(shares(dataset))
     long = _flat(found)
     table = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()

@@ -8,8 +8,6 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 from pydantic import TypeAdapter
 from scipy.signal import resample
 
@@ -19,19 +17,7 @@ from sim.laws.halfspace import displacement
 from sim.numerics.grid import Grid
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.modes import Modes, modes
-from sim.plots.style import (
-    BOTH,
-    FLUCTUATIONS,
-    WIDE,
-    Unit,
-    across,
-    first_point,
-    legend,
-    letter,
-    picture,
-    plain_ticks,
-    rows,
-)
+from sim.plots import style
 from sim.spectrum.families import Spectrum
 from sim.spectrum.periodogram import periodogram, radial_average
 
@@ -52,15 +38,15 @@ def _maps_of(dataset: xr.Dataset, at: dict[str, int]) -> xr.DataArray:
 
 def map_figure(dataset: xr.Dataset) -> Figure:
     """The last stress map of the first member and the displacement that it makes."""
-    at, point = first_point(dataset)
+    at, point = style.first_point(dataset)
     stress = _maps_of(dataset, at).isel(map_member=0)
     cell = _cell_of(stress)
     modulus, ratio = (float(dataset[f"effective_{n}"].isel(at)) for n in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), cell, modulus, ratio)
     radius = _radius_of(dataset, at, stress)
-    figure = picture(WIDE, 3.1)
+    figure = style.picture(style.WIDE, 3.1)
     axes = figure.subplots(1, 2, sharey=True)
-    length = Unit.of(np.array([cell]), "m")
+    length = style.Unit.of(np.array([cell]), "m")
     shown = (
         (stress.to_numpy(), "Pa", r"shear stress $\tau_1$", "RdBu_r"),
         (moved, "m", "displacement $w_1$", "PuOr_r"),
@@ -75,7 +61,7 @@ def map_figure(dataset: xr.Dataset) -> Figure:
             bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0},
         )  # fmt: skip
     axes[0].set_ylabel(length.label("$y$"))
-    letter(list(axes))
+    style.letter(list(axes))
     then = f"$t$ = {engineering(float(stress['map_time']), 's')}, $V$ = {engineering(speed_then, 'm/s')}"
     axes[0].set_title(", ".join(filter(None, [point, then.replace("-", "−")])))
     return figure
@@ -83,14 +69,14 @@ def map_figure(dataset: xr.Dataset) -> Figure:
 
 def _radius_of(dataset: xr.Dataset, at: dict[str, int], stress: xr.DataArray) -> float:
     """Contact radius of the map's member at the map's time [m]."""
-    radius = dataset["contact_radius" if "contact_radius" in dataset else "contact_radius_mean"].isel(at)
+    radius = style.recorded(dataset, "contact_radius").isel(at)
     if "member" in radius.dims:
         radius = radius.sel(member=stress["map_member"])
     return float(radius.sel(t=stress["map_time"], method="nearest"))
 
 
 def _draw_map(
-    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: Unit, about: tuple
+    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: style.Unit, about: tuple
 ) -> None:
     """One field around the contact, continued periodically where the contact is wider than the cell."""
     si, words, colours = about
@@ -99,7 +85,7 @@ def _draw_map(
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
-    unit = Unit.of(field, si)
+    unit = style.Unit.of(field, si)
     most = unit.factor * float(np.max(np.abs(field))) or 1.0
     reach = (half + 0.5) * cell / points * length.factor
     image = panel.imshow(
@@ -109,9 +95,7 @@ def _draw_map(
     bar = figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)))
     bar.set_label(unit.label(words))
     if 0.0 < radius < 1.5 * cell:
-        circle = Circle((0.0, 0.0), radius * length.factor, fill=False, linewidth=1.0, color=BOTH)
-        circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
-        panel.add_patch(circle)
+        style.contact_circle(panel, radius * length.factor)
     limit = 0.5 * side * length.factor
     panel.set_xlim(-limit, limit)
     panel.set_ylim(-limit, limit)
@@ -149,8 +133,10 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _T
         return _Target(spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled")
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
     time = {"t": float(stress["map_time"])}
-    names = ("speed", "shear_stress" if "shear_stress" in dataset else "shear_stress_mean")
-    now = [dataset[name].isel(at, missing_dims="ignore").sel(time, method="nearest").to_numpy() for name in names]
+    now = [
+        style.recorded(dataset, name).isel(at, missing_dims="ignore").sel(time, method="nearest").to_numpy()
+        for name in ("speed", "shear_stress")
+    ]
     return _Target(spectrum, float(np.mean(amplitude.factor(*now) ** 2)), "target")
 
 
@@ -170,7 +156,7 @@ def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
 
 def spectrum_figure(dataset: xr.Dataset) -> Figure:
     """Power spectrum of the last stress maps: target, discretised on the cell, and realised."""
-    at, point = first_point(dataset)
+    at, point = style.first_point(dataset)
     stress = _maps_of(dataset, at)
     if not np.any(stress.to_numpy()):
         raise ValueError("the last map holds no stress; record one where fluctuations have grown")
@@ -189,23 +175,24 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     measured = np.mean([ring.density for ring in rings], axis=0)[held]
     error = np.sqrt(np.sum([ring.standard_error**2 for ring in rings], axis=0))[held] / len(rings)
 
-    length = Unit.of(2 * np.pi / q, "m")
-    figure, (panel, below) = rows([1.9, 1.1])
-    dots: Any = {"fmt": "o", "color": BOTH, "markersize": 2.2, "elinewidth": 0.7}
+    length = style.Unit.of(2 * np.pi / q, "m")
+    figure, (panel, below) = style.rows([1.9, 1.1])
+    dots: Any = {"fmt": "o", "color": style.BOTH, "markersize": 2.2, "elinewidth": 0.7}
     ring: Any = {"marker": "o", "linestyle": "none", "markersize": 4.5, "markerfacecolor": "none"}
-    ring |= {"color": FLUCTUATIONS, "markeredgewidth": 0.7}
-    panel.loglog(fine / length.factor, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS, label=target.words)
+    ring |= {"color": style.FLUCTUATIONS, "markeredgewidth": 0.7}
+    shown = np.where(density > 0.0, density, np.nan)
+    panel.loglog(fine / length.factor, shown, color=style.FLUCTUATIONS, label=target.words)
     panel.plot(q / length.factor, expected, label="discretised", **ring)
     count = f"{len(rings)} maps" if len(rings) > 1 else "1 map"
     panel.errorbar(q / length.factor, measured, error, label=f"realised, {count}", **dots)
     panel.set_ylabel("spectral density $C$ (Pa² m²)")
     if np.max(measured) < 100.0 * np.min(measured):
-        plain_ticks(panel.yaxis)
-    legend(panel, point)
-    below.axhline(1.0, color=FLUCTUATIONS, linewidth=1.2)
+        style.plain_ticks(panel.yaxis)
+    style.legend(panel, point)
+    below.axhline(1.0, color=style.FLUCTUATIONS, linewidth=1.2)
     below.errorbar(q / length.factor, measured / expected, error / expected, **dots)
     below.set_ylabel("realised/discretised")
-    across(below, q / length.factor, "log", f"wavenumber $q$ (rad/{length.name})", 0.03)
+    style.across(below, q / length.factor, "log", f"wavenumber $q$ (rad/{length.name})", 0.03)
     return figure
 
 

@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 from sim.plots.bond_laws import rest_of
 from sim.plots.curves import colour_bar, scene_along
 from sim.plots.panels import friction_panel
-from sim.plots.style import REFERENCE, Unit, across, legend, rows
+from sim.plots.style import REFERENCE, Unit, across, legend, recorded, rows
 
 
 def turns(dataset: xr.Dataset) -> bool:
@@ -18,8 +18,7 @@ def turns(dataset: xr.Dataset) -> bool:
 
 def needs_friction(dataset: xr.Dataset) -> None:
     """Refuse a dataset without friction, or whose slider does not move."""
-    force = dataset["friction_force" if "friction_force" in dataset else "friction_force_mean"]
-    if not bool((force != 0.0).any()):
+    if not bool((recorded(dataset, "friction_force") != 0.0).any()):
         raise ValueError('there is no friction; give the bonds a stress, such as [bonds] stress = "0.3 MPa"')
     if not bool((dataset["slider_position"] != 0.0).any()):
         raise ValueError('the slider does not move; let it: [drive] speed = "1 mm/s"')

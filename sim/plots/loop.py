@@ -11,7 +11,7 @@ from sim.analysis import control, loop_energy, setting
 from sim.analysis.scene import stays_held
 from sim.laws import jkr
 from sim.plots.curves import Line, Scene, colour_bar, mark_jumps, scene_along
-from sim.plots.style import REFERENCE, Unit, across, fill, legend, rows
+from sim.plots.style import REFERENCE, Unit, across, fill, legend, mean_of, recorded, rows
 
 #: Radii at which the equilibrium curve is evaluated.
 _FINE = 600
@@ -25,14 +25,14 @@ _NAME = 0.08
 
 
 class Held(NamedTuple):
-    """How the sphere is held, as far as the dataset tells: ``kind`` is "" where it does not."""
+    """Control of the sphere; ``kind`` is "" where the whole table [contact] is swept."""
 
     kind: str
     stiffness: xr.DataArray
 
     @property
     def symbol(self) -> str:
-        """What stands on the axis: the displacement, or the indentation where there is no machine."""
+        """Symbol of the axis: the displacement, or the indentation where no stiffness is between."""
         return r"\Delta" if self.kind in ("displacement", "") else r"\delta"
 
     @property
@@ -50,7 +50,7 @@ class Theory(NamedTuple):
     stiffness: float
 
     def equilibria(self, largest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Travel [m], load [N] and radius [m] of all equilibria, stable or not, up to a radius [m]."""
+        """Displacement [m], load [N] and radius [m] of all equilibria, stable or not, up to a radius [m]."""
         radius = largest * np.linspace(0.0, 1.0, _FINE) ** 2  # dense at small radii, where the slopes are infinite
         load = jkr.load_at_radius(radius, self.work, self.sphere_radius, self.modulus)
         depth = jkr.indentation_at_radius(radius, self.work, self.sphere_radius, self.modulus)
@@ -86,7 +86,7 @@ def _held(dataset: xr.Dataset) -> Held:
 
 
 def _theory(dataset: xr.Dataset, held: Held, line: Line) -> Theory:
-    """What JKR says of a curve; a machine that a load stands for, or none, yields nothing."""
+    """JKR's contact for a curve; behind an infinite stiffness at a load or an indentation."""
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     numbers = (work, size, dataset["contact_modulus"], held.stiffness)
     return Theory(*(float(found.isel(line.point, missing_dims="ignore")) for found in numbers))
@@ -117,7 +117,8 @@ def loop_figure(dataset: xr.Dataset) -> Figure:
     loads.set_ylabel(force.label("normal load $P$"))
     radii.set_ylabel(length.label("contact radius $a$"))
     radii.set_ylim(bottom=0.0)
-    legend(loads, _title(dataset, held), columns=1)
+    cycled = "per cycle: dissipated $W$, and the loop enclosed, each jump a straight line between records"
+    legend(loads, "dissipated in all: $W$" if _cycles(dataset, held) is None else cycled, columns=1)
     legend(radii)
     colour_bar(figure, [loads, radii], scene)
     across(radii, scene.x, "linear", unit.label(held.words), 0.03)
@@ -177,12 +178,12 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
 
 
 def _cycles(dataset: xr.Dataset, held: Held) -> xr.DataArray | None:
-    """Trips there and back; None where something else is made, they are not known, or a run stopped on the way."""
+    """Cycles there and back; None without any, where they are not known, or where a run stopped on the way."""
     try:
         cycles = setting(dataset, f"contact.{held.kind}.cycles")
     except KeyError:
         return None
-    radius = dataset["contact_radius" if "contact_radius" in dataset else "contact_radius_mean"]
+    radius = recorded(dataset, "contact_radius")
     whole = bool((cycles >= 1.0).all()) and bool(radius.isel(t=-1).notnull().all())
     return cycles if whole else None
 
@@ -193,8 +194,7 @@ def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]
     Means over the members, with the sweep's dimensions. Where no cycles are made the energy is that of the
     whole run, and there is no integral.
     """
-    suffix = "" if "dissipated_energy" in dataset else "_mean"
-    spent = dataset[f"dissipated_energy{suffix}"].astype(float)
+    spent = recorded(dataset, "dissipated_energy")
     known = spent.notnull().cumsum("t").argmax("t")  # the last record of those that stop
     spent = spent.isel(t=known).drop_vars("t")
     spent = spent.mean("member") if "member" in spent.dims else spent
@@ -202,14 +202,7 @@ def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]
     if cycles is None:
         return spent, None
     loops = loop_energy(dataset)
-    loop = loops["loop_energy" if "loop_energy" in loops else "loop_energy_mean"].mean("cycle")
-    return spent / cycles, loop.mean("member") if "member" in loop.dims else loop
-
-
-def _title(dataset: xr.Dataset, held: Held) -> str:
-    if _cycles(dataset, held) is None:
-        return "dissipated in all: $W$"
-    return "per cycle: dissipated $W$, and the loop enclosed"
+    return spent / cycles, mean_of(loops, "loop_energy").mean("cycle")
 
 
 def _named(dataset: xr.Dataset, scene: Scene, held: Held) -> list[Line]:
@@ -221,8 +214,7 @@ def _named(dataset: xr.Dataset, scene: Scene, held: Held) -> list[Line]:
         parts = []
         for words, energies in (("$W$", spent), (rf"$\oint P\,\mathrm{{d}}{held.symbol}$", loop)):
             value = np.nan if energies is None else float(energies.isel(line.point, missing_dims="ignore"))
-            parts += (
-                [f"{words} = {unit.factor * value:.3g} {unit.name}".replace("-", "−")] if np.isfinite(value) else []
-            )
+            if np.isfinite(value):
+                parts.append(f"{words} = {unit.factor * value:.3g} {unit.name}".replace("-", "−"))
         named.append(line._replace(label=f"{line.label}: {', '.join(parts)}" if line.label else ""))
     return named

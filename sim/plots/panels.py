@@ -33,6 +33,7 @@ from sim.plots.style import (
     axis_scale,
     fill,
     legend,
+    recorded,
     rows,
     symbol,
 )
@@ -257,7 +258,7 @@ def sweep_figure(dataset: xr.Dataset) -> Figure:
 
 def _at_the_end(dataset: xr.Dataset, averaged: str) -> str:
     """The last time and the speed then, which may differ between the points of the sweep, and what a mean is over."""
-    speed = dataset["speed" if "speed" in dataset else "speed_mean"].isel(t=-1)
+    speed = recorded(dataset, "speed").isel(t=-1)
     ends = dict.fromkeys(engineering(float(end), "m/s") for end in (speed.min(), speed.max()))
     words = f"at the end: $t$ = {engineering(float(dataset['t'][-1]), 's')}, $V$ = {' to '.join(ends)}"
     return ", ".join(filter(None, [words.replace("-", "−"), averaged]))

@@ -6,12 +6,22 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.patches import Circle
-from matplotlib.patheffects import withStroke
 
 from sim.analysis import engineering, setting
 from sim.laws import jkr, profiles
-from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, first_point, legend, letter, picture
+from sim.plots.style import (
+    BOTH,
+    LINES,
+    REFERENCE,
+    WIDE,
+    Unit,
+    contact_circle,
+    first_point,
+    legend,
+    letter,
+    picture,
+    recorded,
+)
 
 #: Points of a profile on one side, and how far it goes in contact radii.
 _POINTS, _REACH = 1500, 2.0
@@ -52,8 +62,7 @@ def needs_contact(dataset: xr.Dataset) -> None:
 
 def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
     """An observable of the first member over time, or its mean where only that was recorded."""
-    values = dataset[name if name in dataset else f"{name}_mean"]
-    return values.isel({"member": 0} | at, missing_dims="ignore").to_numpy()
+    return recorded(dataset, name).isel({"member": 0} | at, missing_dims="ignore").to_numpy()
 
 
 class _Drawn(NamedTuple):
@@ -204,8 +213,6 @@ def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: 
     at = length.factor * x
     panel.contour(at, at, unit.factor * moved.T, unit.factor * levels, colors="white", linewidths=0.4, linestyles="-")
     figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$"))
-    circle = Circle((0.0, 0.0), length.factor * shape.radius, fill=False, linewidth=1.0, color=BOTH)
-    circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
-    panel.add_patch(circle)
+    contact_circle(panel, length.factor * shape.radius)
     panel.set_xlabel(length.label("$x$"))
     panel.set_ylabel(length.label("$y$"))

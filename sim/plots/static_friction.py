@@ -9,20 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import engineering, setting, sweep_dims
+from sim.plots import style
 from sim.plots.bond_laws import start_peak, steady_laws
-from sim.plots.style import (
-    COLUMN,
-    REFERENCE,
-    WIDE,
-    Unit,
-    legend,
-    letter,
-    picture,
-    plain_ticks,
-    rounded,
-    span,
-    swept_value,
-)
 
 _MARKERS = "osD^vP"
 _FINE = 300
@@ -60,7 +48,7 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
     """All starts of a sweep over rest and speed, at the first point of further swept keys."""
     rest, speed, varied = setting(dataset, "drive.rest"), setting(dataset, "drive.speed"), _varied(dataset)
     first = {name: 0 for name in sweep_dims(dataset) if name not in varied}
-    values = [_mean(dataset, name) for name in ("shear_stress", "bond_fraction")]
+    values = [style.mean_of(dataset, name) for name in ("shear_stress", "bond_fraction")]
     time, found = dataset["t"].to_numpy(), []
     for where in np.ndindex(*(dataset.sizes[name] for name in varied)):
         at = first | dict(zip(varied, where, strict=True))
@@ -73,30 +61,24 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
     return found
 
 
-def _mean(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Mean over the members."""
-    values = dataset[name if name in dataset else f"{name}_mean"]
-    return values.mean("member") if "member" in values.dims else values
-
-
 def start_figure(dataset: xr.Dataset) -> Figure:
     """Stress since the start at the longest rest, one line a speed; peak stress over speed, one line a rest."""
     starts = starts_of(dataset)
-    unit = Unit.of(np.concatenate([start.stress for start in starts]), "Pa")
+    unit = style.Unit.of(np.concatenate([start.stress for start in starts]), "Pa")
     longest = sorted((s for s in starts if s.rest == max(s.rest for s in starts)), key=lambda s: abs(s.speed))
     over = "speed" if len({abs(s.speed) for s in starts} - {0.0}) > 1 else "rest"
     if len({getattr(start, over) for start in starts}) == 1:
-        figure = picture(COLUMN, 2.6)
+        figure = style.picture(style.COLUMN, 2.6)
         axes = [figure.subplots()]
     else:
-        figure = picture(WIDE, 2.9)
+        figure = style.picture(style.WIDE, 2.9)
         axes = list(figure.subplots(1, 2, sharey=True))
-        letter(axes)
+        style.letter(axes)
         _peak_panel(axes[1], dataset, starts, over, unit)
     _time_panel(axes[0], longest, unit)
     others = [name for name in sweep_dims(dataset) if name not in _varied(dataset) and dataset.sizes[name] > 1]
     after = f"after {engineering(longest[0].rest, 's')} at rest, sliding at"
-    legend(axes[0], ", ".join([*(swept_value(dataset, name, 0) for name in others), after]))
+    style.legend(axes[0], ", ".join([*(style.swept_value(dataset, name, 0) for name in others), after]))
     return figure
 
 
@@ -106,31 +88,31 @@ def _coloured(starts: list[Start]) -> list[tuple[Start, str]]:
     return [(start, mpl.colors.to_hex(shade)) for start, shade in zip(starts, shades, strict=True)]
 
 
-def _time_panel(panel: Axes, starts: list[Start], unit: Unit) -> None:
+def _time_panel(panel: Axes, starts: list[Start], unit: style.Unit) -> None:
     """Stress over the time since the start; a dot at each peak that was recorded."""
     several = len(starts) > 1
-    length = Unit.of(np.concatenate([start.time for start in starts]), "s", several)
+    length = style.Unit.of(np.concatenate([start.time for start in starts]), "s", several)
     for start, colour in _coloured(starts):
         time, stress = length.factor * start.time, unit.factor * start.stress
-        panel.plot(time, stress, color=colour, label=rounded(start.speed, "m/s"))
+        panel.plot(time, stress, color=colour, label=style.rounded(start.speed, "m/s"))
         if start.seen:
             panel.plot(time[start.peak], stress[start.peak], "o", markersize=3, color=colour)
     first, last = (length.factor * float(starts[0].time[k]) for k in (0, -1))
     if several and last > first:
-        span(panel, first, last)
+        style.span(panel, first, last)
     else:
         panel.set_xlim(0.0, last)
     panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
     panel.set_xlabel(length.label("time since the start"))
 
 
-def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over: str, unit: Unit) -> None:
+def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over: str, unit: style.Unit) -> None:
     """Peak stress over speed, one line a rest; over the rest where there is one speed only.
 
     Beneath it what closed forms say of Bell bonds: their peak if none rebinds, and of any bonds steady sliding.
     """
     values = np.array([abs(getattr(start, over)) for start in starts])
-    pace = Unit.of(values, "m/s" if over == "speed" else "s", logarithmic=True)
+    pace = style.Unit.of(values, "m/s" if over == "speed" else "s", logarithmic=True)
     groups = sorted({start.rest for start in starts}) if over == "speed" else [None]
     for k, rest in enumerate(groups):
         own = sorted((s for s in starts if rest in (s.rest, None)), key=lambda s: abs(getattr(s, over)))
@@ -142,23 +124,23 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over: str
         rising = np.array([not s.seen for s in own])
         panel.plot(pace.factor * x[rising], unit.factor * y[rising], **(line | {"linestyle": "none", "mfc": "white"}))
     if not all(start.seen for start in starts):
-        panel.plot([], [], "o", color=REFERENCE, mfc="white", label="not resolved")
+        panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
     if over == "speed":
         _closed_forms(panel, dataset, starts, pace, unit)
     panel.set_xscale("log")
     if values.max() < 100.0 * np.min(values[values > 0.0]):
-        plain_ticks(panel.xaxis)
+        style.plain_ticks(panel.xaxis)
     panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
     words = "sliding speed $V$" if over == "speed" else "time at rest"
     panel.set_xlabel(pace.label(words))
-    legend(panel, "peak of the stress")
+    style.legend(panel, "peak of the stress")
 
 
-def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: Unit, unit: Unit) -> None:
+def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: style.Unit, unit: style.Unit) -> None:
     """Thin lines of what is known in closed form."""
     speeds = np.array([abs(start.speed) for start in starts if start.speed != 0.0])
     fine = np.geomspace(speeds.min(), speeds.max(), _FINE)
-    thin: Any = {"color": REFERENCE, "linewidth": 0.7, "zorder": 1.5}
+    thin: Any = {"color": style.REFERENCE, "linewidth": 0.7, "zorder": 1.5}
     peaks = [start_peak(dataset, start.at, fine, start.fraction) for start in {s.rest: s for s in starts}.values()]
     for peak in (peak for peak in peaks if peak is not None):
         panel.plot(pace.factor * fine, unit.factor * peak, linestyle=":", label="none rebinds", **thin)

@@ -12,7 +12,7 @@ from sim.plots.bond_laws import Steady, rest_of, steady_laws
 from sim.plots.curves import Line, Scene, contact_curves, over_speed, room_of, speed_dim
 from sim.plots.panels import stacked
 from sim.plots.static_friction import start_figure
-from sim.plots.style import REFERENCE, Unit, across, legend, rounded
+from sim.plots.style import REFERENCE, Unit, across, legend, recorded, rounded
 
 #: Speeds at which a closed form is drawn.
 _FINE = 600
@@ -35,8 +35,7 @@ def needs_stress(dataset: xr.Dataset) -> None:
     rest = rest_of(dataset)
     if rest is not None and not bool((dataset["t"] > rest).any()):
         raise ValueError("the run ends before the slider starts; make clock.duration longer than drive.rest")
-    stress = dataset["shear_stress" if "shear_stress" in dataset else "shear_stress_mean"]
-    if not bool((stress != 0.0).any()):
+    if not bool((recorded(dataset, "shear_stress") != 0.0).any()):
         raise ValueError('the bonds bear no shear stress; give them one, such as [bonds] stress = "0.3 MPa"')
     if rest is None and is_steady(dataset) and speed_dim(dataset) is None:
         raise ValueError(

@@ -17,6 +17,8 @@ from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from sim.analysis import engineering, scaled, sweep_dims
@@ -91,6 +93,24 @@ def first_point(dataset: xr.Dataset) -> tuple[dict[str, int], str]:
     """The first point of a sweep, by index and in words."""
     dims = sweep_dims(dataset)
     return dict.fromkeys(dims, 0), ", ".join(swept_value(dataset, n, 0) for n in dims if dataset.sizes[n] > 1)
+
+
+def recorded(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """A variable of each member, or its mean where only that was recorded."""
+    return dataset[name if name in dataset else f"{name}_mean"].astype(float)
+
+
+def mean_of(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Mean of a variable over the members."""
+    values = recorded(dataset, name)
+    return values.mean("member") if "member" in values.dims else values
+
+
+def contact_circle(panel: Axes, radius: float) -> None:
+    """The edge of the contact on a map."""
+    circle = Circle((0.0, 0.0), radius, fill=False, linewidth=1.0, color=BOTH)
+    circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
+    panel.add_patch(circle)
 
 
 def rounded(value: float, unit: str) -> str:

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from sim.analysis import control, engineering, is_steady, setting, settled
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots.curves import choice
-from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, letter, picture, span
+from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, letter, mean_of, picture, span
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
@@ -114,15 +114,13 @@ def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     Of steady sliding the mean over the second half of the run at each point of the sweep, else records
     spread evenly over the run.
     """
-    names = [name if name in dataset else f"{name}_mean" for name in ("shear_stress", "contact_area")]
-    found = dataset[names]
+    names = ("shear_stress", "contact_area")
+    found = xr.Dataset({name: mean_of(dataset, name) for name in names})
     if is_steady(dataset):
         found = settled(found)
     else:
         chosen = np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int))
         found = found.isel(t=chosen)
-    if "member" in found.dims:
-        found = found.mean("member")
     stress, area = (values.to_numpy().ravel() for values in xr.broadcast(*(found[name] for name in names)))
     closed = area > 0.0
     return np.abs(stress[closed]), area[closed]
