@@ -11,10 +11,11 @@ import numpy as np
 from sim.numerics import extremes
 from sim.numerics.noise import Noise
 from sim.parts.contact.balance import Balance
-from sim.parts.exchange import NO_RESISTANCE, Bonding, Resistance, Sliding, Storing, Touching
+from sim.parts.exchange import NO_RESISTANCE, Bonding, Motion, Resistance, Sliding, Storing, Touching
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, np.ndarray]
+_UNKNOWN = np.full(1, np.nan)
 
 
 class Extremes(NamedTuple):
@@ -64,8 +65,8 @@ def start(scenario: Scenario, dice: Dice) -> State:
     bonding = population.bonding(bonds)
     shear = process.start(motion, bonding, dice.shear)
     touch = contact.start(motion, scenario.times.duration, balance(scenario, bonding, shear))
-    loads = _loads(scenario, bonding, touch, 0)
-    return State(0, slider, bonds, bonding, shear, touch, Extremes(*(extremes.first(values, 0.0) for values in loads)))
+    largest = Extremes(*(extremes.first(values, 0.0) for values in _loads(scenario, bonding, touch, 0)))
+    return State(0, slider, bonds, bonding, shear, touch, largest)
 
 
 def advance(scenario: Scenario, state: State, dice: Dice) -> State:
@@ -78,9 +79,8 @@ def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     bonding = population.bonding(bonds)
     shear = process.advance(state.shear, motion, bonding, dice.shear)
     touch = contact.advance(state.contact, motion, times.duration, balance(scenario, bonding, shear))
-    time, loads = times.at(step), _loads(scenario, bonding, touch, step)
-    largest = (extremes.after(*pair, time, times.step) for pair in zip(state.extremes, loads, strict=True))
-    return State(step, slider, bonds, bonding, shear, touch, Extremes(*largest))
+    after = State(step, slider, bonds, bonding, shear, touch, state.extremes)
+    return after._replace(extremes=_largest(scenario, state, after, motion))
 
 
 def march(scenario: Scenario, members: np.ndarray, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -129,6 +129,21 @@ def _loads(scenario: Scenario, bonding: Bonding, touch: Touching, step: int) -> 
         return stress, friction, np.zeros(1)
     control = scenario.contact.control(scenario.times.at(step), scenario.times.duration)
     return stress, friction, -control.normal_load(touch.radius, scenario.bodies)
+
+
+def _largest(scenario: Scenario, before: State, after: State, motion: Motion) -> Extremes:
+    """Maxima so far, those between the two ends of a step included; the area is taken as linear in between."""
+    loads, time = _loads(scenario, after.bonding, after.contact, after.step), motion.time
+    stresses, slopes = [], []
+    for bonding, speed in ((before.bonding, motion.first), (after.bonding, motion.speed)):
+        stresses.append(np.abs(bonding.stress))
+        slopes.append(np.sign(bonding.stress) * (bonding.stiffness * speed + bonding.relaxation))
+    areas = [np.pi * state.contact.radius**2 for state in (before, after)]
+    growth = (areas[1] - areas[0]) / motion.duration
+    frictions = [a * slope + growth * stress for a, slope, stress in zip(areas, slopes, stresses, strict=True)]
+    ends = slopes, frictions, (_UNKNOWN, _UNKNOWN)
+    pairs = zip(before.extremes, loads, ends, strict=True)
+    return Extremes(*(extremes.after(so_far, now, time, motion.duration, *both) for so_far, now, both in pairs))
 
 
 def _resistance(scenario: Scenario, state: State) -> Resistance:

@@ -113,6 +113,8 @@ class Bonding(NamedTuple):
         Magnitude of the stress that ΔΓ, the reversible term and the amplitude law use, slip or no slip [Pa].
     stiffness : array
         Slope of the stress over slip at frozen time [Pa/m]; negative where slip breaks more than it stretches.
+    relaxation : array
+        Rate of the stress at frozen slip [Pa/s], which thermal rupture makes. nan where it is not known.
     frozen : array
         n f̄² [N²/m²] for n sites per area of mean force f̄: the power of a pattern of sites fixed on the slider.
         nan where bonds carry no stretch.
@@ -127,6 +129,7 @@ class Bonding(NamedTuple):
     stress: np.ndarray
     strength: np.ndarray
     stiffness: np.ndarray = _NONE
+    relaxation: np.ndarray = _UNKNOWN
     frozen: np.ndarray = _UNKNOWN
     varying: np.ndarray = _UNKNOWN
     stored: np.ndarray = _NONE

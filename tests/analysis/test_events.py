@@ -232,7 +232,8 @@ def test_static_peak_is_timed_from_the_start_of_sliding(started):
         stress, t = started["shear_stress"][k].to_numpy(), started["t"].to_numpy()
         at = int(np.argmax(stress))
         assert stress[at] > 1.5 * stress[-1] and t[at] > rest
-        assert stress[at] <= float(found["peak_stress"][k]) < 1.03 * stress[at]  # between two records it is higher
+        # between two records it is higher, but below the lines through its neighbours: it is concave there
+        assert stress[at] <= float(found["peak_stress"][k]) < 2.0 * stress[at] - min(stress[at - 1], stress[at + 1])
         assert abs(float(found["peak_time"][k]) - (t[at] - rest)) < 2e-3
     assert float(found["peak_stress"][1]) > float(found["peak_stress"][0])  # more bonds after a longer rest
     rows = analysis.highlights(started)
@@ -242,7 +243,7 @@ def test_static_peak_is_timed_from_the_start_of_sliding(started):
 
 
 def test_the_static_peak_is_found_among_steps_not_records():
-    """With a record in fifty steps it is that of every step; the parabola is of third order in the step."""
+    """With a record in fifty steps it is that of every step; between steps a cubic."""
     rupture = Bell(zero_force_rate=5.0, bell_force=4e-12)
     stretched = bonds.Cohort(rupture=rupture, bond_stiffness=4e-4, rebinding_rate=5.0, site_density=9e16)
 
@@ -254,9 +255,8 @@ def test_the_static_peak_is_found_among_steps_not_records():
         return float(dataset["peak_stress"]), float(dataset["peak_time"])
 
     assert peak(2e-3, 2e-3) == peak(2e-3, 0.1)
-    coarse, half, quarter, fine = (peak(step, 0.1)[0] for step in (2e-3, 1e-3, 5e-4, 5e-5))
-    assert abs(quarter / fine - 1.0) < 5e-4
-    assert abs(quarter - fine) < abs(half - fine) / 4.0 < abs(coarse - fine) / 16.0
+    coarse, half, fine = (peak(step, 0.1)[0] for step in (2.5e-3, 1.25e-3, 5e-5))
+    assert max(abs(coarse / fine - 1.0), abs(half / fine - 1.0)) < 1e-4  # the cohorts' tolerance
 
 
 def test_the_lowest_load_of_a_retraction_is_that_of_pull_off():

@@ -243,6 +243,19 @@ def step_rows(
         new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
 
 
+@kernel("void(float64[:,::1], float64[:,::1], UniTuple(float64, 5), float64[::1])")
+def lost_rows(weight, stretch, law, lost):
+    """Stretch per site that rupture takes in unit time, ∑ w x k(\\|x\\|), of each row [m/s]."""
+    rate, softness, _, catch, relief = law
+    for m in range(len(weight)):
+        lost[m] = 0.0
+        for i in range(weight.shape[1]):
+            if weight[m, i] > 0.0:
+                size = math.fabs(stretch[m, i])
+                breaking = rate * math.exp(size * softness) + catch * math.exp(-size * relief)
+                lost[m] += weight[m, i] * stretch[m, i] * breaking
+
+
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
 def settle_steady(speed, numbers, weight, stretch, width, lattice):
     """The merged steady state of one row; the arrays are zero before."""

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.parts.bonds.cohort_step import settle_steady, step_rows
+from sim.parts.bonds.cohort_step import lost_rows, settle_steady, step_rows
 from sim.parts.bonds.rupture import RuptureRate
 
 
@@ -163,6 +163,13 @@ def second_moment(cohorts: Cohorts) -> np.ndarray:
 def moments(cohorts: Cohorts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Share of the sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each shape (rows,)."""
     return bound(cohorts), first_moment(cohorts), second_moment(cohorts)
+
+
+def lost_moment(cohorts: Cohorts, rupture: RuptureRate) -> np.ndarray:
+    """Stretch per site that thermal rupture takes in unit time [m/s], shape (rows,): the sum of w x k(|x|)."""
+    lost = np.empty(len(cohorts.weight))
+    lost_rows(cohorts.weight, cohorts.stretch, tuple(rupture), lost)
+    return lost
 
 
 def at_limit(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> np.ndarray:

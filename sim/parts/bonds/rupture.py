@@ -7,6 +7,7 @@ integral of the rate along a motion, the same of a fresh bond, the time to ruptu
 import math
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.dataclasses import dataclass
@@ -41,6 +42,11 @@ class RuptureRate(NamedTuple):
     def at_rest(self) -> float:
         """Rupture rate of an unstretched bond [1/s]."""
         return self.rate + self.catch
+
+    def at(self, stretch: np.ndarray) -> np.ndarray:
+        """Rupture rate of bonds of a stretch [m] below any limit [1/s]."""
+        size = np.abs(stretch)
+        return self.rate * np.exp(size * self.softness) + self.catch * np.exp(-size * self.relief)
 
     @property
     def steepness(self) -> float:

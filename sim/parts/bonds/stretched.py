@@ -53,11 +53,14 @@ class _Stretched:
         """Share of sites that are bound at rest [1]."""
         return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
 
-    def _bonding(self, bound: np.ndarray, stretch: np.ndarray, square: np.ndarray, breaking: np.ndarray) -> Bonding:
+    def _bonding(
+        self, bound: np.ndarray, stretch: np.ndarray, square: np.ndarray, breaking: np.ndarray, lost: np.ndarray
+    ) -> Bonding:
         """Readings of a population of these moments per site.
 
         The stress is n κ x̄; with f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²). Slip stretches all
-        bonds and breaks, at a limit ℓ of the stretch, the share ``breaking`` of the sites for each ℓ of slip.
+        bonds and breaks, at a limit ℓ of the stretch, the share ``breaking`` of the sites for each ℓ of slip. Thermal
+        rupture takes the stretch ``lost`` per site and unit time.
         """
         frozen, scale = stretch**2, self.site_density * self.bond_stiffness**2
         varying = np.maximum(square - frozen, 0.0)  # nan stays nan
@@ -65,7 +68,8 @@ class _Stretched:
         stress = per_stretch * stretch
         fraction = bound / self.bound_at_rest
         stiffness = per_stretch * (bound - breaking)
-        return Bonding(fraction, stress, np.abs(stress), stiffness, scale * frozen, scale * varying)
+        relaxation = -per_stretch * lost
+        return Bonding(fraction, stress, np.abs(stress), stiffness, relaxation, scale * frozen, scale * varying)
 
     def chosen(self, area: float, forces: bool) -> Self:
         """The model for a contact of this ``area`` [m²] whose field reads the bonds' ``forces`` or not: this one."""
@@ -156,7 +160,9 @@ class FirstMoment(OverArea, _Separable):
         return state
 
     def bonding(self, state: Stretches) -> Bonding:
-        return self._bonding(*self.moments(state), 2.0 * np.abs(state.stretch) / self.law.limit)
+        mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
+        breaking, lost = 2.0 * np.abs(state.stretch) / self.law.limit, state.stretch * self.law.at(mean)
+        return self._bonding(*self.moments(state), breaking, lost)
 
     def moments(self, state: Stretches) -> Moments:
         """Share of sites bound [1] and mean stretch [m] per site; the mean square stretch is not known."""
@@ -223,7 +229,8 @@ class Cohort(OverArea, _Stretched):
         return state
 
     def bonding(self, state: Ages) -> Bonding:
-        return self._bonding(*self.moments(state), cohorts.at_limit(state.cohorts, self.law, self.tolerance))
+        breaking = cohorts.at_limit(state.cohorts, self.law, self.tolerance)
+        return self._bonding(*self.moments(state), breaking, cohorts.lost_moment(state.cohorts, self.law))
 
     def moments(self, state: Ages) -> Moments:
         """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""
@@ -283,7 +290,8 @@ class Tracked(_Separable):
         return state.copy()
 
     def bonding(self, state: Tracks) -> Bonding:
-        return self._bonding(*self.moments(state), np.zeros(1))  # one bond after the other breaks at a limit
+        # one bond after the other breaks, at a limit or by itself
+        return self._bonding(*self.moments(state), np.zeros(1), _UNKNOWN)
 
     def moments(self, state: Tracks) -> Moments:
         """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""

@@ -111,6 +111,20 @@ def test_the_stiffness_is_the_slope_of_the_stress_over_slip_at_frozen_time(name,
     assert_allclose(np.broadcast_to(state.bonding.stiffness, slope.shape), slope, rtol=3e-5)
 
 
+@pytest.mark.parametrize(
+    "name", ["rate, bell", "rate, cut-off, carried", "cohort", "cohort, cut-off", "cohort, carried"]
+)
+def test_the_relaxation_is_the_rate_of_the_stress_at_frozen_slip(name):
+    # 1 ns: of the lives that rupture leaves, some 1e-6 pass, and rounding of the difference is 1e-10 of it or less
+    scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=4e-3))
+    *_, state = march(scenario, np.arange(3))
+    part, still = scenario.population, np.zeros(1)
+    motion = Motion(41, 41e-3, 1e-9, still, still, still, still)
+    after = part.bonding(part.advance(state.bonds, motion, state.contact.radius, Noise(5, "bonds", np.arange(3))))
+    rate = (after.stress - state.bonding.stress) / 1e-9
+    assert_allclose(np.broadcast_to(state.bonding.relaxation, rate.shape), rate, rtol=3e-5)
+
+
 @pytest.mark.parametrize("speed", [1e-3, 4e-3, -4e-3])
 def test_cohorts_at_a_cut_off_lose_stiffness_to_the_bonds_that_break(speed):
     # steady: a density k_on (1 − N)/V e^(−k x/V) up to the limit l; the mean over a cell of l/1000 stands for its edge
