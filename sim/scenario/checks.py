@@ -1,28 +1,27 @@
 """Conditions that hold between the parts of a scenario."""
 
 import math
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.laws import jkr
-from sim.parts.bonds import Auto as AutoBonds
+from sim.parts.bonds import Cohort, Tracked
 from sim.parts.bonds import Model as BondModel
-from sim.parts.contact import Contact, RateDependent
+from sim.parts.contact import Contact
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.drive import Drive, Table
-from sim.parts.shear import Auto, Mean, Modal, Model, Uniform
+from sim.parts.drive import Drive
+from sim.parts.exchange import Setting
+from sim.parts.shear import Model
 from sim.scenario.clock import Clock, Ensemble, Record
+from sim.spectrum.bond_made import BondMade
 
 _STEPS_A_CYCLE = 2
-#: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
-_MOST_PAIRS = 2**21
-_MOST_WAVES = 1e9
 
 
-def _rest_radius(solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> float:
+def rest_radius(solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> float:
     work = np.array([adhesion.work])
     return float(contact.equilibrium_radius(work, sphere.radius, solid.contact_modulus)[0])
 
@@ -32,7 +31,7 @@ Faults = list[tuple[tuple[str, ...], str]]
 
 def faults_across(parts: dict[str, Any]) -> Faults:
     """What does not go together between those parts that are there, each as (place, what is wrong and the cure)."""
-    if isinstance(parts.get("shear"), Auto):
+    if "shear" in parts:
         record = parts.get("record")
         try:
             chosen = parts["shear"].chosen(record is not None and bool(record.maps))
@@ -40,10 +39,11 @@ def faults_across(parts: dict[str, Any]) -> Faults:
             text = fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
             return [(("shear",), text)]
         parts = parts | {"shear": chosen}
-    if isinstance(parts.get("bonds"), AutoBonds):
+    if "bonds" in parts:
         held = [parts[name] for name in ("solid", "sphere", "adhesion", "contact") if name in parts]
-        radius = _rest_radius(*held) if len(held) == 4 else math.nan
-        parts = parts | {"bonds": parts["bonds"].chosen(math.pi * radius**2, _reads_forces(parts.get("shear")))}
+        radius = rest_radius(*held) if len(held) == 4 else math.nan
+        forces = "shear" in parts and parts["shear"].spectrum.bond_made
+        parts = parts | {"bonds": parts["bonds"].chosen(math.pi * radius**2, forces)}
     return [
         fault
         for reads, check in _CHECKS
@@ -53,22 +53,17 @@ def faults_across(parts: dict[str, Any]) -> Faults:
 
 
 def _table_too_short(drive: Drive, clock: Clock) -> Faults:
-    if isinstance(drive, Table) and drive.time[-1] < clock.duration * (1 - 1e-9):
-        said = f"the table ends at {drive.time[-1]:g} s, before clock.duration ({clock.duration:g} s)"
+    if drive.end < clock.duration * (1 - 1e-9):
+        said = f"the table ends at {drive.end:g} s, before clock.duration ({clock.duration:g} s)"
         return [(("drive",), f"{said}; add rows or shorten the run")]
     return []
 
 
 def _no_adhesion(contact: Contact, adhesion: Adhesion) -> Faults:
-    if isinstance(contact, RateDependent) and not adhesion.work > 0.0:
+    if contact.lags and not adhesion.work > 0.0:
         said = "a rate-dependent edge measures its drive by the work of adhesion at rest; give a work above zero"
         return [(("adhesion", "work"), said)]
     return []
-
-
-def _reads_forces(shear: Any) -> bool:
-    """Whether the shear part follows the forces of the single bonds."""
-    return getattr(getattr(shear, "spectrum", None), "bond_made", False)
 
 
 def _control_too_short(contact: Contact, clock: Clock) -> Faults:
@@ -82,20 +77,20 @@ def _control_too_short(contact: Contact, clock: Clock) -> Faults:
 
 
 def _no_stress(shear: Model, bonds: BondModel) -> Faults:
-    if shear.reads_stress and not bonds.carries_stress and not _reads_forces(shear):
+    if shear.reads_stress and not bonds.carries_stress and not shear.spectrum.bond_made:
         said = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
         return [(("shear", "amplitude"), said)]
     return []
 
 
 def _no_forces(shear: Model, bonds: BondModel, solid: Solid) -> Faults:
-    if not _reads_forces(shear):
+    if not shear.spectrum.bond_made:
         return []
     if not bonds.knows_forces:
         said = 'the spectrum that bonds make needs the force of each bond; use bonds.model = "cohort" or "tracked"'
         return [(("shear", "spectrum"), said)]
-    stiffest = shear.spectrum.stiffest(*solid.effective)  # type: ignore[union-attr]
-    if bonds.bond_stiffness > stiffest * (1.0 + 1e-9):  # type: ignore[union-attr]
+    stiffest = cast(BondMade, shear.spectrum).stiffest(*solid.effective)
+    if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
         said = f"the half-space under a bond of this footprint yields with {stiffest:.3g} N/m, in series with the bond"
         return [(("bonds", "bond_stiffness"), f"{said}: give at most that, or a larger shear.spectrum.footprint")]
     return []
@@ -126,46 +121,18 @@ def _too_many_map_members(record: Record, ensemble: Ensemble) -> Faults:
 
 
 def _shear_faults(shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> Faults:
-    """What keeps the shear part from being built on its solid and cell."""
-    if isinstance(shear, Uniform | Mean):
-        return []
-    radius = _rest_radius(solid, sphere, adhesion, contact)
-    cell = shear.cell or math.sqrt(math.pi) * radius
-    if not cell > 0.0:
+    radius = rest_radius(solid, sphere, adhesion, contact)
+    if not shear.side(math.sqrt(math.pi) * radius) > 0.0:
         return _open_at_rest(contact, sphere, adhesion)
-    if shear.contact == "disc" and shear.draws_maps and not 2.0 * radius <= cell:
-        said = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * radius:g} m wide at rest"
-        return [(("shear", "cell"), f'{said}; give shear.cell = "{2.2e6 * radius:.3g} um" or more')]
-    too_many = _too_many_modes(shear, cell)
-    if too_many:
-        return [(("shear",), f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
-    try:
-        shear.process(*solid.effective, cell)
-    except PydanticCustomError as fault:
-        return [(("shear",), fault.message())]
-    return []
+    found = shear.faults(*solid.effective, radius)
+    return [(("shear", key) if key else ("shear",), said) for key, said in found]
 
 
 def _open_at_rest(contact: Contact, sphere: Sphere, adhesion: Adhesion) -> Faults:
     """What holds the sphere leaves no contact at rest, which the cell is sized by."""
-    name = next(name for name in ("load", "indentation", "displacement") if getattr(contact, name) is not None)
-    limit = f" of {jkr.pull_off_load(adhesion.work, sphere.radius):.3g} N" if name == "load" else ""
+    limit = f" of {jkr.pull_off_load(adhesion.work, sphere.radius):.3g} N" if contact.kind == "load" else ""
     said = f"is beyond pull-off{limit} at the start, so that there is no contact at rest to size the cell of shear by"
-    return [(("contact", name), f'{said}; hold the sphere closer, or give shear.cell such as "0.2 mm"')]
-
-
-def _too_many_modes(shear: Any, cell: float) -> str | None:
-    """What is too large about the smallest grid that holds the spectrum, or about the one asked for."""
-    ripple = shear.spectrum.wavevector
-    waves = (max(map(abs, ripple)) if ripple else shear.spectrum.support[1]) * cell / (2.0 * math.pi)
-    if math.isfinite(waves) and waves > _MOST_WAVES:
-        return f"the cell of {cell:g} m holds {waves:.2g} of the shortest waves along a side"
-    reach = waves if shear.points is None else min(waves, (shear.points - 1) // 2)
-    pairs = (2.0 * reach + 1.0) * (reach + 1.0)
-    kept = isinstance(shear, Modal) and (shear.draws_maps or not ripple)
-    if kept and math.isfinite(reach) and pairs > _MOST_PAIRS:
-        return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes, of which {_MOST_PAIRS:.2g} can be kept"
-    return None
+    return [(("contact", contact.kind), f'{said}; hold the sphere closer, or give shear.cell such as "0.2 mm"')]
 
 
 _CHECKS: tuple[tuple[tuple[str, ...], Any], ...] = (
@@ -181,3 +148,32 @@ _CHECKS: tuple[tuple[tuple[str, ...], Any], ...] = (
 )
 #: The parts that the checks read.
 CHECKED = sorted({name for reads, _ in _CHECKS for name in reads})
+
+#: Rms of the fluctuations over the mean stress that is remarked on: some 2 % of the area is reversed.
+_MOST_REVERSED = 0.5
+_LARGEST_STRAIN = 0.3
+
+
+def remarks_between(
+    bonds: BondModel, shear: Model, contact: Contact, setting: Setting, speeds: np.ndarray, varies: bool
+) -> list[str]:
+    """Assumptions and limits of parts in one scene at some ``speeds``; ``varies`` if ΔΓ differs between members."""
+    said = []
+    if varies and bonds.feeds_back and not contact.lags:
+        said.append(
+            'carried area in a contact that fluctuates has no limit of fine steps: take model = "rate_dependent"'
+        )
+    if contact.after_pull_off == "reattach" and bonds.stretched and not bonds.feeds_back:
+        said.append('bonds go on sliding while the contact is open: bonds.area = "carried" starts without them')
+    strength = np.broadcast_to(bonds.steady(speeds).strength, speeds.shape)
+    strain = strength.max() / setting.shear_modulus
+    if strain > _LARGEST_STRAIN:
+        said.append(f"the mean stress is {strain:.2g} times the shear modulus, beyond linear elasticity: check bonds")
+    rms = math.sqrt(shear.spectrum.variance) * shear.amplitude.factor(speeds, strength)
+    if not shear.spectrum.bond_made and np.any((rms > _MOST_REVERSED * strength) & (strength > 0.0)):
+        said.append(
+            f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
+        )
+    if varies and contact.course.lowest < 0.0:
+        said.append("under tension detachment is a first passage: take clock steps well below the correlation")
+    return said

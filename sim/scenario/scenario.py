@@ -11,7 +11,6 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, model
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from sim.parts.bonds import Auto as AutoBonds
 from sim.parts.bonds import Bonds, Unbroken
 from sim.parts.bonds import Model as BondModel
 from sim.parts.contact import Contact
@@ -20,11 +19,11 @@ from sim.parts.contact.control import Bodies
 from sim.parts.drive import Drive
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
-from sim.parts.shear import Auto, Model, Shear, Uniform
+from sim.parts.shear import Model, Shear, Uniform
 from sim.parts.shear.banded import BandedProcess
-from sim.parts.shear.modal import ModalProcess
+from sim.parts.shear.modal import MappedProcess, ModalProcess
 from sim.parts.shear.process import SmoothProcess
-from sim.scenario.checks import CHECKED, _reads_forces, _rest_radius, faults_across
+from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.declared import as_html, entries, with_models
 from sim.scenario.messages import in_plain_words, plain_spoken
@@ -34,6 +33,8 @@ from sim.spectrum.finite_contact import Margin
 from sim.units.quantity import Quantity
 from sim.units.refusals import BadInput
 
+#: Relative error of a cell against the infinite plane that is remarked on.
+_CELL_ERROR = 0.05
 #: Columns that a part has read from its file, read anew where its table changes.
 _FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
 
@@ -41,7 +42,7 @@ _FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
 @plain_spoken
 @dataclass(frozen=True, config={"extra": "forbid", "arbitrary_types_allowed": True})
 class Scenario:
-    """One sliding contact, ready to run. Parts left out are the shallowest: at rest, unbroken bonds, uniform stress.
+    """One sliding contact, ready to run. Parts left out are the simplest: at rest, unbroken bonds, uniform stress.
 
     Examples
     --------
@@ -77,7 +78,7 @@ class Scenario:
     source: Annotated[Any, Field(exclude=True)] = Source()
 
     def __repr__(self) -> str:
-        models = ", ".join(f"{name} {getattr(self, name).model}" for name in ("drive", "bonds", "shear", "contact"))
+        models = ", ".join(f"{name} {part.model}" for name, part in zip(Parts._fields, self.given, strict=True))
         points = math.prod(len(axis.values) for axis in self.sweep)
         return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
 
@@ -111,29 +112,28 @@ class Scenario:
     @cached_property
     def rest_radius(self) -> float:
         """Contact radius with every bond of rest and no fluctuation [m]; nan without equilibrium."""
-        return _rest_radius(self.solid, self.sphere, self.adhesion, self.contact)
+        return rest_radius(self.solid, self.sphere, self.adhesion, self.contact)
 
     @cached_property
     def population(self) -> BondModel:
-        """The bonds at their depth, chosen by their number if the scenario leaves the choice."""
-        if not isinstance(self.bonds, AutoBonds):
-            return self.bonds
-        return self.bonds.chosen(math.pi * self.rest_radius**2, _reads_forces(self.fluctuations))
+        """The model of the bonds, chosen by their number if the scenario leaves the choice."""
+        return self.bonds.chosen(*self._bonds_seen)
+
+    @property
+    def _bonds_seen(self) -> tuple[float, bool]:
+        """Area of the contact at rest [m²], and whether the field reads the forces of the bonds."""
+        return math.pi * self.rest_radius**2, self.fluctuations.spectrum.bond_made
 
     @cached_property
     def fluctuations(self) -> Model:
-        """The shear part at its depth, chosen by what is recorded if the scenario leaves the choice."""
-        return self.shear.chosen(bool(self.record.maps)) if isinstance(self.shear, Auto) else self.shear
+        """The model of the shear part, chosen by what is recorded if the scenario leaves the choice."""
+        return self.shear.chosen(bool(self.record.maps))
 
     @cached_property
     def why(self) -> dict[str, str]:
-        """Reasons for the depths that the scenario left open, by part."""
-        why = {}
-        if isinstance(self.shear, Auto):
-            why["shear"] = self.shear.why(bool(self.record.maps))
-        if isinstance(self.bonds, AutoBonds):
-            why["bonds"] = self.bonds.why(math.pi * self.rest_radius**2, _reads_forces(self.fluctuations))
-        return why
+        """Reasons for the models that the scenario left open, by part."""
+        why = {"shear": self.shear.why(bool(self.record.maps)), "bonds": self.bonds.why(*self._bonds_seen)}
+        return {part: reason for part, reason in why.items() if reason}
 
     @cached_property
     def process(self) -> SmoothProcess | BandedProcess | ModalProcess:
@@ -141,6 +141,14 @@ class Scenario:
         shear_modulus, poisson_ratio = self.solid.effective
         cell = math.sqrt(math.pi) * self.rest_radius
         return self.fluctuations.process(shear_modulus, poisson_ratio, cell)
+
+    @property
+    def map_size(self) -> tuple[float, int] | None:
+        """Side of the cell [m] and points along it of the maps that are recorded; None where none is."""
+        if not self.record.maps:
+            return None
+        modes = cast(MappedProcess, self.process).modes
+        return modes.cell, modes.points
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -150,9 +158,9 @@ class Scenario:
     @cached_property
     def margin(self) -> Margin | None:
         """Share of ΔΓ that a contact of finite radius pays when it grows; None where waves are taken as short."""
-        if getattr(self.fluctuations, "contact", "plane") == "plane":
-            return None
-        return Margin(self.fluctuations.spectrum, *self.solid.effective, self.sphere.radius)  # type: ignore[union-attr]
+        shear = self.fluctuations
+        solid = *self.solid.effective, self.sphere.radius
+        return None if shear.contact == "plane" else Margin(shear.spectrum, *solid)
 
     @cached_property
     def times(self) -> Times:
@@ -173,6 +181,22 @@ class Scenario:
             math.sqrt(math.pi) * self.rest_radius,
             self.times,
         )
+
+    @property
+    def given(self) -> tuple[Drive, Bonds, Shear, Contact]:
+        """The four parts as given, in the order in which they act."""
+        return self.drive, self.bonds, self.shear, self.contact
+
+    @property
+    def chosen(self) -> tuple[Drive, BondModel, Model, Contact]:
+        """The four parts with the models chosen that the scenario leaves open."""
+        return self.drive, self.population, self.fluctuations, self.contact
+
+    def speeds(self, count: int) -> np.ndarray:
+        """Speeds at times spread evenly over the run, its ends included [m/s]."""
+        duration = self.times.duration
+        times = np.linspace(0.0, duration, count).tolist()
+        return np.array([self.drive.motion(0, time, time, duration).speed[0] for time in times])
 
     @cached_property
     def parts(self) -> Parts:
@@ -195,6 +219,17 @@ class Scenario:
             "shear": sheared,
             "contact": bonded or sheared,
         }
+
+    def remarks(self) -> list[str]:
+        """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""
+        said = [remark for part in self.chosen for remark in part.remarks(self.setting)]
+        said += remarks_between(*self.chosen[1:], self.setting, self.speeds(41), self.varies["shear"])
+        if self.solid.poisson_ratio != 0.5:
+            said.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
+        off = (abs(value) for name, value in self.process.known_errors().items() if name.startswith("cell_error"))
+        if max(off, default=0.0) > _CELL_ERROR:
+            said.append(f"the cell is off by more than {_CELL_ERROR:.0%}: a larger cell or more points bring it closer")
+        return list(dict.fromkeys(said))
 
     def with_values(self, values: dict[str, Any]) -> "Scenario":
         """This scenario with some keys changed, ``{"contact.load": 1e-3}``, checked anew and without its sweep.
@@ -230,17 +265,11 @@ class Scenario:
             raise BadInput([f"some values do not go together: {said}" for said in fault.problems]) from None
         for what, found in (
             ("records; give clock.record", {point.clock.records for point in points}),
-            ("maps; run once for each cell and number of points", set(map(_map_size, points))),
+            ("maps; run once for each cell and number of points", {point.map_size for point in points}),
         ):
             if len(found) > 1:
                 raise BadInput([f"the points of the sweep would have different {what}"])
         return points
-
-
-def _map_size(scenario: Scenario) -> tuple[float, int] | None:
-    """Side of the cell [m] and points of the maps that a scenario draws."""
-    modes = getattr(scenario.process, "modes", None) if scenario.record.maps else None
-    return None if modes is None else (modes.cell, modes.points)
 
 
 def _forget_file(document: dict[str, Any], key: str) -> None:

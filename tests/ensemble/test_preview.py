@@ -15,6 +15,7 @@ from sim.scenario.reader import load
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 WIDE = {"model": "gaussian", "rms": "10 kPa", "length": "4 mm"}
+RIPPLE = {"sweep": {}}
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
@@ -63,12 +64,12 @@ def test_the_columns_of_a_block_line_up_and_no_line_trails(name):
 
 
 def test_each_depth_is_told_with_its_reason():
-    lines = told("masking", **{"drive.speed": "2 mm/s"})["depths"]
+    lines = told("masking", **{"drive.speed": "2 mm/s"})["models"]
     assert row(lines, "drive")[1:3] == ["steady", "changed by --set"]
-    assert row(lines, "bonds")[1:3] == ["none", "left out, so the shallowest"]
+    assert row(lines, "bonds")[1:3] == ["none", "left out, so the simplest"]
     assert row(lines, "shear")[1:3] == ["mean", "in the file"]
     assert row(lines, "contact")[3].startswith("The contact is in JKR equilibrium")
-    swept = told("masking", sweep={"bonds": [{"model": "none"}, {"model": "steady", "critical_speed": 0.01}]})["depths"]
+    swept = told("masking", sweep={"bonds": [{"model": "none"}, {"model": "steady", "critical_speed": 0.01}]})["models"]
     assert [line.split()[1] for line in swept if line.startswith("bonds")] == ["none", "steady"]
     assert all("swept" in line for line in swept if line.startswith("bonds"))
 
@@ -146,15 +147,18 @@ def test_the_mean_depth_knows_its_energy():
             "the longest waves exceed the contact",
         ),
         ("soft_lens", {"shear.spectrum": WIDE, "shear.points": 32, "sweep": {}}, "the cell is off by more than 5%"),
+        ("uniform_stress", {}, "the mean stress is 0.62 times the shear modulus, beyond linear elasticity"),
+        ("masking", RIPPLE | {"shear.spectrum.amplitude": "3.2 MPa"}, "the rms of the fluctuations is 1.41 times the"),
+        ("masking", RIPPLE | {"adhesion.work": "1 uJ/m^2"}, "the stored energy is 4.2e+04 times the work of adhesion"),
     ],
 )
 def test_what_the_theory_or_the_cell_cannot_hold_is_told(name, overrides, said):
-    lines = told(name, **overrides)["to know before the run"]
+    lines = told(name, **overrides)["notes"]
     assert sum(line.startswith(said) for line in lines) == 1
 
 
 def test_nothing_is_told_where_nothing_is_to_know():
-    assert "to know before the run" not in told("uniform_stress")
+    assert "notes" not in told("uniform_stress", sweep={})
     assert "fluctuations" not in told("uniform_stress")
 
 
@@ -254,7 +258,7 @@ def test_bonds_left_open_are_told_with_their_depth_and_the_reason():
     ):  # fmt: skip
         lines = preview(scene(bonds=auto)).split("\n\n")[1].splitlines()
         place = next(k for k, line in enumerate(lines) if line.startswith("  bonds "))
-        assert re.split(r" {2,}", lines[place])[2:4] == ["auto", "in the file"]
+        assert re.split(r" {2,}", lines[place])[2:4] == ["auto", "given"]
         mark, chosen, why = re.split(r" {2,}", lines[place + 1].strip())
         assert (mark, chosen) == (f"→ {depth}", "chosen")
         assert why.startswith(reason)
@@ -262,12 +266,12 @@ def test_bonds_left_open_are_told_with_their_depth_and_the_reason():
 
 def test_energy_under_bonds_that_friction_has_paid_for_is_told_where_adhesion_pays_again():
     def twice(**overrides):
-        lines = told("bond_noise", **overrides).get("to know before the run", [])
+        lines = told("bond_noise", **overrides).get("notes", [])
         return sum(line.startswith("friction has paid for the energy under each bond") for line in lines)
 
     assert twice() == twice(sweep={}) == 1
     assert twice(**{"sweep": {}, "shear.paid_by_adhesion": 0.0}) == twice(sweep={}, shear={"model": "uniform"}) == 0
-    assert not any("friction has paid" in line for line in told("masking")["to know before the run"])
+    assert not any("friction has paid" in line for line in told("masking")["notes"])
 
 
 def test_the_size_of_the_bonds_field_is_that_of_steady_sliding_at_the_last_speed():

@@ -1,4 +1,4 @@
-"""Drives: how the slider moves. Shallow to deep: steady, start, ramp, table.
+"""Motion of the slider. Simple to full: steady, start, ramp, table.
 
 A prescribed drive is a function of time, the same for all members. It gives the exact slip of a
 step, never the speed times the step, so that parts that live on slip see no step error.
@@ -73,6 +73,8 @@ class Steady(_Sliding):
     speed: Annotated[float, _SPEED] = 0.0
     model: Literal["steady"] = "steady"
 
+    end: ClassVar[float] = math.inf
+
     def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
         return Number(self.speed).pieces(start, stop, duration)
 
@@ -89,6 +91,12 @@ class Start(_Sliding):
     rest: Annotated[float, Quantity("s", "time at rest before sliding", "t_w", at_least=0)]
     speed: Annotated[float, _SPEED]
     model: Literal["start"] = "start"
+
+    end: ClassVar[float] = math.inf
+
+    def remarks(self, setting: Setting) -> list[str]:
+        still = "the slider rests for the whole run: shorten drive.rest or lengthen clock.duration"
+        return [still] if self.rest >= setting.times.duration else []
 
     def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
         times, speeds = np.array([0.0, self.rest, self.rest]), np.array([0.0, 0.0, self.speed])

@@ -1,19 +1,20 @@
-"""Shear-stress fluctuations and the elastic energy they store. Shallow to deep: uniform, mean, modal, mapped.
+"""Shear-stress fluctuations and the elastic energy they store. Simple to full: uniform, mean, banded, modal, mapped.
 
-A depth is a frozen recipe; with the solid and the cell it becomes a *process* with ``start`` and
+A model is a frozen recipe; with the solid and the cell it becomes a *process* with ``start`` and
 ``advance``. All the contact ever feels of it is one number a step, the stored energy per area ΔΓ.
 """
 
 import functools
 import math
 from dataclasses import fields, replace
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from sim.parts.exchange import Setting
 from sim.parts.shear.amplitude import Amplitude, Constant
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.bands import Bands, group
@@ -23,8 +24,9 @@ from sim.parts.shear.modal import FixedProcess, MappedFixedProcess, MappedProces
 from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.modes import cell_variance, modes
 from sim.parts.shear.process import SmoothProcess
-from sim.spectrum.families import Spectrum
+from sim.spectrum.families import Ripple, Spectrum
 from sim.spectrum.family import Family
+from sim.spectrum.finite_contact import marginal_energy
 from sim.units.quantity import Quantity
 
 _Paid = Annotated[
@@ -41,50 +43,121 @@ _ModeAmplitudes = Annotated[
 ]
 _Points = Annotated[int, Quantity("1", "grid points along a side of the cell", at_least=2, at_most=2**14, whole=True)]
 
+#: Mode pairs of a cell beyond which neither time nor memory suffices: those of a grid of 2048 × 2048.
+_MOST_PAIRS = 2**21
+_MOST_WAVES = 1e9
+#: Stored energy over the work of adhesion that is remarked on as implausible.
+_MOST_STORED = 1000.0
+
+_Process = SmoothProcess | BandedProcess | ModalProcess
+
+
+class _Model:
+    """Attributes of all shear models."""
+
+    feeds_back: ClassVar[bool] = False
+    draws_maps: ClassVar[bool] = False
+    keeps_modes: ClassVar[bool] = False
+    #: Rough time that one step of a mode pair takes on one core, for estimates [s].
+    pair_seconds: ClassVar[float] = 20e-9
+    spectrum: Spectrum
+    amplitude: Amplitude
+    paid_by_adhesion: float
+    contact: str
+    #: Relative error of the energy on a disc that needs no remark.
+    tolerance: float = 0.01
+
+    @property
+    def reads_stress(self) -> bool:
+        """Whether the size of the field follows the bonds."""
+        return self.amplitude.reads_stress or self.spectrum.bond_made
+
+    def side(self, cell: float) -> float:
+        """Side of the periodic cell [m], ``cell`` where the scene gives none; infinite without a cell."""
+        return math.inf
+
+    def chosen(self, maps: bool) -> Self:
+        """The model for a scene that records ``maps`` or does not: this one."""
+        return self
+
+    def why(self, maps: bool) -> str:
+        """The reason for the choice, in words; empty where there is none."""
+        return ""
+
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> _Process:
+        """The process on a given solid, and a cell of this side [m] if none is given."""
+        raise NotImplementedError
+
+    def faults(self, shear_modulus: float, poisson_ratio: float, rest_radius: float) -> list[tuple[str, str]]:
+        """Reasons why the process cannot be built on a solid and a contact at rest, each as (key, words)."""
+        return []
+
+    def remarks(self, setting: Setting) -> list[str]:
+        spectrum, radius, solid = self.spectrum, setting.rest_radius, (setting.shear_modulus, setting.poisson_ratio)
+        plane, rms = float(spectrum.surface_energy(*solid)), math.sqrt(spectrum.variance)
+        if not plane > 0.0:
+            return []
+        said = []
+        if self.paid_by_adhesion > 0.0:
+            said.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
+            if spectrum.bond_made:
+                said.append("friction has paid for the energy under each bond: with paid_by_adhesion it counts twice")
+        longest, side = 2.0 * math.pi / max(spectrum.support[0], 1e-300), self.side(setting.cell)
+        if spectrum.wavevector is None and side < longest < 1e300:
+            said.append("the spectrum has waves longer than the cell, which are missing: give a larger shear.cell")
+        if self.contact == "plane" and radius > 0.0:
+            share = float(marginal_energy(spectrum, radius, *solid)) / plane
+            long = min(longest, side) > 2.0 * radius
+            what = "the longest waves exceed the contact, which" if long else "a contact of this size"
+            off = f"{what} pays {share:.1%} of the plane's fluctuation energy when it grows"
+            if abs(share - 1.0) > self.tolerance:
+                said.append(f'{off}: shear.contact = "disc" takes that into account')
+        if not spectrum.bond_made and rms > setting.shear_modulus:
+            times = f"{rms / setting.shear_modulus:.3g} times the shear modulus"
+            said.append(f"the rms of the fluctuations is {times}, beyond linear elasticity: check shear.spectrum")
+        if not spectrum.bond_made and plane > _MOST_STORED * setting.work > 0.0:
+            times = f"{plane / setting.work:.2g} times the work of adhesion"
+            said.append(f"the stored energy is {times}: check shear.spectrum and adhesion.work")
+        return said
+
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Uniform:
+class Uniform(_Model):
     """No fluctuation: a uniform shear stress, which stores nothing at the expense of adhesion."""
 
     per_member: ClassVar[bool] = False
-    draws_maps: ClassVar[bool] = False
-    reads_stress: ClassVar[bool] = False
-    paid_by_adhesion: ClassVar[float] = 1.0
+    spectrum = Ripple(amplitude=0.0, wavelength=1.0)
+    amplitude = Constant()
+    paid_by_adhesion = 1.0
+    contact = "plane"
 
     model: Literal["uniform"] = "uniform"
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
-        """The process on a given solid and cell."""
         return SmoothProcess(0.0, Constant())
 
 
-def _bonds_set_the_size(part: Any) -> None:
+def _bonds_set_the_size(spectrum: Spectrum, amplitude: Amplitude, mode_amplitudes: str) -> None:
     """Refuse what a field that bonds make cannot follow."""
-    if not part.spectrum.bond_made:
+    if not spectrum.bond_made:
         return
-    if not isinstance(part.amplitude, Constant):
+    if amplitude.model != "constant":
         raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
-    if getattr(part, "mode_amplitudes", "gaussian") == "fixed":
+    if mode_amplitudes == "fixed":
         raise PydanticCustomError("bond_made", 'bonds at random places make mode_amplitudes = "gaussian"; leave it out')
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Mean:
+class Mean(_Model):
     """The ensemble mean of ΔΓ on the infinite plane, in closed form. Limit: uniform as rms -> 0."""
 
     per_member: ClassVar[bool] = False
-    draws_maps: ClassVar[bool] = False
 
     spectrum: Spectrum
     amplitude: Amplitude = Field(default_factory=Constant)
     paid_by_adhesion: _Paid = 1.0
     contact: _Contact = "plane"
     model: Literal["mean"] = "mean"
-
-    @property
-    def reads_stress(self) -> bool:
-        """Whether the size of the field follows the bonds."""
-        return self.amplitude.reads_stress or self.spectrum.bond_made
 
     @model_validator(mode="after")
     def _no_memory(self) -> "Mean":
@@ -93,7 +166,7 @@ class Mean:
                 "mean_has_no_memory",
                 'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"',
             )
-        _bonds_set_the_size(self)
+        _bonds_set_the_size(self.spectrum, self.amplitude, "gaussian")
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
@@ -102,14 +175,12 @@ class Mean:
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class _Fluctuating:
-    """What every depth with a periodic cell and a correlation is given.
+class _Fluctuating(_Model):
+    """Keys of the models with a periodic cell and a correlation.
 
     ``cell`` None means √π times the radius at rest, the square of the contact's area; ``points``
     None means the grid that holds the spectrum's shortest wavelength.
     """
-
-    draws_maps: ClassVar[bool] = False
 
     spectrum: Spectrum
     correlation: Correlation
@@ -122,13 +193,37 @@ class _Fluctuating:
 
     @property
     def per_member(self) -> bool:
-        """Whether ΔΓ differs between members: with fixed mode_amplitudes it does not."""
-        return self.mode_amplitudes == "gaussian"
+        return self.mode_amplitudes == "gaussian"  # fixed ones give all members one ΔΓ
 
-    @property
-    def reads_stress(self) -> bool:
-        """Whether the size of the field follows the bonds."""
-        return self.amplitude.reads_stress or self.spectrum.bond_made
+    def side(self, cell: float) -> float:
+        return cell if self.cell is None else self.cell
+
+    def faults(self, shear_modulus: float, poisson_ratio: float, rest_radius: float) -> list[tuple[str, str]]:
+        cell = self.side(math.sqrt(math.pi) * rest_radius)
+        if self.contact == "disc" and self.draws_maps and not 2.0 * rest_radius <= cell:
+            said = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * rest_radius:g} m wide at rest"
+            return [("cell", f'{said}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more')]
+        too_many = self._too_many_modes(cell)
+        if too_many:
+            return [("", f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
+        try:
+            self.process(shear_modulus, poisson_ratio, cell)
+        except PydanticCustomError as fault:
+            return [("", fault.message())]
+        return []
+
+    def _too_many_modes(self, cell: float) -> str:
+        """What is too large about the smallest grid that holds the spectrum, or about the one given; empty if none."""
+        ripple = self.spectrum.wavevector
+        waves = (max(map(abs, ripple)) if ripple else self.spectrum.support[1]) * cell / (2.0 * math.pi)
+        if math.isfinite(waves) and waves > _MOST_WAVES:
+            return f"the cell of {cell:g} m holds {waves:.2g} of the shortest waves along a side"
+        reach = waves if self.points is None else min(waves, (self.points - 1) // 2)
+        pairs = (2.0 * reach + 1.0) * (reach + 1.0)
+        kept = self.keeps_modes and (self.draws_maps or not ripple)
+        if kept and math.isfinite(reach) and pairs > _MOST_PAIRS:
+            return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes, of which {_MOST_PAIRS:.2g} can be kept"
+        return ""
 
     @model_validator(mode="after")
     def _fixed_cannot_relax(self) -> "_Fluctuating":
@@ -137,7 +232,7 @@ class _Fluctuating:
                 "fixed_cannot_relax",
                 'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false',
             )
-        _bonds_set_the_size(self)
+        _bonds_set_the_size(self.spectrum, self.amplitude, self.mode_amplitudes)
         return self
 
 
@@ -147,15 +242,15 @@ class Modal(_Fluctuating):
 
     model: Literal["modal"] = "modal"
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
-        kind = SiteModes if self.spectrum.bond_made else ModalProcess
-        return self._process(kind, FixedProcess, shear_modulus, poisson_ratio, cell)
+    keeps_modes: ClassVar[bool] = True
+    #: Classes of the process: of free and of fixed mode amplitudes, and of a field that bonds make.
+    kinds: ClassVar[tuple[type[ModalProcess], ...]] = (ModalProcess, FixedProcess, SiteModes)
 
-    def _process(self, gaussian: Any, fixed: Any, shear_modulus: float, poisson_ratio: float, cell: float) -> Any:
-        side = cell if self.cell is None else self.cell
-        kind = fixed if self.mode_amplitudes == "fixed" else gaussian
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
+        free, fixed, of_bonds = self.kinds
+        kind = of_bonds if self.spectrum.bond_made else fixed if self.mode_amplitudes == "fixed" else free
         return kind(
-            modes(self.spectrum, side, self.points),
+            modes(self.spectrum, self.side(cell), self.points),
             shear_modulus,
             poisson_ratio,
             float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)),
@@ -175,10 +270,10 @@ class Mapped(Modal):
     model: Literal["mapped"] = "mapped"  # type: ignore[assignment]
 
     draws_maps: ClassVar[bool] = True
+    kinds: ClassVar[tuple[type[ModalProcess], ...]] = (MappedProcess, MappedFixedProcess, MappedSiteModes)
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> MappedProcess:
-        kind = MappedSiteModes if self.spectrum.bond_made else MappedProcess
-        process = self._process(kind, MappedFixedProcess, shear_modulus, poisson_ratio, cell)
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
+        process = super().process(shear_modulus, poisson_ratio, cell)
         if not process.modes.on_lattice:
             raise PydanticCustomError(
                 "off_lattice",
@@ -197,6 +292,8 @@ class Banded(_Fluctuating):
     variance of the stationary field are exact.
     """
 
+    pair_seconds: ClassVar[float] = 130e-9
+
     tolerance: _Tolerance = 0.01
     model: Literal["banded"] = "banded"
 
@@ -209,10 +306,9 @@ class Banded(_Fluctuating):
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
-        side = cell if self.cell is None else self.cell
         spectrum, size = _of_unit_size(self.spectrum)
         power, relaxing = self.correlation.power, self.amplitude.relaxing
-        unit, errors = _grouped(spectrum, side, self.points, poisson_ratio, power, self.tolerance, relaxing)
+        unit, errors = _grouped(spectrum, self.side(cell), self.points, poisson_ratio, power, self.tolerance, relaxing)
         bands = replace(unit, weight=unit.weight * (size / shear_modulus))
         if self.mode_amplitudes == "fixed":
             return SmoothProcess(bands.mean, self.amplitude)
@@ -247,7 +343,7 @@ def _grouped(
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Auto:
-    """The shallowest depth that gives what the scene records; it takes the keys of all of them."""
+    """The simplest model that gives what the scene records; it takes the keys of all of them."""
 
     spectrum: Spectrum
     correlation: Correlation | None = None
@@ -261,32 +357,22 @@ class Auto:
     model: Literal["auto"] = "auto"
 
     def chosen(self, maps: bool) -> "Mean | Banded | Modal":
-        """The depth for a scene that records ``maps`` or does not.
+        """The model for a scene that records ``maps`` or does not.
 
         Raises
         ------
         PydanticCustomError
             If maps are recorded and no correlation is given.
         """
-        common: dict[str, Any] = {
-            "spectrum": self.spectrum,
-            "amplitude": self.amplitude,
-            "paid_by_adhesion": self.paid_by_adhesion,
-            "contact": self.contact,
-        }
         if self.correlation is None and maps:
             raise PydanticCustomError("maps_need_memory", "maps change in time: give shear.correlation")
         if self.correlation is None:
-            return Mean(**common)
-        common |= {
-            "correlation": self.correlation,
-            "cell": self.cell,
-            "points": self.points,
-            "mode_amplitudes": self.mode_amplitudes,
-        }
+            return Mean(self.spectrum, self.amplitude, self.paid_by_adhesion, self.contact)
+        field = self.spectrum, self.correlation, self.amplitude, self.cell, self.points
+        rest = self.mode_amplitudes, self.paid_by_adhesion, self.contact
         if maps or self.spectrum.bond_made:
-            return Mapped(**common) if maps else Modal(**common)
-        return Banded(**common, tolerance=self.tolerance)
+            return Mapped(*field, *rest) if maps else Modal(*field, *rest)
+        return Banded(*field, *rest, tolerance=self.tolerance)
 
     def why(self, maps: bool) -> str:
         """The reason for the choice, in words."""
@@ -299,7 +385,7 @@ class Auto:
         return "a correlation is given and no maps are recorded: energies in time are all the contact feels"
 
 
-#: A depth, chosen.
+#: A model that has a process.
 Model = Uniform | Mean | Banded | Modal | Mapped
 
 Shear = Annotated[Uniform | Mean | Banded | Modal | Mapped | Auto, Field(discriminator="model")]
