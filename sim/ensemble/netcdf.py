@@ -15,10 +15,9 @@ import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
-from sim.engine import Extremes
 from sim.ensemble.part_files import Parts
 from sim.ensemble.plan import Plan, part_name
-from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, Largest, Variable
+from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
 from sim.parts.shear.modal import MappedProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
@@ -81,10 +80,9 @@ def write_dataset(file: File, plan: Plan, parts: Parts) -> None:
     _scenario_variables(file, plan)
     _derived_variables(file, plan)
     for variable in plan.variables:
-        _trajectories(file, plan, parts, variable)
-    for largest in LARGEST:
-        if any(largest.there(point) for point in plan.points):
-            _largest(file, plan, parts, largest)
+        _recorded(file, plan, parts, variable)
+    for variable in plan.largest:
+        _recorded(file, plan, parts, variable, whole=True)
     if plan.scenario.record.maps:
         _maps(file, plan, parts)
 
@@ -100,10 +98,6 @@ def variable_name(key: str) -> str:
 
 def _sweep_shape(plan: Plan) -> tuple[int, ...]:
     return tuple(len(axis.values) for axis in plan.scenario.sweep)
-
-
-def _per_member(plan: Plan, variable: Variable) -> bool:
-    return plan.varies(variable) and plan.scenario.record.per_member
 
 
 def _variable(
@@ -223,80 +217,39 @@ def _derived_variables(file: File, plan: Plan) -> None:
             file.setncatts({name: max(values, key=abs)})
 
 
-def _trajectories(file: File, plan: Plan, parts: Parts, recorded: Variable) -> None:
-    names, shape = _sweep_names(plan), _sweep_shape(plan)
-    ones = (1,) * len(shape)
-    kind = {"float64": "f8", "float32": "f4"}[plan.scenario.record.precision]
-    if _per_member(plan, recorded):
-        dimensions, chunks = (*names, "member", "t"), (*ones, plan.group, plan.stretch)
-        wanted = {recorded.name: ""}
-    elif plan.varies(recorded):
-        dimensions, chunks = (*names, "t"), (*ones, plan.stretch)
-        wanted, kind = {f"{recorded.name}_{s}": s for s in _STATISTICS}, "f8"
-    else:
-        dimensions, chunks = (*names, "t"), (*ones, plan.stretch)
-        wanted = {recorded.name: ""}
+def _recorded(file: File, plan: Plan, parts: Parts, recorded: Variable, whole: bool = False) -> None:
+    """A quantity at each record, or of each ``whole`` run."""
+    shape, varies = _sweep_shape(plan), plan.varies(recorded)
+    each = varies and plan.scenario.record.per_member
+    dimensions = (*_sweep_names(plan), *(("member",) if each else ()), *(() if whole else ("t",)))
+    chunks = (*np.ones(len(shape), int).tolist(), *((plan.group,) if each else ()), plan.stretch)
     variables = {}
-    for name, statistic in wanted.items():
-        long_name = f"{_STATISTICS[statistic]} {recorded.long_name}" if statistic else recorded.long_name
+    for statistic, of in (_STATISTICS if varies and not each else {"": ""}).items():
+        kind = "f4" if plan.scenario.record.precision == "float32" and not (statistic or whole) else "f8"
         flags: dict[str, Any] = {}
         if recorded.name == "in_contact" and not statistic:
             kind, flags = "i1", {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
-        variable = _variable(file, name, kind, dimensions, recorded.unit, long_name, recorded.symbol, chunks, **flags)
-        variables[name] = variable
+        named = "_".join(filter(None, (recorded.name, statistic)))
+        described = recorded.unit, f"{of} {recorded.long_name}".strip(), recorded.symbol
+        variables[statistic] = _variable(file, named, kind, dimensions, *described, None if whole else chunks, **flags)
     for number, point in enumerate(plan.points):
-        where = np.unravel_index(number, shape) if shape else ()
-        for index, records in enumerate(plan.stretches(point)):
-            time = slice(records.start, records.stop)
-            if _per_member(plan, recorded):
-                for group, members in enumerate(plan.groups()):
-                    values = parts.load(part_name(number, group, index), recorded.name)[recorded.name]
-                    variables[recorded.name][(*where, slice(members[0], members[-1] + 1), time)] = values
-            elif plan.varies(recorded):
-                loaded = [
-                    parts.load(part_name(number, group, index), recorded.name)[recorded.name]
-                    for group in range(len(plan.groups()))
-                ]
-                for statistic, values in pooled(loaded).items():
-                    variables[f"{recorded.name}_{statistic}"][(*where, time)] = values
+        where, stretches = np.unravel_index(number, shape), list(enumerate(plan.stretches(point)))
+        for index, records in stretches[-1:] if whole else stretches:
+            times = () if whole else (slice(records.start, records.stop),)
+            names = [part_name(number, group, index) for group in range(len(plan.groups()) if varies else 1)]
+            found = (parts.load(name, recorded.name)[recorded.name] for name in names)
+            if each:
+                for members, values in zip(plan.groups(), found, strict=True):
+                    variables[""][(*where, slice(members[0], members[-1] + 1), *times)] = values
             else:
-                values = parts.load(part_name(number, 0, index), recorded.name)[recorded.name]
-                variables[recorded.name][(*where, time)] = values[0]
-
-
-def _largest(file: File, plan: Plan, parts: Parts, largest: Largest) -> None:
-    """One quantity of whole runs, from the states at their ends."""
-    names, shape = _sweep_names(plan), _sweep_shape(plan)
-    varies, each = plan.varies(largest), plan.scenario.record.per_member
-    variables = {
-        statistic: _variable(
-            file, f"{largest.name}_{statistic}" if statistic else largest.name, "f8",
-            (*names, "member") if varies and each else names, largest.unit,
-            f"{_STATISTICS[statistic]} {largest.long_name}" if statistic else largest.long_name, largest.symbol,
-        )
-        for statistic in ([""] if each or not varies else _STATISTICS)
-    }  # fmt: skip
-    for number, point in enumerate(plan.points):
-        where = np.unravel_index(number, shape) if shape else ()
-        last = len(plan.stretches(point)) - 1
-        found = []
-        for group, members in enumerate(plan.groups()):
-            beginning = "state.extremes."
-            held = parts.load(part_name(number, group, last), beginning)
-            values = largest.read(Extremes(**{key.removeprefix(beginning): array for key, array in held.items()}))
-            found.append(np.broadcast_to(values, len(members) if varies else 1)[:, None])
-        if "" in variables:
-            values = np.concatenate(found)[:, 0]
-            variables[""][where if where else ...] = values if varies else values[0]
-        else:
-            for statistic, value in pooled([moments(values) for values in found]).items():
-                variables[statistic][where if where else ...] = value[0]
+                for statistic, values in (pooled(list(found)) if varies else {"": next(found)[0]}).items():
+                    variables[statistic][(*where, *times)] = values
 
 
 def moments(values: np.ndarray) -> np.ndarray:
-    """Count, mean and sum of squared deviations over the first axis, shape (3, records)."""
-    mean = np.ascontiguousarray(values.T).mean(axis=1)
-    squares = np.ascontiguousarray(((values - mean) ** 2).T).sum(axis=1)
+    """Count, mean and sum of squared deviations over the first axis, shape (3, records) or (3,)."""
+    mean = np.ascontiguousarray(values.T).mean(axis=-1)
+    squares = np.ascontiguousarray(((values - mean) ** 2).T).sum(axis=-1)
     return np.stack([np.full_like(mean, len(values)), mean, squares])
 
 
@@ -329,21 +282,15 @@ def _maps(file: File, plan: Plan, parts: Parts) -> None:
         variable[:] = np.arange(points) * (cell / points)
     names = (*_sweep_names(plan), "map_member", "map_time", "x", "y")
     chunks = (1,) * (len(names) - 2) + (points, points)
-    variable = _variable(file, MAP[0], "f8", names, *MAP[1:], chunks)
-    energies = [
-        _variable(file, name, "f8", names[:-2], unit, text, symbol)
-        for name, unit, text, symbol in DISC_ENERGIES
-        if all(point.margin is not None for point in plan.points)
-    ]
+    variables = {MAP[0]: _variable(file, MAP[0], "f8", names, *MAP[1:], chunks)}
+    if all(point.margin is not None for point in plan.points):
+        variables |= {one[0]: _variable(file, one[0], "f8", names[:-2], *one[1:]) for one in DISC_ENERGIES}
     for number, point in enumerate(plan.points):
-        where = np.unravel_index(number, _sweep_shape(plan)) if plan.scenario.sweep else ()
+        where = np.unravel_index(number, _sweep_shape(plan))
         for index in range(len(plan.stretches(point))):
             for group, members in enumerate(plan.groups()):
-                part = parts.load(part_name(number, group, index), "map.")
-                part |= parts.load(part_name(number, group, index), "disc.") if energies else {}
-                for name, values in part.items():
-                    kind, _, snapshot = name.partition(".")
-                    rows = slice(members[0], members[0] + values.shape[0 if kind == "map" else 1])
-                    kept = [(variable, values)] if kind == "map" else zip(energies, values, strict=True)
-                    for target, array in kept:
-                        target[(*where, rows, int(snapshot))] = array
+                for key, values in parts.load(part_name(number, group, index), "map.").items():
+                    _, name, snapshot = key.split(".")
+                    if name in variables:
+                        rows = slice(members[0], members[0] + len(values))
+                        variables[name][(*where, rows, int(snapshot))] = values

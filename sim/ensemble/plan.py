@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.ensemble.recorded import VARIABLES, Largest, Variable
+from sim.ensemble.recorded import LARGEST, VARIABLES, Variable
 from sim.scenario.scenario import Scenario
 
 _GROUP = 64
@@ -32,8 +32,16 @@ class Plan:
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
-        """What is recorded of such scenes."""
-        return tuple(one for one in VARIABLES if any(one.there(point) for point in self.points))
+        """Quantities that are recorded at each record."""
+        return self._there(VARIABLES)
+
+    @cached_property
+    def largest(self) -> tuple[Variable, ...]:
+        """Quantities that are recorded of each whole run."""
+        return self._there(LARGEST)
+
+    def _there(self, variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+        return tuple(one for one in variables if any(one.there(point) for point in self.points))
 
     @cached_property
     def group(self) -> int:
@@ -59,7 +67,7 @@ class Plan:
         records = point.clock.records
         return [range(first, min(first + self.stretch, records)) for first in range(0, records, self.stretch)]
 
-    def varies(self, variable: Variable | Largest) -> bool:
+    def varies(self, variable: Variable) -> bool:
         """Whether the variable has the member dimension."""
         return any(point.varies[variable.part] for point in self.points)
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.engine import Extremes, State, balance
+from sim.engine import State, balance
 from sim.laws import jkr
 from sim.numerics import extremes
 from sim.parts.contact.control import Control
@@ -45,93 +45,66 @@ def _area(scene: Scenario, state: State) -> np.ndarray:
     return np.pi * _radius(scene, state) ** 2
 
 
-def _stress(scene: Scenario, state: State) -> np.ndarray:
-    return state.bonding.stress
-
-
 def _control(scene: Scenario, state: State) -> Control:
     return scene.contact.control(scene.clock.time(state.step), scene.clock.duration)
 
 
-def _load(scene: Scenario, state: State) -> np.ndarray:
-    return _control(scene, state).normal_load(state.contact.radius, scene.bodies)
-
-
-def _indentation(scene: Scenario, state: State) -> np.ndarray:
-    return _control(scene, state).indentation(state.contact.radius, scene.bodies)
-
-
-def _displacement(scene: Scenario, state: State) -> np.ndarray:
-    return _control(scene, state).displacement(state.contact.radius, scene.bodies)
-
-
 def _applied_load(scene: Scenario, state: State) -> np.ndarray:
-    load = scene.contact.load
-    return np.full(
-        1, np.nan if load is None else scene.contact.course.at(scene.clock.time(state.step), scene.clock.duration)
-    )
+    if scene.contact.load is None:
+        return np.full(1, np.nan)
+    return np.full(1, scene.contact.course.at(scene.clock.time(state.step), scene.clock.duration))
 
 
 def _hertz_radius(scene: Scenario, state: State) -> np.ndarray:
     return np.nan_to_num(_control(scene, state).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
 
 
+def _reference(scene: Scenario, state: State, phase: np.ndarray, work: np.ndarray) -> np.ndarray:
+    """Radius of the contact in equilibrium with another work of adhesion [m], 0 where that one is open."""
+    return scene.contact.reference_radius(phase, work, _control(scene, state), scene.bodies)
+
+
 def _jkr_radius(scene: Scenario, state: State) -> np.ndarray:
-    work, control = np.full(1, scene.adhesion.work), _control(scene, state)
-    return scene.contact.reference_radius(state.contact.whole, work, control, scene.bodies)
+    return _reference(scene, state, state.contact.whole, np.full(1, scene.adhesion.work))
 
 
 def _bonds_radius(scene: Scenario, state: State) -> np.ndarray:
-    work = balance(scene, state.bonding, state.shear).bonded
-    return scene.contact.reference_radius(state.contact.bonded, work, _control(scene, state), scene.bodies)
+    return _reference(scene, state, state.contact.bonded, balance(scene, state.bonding, state.shear).bonded)
 
 
 def _stressless_radius(scene: Scenario, state: State) -> np.ndarray:
     if not scene.contact.reversible:
         return _equilibrium_radius(scene, state)
     work = balance(scene, state.bonding, state.shear).work(_radius(scene, state))
-    return scene.contact.reference_radius(state.contact.stressless, work, _control(scene, state), scene.bodies)
+    return _reference(scene, state, state.contact.stressless, work)
 
 
 def _equilibrium_radius(scene: Scenario, state: State) -> np.ndarray:
     if not scene.contact.lags:
         return _radius(scene, state)
-    control = _control(scene, state)
-    return scene.contact.reference_radius(state.contact.settled, state.contact.work, control, scene.bodies)
+    return _reference(scene, state, state.contact.settled, state.contact.work)
 
 
-@dataclass(frozen=True)
-class Largest:
-    """One quantity of a whole run, read off the running maxima at its end; ``there`` as for a ``Variable``."""
-
-    name: str
-    unit: str
-    long_name: str
-    symbol: str
-    part: str
-    read: Callable[[Extremes], np.ndarray]
-    there: Callable[[Scenario], bool] = lambda scene: True
-    condition: str = ""
-
-
-def _pulled(found: Extremes, column: int, sign: float) -> np.ndarray:
+def _pulled(state: State, column: int, sign: float) -> np.ndarray:
     """A column of the largest pull; nan for a contact that was never pulled."""
-    return np.where(found.pull[:, extremes.LARGEST] > 0.0, sign * found.pull[:, column], np.nan)
+    pull = state.extremes.pull
+    return np.where(pull[:, extremes.LARGEST] > 0.0, sign * pull[:, column], np.nan)
 
 
+#: Quantities of a whole run, read at its end.
 LARGEST = (
-    Largest("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start",
-            "tau_p", "bonds", lambda found: found.stress[:, extremes.LARGEST]),
-    Largest("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
-            "F_p", "contact", lambda found: found.friction[:, extremes.LARGEST]),
-    Largest("peak_time", "s", "time of the largest shear stress", "t_p", "bonds",
-            lambda found: found.stress[:, extremes.WHEN]),
-    Largest("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
-            "contact", lambda found: _pulled(found, extremes.LARGEST, -1.0), lambda scene: scene.contact.makes_load,
-            "a load that changes"),
-    Largest("pull_off_time", "s", "time of the lowest normal load", "t_min", "contact",
-            lambda found: _pulled(found, extremes.WHEN, 1.0), lambda scene: scene.contact.makes_load,
-            "a load that changes"),
+    Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start",
+          "tau_p", "bonds", lambda scene, state: state.extremes.stress[:, extremes.LARGEST]),
+    Variable("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
+          "F_p", "contact", lambda scene, state: state.extremes.friction[:, extremes.LARGEST]),
+    Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds",
+          lambda scene, state: state.extremes.stress[:, extremes.WHEN]),
+    Variable("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
+          "contact", lambda scene, state: _pulled(state, extremes.LARGEST, -1.0),
+          lambda scene: scene.contact.makes_load, "a load that changes"),
+    Variable("pull_off_time", "s", "time of the lowest normal load", "t_min", "contact",
+          lambda scene, state: _pulled(state, extremes.WHEN, 1.0),
+          lambda scene: scene.contact.makes_load, "a load that changes"),
 )  # fmt: skip
 
 VARIABLES = (
@@ -140,7 +113,8 @@ VARIABLES = (
           lambda scene, state: state.drive.position),
     Variable("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
           lambda scene, state: state.bonding.fraction),
-    Variable("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds", _stress),
+    Variable("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds",
+          lambda scene, state: state.bonding.stress),
     Variable("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
           "DeltaGamma", "shear", lambda scene, state: state.shear.energy),
     Variable("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
@@ -148,12 +122,13 @@ VARIABLES = (
     Variable("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),
     Variable("contact_area", "m^2", "contact area", "A", "contact", _until_stopped(_area)),
     Variable("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact",
-          _until_stopped(_load)),
-    Variable("indentation", "m", "indentation of the sphere", "delta", "contact", _until_stopped(_indentation)),
+          _until_stopped(lambda scene, state: _control(scene, state).normal_load(state.contact.radius, scene.bodies))),
+    Variable("indentation", "m", "indentation of the sphere", "delta", "contact",
+          _until_stopped(lambda scene, state: _control(scene, state).indentation(state.contact.radius, scene.bodies))),
     Variable("displacement", "m", "displacement of what holds the sphere", "Delta", "contact",
-          _until_stopped(_displacement)),
+          _until_stopped(lambda scene, state: _control(scene, state).displacement(state.contact.radius, scene.bodies))),
     Variable("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
-          _until_stopped(lambda scene, state: _stress(scene, state) * _area(scene, state))),
+          _until_stopped(lambda scene, state: state.bonding.stress * _area(scene, state))),
     Variable("in_contact", "1", "whether the contact is closed", "", "contact",
           lambda scene, state: (state.contact.radius > 0.0).astype(float)),
     Variable("masked", "1", "whether no work of adhesion is left, so that the contact is Hertz's", "", "contact",
@@ -225,10 +200,6 @@ KNOWN_ERRORS = {
 MAP = ("shear_map", "Pa", "shear-stress fluctuation", "tau_1")
 DISC_ENERGIES = (
     ("disc_energy", "J/m^2", "energy of the map on the disc of the contact, per area", "DeltaGamma_d"),
-    (
-        "cross_energy",
-        "J/m^2",
-        "energy of the map in the field of the mean stress, per area of the disc",
-        "DeltaGamma_x",
-    ),
-)
+    ("cross_energy", "J/m^2", "energy of the map in the field of the mean stress, per area of the disc",
+     "DeltaGamma_x"),
+)  # fmt: skip

@@ -20,6 +20,7 @@ from sim.engine import State, march, pack
 from sim.ensemble.netcdf import MemoryFile, moments, write_dataset
 from sim.ensemble.part_files import MemoryParts, PartFiles, Parts
 from sim.ensemble.plan import Plan, part_name, work
+from sim.ensemble.recorded import DISC_ENERGIES, MAP
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import HDF5, StoreTrouble, explained, sync_folder
 from sim.parts.shear.modal import MappedProcess
@@ -110,7 +111,9 @@ def _record(
     progress: Progress | None,
 ) -> dict[str, np.ndarray]:
     """One part: every variable over a stretch of records, the maps in it, and the state at its end."""
-    rows = {g.name: np.empty((len(members) if plan.varies(g) else 1, len(records))) for g in plan.variables}
+    each, rows = plan.scenario.record.per_member, {}
+    for g in plan.variables:
+        rows[g.name] = np.empty((len(members) if plan.varies(g) else 1, len(records)))
     maps: dict[str, np.ndarray] = {}
     snapshots = {
         round(t / point.clock.duration * point.clock.steps): k for k, t in enumerate(sorted(point.record.maps))
@@ -123,17 +126,28 @@ def _record(
         for variable in plan.variables:
             rows[variable.name][:, column] = variable.read(point, state)
         if state.step in snapshots and drawn:
-            number, process = snapshots[state.step], cast(MappedProcess, point.process)
-            maps[f"map.{number}"] = process.maps(
-                cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn
-            )
-            if point.margin is not None:
-                maps[f"disc.{number}"] = _on_the_disc(point, state, maps[f"map.{number}"])
+            for name, values in _maps(point, state, drawn).items():
+                maps[f"map.{name}.{snapshots[state.step]}"] = values
         if progress is not None:
             progress(len(members) * (point.clock.stride if record else 1))
-    if not plan.scenario.record.per_member:
-        rows = {g.name: moments(rows[g.name]) if plan.varies(g) else rows[g.name] for g in plan.variables}
+    if records.stop == point.clock.records:
+        for g in plan.largest:
+            rows[g.name] = np.broadcast_to(g.read(point, state), len(members) if plan.varies(g) else 1)
+    for g in (*plan.variables, *plan.largest):
+        if plan.varies(g) and not each and g.name in rows:
+            rows[g.name] = moments(rows[g.name])
     return rows | maps | {f"state.{name}": array for name, array in pack(state).items()}
+
+
+def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
+    """Maps of the first members, and in a contact of finite size their energies on its disc, shape (maps, ...)."""
+    process = cast(MappedProcess, point.process)
+    maps = process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)
+    found = {MAP[0]: maps}
+    if point.margin is not None:
+        energies = _on_the_disc(point, state, maps)
+        found |= {name: values for (name, *_), values in zip(DISC_ENERGIES, energies, strict=True)}
+    return found
 
 
 def _on_the_disc(point: Scenario, state: State, maps: np.ndarray) -> np.ndarray:
