@@ -85,6 +85,29 @@ def test_a_part_reads_no_other_part(name):
             assert other == "parts.exchange" or other.split(".")[1] == part, f"{name} imports {other}"
 
 
+#: Words by which parts go outside their folder.
+PARTS = {"drive", "bonds", "shear", "contact", "population", "fluctuations", "process", "part"}
+OUTSIDE = sorted(name for name in MODULES if floor(name) != "parts" and name != "scenario.reader")
+
+
+def asks_a_class(call, taken):
+    """Whether a call asks a part for its class: isinstance of a class taken from parts, or a test for an attribute."""
+    name, *arguments = (ast.unparse(node) for node in (call.func, *call.args))
+    if name == "isinstance":
+        return bool(taken & {node.id for node in ast.walk(call.args[1]) if isinstance(node, ast.Name)})
+    tested = name == "hasattr" or (name == "getattr" and len(arguments) == 3)
+    return tested and bool(PARTS & set(arguments[0].replace("(", ".").replace(",", ".").split(".")))
+
+
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_outside_its_folder_no_part_is_asked_for_its_class(name):
+    tree = ast.parse(MODULES[name].read_text())
+    froms = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
+    taken = {alias.asname or alias.name for node in froms if node.module.startswith("sim.parts") for alias in node.names}
+    calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
+    assert not [f"line {call.lineno}: {ast.unparse(call)}" for call in calls if asks_a_class(call, taken)]
+
+
 def test_nothing_imports_in_a_circle_benchmarks_and_tests_included():
     graph = {f"sim.{name}": path for name, path in MODULES.items()} | BESIDE
     # raises a CycleError that names the circle
