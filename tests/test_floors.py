@@ -103,7 +103,8 @@ def asks_a_class(call, taken):
 def test_outside_its_folder_no_part_is_asked_for_its_class(name):
     tree = ast.parse(MODULES[name].read_text())
     froms = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
-    taken = {alias.asname or alias.name for node in froms if node.module.startswith("sim.parts") for alias in node.names}
+    named = (alias for node in froms if node.module.startswith("sim.parts") for alias in node.names)
+    taken = {alias.asname or alias.name for alias in named}
     calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
     assert not [f"line {call.lineno}: {ast.unparse(call)}" for call in calls if asks_a_class(call, taken)]
 
