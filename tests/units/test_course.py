@@ -33,9 +33,10 @@ def course(name):
 def test_pieces_hold_the_integral_and_the_path_of_the_value(name, start, stop):
     # the zeros of the linear courses, besides their turns, are kinks of the magnitude
     kinks = [t for t in (*TURNS, 0.2, 0.4, 0.5 + 0.3 * 0.25, 0.8, 1.0) if start < t < stop]
-    pieces = course(name).pieces(start, stop, DURATION)
+    held = course(name)
+    pieces = held.pieces(start, stop, DURATION)
     exact = [
-        quad(lambda t, f=f: f(course(name).at(t, DURATION)), start, stop, points=kinks, epsabs=0.0, epsrel=1e-12)[0]
+        quad(lambda t, f=f: f(held.at(t, DURATION)), start, stop, points=kinks, epsabs=0.0, epsrel=1e-12)[0]
         for f in (float, abs)
     ]
     found = [sum(piece.integral for piece in pieces), sum(piece.path for piece in pieces)]
