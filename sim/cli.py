@@ -5,14 +5,15 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
 import click
 
-DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, STOPPED, INTERRUPTED = 0, 1, 2, 73, 74, 75, 130
+DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
+_PATH = click.Path(path_type=Path)
 _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of the file.")
 _WHERE = click.option(
     "--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key, as load='4 mN'."
@@ -28,8 +29,6 @@ def main() -> None:
         signal.signal(order, signal.default_int_handler)
     try:
         cli.main(standalone_mode=False)
-    except click.exceptions.Exit as done:
-        sys.exit(done.exit_code)
     except (click.Abort, KeyboardInterrupt):
         _fail("stopped; nothing was written to the output", INTERRUPTED)
     except click.ClickException as fault:
@@ -38,16 +37,11 @@ def main() -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         sys.exit(DONE)
-    except ValueError as fault:
-        if type(fault).__name__ != "BadInput":
-            raise
-        _fail(str(fault), BAD_INPUT)
     except MemoryError:
         _fail("there is not enough memory; fewer points, members or records take less (see `sim check`)", FAILED)
-    except (OSError, RuntimeError) as trouble:
-        code = {"OutputExists": EXISTS, "OutputBusy": STOPPED, "StoreTrouble": TROUBLE}.get(type(trouble).__name__)
-        if code is not None:
-            _fail(str(trouble), code)
+    except (OSError, RuntimeError, ValueError) as trouble:
+        if hasattr(trouble, "exit_code"):
+            _fail(str(trouble), trouble.exit_code)
         if not isinstance(trouble, OSError) or trouble.strerror is None:
             raise
         _fail(f"{trouble.filename or 'files'}: {trouble.strerror}", TROUBLE)
@@ -70,8 +64,8 @@ def cli() -> None:
 
 
 @cli.command()
-@click.argument("scenario", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="The netCDF file; default outputs/<name>.nc.")
+@click.argument("scenario", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="The netCDF file; default outputs/<name>.nc.")
 @_SET
 @click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
 @click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
@@ -102,7 +96,8 @@ def run(
         simulate.run(scene, target, replace=force, progress=advance)
     simulate.write_log(target, began, sys.argv[1:])
     if not quiet:
-        _show_table(target)
+        with _opened(target) as dataset:
+            _print_tables(dataset)
         click.echo(str(target))
 
 
@@ -125,46 +120,31 @@ def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
 
 def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> dict[str, Any]:
     """The values of --set, --seed and --members."""
-    overrides = _values(changes, "--set")
-    if seed is not None:
-        overrides["seed"] = seed
-    if members is not None:
-        overrides["ensemble.members"] = members
-    return overrides
+    given = {"seed": seed, "ensemble.members": members}
+    return _values(changes, "--set") | {key: value for key, value in given.items() if value is not None}
 
 
-def progress_bar(total: int) -> Any:
+@contextlib.contextmanager
+def progress_bar(total: int) -> Iterator[Callable[[int], None]]:
     """A context that gives a callback taking member-steps: a bar on a terminal, else a line every half minute."""
-
-    @contextlib.contextmanager
-    def bar() -> Any:
+    if sys.stderr.isatty() and sys.stdout.isatty():
         from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
         shown = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f}%"))
         with Progress(*shown, TimeRemainingColumn(), transient=True) as progress:
             task = progress.add_task("member-steps", total=total)
             yield lambda done: progress.advance(task, done)
+        return
+    so_far, said = 0, time.monotonic()
 
-    @contextlib.contextmanager
-    def lines() -> Any:
-        state = {"done": 0, "said": time.monotonic()}
+    def advance(done: int) -> None:
+        nonlocal so_far, said
+        so_far += done
+        if time.monotonic() - said > 30.0:
+            said = time.monotonic()
+            click.echo(f"{100 * so_far / total:.0f} % of {total:,} member-steps", err=True)
 
-        def advance(done: int) -> None:
-            state["done"] += done
-            if time.monotonic() - state["said"] > 30.0:
-                state["said"] = time.monotonic()
-                click.echo(f"{100 * state['done'] / total:.0f} % of {total:,} member-steps", err=True)
-
-        yield advance
-
-    return bar() if sys.stderr.isatty() and sys.stdout.isatty() else lines()
-
-
-def _show_table(path: Path) -> None:
-    import xarray
-
-    with xarray.open_dataset(path) as dataset:
-        _print_tables(dataset)
+    yield advance
 
 
 def _print_tables(dataset: Any, most: int = _ROWS) -> None:
@@ -191,14 +171,12 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
         shown.add_row(*row.values())
     console = Console(highlight=False, markup=False, emoji=False)
     wide = console.options.update(max_width=10_000)
-    console.width = max(
-        console.width, console.measure(shown, options=wide).maximum
-    )  # a number cut short is a wrong one
+    console.width = max(console.width, console.measure(shown, options=wide).maximum)  # no number is cut short
     console.print(shown)
 
 
 @cli.command()
-@click.argument("scenario", type=click.Path(path_type=Path))
+@click.argument("scenario", type=_PATH)
 @_SET
 def check(scenario: Path, changes: tuple[str, ...]) -> None:
     """Print what a scenario would run: quantities in SI, models, errors known beforehand, time, memory, file size."""
@@ -209,10 +187,10 @@ def check(scenario: Path, changes: tuple[str, ...]) -> None:
 
 
 @cli.command()
-@click.argument("output", type=click.Path(path_type=Path))
+@click.argument("output", type=_PATH)
 @_WHERE
 @click.option("--all", "whole", is_flag=True, help="Every row: all times and sweep values.")
-@click.option("--csv", type=click.Path(path_type=Path), help="Also write every time and sweep value to this CSV file.")
+@click.option("--csv", type=_PATH, help="Also write every time and sweep value to this CSV file.")
 def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None) -> None:
     """Ensemble statistics over time and sweep."""
     from sim import analysis
@@ -238,9 +216,9 @@ class _Plot(click.Command):
 
 
 @cli.command(cls=_Plot)
-@click.argument("output", type=click.Path(path_type=Path))
+@click.argument("output", type=_PATH)
 @click.argument("kind", required=False)
-@click.option("-o", "--picture", type=click.Path(path_type=Path), help="The picture; default beside the dataset.")
+@click.option("-o", "--picture", type=_PATH, help="The picture; default beside the dataset.")
 @_WHERE
 def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str, ...]) -> None:
     """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset."""
@@ -262,33 +240,26 @@ def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str
 @contextlib.contextmanager
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """A dataset of ours, at chosen values of its sweep, or one message."""
+    from sim import analysis
     from sim.analysis import scene
     from sim.units.refusals import BadInput
 
     with scene.open(path) as dataset:
         try:
-            yield _chosen(path, dataset, chosen) if chosen else dataset
+            found = analysis.where(dataset, _values(chosen, "--where"))
+        except ValueError as fault:
+            _fail(f"{path}: --where {fault}", BAD_INPUT)
+        try:
+            yield found
         except RuntimeError as trouble:
             if "NetCDF" not in str(trouble):
                 raise
             raise BadInput([f"{path}: {scene.BROKEN}"]) from None
 
 
-def _chosen(path: Path, dataset: Any, chosen: tuple[str, ...]) -> Any:
-    """The dataset where its swept keys have the values of --where."""
-    from sim import analysis
-
-    try:
-        return analysis.where(dataset, _values(chosen, "--where"))
-    except ValueError as fault:
-        _fail(f"{path}: --where {fault}", BAD_INPUT)
-
-
 @cli.command()
-@click.argument("scenario", type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The netCDF file; default outputs/<name>-converge.nc."
-)
+@click.argument("scenario", type=_PATH)
+@click.option("-o", "--output", type=_PATH, help="The netCDF file; default outputs/<name>-converge.nc.")
 @click.option("--budget", default="60 s", show_default=True, help="Computing time to share over the settings.")
 @click.option("--tolerance", help="Error that is accepted, such as 1 %; default that of the scene.")
 @_SET
@@ -344,7 +315,7 @@ def paper() -> None:
 
 
 @cli.command()
-@click.argument("name", default="first.toml", type=click.Path(path_type=Path))
+@click.argument("name", default="first.toml", type=_PATH)
 def new(name: Path) -> None:
     """Write a commented starter scenario."""
     from importlib.resources import files

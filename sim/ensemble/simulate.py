@@ -33,9 +33,13 @@ Progress = Callable[[int], None]
 class OutputExists(FileExistsError):
     """The output is there already and was not to be replaced."""
 
+    exit_code = 73
+
 
 class OutputBusy(RuntimeError):
     """Another run is writing this output."""
+
+    exit_code = 75
 
 
 def run(

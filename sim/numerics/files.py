@@ -36,6 +36,8 @@ HDF5 = _Lock()
 class StoreTrouble(OSError):
     """Disk or file error; the message names the folder and the reason."""
 
+    exit_code = 74
+
 
 def write_whole(path: Path, content: memoryview | bytes) -> None:
     """Write a file whole or not at all: beside its place, to disk, then renamed."""

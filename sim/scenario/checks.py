@@ -174,6 +174,6 @@ def remarks_between(
         said.append(
             f"the rms of the fluctuations exceeds {_MOST_REVERSED} of the mean stress: patches of reversed friction"
         )
-    if varies and contact.course.lowest < 0.0:
+    if varies and min(contact.course.extremes) < 0.0:
         said.append("under tension detachment is a first passage: take clock steps well below the correlation")
     return said

@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
@@ -38,34 +38,6 @@ class Piece(NamedTuple):
     path: float
 
 
-class Prescribed(Protocol):
-    """A value prescribed over a run of ``duration`` [s].
-
-    ``changes`` says whether it depends on time, ``cycles`` counts its ways there and back, and ``end`` [s] is the last
-    time for which it is given.
-    """
-
-    @property
-    def changes(self) -> bool: ...
-    @property
-    def cycles(self) -> int: ...
-    @property
-    def end(self) -> float: ...
-    @property
-    def lowest(self) -> float:
-        """The least value of the run."""
-
-    @property
-    def highest(self) -> float:
-        """The largest value of the run."""
-
-    def at(self, time: float, duration: float) -> float:
-        """The value at a time [s]; where it jumps, that after the jump."""
-
-    def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
-        """The way from one time to another [s], cut where the value turns or jumps; at least one piece."""
-
-
 def linear_piece(start: float, stop: float, first: float, last: float) -> Piece:
     """A piece in which the value changes linearly."""
     integral = 0.5 * (first + last) * (stop - start)
@@ -76,7 +48,11 @@ def linear_piece(start: float, stop: float, first: float, last: float) -> Piece:
 
 
 class Number(NamedTuple):
-    """A value that stays."""
+    """A value that stays.
+
+    As of every prescribed value ``changes`` is whether it depends on time, ``cycles`` counts its ways there and back,
+    and ``end`` [s] is the last time for which it is given.
+    """
 
     value: float
     changes: bool = False
@@ -84,17 +60,16 @@ class Number(NamedTuple):
     end: float = math.inf
 
     @property
-    def lowest(self) -> float:
-        return self.value
-
-    @property
-    def highest(self) -> float:
-        return self.value
+    def extremes(self) -> tuple[float, ...]:
+        """Values among which are the least and the largest of the run."""
+        return (self.value,)
 
     def at(self, time: float, duration: float) -> float:
+        """The value at a time [s] of a run of ``duration`` [s]; where it jumps, that after the jump."""
         return self.value
 
     def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
+        """The way from one time to another [s], cut where the value turns or jumps; at least one piece."""
         return [linear_piece(start, stop, self.value, self.value)]
 
 
@@ -124,12 +99,8 @@ class Course:
         return self
 
     @property
-    def lowest(self) -> float:
-        return min(self.start, self.stop)
-
-    @property
-    def highest(self) -> float:
-        return max(self.start, self.stop)
+    def extremes(self) -> tuple[float, ...]:
+        return self.start, self.stop
 
     def at(self, time: float, duration: float) -> float:
         part = time / duration if duration > 0.0 else 0.0
@@ -235,12 +206,8 @@ class Table:
         return np.array(self.time), np.array(self.values)
 
     @property
-    def lowest(self) -> float:
-        return min(self.values)
-
-    @property
-    def highest(self) -> float:
-        return max(self.values)
+    def extremes(self) -> tuple[float, ...]:
+        return self.values
 
     @property
     def end(self) -> float:
@@ -282,6 +249,10 @@ def held(unit: Quantity, name: str) -> Any:
 
     number, course = Annotated[float, unit, Tag("[value]")], Annotated[_Course, Tag("[course]")]
     return Annotated[number | course | Annotated[_Table, Tag("[table]")], Discriminator(_kind)]
+
+
+#: A value prescribed over a run.
+Prescribed = Number | Course | Table
 
 
 def prescribed(given: float | Course | Table) -> Prescribed:

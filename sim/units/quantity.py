@@ -8,6 +8,7 @@ the JSON schema, the netCDF attributes and ``sim check``. SI inside, always.
 import difflib
 import functools
 import math
+import operator
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -32,6 +33,13 @@ _TYPESET = str.maketrans("−·⋅×⁄⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-***/-0
 # Beyond these nothing is measurable, and products of a few such numbers leave the range of floats.
 _LARGEST, _SMALLEST = 1e60, 1e-60
 
+#: Each bound of a quantity: its name in a JSON schema, and how a number within it compares.
+_BOUNDS = {
+    "above": ("exclusiveMinimum", operator.gt),
+    "at_least": ("minimum", operator.ge),
+    "below": ("exclusiveMaximum", operator.lt),
+    "at_most": ("maximum", operator.le),
+}
 _TYPICAL = {
     "m": "2 mm",
     "Pa": "1.6 MPa",
@@ -189,63 +197,63 @@ class Quantity:
             return self._integer(value)
         number = self._parse(value) if isinstance(value, str) else self._number(value)
         if not math.isfinite(number):
-            raise PydanticCustomError("not_finite", "must be finite; write for example {example}", self._about())
+            raise self._fault("not_finite", "must be finite; write for example {example}")
         self._check(number)
         return number
+
+    def _fault(self, kind: str, said: str, **words: str) -> PydanticCustomError:
+        """A fault in these words, with those about the quantity itself filled in."""
+        pure = self.unit == "1"
+        wanted = "a number" if pure else "a number or text with a unit"
+        own = {"unit": "" if pure else f" {self.unit}", "kind": wanted, "example": self.example, "wanted": self.wanted}
+        return PydanticCustomError(kind, said, own | words)
 
     def _integer(self, value: Any) -> int:
         whole = hasattr(value, "__index__") or (isinstance(value, float) and value.is_integer())
         if isinstance(value, bool) or not whole:
-            given = f"{value:g}" if isinstance(value, float) else in_words(value)
-            about = {"given": f'"{value[:40]}"' if isinstance(value, str) else given, **self._about()}
-            text = "must be a whole number such as {example}, not {given}"
-            raise PydanticCustomError("not_a_quantity", text, about)
+            given = f'"{value[:40]}"' if isinstance(value, str) else in_words(value)
+            given = f"{value:g}" if isinstance(value, float) else given
+            raise self._fault("not_a_quantity", "must be a whole number such as {example}, not {given}", given=given)
         self._check(int(value))
         return int(value)
 
     def _number(self, value: Any) -> float:
         if isinstance(value, bool) or not hasattr(value, "__float__"):
-            about = {"given": in_words(value), **self._about()}
-            raise PydanticCustomError("not_a_quantity", "must be {kind} such as {example}, not {given}", about)
+            said = "must be {kind} such as {example}, not {given}"
+            raise self._fault("not_a_quantity", said, given=in_words(value))
         try:
             return float(value)
         except (OverflowError, TypeError, ValueError):
-            raise PydanticCustomError("too_large", "is too large; write for example {example}", self._about()) from None
+            raise self._fault("too_large", "is too large; write for example {example}") from None
 
     def _parse(self, text: str) -> float:
         match = _read_text(text)
         if match is None or (match["unit"] and _COMMA.match(text)):
             cure = "write decimals with a point" if _COMMA.match(text) else "write a number"
-            if self.unit != "1":
-                cure += " and a unit"
-            raise PydanticCustomError(
-                "not_a_quantity",
-                'cannot be read: "{text}"; {cure}, such as {example}',
-                {"text": text[:40], "cure": cure, **self._about()},
+            cure += "" if self.unit == "1" else " and a unit"
+            raise self._fault(
+                "not_a_quantity", 'cannot be read: "{text}"; {cure}, such as {example}', text=text[:40], cure=cure
             )
         number = float(match["number"])
         if match["unit"] is not None:
             return _times(number, self._factor(match["unit"]))
         if self.unit != "1" and math.isfinite(number):
             said = "is text without a unit; write for example {example}, or a bare number in {wanted}"
-            raise PydanticCustomError("no_unit", said, {"wanted": self.wanted, **self._about()})
+            raise self._fault("no_unit", said)
         return number
 
     def _factor(self, given: str) -> float:
         """Factor from a unit's text to SI."""
-        about = {"given": given[:40], "wanted": self.wanted, **self._about()}
         try:
             scale = _scale(_written(given), self.unit)
         except ValueError:
             near = self._near(given)
-            if near:
-                text = 'has the unknown unit "{given}"; did you mean "{near}"?'
-                raise PydanticCustomError("unknown_unit", text, {"near": near, **about}) from None
-            text = 'has the unknown unit "{given}"; write for example {example}'
-            raise PydanticCustomError("unknown_unit", text, about) from None
+            cure = f'did you mean "{near}"?' if near else f"write for example {self.example}"
+            said = 'has the unknown unit "{given}"; {cure}'
+            raise self._fault("unknown_unit", said, given=given[:40], cure=cure) from None
         if scale is None:
-            text = 'has the unit "{given}", which is not a unit of {wanted}; write for example {example}'
-            raise PydanticCustomError("wrong_dimension", text, about)
+            said = 'has the unit "{given}", which is not a unit of {wanted}; write for example {example}'
+            raise self._fault("wrong_dimension", said, given=given[:40])
         return scale
 
     def _near(self, given: str) -> str | None:
@@ -257,36 +265,20 @@ class Quantity:
         return next(iter(same or difflib.get_close_matches(given, known, 1, 0.7)), None)
 
     def _check(self, number: float) -> None:
-        for wrong, text, bound in (
-            (not number > self.above, "above", self.above),
-            (not number >= self.at_least, "at least", self.at_least),
-            (not number < self.below, "below", self.below),
-            (not number <= self.at_most, "at most", self.at_most),
-        ):
-            if wrong:
-                raise PydanticCustomError(
-                    "out_of_bounds",
-                    "must be {text} {bound}{unit}, not {number}{unit}",
-                    {"text": text, "bound": _digits(bound), "number": _digits(number), **self._about()},
-                )
+        for name, bound in self._bounds.items():
+            if not _BOUNDS[name][1](number, bound):
+                said = "must be {text} {bound}{unit}, not {number}{unit}"
+                text = name.replace("_", " ")
+                raise self._fault("out_of_bounds", said, text=text, bound=_digits(bound), number=_digits(number))
         if abs(number) > _LARGEST or (self.above >= 0.0 and number < _SMALLEST):
+            said = "is too {size} to be real: {number}{unit}; write for example {example}"
             size = "large" if abs(number) > 1.0 else "small"
-            raise PydanticCustomError(
-                "beyond_measure",
-                "is too {size} to be real: {number}{unit}; write for example {example}",
-                {"size": size, "number": f"{number:g}", **self._about()},
-            )
+            raise self._fault("beyond_measure", said, size=size, number=f"{number:g}")
 
     @property
     def wanted(self) -> str:
         """The unit in words, for messages."""
         return "a pure number" if self.unit == "1" else self.unit
-
-    def _about(self) -> dict[str, Any]:
-        pure = self.unit == "1"
-        unit = "" if pure else f" {self.unit}"
-        kind = "a number" if pure else "a number or text with a unit"
-        return {"unit": unit, "kind": kind, "example": self.example}
 
     @property
     def example(self) -> str:
@@ -302,8 +294,12 @@ class Quantity:
         inside = next((number for number in (*usual, *bounds) if self._holds(number)), 1.0)
         return f"{inside:g}" if self.unit == "1" else f'"{inside:g} {self.unit}"'
 
+    @property
+    def _bounds(self) -> dict[str, float]:
+        return {name: getattr(self, name) for name in _BOUNDS}
+
     def _holds(self, number: float) -> bool:
-        return self.above < number < self.below and self.at_least <= number <= self.at_most
+        return all(_BOUNDS[name][1](number, bound) for name, bound in self._bounds.items())
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         kind = int if self.whole else float
@@ -315,12 +311,6 @@ class Quantity:
         described: dict[str, Any] = {"type": ["number", "string"], "description": f"{self.meaning} [{self.unit}]"}
         if self.whole:
             described = {"type": "integer", "description": self.meaning}
-        bounds = {
-            "exclusiveMinimum": self.above,
-            "minimum": self.at_least,
-            "exclusiveMaximum": self.below,
-            "maximum": self.at_most,
-        }
-        described |= {name: bound for name, bound in bounds.items() if math.isfinite(bound)}
+        described |= {_BOUNDS[name][0]: bound for name, bound in self._bounds.items() if math.isfinite(bound)}
         example: Any = self.example.strip('"')
         return described | {"examples": [64 if self.whole else float(example) if self.unit == "1" else example]}

@@ -89,7 +89,7 @@ class _Controlled:
                 f"the contact is open for the whole run: raise contact.{self.kind} to zero, where the sphere touches"
             )
             jumps = f"the contact begins open and jumps in where contact.{self.kind} first reaches zero"
-            said.append(jumps if self.course.highest >= 0.0 else never)
+            said.append(jumps if max(self.course.extremes) >= 0.0 else never)
         return said
 
     @cached_property
@@ -154,7 +154,7 @@ class _Controlled:
     ) -> tuple[np.ndarray, ...]:
         """Phases of the reference contacts after a step."""
         phases = state.whole, state.bonded, state.stressless, state.settled
-        if self.course.lowest >= 0.0:
+        if min(self.course.extremes) >= 0.0:
             return phases
         if control.closes:
             stay_open = self.after_pull_off != "reattach"
