@@ -1,6 +1,8 @@
 """Conditions that hold between the parts of a scenario."""
 
+import inspect
 import math
+from collections.abc import Callable, Iterator
 from typing import Any, cast
 
 import numpy as np
@@ -19,6 +21,7 @@ from sim.scenario.clock import Clock, Ensemble, Record
 from sim.spectrum.bond_made import BondMade
 
 _STEPS_A_CYCLE = 2
+_TOO_SHORT = "the table ends at {:g} s, before clock.duration ({:g} s); add rows or shorten the run"
 
 
 def rest_radius(solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> float:
@@ -26,7 +29,7 @@ def rest_radius(solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Conta
     return float(contact.equilibrium_radius(work, sphere.radius, solid.contact_modulus)[0])
 
 
-Faults = list[tuple[tuple[str, ...], str]]
+Faults = Iterator[tuple[tuple[str, ...], str]]
 
 
 def faults_across(parts: dict[str, Any]) -> Faults:
@@ -36,118 +39,97 @@ def faults_across(parts: dict[str, Any]) -> Faults:
         try:
             chosen = parts["shear"].chosen(record is not None and bool(record.maps))
         except (PydanticCustomError, ValidationError) as fault:
-            text = fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
-            return [(("shear",), text)]
+            yield ("shear",), fault.message() if isinstance(fault, PydanticCustomError) else fault.errors()[0]["msg"]
+            return
         parts = parts | {"shear": chosen}
     if "bonds" in parts:
         held = [parts[name] for name in ("solid", "sphere", "adhesion", "contact") if name in parts]
         radius = rest_radius(*held) if len(held) == 4 else math.nan
         forces = "shear" in parts and parts["shear"].spectrum.bond_made
         parts = parts | {"bonds": parts["bonds"].chosen(math.pi * radius**2, forces)}
-    return [
-        fault
-        for reads, check in _CHECKS
-        if all(name in parts for name in reads)
-        for fault in check(*(parts[name] for name in reads))
-    ]
+    for check, reads in _CHECKS.items():
+        if all(name in parts for name in reads):
+            yield from check(*(parts[name] for name in reads))
 
 
 def _table_too_short(drive: Drive, clock: Clock) -> Faults:
     if drive.end < clock.duration * (1 - 1e-9):
-        said = f"the table ends at {drive.end:g} s, before clock.duration ({clock.duration:g} s)"
-        return [(("drive",), f"{said}; add rows or shorten the run")]
-    return []
+        yield ("drive",), _TOO_SHORT.format(drive.end, clock.duration)
 
 
 def _no_adhesion(contact: Contact, adhesion: Adhesion) -> Faults:
     if contact.lags and not adhesion.work > 0.0:
         said = "a rate-dependent edge measures its drive by the work of adhesion at rest; give a work above zero"
-        return [(("adhesion", "work"), said)]
-    return []
+        yield ("adhesion", "work"), said
 
 
 def _control_too_short(contact: Contact, clock: Clock) -> Faults:
     if contact.course.end < clock.duration * (1 - 1e-9):
-        said = f"the table ends at {contact.course.end:g} s, before clock.duration ({clock.duration:g} s)"
-        return [(("contact", contact.kind), f"{said}; add rows or shorten the run")]
-    if clock.steps < _STEPS_A_CYCLE * contact.course.cycles:
+        yield ("contact", contact.kind), _TOO_SHORT.format(contact.course.end, clock.duration)
+    elif clock.steps < _STEPS_A_CYCLE * contact.course.cycles:
         said = f"fewer than {_STEPS_A_CYCLE} of the {clock.steps} clock steps for a cycle"
-        return [(("contact", contact.kind, "cycles"), f"{said}; make fewer cycles or shorter steps")]
-    return []
+        yield ("contact", contact.kind, "cycles"), f"{said}; make fewer cycles or shorter steps"
 
 
 def _no_stress(shear: Model, bonds: BondModel) -> Faults:
     if shear.reads_stress and not bonds.carries_stress and not shear.spectrum.bond_made:
         said = 'amplitude model "stress" follows the stress of the bonds, which is 0 Pa; give bonds.stress'
-        return [(("shear", "amplitude"), said)]
-    return []
+        yield ("shear", "amplitude"), said
 
 
 def _no_forces(shear: Model, bonds: BondModel, solid: Solid) -> Faults:
     if not shear.spectrum.bond_made:
-        return []
+        return
     if not bonds.knows_forces:
         said = 'the spectrum that bonds make needs the force of each bond; use bonds.model = "cohort" or "tracked"'
-        return [(("shear", "spectrum"), said)]
+        yield ("shear", "spectrum"), said
+        return
     stiffest = cast(BondMade, shear.spectrum).stiffest(*solid.effective)
     if cast(Cohort | Tracked, bonds).bond_stiffness > stiffest * (1.0 + 1e-9):
         said = f"the half-space under a bond of this footprint yields with {stiffest:.3g} N/m, in series with the bond"
-        return [(("bonds", "bond_stiffness"), f"{said}: give at most that, or a larger shear.spectrum.footprint")]
-    return []
+        yield ("bonds", "bond_stiffness"), f"{said}: give at most that, or a larger shear.spectrum.footprint"
 
 
 def _no_maps(record: Record, shear: Model) -> Faults:
     if record.maps and not shear.draws_maps:
-        return [(("record", "maps"), 'needs shear.model = "mapped"; choose it or leave the maps out')]
-    return []
+        yield ("record", "maps"), 'needs shear.model = "mapped"; choose it or leave the maps out'
 
 
 def _unrecorded_maps(record: Record, clock: Clock) -> Faults:
-    faults: Faults = []
     between = clock.step * clock.stride
     for time in record.maps:
         ratio = time / between
         if time > clock.duration * (1 + 1e-9) or abs(ratio - round(ratio)) > 1e-9 * max(ratio, 1.0):
             said = f"{time:g} s is none of the recorded times; choose whole multiples of {between:g} s"
-            faults.append((("record", "maps"), f"{said} up to {clock.duration:g} s"))
-    return faults[:1]
+            yield ("record", "maps"), f"{said} up to {clock.duration:g} s"
+            return
 
 
 def _too_many_map_members(record: Record, ensemble: Ensemble) -> Faults:
     if record.map_members > ensemble.members:
         said = f"is more than ensemble.members ({ensemble.members}); lower it or add members"
-        return [(("record", "map_members"), said)]
-    return []
+        yield ("record", "map_members"), said
 
 
 def _shear_faults(shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> Faults:
     radius = rest_radius(solid, sphere, adhesion, contact)
     if not shear.side(math.sqrt(math.pi) * radius) > 0.0:
-        return _open_at_rest(contact, sphere, adhesion)
-    found = shear.faults(*solid.effective, radius)
-    return [(("shear", key) if key else ("shear",), said) for key, said in found]
+        limit = f" of {jkr.pull_off_load(adhesion.work, sphere.radius):.3g} N" if contact.kind == "load" else ""
+        said = f"is beyond pull-off{limit} at the start, so that there is no contact at rest to size the cell of shear"
+        yield ("contact", contact.kind), f'{said} by; hold the sphere closer, or give shear.cell such as "0.2 mm"'
+    else:
+        found = shear.faults(*solid.effective, radius)
+        yield from ((("shear", key) if key else ("shear",), said) for key, said in found)
 
 
-def _open_at_rest(contact: Contact, sphere: Sphere, adhesion: Adhesion) -> Faults:
-    """What holds the sphere leaves no contact at rest, which the cell is sized by."""
-    limit = f" of {jkr.pull_off_load(adhesion.work, sphere.radius):.3g} N" if contact.kind == "load" else ""
-    said = f"is beyond pull-off{limit} at the start, so that there is no contact at rest to size the cell of shear by"
-    return [(("contact", contact.kind), f'{said}; hold the sphere closer, or give shear.cell such as "0.2 mm"')]
-
-
-_CHECKS: tuple[tuple[tuple[str, ...], Any], ...] = (
-    (("drive", "clock"), _table_too_short),
-    (("contact", "clock"), _control_too_short),
-    (("shear", "bonds"), _no_stress),
-    (("shear", "bonds", "solid"), _no_forces),
-    (("contact", "adhesion"), _no_adhesion),
-    (("record", "shear"), _no_maps),
-    (("record", "clock"), _unrecorded_maps),
-    (("record", "ensemble"), _too_many_map_members),
-    (("shear", "solid", "sphere", "adhesion", "contact"), _shear_faults),
-)
+#: Each check with the names of the parts that it reads.
+_CHECKS: dict[Callable[..., Faults], tuple[str, ...]] = {
+    check: tuple(inspect.signature(check).parameters)
+    for check in (_table_too_short, _control_too_short, _no_stress, _no_forces, _no_adhesion, _no_maps)
+    + (_unrecorded_maps, _too_many_map_members, _shear_faults)
+}
 #: The parts that the checks read.
-CHECKED = sorted({name for reads, _ in _CHECKS for name in reads})
+CHECKED = sorted({name for reads in _CHECKS.values() for name in reads})
 
 #: Rms of the fluctuations over the mean stress that is remarked on: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5

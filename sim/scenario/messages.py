@@ -27,13 +27,11 @@ _NO_TABLE = ("dataclass_type", "dataclass_exact_type", "model_attributes_type", 
 _BUILT_IN = frozenset(get_args(core_schema.ErrorType)) - {"value_error"}
 _FILES = ("table", "bad_table", "no_table", "file_unreadable", "file_not_text")
 _EXCLUSIVE = ("control", "one_modulus")
+#: What a value must be, by the beginning of the kind of its error.
 _KINDS = {
-    "bool_type": "true or false, without quotes",
-    "bool_parsing": "true or false, without quotes",
-    "string_type": "text in quotes",
-    "string_unicode": "text in quotes",
-    "tuple_type": 'a list such as ["1 s", "2 s"]',
-    "list_type": 'a list such as ["1 s", "2 s"]',
+    "bool": "true or false, without quotes",
+    "string": "text in quotes",
+    "tuple": 'a list such as ["1 s", "2 s"]',
 }
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -188,10 +186,10 @@ def _worded(root: type, error: ErrorDetails) -> Fault:
 def _value_fault(error: ErrorDetails) -> str:
     """What is wrong with a plain value; kinds that are not pydantic's own come with their words."""
     kind = error["type"]
-    if kind in _KINDS:
-        return f"must be {_KINDS[kind]}, not {shown(error['input'])}"
     if kind == "string_too_long":
         return f"is longer than {error['ctx']['max_length']} characters; shorten it"
+    if kind in _BUILT_IN and kind.partition("_")[0] in _KINDS:
+        return f"must be {_KINDS[kind.partition('_')[0]]}, not {shown(error['input'])}"
     if kind in _BUILT_IN:
         return "has a value that cannot be used here; `sim schema` lists what can"
     return error["msg"].removeprefix("Value error, ")

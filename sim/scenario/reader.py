@@ -65,9 +65,9 @@ def load(
     found, wrong = _validated(document, files, axes, source)
     wrong = astray + _under_new_models(wrong, place.overrides)
     wrong += [Fault(("sweep", *where), said) for where, said in unfit]
-    wrong += _row_faults(document, files, axes, wrong, zipped=isinstance(sweep, list))
-    if found is not None and not wrong:
-        wrong = _point_faults(found)
+    if found is None or wrong or (wrong := _point_faults(found)):  # then the values that are wrong in themselves
+        rows = _row_faults(document, files, axes, wrong, zipped=isinstance(sweep, list))
+        wrong = rows if found is not None and rows else wrong + rows
     if found is None or wrong:
         raise BadInput(place.problems(wrong))
     return found
@@ -130,29 +130,25 @@ def _row_faults(
             for key, value in zip(axis.keys, row, strict=True):
                 set_key(changed, key, value)
             for fault in _validated(changed, files)[1]:
-                # a table whose name is misspelt lacks its keys: that has been told
-                told = any(fault.path[:length] in meant for length in range(1, len(fault.path) + 1))
-                if fault not in known and not told:
+                # a table whose name is misspelt lacks its keys: that is one fault
+                lacking = any(fault.path[:length] in meant for length in range(1, len(fault.path) + 1))
+                if fault not in known and not lacking:
                     places.setdefault(fault, []).append(place)
         found += [_swept(fault, axis, several, zipped) for fault, several in places.items()]
     return found
 
 
 def _swept(fault: Fault, axis: Axis, places: list[int], zipped: bool) -> Fault:
-    """A fault of some values of a sweep, told where the first of them stands."""
+    """A fault of some values of a sweep, placed at the first of them."""
     paths = {key: tuple(key.split(".")) for key in axis.keys}
     inside = (
-        key for key, path in paths.items() if fault.path[: len(path)] == path or path[: len(fault.path)] == fault.path
+        key for key, path in paths.items() if all(one == other for one, other in zip(path, fault.path, strict=False))
     )
     key = next(inside, axis.keys[0])
     if fault.kind in ("unknown", "renamed") and paths[key][: len(fault.path)] == fault.path:
-        meant = (*fault.near, *paths[key][len(fault.path) :])
-        asked = (
-            f'is now called "{dotted(meant)}"'
-            if fault.kind == "renamed"
-            else f'is not a key; did you mean "{dotted(meant)}"?'
-        )
-        return Fault(("sweep", key), asked if fault.near else fault.said, fault.kind)
+        meant = dotted((*fault.near, *paths[key][len(fault.path) :]))
+        said = f'is now called "{meant}"' if fault.kind == "renamed" else f'is not a key; did you mean "{meant}"?'
+        return Fault(("sweep", key), said if fault.near else fault.said, fault.kind)
     value = axis.values[places[0]][axis.keys.index(key)]
     split = number_and_unit(value)
     written = f"{split[0]:g} {split[1]}".strip() if split else shown(value)

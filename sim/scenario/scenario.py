@@ -213,12 +213,7 @@ class Scenario:
         """For each part whether its values differ between members: by its class, never by looking."""
         bonded = self.population.per_member
         sheared = self.fluctuations.per_member or (self.fluctuations.reads_stress and bonded)
-        return {
-            "drive": self.drive.per_member,
-            "bonds": bonded,
-            "shear": sheared,
-            "contact": bonded or sheared,
-        }
+        return {"drive": self.drive.per_member, "bonds": bonded, "shear": sheared, "contact": bonded or sheared}
 
     def remarks(self) -> list[str]:
         """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""

@@ -1,7 +1,9 @@
 """Tables from CSV text: named columns with units in the header, and the files that hold them."""
 
+import contextlib
 import csv
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -167,32 +169,27 @@ def file_text(name: str, context: Any) -> str:
     PydanticCustomError
         If the file cannot be read, with the reason and a cure.
     """
-    try:
-        if context and "files" in context:
-            return context["files"].text(name)
-        return Path(name).read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise PydanticCustomError(
-            "file_not_text", "{file} is not UTF-8 text; save it as plain CSV in UTF-8", {"file": name}
-        ) from None
-    except (OSError, ValueError) as fault:
-        raise _unreadable(name, fault) from None
+    with _readable(name):
+        return context["files"].text(name) if context and "files" in context else Path(name).read_text("utf-8")
 
 
 def file_path(name: str, context: Any) -> Path:
     """Where a file that a scenario names lies; arguments and errors as ``file_text``."""
-    try:
+    with _readable(name):
         path = context["files"].path(name) if context and "files" in context else Path(name)
         path.open("rb").close()
+        return path
+
+
+@contextlib.contextmanager
+def _readable(name: str) -> Iterator[None]:
+    """A context in which trouble with a file that a scenario names is a fault of the scenario."""
+    try:
+        yield
+    except UnicodeDecodeError:
+        said = "{file} is not UTF-8 text; save it as plain CSV in UTF-8"
+        raise PydanticCustomError("file_not_text", said, {"file": name}) from None
     except (OSError, ValueError) as fault:
-        raise _unreadable(name, fault) from None
-    return path
-
-
-def _unreadable(name: str, fault: Exception) -> PydanticCustomError:
-    reason = getattr(fault, "strerror", None) or str(fault) or "not found"
-    return PydanticCustomError(
-        "file_unreadable",
-        "{file} cannot be read ({reason}); give a path relative to the scenario",
-        {"file": name[:200], "reason": reason},
-    )
+        about = {"file": name[:200], "reason": getattr(fault, "strerror", None) or str(fault) or "not found"}
+        said = "{file} cannot be read ({reason}); give a path relative to the scenario"
+        raise PydanticCustomError("file_unreadable", said, about) from None

@@ -64,8 +64,22 @@ class _Model:
     amplitude: Amplitude
     paid_by_adhesion: float
     contact: str
+    mode_amplitudes: str = "gaussian"
     #: Relative error of the energy on a disc that needs no remark.
     tolerance: float = 0.01
+
+    @model_validator(mode="after")
+    def _what_sets_the_size(self) -> Self:
+        fixed = self.mode_amplitudes == "fixed"
+        if fixed and self.amplitude.relaxing:
+            said = 'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false'
+            raise PydanticCustomError("fixed_cannot_relax", said)
+        if self.spectrum.bond_made and self.amplitude.model != "constant":
+            raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
+        if self.spectrum.bond_made and fixed:
+            said = 'bonds at random places make mode_amplitudes = "gaussian"; leave it out'
+            raise PydanticCustomError("bond_made", said)
+        return self
 
     @property
     def reads_stress(self) -> bool:
@@ -137,16 +151,6 @@ class Uniform(_Model):
         return SmoothProcess(0.0, Constant())
 
 
-def _bonds_set_the_size(spectrum: Spectrum, amplitude: Amplitude, mode_amplitudes: str) -> None:
-    """Refuse what a field that bonds make cannot follow."""
-    if not spectrum.bond_made:
-        return
-    if amplitude.model != "constant":
-        raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
-    if mode_amplitudes == "fixed":
-        raise PydanticCustomError("bond_made", 'bonds at random places make mode_amplitudes = "gaussian"; leave it out')
-
-
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Mean(_Model):
     """The ensemble mean of ΔΓ on the infinite plane, in closed form. Limit: uniform as rms -> 0."""
@@ -162,11 +166,8 @@ class Mean(_Model):
     @model_validator(mode="after")
     def _no_memory(self) -> "Mean":
         if self.amplitude.relaxing:
-            raise PydanticCustomError(
-                "mean_has_no_memory",
-                'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"',
-            )
-        _bonds_set_the_size(self.spectrum, self.amplitude, "gaussian")
+            said = 'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"'
+            raise PydanticCustomError("mean_has_no_memory", said)
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
@@ -225,16 +226,6 @@ class _Fluctuating(_Model):
             return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes, of which {_MOST_PAIRS:.2g} can be kept"
         return ""
 
-    @model_validator(mode="after")
-    def _fixed_cannot_relax(self) -> "_Fluctuating":
-        if self.mode_amplitudes == "fixed" and self.amplitude.relaxing:
-            raise PydanticCustomError(
-                "fixed_cannot_relax",
-                'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false',
-            )
-        _bonds_set_the_size(self.spectrum, self.amplitude, self.mode_amplitudes)
-        return self
-
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Modal(_Fluctuating):
@@ -275,10 +266,8 @@ class Mapped(Modal):
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
         process = super().process(shear_modulus, poisson_ratio, cell)
         if not process.modes.on_lattice:
-            raise PydanticCustomError(
-                "off_lattice",
-                "a map is periodic: make the cell a whole number of wavelengths along x and along y",
-            )
+            said = "a map is periodic: make the cell a whole number of wavelengths along x and along y"
+            raise PydanticCustomError("off_lattice", said)
         return process
 
 
@@ -300,9 +289,8 @@ class Banded(_Fluctuating):
     @model_validator(mode="after")
     def _not_of_bonds(self) -> "Banded":
         if self.spectrum.bond_made:
-            raise PydanticCustomError(
-                "bond_made", 'the frozen part of a field that bonds make has no bands; use model = "mean" or "modal"'
-            )
+            said = 'the frozen part of a field that bonds make has no bands; use model = "mean" or "modal"'
+            raise PydanticCustomError("bond_made", said)
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
