@@ -4,7 +4,7 @@ import contextlib
 import difflib
 import functools
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar, cast, get_args
 
@@ -139,17 +139,19 @@ def _unknown(root: type, error: ErrorDetails, document: dict[str, Any]) -> Fault
         given: Any = functools.reduce(lambda table, step: table[step], place.path, cast(Any, document))
         other = next((name for name in given if name in known and name not in keys(having[0])), "model")
         return Fault(path, f"does not go with {other}; leave one of them out", "foreign")
-    elsewhere: list[Path] = list(
-        dict.fromkeys(table for table, field in all_tables(root) if word in _keys(tables(field.annotation)))
-    )
-    closest = [table for table in elsewhere if table[:-1] == path[:-1] or path[: len(table)] == table] or elsewhere
+    elsewhere: set[Path] = {table for table, field in all_tables(root) if word in _keys(tables(field.annotation))}
+    closest = {table for table in elsewhere if table[:-1] == path[:-1] or path[: len(table)] == table} or elsewhere
     if len(closest) == 1:
-        meant = (*closest[0], word)
+        meant = (*closest.pop(), word)
         return Fault(path, f'is not a key here; did you mean "{dotted(meant)}"?', "unknown", meant)
-    near = difflib.get_close_matches(word, known, 1, 0.6)
-    if near:
-        return Fault(path, f'is not a key; did you mean "{near[0]}"?', "unknown", (*path[:-1], near[0]))
+    if near := _near(word, known):
+        return Fault(path, f'is not a key; did you mean "{near}"?', "unknown", (*path[:-1], near))
     return Fault(path, f"is not a key; known: {', '.join(known)}", "unknown")
+
+
+def _near(word: str, known: Iterable[str]) -> str:
+    """The word that was probably meant; empty if none is near."""
+    return next(iter(difflib.get_close_matches(word, list(known), 1, 0.6)), "")
 
 
 def _worded(root: type, error: ErrorDetails) -> Fault:
@@ -163,14 +165,9 @@ def _worded(root: type, error: ErrorDetails) -> Fault:
             return Fault((*path[:-1], "file"), said, "missing")
         return Fault(path, f"is missing; add {_example(spot)}", "missing")
     if kind == "union_tag_not_found" and isinstance(given, dict):
-        misspelt = difflib.get_close_matches("model", map(str, given), 1, 0.6)
-        if misspelt:
-            return Fault((*path, misspelt[0]), 'is not a key; did you mean "model"?', "unknown", (*path, "model"))
-        fitting = [
-            name
-            for name, table in zip(names, spot.admitted.values(), strict=True)
-            if given.keys() <= keys(table).keys()
-        ]
+        if misspelt := _near("model", map(str, given)):
+            return Fault((*path, misspelt), 'is not a key; did you mean "model"?', "unknown", (*path, "model"))
+        fitting = [model(table) for table in spot.admitted.values() if given.keys() <= keys(table).keys()]
         return Fault((*path, "model"), f"is missing; choose {_either(fitting or names)}", "missing")
     if kind == "union_tag_invalid":
         return Fault((*path, "model"), _choice(given.get("model") if isinstance(given, dict) else None, names))
@@ -241,9 +238,8 @@ def _choice(given: Any, known: list) -> str:
     now = renamed(given) if isinstance(given, str) else None
     if now in known:
         return f'{shown(given)} is now called "{now}"'
-    near = difflib.get_close_matches(given, [word for word in known if word], 1, 0.6) if isinstance(given, str) else []
-    if near:
-        return f'must not be {shown(given)}; did you mean "{near[0]}"?'
+    if isinstance(given, str) and (near := _near(given, filter(None, known))):
+        return f'must not be {shown(given)}; did you mean "{near}"?'
     return f"must be {_either(known)}, not {shown(given)}"
 
 
@@ -290,9 +286,9 @@ class Place:
             return ""
         value, table = self.overrides[words], dotted(words[:-1])
         written = shown(value) if isinstance(value, str | int | float) else "..."
-        if not self.option:
-            return f'; replace the whole table by overrides={{"{table}": {{"{words[-1]}": {written}}}}}'
-        return f"; replace the whole table by {self.option} '{table}={{ {words[-1]} = {written} }}'"
+        inline = f"'{table}={{ {words[-1]} = {written} }}'"
+        given = f"{self.option} {inline}" if self.option else f'overrides={{"{table}": {{"{words[-1]}": {written}}}}}'
+        return f"; replace the whole table by {given}"
 
     def _number(self, path: Path, lines: dict[Path, int]) -> int | None:
         """The line of the key, else of the nearest table above it that the file names."""

@@ -68,21 +68,21 @@ def sweep_axes(sweep: Any) -> tuple[tuple[Axis, ...], list[Fault]]:
         return sweep, []
     faults: list[Fault] = []
     if isinstance(sweep, list):
-        columns = _zipped(sweep, faults)
+        axes = _zipped(sweep, faults)
     elif isinstance(sweep, dict):
-        columns = [((key,), rows) for key, rows in _columns(sweep, (), faults)]
+        axes = _columns(sweep, (), faults)
     else:
         return (), [((), 'must be a table of lists, such as "contact.load" = ["1 mN", "4 mN"]')]
-    keys = [key for several, _ in columns for key in several]
+    keys = [key for axis in axes for key in axis.keys]
     unfit = {key: said for key in keys if (said := _unfit(key, keys))}
     faults += [((key,), said) for key, said in unfit.items()]
-    columns = [column for column in columns if not unfit.keys() & set(column[0])]
-    if math.prod(len(rows) for _, rows in columns) > _MOST_POINTS:
-        return (), [*faults, ((), f"asks for more than {_MOST_POINTS:,} points; take fewer values, or several runs")]
-    return tuple(Axis(several, tuple(rows)) for several, rows in columns), faults
+    axes = [axis for axis in axes if not unfit.keys() & set(axis.keys)]
+    if math.prod(len(axis.values) for axis in axes) > _MOST_POINTS:
+        return (), [*faults, ((), f"has more than {_MOST_POINTS:,} points; take fewer values, or several runs")]
+    return tuple(axes), faults
 
 
-def _zipped(tables: list[Any], faults: list[Fault]) -> list[tuple[tuple[str, ...], list[tuple]]]:
+def _zipped(tables: list[Any], faults: list[Fault]) -> list[Axis]:
     """One axis from a list of tables, each a row of values."""
     if not tables or not all(isinstance(table, dict) and table for table in tables):
         faults.append(((), 'must be a list of tables, each such as { "contact.load" = "1 mN" }'))
@@ -94,30 +94,28 @@ def _zipped(tables: list[Any], faults: list[Fault]) -> list[tuple[tuple[str, ...
             said = f'has other keys than the first table of the sweep ("{other}"); give all of them the same keys'
             faults.append(((place,), said))
             return []
-    return [(keys, [tuple(table.get(key) for key in keys) for table in tables])]
+    return [Axis(keys, tuple(tuple(table[key] for key in keys) for table in tables))]
 
 
-def _columns(table: dict[str, Any], above: tuple[str, ...], faults: list[Fault]) -> list[tuple[str, list[tuple]]]:
-    """Each swept key with its values; keys may be quoted as one or nested as tables."""
-    columns: list[tuple[str, list[tuple]]] = []
+def _columns(table: dict[str, Any], above: tuple[str, ...], faults: list[Fault]) -> list[Axis]:
+    """An axis for each swept key; keys may be quoted as one or nested as tables."""
+    axes: list[Axis] = []
     for name, values in table.items():
-        path, key = (*above, name), ".".join((*above, name))
+        path = (*above, name)
+        if isinstance(values, dict) and any(type(values.get(word, [])) not in (list, dict) for word in _RANGE):
+            try:
+                values = _spaced(values)
+            except ValueError as fault:
+                faults.append((path, str(fault)))
+                continue
         if isinstance(values, list) and values:
-            columns.append((key, [(value,) for value in values]))
-        elif isinstance(values, dict) and any(
-            word in values and not isinstance(values[word], list | dict) for word in _RANGE
-        ):
-            said = _range_fault(values)
-            if said:
-                faults.append((path, said))
-            else:
-                columns.append((key, [(value,) for value in _spaced(values)]))
+            axes.append(Axis((".".join(path),), tuple((value,) for value in values)))
         elif isinstance(values, dict) and values:
-            columns += _columns(values, path, faults)
+            axes += _columns(values, path, faults)
         else:
             what = "must not be an empty list" if values == [] else "must be a list of values"
             faults.append((path, f'{what}; write ["1 mN", "4 mN"] or {{ from, to, count, scale = "linear" or "log" }}'))
-    return columns
+    return axes
 
 
 def _unfit(key: str, keys: list[str]) -> str | None:
@@ -137,32 +135,28 @@ def _unfit(key: str, keys: list[str]) -> str | None:
     return None
 
 
-def _range_fault(values: dict[str, Any]) -> str | None:
+def _spaced(values: dict[str, Any]) -> list[Any]:
+    """Evenly spaced values of a range, linearly or logarithmically; ValueError with what is wrong about it."""
     unknown = [key for key in values if key not in _RANGE]
     if unknown:
-        return f'the range has the unknown key "{unknown[0]}"; it takes {", ".join(_RANGE)}'
+        raise ValueError(f'the range has the unknown key "{unknown[0]}"; it takes {", ".join(_RANGE)}')
     missing = [key for key in _RANGE[:3] if key not in values]
     if missing:
-        return f"the range lacks {' and '.join(missing)}; write {{ from = ..., to = ..., count = ... }}"
-    ends = [number_and_unit(values[end]) for end in ("from", "to")]
+        raise ValueError(f"the range lacks {' and '.join(missing)}; write {{ from = ..., to = ..., count = ... }}")
+    low, high, count, scale = (values.get(key, "linear") for key in _RANGE)
+    ends = number_and_unit(low), number_and_unit(high)
     if ends[0] is None or ends[1] is None:
-        return "the range needs finite numbers, with or without a unit, as from and to"
-    if same_unit(values["from"], values["to"]) is None:
+        raise ValueError("the range needs finite numbers, with or without a unit, as from and to")
+    both = same_unit(low, high)
+    if both is None:
         given = [f'"{unit}"' if unit else "no unit" for _, unit in (ends[0], ends[1])]
-        return f"the range goes from {given[0]} to {given[1]}; write both ends in units of one dimension"
-    if type(values["count"]) is not int or not 2 <= values["count"] <= _MOST_POINTS:
-        return f"the count of the range must be a whole number from 2 to {_MOST_POINTS:,}"
-    scale = values.get("scale", "linear")
+        raise ValueError(f"the range goes from {given[0]} to {given[1]}; write both ends in units of one dimension")
+    if type(count) is not int or not 2 <= count <= _MOST_POINTS:
+        raise ValueError(f"the count of the range must be a whole number from 2 to {_MOST_POINTS:,}")
     if scale not in ("linear", "log"):
-        return 'the scale of the range must be "linear" or "log"'
-    if scale == "log" and not (ends[0][0] > 0.0 and ends[1][0] > 0.0):
-        return 'a range with scale = "log" needs both ends above zero'
-    return None
-
-
-def _spaced(values: dict[str, Any]) -> list[Any]:
-    """Evenly spaced values of a sound range, linearly or logarithmically."""
-    first, last, unit = same_unit(values["from"], values["to"])  # type: ignore[misc]
-    spacing = np.geomspace if values.get("scale") == "log" else np.linspace
-    numbers = spacing(first, last, values["count"]).tolist()
+        raise ValueError('the scale of the range must be "linear" or "log"')
+    first, last, unit = both
+    if scale == "log" and not (first > 0.0 and last > 0.0):
+        raise ValueError('a range with scale = "log" needs both ends above zero')
+    numbers = (np.geomspace if scale == "log" else np.linspace)(first, last, count).tolist()
     return numbers if unit is None else [f"{number!r} {unit}".strip() for number in numbers]
