@@ -6,6 +6,7 @@ step or the grid. Its error follows without sampling from closed forms and a mar
 """
 
 import importlib.metadata
+import itertools
 import math
 import time
 from collections.abc import Sequence
@@ -101,9 +102,10 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     -----
     Truth: all modes of the cell (of a grid eight times as fine as the finest that is tried, where the spectrum has no
     end), cohorts to 1e-6 or the linear rate equation, and the limit of short steps. The clock step is halved until
-    two steps agree; the finest differs from the limit by no more than from the one before, if its error is of first
-    order or better. Yardsticks are largest values over the run: of the mean for means and for the spread of bonds,
-    of the spread for spreads, of the skewness for that of ΔΓ; that of the rest is not judged.
+    steps agree; the finest is taken to differ from the limit by the largest change so far, each halved as often as
+    the step since, which is no less than errors of first order or better leave. Yardsticks are largest values over
+    the run: of the mean for means and for the spread of bonds, of the spread for spreads, of the skewness for that of
+    ΔΓ; that of the rest is not judged.
     """
     left_out: list[str] = []
     base = plain(scenario)
@@ -188,22 +190,27 @@ class _Study:
             row.error[:, :3] = self._largest(self._meant(walk.statistics(0, sites), walk) - exact)
 
     def judge_steps(self, tolerance: float, seconds: float) -> None:
-        """Errors of clock steps: halved until two agree or the time is up, and longer ones if the records allow."""
-        found = [self._at(1.0, self.walk)]
-        spent = 0.0
-        while True:
+        """Errors of clock steps: from the longest that the records allow, halved until they agree or the time is up.
+
+        A first-order error changes by half of itself when the step is halved, more or less as a jump of the speed
+        lies within a step: what is left of the finest is taken from the largest change so far.
+        """
+        longer = [ratio for ratio in (4.0, 2.0) if not self.base.clock.stride % round(ratio)]
+        found = [*map(self._at, longer), self._at(1.0, self.walk)]
+        rest = np.zeros(self.yard.shape)
+        for (_, one), (_, other) in itertools.pairwise(found):
+            rest = np.fmax(0.5 * rest, self._largest(other - one))
+        agree = late = False
+        while not (late or (agree and len(found) > 2) or found[-1][0].setting.ratio <= _FINEST):
             began = time.process_time()
             found.append(self._at(0.5 * found[-1][0].setting.ratio))
-            rest = self._largest(found[-1][1] - found[-2][1])
+            rest = np.fmax(0.5 * rest, self._largest(found[-1][1] - found[-2][1]))
             spent = time.process_time() - began
             late = time.process_time() + 2.0 * spent > self.began + seconds
-            if late or np.nanmax(rest) <= _FINE * tolerance or found[-1][0].setting.ratio <= _FINEST:
-                break
-        finest = found[-1][1]
-        found += [self._at(ratio) for ratio in (2.0, 4.0) if not self.base.clock.stride % round(ratio)]
+            agree = bool(np.max(rest) <= _FINE * tolerance)
         for row, statistics in found:
-            row.error[:, :3] = self._largest(statistics - finest) + rest
-        self.rows += sorted((row for row, _ in found), key=lambda row: -row.setting.ratio)
+            row.error[:, :3] = self._largest(statistics - found[-1][1]) + rest
+        self.rows += [row for row, _ in found]
 
     def _at(self, ratio: float, walk: Walk | None = None) -> tuple[Row, Array]:
         setting = at_step(self.base, ratio)

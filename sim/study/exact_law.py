@@ -67,11 +67,8 @@ class Terms:
         """Terms that the scene's shear model draws."""
         process: Any = scenario.process
         if not scenario.fluctuations.per_member:
-            none = np.zeros(1)
-            still = Motion(0, 0.0, 0.0, none, none, none, none)
-            started = process.start(still, scenario.population.steady(np.zeros(1)), Noise(0, "shear", np.arange(1)))
             empty = np.empty(0)
-            return cls(empty, empty, empty, float(started.energy[0] / started.amplitude[0] ** 2))
+            return cls(empty, empty, empty, 2.0 * float(np.sum(process.weights)) if process.pairs else process.energy)
         if scenario.fluctuations.model == "banded":
             return cls(process.bands.weight, 0.5 * process.bands.freedom, process.wavenumber)
         return cls(2.0 * process.weights, np.ones(process.pairs), process.wavenumber)

@@ -315,7 +315,7 @@ def keeps_its_promise(scenario, budget, members, tolerance=None):
                     continue
                 off = abs(one.value - other.value)
                 chance = 5.0 * math.hypot(one.standard_error, other.standard_error)
-                allowed = best.bound[q, s] * yard + chance + 1e-9 * abs(other.value)
+                allowed = (best.bound[q, s] + REFERENCE) * yard + chance
                 assert off <= allowed, (labels, QUANTITIES[q], t, s, off / yard, best.bound[q, s], chance / yard)
                 worst = max(worst, off / yard)
     return dataset, worst
