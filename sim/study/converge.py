@@ -101,11 +101,11 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     Notes
     -----
     Truth: all modes of the cell (of a grid eight times as fine as the finest that is tried, where the spectrum has no
-    end), cohorts to 1e-6 or the linear rate equation, and the limit of short steps. The clock step is halved until
-    steps agree; the finest is taken to differ from the limit by the largest change so far, each halved as often as
-    the step since, which is no less than errors of first order or better leave. Yardsticks are largest values over
-    the run: of the mean for means and for the spread of bonds, of the spread for spreads, of the skewness for that of
-    ΔΓ; that of the rest is not judged.
+    end), cohorts to 1e-6 or the linear rate equation, and the limit of short steps. Under such bonds, which any that
+    keep the accepted error resemble, the clock step is halved until steps agree; the finest is taken to differ from
+    the limit by the largest change so far, each halved as often as the step since, which is no less than errors of
+    first order or better leave. Yardsticks are largest values over the run: of the mean for means and for the spread
+    of bonds, of the spread for spreads, of the skewness for that of ΔΓ; that of the rest is not judged.
     """
     left_out: list[str] = []
     base = plain(scenario)
@@ -139,6 +139,8 @@ class _Study:
         self.terms += [Terms.of_cell(base, count) for count in grids]
         self.began = time.process_time()
         self.walk = Walk.of(base, self.terms)
+        #: The run with exact bonds, once ``judge_bonds`` has found it.
+        self.exact = self.walk
         law = self.walk.statistics(-1 if grids else 0, sites)
         #: Where there is a law of each statistic.
         self.lawful: NDArray[np.bool_] = np.all(np.isfinite(law), axis=0)
@@ -182,11 +184,13 @@ class _Study:
         rows = self.of("bonds")
         walks = [self.walk if row.setting.own else Walk.of(row.setting.scenario, self.terms[:2])
                  for row in rows if math.isinf(row.setting.sites)]  # fmt: skip
+        if walks:
+            self.exact = walks[-1]
         walks += walks[-1:] * (len(rows) - len(walks))
         for row, walk in zip(rows, walks, strict=True):
             sites = row.setting.sites
             row.law = walk.statistics(1, sites)
-            exact = self._meant(walks[-1].statistics(0, self.sites), walks[-1])
+            exact = self._meant(self.exact.statistics(0, self.sites), self.exact)
             row.error[:, :3] = self._largest(self._meant(walk.statistics(0, sites), walk) - exact)
 
     def judge_steps(self, tolerance: float, seconds: float) -> None:
@@ -196,7 +200,7 @@ class _Study:
         lies within a step: what is left of the finest is taken from the largest change so far.
         """
         longer = [ratio for ratio in (4.0, 2.0) if not self.base.clock.stride % round(ratio)]
-        found = [*map(self._at, longer), self._at(1.0, self.walk)]
+        found = [*map(self._at, longer), self._at(1.0, self.exact)]
         rest = np.zeros(self.yard.shape)
         for (_, one), (_, other) in itertools.pairwise(found):
             rest = np.fmax(0.5 * rest, self._largest(other - one))
@@ -214,7 +218,7 @@ class _Study:
 
     def _at(self, ratio: float, walk: Walk | None = None) -> tuple[Row, Array]:
         setting = at_step(self.base, ratio)
-        walk = walk or Walk.of(setting.scenario, self.terms[:2])
+        walk = walk or Walk.of(at_step(self.exact.scenario, ratio).scenario, self.terms[:2])
         return Row(setting), self._meant(walk.statistics(0, self.own_sites), walk)
 
     def sample(self, seconds: float) -> None:

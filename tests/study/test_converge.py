@@ -343,6 +343,31 @@ def test_the_error_of_a_long_step_is_found(quick):
     assert off[0] > 0.5 * promised[0]  # and it is no mere bound
 
 
+#: Bonds that live for half a second, under a jump of the speed and a reversal within 5 ms.
+STEEP = {
+    "bonds": bonds.Cohort(
+        rupture=Bell(zero_force_rate=2.0, bell_force=4e-12), **STRETCHED | {"rebinding_rate": 4.0}, tolerance=1e-2
+    ),
+    "drive": drive.Table(time=(0.0, 0.1, 0.1, 0.4, 0.405, 0.6), speed=(2e-5, 2e-5, 2e-3, 2e-3, -1e-3, 5e-4)),
+}
+
+
+@pytest.fixture(scope="module")
+def steep():
+    return run_of(scene(**STEEP, clock=Clock(duration=0.6, step=4e-4, record=0.02)), 1)[:, 0]
+
+
+@pytest.mark.parametrize("step", [0.02, 0.004])
+def test_a_steep_reversal_under_coarse_cohorts_is_no_worse_than_promised(step, quick, steep):
+    quick()
+    written = scene(**STEEP, clock=Clock(duration=0.6, step=step, record=0.02))
+    own = choices(converge(written, 1.0))[0]
+    promised = own.error[:, 0] * np.max(np.abs(steep), axis=1)
+    off = np.abs(run_of(written, 1)[:, 0] - steep).max(axis=1)
+    assert np.all(off <= promised)
+    assert off[0] > 0.5 * promised[0]
+
+
 _RUPTURES = (BELL, CUT_OFF, Constant(rate=200.0))
 
 
