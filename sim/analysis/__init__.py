@@ -9,47 +9,15 @@ peak); ``summary`` turns both into statistics over the members.
 from sim.analysis.correlation import IntegralTime, correlation_time, integral_time
 from sim.analysis.events import events, peaks
 from sim.analysis.loops import loop_energy
-from sim.analysis.observables import (
-    bond_work,
-    observables,
-    reference_radii,
-    settled,
-    share_observables,
-)
+from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, sweep_dims
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary, where
 from sim.analysis.tables import highlights, notes, table, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
-    "QUANTILES",
-    "Control",
-    "IntegralTime",
-    "averaging",
-    "bond_work",
-    "concise",
-    "control",
-    "correlation_time",
-    "engineering",
-    "events",
-    "highlights",
-    "integral_time",
-    "is_stationary",
-    "is_steady",
-    "loop_energy",
-    "notes",
-    "observables",
-    "peaks",
-    "reference_radii",
-    "scaled",
-    "setting",
-    "settled",
-    "share_observables",
-    "shares",
-    "statistics",
-    "summary",
-    "sweep_dims",
-    "table",
-    "to_csv",
-    "where",
-]
+    "QUANTILES", "Control", "IntegralTime", "averaging", "bond_work", "concise", "control", "correlation_time",
+    "engineering", "events", "highlights", "integral_time", "is_stationary", "is_steady", "loop_energy", "notes",
+    "observables", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables", "shares",
+    "statistics", "summary", "sweep_dims", "table", "to_csv", "where",
+]  # fmt: skip

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from sim.analysis.scene import MEMBERS, sweep_dims
+from sim.analysis.scene import MEMBERS
 
 #: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
 _WINDOW = 6.0
@@ -108,24 +108,19 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         ``correlation_time_below`` [s] with the sweep's dimensions.
     """
     energy, speed = dataset.get("fluctuation_energy"), dataset["speed"]
-    dims = sweep_dims(dataset)
-    shape = tuple(dataset.sizes[name] for name in dims)
-    times = np.full((3, *shape), np.nan)
+    times = [xr.full_like(dataset["contact_modulus"], math.nan)] * 3
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
-        steady = (speed == speed.isel(t=0)).all("t").broadcast_like(dataset["contact_modulus"])
-        for where in np.ndindex(shape):
-            point = dict(zip(dims, where, strict=True))
-            if bool(steady.isel(point)):
-                member_rows = energy.isel(point).transpose(MEMBERS, "t").to_numpy().astype(float)
-                times[(slice(None), *where)] = integral_time(member_rows, step)
+        stationary = energy.astype(float).where((speed == speed.isel(t=0)).all("t"))  # nan has no correlation time
+        times = xr.apply_ufunc(
+            lambda values: integral_time(values, step), stationary,
+            input_core_dims=[[MEMBERS, "t"]], output_core_dims=[[]] * 3, vectorize=True,
+        )  # fmt: skip
     about = "integral correlation time of the fluctuation energy"
-    coordinates = {name: dataset[name] for name in dims}
-    return xr.Dataset(
-        {
-            "correlation_time": (dims, times[0], {"units": "s", "long_name": about, "symbol": "t_c"}),
-            "correlation_time_sem": (dims, times[1], {"units": "s", "long_name": f"standard error of the {about}"}),
-            "correlation_time_below": (dims, times[2], {"units": "s", "long_name": f"what the {about} is below"}),
-        },
-        coordinates,
-    )
+    texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"what the {about} is below"}
+    found = {
+        f"correlation_time{suffix}": values.drop_attrs().assign_attrs(units="s", long_name=text)
+        for (suffix, text), values in zip(texts.items(), times, strict=True)
+    }
+    found["correlation_time"].attrs["symbol"] = "t_c"
+    return xr.Dataset(found)

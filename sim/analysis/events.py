@@ -68,14 +68,14 @@ def _openings(dataset: xr.Dataset) -> xr.Dataset:
 def _masks(dataset: xr.Dataset) -> xr.Dataset:
     """Each record stands for the time since the one before; a trajectory that stopped counts up to its end."""
     text, found = "share of the time in which adhesion was masked", masks(dataset)
-    after = {"t": slice(1, None)} if dataset.sizes["t"] > 1 else {}
-    if "fraction_masked" in found:
-        masked = found["fraction_masked"].where(dataset["contact_area"].notnull())
-        return xr.Dataset({"time_masked": pure(masked.isel(after).mean("t"), text)})
-    if "fraction_masked_mean" in found:
-        masked = found["fraction_masked_mean"].isel(after)
-        return xr.Dataset({"time_masked_mean": pure(masked.mean("t", skipna=False), text)})
-    return xr.Dataset()
+    each = "fraction_masked" in found
+    masked = found.get("fraction_masked" if each else "fraction_masked_mean")
+    if masked is None:
+        return xr.Dataset()
+    if each:
+        masked = masked.where(dataset["contact_area"].notnull())
+    share = masked.isel(t=slice(min(1, dataset.sizes["t"] - 1), None)).mean("t", skipna=each)
+    return xr.Dataset({"time_masked" if each else "time_masked_mean": pure(share, text)})
 
 
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
@@ -106,33 +106,30 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     ramp, start = drive == "ramp", drive == "start"
     if not bool((ramp | start).any()):
         return xr.Dataset()
-    found = {}
-    for name, source, unit in (("peak_stress", "shear_stress", "Pa"), ("peak_friction", "friction_force", "N")):
+    found, slides = {}, (ramp | start) & _sliding(dataset)
+    for name, prefix, source, unit in (
+        ("peak_stress", "peak", "shear_stress", "Pa"), ("peak_friction", "peak_friction", "friction_force", "N")
+    ):  # fmt: skip
         suffix = "" if source in dataset else "_mean"
-        if source + suffix not in dataset:
-            continue
-        size = abs(dataset[source + suffix].astype(float)).where((ramp | start) & _sliding(dataset))
-        at, known = _highest(size, ramp)
-        known &= _stands_out(size, ramp)
-        text = f"largest {dataset[source + suffix].attrs.get('long_name', source)} while sliding"
-        largest = (
-            dataset[name].where(known).drop_vars("t", errors="ignore")
-            if name in dataset and not suffix
-            else _picked(size, at, known)
-        )
-        found[name + suffix] = largest.assign_attrs(units=unit, long_name=text)
+        recorded = dataset[source + suffix].astype(float)
+        size = abs(recorded).where(slides)
+        at, known = _maximum(size, ramp)
+        stepped = not suffix and name in dataset
+        largest = dataset[name] if stepped else size.isel(t=at)
+        when = dataset["peak_time"] if stepped and prefix == "peak" else dataset["t"].isel(t=at)
+        text = f"largest {recorded.attrs.get('long_name', source)} while sliding"
+        described = {
+            name + suffix: (largest, unit, text),
+            f"{prefix}_time": (when - _beginning(dataset), "s", f"time from the start of sliding to the {text}"),
+            f"{prefix}_speed": (dataset["speed"].isel(t=at), "m/s", f"sliding speed at the {text}"),
+        }
         if suffix:
-            found[f"{name}_sem"] = _picked(dataset[f"{source}_sem"], at, known).assign_attrs(units=unit)
-        prefix = "peak" if name == "peak_stress" else name
-        stepped = f"{prefix}_time" in dataset and not suffix
-        when = dataset["peak_time"].where(known) if stepped else _picked(dataset["t"], at, known)
-        since = (when - _beginning(dataset)).drop_vars("t", errors="ignore")
-        found[f"{prefix}_time"] = since.assign_attrs(
-            units="s", long_name=f"time from the start of sliding to the {text}"
-        )
-        speed = _picked(dataset["speed"], at, known)
-        found[f"{prefix}_speed"] = speed.assign_attrs(units="m/s", long_name=f"sliding speed at the {text}")
-    return xr.Dataset({name: ordered(values) for name, values in found.items()})
+            error = dataset[f"{source}_sem"].isel(t=at)
+            described[f"{name}_sem"] = (error, unit, error.attrs["long_name"])
+        for key, (values, units, words) in described.items():
+            values = values.where(known).drop_vars("t", errors="ignore")
+            found[key] = ordered(values).assign_attrs(units=units, long_name=words)
+    return xr.Dataset(found)
 
 
 def _beginning(dataset: xr.Dataset) -> xr.DataArray:
@@ -149,26 +146,23 @@ def _sliding(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["t"] >= _beginning(dataset) - 1e-6 * between
 
 
-def _highest(values: xr.DataArray, ramp: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """Record of the largest value, and whether it is a maximum that stands above the ends by more than rounding."""
+def _maximum(values: xr.DataArray, ramp: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
+    """Record of the largest value, and whether it is a maximum.
+
+    It is one if it stands above the ends by more than rounding; and members must fall from where their mean is largest
+    to the ends, in parts of it, by more than noise may.
+    """
     at = values.fillna(-1.0).argmax("t")
-    level = values.isel(t=at) / (1.0 + _ROUNDING)
-    first, last = _ends(values)
-    return at, (level > last) & (~ramp | (level > first))
-
-
-def _stands_out(values: xr.DataArray, ramp: xr.DataArray) -> xr.DataArray:
-    """Whether members fall from where their mean is largest to the ends, in parts of it, by more than noise may."""
-    if MEMBERS not in values.dims or values.sizes[MEMBERS] == 1:
-        return xr.DataArray(True)
-    mean = values.mean(MEMBERS)
-    peak = values.isel(t=mean.fillna(-1.0).argmax("t"))
-    above = []
-    for end in _ends(values):
-        drop = 1.0 - end / peak.where(peak > 0.0)
-        error = drop.std(MEMBERS, ddof=1) / np.sqrt(values.sizes[MEMBERS])
-        above.append(drop.mean(MEMBERS) > _ERRORS * error)
-    return above[1] & (~ramp | above[0])
+    ends = _ends(values)
+    above = [values.isel(t=at) / (1.0 + _ROUNDING) > end for end in ends]
+    if values.sizes.get(MEMBERS, 1) > 1:
+        peak = values.isel(t=values.mean(MEMBERS).fillna(-1.0).argmax("t"))
+        drops = [1.0 - end / peak.where(peak > 0.0) for end in ends]
+        errors = [drop.std(MEMBERS, ddof=1) / np.sqrt(values.sizes[MEMBERS]) for drop in drops]
+        falls = [drop.mean(MEMBERS) > _ERRORS * error for drop, error in zip(drops, errors, strict=True)]
+        above = [higher & fall for higher, fall in zip(above, falls, strict=True)]
+    first, last = above
+    return at, last & (~ramp | first)
 
 
 def _ends(values: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
@@ -177,8 +171,3 @@ def _ends(values: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
     number, there = xr.DataArray(np.arange(count), dims="t"), values.notnull()
     first, last = number.where(there, count).min("t"), number.where(there, -1).max("t")
     return values.isel(t=first.clip(0, count - 1)), values.isel(t=last.clip(0, count - 1))
-
-
-def _picked(values: xr.DataArray, at: xr.DataArray, known: xr.DataArray) -> xr.DataArray:
-    """Values at one record each; nan where it is not known."""
-    return values.isel(t=at).where(known).drop_vars("t", errors="ignore")

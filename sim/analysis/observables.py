@@ -4,7 +4,7 @@ The reference of every ratio and share is JKR's contact with the full work of ad
 recorded contact is at that time.
 """
 
-from collections.abc import Iterator
+import contextlib
 
 import numpy as np
 import xarray as xr
@@ -12,6 +12,13 @@ import xarray as xr
 from sim.analysis.scene import MEMBERS, setting, stays_held
 
 KEPT = ("mean", "std", "sem")
+
+#: Shares of the area after that lost to bonds, in the order of charging: radius before each, and what it is lost to.
+_LOSSES = {
+    "lost_to_fluctuations": ("bonds_radius", "fluctuations, after the bonds"),
+    "lost_to_mean_stress": ("fluctuations_radius", "the mean stress, after bonds and fluctuations"),
+    "lost_to_lag": ("equilibrium_radius", "the edge's lag behind equilibrium, after all else"),
+}
 
 
 def ordered(variable: xr.DataArray) -> xr.DataArray:
@@ -42,8 +49,7 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
     """JKR's area at the full work of adhesion [m^2]; nan where that contact is open."""
-    area = np.pi * reference_radii(dataset)["radius_jkr"] ** 2
-    return area.where(area > 0.0)
+    return np.pi * reference_radii(dataset)["radius_jkr"] ** 2
 
 
 def bond_work(dataset: xr.Dataset) -> xr.DataArray:
@@ -80,35 +86,23 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     as recorded.
     """
     suffix = "" if "contact_area" in dataset else "_mean"
-    area, before = dataset[f"contact_area{suffix}"].astype(float), full_area(dataset)
-    full, found = before, {}
-    for name, text, after in _levels(dataset, area):
-        key = name if name == "lost_to_bonds" else name + suffix
-        found[key] = pure((before - after) / full, f"share of JKR's area lost to {text}")
-        before = after
+    area, full = dataset[f"contact_area{suffix}"].astype(float), full_area(dataset)
+    there = {str(name).removesuffix("_mean") for name in dataset}
+    charged = {name: loss for name, loss in _LOSSES.items() if loss[0] in there}
+    if any(radius not in dataset for radius, _ in charged.values()):
+        raise ValueError("shares need each member; record them: [record] per_member = true")
+    left = [np.pi * dataset[radius].astype(float) ** 2 for radius, _ in charged.values()]
+    levels = [full, *(level.where(area.notnull()) for level in left), area]
+    texts = {"lost_to_bonds": "broken bonds, which are charged first"}
+    texts |= {name + suffix: text for name, (_, text) in charged.items()}
+    found = {
+        name: pure((before - after) / full, f"share of JKR's area lost to {text}")
+        for (name, text), before, after in zip(texts.items(), levels, levels[1:], strict=False)
+    }
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
             found[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")
     return xr.Dataset(found)
-
-
-def _levels(dataset: xr.Dataset, area: xr.DataArray) -> Iterator[tuple[str, str, xr.DataArray]]:
-    """Share, what it is lost to, and the area [m^2] that is left after it."""
-    stressed, lags = (_has(dataset, f"{kind}_radius") for kind in ("fluctuations", "equilibrium"))
-    charged = [("lost_to_bonds", "broken bonds, which are charged first")]
-    charged += [("lost_to_fluctuations", "fluctuations, after the bonds")]
-    charged += [("lost_to_mean_stress", "the mean stress, after bonds and fluctuations")] * stressed
-    charged += [("lost_to_lag", "the edge's lag behind equilibrium, after all else")] * lags
-    left = ["bonds_radius"] + ["fluctuations_radius"] * stressed + ["equilibrium_radius"] * lags
-    if any(name not in dataset for name in left):
-        raise ValueError("shares need each member; record them: [record] per_member = true")
-    areas = [(np.pi * dataset[name].astype(float) ** 2).where(area.notnull()) for name in left]
-    for (name, text), after in zip(charged, [*areas, area], strict=True):
-        yield name, text, after
-
-
-def _has(dataset: xr.Dataset, name: str) -> bool:
-    return name in dataset or f"{name}_mean" in dataset
 
 
 def observables(dataset: xr.Dataset) -> xr.Dataset:
@@ -130,6 +124,14 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
             found[f"fraction_detached{suffix}"] = pure(opened, "open contacts")
     found = found.assign(masks(dataset))
     return found.drop_vars([n for n in found if str(n).startswith(("in_contact", "masked"))])
+
+
+def all_observables(dataset: xr.Dataset) -> xr.Dataset:
+    """``observables``, with the shares of the lost area where they are known."""
+    found = observables(dataset)
+    with contextlib.suppress(ValueError):
+        found = found.merge(share_observables(dataset))
+    return found
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:

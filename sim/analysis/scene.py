@@ -147,23 +147,14 @@ def control(dataset: xr.Dataset) -> Control:
     KeyError
         If the table ``[contact]`` is swept whole, so that the dataset does not say.
     """
+    table: dict[str, Any] = {}
+    with contextlib.suppress(KeyError):
+        table = resolved(dataset, "contact")
     for kind in _CONTROLS:
-        if _given(dataset, kind):
+        if table.get(kind) is not None or f"contact_{kind}" in dataset:
             stiffness = setting(dataset, "contact.stiffness") if kind == "displacement" else xr.DataArray(np.inf)
             return Control(kind, stiffness)
     raise KeyError("the dataset does not say what holds the sphere: a load, an indentation or a displacement")
-
-
-def _given(dataset: xr.Dataset, kind: str) -> bool:
-    """True if the scenario gives such a control, as a number, a course or a table."""
-    try:
-        setting(dataset, f"contact.{kind}")
-    except KeyError:
-        try:
-            return resolved(dataset, "contact").get(kind) is not None
-        except KeyError:
-            return False
-    return True
 
 
 def stays_held(dataset: xr.Dataset) -> xr.DataArray:

@@ -9,7 +9,7 @@ import xarray as xr
 
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import KEPT, observables, reference_radii, share_observables
+from sim.analysis.observables import KEPT, observables, pure, reference_radii, share_observables
 from sim.analysis.scene import MEMBERS, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
@@ -168,10 +168,6 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     adhesion does not pay for the mean stress, A_fluct is the contact area A. The order is a choice: the
     area is not linear in the work, so what is taken off later weighs more.
     """
-    found = summary(share_observables(dataset))
     radii = reference_radii(dataset)
-    rest, hertz = radii["radius_jkr"], radii["radius_hertz"]
-    found["radius_jkr"], found["radius_hertz"] = rest, hertz
-    ratio = (hertz / rest.where(rest > 0.0)) ** 2
-    found["area_ratio_hertz"] = ratio.assign_attrs(units="1", long_name="Hertz's contact area over JKR's", symbol="")
-    return found
+    ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz's contact area over JKR's")
+    return summary(share_observables(dataset)).merge(radii).assign(area_ratio_hertz=ratio)

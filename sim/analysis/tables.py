@@ -1,8 +1,6 @@
 """Statistics as rows: a dozen for the terminal, all of them as CSV."""
 
 import contextlib
-import csv
-import io
 import math
 import os
 import re
@@ -16,13 +14,16 @@ import xarray as xr
 
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import observables, settled, share_observables
-from sim.analysis.scene import is_stationary, setting, stays_held, sweep_dims, word
+from sim.analysis.observables import all_observables, settled
+from sim.analysis.scene import is_stationary, stays_held, sweep_dims, word
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary
 from sim.numerics.files import write_whole
 from sim.units.notation import concise, scaled
 
+#: Cells of columns by heading.
 Columns = dict[str, list[str]]
+#: The index of each row along the dimensions of sweep and time.
+Points = dict[str, xr.DataArray]
 
 
 class _Column(NamedTuple):
@@ -106,29 +107,16 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     found, points = _tabulated(dataset, rows)
     whole = is_stationary(dataset) and bool(sweep_dims(dataset))
     changing = not bool(stays_held(dataset).all())
-    cells: Columns = {}
-    for name, index in points.items():
-        if name != "t" or not whole:
-            heading, texts = _cells(name, found[name].attrs.get("units", "1"), found[name][index].to_numpy())
-            cells[heading] = texts
-    same = whole and any(named in points for named in _dims_of(dataset, "drive.speed"))  # V is a column already
-    left_out = {"speed"} if same else set()
-    columns = [c for c in _COLUMNS if (changing or not c.changing) and c.name not in left_out]
+    cells = _places(found, {name: index for name, index in points.items() if name != "t" or not whole})
+    speeds = dataset.get("drive_speed", xr.DataArray())
+    same = whole and any(name in points for name in speeds.dims)  # V is a column already
+    columns = [c for c in _COLUMNS if (changing or not c.changing) and not (same and c.name == "speed")]
     cells |= _shown(found, points, columns)
-    where = {name: index for name, index in points.items() if name != "t"}
-    known = (found[f"correlation_time{name}"].isel(where).to_numpy() for name in ("", "_sem", "_below"))
-    times, errors, below, _ = np.broadcast_arrays(*known, points["t"])
+    times, errors, below = (_at(found[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below"))
     if np.any(np.isfinite(times) | np.isfinite(below)):
-        heading, texts = _cells(_MEMORY.heading, "s", np.where(np.isnan(times), below, times), errors)
+        ((heading, texts),) = _cells(_MEMORY.heading, "s", np.where(np.isnan(times), below, times), errors).items()
         cells[heading] = [f"<{text}" if math.isfinite(most) else text for text, most in zip(texts, below, strict=True)]
     return _rows(cells)
-
-
-def _dims_of(dataset: xr.Dataset, key: str) -> tuple[Any, ...]:
-    """Dimensions of a number of the scenario, none where it is not one."""
-    with contextlib.suppress(KeyError):
-        return setting(dataset, key).dims
-    return ()
 
 
 def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]]) -> list[str]:
@@ -169,74 +157,68 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     counts = _thinned({name: dataset.sizes[name] for name in sweep_dims(dataset)}, rows)
     points = _points(dataset.sizes, counts)
     shown = _shown(found, points, [column for column in _EVENTS if _of_drive(dataset, column.name)])
-    if not shown:
-        return []
-    cells: Columns = {}
-    for name, index in points.items():
-        heading, texts = _cells(name, dataset[name].attrs.get("units", "1"), dataset[name][index].to_numpy())
-        cells[heading] = texts
+    cells = _places(dataset, points)
     for heading, texts in shown.items():
         cells[heading] = texts
         if heading.startswith("first\n") and "first_detachment_quantile" in found:
-            cells |= _range(found["first_detachment_quantile"], points, len(texts))
-    return _rows(cells)
+            cells |= _range(found["first_detachment_quantile"], points)
+    return _rows(cells) if shown else []
 
 
 def _of_drive(dataset: xr.Dataset, name: str) -> bool:
     """Whether an event is shown under this drive: the speed of a peak on a ramp, its time after a start."""
-    if not name.startswith("peak_"):
-        return True
     drives = {"speed": "ramp", "time": "start"}
-    wanted = drives.get(name.rpartition("_")[2])
+    wanted = drives.get(name.rpartition("_")[2]) if name.startswith("peak_") else None
     return wanted is None or bool((word(dataset, "drive.model", "") == wanted).any())
 
 
-def _range(quantiles: xr.DataArray, points: dict[str, xr.DataArray], count: int) -> Columns:
+def _places(found: xr.Dataset, points: Points) -> Columns:
+    """The columns that say where in the sweep and when each row is."""
+    cells: Columns = {}
+    for name, index in points.items():
+        cells |= _cells(name, found[name].attrs.get("units", "1"), found[name][index].to_numpy())
+    return cells
+
+
+def _range(quantiles: xr.DataArray, points: Points) -> Columns:
     """The 5 and 95 % quantiles of a time, where there is a spread."""
-    ends = [np.broadcast_to(quantiles.isel(points).isel(quantile=end).to_numpy(), count) for end in (0, -1)]
-    if not np.any(ends[0] < ends[1]):
+    low, high = (_at(quantiles.isel(quantile=end), points) for end in (0, -1))
+    if not np.any(low < high):
         return {}
-    largest = np.nanmax(ends[1])
-    factor, shown = scaled(float(largest), "s")
-    texts = [f"{concise(factor * low, 0.0)} to {concise(factor * high, 0.0)}" for low, high in zip(*ends, strict=True)]
+    factor, shown = scaled(float(np.nanmax(high)), "s")
+    texts = [f"{concise(factor * a, 0.0)} to {concise(factor * b, 0.0)}" for a, b in zip(low, high, strict=True)]
     return {f"5 to 95 %\nof members ({shown})": texts}
 
 
-def _shown(found: xr.Dataset, points: dict[str, xr.DataArray], columns: Iterable[_Column]) -> Columns:
+def _shown(found: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Columns:
     """The columns that are not constant at their dull value at these points."""
     cells: Columns = {}
-    count = next(iter(points.values())).size if points else 1
     for name, heading, dull, *_ in columns:
         if f"{name}_mean" not in found:
             continue
-        mean, sem = (_at(found, f"{name}_{kind}", points, count) for kind in ("mean", "sem"))
+        mean, sem = (_at(found.get(f"{name}_{kind}"), points) for kind in ("mean", "sem"))
         if name in _PERCENT:  # differences of areas leave rounding behind
             mean = np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | np.isnan(mean)):
             unit = "%" if name in _PERCENT else found[f"{name}_mean"].attrs.get("units", "1")
-            heading, texts = _cells(heading, unit, mean, sem)
-            cells[heading] = texts
+            cells |= _cells(heading, unit, mean, sem)
     return cells
 
 
-def _at(found: xr.Dataset, name: str, points: dict[str, xr.DataArray], count: int) -> np.ndarray:
+def _at(variable: xr.DataArray | None, points: Points) -> np.ndarray:
     """Values of a variable at each row; nan if there is no such variable."""
-    if name not in found:
-        return np.full(count, np.nan)
-    values = found[name].isel({dim: index for dim, index in points.items() if dim in found[name].dims})
-    return np.broadcast_to(values.to_numpy(), count)
+    count = next(iter(points.values())).size if points else 1
+    values = np.nan if variable is None else variable.isel(points, missing_dims="ignore").to_numpy()
+    return np.broadcast_to(values, count)
 
 
 def _rows(cells: Columns) -> list[dict[str, str]]:
     return [dict(zip(cells, row, strict=True)) for row in zip(*cells.values(), strict=True)]
 
 
-def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, dict[str, xr.DataArray]]:
+def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
     """Statistics to tabulate, and the index of each row in every dimension of sweep and time."""
-    trajectories = observables(dataset)
-    with contextlib.suppress(ValueError):  # shares are not known of every dataset
-        trajectories = trajectories.merge(share_observables(dataset))
-    dims = sweep_dims(dataset)
+    trajectories, dims = all_observables(dataset), sweep_dims(dataset)
     if is_stationary(dataset) and dims:
         trajectories = settled(trajectories)
     found = summary(trajectories).merge(correlation_time(dataset))
@@ -248,7 +230,7 @@ def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, dict[str, xr
     return found, _points(found.sizes, counts)
 
 
-def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> dict[str, xr.DataArray]:
+def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
     """The index of each row in every dimension."""
     chosen = [_spread(sizes[name], count) for name, count in counts.items()]
     rowwise = (np.ravel(index) for index in np.meshgrid(*chosen, indexing="ij"))
@@ -259,8 +241,7 @@ def _thinned(sizes: dict[str, int], rows: int) -> dict[str, int]:
     """How many values of each dimension make at most ``rows`` points, two of each at least."""
     counts = dict(sizes)
     while math.prod(counts.values()) > rows and max(counts.values()) > 2:
-        longest = max(counts, key=lambda name: counts[name])
-        counts[longest] -= 1
+        counts[max(counts, key=lambda name: counts[name])] -= 1
     return counts
 
 
@@ -270,16 +251,15 @@ def _spread(size: int, count: int) -> np.ndarray:
     return np.rint(np.linspace(0 if count > 1 else size - 1, size - 1, count)).astype(int)
 
 
-def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | None = None) -> tuple[str, list[str]]:
-    """Heading with its unit, and the column's cells in that unit."""
+def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | float = 0.0) -> Columns:
+    """A column's cells in the unit of its largest value, under its heading with that unit."""
     if values.dtype.kind not in "fi":
-        return heading, [str(value) for value in values]
+        return {heading: [str(value) for value in values]}
     finite = np.abs(values[np.isfinite(values)])
     factor, shown = (100.0, "%") if unit == "%" else scaled(finite.max(initial=0.0), unit)
-    errors = np.zeros(len(values)) if errors is None else errors
-    texts = [concise(factor * value, factor * error) for value, error in zip(values, errors, strict=True)]
+    texts = [concise(factor * value, factor * error) for value, error in np.broadcast(values, errors)]
     gap = " " if "\n" in heading else "\n"
-    return f"{heading}{gap}({shown})" if shown else heading, texts
+    return {f"{heading}{gap}({shown})" if shown else heading: texts}
 
 
 def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
@@ -296,11 +276,9 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     """
     long = frame(dataset)
     units = long.attrs["units"]
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([name if units[name] == "1" else f"{name} [{units[name]}]" for name in long])
-    writer.writerows(long.itertuples(index=False, name=None))
-    _write(Path(path), text.getvalue().encode())
+    header = [name if units[name] == "1" else f"{name} [{units[name]}]" for name in long]
+    text = long.to_csv(header=header, index=False, na_rep="nan", lineterminator="\n")
+    _write(Path(path), text.encode())
 
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
@@ -319,12 +297,11 @@ def _flat(found: xr.Dataset) -> xr.Dataset:
     flat: dict[str, xr.DataArray] = {}
     for key, variable in found.data_vars.items():
         name = str(key)
-        if "quantile" not in variable.dims:
+        if "quantile" in variable.dims:
+            stem = name.removesuffix("_quantile")
+            flat |= {f"{stem}_q{100 * level:02.0f}": variable.sel(quantile=level, drop=True) for level in QUANTILES}
+        else:
             flat[name] = variable
-            continue
-        for level in QUANTILES:
-            column = f"{name.removesuffix('_quantile')}_q{100 * level:02.0f}"
-            flat[column] = variable.sel(quantile=level, drop=True)
     return xr.Dataset(flat)
 
 

@@ -1,13 +1,23 @@
 """What closed forms say of the bonds that a dataset was made with."""
 
 import contextlib
-from typing import NamedTuple
+import math
+from typing import NamedTuple, get_args
 
 import numpy as np
 import xarray as xr
+from pydantic import TypeAdapter
 
 from sim.analysis import setting
 from sim.laws import schallamach
+from sim.parts.bonds.rupture import Rupture, RuptureRate
+from sim.plots.style import number_at
+
+_PREFIX = "bonds_rupture_"
+_BONDS = ("bond_stiffness", "rebinding_rate", "site_density")
+
+#: Any rupture law by its numbers alone, as a dataset holds them.
+_RUPTURE: TypeAdapter[Rupture] = TypeAdapter(get_args(Rupture)[0])
 
 
 class Steady(NamedTuple):
@@ -19,10 +29,43 @@ class Steady(NamedTuple):
     fraction: np.ndarray
 
 
-def numbers(dataset: xr.Dataset, at: dict[str, int], *keys: str) -> list[float]:
-    """Numbers of the bonds at a point of the sweep; raises KeyError where one is not held."""
-    found = (setting(dataset, f"bonds.{key}") for key in keys)
-    return [float(number.isel(at, missing_dims="ignore")) for number in found]
+class Population(NamedTuple):
+    """Bonds that stretch: their rupture law, stiffness [N/m], rebinding rate [1/s] and sites per area [1/m^2]."""
+
+    rupture: Rupture
+    stiffness: float
+    rebinding: float
+    density: float
+
+    @property
+    def rate(self) -> RuptureRate:
+        return self.rupture.law(self.stiffness)
+
+    @property
+    def pathway(self) -> tuple[float, float, float] | tuple[()]:
+        """Rate [1/s], Bell force [N] and stiffness [N/m] where all rupture is by one pathway that force opens."""
+        rate, softness, limit, catch, _ = self.rate
+        bell = softness > 0.0 and catch == 0.0 and limit == math.inf
+        return (rate, self.stiffness / softness, self.stiffness) if bell else ()
+
+    @property
+    def at_rest(self) -> float:
+        """Share of the sites that are bound at rest."""
+        return float(schallamach.rest_share(self.rate.at_rest, self.rebinding))
+
+    def start_peak(self, speed: np.ndarray) -> np.ndarray:
+        """Static peak at speeds [m/s] after a long rest, of bonds with one pathway of which none rebinds [Pa]."""
+        peak = schallamach.start_up_peak(speed, *self.pathway)
+        return self.density * self.at_rest * np.asarray(peak.force)
+
+
+def population_of(dataset: xr.Dataset, at: dict[str, int]) -> Population | None:
+    """Bonds at a point of the sweep; None where they do not stretch, or the dataset does not hold their numbers."""
+    keys = [str(name) for name in dataset.variables if str(name).startswith(_PREFIX)]
+    with contextlib.suppress(KeyError, ValueError):
+        rupture = _RUPTURE.validate_python({key.removeprefix(_PREFIX): number_at(dataset[key], at) for key in keys})
+        return Population(rupture, *(number_at(setting(dataset, f"bonds.{key}"), at) for key in _BONDS))
+    return None
 
 
 def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> list[Steady]:
@@ -42,43 +85,20 @@ def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> l
     list of Steady
         Exact, and for Bell's rupture the first-moment closure, too. None for bonds without a stretch.
     """
-    common = ("bond_stiffness", "rebinding_rate", "site_density")
-    with contextlib.suppress(KeyError):
-        rate, force = numbers(dataset, at, "rupture.zero_force_rate", "rupture.bell_force")
-        stiffness, rebinding, density = numbers(dataset, at, *common)
-        bell, field = (rate, force, stiffness, rebinding), schallamach.first_moment_stress
-        exact = schallamach.bell_stress(speed, *bell, density), schallamach.bell_fraction(speed, *bell)
-        closed = field(speed, *bell, density), schallamach.first_moment_fraction(speed, *bell)
-        return [Steady("steady sliding, exact", "-", *exact), Steady("mean field", "--", *closed)]
-    with contextlib.suppress(KeyError):
-        rate, stretch = numbers(dataset, at, "rupture.rate", "rupture.stretch")
-        stiffness, rebinding, density = numbers(dataset, at, *common)
-        stress = schallamach.cut_off_stress(speed, rate, stretch, stiffness, rebinding, density)
-        fraction = schallamach.cut_off_fraction(speed, rate, stretch, rebinding)
-        return [Steady("steady sliding, exact", "-", stress, fraction)]
-    with contextlib.suppress(KeyError):
-        (rate,) = numbers(dataset, at, "rupture.rate")
-        stiffness, rebinding, density = numbers(dataset, at, *common)
-        force = schallamach.constant_moments(speed, rate, stiffness, rebinding).force
-        return [Steady("steady sliding, exact", "-", density * force, np.ones_like(speed))]
-    return []
+    bonds = population_of(dataset, at)
+    if bonds is None:
+        return []
+    bound, force, _ = bonds.rupture.closed_form(speed, bonds.stiffness, bonds.rebinding)
+    laws = [Steady("steady sliding, exact", "-", bonds.density * force, bound / bonds.at_rest)]
+    if bonds.pathway:
+        stress = schallamach.first_moment_stress(speed, *bonds.pathway, bonds.rebinding, bonds.density)
+        fraction = schallamach.first_moment_fraction(speed, *bonds.pathway, bonds.rebinding)
+        laws.append(Steady("mean field", "--", stress, fraction))
+    return laws
 
 
 def rest_of(dataset: xr.Dataset) -> xr.DataArray | None:
     """Time at rest before the start [s], for a drive that rests and starts; else None."""
     with contextlib.suppress(KeyError):
         return setting(dataset, "drive.rest")
-    return None
-
-
-def start_peak(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray, fraction: float) -> np.ndarray | None:
-    """Static peak of the dataset's Bell bonds at start-up speeds [m/s], if none of them rebinds [Pa].
-
-    ``fraction`` is that of bonds over bonds at rest when sliding begins. None for other rupture laws.
-    """
-    with contextlib.suppress(KeyError):
-        rate, force = numbers(dataset, at, "rupture.zero_force_rate", "rupture.bell_force")
-        stiffness, rebinding, density = numbers(dataset, at, "bond_stiffness", "rebinding_rate", "site_density")
-        bound = fraction * float(schallamach.rest_share(rate, rebinding))
-        return density * bound * np.asarray(schallamach.start_up_peak(speed, rate, force, stiffness).force)
     return None

@@ -10,20 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from sim.analysis import (
-    averaging,
-    bond_work,
-    is_stationary,
-    is_steady,
-    observables,
-    settled,
-    share_observables,
-    summary,
-    sweep_dims,
-)
-from sim.plots.style import BOTH, LINES, Unit, axis_scale, fill, swept_value, symbol
+from sim.analysis import averaging, bond_work, is_stationary, is_steady, settled, summary, sweep_dims
+from sim.analysis.observables import all_observables
+from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
 
-#: Points up to which each carries a marker.
+#: Different points up to which each carries a marker.
 MARKED = 25
 
 #: Curves that a figure holds at most: named in a legend, and along a colour bar.
@@ -45,7 +36,7 @@ _CATEGORY = 0.6
 _JUMP = 4.0
 
 _CROSS: Any = {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3}
-_RING: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "mew": 0.8, "linestyle": "none", "zorder": 3}
+_RING: Any = HOLLOW | {"mew": 0.8, "zorder": 3}
 
 
 class Line(NamedTuple):
@@ -57,18 +48,12 @@ class Line(NamedTuple):
     colour: str
 
 
-class Bar(NamedTuple):
-    """A colour bar in place of the names of many curves."""
-
-    colours: ScalarMappable
-    words: str
-
-
 class Scene(NamedTuple):
     """Statistics laid out for panels: along time or a swept key, one curve for each other point of the sweep.
 
     ``x`` has shape (curves, points), in the unit of the axis. Points that are categories are not ``joined``;
-    where the speed jumps lines are ``broken``. ``averaged`` says what the curves are means over.
+    where the speed jumps lines are ``broken``. ``averaged`` is what the curves are means over, in words; ``bar`` a
+    colour bar with its label, in place of the names of many curves.
     """
 
     found: xr.Dataset
@@ -76,7 +61,7 @@ class Scene(NamedTuple):
     lines: list[Line]
     averaged: str
     spread: str
-    bar: Bar | None = None
+    bar: tuple[ScalarMappable, str] | None = None
     x: np.ndarray = np.empty((0, 0))
     joined: bool = True
     broken: bool = False
@@ -84,6 +69,17 @@ class Scene(NamedTuple):
     @property
     def single(self) -> bool:
         return len(self.lines) == 1
+
+    @property
+    def marked(self) -> bool:
+        """Whether each point carries a marker: where curves over anything but time have few."""
+        over_time = self.along == "t" and not self.broken
+        return not over_time and max(np.unique(own).size for own in self.x) <= MARKED
+
+    @property
+    def room(self) -> float:
+        """Room for markers at the ends of the x axis, where there are any."""
+        return 0.03 if self.marked else 0.0
 
     @property
     def title(self) -> str:
@@ -118,15 +114,10 @@ class Scene(NamedTuple):
         """Where the contacts of all members are open."""
         return self.values("fraction_detached_mean", line) >= 1.0
 
-    def pulled_off(self, line: Line) -> np.ndarray:
-        """Records after which the contact opens; none in a sweep, whose points follow no time."""
-        gone = self.opened(line)
-        return np.flatnonzero(~gone[:-1] & gone[1:]) if self.along == "t" else np.empty(0, dtype=int)
-
-    def jumped_in(self, line: Line) -> np.ndarray:
-        """Records at which an open contact has closed."""
-        gone = self.opened(line)
-        return np.flatnonzero(gone[:-1] & ~gone[1:]) + 1 if self.along == "t" else np.empty(0, dtype=int)
+    def openings(self, line: Line) -> tuple[np.ndarray, np.ndarray]:
+        """Records after which the contact opens, and at which an open one has closed; none in a sweep."""
+        gone = self.opened(line) & (self.along == "t")
+        return np.flatnonzero(~gone[:-1] & gone[1:]), np.flatnonzero(gone[:-1] & ~gone[1:]) + 1
 
     def values(self, name: str, line: Line) -> np.ndarray:
         """A statistic along the x axis; nan where it is not known."""
@@ -139,24 +130,37 @@ class Scene(NamedTuple):
         """Statistics of all curves, shape (statistics * curves, points)."""
         return np.stack([self.values(name, line) for name in names for line in self.lines])
 
-    def band(self, name: str, line: Line) -> tuple[np.ndarray, np.ndarray]:
-        """5 and 95 % quantiles, or one standard deviation on both sides where only that was recorded."""
-        if f"{name}_quantile" in self.found:
-            quantiles = self.found[f"{name}_quantile"].isel(line.point)
-            return quantiles.isel(quantile=0).to_numpy(), quantiles.isel(quantile=-1).to_numpy()
-        mean, spread = (self.values(f"{name}_{kind}", line) for kind in ("mean", "std"))
-        return mean - spread, mean + spread
-
     def drawn(self, name: str, line: Line) -> list[np.ndarray]:
-        """Mean, its standard error, and both sides of the band; nan where there is no contact that it is of."""
-        known = [self.values(f"{name}_mean", line), self.values(f"{name}_sem", line), *self.band(name, line)]
+        """Mean, its standard error, and both sides of the band; nan where there is no contact that it is of.
+
+        The band is between 5 and 95 % quantiles, or one standard deviation on both sides where only that was recorded.
+        """
+        mean, error, spread = (self.values(f"{name}_{kind}", line) for kind in ("mean", "sem", "std"))
+        low, high = mean - spread, mean + spread
+        if f"{name}_quantile" in self.found:
+            low, _, high = self.found[f"{name}_quantile"].isel(line.point).to_numpy()
         gone = self.opened(line) if name in _OF_CONTACT else False
-        return [np.where(gone, np.nan, values) for values in known]
+        return [np.where(gone, np.nan, values) for values in (mean, error, low, high)]
 
     def parted(self, line: Line, *several: np.ndarray) -> list[np.ndarray]:
         """The x values of a curve and values over them, with a nan in each where lines break."""
-        at = jumps(self.values("speed_mean", line)) if self.broken else np.empty(0, dtype=int)
+        at = jumps(self.values("speed_mean", line)) if self.broken else ()
         return [np.insert(values, at, np.nan) for values in (self.x[line.number], *several)]
+
+    def covered(self, name: str, lines: list[Line]) -> list[bool]:
+        """Which of a few curves a later one would hide: it is nowhere farther than a hundredth of what all span."""
+        values = np.stack([self.values(f"{name}_mean", line) for line in lines])
+        if len(lines) > _FEW or not np.any(np.isfinite(values)):
+            return [False] * len(lines)
+        near = 0.01 * (np.nanmax(values) - np.nanmin(values))
+        return [any(np.all(np.abs(later - own) <= near) for later in values[k + 1 :]) for k, own in enumerate(values)]
+
+    def distinct(self, name: str) -> list[Line]:
+        """Curves that do not lie on an earlier one."""
+        kept: dict[bytes, Line] = {}
+        for line in self.lines:
+            kept.setdefault(self.values(f"{name}_mean", line).tobytes(), line)
+        return list(kept.values())
 
     def varies(self, name: str) -> bool:
         """Whether the observable is there and changes along the axis or between the curves."""
@@ -184,25 +188,16 @@ def jumps(speed: np.ndarray) -> np.ndarray:
     return np.flatnonzero(change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:])) + 2
 
 
-def _stated(dataset: xr.Dataset) -> xr.Dataset:
-    """Observables of all panels, with the shares of the lost area where they are known."""
-    found = observables(dataset)
-    with contextlib.suppress(ValueError):
-        found = found.merge(share_observables(dataset))
-    with contextlib.suppress(KeyError):
-        found["bond_work"] = bond_work(dataset)
-    return found
-
-
 def scene_along(dataset: xr.Dataset, along: str) -> Scene:
     """Statistics along time (``"t"``), or along a dimension of the sweep.
 
     Along the sweep they are of the means over the second half of the run where neither speed nor control change,
     else of the last record.
     """
-    others = [name for name in sweep_dims(dataset) if name != along]
-    lines, bar = _lines_of(dataset, others)
-    late, stated = along != "t" and is_stationary(dataset), _stated(dataset)
+    lines, bar = _lines_of(dataset, [name for name in sweep_dims(dataset) if name != along])
+    late, stated = along != "t" and is_stationary(dataset), all_observables(dataset)
+    with contextlib.suppress(KeyError):
+        stated["bond_work"] = bond_work(dataset)
     if along != "t":
         stated = (settled(stated) if late else stated.isel(t=slice(-1, None))).isel(t=0, drop=True)
     found = summary(stated)
@@ -213,22 +208,22 @@ def scene_along(dataset: xr.Dataset, along: str) -> Scene:
     return Scene(found, along, lines, words, f"{spread}' means" if late else spread, bar)
 
 
-def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], Bar | None]:
+def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[ScalarMappable, str] | None]:
     """One curve for each point of some dimensions, and a colour bar where they are many along one number."""
     points = [dict(zip(dims, at, strict=True)) for at in np.ndindex(*(dataset.sizes[name] for name in dims))]
     dims = [name for name in dims if dataset.sizes[name] > 1]
-    keyed = len(points) > len(LINES) and len(dims) == 1 and dataset[dims[0]].dtype.kind in "fi"
-    if len(points) > (MOST if keyed else NAMED):
-        sizes = " × ".join(f"{dataset.sizes[name]} of {name}" for name in dims)
-        raise ValueError(f"{len(points)} curves ({sizes}) are too many to tell apart; {choice(dataset, dims[0])}")
-    if keyed:
-        bar, colours = _bar(dataset[dims[0]])
-        return [Line(k, at, "", colour) for k, (at, colour) in enumerate(zip(points, colours, strict=True))], bar
-    shades: tuple[str, ...] = LINES
-    if len(points) > len(LINES):
-        shades = tuple(mpl.colors.to_hex(c) for c in mpl.colormaps["turbo"](np.linspace(0.05, 0.95, len(points))))
+    count, bar, shades = len(points), None, list(LINES)
     names = [", ".join(swept_value(dataset, name, at[name]) for name in dims) for at in points]
-    return [Line(k, at, names[k], shades[k]) for k, at in enumerate(points)], None
+    keyed = count > len(LINES) and len(dims) == 1 and dataset[dims[0]].dtype.kind in "fi"
+    if count > (MOST if keyed else NAMED):
+        sizes = " × ".join(f"{dataset.sizes[name]} of {name}" for name in dims)
+        raise ValueError(f"{count} curves ({sizes}) are too many to tell apart; {choice(dataset, dims[0])}")
+    if keyed:
+        bar, shades = _bar(dataset[dims[0]])
+        names = [""] * count
+    elif count > len(LINES):
+        shades = [mpl.colors.to_hex(shade) for shade in mpl.colormaps["turbo"](np.linspace(0.05, 0.95, count))]
+    return [Line(k, points[k], names[k], shades[k]) for k in range(count)], bar
 
 
 def choice(dataset: xr.Dataset, dim: str) -> str:
@@ -237,7 +232,7 @@ def choice(dataset: xr.Dataset, dim: str) -> str:
     return f'choose by --where, such as --where {dim}="{value}"'
 
 
-def _bar(key: xr.DataArray) -> tuple[Bar, list[str]]:
+def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
     """A colour bar over the values of a swept number, and the colours of them."""
     values = key.to_numpy().astype(float)
     logarithmic = axis_scale(values) == "log"
@@ -247,13 +242,14 @@ def _bar(key: xr.DataArray) -> tuple[Bar, list[str]]:
     shades = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
     colours = ScalarMappable(norm, shades)
     words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
-    return Bar(colours, unit.label(words)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
+    return (colours, unit.label(words)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
 
 
 def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
     """The colour bar beside panels, where the curves have one."""
     if scene.bar:
-        figure.colorbar(scene.bar.colours, ax=axes, label=scene.bar.words, aspect=45, pad=0.02)
+        colours, words = scene.bar
+        figure.colorbar(colours, ax=axes, label=words, aspect=45, pad=0.02)
 
 
 def curve(
@@ -270,7 +266,7 @@ def curve(
         fill(panel, x, low, high, **shade)
     else:
         panel.vlines(x, low, high, linewidth=5.0, **shade)
-    dots: Any = {"marker": "o", "markersize": 2.6} if scene.along != "t" and len(x) <= MARKED else {}
+    dots: Any = {"marker": "o", "markersize": 2.6} if scene.marked else {}
     width = {"linewidth": _UNDERNEATH} if wide and scene.joined else {}
     panel.plot(x, mean, color=colour, label=label, **(dots | scene.look(style) | width))
     if scene.along == "t":
@@ -281,7 +277,7 @@ def curve(
 
 def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
     """Curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
-    for line, wide in zip(scene.lines, covered(scene, name, scene.lines), strict=True):
+    for line, wide in zip(scene.lines, scene.covered(name, scene.lines), strict=True):
         curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread, wide=wide)
         if name in _OF_CONTACT:
             mark_jumps(panel, scene, name, line, factor)
@@ -292,31 +288,9 @@ def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, named: bool = True) -> None:
     """A cross at each pull-off and a ring at each jump-in of a curve."""
     x, mean = scene.x[line.number], factor * scene.values(f"{name}_mean", line)
-    for words, at, sign in (("pull-off", scene.pulled_off(line), _CROSS), ("jump-in", scene.jumped_in(line), _RING)):
+    for words, at, sign in zip(("pull-off", "jump-in"), scene.openings(line), (_CROSS, _RING), strict=True):
         if at.size:
             panel.plot(x[at], mean[at], color=line.colour, label=words if named else "", **sign)
-
-
-def covered(scene: Scene, name: str, lines: list[Line]) -> list[bool]:
-    """Which of a few curves a later one would hide: it is nowhere farther than a hundredth of what all span."""
-    values = np.stack([scene.values(f"{name}_mean", line) for line in lines])
-    if len(lines) > _FEW or not np.any(np.isfinite(values)):
-        return [False] * len(lines)
-    near = 0.01 * (np.nanmax(values) - np.nanmin(values))
-    return [any(np.all(np.abs(later - own) <= near) for later in values[k + 1 :]) for k, own in enumerate(values)]
-
-
-def distinct(scene: Scene, name: str) -> list[Line]:
-    """Curves that do not lie on an earlier one."""
-    kept: dict[bytes, Line] = {}
-    for line in scene.lines:
-        kept.setdefault(np.ascontiguousarray(scene.values(name, line), dtype=float).tobytes(), line)
-    return list(kept.values())
-
-
-def room_of(scene: Scene) -> float:
-    """Room for markers at the ends of the x axis, where there are any."""
-    return 0.03 if scene.x.shape[1] <= MARKED else 0.0
 
 
 def speed_dim(dataset: xr.Dataset) -> str | None:

@@ -11,13 +11,14 @@ from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 from scipy.signal import resample
 
-from sim.analysis import engineering, setting
+from sim.analysis import setting
 from sim.analysis.scene import word
 from sim.laws.halfspace import displacement
 from sim.numerics.grid import Grid
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.modes import Modes, modes
 from sim.plots import style
+from sim.plots.style import BOTH, FLUCTUATIONS, Unit, number_at
 from sim.spectrum.families import Spectrum
 from sim.spectrum.periodogram import periodogram, radial_average
 
@@ -41,42 +42,33 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     at, point = style.first_point(dataset)
     stress = _maps_of(dataset, at).isel(map_member=0)
     cell = _cell_of(stress)
-    modulus, ratio = (float(dataset[f"effective_{n}"].isel(at)) for n in ("shear_modulus", "poisson_ratio"))
+    modulus, ratio = (number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), cell, modulus, ratio)
-    radius = _radius_of(dataset, at, stress)
-    figure = style.picture(style.WIDE, 3.1)
-    axes = figure.subplots(1, 2, sharey=True)
-    length = style.Unit.of(np.array([cell]), "m")
-    shown = (
-        (stress.to_numpy(), "Pa", r"shear stress $\tau_1$", "RdBu_r"),
-        (moved, "m", "displacement $w_1$", "PuOr_r"),
-    )
-    speed = dataset["speed"].isel(at, missing_dims="ignore")
-    speed_then = float(speed.sel(t=stress["map_time"], method="nearest"))
+    radius, speed = (float(_then(dataset, name, at, stress)) for name in ("contact_radius", "speed"))
+    figure, axes = style.pairs(3.1, shared=True)
+    length = Unit.of(np.array([cell]), "m")
+    _draw_map(figure, axes[0], stress.to_numpy(), cell, radius, length, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
+    _draw_map(figure, axes[1], moved, cell, radius, length, ("m", "displacement $w_1$", "PuOr_r"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
-    for panel, (field, si, words, colours) in zip(axes, shown, strict=True):
-        _draw_map(figure, panel, field, cell, radius, length, (si, words, colours))
+    for panel in axes:
         panel.text(
-            0.04, 0.05, arrow[float(np.sign(speed_then))], transform=panel.transAxes, fontsize=7,
+            0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7,
             bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0},
         )  # fmt: skip
     axes[0].set_ylabel(length.label("$y$"))
-    style.letter(list(axes))
-    then = f"$t$ = {engineering(float(stress['map_time']), 's')}, $V$ = {engineering(speed_then, 'm/s')}"
-    axes[0].set_title(", ".join(filter(None, [point, then.replace("-", "−")])))
+    then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}, $V$ = {style.text_of(speed, 'm/s')}"
+    axes[0].set_title(", ".join(filter(None, [point, then])))
     return figure
 
 
-def _radius_of(dataset: xr.Dataset, at: dict[str, int], stress: xr.DataArray) -> float:
-    """Contact radius of the map's member at the map's time [m]."""
-    radius = style.recorded(dataset, "contact_radius").isel(at)
-    if "member" in radius.dims:
-        radius = radius.sel(member=stress["map_member"])
-    return float(radius.sel(t=stress["map_time"], method="nearest"))
+def _then(dataset: xr.Dataset, name: str, at: dict[str, int], stress: xr.DataArray) -> np.ndarray:
+    """A variable at the time of the maps, of the member that one map is of."""
+    values = style.recorded(dataset, name).isel(at, missing_dims="ignore").sel(t=stress["map_time"], method="nearest")
+    return (values.sel(member=stress["map_member"]) if "member" in values.dims else values).to_numpy()
 
 
 def _draw_map(
-    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: style.Unit, about: tuple
+    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: Unit, about: tuple
 ) -> None:
     """One field around the contact, continued periodically where the contact is wider than the cell."""
     si, words, colours = about
@@ -85,21 +77,18 @@ def _draw_map(
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
-    unit = style.Unit.of(field, si)
+    unit = Unit.of(field, si)
     most = unit.factor * float(np.max(np.abs(field))) or 1.0
     reach = (half + 0.5) * cell / points * length.factor
     image = panel.imshow(
         unit.factor * field[np.ix_(index, index)].T, cmap=colours, vmin=-most, vmax=most, origin="lower",
         extent=(-reach, reach, -reach, reach), interpolation="nearest",
     )  # fmt: skip
-    bar = figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)))
-    bar.set_label(unit.label(words))
+    figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
     if 0.0 < radius < 1.5 * cell:
         style.contact_circle(panel, radius * length.factor)
     limit = 0.5 * side * length.factor
-    panel.set_xlim(-limit, limit)
-    panel.set_ylim(-limit, limit)
-    panel.set_xlabel(length.label("$x$"))
+    panel.set(xlim=(-limit, limit), ylim=(-limit, limit), xlabel=length.label("$x$"))
 
 
 def _refined(field: np.ndarray) -> np.ndarray:
@@ -124,7 +113,7 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _T
     for table in ("spectrum", "amplitude"):
         for key in shear[table]:
             with contextlib.suppress(KeyError):
-                shear[table][key] = float(setting(dataset, f"shear.{table}.{key}").isel(at, missing_dims="ignore"))
+                shear[table][key] = number_at(setting(dataset, f"shear.{table}.{key}"), at)
     spectrum = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
     if spectrum.wavevector is not None:
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
@@ -132,12 +121,8 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _T
         cells = modes(spectrum, _cell_of(stress), stress.sizes["x"])
         return _Target(spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled")
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
-    time = {"t": float(stress["map_time"])}
-    now = [
-        style.recorded(dataset, name).isel(at, missing_dims="ignore").sel(time, method="nearest").to_numpy()
-        for name in ("speed", "shear_stress")
-    ]
-    return _Target(spectrum, float(np.mean(amplitude.factor(*now) ** 2)), "target")
+    factor = amplitude.factor(*(_then(dataset, name, at, stress) for name in ("speed", "shear_stress")))
+    return _Target(spectrum, float(np.mean(factor**2)), "target")
 
 
 def _cell_of(stress: xr.DataArray) -> float:
@@ -175,24 +160,22 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     measured = np.mean([ring.density for ring in rings], axis=0)[held]
     error = np.sqrt(np.sum([ring.standard_error**2 for ring in rings], axis=0))[held] / len(rings)
 
-    length = style.Unit.of(2 * np.pi / q, "m")
+    length = Unit.of(2 * np.pi / q, "m")
+    q, fine = q / length.factor, fine / length.factor
     figure, (panel, below) = style.rows([1.9, 1.1])
-    dots: Any = {"fmt": "o", "color": style.BOTH, "markersize": 2.2, "elinewidth": 0.7}
-    ring: Any = {"marker": "o", "linestyle": "none", "markersize": 4.5, "markerfacecolor": "none"}
-    ring |= {"color": style.FLUCTUATIONS, "markeredgewidth": 0.7}
-    shown = np.where(density > 0.0, density, np.nan)
-    panel.loglog(fine / length.factor, shown, color=style.FLUCTUATIONS, label=target.words)
-    panel.plot(q / length.factor, expected, label="discretised", **ring)
-    count = f"{len(rings)} maps" if len(rings) > 1 else "1 map"
-    panel.errorbar(q / length.factor, measured, error, label=f"realised, {count}", **dots)
+    dots: Any = {"fmt": "o", "color": BOTH, "markersize": 2.2, "elinewidth": 0.7}
+    ring: Any = {"markersize": 4.5, "markerfacecolor": "none", "color": FLUCTUATIONS, "markeredgewidth": 0.7}
+    panel.loglog(fine, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS, label=target.words)
+    panel.plot(q, expected, "o", label="discretised", **ring)
+    panel.errorbar(q, measured, error, label=f"realised, {len(rings)} map{'s' * (len(rings) > 1)}", **dots)
     panel.set_ylabel("spectral density $C$ (Pa² m²)")
     if np.max(measured) < 100.0 * np.min(measured):
         style.plain_ticks(panel.yaxis)
     style.legend(panel, point)
-    below.axhline(1.0, color=style.FLUCTUATIONS, linewidth=1.2)
-    below.errorbar(q / length.factor, measured / expected, error / expected, **dots)
+    below.axhline(1.0, color=FLUCTUATIONS)
+    below.errorbar(q, measured / expected, error / expected, **dots)
     below.set_ylabel("realised/discretised")
-    style.across(below, q / length.factor, "log", f"wavenumber $q$ (rad/{length.name})", 0.03)
+    style.across(below, q, "log", f"wavenumber $q$ (rad/{length.name})", 0.03)
     return figure
 
 

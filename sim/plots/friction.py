@@ -1,13 +1,12 @@
 """The figure of the friction force: over time, and as a loop over the position of the slider."""
 
-import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
 
 from sim.plots.bond_laws import rest_of
 from sim.plots.curves import colour_bar, scene_along
 from sim.plots.panels import friction_panel
-from sim.plots.style import REFERENCE, Unit, across, legend, recorded, rows
+from sim.plots.style import GUIDE, Unit, across, legend, recorded, rows
 
 
 def turns(dataset: xr.Dataset) -> bool:
@@ -28,15 +27,15 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
     """Friction force over time and over the slider's position: the friction loop."""
     scene = scene_along(dataset, "t")
     figure, axes = rows([1.7, 2.1], shared=False)
-    for panel, x, words, si in (
-        (axes[0], scene.found["t"].to_numpy(), "time $t$", "s"),
-        (axes[1], scene.all("slider_position_mean"), "slider position $x$", "m"),
+    for panel, x, words, si, room in (
+        (axes[0], dataset["t"].to_numpy(), "time $t$", "s", 0.0),
+        (axes[1], scene.all("slider_position_mean"), "slider position $x$", "m", 0.03),
     ):
-        unit = Unit.of(np.asarray(x), si)
+        unit = Unit.of(x, si)
         placed = scene.placed(unit.factor * x, broken=True)
         friction_panel(panel, placed)
-        panel.axhline(0.0, color=REFERENCE, linewidth=0.5, zorder=1)
-        across(panel, placed.x, "linear", unit.label(words), 0.0 if si == "s" else 0.03)
+        panel.axhline(0.0, **GUIDE)
+        across(panel, placed.x, "linear", unit.label(words), room)
     legend(axes[0], scene.title)
     colour_bar(figure, axes, scene)
     return figure

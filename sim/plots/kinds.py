@@ -36,19 +36,15 @@ class Kind(NamedTuple):
         return (self.draw.__doc__ or "").partition("\n")[0]
 
 
-def _always(dataset: xr.Dataset) -> bool:
-    return True
-
-
 #: What can be drawn, by name; the first line of what draws it is its help. The default is the first kind that fits.
 KINDS: dict[str, Kind] = {
-    "loop": Kind(loop_figure, needs_course, _always),
+    "loop": Kind(loop_figure, needs_course, lambda dataset: True),
     "theories": Kind(theories_figure, needs_control, sweeps_theories),
     "stress": Kind(stress_figure, needs_stress, lambda dataset: rest_of(dataset) is not None),
     "friction": Kind(friction_figure, needs_friction, turns),
     "curve": Kind(curve_figure, needs_speeds, lambda dataset: not turns(dataset)),
-    "sweep": Kind(sweep_figure, needs_sweep, _always),
-    "time": Kind(time_figure, fits=_always),
+    "sweep": Kind(sweep_figure, needs_sweep, lambda dataset: True),
+    "time": Kind(time_figure, fits=lambda dataset: True),
     "map": Kind(map_figure, needs_maps),
     "spectrum": Kind(spectrum_figure, needs_maps),
     "profile": Kind(profile_figure, needs_contact),

@@ -1,6 +1,6 @@
 """Panels of one observable each, and the figures that are stacked of them: over speed, over time, over a swept key."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,35 +8,12 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import engineering, is_stationary, is_steady, sweep_dims
+from sim.analysis import is_stationary, is_steady
 from sim.analysis.scene import stays_held
+from sim.plots import style
 from sim.plots.bond_laws import rest_of
-from sim.plots.curves import (
-    Scene,
-    colour_bar,
-    contact_curves,
-    covered,
-    curve,
-    distinct,
-    over_speed,
-    room_of,
-    scene_along,
-    speed_dim,
-)
-from sim.plots.style import (
-    BONDS,
-    BOTH,
-    FLUCTUATIONS,
-    REFERENCE,
-    Unit,
-    across,
-    axis_scale,
-    fill,
-    legend,
-    recorded,
-    rows,
-    symbol,
-)
+from sim.plots.curves import Scene, colour_bar, contact_curves, curve, over_speed, scene_along, speed_dim
+from sim.plots.style import BONDS, BOTH, FLUCTUATIONS, GREY, GUIDE, REFERENCE, Unit, legend
 
 Panel = Callable[[Axes, Scene], None]
 
@@ -45,8 +22,6 @@ _SMALL = 0.02
 
 #: Opacity of the shades that show what a mechanism takes.
 _SHADE = 0.35
-
-_THIN: Any = {"linewidth": 0.9, "zorder": 1.5}
 
 
 def series(name: str, words: str, si: str) -> Panel:
@@ -67,13 +42,12 @@ def radius_panel(panel: Axes, scene: Scene) -> None:
     """Contact radius between Hertz's and JKR's."""
     unit = Unit.of(scene.all("contact_radius_mean", "jkr_radius_mean"), "m")
     contact_curves(panel, scene, "contact_radius", unit.factor)
-    for which, style in (("JKR", "--"), ("Hertz", ":")):
-        name = f"{which.lower()}_radius_mean"
-        _reference(panel, scene, unit.factor * scene.all(name), style, which)
+    for which, dashes in (("JKR", "--"), ("Hertz", ":")):
+        _reference(panel, scene, unit.factor * scene.all(f"{which.lower()}_radius_mean"), dashes, which)
     panel.set_ylabel(unit.label("contact radius $a$"))
 
 
-def _reference(panel: Axes, scene: Scene, values: np.ndarray, style: Any, name: str) -> None:
+def _reference(panel: Axes, scene: Scene, values: np.ndarray, dashes: str, name: str) -> None:
     """Lines of a closed form: one grey one where all curves have the same, else in their colours."""
     known = [_broken(own) for own in values]
     same = scene.joined and all(np.array_equal(own, known[0], equal_nan=True) for own in known)
@@ -85,8 +59,8 @@ def _reference(panel: Axes, scene: Scene, values: np.ndarray, style: Any, name: 
             half = 0.5 * scene.category
             x, y = np.stack([x - half, x + half, x], axis=1).ravel(), np.repeat(y, 3)
             y[2::3] = np.nan
-        panel.plot(x, y, linestyle=style, color=REFERENCE if same else line.colour, **_THIN)
-    panel.plot([], [], linestyle=style, color=REFERENCE, label=name, **_THIN)
+        panel.plot(x, y, dashes, **GREY | ({} if same else {"color": line.colour}))
+    panel.plot([], [], dashes, label=name, **GREY)
 
 
 def _broken(values: np.ndarray) -> np.ndarray:
@@ -108,19 +82,21 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
     drawn = [entry for entry in _ENERGIES if np.any(np.nan_to_num(scene.all(f"{entry[0]}_mean")))]
     if _small_fluctuations(scene):
         drawn = [entry for entry in drawn if entry[0] != "fluctuation_energy"]
-    if not scene.single:  # one colour for each curve leaves line styles for the energies
+    left, work = (scene.all(f"{name}_mean") for name in ("bond_work", "work_of_adhesion"))
+    # one colour for each curve leaves line styles for the energies; without fluctuations all is left to the contact
+    if not scene.single or np.allclose(left, work, rtol=1e-9, atol=0.0, equal_nan=True):
         drawn = [entry for entry in drawn if entry[0] != "bond_work"]
     values = scene.all(*(f"{name}_mean" for name, *_ in drawn))
     unit = Unit.of(values, "J/m^2")
-    for name, text, own, style in drawn:
-        curves = distinct(scene, f"{name}_mean")
-        placed = scene.middle() if len(curves) == 1 else scene
-        for line, wide in zip(curves, covered(scene, name, curves), strict=True):
-            colour = own if scene.single else REFERENCE if len(curves) == 1 else line.colour
-            curve(panel, placed, name, line, unit.factor, colour, style, wide=wide)
-        panel.plot([], [], color=own if scene.single else REFERENCE, label=text, **scene.look(style))
+    for name, text, own, dashes in drawn:
+        lines = scene.distinct(name)
+        placed = scene.middle() if len(lines) == 1 else scene
+        for line, wide in zip(lines, scene.covered(name, lines), strict=True):
+            colour = own if scene.single else REFERENCE if len(lines) == 1 else line.colour
+            curve(panel, placed, name, line, unit.factor, colour, dashes, wide=wide)
+        panel.plot([], [], color=own if scene.single else REFERENCE, label=text, **scene.look(dashes))
     if np.any(values <= 0.0):
-        panel.axhline(0.0, color=REFERENCE, linewidth=0.5, zorder=1)
+        panel.axhline(0.0, **GUIDE)
     panel.set_ylabel(unit.label("energy per area"))
     legend(panel)
 
@@ -134,7 +110,7 @@ def _small_fluctuations(scene: Scene) -> bool:
 def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
     """Fluctuation energy where it is small."""
     unit = Unit.of(scene.all("fluctuation_energy_mean"), "J/m^2")
-    for line in distinct(scene, "fluctuation_energy_mean"):
+    for line in scene.distinct("fluctuation_energy"):
         colour = FLUCTUATIONS if scene.single else line.colour
         curve(panel, scene, "fluctuation_energy", line, unit.factor, colour, "--")
     panel.set_ylim(bottom=0.0)
@@ -146,7 +122,7 @@ def share_panel(panel: Axes, scene: Scene) -> None:
     if scene.single:
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
-    panel.axhline(1.0, linestyle="--", color=REFERENCE, label="JKR", **_THIN)
+    panel.axhline(1.0, linestyle="--", label="JKR", **GREY)
     hertz, jkr = (scene.all(f"{name}_radius_mean") for name in ("hertz", "jkr"))
     _reference(panel, scene, (hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2, ":", "Hertz")
     legend(panel, scene.title)
@@ -164,17 +140,20 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
             panel.plot(x, bonds, "-.", color=BONDS, label="with the bonds left alone")
         return
     if scene.varies("lost_to_bonds"):
-        fill(panel, x, bonds, np.ones_like(bonds), color=BONDS, alpha=_SHADE, label="lost to broken bonds")
+        style.fill(panel, x, bonds, np.ones_like(bonds), color=BONDS, alpha=_SHADE, label="lost to broken bonds")
     if scene.varies("lost_to_fluctuations"):
-        fill(panel, x, ratio, bonds, color=FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
+        style.fill(panel, x, ratio, bonds, color=FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
 
 
-def stacked(scene: Scene, panels: list[tuple[float, Panel]]) -> tuple[Figure, list[Axes]]:
-    """Panels of given heights [in] above each other that share their x axis, lettered, with the colour bar if any."""
-    figure, axes = rows([height for height, _ in panels])
+def stacked(
+    scene: Scene, panels: Sequence[tuple[float, Panel]], words: str, scale: str = "linear", room: float = 0.0
+) -> tuple[Figure, list[Axes]]:
+    """Panels of given heights [in] above each other with one x axis and its label, lettered; a colour bar if any."""
+    figure, axes = style.rows([height for height, _ in panels])
     for panel, (_, drawing) in zip(axes, panels, strict=True):
         drawing(panel, scene)
     colour_bar(figure, axes, scene)
+    style.across(axes[-1], scene.x, scale, words, room)
     return figure, axes
 
 
@@ -200,9 +179,8 @@ def needs_speeds(dataset: xr.Dataset) -> None:
 def curve_figure(dataset: xr.Dataset) -> Figure:
     """Contact area with what each mechanism takes of it, energies and friction, over speed."""
     scene, scale, unit = over_speed(dataset)
-    figure, axes = stacked(scene, [(1.9, share_panel), *further_panels(scene)])
-    across(axes[-1], scene.x, scale, unit.label("sliding speed $V$"), room_of(scene))
-    return figure
+    panels = [(1.9, share_panel), *further_panels(scene)]
+    return stacked(scene, panels, unit.label("sliding speed $V$"), scale, scene.room)[0]
 
 
 #: What drives a contact, drawn over time where it changes.
@@ -220,45 +198,41 @@ def time_figure(dataset: xr.Dataset) -> Figure:
     moved = not bool(stays_held(dataset).all())
     shown = [name for name in _DRIVEN if scene.moves(name) and (name != "displacement" or moved)]
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
-    figure, axes = stacked(scene, [(1.6, radius_panel), *further_panels(scene), *driven])
+    panels = [(1.6, radius_panel), *further_panels(scene), *driven]
+    figure, axes = stacked(scene, panels, unit.label("time $t$"))
     legend(axes[0], scene.title)
-    across(axes[-1], scene.x, "linear", unit.label("time $t$"))
     return figure
 
 
 def needs_sweep(dataset: xr.Dataset) -> None:
-    if not _swept(dataset):
+    if not style.swept(dataset):
         raise ValueError('nothing is swept; sweep a key: [sweep] "contact.load" = ["1 mN", "4 mN"]')
-
-
-def _swept(dataset: xr.Dataset) -> list[str]:
-    """Dimensions of the sweep with more than one value."""
-    return [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
 
 
 def sweep_figure(dataset: xr.Dataset) -> Figure:
     """Contact radius, energies and friction over the first swept key; further keys make curves."""
-    key = dataset[_swept(dataset)[0]]
-    named = key.dtype.kind not in "fi"
-    values = np.arange(key.size, dtype=float) if named else key.to_numpy().astype(float)
-    scale = "linear" if named else axis_scale(values)
-    unit = Unit(1.0, "") if named else Unit.of(values, key.attrs["units"], scale == "log")
-    scene = scene_along(dataset, str(key.name)).placed(unit.factor * values)
-    if named:
-        scene = scene.apart()
-    figure, axes = stacked(scene, [(1.7, radius_panel), *further_panels(scene)])
-    legend(axes[0], scene.title if is_stationary(dataset) else _at_the_end(dataset, scene.title))
-    words = f"{key.attrs.get('long_name', key.name)} {symbol(key)}".strip()
-    beside = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
-    across(axes[-1], scene.x, scale, unit.label(words), beside if named else room_of(scene))
-    if named:
+    key = dataset[style.swept(dataset)[0]]
+    words = f"{key.attrs.get('long_name', key.name)} {style.symbol(key)}".strip()
+    scene, panels = scene_along(dataset, str(key.name)), [(1.7, radius_panel)]
+    if key.dtype.kind in "fi":
+        values = key.to_numpy().astype(float)
+        scale = style.axis_scale(values)
+        unit = Unit.of(values, key.attrs["units"], scale == "log")
+        scene = scene.placed(unit.factor * values)
+        figure, axes = stacked(scene, [*panels, *further_panels(scene)], unit.label(words), scale, scene.room)
+    else:
+        values = np.arange(key.size, dtype=float)
+        scene = scene.placed(values).apart()
+        beside = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
+        figure, axes = stacked(scene, [*panels, *further_panels(scene)], words, room=beside)
         axes[-1].set_xticks(values, [str(value) for value in key.to_numpy()])
+    legend(axes[0], scene.title if is_stationary(dataset) else _at_the_end(dataset, scene.title))
     return figure
 
 
 def _at_the_end(dataset: xr.Dataset, averaged: str) -> str:
     """The last time and the speed then, which may differ between the points of the sweep, and what a mean is over."""
-    speed = recorded(dataset, "speed").isel(t=-1)
-    ends = dict.fromkeys(engineering(float(end), "m/s") for end in (speed.min(), speed.max()))
-    words = f"at the end: $t$ = {engineering(float(dataset['t'][-1]), 's')}, $V$ = {' to '.join(ends)}"
-    return ", ".join(filter(None, [words.replace("-", "−"), averaged]))
+    speed = style.recorded(dataset, "speed").isel(t=-1)
+    ends = dict.fromkeys(style.text_of(float(end), "m/s") for end in (speed.min(), speed.max()))
+    words = f"at the end: $t$ = {style.text_of(float(dataset['t'][-1]), 's')}, $V$ = {' to '.join(ends)}"
+    return ", ".join(filter(None, [words, averaged]))

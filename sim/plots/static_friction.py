@@ -8,16 +8,24 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import engineering, setting, sweep_dims
+from sim.analysis import setting, sweep_dims
 from sim.plots import style
-from sim.plots.bond_laws import start_peak, steady_laws
+from sim.plots.bond_laws import population_of, steady_laws
+from sim.plots.style import number_at
 
 _MARKERS = "osD^vP"
 _FINE = 300
 
+#: A peak is resolved if more steps than that lead up to it.
+_STEPS = 3.5
+
 
 class Start(NamedTuple):
-    """One start: where in the sweep, rest [s], speed [m/s]; since it began times [s] and mean stresses [Pa]."""
+    """One start: where in the sweep, rest [s], speed [m/s]; since it began times [s] and mean stresses [Pa].
+
+    ``peak`` [Pa] is the largest stress, at the time ``when`` [s]; it is ``seen`` if the stress falls again and several
+    steps lead up to it.
+    """
 
     at: dict[str, int]
     rest: float
@@ -25,17 +33,9 @@ class Start(NamedTuple):
     fraction: float
     time: np.ndarray
     stress: np.ndarray
-
-    @property
-    def peak(self) -> int:
-        """Index of the largest stress."""
-        return int(np.argmax(np.abs(self.stress)))
-
-    @property
-    def seen(self) -> bool:
-        """Whether the records show the peak: three lead up to it, and the next is not lower by a fifth."""
-        beside = np.abs(self.stress[self.peak + 1 : self.peak + 2])
-        return self.peak > 2 and beside.size == 1 and bool(beside[0] >= 0.8 * abs(self.stress[self.peak]))
+    peak: float
+    when: float
+    seen: bool
 
 
 def _varied(dataset: xr.Dataset) -> list[str]:
@@ -45,94 +45,98 @@ def _varied(dataset: xr.Dataset) -> list[str]:
 
 
 def starts_of(dataset: xr.Dataset) -> list[Start]:
-    """All starts of a sweep over rest and speed, at the first point of further swept keys."""
-    rest, speed, varied = setting(dataset, "drive.rest"), setting(dataset, "drive.speed"), _varied(dataset)
-    first = {name: 0 for name in sweep_dims(dataset) if name not in varied}
-    values = [style.mean_of(dataset, name) for name in ("shear_stress", "bond_fraction")]
-    time, found = dataset["t"].to_numpy(), []
+    """All starts of a sweep over rest and speed, at the first point of further swept keys.
+
+    Peaks are those of the clock steps, or where members differ those of their mean over the records.
+    """
+    varied, found = _varied(dataset), []
     for where in np.ndindex(*(dataset.sizes[name] for name in varied)):
-        at = first | dict(zip(varied, where, strict=True))
-        still, pace = (float(number.isel(at, missing_dims="ignore")) for number in (rest, speed))
-        stress, fraction = (value.isel(at, missing_dims="ignore").to_numpy() for value in values)
-        slides = time > still + 1e-9 * time[-1]
+        at = dict.fromkeys(sweep_dims(dataset), 0) | dict(zip(varied, where, strict=True))
+        rest, speed = (number_at(setting(dataset, f"drive.{key}"), at) for key in ("rest", "speed"))
+        means = (style.mean_of(dataset, name) for name in ("shear_stress", "bond_fraction"))
+        stress, fraction = (mean.isel(at, missing_dims="ignore").to_numpy() for mean in means)
+        time = dataset["t"].to_numpy() - rest
+        slides = time > 1e-9 * (time[-1] + rest)
         if np.any(slides):
             before = float(fraction[~slides][-1]) if not np.all(slides) else float(fraction[0])
-            found.append(Start(at, still, pace, before, time[slides] - still, stress[slides]))
+            time, stress = time[slides], stress[slides]
+            peak = _peak(dataset, at, rest, time, np.abs(stress))
+            found.append(Start(at, rest, speed, before, time, stress, np.copysign(peak[0], speed), *peak[1:]))
     return found
+
+
+def _peak(
+    dataset: xr.Dataset, at: dict[str, int], rest: float, time: np.ndarray, size: np.ndarray
+) -> tuple[float, float, bool]:
+    """Largest size of the stress of a start [Pa], its time since [s], and whether it is resolved."""
+    k = int(np.argmax(size))
+    peak, when, step = float(size[k]), float(time[k]), float(dataset["t"][1] - dataset["t"][0])
+    if "peak_stress" in dataset and "member" not in dataset["peak_stress"].dims:
+        peak, when, step = (number_at(dataset[name], at) for name in ("peak_stress", "peak_time", "clock_step"))
+        when -= rest
+    return peak, when, bool(size[-1] < peak and when > _STEPS * step)
 
 
 def start_figure(dataset: xr.Dataset) -> Figure:
     """Stress since the start at the longest rest, one line a speed; peak stress over speed, one line a rest."""
     starts = starts_of(dataset)
     unit = style.Unit.of(np.concatenate([start.stress for start in starts]), "Pa")
-    longest = sorted((s for s in starts if s.rest == max(s.rest for s in starts)), key=lambda s: abs(s.speed))
-    over = "speed" if len({abs(s.speed) for s in starts} - {0.0}) > 1 else "rest"
-    if len({getattr(start, over) for start in starts}) == 1:
+    rests, speeds = ({start.rest for start in starts}, {abs(start.speed) for start in starts})
+    longest = sorted((s for s in starts if s.rest == max(rests)), key=lambda s: abs(s.speed))
+    if len(rests) == len(speeds) == 1:
         figure = style.picture(style.COLUMN, 2.6)
         axes = [figure.subplots()]
     else:
-        figure = style.picture(style.WIDE, 2.9)
-        axes = list(figure.subplots(1, 2, sharey=True))
-        style.letter(axes)
-        _peak_panel(axes[1], dataset, starts, over, unit)
+        figure, axes = style.pairs(2.9, shared=True)
+        _peak_panel(axes[1], dataset, starts, len(speeds - {0.0}) > 1, unit)
     _time_panel(axes[0], longest, unit)
-    others = [name for name in sweep_dims(dataset) if name not in _varied(dataset) and dataset.sizes[name] > 1]
-    after = f"after {engineering(longest[0].rest, 's')} at rest, sliding at"
+    others = [name for name in style.swept(dataset) if name not in _varied(dataset)]
+    after = f"after {style.text_of(longest[0].rest, 's')} at rest, sliding at"
     style.legend(axes[0], ", ".join([*(style.swept_value(dataset, name, 0) for name in others), after]))
     return figure
 
 
-def _coloured(starts: list[Start]) -> list[tuple[Start, str]]:
-    """Starts with the colours of their lines."""
-    shades = mpl.colormaps["viridis"](np.linspace(0.0, 0.88, len(starts)))
-    return [(start, mpl.colors.to_hex(shade)) for start, shade in zip(starts, shades, strict=True)]
-
-
 def _time_panel(panel: Axes, starts: list[Start], unit: style.Unit) -> None:
-    """Stress over the time since the start; a dot at each peak that was recorded."""
+    """Stress over the time since the start; a dot at each peak that is resolved."""
     several = len(starts) > 1
-    length = style.Unit.of(np.concatenate([start.time for start in starts]), "s", several)
-    for start, colour in _coloured(starts):
-        time, stress = length.factor * start.time, unit.factor * start.stress
-        panel.plot(time, stress, color=colour, label=style.rounded(start.speed, "m/s"))
+    times = starts[0].time
+    length = style.Unit.of(times, "s", several)
+    for start, colour in zip(starts, mpl.colormaps["viridis"](np.linspace(0.0, 0.88, len(starts))), strict=True):
+        words = style.rounded(start.speed, "m/s")
+        panel.plot(length.factor * start.time, unit.factor * start.stress, color=colour, label=words)
         if start.seen:
-            panel.plot(time[start.peak], stress[start.peak], "o", markersize=3, color=colour)
-    first, last = (length.factor * float(starts[0].time[k]) for k in (0, -1))
-    if several and last > first:
-        style.span(panel, first, last)
-    else:
-        panel.set_xlim(0.0, last)
+            panel.plot(length.factor * start.when, unit.factor * start.peak, "o", markersize=3, color=colour)
+    ends = length.factor * np.array([times[0] if several else 0.0, times[-1]])
+    style.across(panel, ends, "log" if several else "linear", length.label("time since the start"))
     panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
-    panel.set_xlabel(length.label("time since the start"))
 
 
-def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over: str, unit: style.Unit) -> None:
+def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_speed: bool, unit: style.Unit) -> None:
     """Peak stress over speed, one line a rest; over the rest where there is one speed only.
 
     Beneath it what closed forms say of Bell bonds: their peak if none rebinds, and of any bonds steady sliding.
     """
-    values = np.array([abs(getattr(start, over)) for start in starts])
-    pace = style.Unit.of(values, "m/s" if over == "speed" else "s", logarithmic=True)
-    groups = sorted({start.rest for start in starts}) if over == "speed" else [None]
-    for k, rest in enumerate(groups):
-        own = sorted((s for s in starts if rest in (s.rest, None)), key=lambda s: abs(getattr(s, over)))
-        own = [s for s in own if getattr(s, over) != 0.0]
-        shade = mpl.colors.to_hex((0.65 * (1.0 - (k + 1) / len(groups)),) * 3)
-        x, y = np.array([(abs(getattr(s, over)), s.stress[s.peak]) for s in own]).T
-        line: Any = {"color": shade, "marker": _MARKERS[k % len(_MARKERS)], "markersize": 3.5}
-        panel.plot(pace.factor * x, unit.factor * y, label=f"{engineering(rest, 's')} at rest" if rest else "", **line)
-        rising = np.array([not s.seen for s in own])
-        panel.plot(pace.factor * x[rising], unit.factor * y[rising], **(line | {"linestyle": "none", "mfc": "white"}))
+    places = np.array([abs(start.speed) if over_speed else start.rest for start in starts])
+    order = [k for k in np.argsort(places, kind="stable") if places[k] > 0.0]
+    pace = style.Unit.of(places, "m/s" if over_speed else "s", logarithmic=True)
+    lines = sorted({start.rest for start in starts}) if over_speed else [0.0]
+    for number, rest in enumerate(lines):
+        own = [k for k in order if not over_speed or starts[k].rest == rest]
+        grey = mpl.colors.to_hex((0.65 * (1.0 - (number + 1) / len(lines)),) * 3)
+        look: Any = {"color": grey, "marker": _MARKERS[number % len(_MARKERS)], "markersize": 3.5}
+        x, y = pace.factor * places[own], unit.factor * np.array([starts[k].peak for k in own])
+        panel.plot(x, y, label=f"{style.text_of(rest, 's')} at rest" if over_speed else "", **look)
+        risen = np.array([not starts[k].seen for k in own])
+        panel.plot(x[risen], y[risen], **look | {"linestyle": "none", "mfc": "white"})
     if not all(start.seen for start in starts):
         panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
-    if over == "speed":
+    if over_speed:
         _closed_forms(panel, dataset, starts, pace, unit)
     panel.set_xscale("log")
-    if values.max() < 100.0 * np.min(values[values > 0.0]):
+    if places.max() < 100.0 * np.min(places[places > 0.0]):
         style.plain_ticks(panel.xaxis)
     panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
-    words = "sliding speed $V$" if over == "speed" else "time at rest"
-    panel.set_xlabel(pace.label(words))
+    panel.set_xlabel(pace.label("sliding speed $V$" if over_speed else "time at rest"))
     style.legend(panel, "peak of the stress")
 
 
@@ -140,9 +144,11 @@ def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: s
     """Thin lines of what is known in closed form."""
     speeds = np.array([abs(start.speed) for start in starts if start.speed != 0.0])
     fine = np.geomspace(speeds.min(), speeds.max(), _FINE)
-    thin: Any = {"color": style.REFERENCE, "linewidth": 0.7, "zorder": 1.5}
-    peaks = [start_peak(dataset, start.at, fine, start.fraction) for start in {s.rest: s for s in starts}.values()]
-    for peak in (peak for peak in peaks if peak is not None):
-        panel.plot(pace.factor * fine, unit.factor * peak, linestyle=":", label="none rebinds", **thin)
+    thin: Any = style.GREY | {"linewidth": 0.7}
+    for start in {start.rest: start for start in starts}.values():
+        bonds = population_of(dataset, start.at)
+        if bonds and bonds.pathway:
+            peak = start.fraction * bonds.start_peak(fine)
+            panel.plot(pace.factor * fine, unit.factor * peak, linestyle=":", label="none rebinds", **thin)
     for law in steady_laws(dataset, starts[0].at, fine)[:1]:
         panel.plot(pace.factor * fine, unit.factor * law.stress, label="steady sliding", **thin)

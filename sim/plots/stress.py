@@ -1,5 +1,6 @@
 """Figures of what bonds bear: friction over speed with its maximum, and the static peak after a rest."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -9,25 +10,23 @@ from matplotlib.figure import Figure
 
 from sim.analysis import is_steady
 from sim.plots.bond_laws import Steady, rest_of, steady_laws
-from sim.plots.curves import Line, Scene, contact_curves, over_speed, room_of, speed_dim
+from sim.plots.curves import Line, Scene, contact_curves, over_speed, speed_dim
 from sim.plots.panels import stacked
 from sim.plots.static_friction import start_figure
-from sim.plots.style import REFERENCE, Unit, across, legend, recorded, rounded
+from sim.plots.style import REFERENCE, Unit, legend, recorded, rounded
 
 #: Speeds at which a closed form is drawn.
 _FINE = 600
 
-#: Grey that shows on a black line and beside it.
-_PALE = "#BBBBBB"
-
-_RING: Any = {
-    "linestyle": "none",
-    "marker": "o",
-    "markersize": 5.0,
-    "markerfacecolor": "none",
-    "markeredgewidth": 0.9,
-    "zorder": 4,
+#: Look of an exact closed form, grey that shows on a black line and beside it, and of an approximate one.
+_LAWS: Any = {
+    "-": {"linestyle": "-", "color": "#BBBBBB", "linewidth": 0.7, "zorder": 3},
+    "--": {"linestyle": "--", "color": REFERENCE, "linewidth": 0.7, "zorder": 1.5},
 }
+_RING: Any = {
+    "linestyle": "none", "marker": "o", "markersize": 5.0, "markerfacecolor": "none", "markeredgewidth": 0.9,
+    "zorder": 4,
+}  # fmt: skip
 
 
 def needs_stress(dataset: xr.Dataset) -> None:
@@ -46,26 +45,31 @@ def needs_stress(dataset: xr.Dataset) -> None:
 
 def stress_figure(dataset: xr.Dataset) -> Figure:
     """Shear stress with its maximum, and bonds, over speed; for a start from rest the static peaks."""
-    needs_stress(dataset)
     if rest_of(dataset) is not None:
         return start_figure(dataset)
-    scene, scale, unit = over_speed(dataset)
-    laws = {line.number: _laws_of(dataset, scene, line, scale) for line in scene.lines}
+    scene, scale, pace = over_speed(dataset)
+    laws = [law for line in scene.lines for law in _laws_of(dataset, scene, line, scale)]
+
+    def thin_lines(panel: Axes, values: Callable[[Steady], np.ndarray]) -> None:
+        for speed, law in laws:
+            panel.plot(pace.factor * speed, values(law), label=law.words, **_LAWS[law.style])
 
     def stress_panel(panel: Axes, scene: Scene) -> None:
-        _stress_panel(panel, scene, laws, unit.factor)
+        """Shear stress of the dataset upon closed forms, with the maximum of each curve."""
+        unit = Unit.of(scene.all("shear_stress_mean"), "Pa")
+        contact_curves(panel, scene._replace(lines=_marked(panel, scene, unit.factor)), "shear_stress", unit.factor)
+        thin_lines(panel, lambda law: unit.factor * law.stress)
+        legend(panel, scene.title)
+        panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
 
     def fraction_panel(panel: Axes, scene: Scene) -> None:
-        for line in scene.lines:
-            for speed, law in laws[line.number]:
-                panel.plot(unit.factor * speed, law.fraction, **_thin(law.style))
+        thin_lines(panel, lambda law: law.fraction)
         contact_curves(panel, scene, "bond_fraction", 1.0)
         panel.set_ylabel("bond fraction $N/N_0$")
 
-    further = [(1.3, fraction_panel)] if scene.varies("bond_fraction") else []
-    figure, axes = stacked(scene, [(2.1, stress_panel), *further])
-    across(axes[-1], scene.x, scale, unit.label("sliding speed $V$"), room_of(scene))
-    return figure
+    panels = [(2.1, stress_panel), (1.3, fraction_panel)]
+    shown = panels if scene.varies("bond_fraction") else panels[:1]
+    return stacked(scene, shown, pace.label("sliding speed $V$"), scale, scene.room)[0]
 
 
 def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line, scale: str) -> list[tuple[np.ndarray, Steady]]:
@@ -78,27 +82,6 @@ def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line, scale: str) -> list[
     elif scale == "symlog":
         fine = np.append(0.0, np.geomspace(np.min(speeds[speeds > 0.0]), high, _FINE - 1))
     return [(fine, law) for law in steady_laws(dataset, line.point, fine)]
-
-
-def _thin(style: str) -> dict[str, Any]:
-    exact = style == "-"
-    colour, height = (_PALE, 3) if exact else (REFERENCE, 1.5)
-    return {"linestyle": style, "color": colour, "linewidth": 0.7, "zorder": height}
-
-
-def _stress_panel(panel: Axes, scene: Scene, laws: dict[int, list[tuple[np.ndarray, Steady]]], pace: float) -> None:
-    """Shear stress of the dataset upon closed forms, with the maximum of each curve."""
-    unit = Unit.of(scene.all("shear_stress_mean"), "Pa")
-    named = []
-    for line in scene.lines:
-        words = _mark_maximum(panel, scene, line, unit.factor)
-        named.append(line._replace(label=f"{line.label}: {words}" if words and line.label else line.label))
-    contact_curves(panel, scene._replace(lines=named), "shear_stress", unit.factor)
-    for line in scene.lines:
-        for speed, law in laws[line.number]:
-            panel.plot(pace * speed, unit.factor * law.stress, label=law.words, **_thin(law.style))
-    legend(panel, scene.title)
-    panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
 
 
 def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
@@ -118,11 +101,15 @@ def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
     return at if inside else None
 
 
-def _mark_maximum(panel: Axes, scene: Scene, line: Line, factor: float) -> str:
-    """Mark the maximum with a ring; returns it in words, "" without one."""
-    speed, stress = scene.values("speed_mean", line), scene.values("shear_stress_mean", line)
-    at = maximum_of(speed, stress)
-    if at is None:
-        return ""
-    panel.plot(scene.x[line.number][at], factor * stress[at], color=line.colour, **_RING)
-    return f"{rounded(float(stress[at]), 'Pa')} at {rounded(float(speed[at]), 'm/s')}"
+def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
+    """The curves, each with its maximum in its name; a ring marks it."""
+    named = []
+    for line in scene.lines:
+        speed, stress = scene.values("speed_mean", line), scene.values("shear_stress_mean", line)
+        at = maximum_of(speed, stress)
+        words = line.label
+        if at is not None:
+            panel.plot(scene.x[line.number][at], factor * stress[at], color=line.colour, **_RING)
+            words += f": {rounded(float(stress[at]), 'Pa')} at {rounded(float(speed[at]), 'm/s')}" if words else ""
+        named.append(line._replace(label=words))
+    return named

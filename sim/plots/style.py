@@ -19,7 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import withStroke
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.analysis import engineering, scaled, sweep_dims
 
@@ -30,6 +30,12 @@ BONDS, FLUCTUATIONS, BOTH, REFERENCE = "#0072B2", "#D55E00", "#000000", "#777777
 #: Colours of several curves.
 LINES = ("#000000", "#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 
+#: A closed form beneath what was simulated, a line that only guides the eye, and a marker with a white face.
+GREY: Any = {"color": REFERENCE, "linewidth": 0.9, "zorder": 1.5}
+GUIDE: Any = {"color": REFERENCE, "linewidth": 0.5, "zorder": 1}
+HOLLOW: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "none"}
+
+_TICKS = {"direction": "in", "labelsize": 7.5, "major.width": 0.6, "minor.width": 0.4}
 STYLE: Any = {
     "font.family": "STIXGeneral",
     "mathtext.fontset": "stix",
@@ -37,18 +43,11 @@ STYLE: Any = {
     "axes.labelsize": 8.0,
     "axes.titlesize": 8.0,
     "legend.fontsize": 7.0,
-    "xtick.labelsize": 7.5,
-    "ytick.labelsize": 7.5,
     "axes.linewidth": 0.6,
     "lines.linewidth": 1.2,
-    "xtick.direction": "in",
-    "ytick.direction": "in",
+    **{f"{axis}tick.{key}": value for axis in "xy" for key, value in _TICKS.items()},
     "xtick.top": True,
     "ytick.right": True,
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.minor.width": 0.4,
-    "ytick.minor.width": 0.4,
     "legend.frameon": False,
     "legend.handlelength": 1.6,
     "legend.columnspacing": 1.2,
@@ -71,11 +70,35 @@ class Picture(Figure):
             super().savefig(fname, **({"metadata": undated} | options))
 
 
-def picture(width: float, height: float) -> Picture:
+def picture(width: float, height: float) -> Figure:
     """An empty picture [in] with a canvas of its own."""
     empty = Picture(figsize=(width, height), dpi=200, layout="constrained")
     FigureCanvasAgg(empty)
     return empty
+
+
+def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
+    """A picture of one column: panels of given heights [in] above each other, lettered; with one x axis if shared."""
+    figure = picture(COLUMN, 0.45 + sum(heights))
+    axes = list(figure.subplots(len(heights), 1, sharex=shared, squeeze=False, height_ratios=heights)[:, 0])
+    figure.align_ylabels(axes)
+    return figure, _lettered(axes)
+
+
+def pairs(height: float, count: int = 1, shared: bool = False) -> tuple[Figure, list[Axes]]:
+    """A picture of both columns and a height [in]: pairs of panels side by side, lettered; one y axis if shared."""
+    figure = picture(WIDE, height)
+    return figure, _lettered(list(figure.subplots(count, 2, sharey=shared, squeeze=False).flat))
+
+
+def _lettered(axes: list[Axes]) -> list[Axes]:
+    """Several panels with (a), (b), ... in the order given."""
+    for mark, panel in zip("abcdefg", axes if len(axes) > 1 else (), strict=False):
+        panel.annotate(
+            f"({mark})", (0.0, 1.0), (-2, 4), xycoords="axes fraction", textcoords="offset points",
+            ha="right", va="bottom", fontweight="bold",
+        )  # fmt: skip
+    return axes
 
 
 def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
@@ -89,10 +112,15 @@ def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
     return f"{symbol(coordinate) or name.replace('_', ' ')} = {number}"
 
 
+def swept(dataset: xr.Dataset) -> list[str]:
+    """Dimensions of the sweep with more than one value."""
+    return [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
+
+
 def first_point(dataset: xr.Dataset) -> tuple[dict[str, int], str]:
     """The first point of a sweep, by index and in words."""
-    dims = sweep_dims(dataset)
-    return dict.fromkeys(dims, 0), ", ".join(swept_value(dataset, n, 0) for n in dims if dataset.sizes[n] > 1)
+    words = ", ".join(swept_value(dataset, name, 0) for name in swept(dataset))
+    return dict.fromkeys(sweep_dims(dataset), 0), words
 
 
 def recorded(dataset: xr.Dataset, name: str) -> xr.DataArray:
@@ -106,6 +134,11 @@ def mean_of(dataset: xr.Dataset, name: str) -> xr.DataArray:
     return values.mean("member") if "member" in values.dims else values
 
 
+def number_at(variable: xr.DataArray, at: dict[str, int]) -> float:
+    """A number at a point of the sweep, whether it is swept or not."""
+    return float(variable.isel(at, missing_dims="ignore"))
+
+
 def contact_circle(panel: Axes, radius: float) -> None:
     """The edge of the contact on a map."""
     circle = Circle((0.0, 0.0), radius, fill=False, linewidth=1.0, color=BOTH)
@@ -113,9 +146,14 @@ def contact_circle(panel: Axes, radius: float) -> None:
     panel.add_patch(circle)
 
 
+def text_of(value: float, unit: str) -> str:
+    """A number with its unit: ``305.2 kPa``."""
+    return engineering(value, unit).replace("-", "−")
+
+
 def rounded(value: float, unit: str) -> str:
     """A number with its unit in three digits: ``305 kPa``."""
-    return engineering(float(f"{value:.3g}"), unit).replace("-", "−")
+    return text_of(float(f"{value:.3g}"), unit)
 
 
 _GREEK = re.compile(r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|lambda|DeltaGamma)(?![A-Za-z])")
@@ -141,9 +179,10 @@ class Unit(NamedTuple):
         return f"{words} ({self.name})" if self.name else words
 
     @classmethod
-    def of(cls, values: np.ndarray, unit: str, logarithmic: bool = False) -> "Unit":
+    def of(cls, values: Any, unit: str, logarithmic: bool = False) -> "Unit":
         """The unit that suits the largest of some values, on a logarithmic axis the middle of them."""
-        sizes = np.abs(values[np.isfinite(values) & (values != 0.0)])
+        sizes = np.abs(values)
+        sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         if not sizes.size:
             return cls(*scaled(0.0, unit))
         return cls(*scaled(float(np.sqrt(sizes.min() * sizes.max()) if logarithmic else sizes.max()), unit))
@@ -157,15 +196,6 @@ def axis_scale(values: np.ndarray) -> str:
     if above.size == values.size:
         return "log"
     return "symlog" if above.max() >= 100.0 * above.min() else "linear"
-
-
-def letter(axes: list[Axes]) -> None:
-    """Panels (a), (b), ... in the order given."""
-    for mark, panel in zip("abcdefg", axes, strict=False):
-        panel.annotate(
-            f"({mark})", (0.0, 1.0), (-2, 4), xycoords="axes fraction", textcoords="offset points",
-            ha="right", va="bottom", fontweight="bold",
-        )  # fmt: skip
 
 
 def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any] = ()) -> None:
@@ -191,42 +221,22 @@ def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: 
         panel.fill_between(x[part], low[part], high[part], linewidth=0, **look)
 
 
-def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
-    """A picture of one column: panels of given heights [in] above each other, lettered; with one x axis if shared."""
-    figure = picture(COLUMN, 0.45 + sum(heights))
-    axes = list(figure.subplots(len(heights), 1, sharex=shared, squeeze=False, height_ratios=heights)[:, 0])
-    if len(axes) > 1:
-        letter(axes)
-    figure.align_ylabels(axes)
-    return figure, axes
-
-
 def across(panel: Axes, x: np.ndarray, scale: str, words: str, room: float = 0.0) -> None:
-    """The x axis that the panels share, with some ``room`` for markers at its ends."""
+    """The x axis from the least to the largest value, with some ``room`` for markers at its ends, and its label."""
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
-    if scale == "symlog":
-        panel.set_xscale(scale, linthresh=float(np.min(x[x > 0.0])))
-    else:
-        panel.set_xscale(scale)
-    if scale == "log" and known.max() < 100.0 * known.min():
+    low, high = known.min(), known.max()
+    panel.set_xscale(scale, **({"linthresh": np.min(x[x > 0.0])} if scale == "symlog" else {}))
+    if scale == "log" and high < 100.0 * low:
         plain_ticks(panel.xaxis)
-    if scale != "symlog" and known.max() > known.min():
-        ends = np.log([known.min(), known.max()]) if scale == "log" else np.array([known.min(), known.max()])
-        ends = ends + np.array([-room, room]) * (ends[1] - ends[0])
-        panel.set_xlim(*(np.exp(ends) if scale == "log" else ends))
+    if scale != "symlog" and high > low:
+        axis, back = (np.log, np.exp) if scale == "log" else (np.array, np.array)
+        ends = axis([low, high])
+        panel.set_xlim(*back(ends + np.array([-room, room]) * np.ptp(ends)))
     panel.set_xlabel("\n".join(textwrap.wrap(words, 64)))
-
-
-def span(panel: Axes, low: float, high: float) -> None:
-    """A logarithmic x axis from one value to another."""
-    panel.set_xscale("log")
-    panel.set_xlim(low, high)
-    if high < 100.0 * low:
-        plain_ticks(panel.xaxis)
 
 
 def plain_ticks(axis: Axis) -> None:
     """Numbers such as 0.1, 0.2, 0.5 on a logarithmic axis of few decades."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter(NullFormatter())

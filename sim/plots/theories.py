@@ -6,12 +6,12 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
-from sim.analysis import control, engineering, is_steady, setting, settled
+from sim.analysis import control, is_steady, setting, settled
 from sim.laws.theories import compare_at_indentation, compare_at_load
+from sim.plots import style
 from sim.plots.curves import choice
-from sim.plots.style import BOTH, LINES, REFERENCE, WIDE, Unit, letter, mean_of, picture, span
+from sim.plots.style import LINES, REFERENCE, Unit
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
@@ -33,6 +33,9 @@ _FINE, _WIDEST = 1500, 1.6
 #: Points of a dataset that are drawn at most.
 _POINTS = 40
 
+#: Control of the contact: the law of all theories under it, its symbol and unit.
+_CONTROLS: Any = {"load": (compare_at_load, "$P$", "N"), "indentation": (compare_at_indentation, r"$\delta$", "m")}
+
 
 class Case(NamedTuple):
     """What the theories need of a scene: ``held`` is "load" [N] or "indentation" [m], rest as in ``laws.theories``."""
@@ -47,9 +50,8 @@ class Case(NamedTuple):
 
     def radii(self, stress: np.ndarray) -> dict[str, np.ndarray]:
         """Contact radius at shear stresses [Pa] by theory [m]."""
-        law = compare_at_load if self.held == "load" else compare_at_indentation
-        numbers = (self.value, self.work, self.sphere_radius, self.modulus, self.poisson_ratio, self.reversible)
-        return {name: a for name, a in law(stress, *numbers).items() if name in _THEORIES}
+        found = _CONTROLS[self.held][0](stress, *self[1:])
+        return {name: radius for name, radius in found.items() if name in _THEORIES}
 
     @property
     def scale(self) -> float:
@@ -89,7 +91,7 @@ def _numbers(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
         value = setting(dataset, f"contact.{held}")
     except KeyError:
         held = ""
-    if held not in ("load", "indentation"):
+    if held not in _CONTROLS:
         cure = 'run it with [contact] load = "4 mN", or with an indentation'
         raise ValueError(f"theories need a load or an indentation that stays; {cure}")
     return {
@@ -114,14 +116,12 @@ def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     Of steady sliding the mean over the second half of the run at each point of the sweep, else records
     spread evenly over the run.
     """
-    names = ("shear_stress", "contact_area")
-    found = xr.Dataset({name: mean_of(dataset, name) for name in names})
+    found = xr.Dataset({name: style.mean_of(dataset, name) for name in ("shear_stress", "contact_area")})
     if is_steady(dataset):
         found = settled(found)
     else:
-        chosen = np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int))
-        found = found.isel(t=chosen)
-    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(*(found[name] for name in names)))
+        found = found.isel(t=np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int)))
+    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(*found.data_vars.values()))
     closed = area > 0.0
     return np.abs(stress[closed]), area[closed]
 
@@ -135,43 +135,47 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     low = max(0.01 * case.scale, 0.7 * float(np.min(sheared, initial=low / 0.7)))
     fine = np.geomspace(low, high, _FINE)
     areas = {name: np.pi * radius**2 for name, radius in case.radii(fine).items()}
-    figure = picture(WIDE, 3.3)
-    axes = list(figure.subplots(1, 2, sharey=True))
-    letter(axes)
-    unit, pace = Unit.of(areas["jkr"], "m^2"), Unit.of(fine, "Pa", logarithmic=True)
-    force = Unit.of(areas["jkr"] * fine, "N", logarithmic=True)
-    _panel(axes[0], dict.fromkeys(areas, pace.factor * fine), areas, (pace.factor * stress, area), unit)
+    figure, axes = style.pairs(3.3, shared=True)
+    unit, full = Unit.of(areas["jkr"], "m^2"), areas["jkr"][0]
+    pace, force = Unit.of(fine, "Pa", logarithmic=True), Unit.of(full * fine, "N", logarithmic=True)
+    stresses = dict.fromkeys(areas, pace.factor * fine)
     forces = {name: force.factor * values * fine for name, values in areas.items()}
-    _panel(axes[1], forces, areas, (force.factor * stress * area, area), unit)
+    _panel(axes[0], case, stresses, areas, (pace.factor * stress, area), unit)
+    _panel(axes[1], case, forces, areas, (force.factor * stress * area, area), unit)
+    ends = np.array([low, high])
+    style.across(axes[0], pace.factor * ends, "log", pace.label(r"shear stress $\tau$"))
+    style.across(axes[1], force.factor * ends * full, "log", force.label(r"tangential force $T = \tau A$"))
     axes[0].set_ylabel(unit.label("contact area $A$"))
-    axes[0].set_xlabel(pace.label(r"shear stress $\tau$"))
-    axes[1].set_xlabel(force.label(r"tangential force $T = \tau A$"))
-    span(axes[0], pace.factor * low, pace.factor * high)
-    span(axes[1], *(force.factor * stress * areas["jkr"][0] for stress in (low, high)))
-    _limit(axes[0], areas, area, unit)
-    held = {"load": "$P$", "indentation": r"$\delta$"}[case.held]
-    amount = engineering(case.value, {"load": "N", "indentation": "m"}[case.held]).replace("-", "−")
-    axes[1].set_title(f"{held} = {amount}, $w$ = {engineering(case.work, 'J/m^2')}", loc="right")
-    figure.legend(handles=_handles(case), loc="outside upper left", ncols=3, handletextpad=0.5, labelspacing=0.25)
+    # heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond
+    least = float(np.nan_to_num(areas["hertz"][0]))
+    bottom = min(least - 0.3 * (full - least), float(np.min(area, initial=least)))
+    top = max(_WIDEST * full, 1.05 * float(np.max(area, initial=0.0)))
+    axes[0].set_ylim(unit.factor * max(bottom, 0.0), unit.factor * top)
+    _, symbol, si = _CONTROLS[case.held]
+    words = f"{symbol} = {style.text_of(case.value, si)}, $w$ = {style.text_of(case.work, 'J/m^2')}"
+    axes[1].set_title(words, loc="right")
+    handles, names = axes[0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper left", ncols=3, handletextpad=0.5, labelspacing=0.25)
     return figure
 
 
 def _panel(
-    panel: Axes, across: dict[str, np.ndarray], areas: dict[str, np.ndarray],
+    panel: Axes, case: Case, across: dict[str, np.ndarray], areas: dict[str, np.ndarray],
     points: tuple[np.ndarray, np.ndarray], unit: Unit,
 ) -> None:  # fmt: skip
     """Every theory along its own x, as far as its adhesive branch goes, and the dataset's points."""
-    for name, values in areas.items():
-        _, colour, style = _THEORIES[name]
+    for name, (words, colour, line) in _THEORIES.items():
+        values, label = areas[name], words.format(share=case.reversible)
         if name in ("jkr", "hertz"):  # whatever the shear
-            panel.axhline(unit.factor * values[0], linestyle=style, color=colour, linewidth=0.9, zorder=1.5)
+            panel.axhline(unit.factor * values[0], linestyle=line, label=label, **style.GREY)
             continue
         branch = adhesive(values, areas["hertz"])
-        panel.plot(across[name], unit.factor * branch, linestyle=style, color=colour)
+        panel.plot(across[name], unit.factor * branch, linestyle=line, color=colour, label=label)
         held = np.flatnonzero(np.isfinite(branch))
         if held.size and held[-1] < len(branch) - 1:  # it ends: at a fold with a dot
             panel.plot(across[name][held[-1]], unit.factor * branch[held[-1]], "o", markersize=3, color=colour)
-    panel.plot(points[0], unit.factor * points[1], "o", markersize=3.5, mfc="white", color=BOTH, zorder=4)
+    look = style.HOLLOW | {"color": style.BOTH, "zorder": 4}
+    panel.plot(points[0], unit.factor * points[1], label="simulated", **look)
 
 
 def adhesive(areas: np.ndarray, hertz: np.ndarray) -> np.ndarray:
@@ -181,22 +185,3 @@ def adhesive(areas: np.ndarray, hertz: np.ndarray) -> np.ndarray:
     array([ 3.,  2., nan])
     """
     return np.where(areas > np.nan_to_num(hertz) * (1.0 + 1e-9), areas, np.nan)
-
-
-def _limit(panel: Axes, areas: dict[str, np.ndarray], area: np.ndarray, unit: Unit) -> None:
-    """Heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond."""
-    full, least = float(areas["jkr"][0]), float(np.nan_to_num(areas["hertz"][0]))
-    top = max(_WIDEST * full, 1.05 * float(np.max(area, initial=0.0)))
-    bottom = min(least - 0.3 * (full - least), float(np.min(area, initial=least)))
-    panel.set_ylim(unit.factor * max(bottom, 0.0), unit.factor * top)
-
-
-def _handles(case: Case) -> list[Line2D]:
-    """Legend entries: the theories by name, and the dataset."""
-    handles = []
-    for words, colour, style in _THEORIES.values():
-        width = 0.9 if colour == REFERENCE else 1.2
-        text = words.format(share=case.reversible)
-        handles.append(Line2D([], [], color=colour, linestyle=style, linewidth=width, label=text))
-    points: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "none"}
-    return [*handles, Line2D([], [], color=BOTH, label="simulated", **points)]

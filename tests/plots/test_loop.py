@@ -149,7 +149,7 @@ def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
     assert_allclose(loop, spent, rtol=0, atol=2 * 0.5 * 1.5 * np.pi * 42e-3 * 2e-3 * RECORD)
     (entry,) = plots.draw(machine, "loop").axes[0].get_legend().get_texts()
     assert entry.get_text() == (
-        rf"simulated: $W$ = {1e12 * float(spent):.3g} pJ, $\oint P\,\mathrm{{d}}\Delta$ = {1e12 * float(loop):.3g} pJ"
+        rf"simulated: $W$ = {1e12 * float(spent):.3g} pJ, $\oint\,P\,\mathrm{{d}}\Delta$ = {1e12 * float(loop):.3g} pJ"
     )
 
 
