@@ -136,6 +136,27 @@ class Bonding(NamedTuple):
     dissipated: np.ndarray = _NONE
 
 
+class Gammas(NamedTuple):
+    """ΔΓ at amplitude 1 as a sum of independent gamma numbers; arrays of shape (terms,), empty where none is drawn.
+
+    Attributes
+    ----------
+    weight : array
+        Energy of each term per unit of its gamma number [J/m²].
+    shape : array
+        Shape of the gamma number: how many mode pairs the term stands for.
+    wavenumber : array
+        \\|q\\| that sets its rate [rad/m].
+    constant : float
+        Energy that does not fluctuate [J/m²].
+    """
+
+    weight: np.ndarray = np.empty(0)
+    shape: np.ndarray = np.empty(0)
+    wavenumber: np.ndarray = np.empty(0)
+    constant: float = 0.0
+
+
 class Resistance(NamedTuple):
     """What a drive that feeds back feels of the contact: friction force [N], its tangent and k_t [N/m]."""
 
@@ -276,6 +297,10 @@ class Shear(Protocol[Own]):
 
     def advance(self, state: Own, motion: Motion, bonding: Bonding, noise: Noise) -> Own:
         """Fluctuations after a step, at the end of which the bonds are ``bonding``."""
+
+    @property
+    def gammas(self) -> Gammas:
+        """Distribution of ΔΓ at amplitude 1, of a field that bonds make for n E[f²] = 1 N²/m²."""
 
     def known_errors(self) -> dict[str, float]:
         """Errors and spreads known before the run [1], by name."""

@@ -8,6 +8,7 @@ import numpy as np
 
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
+from sim.parts.exchange import Gammas
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.bands import Bands
 from sim.parts.shear.correlation import Correlation
@@ -79,6 +80,10 @@ class BandedProcess(_Renewing):
         )
         scale = np.ones(1) if self.amplitude.relaxing else amplitude
         return Fluctuation(scale**2 * energy, amplitude, after)
+
+    @property
+    def gammas(self) -> Gammas:
+        return Gammas(self.bands.weight, 0.5 * self.bands.freedom, self.wavenumber)
 
     def known_errors(self) -> dict[str, float]:
         """What banding adds to the cell's own mode sum, and the cell's own errors beside it."""

@@ -8,7 +8,7 @@ import numpy as np
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Bonding, Motion
+from sim.parts.exchange import Bonding, Gammas, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modes import Modes
@@ -93,6 +93,10 @@ class ModalProcess(_Renewing):
         np.multiply(state.values[:, 1], size, out=values.imag)
         return values
 
+    @property
+    def gammas(self) -> Gammas:
+        return Gammas(2.0 * self.weights, np.ones(self.pairs), self.wavenumber)
+
     def known_errors(self) -> dict[str, float]:
         """The cell's own errors against the infinite plane, and the spreads of one realisation."""
         return {
@@ -123,6 +127,10 @@ class FixedProcess(ModalProcess):
     def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
         size = np.sqrt(0.5) * state.amplitude[:, np.newaxis] * self.deviation
         return size * np.exp(1j * state.values)
+
+    @property
+    def gammas(self) -> Gammas:
+        return Gammas(constant=2.0 * float(np.sum(self.weights)))
 
     def known_errors(self) -> dict[str, float]:
         fixed = {"member_spread_variance": 0.0, "member_spread_energy": 0.0}

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Bonding, Motion
+from sim.parts.exchange import Bonding, Gammas, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 
@@ -48,6 +48,10 @@ class SmoothProcess:
 
     def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         return self.start(motion, bonding, noise)
+
+    @property
+    def gammas(self) -> Gammas:
+        return Gammas(constant=self.energy)
 
     def known_errors(self) -> dict[str, float]:
         """Errors and spreads known before the run."""
