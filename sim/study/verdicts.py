@@ -64,9 +64,10 @@ def differing(dataset: xr.Dataset) -> NDArray[np.bool_]:
     return off > _DIFFERS * dataset["standard_error"].to_numpy()
 
 
-def _lawful(dataset: xr.Dataset) -> NDArray[np.bool_]:
-    """Errors that a law gives, shape (rows, 1, quantities, statistics)."""
-    return np.isnan(dataset["bound"].to_numpy()[:, np.newaxis])
+def _wrong(dataset: xr.Dataset) -> NDArray[np.bool_]:
+    """Rows of which a sample differs from a law."""
+    lawful = np.isnan(dataset["bound"].to_numpy()[:, np.newaxis])
+    return np.any(differing(dataset) & lawful, axis=(1, 2, 3))
 
 
 def table(dataset: xr.Dataset) -> list[dict[str, str]]:
@@ -83,9 +84,8 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
         Cells by heading.
     """
     shown = np.flatnonzero(np.isfinite(dataset["error"].to_numpy()).any(axis=(0, 2)))
-    wrong = np.any(differing(dataset) & _lawful(dataset), axis=(1, 2, 3))
     rows = []
-    for row in range(dataset.sizes["row"]):
+    for row, wrong in enumerate(_wrong(dataset)):
         here = dataset.isel(row=row)
         cells = {"changed": str(here["part"].values), "setting": str(here["row"].values) + " *" * int(here["own"])}
         cells["time of the run"] = _time(*(float(here[name]) for name in ("time", "time_low", "time_high")))
@@ -93,7 +93,7 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
             cells[f"{_SYMBOLS[q]}\n(%)"] = _error_cell(here["error"].to_numpy()[q], here["bound"].to_numpy()[q])
         members = int(here["members"])
         cells["members\nsampled"] = f"{members:,}" if members else "–"
-        cells["sample"] = "DIFFERS" if wrong[row] else "agrees" if members else "–"
+        cells["sample"] = "DIFFERS" if wrong else "agrees" if members else "–"
         rows.append(cells)
     return rows
 
@@ -144,7 +144,7 @@ def _step(seconds: float) -> str:
 
 
 class Choice(NamedTuple):
-    """One row of each part, with the time of the run and the errors that they make together."""
+    """One row of each part, that of the clock step last, with the time of the run and the errors of them together."""
 
     rows: tuple[int, ...]
     time: float
@@ -170,23 +170,15 @@ def choices(dataset: xr.Dataset) -> list[Choice]:
     kinds = [np.flatnonzero(part == kind) for kind in ("shear", "bonds", "grid", "step")]
     groups = [sorted(rows.tolist(), key=lambda row: not own[row]) for rows in kinds if rows.size]
     median, low, high = (dataset[name].to_numpy() for name in ("time", "time_low", "time_high"))
-    found = []
+    written, found = float(median[groups[-1][0]]), []
     for rows in itertools.product(*groups):
-        time, timed = _together(median, rows, groups[-1][0]), [row for row in rows if not own[row]] or rows[-1:]
-        shares = (low / median)[list(timed)].min(), (high / median)[list(timed)].max()
-        found.append(
-            Choice(
-                rows, time, time * shares[0], time * shares[1], *(of[list(rows)].sum(axis=0) for of in (error, bound))
-            )
-        )
+        *changed, step = median[list(rows)].tolist()
+        summed = written + sum(time - written for time in changed)
+        time = max(summed, 0.2 * min([written, *changed])) * (step / written)
+        timed = [row for row in rows if not own[row]] or [rows[-1]]
+        ends = float(time * np.min((low / median)[timed])), float(time * np.max((high / median)[timed]))
+        found.append(Choice(rows, time, *ends, error[list(rows)].sum(axis=0), bound[list(rows)].sum(axis=0)))
     return found
-
-
-def _together(times: Array, rows: tuple[int, ...], own: int) -> float:
-    """Time of a run with several changes; the last row is a clock step."""
-    changed = [float(times[row]) for row in rows[:-1]]
-    summed = float(times[own]) + sum(time - float(times[own]) for time in changed)
-    return max(summed, 0.2 * min([float(times[own]), *changed])) * float(times[rows[-1]] / times[own])
 
 
 def chosen(tried: list[Choice], tolerance: float) -> tuple[Choice, int]:
@@ -212,26 +204,18 @@ def recommendation(dataset: xr.Dataset) -> str:
     tolerance = float(dataset.attrs["tolerance"])
     tried = choices(dataset)
     own, (best, equal) = tried[0], chosen(tried, tolerance)
-    said = [_as_written(dataset, own)]
+    named, off = f"“{', '.join(dataset['row'].values[list(best.rows)])}”", f"off by at most {largest(best.error)}"
     if equal:
         same = f"; {equal - 1} more take as long within the spread of the times, this is the most accurate"
-        said.append(
-            f"{'It' if best is own else f'“{_named(dataset, best)}”'} is the cheapest combination that keeps "
-            f"{percent(tolerance)}: off by at most {largest(best.error)}, {_time(best.time, best.low, best.high)} of "
-            f"CPU time{same if equal > 1 else ''}."
+        verdict = (
+            f"{'It' if best is own else named} is the cheapest combination that keeps {percent(tolerance)}: {off}, "
+            f"{_time(best.time, best.low, best.high)} of CPU time{same if equal > 1 else ''}."
         )
     else:
-        said.append(
-            f"No combination keeps {percent(tolerance)}: “{_named(dataset, best)}” comes nearest, off by "
-            f"at most {largest(best.error)}. {_shorter(dataset, best, tolerance)}".rstrip()
-        )
-    said.append(_sight(dataset, best))
-    text = "\n".join(said)
+        shorter = _shorter(dataset, best, tolerance)
+        verdict = f"No combination keeps {percent(tolerance)}: {named} comes nearest, {off}. {shorter}".rstrip()
+    text = "\n".join([_as_written(dataset, own), verdict, _sight(dataset, best)])
     return text if best is own else f"{text}\nWrite:\n\n{_toml(dataset, best, own)}"
-
-
-def _named(dataset: xr.Dataset, choice: Choice) -> str:
-    return ", ".join(str(dataset["row"].values[row]) for row in choice.rows)
 
 
 _PARTS = {"shear": "shear model", "bonds": "bond model", "grid": "grid", "step": "clock step"}
@@ -259,24 +243,19 @@ def _shorter(dataset: xr.Dataset, chosen: Choice, tolerance: float) -> str:
     errors = dataset["error"].to_numpy()[step]
     if not np.nanmax(errors, initial=0.0) > 0.5 * tolerance:
         return ""
-    guess = float(dataset["clock_step"][step]) * 0.5 * tolerance / float(np.nanmax(errors))
-    return (
-        f"The clock step rules: by its trend about {_step(float(f'{guess:.1g}'))} would do; a larger budget tries it."
-    )
+    guess = float(f"{float(dataset['clock_step'][step]) * 0.5 * tolerance / float(np.nanmax(errors)):.1g}")
+    return f"The clock step rules: by its trend about {_step(guess)} would do; a larger budget tries it."
 
 
 def _sight(dataset: xr.Dataset, best: Choice) -> str:
     """What the samples can tell."""
-    wrong = differing(dataset) & _lawful(dataset)
-    if wrong.any():
-        rows = dataset["row"].to_numpy()[wrong.any(axis=(1, 2, 3))]
-        return f"Beware: samples of {', '.join(map(str, rows))} are not what is expected: a fault of the program."
-    sem = dataset["standard_error"].to_numpy()
+    wrong, sem = dataset["row"].to_numpy()[_wrong(dataset)], dataset["standard_error"].to_numpy()
+    if wrong.size:
+        return f"Beware: samples of {', '.join(map(str, wrong))} are not what is expected: a fault of the program."
+    if not np.any(np.isfinite(sem)) and not dataset.attrs["fluctuates"]:
+        return "Nothing fluctuates here; there is nothing to sample."
     if not np.any(np.isfinite(sem)):
-        small = bool(dataset.attrs["fluctuates"])
-        return (
-            "The budget is too small for samples." if small else "Nothing fluctuates here; there is nothing to sample."
-        )
+        return "The budget is too small for samples."
     open_ = largest(np.where(best.bound > best.error * (1.0 + 1e-9), best.bound, np.nan))
     if open_.error > 0.0:
         return f"Where there is no law, samples leave errors of up to {open_} open; a larger budget narrows that."
