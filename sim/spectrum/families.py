@@ -110,19 +110,12 @@ def _ordered(*wavelengths: tuple[str, float]) -> None:
     """Refuse cut-off wavelengths that do not fall from the first to the last."""
     for (name, long), (other, short) in itertools.pairwise(wavelengths):
         if long < short:
-            raise PydanticCustomError(
-                "cut_offs_out_of_order",
-                "{name} ({long} m) is shorter than {other} ({short} m); exchange them or raise {name}",
-                {"name": name, "long": f"{long:g}", "other": other, "short": f"{short:g}"},
-            )
+            said = f"{name} ({long:g} m) is shorter than {other} ({short:g} m); exchange them or raise {name}"
+            raise PydanticCustomError("cut_offs_out_of_order", said)
     (name, long), (other, short) = wavelengths[0], wavelengths[-1]
     if long * (1 - 1e-9) <= short:
-        raise PydanticCustomError(
-            "empty_band",
-            "{name} and {other} are equal ({long} m), which leaves no band; make {name} longer, or use "
-            'model = "ripple" for a single wavelength',
-            {"name": name, "long": f"{long:g}", "other": other},
-        )
+        said = f"{name} and {other} are equal ({long:g} m), which leaves no band; make {name} longer, or use"
+        raise PydanticCustomError("empty_band", f'{said} model = "ripple" for a single wavelength')
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -377,7 +370,8 @@ class AnisotropicGaussian:
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
         level = np.pi * self.length_x * self.length_y * self.variance
-        return level * np.exp(-self._exponent(np.asarray(qx, float), np.asarray(qy, float)))
+        (xx, xy, yy), x, y = self._form, np.asarray(qx, float), np.asarray(qy, float)
+        return level * np.exp(-(xx * x**2 + 2 * xy * x * y + yy * y**2))
 
     def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
         """Mean energy per area [J/m²] stored in an infinite half-space (see Notes)."""
@@ -396,14 +390,9 @@ class AnisotropicGaussian:
         a, b = self.length_x**2 / 4, self.length_y**2 / 4
         return a * cosine**2 + b * sine**2, (a - b) * cosine * sine, a * sine**2 + b * cosine**2
 
-    def _exponent(self, qx: Array, qy: Array) -> Array:
-        xx, xy, yy = self._form
-        return xx * qx**2 + 2 * xy * qx * qy + yy * qy**2
-
     def reach(self, radius: float) -> tuple[float, float]:
         """Wavenumbers [rad/m] between which the density varies."""
-        both = self.length_x, self.length_y
-        return 0.25 / max(both), 14.0 / min(both)
+        return 0.25 / max(self.length_x, self.length_y), 14.0 / min(self.length_x, self.length_y)
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
         """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""

@@ -219,39 +219,31 @@ class Margin:
     """
 
     def __init__(self, spectrum: Family, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
-        self.spectrum, self.solid, self.sphere_radius = spectrum, (shear_modulus, poisson_ratio), sphere_radius
+        self.spectrum, self.solid = spectrum, (shear_modulus, poisson_ratio)
+        self._ends = sphere_radius * 10.0**-_DECADES, sphere_radius
+        self._splines: dict[Callable[..., Array], CubicSpline] = {}
 
     def __call__(self, radius: Array) -> Array:
         """Share at contact radii [m]; nan at nan."""
-        return self._share(radius, marginal_energy, lambda x: self._spline(x))
+        return self._share(radius, marginal_energy)
 
     def mean(self, radius: Array) -> Array:
         """Mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
-        return self._share(radius, disc_energy, lambda x: self._mean_spline(x))
+        return self._share(radius, disc_energy)
 
-    def _share(self, radius: Array, law: Callable[..., Array], spline: Callable[[Array], Array]) -> Array:
+    def _share(self, radius: Array, law: Callable[..., Array]) -> Array:
         if self.spectrum.wavevector is not None and self._plane > 0.0:
             share = law(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
             return np.where(np.isnan(radius), np.nan, share)
         low, high = self._ends
-        share = spline(np.log(np.clip(radius, low, high)))
+        if law not in self._splines:
+            self._splines[law] = self._splined(law)
+        share = self._splines[law](np.log(np.clip(radius, low, high)))
         return np.where(radius < low, share * np.maximum(radius, 0.0) / low, share)
-
-    @property
-    def _ends(self) -> tuple[float, float]:
-        return self.sphere_radius * 10.0**-_DECADES, self.sphere_radius
 
     @cached_property
     def _plane(self) -> float:
         return float(self.spectrum.surface_energy(*self.solid))
-
-    @cached_property
-    def _spline(self) -> CubicSpline:
-        return self._splined(marginal_energy)
-
-    @cached_property
-    def _mean_spline(self) -> CubicSpline:
-        return self._splined(disc_energy)
 
     def _splined(self, law: Callable[..., Array]) -> CubicSpline:
         radii = np.geomspace(*self._ends, _POINTS)

@@ -6,6 +6,7 @@ Convention: ``C(q) = ∫ d²x <τ1(x) τ1(0)> e^{-iq·x}`` in Pa² m², q in rad
 
 import functools
 import math
+from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -19,7 +20,7 @@ from sim.spectrum.periodogram import periodogram, radial_average
 from sim.spectrum.radial import PowerLaws, Rowed
 from sim.spectrum.tabulated import Densities, Wavenumbers, by_name, check_rows, file_fault
 from sim.units.quantity import Quantity
-from sim.units.table import TableError, file_path, file_text, matrix
+from sim.units.table import file_path, file_text, matrix
 
 Array = NDArray[np.float64]
 
@@ -77,11 +78,16 @@ class Measured(Rowed):
             spacing = None if values.get("spacing") is None else _SPACING.read(values["spacing"])
         except ValueError:
             return values  # refused by the field's own check
-        if name.lower().endswith((".nc", ".nc4", ".cdf")):
-            maps, spacing = _read_netcdf(name, str(values.get("variable", "shear_map")), spacing, info.context)
-        else:
-            maps = _read_matrix(name, info.context)
-        q, density = _estimate(name, maps, spacing, window)
+        netcdf = name.lower().endswith((".nc", ".nc4", ".cdf"))
+        source: Any = (file_path if netcdf else file_text)(name, info.context)
+        try:
+            if netcdf:
+                maps, spacing = _read_netcdf(source, str(values.get("variable", "shear_map")), spacing)
+            else:
+                maps = matrix(source, _STRESS)
+            q, density = _estimate(maps, spacing, window)
+        except (OSError, ValueError, RuntimeError) as fault:
+            raise file_fault(name, fault) from None
         return {**values, "spacing": spacing, "wavenumbers": q.tolist(), "densities": density.tolist()}
 
     @model_validator(mode="after")
@@ -95,35 +101,21 @@ class Measured(Rowed):
         return PowerLaws(np.array(self.wavenumbers), np.array(self.densities))
 
 
-def _read_matrix(name: str, context: Any) -> Array:
-    try:
-        return matrix(file_text(name, context), _STRESS)
-    except TableError as fault:
-        raise file_fault(name, fault) from None
-
-
-def _read_netcdf(name: str, variable: str, spacing: float | None, context: Any) -> tuple[Array, float | None]:
+def _read_netcdf(path: Path, variable: str, spacing: float | None) -> tuple[Array, float | None]:
     """Maps (..., x, y) [Pa] and their spacing [m]."""
     import xarray as xr  # heavy: only where a map is read
 
-    path = file_path(name, context)
-    try:
-        with HDF5, xr.open_dataset(path, decode_times=False) as dataset:
-            if variable not in dataset:
-                found = ", ".join(map(str, dataset.data_vars))[:80]
-                raise ValueError(f'there is no variable "{variable}" (found: {found}); name it by variable = "..."')
-            data = dataset[variable].load()
-    except (OSError, ValueError, RuntimeError) as fault:
-        raise file_fault(name, ValueError(str(fault).splitlines()[0])) from None
+    with HDF5, xr.open_dataset(path, decode_times=False) as dataset:
+        if variable not in dataset:
+            found = ", ".join(map(str, dataset.data_vars))[:80]
+            raise ValueError(f'there is no variable "{variable}" (found: {found}); name it by variable = "..."')
+        data = dataset[variable].load()
     if data.ndim < 2:
-        raise file_fault(name, ValueError(f'"{variable}" has no two dimensions; name a map by variable = "..."'))
-    try:
-        if {"x", "y"} <= set(data.dims):
-            data = data.transpose(..., "x", "y")
-            spacing = _coordinate_spacing(data, spacing)
-        return np.asarray(data, float) * _factor(data, _STRESS), spacing
-    except ValueError as fault:
-        raise file_fault(name, fault) from None
+        raise ValueError(f'"{variable}" has no two dimensions; name a map by variable = "..."')
+    if {"x", "y"} <= set(data.dims):
+        data = data.transpose(..., "x", "y")
+        spacing = _coordinate_spacing(data, spacing)
+    return np.asarray(data, float) * _factor(data, _STRESS), spacing
 
 
 def _factor(data: Any, quantity: Quantity) -> float:
@@ -149,15 +141,15 @@ def _coordinate_spacing(data: Any, spacing: float | None) -> float | None:
     return spacing
 
 
-def _estimate(name: str, maps: Array, spacing: float | None, window: str) -> tuple[Array, Array]:
+def _estimate(maps: Array, spacing: float | None, window: str) -> tuple[Array, Array]:
     """Rows of the radial spectrum of maps (..., x, y), averaged over the leading axes."""
     points = min(maps.shape[-2:])
     if spacing is None:
-        raise file_fault(name, ValueError('the map has no coordinates; give spacing, such as "0.5 um"'))
+        raise ValueError('the map has no coordinates; give spacing, such as "0.5 um"')
     if points < 8:
-        raise file_fault(name, ValueError(f"a map of {points} points along a side is too small; give at least 8"))
+        raise ValueError(f"a map of {points} points along a side is too small; give at least 8")
     if not np.all(np.isfinite(maps)):
-        raise file_fault(name, ValueError("the map has gaps (nan or infinite); fill them or crop the map"))
+        raise ValueError("the map has gaps (nan or infinite); fill them or crop the map")
     field = maps[..., :points, :points].reshape(-1, points, points)
     grid = Grid(points * spacing, points)
     density = np.mean(periodogram(field, grid.cell, window), axis=0)

@@ -180,11 +180,9 @@ def gaussian_boxes(form: tuple[float, float, float], x_edges: NDArray, y_edges: 
     step, root = np.diff(x_edges), math.sqrt(yy)
     panels = math.ceil(float(np.max(step)) * math.sqrt(xx) / 2)
     if panels > _MOST_PANELS:
-        raise PydanticCustomError(
-            "cell_too_small",
-            "the correlation length is {times} times the cell; make the cell longer",
-            {"times": f"{float(np.max(step)) * math.sqrt(xx) / math.pi:.0f}"},
-        )
+        times = f"{float(np.max(step)) * math.sqrt(xx) / math.pi:.0f}"
+        said = f"the correlation length is {times} times the cell; make the cell longer"
+        raise PydanticCustomError("cell_too_small", said)
     node, weight = np.polynomial.legendre.leggauss(16)
     node = ((node + 1) / 2 + np.arange(panels)[:, None]).ravel() / panels
     weight = np.tile(weight / 2, panels) / panels

@@ -14,21 +14,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from sim.laws.halfspace import angular_compliance
 from sim.spectrum.family import Factors
-from sim.spectrum.finite_contact import wave_sums
-from sim.spectrum.pixels import radial_quadrant
+from sim.spectrum.finite_contact import Waves, wave_sums
+from sim.spectrum.pixels import Radial, radial_quadrant
 
 Array = NDArray[np.float64]
 
 
-class Isotropic(Protocol):
+class Isotropic(Radial, Waves, Protocol):
     """Base of the families (``sim.spectrum.family``) whose density depends on the length of the wavevector only."""
 
     wavevector: ClassVar[None] = None
     bond_made: ClassVar[bool] = False
-
-    @property
-    def variance(self) -> float:
-        """Mean square of the stress [Pa²]."""
 
     @property
     def line_integral(self) -> float:
@@ -36,12 +32,6 @@ class Isotropic(Protocol):
 
     def radial_density(self, q: ArrayLike) -> Array:
         """Density C at wavenumber q [rad/m], in Pa² m²; zero outside ``support``."""
-
-    def cumulative(self, q: ArrayLike) -> Array:
-        """Variance within wavenumber q [Pa²]."""
-
-    def beyond(self, q: ArrayLike) -> Array:
-        """Variance beyond wavenumber q [Pa²]."""
 
     @property
     def support(self) -> tuple[float, float]:

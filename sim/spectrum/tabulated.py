@@ -24,20 +24,14 @@ NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
 
 
 def check_rows(wavenumbers: tuple[float, ...], densities: tuple[float, ...]) -> None:
-    if len(wavenumbers) != len(densities) or len(wavenumbers) < 2:
-        raise PydanticCustomError(
-            "table_too_short",
-            "a spectrum needs at least two rows and as many densities as wavenumbers, not {q} and {c}",
-            {"q": len(wavenumbers), "c": len(densities)},
-        )
-    falls = np.flatnonzero(np.diff(wavenumbers) <= 0.0)
+    """Refuse rows that are no spectrum."""
+    rows, falls = (len(wavenumbers), len(densities)), np.flatnonzero(np.diff(wavenumbers) <= 0.0)
+    if rows[0] != rows[1] or rows[0] < 2:
+        said = "a spectrum needs at least two rows and as many densities as wavenumbers"
+        raise PydanticCustomError("table_too_short", f"{said}, not {rows[0]} and {rows[1]}")
     if len(falls):
-        raise PydanticCustomError(
-            "table_not_increasing",
-            "the wavenumbers must increase from row to row, but row {row} does not exceed the one before; "
-            "sort the rows and merge equal ones",
-            {"row": int(falls[0]) + 2},
-        )
+        said = f"the wavenumbers must increase from row to row, but row {falls[0] + 2} does not exceed the one before"
+        raise PydanticCustomError("table_not_increasing", f"{said}; sort the rows and merge equal ones")
     if not any(densities):
         raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
 
@@ -53,8 +47,10 @@ def by_name(values: Any, names: tuple[str, ...]) -> Any:
     return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}
 
 
-def file_fault(name: str, fault: ValueError) -> PydanticCustomError:
-    return PydanticCustomError("bad_table", "{file}: {reason}", {"file": name, "reason": str(fault)})
+def file_fault(name: str, fault: Exception) -> PydanticCustomError:
+    """A fault of what a file holds; of libraries' messages the first line."""
+    reason = str(fault).partition("\n")[0]
+    return PydanticCustomError("bad_table", "{file}: {reason}", {"file": name, "reason": reason})
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
