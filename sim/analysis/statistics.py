@@ -111,15 +111,18 @@ def _statistics_of(variable: xr.DataArray) -> dict[str, xr.DataArray]:
         none = xr.zeros_like(variable).where(variable.notnull())
         levels = variable.expand_dims(quantile=list(QUANTILES))
         return {"mean": variable, "std": none, "sem": none, "quantile": levels}
-    count = variable.notnull().sum(MEMBERS)
-    mean = variable.mean(MEMBERS)
-    free = (count - 1.0).where(count > 1)
-    deviation = (((variable - mean) ** 2).sum(MEMBERS) / free) ** 0.5
-    gaps = bool((count < variable.sizes[MEMBERS]).any())
-    with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "All-NaN slice", RuntimeWarning)  # nan is the answer there
-        levels = variable.quantile(list(QUANTILES), MEMBERS, skipna=gaps)
-    return {"mean": mean, "std": deviation, "sem": deviation / count.where(count > 0) ** 0.5, "quantile": levels}
+    values, axis = variable.to_numpy(), variable.get_axis_num(MEMBERS)
+    count = np.sum(~np.isnan(values), axis, dtype=float)
+    with warnings.catch_warnings():  # nan is the answer where no member has a value
+        warnings.filterwarnings("ignore", "Mean of empty slice|All-NaN slice", RuntimeWarning)
+        mean = np.nanmean(values, axis)
+        levels = (np.nanquantile if np.any(count < values.shape[axis]) else np.quantile)(values, QUANTILES, axis)
+    squares = np.nansum((values - np.expand_dims(mean, axis)) ** 2, axis)
+    deviation = (squares / np.where(count > 1.0, count - 1.0, np.nan)) ** 0.5
+    error = deviation / np.where(count > 0.0, count, np.nan) ** 0.5
+    one = variable.isel({MEMBERS: 0}, drop=True)
+    found = {name: one.copy(data=data) for name, data in (("mean", mean), ("std", deviation), ("sem", error))}
+    return found | {"quantile": one.expand_dims(quantile=list(QUANTILES)).copy(data=levels)}
 
 
 def statistics(dataset: xr.Dataset) -> xr.Dataset:

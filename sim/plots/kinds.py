@@ -51,6 +51,11 @@ KINDS: dict[str, Kind] = {
 }
 
 
+def default(dataset: xr.Dataset) -> str:
+    """The kind of figure that fits a dataset best."""
+    return next(name for name, kind in KINDS.items() if kind.fits(dataset) and not _missing(dataset, name))
+
+
 def drawable(dataset: xr.Dataset) -> list[str]:
     """Kinds of figures whose needs a dataset meets."""
     return [kind for kind in KINDS if not _missing(dataset, kind)]
@@ -86,7 +91,7 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
     ValueError
         For an unknown kind, or one that the dataset cannot serve, with the cure and the kinds that it can.
     """
-    kind = kind or next(name for name, k in KINDS.items() if k.fits(dataset) and not _missing(dataset, name))
+    kind = kind or default(dataset)
     if renamed(kind) in KINDS:
         raise ValueError(f'the figure "{kind}" is now called "{renamed(kind)}"')
     if kind not in KINDS:

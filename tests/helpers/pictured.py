@@ -66,6 +66,11 @@ def drawn(panel, colour, style="-"):
     return line.get_data()
 
 
+def lines_of(panel):
+    """Data of all lines of a panel that show some."""
+    return [line.get_data() for line in panel.lines if len(line.get_xdata())]
+
+
 def legend_of(panel):
     """Entries of a legend, and its title."""
     legend = panel.get_legend()
@@ -73,7 +78,10 @@ def legend_of(panel):
 
 
 def rendered(figure):
-    """The figure went through its whole layout without a warning, and its panels have labels with units."""
+    """The figure went through its whole layout without a warning; panels are labelled and within the picture."""
     figure.draw_without_rendering()
     assert figure.axes[0].get_ylabel() and figure.axes[-1].get_xlabel() + figure.axes[-1].get_ylabel()
+    for panel in figure.axes:
+        box = panel.get_tightbbox()
+        assert min(box.x0, box.y0) > -1.0 and box.x1 < figure.bbox.x1 + 1.0 and box.y1 < figure.bbox.y1 + 1.0
     return figure

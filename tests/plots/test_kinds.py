@@ -6,7 +6,7 @@ import sys
 import matplotlib as mpl
 import numpy as np
 import pytest
-from helpers.pictured import STEADY, drawn, field, legend_of, mapped, rendered, simulated
+from helpers.pictured import STEADY, drawn, field, legend_of, lines_of, mapped, rendered, simulated
 
 from sim import analysis
 from sim.parts.bonds import models as bonds
@@ -26,12 +26,17 @@ def ramp():
     return simulated()
 
 
+@pytest.fixture(scope="module")
+def found(ramp):
+    return analysis.statistics(ramp)
+
+
 # -- what is drawn ----------------------------------------------------------------------------
 
 
-def test_curve_shows_the_mean_area_over_speed_and_what_each_mechanism_takes(ramp):
+def test_curve_shows_the_mean_area_over_speed_and_what_each_mechanism_takes(ramp, found):
     figure = rendered(plots.draw(ramp, "curve"))
-    found, shares = analysis.statistics(ramp), analysis.shares(ramp)
+    shares = analysis.shares(ramp)
     area, energies, friction = figure.axes
     speed, ratio = drawn(area, pictures.BOTH)
     np.testing.assert_allclose(speed, 1e3 * ramp["speed"], rtol=1e-14)  # mm/s
@@ -55,18 +60,17 @@ def test_curve_shows_the_mean_area_over_speed_and_what_each_mechanism_takes(ramp
     np.testing.assert_allclose(drawn(friction, pictures.BOTH)[1], 1e3 * found["friction_force_mean"], rtol=1e-14)
 
 
-def test_bands_reach_from_the_5_to_the_95_percent_quantile(ramp):
+def test_bands_reach_from_the_5_to_the_95_percent_quantile(ramp, found):
     panel = plots.draw(ramp, "time").axes[0]
-    quantiles = 1e6 * analysis.statistics(ramp)["contact_radius_quantile"]
+    quantiles = 1e6 * found["contact_radius_quantile"]
     # no quantile lies outside of its band, and the band reaches no further
     band = panel.collections[0].get_paths()[0].vertices
     assert band[:, 1].min() == quantiles.sel(quantile=0.05).min()
     assert band[:, 1].max() == quantiles.sel(quantile=0.95).max()
 
 
-def test_time_shows_radius_energies_friction_and_the_speed(ramp):
-    figure = rendered(plots.draw(ramp, "time"))
-    found = analysis.statistics(ramp)
+def test_time_shows_radius_energies_friction_and_the_speed(ramp, found):
+    figure = plots.draw(ramp, "time")
     shown = {0: ("contact_radius", 1e6), 2: ("friction_force", 1e3), 3: ("speed", 1e3)}
     for panel, (name, factor) in shown.items():
         time, mean = drawn(figure.axes[panel], pictures.BOTH)
@@ -89,7 +93,7 @@ def test_what_a_mean_is_over_is_said(ramp):
 
 def test_sweep_shows_the_second_half_against_the_swept_key():
     dataset = simulated(drive=STEADY, sweep={"contact.load": ["1 mN", "4 mN", "16 mN"]})
-    figure = rendered(plots.draw(dataset))
+    figure = plots.draw(dataset)
     found = analysis.summary(analysis.settled(analysis.observables(dataset)))
     load, radius = drawn(figure.axes[0], pictures.BOTH)
     np.testing.assert_allclose(load, [1.0, 4.0, 16.0], rtol=1e-14)
@@ -193,9 +197,9 @@ def test_a_curve_beneath_another_is_wide_enough_to_be_seen():
 
 def test_a_fluctuation_energy_too_small_to_see_has_a_panel_of_its_own(ramp):
     small = simulated(shear=field(spectrum=Band(rms=10e3, longest=60e-6, shortest=16e-6)))
-    labels = [panel.get_ylabel() for panel in plots.draw(small, "curve").axes]
-    assert labels[2].startswith(r"fluctuations $\Delta\Gamma$") and len(labels) == 4
-    _, energy = drawn(plots.draw(small, "curve").axes[2], pictures.FLUCTUATIONS, "--")
+    panels = plots.draw(small, "curve").axes
+    assert panels[2].get_ylabel().startswith(r"fluctuations $\Delta\Gamma$") and len(panels) == 4
+    _, energy = drawn(panels[2], pictures.FLUCTUATIONS, "--")
     found = analysis.statistics(small)["fluctuation_energy_mean"]
     np.testing.assert_allclose(energy / energy[-1], found / found[-1], rtol=1e-13)
     assert len(plots.draw(ramp, "curve").axes) == 3
@@ -228,11 +232,7 @@ def test_a_fluctuation_energy_too_small_to_see_has_a_panel_of_its_own(ramp):
     ],
 )
 def test_default_figure_fits_the_dataset(changes, kind):
-    dataset = simulated(shear=shear.Uniform(), **changes)
-    default, named = plots.draw(dataset), plots.draw(dataset, kind)
-    assert [p.get_xlabel() + p.get_ylabel() for p in default.axes] == [
-        p.get_xlabel() + p.get_ylabel() for p in named.axes
-    ]
+    assert plots.default(simulated(shear=shear.Uniform(), **changes)) == kind
 
 
 def test_an_unknown_kind_names_the_known_ones(ramp):
@@ -315,13 +315,30 @@ CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equil
 )  # fmt: skip
 def test_every_shape_of_dataset_can_be_drawn(changes):
     dataset = simulated(**changes)
-    for figure in (plots.draw(dataset), plots.draw(dataset, "time")):
-        assert all(panel.get_ylabel() for panel in figure.axes) and any(panel.get_xlabel() for panel in figure.axes)
+    for kind in {plots.default(dataset), "time"}:
+        figure = plots.draw(dataset, kind)
+        assert any(panel.get_xlabel() for panel in figure.axes)
+        assert all(
+            panel.get_ylabel() and (lines_of(panel) or panel.texts or panel.collections) for panel in figure.axes
+        )
 
 
 @pytest.mark.parametrize("load", [-1.0, -3e-4], ids=["never closed", "pulled off"])
 def test_layout_stands_without_a_contact(load):
-    rendered(plots.draw(simulated(contact=Equilibrium(load=load), shear=shear.Uniform())))
+    figure = rendered(plots.draw(simulated(contact=Equilibrium(load=load), shear=shear.Uniform())))
+    tops = [panel.get_position().y1 for panel in figure.axes]
+    assert tops == sorted(tops, reverse=True) and len({panel.get_position().x0 for panel in figure.axes}) == 1
+
+
+def test_a_curve_over_two_speeds_is_marked_and_clear_of_the_frame():
+    for panel in plots.draw(simulated(drive=REVERSING, shear=shear.Uniform()), "curve").axes:
+        (speed,) = {tuple(np.unique(line.get_xdata()[:5])) for line in panel.lines if line.get_marker() == "o"}
+        assert speed == (2.0,) and panel.get_xlim()[0] < -2.0 and panel.get_xlim()[1] > 2.0
+
+
+def test_the_work_of_the_bonds_is_drawn_where_the_contact_has_less():
+    dataset = simulated(shear=shear.Uniform())
+    assert legend_of(plots.draw(dataset, "curve").axes[1])[0] == ["left to the contact, $w$"]
 
 
 # -- saving -----------------------------------------------------------------------------------

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.pictured import STEADY, drawn, legend_of, rendered, simulated
+from helpers.pictured import STEADY, drawn, legend_of, lines_of, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.analysis import loop_energy
@@ -13,6 +13,7 @@ from sim.parts.shear import models as shear
 from sim.plots import kinds as plots
 from sim.plots import style as pictures
 from sim.plots.loop import lost_energy
+from sim.plots.style import recorded
 from sim.scenario.clock import Clock, Ensemble, Record
 
 JKR = (42e-3, 2e-3, 6.4e6)
@@ -193,16 +194,19 @@ def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
 )  # fmt: skip
 def test_every_shape_of_dataset_can_be_drawn(changes):
     dataset = moved(**changes)
-    for kind in ("loop", "time"):
-        plots.draw(dataset, kind)
+    loads, radii = plots.draw(dataset, "loop").axes
+    assert loads.get_ylabel().startswith("normal load") and radii.get_ylabel().startswith("contact radius")
+    closed = any(np.isfinite(y).any() for _, y in lines_of(radii))
+    assert closed == bool((recorded(dataset, "contact_radius") > 0.0).any())
+    base = plots.draw(dataset, "time").axes[-1]
+    assert base.get_ylabel().startswith("base") and lines_of(base)
 
 
 # -- which figure -----------------------------------------------------------------------------
 
 
 def test_loop_is_what_fits_where_the_sphere_is_moved_and_refused_where_it_stays(grips):
-    default, named = plots.draw(grips), plots.draw(grips, "loop")
-    assert [p.get_xlabel() for p in default.axes] == [p.get_xlabel() for p in named.axes]
+    assert plots.default(grips) == "loop"
     stays = moved(Equilibrium(load=4e-3))
     assert "loop" not in plots.drawable(stays) and "loop" in plots.drawable(grips)
     cure = r'no loop; move it: \[contact\] indentation = \{ from = "2 um", .*drawn as: theories, time'

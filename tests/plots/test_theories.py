@@ -150,7 +150,13 @@ def test_without_adhesion_or_contact_there_is_nothing_to_compare():
     ids=["ramp", "no stress", "statistics only"],
 )
 def test_every_scene_at_a_load_can_be_compared(changes):
-    plots.draw(plain(**changes), "theories")
+    dataset = plain(**changes)
+    for panel in plots.draw(dataset, "theories").axes:
+        stress, area = rival_figures.points_of(dataset)
+        (points,) = (line.get_data() for line in panel.lines if line.get_label() == "simulated")
+        assert len(points[0]) == len(stress) > 0 and np.all((points[0] > 0.0) == (stress > 0.0))
+        assert_allclose(points[1] / points[1][0], area / area[0], rtol=1e-12)
+        assert panel.get_ylim()[0] < points[1].min() and points[1].max() < panel.get_ylim()[1]
 
 
 # -- profiles ---------------------------------------------------------------------------------
@@ -161,14 +167,14 @@ def slid():
     return simulated(ensemble=Ensemble(members=2))
 
 
-def lines_of(panel, colour, style="-"):
+def data_of(panel, colour, style="-"):
     return [line.get_data() for line in panel.lines if (line.get_color(), line.get_linestyle()) == (colour, style)]
 
 
 def test_pressure_is_that_of_the_first_member_at_the_last_time_and_at_rest(slid):
     panel = rendered(plots.draw(slid, "profile")).axes[0]
     radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
-    (x, p), (_, rest) = lines_of(panel, pictures.BOTH)[0], lines_of(panel, pictures.REFERENCE, "--")[0]
+    (x, p), (_, rest) = data_of(panel, pictures.BOTH)[0], data_of(panel, pictures.REFERENCE, "--")[0]
     inside = np.abs(1e-6 * x) < 0.999 * radius
     exact = profiles.pressure(np.abs(1e-6 * x[inside]), radius, depth, 2e-3, 6.4e6)
     assert_allclose(p[inside], 1e-3 * exact, rtol=1e-9)
@@ -180,7 +186,7 @@ def test_pressure_is_that_of_the_first_member_at_the_last_time_and_at_rest(slid)
 
 def test_surfaces_touch_inside_and_are_the_gap_apart_outside(slid):
     panel = plots.draw(slid, "profile").axes[1]
-    (x, low), (_, high) = lines_of(panel, pictures.BOTH)
+    (x, low), (_, high) = data_of(panel, pictures.BOTH)
     radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
     r = np.abs(1e-6 * x)
     assert np.all(high[r < radius] == low[r < radius])
@@ -193,7 +199,7 @@ def test_surfaces_touch_inside_and_are_the_gap_apart_outside(slid):
 def test_tangential_displacement_is_that_of_the_uniform_stress(slid):
     panels = plots.draw(slid, "profile").axes
     radius, stress = float(slid["contact_radius"][0, -1]), float(slid["shear_stress"][-1])
-    (x, along), (_, across) = (lines_of(panels[2], pictures.BOTH, style)[0] for style in ("-", "--"))
+    (x, along), (_, across) = (data_of(panels[2], pictures.BOTH, style)[0] for style in ("-", "--"))
     exact = profiles.tangential_profiles(1e-6 * x, radius, stress, 1.6e6)
     assert_allclose([along, across], 1e6 * np.array(exact), rtol=1e-9)
     shown = panels[3].images[0].get_array()
@@ -232,4 +238,11 @@ def test_a_contact_that_came_off_is_drawn_as_it_last_was():
     ids=["lifted", "Hertz", "backwards", "statistics only", "sweep"],
 )
 def test_every_contact_has_profiles(changes):
-    plots.draw(plain(**changes), "profile")
+    dataset = plain(**changes)
+    radius = shapes_of(dataset).last.radius
+    pressure, surfaces, *_ = plots.draw(dataset, "profile").axes
+    ((x, p),) = data_of(pressure, pictures.BOTH)
+    (_, low), (_, high) = data_of(surfaces, pictures.BOTH)
+    inside = np.abs(x) < 0.999e6 * radius
+    assert np.isfinite(p[inside]).all() and p[inside].any() and not np.nan_to_num(p[np.abs(x) > 1.001e6 * radius]).any()
+    assert np.all(low[inside] == high[inside]) and np.all(low <= high)
