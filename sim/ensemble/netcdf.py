@@ -120,10 +120,9 @@ def _dimensions(file: File, plan: Plan) -> None:
         _sweep_coordinates(file, plan, axis)
     if plan.scenario.record.per_member and any(plan.varies(variable) for variable in plan.variables):
         file.createDimension("member", plan.members)
-        variable = _variable(
-            file, "member", "i4", ("member",), "1", "number of the ensemble member", standard_name="realization"
-        )
-        variable[:] = np.arange(plan.members)
+        described = "1", "number of the ensemble member"
+        member = _variable(file, "member", "i4", ("member",), *described, standard_name="realization")
+        member[:] = np.arange(plan.members)
     file.createDimension("t", scene.clock.records)
     _variable(file, "t", "f8", ("t",), "s", "time since the start", "t")[:] = scene.clock.times
 
@@ -164,6 +163,7 @@ def _attributes(file: File, plan: Plan) -> None:
     digest = hashlib.sha256(resolved.encode())
     versions = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
     sim_version = importlib.metadata.version("sliding-sim")
+    files = {n: {"sha256": hashlib.sha256(t.encode()).hexdigest(), "text": t} for n, t in source.files.items()}
     attributes = {
         "Conventions": "CF-1.11",
         "title": scene.name,
@@ -175,17 +175,12 @@ def _attributes(file: File, plan: Plan) -> None:
         "scenario_toml": source.text,
         "scenario_overrides": json.dumps(source.overrides, sort_keys=True, default=str),
         "scenario_resolved": resolved,
-        "scenario_files": json.dumps(
-            {n: {"sha256": hashlib.sha256(t.encode()).hexdigest(), "text": t} for n, t in source.files.items()},
-            sort_keys=True,
-        ),
+        "scenario_files": json.dumps(files, sort_keys=True),
         "seed": str(scene.seed),
         "members": np.int32(scene.ensemble.members),
         "sim_version": sim_version,
     }
-    for name, version in versions.items():
-        attributes[f"{name}_version"] = version
-    file.setncatts(attributes)
+    file.setncatts(attributes | {f"{name}_version": version for name, version in versions.items()})
 
 
 def _scenario_variables(file: File, plan: Plan) -> None:
@@ -212,7 +207,7 @@ def _derived_variables(file: File, plan: Plan) -> None:
         if len(values) < len(plan.points):
             continue
         variable = _variable(file, name, "f8", _sweep_names(plan), *described[name])
-        variable[...] = np.reshape(values, _sweep_shape(plan)) if _sweep_names(plan) else values[0]
+        variable[...] = np.reshape(values, _sweep_shape(plan))
         if "error" in name:
             file.setncatts({name: max(values, key=abs)})
 

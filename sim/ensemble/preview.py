@@ -19,7 +19,7 @@ from sim.scenario.scenario import Scenario
 
 # Rough costs of one core, for the estimate only [s]: starting up; a point of a sweep; a part file; a step and a record
 # of a batch; a step of a counted population, a number drawn for it, an event of a bond that is followed; a byte.
-_START, _POINT, _PART, _STEP, _RECORD = 1.5, 15e-3, 5e-3, 150e-6, 150e-6
+_START, _POINT, _PART, _STEP, _RECORD = 3.0, 15e-3, 5e-3, 150e-6, 150e-6
 _COUNTED, _DRAWN, _EVENT, _BYTE = 2e-6, 40e-9, 1e-7, 50e-9
 _PROGRAM_BYTES, _SCENARIO_BYTES = 200e6, 2e4
 _STATISTICS = 3

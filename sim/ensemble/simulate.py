@@ -115,31 +115,29 @@ def _record(
     progress: Progress | None,
 ) -> dict[str, np.ndarray]:
     """One part: every variable over a stretch of records, the maps in it, and the state at its end."""
-    each, rows = plan.scenario.record.per_member, {}
-    for g in plan.variables:
-        rows[g.name] = np.empty((len(members) if plan.varies(g) else 1, len(records)))
+    rows = {one.name: np.empty((len(members) if plan.varies(one) else 1, len(records))) for one in plan.variables}
     maps: dict[str, np.ndarray] = {}
-    snapshots = {
-        round(t / point.clock.duration * point.clock.steps): k for k, t in enumerate(sorted(point.record.maps))
-    }
+    clock, times = point.clock, sorted(point.record.maps)
+    snapshots = {round(time / clock.duration * clock.steps): number for number, time in enumerate(times)}
     drawn = int(np.sum(members < point.record.map_members))
     for column, record in enumerate(records):
         state = next(states)
-        while state.step < record * point.clock.stride:
+        while state.step < record * clock.stride:
             state = next(states)
-        for variable in plan.variables:
-            rows[variable.name][:, column] = variable.read(point, state)
+        for one in plan.variables:
+            rows[one.name][:, column] = one.read(point, state)
         if state.step in snapshots and drawn:
             for name, values in _maps(point, state, drawn).items():
                 maps[f"map.{name}.{snapshots[state.step]}"] = values
         if progress is not None:
-            progress(len(members) * (point.clock.stride if record else 1))
-    if records.stop == point.clock.records:
-        for g in plan.largest:
-            rows[g.name] = np.broadcast_to(g.read(point, state), len(members) if plan.varies(g) else 1)
-    for g in (*plan.variables, *plan.largest):
-        if plan.varies(g) and not each and g.name in rows:
-            rows[g.name] = moments(rows[g.name])
+            progress(len(members) * (clock.stride if record else 1))
+    recorded = plan.variables
+    if records.stop == clock.records:
+        recorded += plan.largest
+        for one in plan.largest:
+            rows[one.name] = np.broadcast_to(one.read(point, state), len(members) if plan.varies(one) else 1)
+    if not plan.scenario.record.per_member:
+        rows |= {one.name: moments(rows[one.name]) for one in recorded if plan.varies(one)}
     return rows | maps | {f"state.{name}": array for name, array in pack(state).items()}
 
 

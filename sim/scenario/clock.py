@@ -34,9 +34,9 @@ class Clock:
         word = "step" if self.record is None else "record"
         _require_multiple("duration", self.duration, word, self.record or self.step)
         if self.steps > _MOST_STEPS:
-            raise PydanticCustomError("clock", f"asks for more than {_MOST_STEPS:,} steps; make step longer")
+            raise PydanticCustomError("clock", f"has more than {_MOST_STEPS:,} steps; make step longer")
         if self.records > _MOST_RECORDS:
-            raise PydanticCustomError("clock", f"asks for more than {_MOST_RECORDS:,} records; give a longer record")
+            raise PydanticCustomError("clock", f"has more than {_MOST_RECORDS:,} records; give a longer record")
         return self
 
     @property

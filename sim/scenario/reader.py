@@ -1,5 +1,6 @@
 """From a TOML file or a dictionary to a scenario. Every fault in one pass, each with its place and the cure."""
 
+import contextlib
 import copy
 import functools
 import os
@@ -23,6 +24,7 @@ from sim.units.refusals import BadInput
 __all__ = ["BadInput", "load"]
 
 _DECLARED: dict[str, Any] = getattr(Scenario, "__pydantic_fields__", {})
+_SCENARIO = TypeAdapter(Scenario)
 Words = tuple[str | int, ...]
 
 
@@ -81,7 +83,7 @@ def _validated(
     strange = [Fault(("source",), "is not a key", "unknown")] if "source" in document else []
     made = {**document, "sweep": axes, "source": source or Source()}
     try:
-        scenario = _type(Scenario).validate_python(made, context={"files": files}, by_alias=True, by_name=False)
+        scenario = _SCENARIO.validate_python(made, context={"files": files}, by_alias=True, by_name=False)
     except ValidationError as invalid:
         found = strange + faults(Scenario, invalid, document)
         if not any(error["type"] == "across" for error in invalid.errors(include_url=False)):
@@ -103,17 +105,14 @@ def _under_new_models(faults: list[Fault], overrides: dict[tuple[str, ...], Any]
 
 def _faults_between_sound_parts(document: dict[str, Any], files: Files) -> list[Fault]:
     """What does not go together between those parts that are sound in themselves."""
-    parts = {}
+    parts: dict[str, Any] = {}
+    how: dict[str, Any] = {"context": {"files": files}, "by_alias": True, "by_name": False}
     for name in CHECKED:
-        declared = _DECLARED[name]
-        try:
+        with contextlib.suppress(ValidationError):
             if name in document:
-                context = {"files": files}
-                parts[name] = _part(name).validate_python(document[name], context=context, by_alias=True, by_name=False)
-            elif not declared.is_required():
-                parts[name] = declared.get_default(call_default_factory=True)
-        except ValidationError:
-            continue
+                parts[name] = _part(name).validate_python(document[name], **how)
+            elif not _DECLARED[name].is_required():
+                parts[name] = _DECLARED[name].get_default(call_default_factory=True)
     return [Fault(path, said) for path, said in faults_across(parts)]
 
 
@@ -168,11 +167,7 @@ def _point_faults(scenario: Scenario) -> list[Fault]:
 
 
 @functools.cache
-def _type(kind: Any) -> TypeAdapter:
-    return TypeAdapter(kind)
-
-
 def _part(name: str) -> TypeAdapter:
     declared = _DECLARED[name]
-    kind: Any = declared.annotation
-    return _type(Annotated[kind, Field(discriminator=declared.discriminator)] if declared.discriminator else kind)
+    kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator)]
+    return TypeAdapter(kind)

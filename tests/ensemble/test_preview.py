@@ -193,13 +193,14 @@ def test_maps_count_in_the_size_of_the_file():
     assert_allclose(size(maps=["1 s", "2 s"], map_members=3) - size(), maps, atol=1.5)
 
 
-def test_more_members_take_longer_and_more_memory():
+def test_more_members_take_longer_in_proportion():
     def about(members):
         lines = told("decomposition", **{"ensemble.members": members})["the run"]
         number, unit = re.search(r"about ([0-9.]+) (s|min|h) on", row(lines, "work")[1]).groups()
         return float(number) * {"s": 1.0, "min": 60.0, "h": 3600.0}[unit]
 
-    assert about(1) < about(1000) < about(100_000)
+    assert about(1) < about(1000) < about(10_000)
+    assert_allclose(about(100_000), 10 * about(10_000), rtol=0.1)  # linear but for the start
 
 
 def test_a_depth_chosen_by_the_scene_is_named_with_its_reason():
