@@ -124,9 +124,7 @@ def uncorrected_at_load(load, work, stress, sphere_radius, modulus, poisson_rati
     p = math.copysign((normal / scale) ** 3, load)
     m = math.copysign((adhesive / scale) ** 3, work)
     z, _ = crossing_at_load(1.7, p, m, (sheared / scale) ** 2)  # z^3 < 2 p + m + s z <= 3 + z
-    if load >= 0.0:
-        return scale * z if scale * z > normal else normal
-    return scale * z
+    return max(normal, scale * z) if load >= 0.0 else scale * z
 
 
 @law
@@ -148,9 +146,7 @@ def uncorrected_at_indentation(indentation, work, stress, sphere_radius, modulus
     q = math.copysign((normal / scale) ** 2, indentation)
     m = math.copysign((adhesive / scale) ** 3, work)
     z, _ = crossing_at_displacement(1.9, q, 0.0, m, (sheared / scale) ** 2, 0.0)  # z^2 <= 1 + sqrt(z + z^2)
-    if indentation >= 0.0:
-        return scale * z if scale * z > normal else normal
-    return scale * z
+    return max(normal, scale * z) if indentation >= 0.0 else scale * z
 
 
 def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
@@ -179,8 +175,8 @@ def savkoor_briggs_at_load(load, work, tangential_force, sphere_radius, modulus,
     >>> print("%.3e %.3e %.3e" % tuple(a))
     1.203e-04 1.039e-04 9.787e-05
     """
-    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
-    return _stuck_at_load(jkr, hertz, load, work, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
+    held = _at_load(load, work, sphere_radius, modulus)
+    return _stuck_at_load(*held, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
 
 
 def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
@@ -190,9 +186,8 @@ def savkoor_briggs_at_indentation(indentation, work, tangential_force, sphere_ra
     -----
     ``E* (delta - a^2/R)^2/(2 pi a) + 3 T^2/(16 pi E* a^3) = w`` at nu = 1/2.
     """
-    jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
-    rest = (tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
-    return _stuck_at_indentation(jkr, hertz, indentation, work, *rest)
+    held = _at_indentation(indentation, work, sphere_radius, modulus)
+    return _stuck_at_indentation(*held, tangential_force, _STICK, sphere_radius, modulus, poisson_ratio)
 
 
 @law
@@ -277,15 +272,14 @@ def reversible_force_at_load(load, work, tangential_force, sphere_radius, modulu
     >>> print(f"{reversible_force_at_load(5.0, 1.0, math.pi * 1.62492**2, 1.0, 4.0):.4f}")
     1.6249
     """
-    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
-    return _stuck_at_load(jkr, hertz, load, work, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
+    held = _at_load(load, work, sphere_radius, modulus)
+    return _stuck_at_load(*held, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
 
 
 def reversible_force_at_indentation(indentation, work, tangential_force, sphere_radius, modulus, poisson_ratio=0.5):
     """Contact radius at an indentation [m]; otherwise as ``reversible_force_at_load``."""
-    jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
-    rest = (tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
-    return _stuck_at_indentation(jkr, hertz, indentation, work, *rest)
+    held = _at_indentation(indentation, work, sphere_radius, modulus)
+    return _stuck_at_indentation(*held, tangential_force, _UNIFORM, sphere_radius, modulus, poisson_ratio)
 
 
 @device
@@ -332,19 +326,20 @@ def sahli_at_load(load, work, tangential_force, shrinkage, sphere_radius, modulu
     >>> print(f"{a[0] ** 2 - a[1] ** 2:.3f}")
     0.100
     """
-    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
+    jkr, hertz, *_ = _at_load(load, work, sphere_radius, modulus)
     return _measured_at_force(jkr, hertz, shrinkage, tangential_force)
 
 
 def _at_load(load, work, sphere_radius, modulus):
-    """Radii of JKR and Hertz at a load."""
-    return radius_at_load(load, work, sphere_radius, modulus), hertz_radius_at_load(load, sphere_radius, modulus)
+    """Radii of JKR and Hertz at a load, the load and the work."""
+    jkr = radius_at_load(load, work, sphere_radius, modulus)
+    return jkr, hertz_radius_at_load(load, sphere_radius, modulus), load, work
 
 
 def _at_indentation(indentation, work, sphere_radius, modulus):
-    """Radii of JKR and Hertz at an indentation."""
+    """Radii of JKR and Hertz at an indentation, the indentation and the work."""
     jkr = radius_at_indentation(indentation, work, sphere_radius, modulus)
-    return jkr, hertz_radius_at_indentation(indentation, sphere_radius)
+    return jkr, hertz_radius_at_indentation(indentation, sphere_radius), indentation, work
 
 
 def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, shrinkage=math.nan):
@@ -385,37 +380,24 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
     fraction          1.7371 1.7036
     """
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
-    jkr, hertz = _at_load(load, work, sphere_radius, modulus)
-    return _by_theory(
-        lambda fraction, held: shrunk_at_load(jkr, hertz, load, work, stress, fraction, held, *rest),
-        reversible,
-        jkr=jkr,
-        hertz=hertz,
-        uncorrected=uncorrected_at_load(load, work, stress, *rest),
-        sahli=_measured_at_stress(jkr, hertz, shrinkage, stress),
-    )
+    jkr, hertz, *held = _at_load(load, work, sphere_radius, modulus)
+    radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_load(load, work, stress, *rest)}
+    radii["sahli"] = _measured_at_stress(jkr, hertz, shrinkage, stress)
+    return _with_shares(radii, shrunk_at_load, (*held, stress), reversible, rest)
 
 
 def compare_at_indentation(stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1):
     """Contact radius [m] at an indentation by theory, as ``compare_at_load`` but for ``"sahli"``, measured at loads."""
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
-    jkr, hertz = _at_indentation(indentation, work, sphere_radius, modulus)
-    held_at = (jkr, hertz, indentation, math.inf, work, stress)
-    return _by_theory(
-        lambda fraction, held: shrunk_at_displacement(*held_at, fraction, held, *rest),
-        reversible,
-        jkr=jkr,
-        hertz=hertz,
-        uncorrected=uncorrected_at_indentation(indentation, work, stress, *rest),
-    )
+    jkr, hertz, *_ = _at_indentation(indentation, work, sphere_radius, modulus)
+    radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_indentation(indentation, work, stress, *rest)}
+    return _with_shares(radii, shrunk_at_displacement, (indentation, math.inf, work, stress), reversible, rest)
 
 
-def _by_theory(shrunk, reversible, **radii):
-    """Radii by theory, broadcast to one shape; ``shrunk`` gives those of a reversible share and what is held."""
-    radii |= {
-        "savkoor_briggs": shrunk(_AS_STICK, 4.0),
-        "reversible_force": shrunk(_AS_UNIFORM, 4.0),
-        "reversible_stress": shrunk(1.0, 0.0),
-        "fraction": shrunk(reversible, 0.0),
-    }
+def _with_shares(radii, shrunk, held, reversible, rest):
+    """Radii by theory with those that differ in the reversible share and in what is held, all of one shape."""
+    shares = {"savkoor_briggs": (_AS_STICK, 4.0), "reversible_force": (_AS_UNIFORM, 4.0)}
+    shares |= {"reversible_stress": (1.0, 0.0), "fraction": (reversible, 0.0)}
+    for name, share in shares.items():
+        radii[name] = shrunk(radii["jkr"], radii["hertz"], *held, *share, *rest)
     return dict(zip(radii, (np.array(a) for a in np.broadcast_arrays(*radii.values())), strict=True))
