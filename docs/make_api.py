@@ -53,10 +53,10 @@ def _section(title: str, module: ModuleType, public: Iterator[tuple[str, Any]]) 
 
 
 def _public(module: ModuleType) -> Iterator[tuple[str, Any]]:
-    """Public functions and classes: those of ``__all__``, or else those that the module defines."""
+    """Public functions and classes: those of ``__all__``, or else those that the module or its folder defines."""
     for name in getattr(module, "__all__", sorted(vars(module))):
         thing = getattr(module, name)
-        own = hasattr(module, "__all__") or getattr(thing, "__module__", "") == module.__name__
+        own = hasattr(module, "__all__") or f"{getattr(thing, '__module__', '')}.".startswith(f"{module.__name__}.")
         if own and not name.startswith("_") and (inspect.isfunction(thing) or inspect.isclass(thing)):
             yield name, thing
 

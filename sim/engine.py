@@ -4,6 +4,7 @@ drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(f
 """
 
 from collections.abc import Iterator
+from copy import deepcopy
 from typing import NamedTuple, cast, get_type_hints
 
 import numpy as np
@@ -11,10 +12,10 @@ import numpy as np
 from sim.numerics import extremes
 from sim.numerics.noise import Noise
 from sim.parts.contact.balance import Balance
-from sim.parts.exchange import NO_RESISTANCE, Bonding, Motion, Resistance, Sliding, Storing, Touching
+from sim.parts.exchange import NO_RESISTANCE, Array, Bonding, Indices, Motion, Sliding, Storing, Touching
 from sim.scenario.scenario import Scenario
 
-Arrays = dict[str, np.ndarray]
+Arrays = dict[str, Array]
 _UNKNOWN = np.full(1, np.nan)
 
 
@@ -25,9 +26,9 @@ class Extremes(NamedTuple):
     is that of the tensile load of a closed contact [N], followed where the control makes the load.
     """
 
-    stress: np.ndarray
-    friction: np.ndarray
-    pull: np.ndarray
+    stress: Array
+    friction: Array
+    pull: Array
 
 
 class State(NamedTuple):
@@ -53,7 +54,7 @@ class Dice(NamedTuple):
     shear: Noise
 
     @classmethod
-    def of(cls, seed: int, members: np.ndarray) -> "Dice":
+    def of(cls, seed: int, members: Indices) -> "Dice":
         return cls(Noise(seed, "bonds", members), Noise(seed, "shear", members))
 
 
@@ -73,8 +74,7 @@ def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     """The state one clock step later."""
     drive, population, process, contact = scenario.parts
     step, times = state.step + 1, scenario.times
-    resistance = _resistance(scenario, state) if drive.feeds_back else NO_RESISTANCE
-    slider, motion = drive.advance(state.drive, resistance, times, step)
+    slider, motion = drive.advance(state.drive, NO_RESISTANCE, times, step)
     bonds = population.advance(state.bonds, motion, state.contact.radius, dice.bonds)
     bonding = population.bonding(bonds)
     shear = process.advance(state.shear, motion, bonding, dice.shear)
@@ -83,7 +83,7 @@ def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     return after._replace(extremes=_largest(scenario, state, after, motion))
 
 
-def march(scenario: Scenario, members: np.ndarray, state: State | None = None, keep: bool = True) -> Iterator[State]:
+def march(scenario: Scenario, members: Indices, state: State | None = None, keep: bool = True) -> Iterator[State]:
     """Advance a batch of members to the end of the run, yielding the state after every step.
 
     Parameters
@@ -108,8 +108,8 @@ def march(scenario: Scenario, members: np.ndarray, state: State | None = None, k
         state = start(scenario, dice)
         yield state
     while state.step < scenario.times.steps:
-        if keep:
-            state = state._replace(bonds=scenario.parts.bonds.copied(state.bonds))
+        if keep and scenario.parts.bonds.in_place:
+            state = state._replace(bonds=deepcopy(state.bonds))
         state = advance(scenario, state, dice)
         yield state
 
@@ -121,7 +121,7 @@ def balance(scenario: Scenario, bonding: Bonding, shear: Storing) -> Balance:
     return Balance(bonded, fluctuating, bonding.strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _loads(scenario: Scenario, bonding: Bonding, touch: Touching, step: int) -> tuple[np.ndarray, ...]:
+def _loads(scenario: Scenario, bonding: Bonding, touch: Touching, step: int) -> tuple[Array, ...]:
     """Magnitudes of stress and friction, and the tensile load, whose maxima a run follows."""
     stress = np.abs(bonding.stress)
     friction = stress * (np.pi * touch.radius**2)
@@ -146,24 +146,16 @@ def _largest(scenario: Scenario, before: State, after: State, motion: Motion) ->
     return Extremes(*(extremes.after(so_far, now, time, motion.duration, *both) for so_far, now, both in pairs))
 
 
-def _resistance(scenario: Scenario, state: State) -> Resistance:
-    """Friction of the contact as it is, its slope over slip, and the tangential stiffness 3π²Ga/(4(2 − ν))."""
-    radius = np.nan_to_num(state.contact.radius, nan=0.0)
-    area, (shear_modulus, poisson_ratio) = np.pi * radius**2, scenario.solid.effective
-    stiffness = 0.75 * np.pi**2 * shear_modulus / (2.0 - poisson_ratio) * radius
-    return Resistance(area * state.bonding.stress, area * state.bonding.stiffness, stiffness)
-
-
 def pack(state: State) -> Arrays:
     """A state as named arrays, ``{"bonds.bound": ...}``, from which ``unpack`` makes it again."""
-    return dict(_named(state, type(state)))
+    return dict(_named(state))
 
 
-def _named(state: tuple[object, ...], kind: type) -> Iterator[tuple[str, np.ndarray]]:
+def _named(state: tuple[object, ...]) -> Iterator[tuple[str, Array]]:
     """The arrays of a state with their names, those of a state inside it with a dotted one."""
-    for name, value in zip(_fields(kind), state, strict=True):
+    for name, value in zip(get_type_hints(type(state)), state, strict=True):
         if isinstance(value, tuple):
-            yield from ((f"{name}.{inner}", array) for inner, array in _named(value, type(value)))
+            yield from ((f"{name}.{inner}", array) for inner, array in _named(value))
         else:
             yield name, np.array(value)
 
@@ -178,9 +170,8 @@ def unpack(scenario: Scenario, arrays: Arrays) -> State:
 
 def _assembled(kind: type, arrays: Arrays) -> tuple[object, ...]:
     """A state of a part from its arrays."""
-    hints = get_type_hints(kind)
-    inner = {name: _within(arrays, name) for name in _fields(kind)}
-    values = {name: _assembled(hints[name], found) if found else arrays[name] for name, found in inner.items()}
+    inner = {name: (hint, _within(arrays, name)) for name, hint in get_type_hints(kind).items()}
+    values = {name: _assembled(*found) if found[1] else arrays[name] for name, found in inner.items()}
     made: tuple[object, ...] = kind(**values)
     return made
 
@@ -188,8 +179,3 @@ def _assembled(kind: type, arrays: Arrays) -> tuple[object, ...]:
 def _within(arrays: Arrays, name: str) -> Arrays:
     """The arrays of what stands under a name."""
     return {key.removeprefix(f"{name}."): array for key, array in arrays.items() if key.startswith(f"{name}.")}
-
-
-def _fields(kind: type) -> tuple[str, ...]:
-    names: tuple[str, ...] = kind.__dict__["_fields"]
-    return names

@@ -9,7 +9,9 @@ from numpy.testing import assert_allclose
 
 from sim.engine import march
 from sim.laws import jkr
+from sim.parts.bonds import cohorts
 from sim.parts.bonds import models as bonds
+from sim.parts.bonds import tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
@@ -62,13 +64,13 @@ def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture):
     members, recipe = 400, {"rupture": rupture, **STRETCHED, "start_from": "bonded"}
     dense = bonds.Cohort(**recipe)
     exact = last(bonds=dense, drive=STARTED)
-    share, stress = dense.moments(exact.bonds)[0][0], exact.bonding.stress[0]
+    share, stress = cohorts.moments(exact.bonds.cohorts)[0][0], exact.bonding.stress[0]
     varying = exact.bonding.varying[0]
     for sites in (10**2, 10**3, 10**4):
         few = bonds.Tracked(**recipe, sites=sites)
         found = last(members, bonds=few, drive=STARTED)
         for values, mean, spread in (
-            (few.moments(found.bonds)[0], share, math.sqrt(share * (1.0 - share) / sites)),
+            (tracks.moments(found.bonds)[0], share, math.sqrt(share * (1.0 - share) / sites)),
             (found.bonding.stress, stress, math.sqrt(STRETCHED["site_density"] * varying / sites)),
         ):
             # cohorts are good to 1e-4 themselves; one site's excess kurtosis is below 10, that of N below 10/N

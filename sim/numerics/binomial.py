@@ -9,6 +9,7 @@ true inverse with a probability of about 1e-14 times its standard deviation.
 import math
 
 import numpy as np
+import scipy.special
 
 from sim.numerics.jit import device, kernel
 
@@ -34,28 +35,6 @@ _STIRLING = np.array((
     0.013876128823070748, 0.01189670994589177, 0.010411265261972096, 0.009255462182712733, 0.00833056343336287,
     0.007573675487951841, 0.00694284010720953, 0.006408994188004207, 0.0059513701127588475, 0.005554733551962801,
 ))  # fmt: skip
-#: Coefficients of AS 241, of top and bottom of a quotient: about the middle, in the tails, far out.
-_MIDDLE = np.array(((
-    3.3871328727963666080, 1.3314166789178437745e2, 1.9715909503065514427e3, 1.3731693765509461125e4,
-    4.5921953931549871457e4, 6.7265770927008700853e4, 3.3430575583588128105e4, 2.5090809287301226727e3,
-), (
-    1.0, 4.2313330701600911252e1, 6.8718700749205790830e2, 5.3941960214247511077e3,
-    2.1213794301586595867e4, 3.9307895800092710610e4, 2.8729085735721942674e4, 5.2264952788528545610e3,
-)))  # fmt: skip
-_TAIL = np.array(((
-    1.42343711074968357734, 4.63033784615654529590, 5.76949722146069140550, 3.64784832476320460504,
-    1.27045825245236838258, 2.41780725177450611770e-1, 2.27238449892691845833e-2, 7.74545014278341407640e-4,
-), (
-    1.0, 2.05319162663775882187, 1.67638483018380384940, 6.89767334985100004550e-1,
-    1.48103976427480074590e-1, 1.51986665636164571966e-2, 5.47593808499534494600e-4, 1.05075007164441684324e-9,
-)))  # fmt: skip
-_FAR = np.array(((
-    6.65790464350110377720, 5.46378491116411436990, 1.78482653991729133580, 2.96560571828504891230e-1,
-    2.65321895265761230930e-2, 1.24266094738807843860e-3, 2.71155556874348757815e-5, 2.01033439929228813265e-7,
-), (
-    1.0, 5.99832206555887937690e-1, 1.36929880922735805310e-1, 1.48753612908506148525e-2,
-    7.86869131145613259100e-4, 1.84631831751005468180e-5, 1.42151175831644588870e-7, 2.04426310338993978564e-15,
-)))  # fmt: skip
 _SURE = 30.0  # variance from which the expansion decides where it can
 #: Its error is below 0.0018 (1 + z²)³/variance² up to |z| = 8.3, as far as numbers of 53 bits reach: six times that.
 _DOUBT, _ROUNDING = 0.011, 2e-15
@@ -98,20 +77,9 @@ def binomial_numbers(uniform, trials, chance) -> np.ndarray:
     """
     uniform, trials, chance = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (uniform, trials, chance)))
     drawn = np.empty(uniform.shape)
-    _draw(uniform.ravel(), trials.ravel(), chance.ravel(), drawn.reshape(-1))
+    normal = scipy.special.ndtri(uniform)
+    _draw(uniform.ravel(), normal.ravel(), trials.ravel(), chance.ravel(), drawn.reshape(-1))
     return drawn
-
-
-def binomial_tails(number, trials, chance) -> tuple[float, float]:
-    """Probabilities of at most, and of more than, ``number`` successes, each to a relative 1e-14.
-
-    >>> least, more = binomial_tails(0, 10, 0.5)
-    >>> print(f"{1024 * least:.6f} {1024 * more:.6f}")
-    1.000000 1023.000000
-    """
-    both = np.empty(2)
-    _both_tails(float(number), float(trials), float(chance), both)
-    return float(both[0]), float(both[1])
 
 
 @device
@@ -227,25 +195,6 @@ def _tails(k, n, p, here, work):
 
 
 @device
-def _ratio(r, top, bottom):
-    """Quotient of two polynomials of degree seven."""
-    above = below = 0.0
-    for k in range(7, -1, -1):
-        above, below = above * r + top[k], below * r + bottom[k]
-    return above / below
-
-
-@device
-def _deviate(u):
-    """Standard normal number below which 0 < u <= 1/2 lies, to 1e-15 (Wichura, AS 241, 1988)."""
-    d = u - 0.5
-    if d >= -0.425:
-        return d * _ratio(0.180625 - d * d, _MIDDLE[0], _MIDDLE[1])
-    r = math.sqrt(-math.log(u))
-    return -_ratio(r - 1.6, _TAIL[0], _TAIL[1]) if r <= 5.0 else -_ratio(r - 5.0, _FAR[0], _FAR[1])
-
-
-@device
 def _expansion(z, n, p):
     """Where F continued between whole numbers, less 1/2, reaches the normal distribution function at z.
 
@@ -272,9 +221,11 @@ def _expansion(z, n, p):
 
 
 @device
-def _inverse(low, high, strict, n, p, work):
-    """Least k with F(k) >= low, or > low if strict; ``high`` is 1 − low, which decides in the upper half."""
-    z = _deviate(low) if low <= 0.5 else -_deviate(high)
+def _inverse(low, high, z, strict, n, p, work):
+    """Least k with F(k) >= low, or > low if strict; ``high`` is 1 − low, which decides in the upper half.
+
+    The normal distribution function is ``low`` at z.
+    """
     variance, size = n * p * (1.0 - p), 1.0 + z * z
     if variance < _SURE:
         k = n * p + math.sqrt(variance) * z + (1.0 - 2.0 * p) * (z * z - 1.0) / 6.0 - 0.5
@@ -322,7 +273,7 @@ def _searched(k, low, high, strict, n, p, work):
 
 
 @device
-def _number(u, n, p, work):
+def _number(u, z, n, p, work):
     if not (u == u and n == n and p == p):
         return math.nan
     if n <= 0.0 or p <= 0.0 or u <= 0.0:
@@ -330,23 +281,12 @@ def _number(u, n, p, work):
     if p >= 1.0 or u >= 1.0:
         return n
     if p <= 0.5:
-        return _inverse(u, 1.0 - u, False, n, p, work)
-    return n - _inverse(1.0 - u, u, True, n, 1.0 - p, work)
+        return _inverse(u, 1.0 - u, z, False, n, p, work)
+    return n - _inverse(1.0 - u, u, -z, True, n, 1.0 - p, work)
 
 
-@kernel("void(float64[::1], float64[::1], float64[::1], float64[::1])")
-def _draw(uniform, trials, chance, drawn):
+@kernel("void(float64[::1], float64[::1], float64[::1], float64[::1], float64[::1])")
+def _draw(uniform, normal, trials, chance, drawn):
     work = np.empty(_NODES.size)
     for i in range(drawn.size):
-        drawn[i] = _number(uniform[i], trials[i], chance[i], work)
-
-
-@kernel("void(float64, float64, float64, float64[::1])")
-def _both_tails(k, n, p, both):
-    work = np.empty(_NODES.size)
-    if p <= 0.5:
-        both[0], both[1] = _tails(k, n, p, _chance(k, n, p), work)
-    elif k >= n:
-        both[0], both[1] = 1.0, 0.0
-    else:  # at most k successes are n − k failures or more
-        both[1], both[0] = _tails(n - k - 1.0, n, 1.0 - p, _chance(n - k - 1.0, n, 1.0 - p), work)
+        drawn[i] = _number(uniform[i], normal[i], trials[i], chance[i], work)

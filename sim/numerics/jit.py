@@ -1,10 +1,10 @@
 """Compilation by numba, the only place that decorates with it.
 
-Three decorators: ``device`` for a scalar helper that compiles into its callers, ``kernel`` for a
-loop over arrays, ``law`` for a formula that broadcasts as a numpy ufunc but keeps its Python
-signature, defaults and docstring. Kernels and laws compile at their first call and are cached on
-disk, in a folder named by a hash of all compiled sources: numba itself does not notice a change in
-a helper of another file. A cache that is broken, read-only or full costs time, never a run.
+Four decorators: ``device`` for a scalar helper that compiles into its callers, ``inlined`` for one whose body must
+stand in the calling loop for vector instructions, ``kernel`` for a loop over arrays, ``law`` for a formula that
+broadcasts as a numpy ufunc but keeps its Python signature, defaults and docstring. Kernels and laws compile at their
+first call and are cached on disk, in a folder named by a hash of all compiled sources: numba itself does not notice a
+change in a helper of another file. A cache that is broken, read-only or full costs time, never a run.
 """
 
 import functools
@@ -22,6 +22,7 @@ import numpy as np
 from numba.core import config
 
 device = numba.njit(error_model="numpy")
+inlined = numba.njit(error_model="numpy", inline="always")
 _building = threading.RLock()
 _BLOCK = 4096
 

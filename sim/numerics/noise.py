@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sim.numerics.jit import device, kernel
+from sim.numerics.jit import device, inlined, kernel
 
 #: Fixed integer of each part that draws; part of the address, so never renumbered.
 PARTS = {"bonds": 1, "shear": 2, "drive": 3, "contact": 4}
@@ -108,19 +108,24 @@ def _high_product(a, b):
     return a_high * b_high + (one >> _HALF) + (two >> _HALF) + (middle >> _HALF)
 
 
+@inlined
+def words_at(seed, part, c0, c1, c2, c3):
+    """Four Philox words of one counter under the key (seed, part)."""
+    k0, k1 = seed, part
+    for _ in range(10):
+        high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0
+        high1, low1 = _high_product(_FACTORS[1], c2), _FACTORS[1] * c2
+        c0, c1, c2, c3 = high1 ^ c1 ^ k0, low1, high0 ^ c3 ^ k1, low0
+        k0, k1 = k0 + _WEYL[0], k1 + _WEYL[1]
+    return c0, c1, c2, c3
+
+
 @device
 def _words(seed, part, block, member, lane, first, words):
     """Philox words of the counters after ``first`` of one block and lane, shape (4, counters)."""
     zero, one, two, three = words[0], words[1], words[2], words[3]
     for i in range(words.shape[1]):
-        c0, c1, c2, c3 = first + _U(i) + _U(1), block, member, lane
-        k0, k1 = seed, part
-        for _ in range(10):
-            high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0
-            high1, low1 = _high_product(_FACTORS[1], c2), _FACTORS[1] * c2
-            c0, c1, c2, c3 = high1 ^ c1 ^ k0, low1, high0 ^ c3 ^ k1, low0
-            k0, k1 = k0 + _WEYL[0], k1 + _WEYL[1]
-        zero[i], one[i], two[i], three[i] = c0, c1, c2, c3
+        zero[i], one[i], two[i], three[i] = words_at(seed, part, first + _U(i) + _U(1), block, member, lane)
 
 
 @device
@@ -261,18 +266,6 @@ def _gammas(seed, part, block, members, lane, shapes, numbers):
 
 
 @device
-def words_at(seed, part, c0, c1, c2, c3):
-    """Four words of one counter under the key (seed, part), for draws whose number depends on the state."""
-    k0, k1 = seed, part
-    for _ in range(10):
-        high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0
-        high1, low1 = _high_product(_FACTORS[1], c2), _FACTORS[1] * c2
-        c0, c1, c2, c3 = high1 ^ c1 ^ k0, low1, high0 ^ c3 ^ k1, low0
-        k0, k1 = k0 + _WEYL[0], k1 + _WEYL[1]
-    return c0, c1, c2, c3
-
-
-@device
 def exponential(word):
     """A standard exponential number from a word, 0 to 36.04."""
     return -logarithm(2.0 - _unit(word))
@@ -289,11 +282,4 @@ def fill_words(seed, part, first, second, member, lane, count, words):
     """Two words of each of ``count`` counters (first[i], second[i], member, lane), shape (2, at least count)."""
     one, two = words[0], words[1]
     for i in range(count):
-        c0, c1, c2, c3 = first[i], second[i], member, lane
-        k0, k1 = seed, part
-        for _ in range(10):
-            high0, low0 = _high_product(_FACTORS[0], c0), _FACTORS[0] * c0
-            high1, low1 = _high_product(_FACTORS[1], c2), _FACTORS[1] * c2
-            c0, c1, c2, c3 = high1 ^ c1 ^ k0, low1, high0 ^ c3 ^ k1, low0
-            k0, k1 = k0 + _WEYL[0], k1 + _WEYL[1]
-        one[i], two[i] = c0, c1
+        one[i], two[i], _, _ = words_at(seed, part, first[i], second[i], member, lane)

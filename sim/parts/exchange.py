@@ -10,8 +10,13 @@ in +x is positive.
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.numerics.noise import Noise
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 
 
 class Times(NamedTuple):
@@ -84,13 +89,13 @@ class Motion(NamedTuple):
     step: int
     time: float
     duration: float
-    slip: np.ndarray
-    path: np.ndarray
-    first: np.ndarray
-    speed: np.ndarray
+    slip: Array
+    path: Array
+    first: Array
+    speed: Array
 
 
-def _constant(value: float) -> np.ndarray:
+def _constant(value: float) -> Array:
     array = np.full(1, value)
     array.setflags(write=False)
     return array
@@ -125,15 +130,15 @@ class Bonding(NamedTuple):
         balance energies; 0 under a prescribed drive.
     """
 
-    fraction: np.ndarray
-    stress: np.ndarray
-    strength: np.ndarray
-    stiffness: np.ndarray = _NONE
-    relaxation: np.ndarray = _UNKNOWN
-    frozen: np.ndarray = _UNKNOWN
-    varying: np.ndarray = _UNKNOWN
-    stored: np.ndarray = _NONE
-    dissipated: np.ndarray = _NONE
+    fraction: Array
+    stress: Array
+    strength: Array
+    stiffness: Array = _NONE
+    relaxation: Array = _UNKNOWN
+    frozen: Array = _UNKNOWN
+    varying: Array = _UNKNOWN
+    stored: Array = _NONE
+    dissipated: Array = _NONE
 
 
 class Gammas(NamedTuple):
@@ -151,18 +156,18 @@ class Gammas(NamedTuple):
         Energy that does not fluctuate [J/m²].
     """
 
-    weight: np.ndarray = np.empty(0)
-    shape: np.ndarray = np.empty(0)
-    wavenumber: np.ndarray = np.empty(0)
+    weight: Array = np.empty(0)
+    shape: Array = np.empty(0)
+    wavenumber: Array = np.empty(0)
     constant: float = 0.0
 
 
 class Resistance(NamedTuple):
     """What a drive that feeds back feels of the contact: friction force [N], its tangent and k_t [N/m]."""
 
-    force: np.ndarray
-    tangent: np.ndarray
-    contact_stiffness: np.ndarray
+    force: Array
+    tangent: Array
+    contact_stiffness: Array
 
 
 #: A drive that prescribes the motion feels nothing.
@@ -173,11 +178,11 @@ class Sliding(Protocol):
     """State of any drive."""
 
     @property
-    def position(self) -> np.ndarray:
+    def position(self) -> Array:
         """Displacement of the slider since the start [m]."""
 
     @property
-    def speed(self) -> np.ndarray:
+    def speed(self) -> Array:
         """Speed of the slider [m/s]."""
 
 
@@ -185,7 +190,7 @@ class Storing(Protocol):
     """State of any shear process."""
 
     @property
-    def energy(self) -> np.ndarray:
+    def energy(self) -> Array:
         """Elastic energy of the fluctuations per area ΔΓ [J/m²]."""
 
 
@@ -193,35 +198,35 @@ class Touching(Protocol):
     """State of any contact."""
 
     @property
-    def work(self) -> np.ndarray:
+    def work(self) -> Array:
         """Work of adhesion left at this radius [J/m²]."""
 
     @property
-    def radius(self) -> np.ndarray:
+    def radius(self) -> Array:
         """Contact radius [m], nan where the contact is open."""
 
     @property
-    def detached(self) -> np.ndarray:
+    def detached(self) -> Array:
         """Time of the last detachment [s], nan if never."""
 
     @property
-    def dissipated(self) -> np.ndarray:
+    def dissipated(self) -> Array:
         """Energy that the edge and the jumps of the contact have dissipated so far [J]."""
 
     @property
-    def whole(self) -> np.ndarray:
+    def whole(self) -> Array:
         """Phase (before its first touch, closed, open) of a contact with all adhesion."""
 
     @property
-    def bonded(self) -> np.ndarray:
+    def bonded(self) -> Array:
         """Phase of a contact with the adhesion of the bonds alone."""
 
     @property
-    def stressless(self) -> np.ndarray:
+    def stressless(self) -> Array:
         """Phase of a contact with the adhesion that fluctuations leave."""
 
     @property
-    def settled(self) -> np.ndarray:
+    def settled(self) -> Array:
         """Phase of a contact in equilibrium with the work of adhesion left."""
 
 
@@ -269,19 +274,20 @@ class Bonds(Part, Protocol[Own]):
     def state_class(self) -> type[Own]:
         """Class of the state."""
 
+    @property
+    def in_place(self) -> bool:
+        """Whether ``advance`` works in the arrays of the state that it is given, which is spent then."""
+
     def start(self, motion: Motion, noise: Noise) -> Own:
         """Population at t = 0, as the scene's ``start`` says."""
 
-    def advance(self, state: Own, motion: Motion, radius: np.ndarray, noise: Noise) -> Own:
+    def advance(self, state: Own, motion: Motion, radius: Array, noise: Noise) -> Own:
         """Population after a step over a contact that had this ``radius`` [m] at its start, nan where it was open."""
 
     def bonding(self, state: Own) -> Bonding:
         """Everything that others read of a population, computed once a step."""
 
-    def copied(self, state: Own) -> Own:
-        """A state that stays good after ``advance`` was called with it: a copy where a step works in place."""
-
-    def steady(self, speed: np.ndarray) -> Bonding:
+    def steady(self, speed: Array) -> Bonding:
         """Ensemble mean in steady sliding at speeds [m/s], arrays of their shape or (1,)."""
 
 

@@ -20,7 +20,7 @@ from sim.parts.exchange import Bonding, Gammas, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.mode_pairs import cell_pairs
-from sim.parts.shear.process import Fluctuation, _Renewing
+from sim.parts.shear.process import Fluctuation, Renewing
 from sim.scenario.scenario import Scenario
 from sim.study.settings import REFERENCE, table
 
@@ -59,7 +59,7 @@ def memory(terms: Gammas, power: int) -> float:
 
 
 @dataclass(frozen=True)
-class Expected(_Renewing):
+class Expected(Renewing):
     """Ensemble mean of a renewing process, of which the state holds the variance of its modes.
 
     ``tables`` has for each set of terms ``(n − 1)! Σ shape wⁿ`` for n = 1, 2, 3 at each ``wavenumber``; the mean that
@@ -89,11 +89,14 @@ class Expected(_Renewing):
     def _empty(self, members: int) -> Array:
         return np.zeros(self.wavenumber.size)
 
-    def _renewed(
-        self, values: Array, keep: Array, renew: Array, size: Array, amplitude: Array, step: int, noise: Noise
-    ) -> Fluctuation:  # fmt: skip
-        after = Fluctuation(np.empty(0), amplitude, keep**2 * values + (renew * size) ** 2)
-        return after._replace(energy=self.cumulants(after)[0, :1])
+    def _renew(
+        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
+    ) -> tuple[Array, Array]:
+        return np.empty(0), keep**2 * values + (renew * size) ** 2
+
+    def _scaled(self, amplitude: Array, energy: Array, values: Array) -> Fluctuation:
+        state = Fluctuation(energy, amplitude, values)
+        return state._replace(energy=self.cumulants(state)[0, :1])
 
     def cumulants(self, state: Fluctuation) -> Array:
         """First three cumulants of ΔΓ for each set, shape (sets, 3)."""

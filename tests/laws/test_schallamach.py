@@ -10,7 +10,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
-from sim.laws import schallamach
 from sim.laws.schallamach import (
     bell_critical_speed,
     bell_fraction,
@@ -127,11 +126,6 @@ def test_transitions_compose_to_the_exact_step_of_the_mean():
     assert_allclose(mean, relax_fraction(0.3, 3e-5, 2e-3, CRITICAL, HEALING), rtol=1e-14, atol=0)
     for probability in transition_probabilities(EXPONENTS * CRITICAL, EXPONENTS, CRITICAL, HEALING):
         assert np.all((probability >= 0.0) & (probability <= 1.0))
-
-
-def test_every_public_name_is_there_once():
-    assert sorted(set(schallamach.__all__)) == sorted(schallamach.__all__)
-    assert all(callable(getattr(schallamach, name)) for name in schallamach.__all__)
 
 
 def test_the_share_at_rest():

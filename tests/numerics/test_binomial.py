@@ -9,11 +9,30 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2
 
-from sim.numerics.binomial import binomial_numbers, binomial_tails
+from sim.numerics.binomial import _chance, _tails, binomial_numbers
+from sim.numerics.jit import kernel
 
 # Rounding of what the parts of a probability are made of: eleven terms in its logarithm, of 40 at the most, each
 # good to two units of 2^-53; likewise the exponent of the integral.
 CLOSE = 2 * 11 * 40 * 2.0**-53
+
+
+@kernel("void(float64, float64, float64, float64[::1])")
+def write_tails(k, n, p, both):
+    work = np.empty(24)
+    if p <= 0.5:
+        both[0], both[1] = _tails(k, n, p, _chance(k, n, p), work)
+    elif k >= n:
+        both[0], both[1] = 1.0, 0.0
+    else:  # at most k successes are n − k failures or more
+        both[1], both[0] = _tails(n - k - 1.0, n, 1.0 - p, _chance(n - k - 1.0, n, 1.0 - p), work)
+
+
+def binomial_tails(number, trials, chance):
+    """Probabilities of at most, and of more than, ``number`` successes."""
+    both = np.empty(2)
+    write_tails(float(number), float(trials), float(chance), both)
+    return float(both[0]), float(both[1])
 
 
 def exact_tails(number, trials, chance):

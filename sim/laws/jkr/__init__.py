@@ -41,12 +41,3 @@ from sim.laws.jkr.stiffness import (
     pull_off_at_stiffness,
     pull_off_displacement,
 )
-
-__all__ = [
-    "PullOff", "energy_release_rate", "energy_release_rate_at_displacement", "energy_release_rate_at_indentation",
-    "hertz_radius_at_indentation", "hertz_radius_at_load", "indentation_at_radius",
-    "indentation_under_displacement", "indentation_under_load", "load_at_radius", "load_under_displacement",
-    "load_under_indentation", "potential_at_indentation", "potential_at_load", "potential_slope_at_indentation",
-    "potential_slope_at_load", "pull_off_at_stiffness", "pull_off_displacement", "pull_off_indentation",
-    "pull_off_load", "radius_at_displacement", "radius_at_indentation", "radius_at_load",
-]  # fmt: skip

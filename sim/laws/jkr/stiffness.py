@@ -96,22 +96,15 @@ def pull_off_displacement(stiffness, work, sphere_radius, modulus):
 
 
 @law
-def _pull_off_radius(stiffness, work, sphere_radius, modulus):
+def _pull_off(stiffness, work, sphere_radius, modulus, which):
+    """Field 0, 1 or 2 of ``PullOff``."""
     root, unit, _, _ = _fold(stiffness, work, sphere_radius, modulus)
-    return unit * root * root
-
-
-@law
-def _pull_off_load(stiffness, work, sphere_radius, modulus):
-    root, _, _, _ = _fold(stiffness, work, sphere_radius, modulus)
+    if which == 0.0:
+        return unit * root * root
     cube = root * root * root
-    return math.pi * work * sphere_radius * (cube * (cube - 6.0) / 6.0) + 0.0
-
-
-@law
-def _pull_off_indentation(stiffness, work, sphere_radius, modulus):
-    root, unit, _, _ = _fold(stiffness, work, sphere_radius, modulus)
-    return unit * (unit / sphere_radius) * (root * (root * root * root - 4.0)) + 0.0
+    if which == 1.0:
+        return math.pi * work * sphere_radius * (cube * (cube - 6.0) / 6.0) + 0.0  # no -0
+    return unit * (unit / sphere_radius) * (root * (cube - 4.0)) + 0.0
 
 
 def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
@@ -141,8 +134,7 @@ def pull_off_at_stiffness(stiffness, work, sphere_radius, modulus) -> PullOff:
     >>> print("%.6f %.6f %.6f" % last)
     0.666667 -1.037037 -0.888889
     """
-    rest = stiffness, work, sphere_radius, modulus
-    return PullOff(_pull_off_radius(*rest), _pull_off_load(*rest), _pull_off_indentation(*rest))
+    return PullOff(*(_pull_off(stiffness, work, sphere_radius, modulus, which) for which in range(3)))
 
 
 @law

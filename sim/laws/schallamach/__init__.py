@@ -32,12 +32,7 @@ from sim.laws.schallamach.first_moment import (
     first_moment_stress,
     first_moment_stretch,
 )
-from sim.laws.schallamach.linear import (
-    fraction_rate,
-    relax_fraction,
-    steady_fraction,
-    transition_probabilities,
-)
+from sim.laws.schallamach.linear import fraction_rate, relax_fraction, steady_fraction, transition_probabilities
 from sim.laws.schallamach.loading import (
     StartUpPeak,
     bell_rupture_force,
@@ -45,20 +40,4 @@ from sim.laws.schallamach.loading import (
     start_up_force,
     start_up_peak,
 )
-from sim.laws.schallamach.renewal import (
-    Lives,
-    Peak,
-    SiteMoments,
-    constant_moments,
-    renewal,
-    rest_share,
-)
-
-__all__ = [
-    "Lives", "Peak", "SiteMoments", "StartUpPeak", "bell_critical_speed", "bell_fraction", "bell_lives",
-    "bell_moments", "bell_peak", "bell_rupture_force", "bell_rupture_force_density", "bell_stress",
-    "catch_lives", "catch_moments", "cluster_lifetime", "constant_moments", "cut_off_fraction", "cut_off_moments",
-    "cut_off_stress", "first_moment_fraction", "first_moment_peak", "first_moment_stress", "first_moment_stretch",
-    "fraction_rate", "relax_fraction", "renewal", "rest_share", "start_up_force", "start_up_peak", "steady_fraction",
-    "transition_probabilities",
-]  # fmt: skip
+from sim.laws.schallamach.renewal import Lives, Peak, SiteMoments, constant_moments, renewal, rest_share

@@ -6,23 +6,17 @@ steady pulling; the renewal integrals are done by quadrature.
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from sim.laws.schallamach.renewal import Lives, SiteMoments, renewal
+from sim.laws.schallamach.renewal import Array, Lives, SiteMoments, renewal
 
-Array = NDArray[np.float64]
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(16)
 #: ∫k dt at which lives are cut: e^-60 are left.
 _END = 60.0
 
 
 def catch_lives(
-    speed: ArrayLike,
-    catch_rate: float,
-    catch_force: float,
-    slip_rate: float,
-    slip_force: float,
-    bond_stiffness: float,
+    speed: ArrayLike, catch_rate: float, catch_force: float, slip_rate: float, slip_force: float, bond_stiffness: float
 ) -> Lives:
     """Moments of the life of a catch bond that is pulled at constant speed.
 

@@ -5,9 +5,10 @@ loaded together, as long as sites do not rebind.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from sim.laws.schallamach.first_moment import steady_tilt
+from sim.laws.schallamach.renewal import Array
 from sim.numerics.jit import device, law
 from sim.numerics.special import reduced
 
@@ -15,8 +16,8 @@ from sim.numerics.special import reduced
 class StartUpPeak(NamedTuple):
     """The static peak: when it comes [s] and the force per bond [N]."""
 
-    time: Any
-    force: Any
+    time: Array
+    force: Array
 
 
 @device

@@ -8,11 +8,14 @@ share do the ``*_fraction`` functions give the bond fraction of Menga, Carbone &
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.numerics.jit import law
+
+Array = NDArray[np.float64]
 
 
 class SiteMoments(NamedTuple):
@@ -29,24 +32,24 @@ class SiteMoments(NamedTuple):
         ``N (force_square - force^2)``, and a binomial number of bonds.
     """
 
-    bound: Any
-    force: Any
-    force_square: Any
+    bound: Array
+    force: Array
+    force_square: Array
 
 
 class Lives(NamedTuple):
     """Moments of the life T of a bond: ``<T>`` [s], ``<T^2>/2`` [s^2] and ``<T^3>/3`` [s^3]."""
 
-    mean: Any
-    half_square: Any
-    third_cube: Any
+    mean: Array
+    half_square: Array
+    third_cube: Array
 
 
 class Peak(NamedTuple):
     """Where friction is largest: speed [m/s] and shear stress [Pa]."""
 
-    speed: Any
-    stress: Any
+    speed: Array
+    stress: Array
 
 
 @law

@@ -3,16 +3,3 @@
 from sim.parts.bonds.models import Auto, Bonds, Model
 from sim.parts.bonds.stretched import Cohort, FirstMoment, Tracked
 from sim.parts.bonds.two_state import Counted, Rate, Steady, Unbroken
-
-__all__ = [
-    "Auto",
-    "Bonds",
-    "Cohort",
-    "Counted",
-    "FirstMoment",
-    "Model",
-    "Rate",
-    "Steady",
-    "Tracked",
-    "Unbroken",
-]

@@ -14,6 +14,7 @@ import numpy as np
 
 from sim.parts.bonds.cohort_step import lost_rows, settle_steady, step_rows
 from sim.parts.bonds.rupture import RuptureRate
+from sim.parts.exchange import Array
 
 
 class Cohorts(NamedTuple):
@@ -31,10 +32,10 @@ class Cohorts(NamedTuple):
         Slip of the lattice on which cohorts are merged [m], and their number after the last merging.
     """
 
-    weight: np.ndarray
-    stretch: np.ndarray
-    width: np.ndarray
-    lattice: np.ndarray
+    weight: Array
+    stretch: Array
+    width: Array
+    lattice: Array
 
 
 def empty(rupture: RuptureRate, tolerance: float) -> Cohorts:
@@ -88,7 +89,7 @@ def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance:
 
 def advance(
     cohorts: Cohorts,
-    slip: np.ndarray,
+    slip: Array,
     duration: float,
     rupture: RuptureRate,
     rebinding_rate: float,
@@ -140,39 +141,39 @@ def advance(
     return Cohorts(*after)
 
 
-def diluted(cohorts: Cohorts, share: np.ndarray) -> Cohorts:
+def diluted(cohorts: Cohorts, share: Array) -> Cohorts:
     """The populations with only a share of their bonds left, of shape (1,) or (rows,); the other sites are free."""
     return cohorts._replace(weight=cohorts.weight * np.asarray(share)[:, np.newaxis])
 
 
-def bound(cohorts: Cohorts) -> np.ndarray:
+def bound(cohorts: Cohorts) -> Array:
     """Share of the sites that is bound [1], shape (rows,)."""
     return np.sum(cohorts.weight, axis=1)
 
 
-def first_moment(cohorts: Cohorts) -> np.ndarray:
+def first_moment(cohorts: Cohorts) -> Array:
     """Stretch per site [m], shape (rows,): the sum of w x."""
     return np.sum(cohorts.weight * cohorts.stretch, axis=1)
 
 
-def second_moment(cohorts: Cohorts) -> np.ndarray:
+def second_moment(cohorts: Cohorts) -> Array:
     """Square stretch per site [m^2], shape (rows,): the sum of w x², that within the width of a cohort included."""
     return np.sum(cohorts.weight * (cohorts.stretch**2 + cohorts.width**2 / 12.0), axis=1)
 
 
-def moments(cohorts: Cohorts) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def moments(cohorts: Cohorts) -> tuple[Array, Array, Array]:
     """Share of the sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each shape (rows,)."""
     return bound(cohorts), first_moment(cohorts), second_moment(cohorts)
 
 
-def lost_moment(cohorts: Cohorts, rupture: RuptureRate) -> np.ndarray:
+def lost_moment(cohorts: Cohorts, rupture: RuptureRate) -> Array:
     """Stretch per site that thermal rupture takes in unit time [m/s], shape (rows,): the sum of w x k(|x|)."""
     lost = np.empty(len(cohorts.weight))
     lost_rows(cohorts.weight, cohorts.stretch, tuple(rupture), lost)
     return lost
 
 
-def at_limit(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> np.ndarray:
+def at_limit(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
     """Density of the stretch at the rupture's limit times that limit, ℓ ρ(ℓ) [1], shape (rows,); 0 without a limit.
 
     The mean over the outermost of the cells that are merged, which is what the tolerance resolves.
@@ -207,7 +208,7 @@ _KINK = 66.0
 
 
 @functools.lru_cache(maxsize=256)
-def _numbers(rupture: RuptureRate, rebinding_rate: float, tolerance: float, largest: float) -> np.ndarray:
+def _numbers(rupture: RuptureRate, rebinding_rate: float, tolerance: float, largest: float) -> Array:
     """``Rules`` as an array.
 
     A two-point Gauss rule over a cell of width d errs by d⁴/4320 of the cell's bonds, a uniform segment

@@ -25,6 +25,7 @@ import numpy as np
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import lambert_w
 from sim.parts.bonds.rupture import RuptureRate
+from sim.parts.exchange import Array
 
 #: Largest error of N and of M that a sub-step under Bell's rate may make, by its embedded lower order, over N and M.
 #: The fifth-order result that is kept is better; errors of sub-steps fade with the bonds that carry them.
@@ -38,7 +39,7 @@ _SMALL = 1e-10  # stretch in units of Bell's below which the rate is taken as co
 _NONE = 1e-290  # share below which no site is bound
 
 
-def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
+def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
     """Population after a step of sliding at constant speed.
 
     Parameters
@@ -96,12 +97,12 @@ def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding
     return bound, moment
 
 
-def resting(rupture: RuptureRate, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
+def resting(rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
     """Population at rest for ever: N = k_on/(k_on + k(0)) [1] and M = 0 [m]; arguments as in ``advance``."""
     return steady(0.0, rupture, rebinding_rate)
 
 
-def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[np.ndarray, np.ndarray]:
+def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
     """Population of steady sliding.
 
     Parameters
@@ -203,7 +204,7 @@ def _linear(bound, moment, slip, binding, breaking, travel):
     return min(after, 1.0), moment * math.exp(-q) + slip * (bound * old + binding * _young(low, gap, high))
 
 
-def _lower(*rows: list[float]) -> np.ndarray:
+def _lower(*rows: list[float]) -> Array:
     """Rows of a strictly lower triangle, filled up with zeros."""
     return np.array([row + [0.0] * (7 - len(row)) for row in rows])
 
@@ -311,7 +312,7 @@ def _slow(speed, rate):
 def _bell(bound, moment, speed, rate, binding, work):
     """A whole step under Bell's rate, the stretch in units of Bell's and time in that of the step: bound, moment.
 
-    Sub-steps take the moment as positive and stop where it becomes zero. The error of one tells the length
+    Sub-steps take the moment as positive and stop where it becomes zero. The error of one sets the length
     of the next, between a tenth and six times its own.
     """
     left, step, sign = 1.0, 0.0, 1.0
@@ -353,28 +354,12 @@ def _at(i, array):
 
 
 @kernel("void(f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8, f8, f8[::1], f8[::1])")
-def _advance(
-    bound,
-    moment,
-    slip,
-    path,
-    duration,
-    rate,
-    softness,
-    limit,
-    rebinding,
-    bound_after,
-    moment_after,
-):
-    """A step of every row; rows know nothing of each other."""
+def _advance(bound, moment, slip, path, duration, rate, softness, limit, rebinding, bound_after, moment_after):
+    """A step of every row, each by itself."""
     work = np.empty((8, 2))
     breaking, binding = rate * duration, rebinding * duration
     for i in range(bound_after.size):
-        share, stretch, way = (
-            bound[_at(i, bound)],
-            moment[_at(i, moment)],
-            slip[_at(i, slip)],
-        )
+        share, stretch, way = bound[_at(i, bound)], moment[_at(i, moment)], slip[_at(i, slip)]
         stiff = softness * math.fabs(stretch) <= _SMALL * share and softness * math.fabs(way) <= _SMALL * breaking
         if stiff or softness == 0.0 or breaking == 0.0:
             k, travel = _slow(softness * way, breaking), path[_at(i, path)] / limit

@@ -14,20 +14,8 @@ from pydantic_core import PydanticCustomError
 from sim.parts.bonds.area import Area
 from sim.parts.bonds.rupture import Rupture
 from sim.parts.bonds.stretched import Cohort, Density, FirstMoment, Rebinding, Stiffness, Tracked
-from sim.parts.bonds.two_state import (
-    Counted,
-    CriticalSpeed,
-    Rate,
-    Sites,
-    Start,
-    Steady,
-    Stress,
-    Unbroken,
-)
+from sim.parts.bonds.two_state import Counted, CriticalSpeed, Rate, Sites, Start, Steady, Stress, Unbroken
 from sim.units.quantity import Quantity
-
-__all__ = ["Auto", "Bonds", "Cohort", "Counted", "FirstMoment", "Model"]
-__all__ += ["Rate", "Steady", "Tracked", "Unbroken"]
 
 _MOST_TRACKED = 10**6
 _WITHOUT = ("critical_speed", "rebinding_rate")

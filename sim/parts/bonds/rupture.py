@@ -8,7 +8,6 @@ import math
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
@@ -22,6 +21,7 @@ from sim.laws.schallamach import (
     first_moment_peak,
 )
 from sim.numerics.jit import device
+from sim.parts.exchange import Array
 from sim.units.quantity import Quantity
 
 
@@ -43,7 +43,7 @@ class RuptureRate(NamedTuple):
         """Rupture rate of an unstretched bond [1/s]."""
         return self.rate + self.catch
 
-    def at(self, stretch: np.ndarray) -> np.ndarray:
+    def at(self, stretch: Array) -> Array:
         """Rupture rate of bonds of a stretch [m] below any limit [1/s]."""
         size = np.abs(stretch)
         return self.rate * np.exp(size * self.softness) + self.catch * np.exp(-size * self.relief)
@@ -68,7 +68,7 @@ class _Law:
         """Numbers of this law for bonds of a stiffness [N/m]."""
         raise NotImplementedError
 
-    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
         """Share bound [1], mean force [N] and mean square force [N²] per site in steady sliding at speeds [m/s]."""
         raise NotImplementedError
 
@@ -89,7 +89,7 @@ class Constant(_Law):
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, math.inf)
 
-    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
         return constant_moments(speed, self.rate, bond_stiffness, rebinding_rate)
 
 
@@ -108,7 +108,7 @@ class Bell(_Law):
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.zero_force_rate, bond_stiffness / self.bell_force, math.inf)
 
-    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
         return bell_moments(speed, self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate)
 
     def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
@@ -127,7 +127,7 @@ class CutOff(_Law):
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.rate, 0.0, self.stretch)
 
-    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
         return cut_off_moments(speed, self.rate, self.stretch, bond_stiffness, rebinding_rate)
 
 
@@ -155,7 +155,7 @@ class Catch(_Law):
         slip, catch = bond_stiffness / self.slip_force, bond_stiffness / self.catch_force
         return RuptureRate(self.slip_rate, slip, math.inf, self.catch_rate, catch)
 
-    def closed_form(self, speed: ArrayLike, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
+    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
         law = self.catch_rate, self.catch_force, self.slip_rate, self.slip_force
         return catch_moments(speed, *law, bond_stiffness, rebinding_rate)
 

@@ -17,13 +17,13 @@ import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.first_moment as first_moment
 import sim.parts.bonds.tracked as tracks
 from sim.numerics.noise import Noise
-from sim.parts.bonds.area import UNSEEN, Area, OverArea, kept
+from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import Tracks
 from sim.parts.bonds.tracked_step import CYCLES
 from sim.parts.bonds.two_state import Start
-from sim.parts.exchange import Bonding, Motion, Setting
+from sim.parts.exchange import Array, Bonding, Motion, Setting
 from sim.units.quantity import Quantity
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
@@ -32,16 +32,18 @@ Density = Annotated[float, Quantity("1/m^2", "bond sites per area", "n", above=0
 CohortTolerance = Annotated[float, Quantity("1", "tolerance of the cohorts", "", at_least=1e-12, below=0.1)]
 
 
-class _Stretched:
-    """Attributes of models with a stretch; a subclass gives the moments of the stretch over all sites."""
+@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
+class _Stretched(Common):
+    """Keys and attributes of models with a stretch; a subclass gives the moments of the stretch over all sites."""
 
     stretched: ClassVar[bool] = True
     knows_forces: ClassVar[bool] = True
     carries_stress: ClassVar[bool] = True
+
     rupture: Rupture
-    bond_stiffness: float
-    rebinding_rate: float
-    site_density: float
+    bond_stiffness: Stiffness
+    rebinding_rate: Rebinding
+    site_density: Density
 
     @cached_property
     def law(self) -> RuptureRate:
@@ -53,9 +55,7 @@ class _Stretched:
         """Share of sites that are bound at rest [1]."""
         return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
 
-    def _bonding(
-        self, bound: np.ndarray, stretch: np.ndarray, square: np.ndarray, breaking: np.ndarray, lost: np.ndarray
-    ) -> Bonding:
+    def _bonding(self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array) -> Bonding:
         """Readings of a population of these moments per site.
 
         The stress is n κ x̄; with f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²). Slip stretches all
@@ -71,32 +71,16 @@ class _Stretched:
         relaxation = -per_stretch * lost
         return Bonding(fraction, stress, np.abs(stress), stiffness, relaxation, scale * frozen, scale * varying)
 
-    def chosen(self, area: float, forces: bool) -> Self:
-        """The model for a contact of this ``area`` [m²] whose field reads the bonds' ``forces`` or not: this one."""
-        return self
-
-    def why(self, area: float, forces: bool) -> str:
-        return ""
-
-    def followed(self, speeds: np.ndarray, step: float) -> float:
-        """Lives of single bonds that are followed in a step of one member at speeds [m/s], on average."""
-        return 0.0
-
-    def remarks(self, setting: Setting) -> list[str]:
-        return []
-
-
-Moments = tuple[np.ndarray, np.ndarray, np.ndarray]
-
 
 class Stretches(NamedTuple):
     """State of the first-moment equation: share of sites bound [1] and mean stretch per site [m]."""
 
-    bound: np.ndarray
-    stretch: np.ndarray
-    seen: np.ndarray = UNSEEN
+    bound: Array
+    stretch: Array
+    seen: Array = UNSEEN
 
 
+@dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
 class _Separable(_Stretched):
     """Models that rest on a rupture law whose ∫k dt has one clock for all bonds."""
 
@@ -116,17 +100,12 @@ class FirstMoment(OverArea, _Separable):
     maximum by some 27 to 47 %; ``Cohort`` has no such error.
     """
 
-    rupture: Rupture
-    bond_stiffness: Stiffness
-    rebinding_rate: Rebinding
-    site_density: Density
     start_from: Start = "steady"
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
     state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
-    numbers: ClassVar[int] = 1
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
         if self.start_from == "steady":
@@ -137,38 +116,22 @@ class FirstMoment(OverArea, _Separable):
         rows = self.rows(noise)
         return Stretches(rows * bound, rows * stretch)
 
-    def advance(self, state: Stretches, motion: Motion, radius: np.ndarray, noise: Noise) -> Stretches:
-        before = self.over(state, radius)
-        bound, stretch = first_moment.advance(
-            before.bound, before.stretch, motion.slip, motion.path, motion.duration, self.law, self.rebinding_rate
-        )
-        return Stretches(bound, stretch, before.seen)
+    def advance(self, state: Stretches, motion: Motion, radius: Array, noise: Noise) -> Stretches:
+        share, seen = self.kept(state.seen, radius)
+        slid, rates = (motion.slip, motion.path, motion.duration), (self.law, self.rebinding_rate)
+        return Stretches(*first_moment.advance(state.bound * share, state.stretch * share, *slid, *rates), seen)
 
     def remarks(self, setting: Setting) -> list[str]:
         excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)
         said = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
         return [said] if excess else []
 
-    def over(self, state: Stretches, radius: np.ndarray) -> Stretches:
-        """The population over a contact of this radius [m], nan where it is open."""
-        if self.area == "present":
-            return state
-        share, seen = kept(state.seen, radius)
-        return Stretches(state.bound * share, state.stretch * share, seen)
-
-    def copied(self, state: Stretches) -> Stretches:
-        return state
-
     def bonding(self, state: Stretches) -> Bonding:
         mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
         breaking, lost = 2.0 * np.abs(state.stretch) / self.law.limit, state.stretch * self.law.at(mean)
-        return self._bonding(*self.moments(state), breaking, lost)
+        return self._bonding(state.bound, state.stretch, _UNKNOWN, breaking, lost)
 
-    def moments(self, state: Stretches) -> Moments:
-        """Share of sites bound [1] and mean stretch [m] per site; the mean square stretch is not known."""
-        return state.bound, state.stretch, _UNKNOWN
-
-    def steady(self, speed: np.ndarray) -> Bonding:
+    def steady(self, speed: Array) -> Bonding:
         return self.bonding(Stretches(*first_moment.steady(speed, self.law, self.rebinding_rate)))
 
 
@@ -176,7 +139,7 @@ class Ages(NamedTuple):
     """State of a cohort population."""
 
     cohorts: Cohorts
-    seen: np.ndarray = UNSEEN
+    seen: Array = UNSEEN
 
 
 _UNKNOWN = np.full(1, np.nan)
@@ -190,17 +153,12 @@ class Cohort(OverArea, _Stretched):
     within a step, and the merging of old cohorts that bounds the cost, are held to ``tolerance``.
     """
 
-    rupture: Rupture
-    bond_stiffness: Stiffness
-    rebinding_rate: Rebinding
-    site_density: Density
     tolerance: CohortTolerance = 1e-4
     start_from: Start = "steady"
     area: Area = "present"
     model: Literal["cohort"] = "cohort"
 
     state_class: ClassVar[type[Ages]] = Ages
-    numbers: ClassVar[int] = 1
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
         recipe = self.law, self.rebinding_rate
@@ -213,30 +171,18 @@ class Cohort(OverArea, _Stretched):
         rows = len(self.rows(noise))
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
-    def advance(self, state: Ages, motion: Motion, radius: np.ndarray, noise: Noise) -> Ages:
-        before, seen = self.over(state, radius)
-        moved = cohorts.advance(before, motion.slip, motion.duration, self.law, self.rebinding_rate, self.tolerance)
-        return Ages(moved, seen)
-
-    def over(self, state: Ages, radius: np.ndarray) -> Ages:
-        """The population over a contact of this radius [m], nan where it is open."""
-        if self.area == "present":
-            return state
-        share, seen = kept(state.seen, radius)
-        return Ages(cohorts.diluted(state.cohorts, share), seen)
-
-    def copied(self, state: Ages) -> Ages:
-        return state
+    def advance(self, state: Ages, motion: Motion, radius: Array, noise: Noise) -> Ages:
+        share, seen = self.kept(state.seen, radius)
+        before = cohorts.diluted(state.cohorts, share) if self.area == "carried" else state.cohorts
+        recipe = self.law, self.rebinding_rate, self.tolerance
+        return Ages(cohorts.advance(before, motion.slip, motion.duration, *recipe), seen)
 
     def bonding(self, state: Ages) -> Bonding:
         breaking = cohorts.at_limit(state.cohorts, self.law, self.tolerance)
-        return self._bonding(*self.moments(state), breaking, cohorts.lost_moment(state.cohorts, self.law))
+        lost = cohorts.lost_moment(state.cohorts, self.law)
+        return self._bonding(*cohorts.moments(state.cohorts), breaking, lost)
 
-    def moments(self, state: Ages) -> Moments:
-        """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""
-        return cohorts.moments(state.cohorts)
-
-    def steady(self, speed: np.ndarray) -> Bonding:
+    def steady(self, speed: Array) -> Bonding:
         rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]
         found = [self.bonding(Ages(row)) for row in rows]
         return Bonding(*(np.concatenate(values) for values in zip(*found, strict=True)))
@@ -250,10 +196,6 @@ class Tracked(_Separable):
     At speeds that are constant within each step a member's bonds are the same for any clock step.
     """
 
-    rupture: Rupture
-    bond_stiffness: Stiffness
-    rebinding_rate: Rebinding
-    site_density: Density
     sites: Annotated[
         int, Quantity("1", "number of bond sites that are followed", at_least=1, at_most=10**6, whole=True)
     ]
@@ -261,41 +203,29 @@ class Tracked(_Separable):
     model: Literal["tracked"] = "tracked"
 
     state_class: ClassVar[type[Tracks]] = Tracks
-    area: ClassVar[str] = "present"
+    in_place: ClassVar[bool] = True
 
     @property
     def per_member(self) -> bool:
         return True
 
     @property
-    def feeds_back(self) -> bool:
-        return False
-
-    @property
     def numbers(self) -> int:
-        """Numbers that a member's state holds."""
         return 3 * self.sites
 
     def start(self, motion: Motion, noise: Noise) -> Tracks:
         return tracks.start(self.law, self.rebinding_rate, self.sites, motion.first, self.start_from, *noise.address())
 
-    def advance(self, state: Tracks, motion: Motion, radius: np.ndarray, noise: Noise) -> Tracks:
+    def advance(self, state: Tracks, motion: Motion, radius: Array, noise: Noise) -> Tracks:
         return tracks.advance(state, motion.slip, motion.duration, self.law, self.rebinding_rate, *noise.address())
 
-    def followed(self, speeds: np.ndarray, step: float) -> float:
+    def followed(self, speeds: Array, step: float) -> float:
         lives = step / (tracks.mean_life(speeds, self.law) + 1.0 / self.rebinding_rate)
         return float(self.sites * np.mean(np.minimum(lives, CYCLES)))
 
-    def copied(self, state: Tracks) -> Tracks:
-        return state.copy()
-
     def bonding(self, state: Tracks) -> Bonding:
         # one bond after the other breaks, at a limit or by itself
-        return self._bonding(*self.moments(state), np.zeros(1), _UNKNOWN)
+        return self._bonding(*tracks.moments(state), np.zeros(1), _UNKNOWN)
 
-    def moments(self, state: Tracks) -> Moments:
-        """Share of sites bound [1], mean stretch [m] and mean square stretch [m²] per site."""
-        return tracks.moments(state)
-
-    def steady(self, speed: np.ndarray) -> Bonding:
+    def steady(self, speed: Array) -> Bonding:
         return Cohort(self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density).steady(speed)

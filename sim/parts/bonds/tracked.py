@@ -2,7 +2,7 @@
 
 Each site is free or bound. A bond is born unstretched, is stretched by the slider, and breaks when
 its integrated rupture reaches an exponential threshold; the site then waits an exponential time and
-binds again, at the slider's place of that very moment. Nothing of this knows the clock step: steps
+binds again, at the slider's place of that very moment. Nothing of this depends on the clock step: steps
 only cut the motion into pieces of constant speed, so the same motion in other steps gives the same
 lives but for rounding. The numbers of each life have an address of their own (seed, site, life,
 member), so members do not depend on the batch, nor on where a run was taken up again.
@@ -17,20 +17,21 @@ from sim.numerics.special import reduced_exponential_integral, scaled_exponentia
 from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
 from sim.parts.bonds.tracked_step import ENDLESS, LONG, SPENT, draw, live
+from sim.parts.exchange import Array
 
 
 class Tracks(NamedTuple):
     """State of the bonds of all members; plain arrays, so that it can be written and read back.
 
     ``advance`` works in the large arrays themselves, which the states of a run share: only the newest
-    state can go on, and an older one says so. The frames are each state's own, so ``bound``,
+    state can go on, an older one raises an error. The frames are each state's own, so ``bound``,
     ``mean_stretch`` and ``mean_square_stretch`` of an older state stay right. Copies of all arrays
     make a state that goes on by itself.
 
     Attributes
     ----------
     birth, due : array, shape (members, sites)
-        Where each bond was born, when it breaks or its site binds, in the units of ``following``.
+        Where each bond was born, when it breaks or its site binds, in the units of ``tracked_events``.
     life : array of uint32, shape (members, sites)
         Number of each site's life.
     soonest : array, shape (members, 3, blocks)
@@ -41,26 +42,22 @@ class Tracks(NamedTuple):
         Slider, time, clock, sums and steps of each member.
     """
 
-    birth: np.ndarray
-    due: np.ndarray
-    life: np.ndarray
-    soonest: np.ndarray
-    stamp: np.ndarray
-    frame: np.ndarray
-
-    def copy(self) -> "Tracks":
-        """The same state with arrays of its own."""
-        return Tracks(*[array.copy() for array in self])
+    birth: Array
+    due: Array
+    life: Array
+    soonest: Array
+    stamp: Array
+    frame: Array
 
 
 def start(
     rupture: RuptureRate,
     rebinding_rate: float,
     sites: int,
-    speed: np.ndarray,
+    speed: Array,
     begin: str,
     seed: int,
-    members: np.ndarray,
+    members: Array,
 ) -> Tracks:
     """Bonds at the start of a run.
 
@@ -73,7 +70,7 @@ def start(
     sites : int
         Sites of each member.
     speed : array, shape (1,) or (members,)
-        V [m/s], either sign; asked by "steady" only.
+        V [m/s], either sign; needed by "steady" only.
     begin : str
         "steady": the stationary law at that speed. "bonded": a site is bound with the chance of rest,
         k_on/(k_on + k0), and unstretched. "empty": no site is bound.
@@ -107,26 +104,18 @@ def start(
         stamp=np.zeros(rows, np.int64),
         frame=np.zeros((rows, COLUMNS)),
     )
-    speed = np.asarray(speed, dtype=float)
-    if begin == "steady":
-        age = mean_life(speed, rupture)
-        share = _steady_share(age, speed, rebinding_rate)
-    else:
-        age = np.zeros(1)
-        rest = 1.0 if rupture.rate == 0.0 else rebinding_rate / (rebinding_rate + rupture.rate)
-        share = np.array([rest if begin == "bonded" else 0.0])
-    _draw(tracks, np.ones(1, bool), speed, share, age, rupture, rebinding_rate, seed, members)
+    _draw(tracks, np.ones(1, bool), begin, np.asarray(speed, dtype=float), rupture, rebinding_rate, seed, members)
     return tracks
 
 
 def advance(
     tracks: Tracks,
-    slip: np.ndarray,
+    slip: Array,
     duration: float,
     rupture: RuptureRate,
     rebinding_rate: float,
     seed: int,
-    members: np.ndarray,
+    members: Array,
 ) -> Tracks:
     """Bonds after a step at constant speed.
 
@@ -153,51 +142,43 @@ def advance(
     Exact for any length of the step. One of more than about 300 lives of a site ends in the
     stationary law of its speed, and is drawn from it.
     """
-    frame = tracks.frame.copy()
-    slip = np.asarray(slip, dtype=float)
-    members = np.asarray(members, dtype=np.uint64)
-    after = Tracks(tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, frame)
-    said = live(
-        tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, frame,
-        slip, duration, *rupture[:3], rebinding_rate, seed, members,
-    )  # fmt: skip
-    if said == SPENT:
+    slip, members = np.asarray(slip, dtype=float), np.asarray(members, dtype=np.uint64)
+    after = tracks._replace(frame=tracks.frame.copy())
+    code = live(tuple(after), slip, duration, *rupture[:3], rebinding_rate, seed, members)
+    if code == SPENT:
         raise RuntimeError("these tracks have been advanced already: go on from the newest state, or from copies")
-    if said == ENDLESS:
+    if code == ENDLESS:
         raise ValueError("slip and duration of a step must be finite, and its duration positive")
-    if said == LONG:
-        speed = slip / duration
-        age = mean_life(speed, rupture)
-        chosen = frame[:, STEPS] == tracks.frame[:, STEPS]
-        share = _steady_share(age, speed, rebinding_rate)
-        _draw(after, chosen, speed, share, age, rupture, rebinding_rate, seed, members)
+    if code == LONG:
+        chosen = after.frame[:, STEPS] == tracks.frame[:, STEPS]
+        _draw(after, chosen, "steady", slip / duration, rupture, rebinding_rate, seed, members)
     return after
 
 
-def bound(tracks: Tracks) -> np.ndarray:
+def bound(tracks: Tracks) -> Array:
     """Number of bound sites, shape (members,)."""
     return tracks.frame[:, BOUND]
 
 
-def mean_stretch(tracks: Tracks) -> np.ndarray:
+def mean_stretch(tracks: Tracks) -> Array:
     """Sum of all stretches, with sign, over the number of sites, shape (members,) [m]."""
     frame = tracks.frame
     return frame[:, SENSE] * (frame[:, BOUND] * frame[:, SLIDER] - frame[:, SUM]) / tracks.due.shape[1]
 
 
-def mean_square_stretch(tracks: Tracks) -> np.ndarray:
+def mean_square_stretch(tracks: Tracks) -> Array:
     """Sum of all squared stretches over the number of sites, shape (members,) [m^2]."""
     frame = tracks.frame
     number, slider, total, squares = frame[:, BOUND], frame[:, SLIDER], frame[:, SUM], frame[:, SQUARES]
     return np.maximum(slider * (number * slider - 2.0 * total) + squares, 0.0) / tracks.due.shape[1]
 
 
-def moments(tracks: Tracks) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def moments(tracks: Tracks) -> tuple[Array, Array, Array]:
     """Share of sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each shape (members,)."""
     return bound(tracks) / tracks.due.shape[1], mean_stretch(tracks), mean_square_stretch(tracks)
 
 
-def mean_life(speed: np.ndarray, rupture: RuptureRate) -> np.ndarray:
+def mean_life(speed: Array, rupture: RuptureRate) -> Array:
     """Mean life of a bond born unstretched at constant speed.
 
     Parameters
@@ -247,7 +228,7 @@ def _mean_life(speed: float, rupture: RuptureRate) -> float:
     return float(0.5 * edges[1] * np.sum(weights * np.exp(-z * np.expm1(pace * age))))
 
 
-def _steady_share(age: np.ndarray, speed: np.ndarray, rebinding_rate: float) -> np.ndarray:
+def _steady_share(age: Array, speed: Array, rebinding_rate: float) -> Array:
     """Chance that a site is bound, ⟨T⟩/(⟨T⟩ + 1/k_on); 1 for bonds that never break and rest."""
     if np.any(np.isinf(age) & (speed != 0.0)):
         raise ValueError("bonds that never break have no stationary stretch: start from bonded or empty")
@@ -255,10 +236,13 @@ def _steady_share(age: np.ndarray, speed: np.ndarray, rebinding_rate: float) -> 
         return np.where(np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0))
 
 
-def _draw(tracks, chosen, speed, share, age, rupture, rebinding_rate, seed, members) -> None:
-    """Draw the chosen members anew, in place."""
-    age = np.where(np.isinf(age), 0.0, age)
-    draw(
-        tracks.birth, tracks.due, tracks.life, tracks.soonest, tracks.stamp, tracks.frame, chosen,
-        speed, share, age, *rupture[:3], rebinding_rate, seed, np.asarray(members, dtype=np.uint64),
-    )  # fmt: skip
+def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) -> None:
+    """Draw the chosen members anew, in place, as a run may begin."""
+    age, rest = np.zeros(1), 1.0 if rupture.rate == 0.0 else rebinding_rate / (rebinding_rate + rupture.rate)
+    share = np.array([rest if begin == "bonded" else 0.0])
+    if begin == "steady":
+        age = mean_life(speed, rupture)
+        share = _steady_share(age, speed, rebinding_rate)
+    laws = (*rupture[:3], rebinding_rate)
+    members = np.asarray(members, dtype=np.uint64)
+    draw(tuple(tracks), chosen, speed, share, np.where(np.isinf(age), 0.0, age), *laws, seed, members)

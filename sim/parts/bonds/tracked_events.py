@@ -1,18 +1,18 @@
-"""Bonds whose stretch has the sign of the motion: one step of a row of them, asking only those that break or bind.
+"""Bonds whose stretch has the sign of the motion: one step of a row of them, touching only those that break or bind.
 
 A row is one member. All its sites follow one slider, so Bell's rupture separates: ∫k dt of bond i is
 e^(−s x_i) times a clock common to all, Φ(t) = ∫ rate e^(s x) dt, with s the softness, x the position of
 the slider and x_i that at the bond's birth, both counted along the motion from where the frame was
-last set. A bond therefore breaks when Φ passes a number known at its birth, its ``due``, and a step
-asks only the least due of each block of sites.
+last set. A bond therefore breaks when Φ passes a number fixed at its birth, its ``due``, and a step
+looks only at the least due of each block of sites.
 
 One array holds two kinds of due: a bound site's, never negative, and minus the time at which a free
 site binds. Read as unsigned whole numbers, the bits of such floats have the first rupture as their
 least; read as signed ones, the first binding: whole numbers are compared by vector instructions. A
 free site keeps the threshold of its next bond in its ``birth``.
 
-What happens in a step is done by lists of some hundred events, each list in passes over plain arrays:
-memory and vector instructions then work side by side.
+Events are processed in batches of a few hundred, one array pass per operation, so that memory latency and vector
+arithmetic overlap.
 """
 
 import math
@@ -23,7 +23,7 @@ from sim.numerics.jit import device
 from sim.numerics.noise import PARTS, exponential, fill_words, logarithm
 
 #: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), whether bonds
-#: are asked singly, bound sites, sum of their births, of the births squared, steps done.
+#: are stepped one by one, bound sites, sum of their births, of the births squared, steps done.
 SLIDER, TIME, CLOCK, SENSE, SINGLY, BOUND, SUM, SQUARES, STEPS = range(9)
 COLUMNS = 9
 
@@ -35,13 +35,21 @@ PART = _U(PARTS["bonds"])
 LIVES = 4096  # of one site in one step: a stop for nonsense, since the rule for long steps comes first
 TINY = 2.2250738585072014e-308
 _AT_ONCE = 512  # events in hand from which they are done
-_PIECE = 32  # blocks asked at once, also bits of one number
+_PIECE = 32  # blocks looked at together, also bits of one number
 HANDS = _AT_ONCE + _PIECE * BLOCK + 1  # most events in hand
 
 
 @device
-def least(signed, unsigned, birth, binding, rupture, rear, blocks, count, bounded):
+def views(due, soonest):
+    """A row's due as signed and unsigned whole numbers, and the first binding, first rupture and rearmost of blocks."""
+    whole = soonest.view(np.int64)
+    return due.view(np.int64), due.view(np.uint64), whole[1], soonest.view(np.uint64)[0], soonest[2]
+
+
+@device
+def least(seen, birth, blocks, count, bounded):
     """Take anew the first binding, the first rupture and the rearmost bond of the first ``count`` blocks named."""
+    signed, unsigned, binding, rupture, rear = seen
     for e in range(count):
         first = blocks[e] * _U(BLOCK)
         size = min(BLOCK, np.int64(_U(signed.size) - first))
@@ -70,10 +78,10 @@ def _lowest(bits):
 
 
 @device
-def _find(
-    signed, unsigned, birth, blocks, known, count, clock_bits, time_bits, bounded, cut, breaking, starting, hands
-):
-    """Add the sites of some blocks that break or bind to those in ``hands``, which counts both."""
+def _find(seen, birth, known, count, clock_bits, time_bits, bounded, cut, work, hands):
+    """Add the sites of blocks ``known`` to ``count`` that break or bind to those in ``hands``, which counts both."""
+    signed, unsigned, _, _, _ = seen
+    breaking, starting, blocks = work[0], work[1], work[2]
     breaks, starts = hands[0], hands[1]
     for e in range(known, count):
         first = blocks[e] * _U(BLOCK)
@@ -97,8 +105,9 @@ def _find(
 
 
 @device
-def _break(sites, count, birth, due, life, row, step, seed, member, drawn, words):
+def _break(sites, count, bonds, row, step, address, drawn, words):
     """Break the bonds of the first ``count`` sites, exactly in time; how many bind again in this step, put first."""
+    (birth, due, life), (seed, member) = bonds, address
     x0, t0, clock, first, _, pace, duration, speed, limit, rebinding = step
     for e in range(count):  # fetch all before the first is needed
         i = sites[e]
@@ -134,8 +143,9 @@ def _break(sites, count, birth, due, life, row, step, seed, member, drawn, words
 
 
 @device
-def _bind(sites, count, birth, due, row, step, last_clock, cut, drawn):
+def _bind(sites, count, bonds, row, step, last_clock, cut, drawn):
     """Bind the first ``count`` sites, exactly in place; how many of them break again in this step, put first."""
+    birth, due, _ = bonds
     x0, t0, clock, first, amplitude, pace, _, speed, _, _ = step
     again = 0
     bound, total, squares = 0.0, 0.0, 0.0
@@ -161,14 +171,15 @@ def _bind(sites, count, birth, due, row, step, last_clock, cut, drawn):
 
 
 @device
-def _live_on(breaking, starting, hands, birth, due, life, row, step, last_clock, cut, seed, member, drawn, words):
+def _live_on(work, hands, bonds, row, step, last_clock, cut, address, drawn, words):
     """Break and bind the sites in hand again and again, until the next event of each is in a later step."""
+    breaking, starting = work[0], work[1]
     breaks, starts = hands[0], hands[1]
     for _ in range(LIVES):
-        more = _bind(starting, starts, birth, due, row, step, last_clock, cut, drawn)
+        more = _bind(starting, starts, bonds, row, step, last_clock, cut, drawn)
         for e in range(more):
             breaking[breaks + e] = starting[e]
-        starts = _break(breaking, breaks + more, birth, due, life, row, step, seed, member, drawn, words)
+        starts = _break(breaking, breaks + more, bonds, row, step, address, drawn, words)
         if starts == 0:
             break
         breaks = 0
@@ -176,28 +187,14 @@ def _live_on(breaking, starting, hands, birth, due, life, row, step, last_clock,
 
 
 @device
-def follow(
-    birth,
-    due,
-    signed,
-    unsigned,
-    life,
-    binding,
-    rupture,
-    rear,
-    row,
-    slip,
-    duration,
-    law,
-    seed,
-    member,
-    work,
-    drawn,
-    words,
-    hands,
-):
-    """One step of a row whose bonds all have the sign of the motion; ``slip`` >= 0 along it."""
-    rate, softness, limit, rebinding = law
+def follow(bonds, soonest, row, slip, duration, law, address, space):
+    """One step of a row whose bonds all have the sign of the motion; ``slip`` >= 0 along it.
+
+    ``bonds`` are its births, dues and lives, ``address`` seed and member of its draws, ``space`` arrays to work in.
+    """
+    (birth, due, _), (work, drawn, words, hands), (rate, softness, limit, rebinding) = bonds, space, law
+    seen = views(due, soonest)
+    _, _, binding, rupture, rear = seen
     x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
     amplitude, bell = math.exp(softness * x0), softness * slip
     first, speed = rate * amplitude, slip / duration
@@ -205,7 +202,7 @@ def follow(
     last_clock = clock + first * duration * (math.expm1(bell) / bell if bell > 0.0 else 1.0)
     end, cut = t0 + duration, x0 + slip - limit
     clock_bits, time_bits = np.float64(last_clock).view(np.uint64), np.float64(-end).view(np.int64)
-    breaking, starting, touched = work[0], work[1], work[2]
+    touched = work[2]
     blocks, bounded = rear.size, limit < math.inf
     hands[:], touches = 0, 0
     for piece in range(0, blocks, _PIECE):
@@ -217,14 +214,9 @@ def follow(
             touched[touches] = first + _lowest(hits)
             hits &= hits - 1
             touches += 1
-        _find(
-            signed, unsigned, birth, touched, known, touches, clock_bits, time_bits, bounded, cut,
-            breaking, starting, hands,
-        )  # fmt: skip
+        _find(seen, birth, known, touches, clock_bits, time_bits, bounded, cut, work, hands)
         if touches > 0 and (hands[0] + hands[1] > _AT_ONCE or piece + _PIECE >= blocks):
-            _live_on(
-                breaking, starting, hands, birth, due, life, row, step, last_clock, cut, seed, member, drawn, words
-            )
-            least(signed, unsigned, birth, binding, rupture, rear, touched, touches, bounded)
+            _live_on(work, hands, bonds, row, step, last_clock, cut, address, drawn, words)
+            least(seen, birth, touched, touches, bounded)
             hands[:], touches = 0, 0
     row[SLIDER], row[TIME], row[CLOCK] = x0 + slip, end, last_clock

@@ -1,8 +1,8 @@
-"""The lives of single bonds within one step: the compiled loops behind ``tracks``.
+"""The lives of single bonds within one step: the compiled loops behind ``tracked``.
 
-Where all bonds of a row have the sign of the motion they are left to ``following``. Where the motion
-turns, or a step spans too many Bell forces for the common clock, each bond is asked singly until all
-follow again; its ``due`` is then what is left of its threshold.
+Where all stretches of a row have the sign of the motion ``tracked_events`` steps its bonds together. Where the motion
+turns, or a step spans too many Bell forces for the common clock, each bond is stepped by itself until all stretches
+have the sign of the motion again; its ``due`` is then what is left of its threshold.
 """
 
 import math
@@ -28,16 +28,17 @@ from sim.parts.bonds.tracked_events import (
     TINY,
     follow,
     least,
+    views,
 )
 
-#: What ``live`` has to say: all done, some rows need a draw of the steady law, the state is spent, endless numbers.
+#: Return codes of ``live``: done; some rows must be drawn from the stationary law; state advanced already; not finite.
 DONE, LONG, SPENT, ENDLESS = range(4)
 
 _U = np.uint64
 #: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
 CYCLES = 300.0
 _FAR = 16.0  # Bell forces, cut-off stretches or natural lives after which a frame is set anew
-_LEAP = 24.0  # Bell forces within a step above which bonds are asked singly, lest the clock overflow
+_LEAP = 24.0  # Bell forces within a step above which bonds are stepped one by one, lest the clock overflow
 
 
 @device
@@ -58,9 +59,9 @@ def _cycle(speed, rate, softness, limit, rebinding):
 
 
 @device
-def _ask(birth, due, life, row, slip, duration, law, seed, member):
-    """One step of a row that asks each bond singly, ``slip`` of any sign; True if all stretches now follow it."""
-    rate, softness, limit, rebinding = law
+def _one_by_one(bonds, row, slip, duration, law, address):
+    """One step of a row bond by bond, ``slip`` of any sign; True if all stretches then have the sign of the motion."""
+    (birth, due, life), (seed, member), (rate, softness, limit, rebinding) = bonds, address, law
     x0, t0, speed = row[SLIDER], row[TIME], slip / duration
     bound, total, squares, lowest, highest = 0.0, 0.0, 0.0, math.inf, -math.inf
     for i in range(due.size):
@@ -95,11 +96,13 @@ def _ask(birth, due, life, row, slip, duration, law, seed, member):
 
 
 @device
-def _set(birth, due, soonest, row, softness, bounded, singly, turn):
-    """Set the frame of a row anew at the slider and now, its bonds asked ``singly`` or not, its sense turned or not.
+def _set(bonds, soonest, row, law, singly, turn):
+    """Put the origin of a row's frame at the slider and at the present time, in which the sense may turn.
 
-    Takes the sums and least dues anew, so that roundings do not gather.
+    Its bonds are then stepped one by one, ``singly``, or together. Sums and least dues are taken anew, so that
+    roundings do not gather.
     """
+    (birth, due, _), (_, softness, limit, _) = bonds, law
     x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
     scale = math.exp(-softness * x0)
     sign = -1.0 if turn else 1.0
@@ -120,76 +123,69 @@ def _set(birth, due, soonest, row, softness, bounded, singly, turn):
         squares += x * x
     if not singly:
         soonest[2] = math.inf
-        signed, unsigned = due.view(np.int64), due.view(np.uint64)
-        binding, rupture = soonest.view(np.int64), soonest.view(np.uint64)
         blocks = np.arange(soonest.shape[1]).astype(np.uint64)
-        least(signed, unsigned, birth, binding[1], rupture[0], soonest[2], blocks, blocks.size, bounded)
+        least(views(due, soonest), birth, blocks, blocks.size, limit < math.inf)
     row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
     row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = 1.0 if singly else 0.0, bound, total, squares
 
 
-@kernel(
-    "int64(float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1],"
-    " float64[:], float64, float64, float64, float64, float64, uint64, uint64[:])"
-)
-def live(birth, due, life, soonest, stamp, frame, slip, duration, rate, softness, limit, rebinding, seed, members):
-    """Advance all rows by one step, in place; the worst of what it has to say.
+#: Arrays of ``Tracks``.
+_TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1]))"
 
-    ``frame`` is the new state's own copy. Rows in which a step is longer than some 300 lives of a site
+
+@kernel(f"int64({_TRACKS}, float64[:], float64, float64, float64, float64, float64, uint64, uint64[:])")
+def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members):
+    """Advance all rows by one step, in place; the return code that says most.
+
+    The frame is the new state's own copy. Rows in which a step is longer than some 300 lives of a site
     are left as they are, their count of steps, too; nothing is touched when the state is spent or a
     number endless.
     """
+    birth, due, life, soonest, stamp, frame = tracks
     rows = len(due)
     for m in range(rows):
         if stamp[m] != np.int64(frame[m, STEPS]):
             return SPENT
         if not (math.fabs(slip[m % slip.size]) < math.inf and 0.0 < duration < math.inf):
             return ENDLESS
-    law, said = (rate, softness, limit, rebinding), DONE
-    work, drawn, hands = np.empty((3, HANDS), np.uint64), np.empty((4, HANDS)), np.zeros(2, np.int64)
-    words = np.empty((4, HANDS), np.uint64)
-    signed, unsigned = due.view(np.int64), due.view(np.uint64)
-    binding, rupture = soonest.view(np.int64), soonest.view(np.uint64)
+    law, code = (rate, softness, limit, rebinding), DONE
+    work, words = np.empty((3, HANDS), np.uint64), np.empty((4, HANDS), np.uint64)
+    space = (work, np.empty((4, HANDS)), words, np.zeros(2, np.int64))
     for m in range(rows):
-        row, member, step = frame[m], members[m], slip[m % slip.size]
+        row, step = frame[m], slip[m % slip.size]
+        bonds, address = (birth[m], due[m], life[m]), (seed, members[m])
         if duration > CYCLES * _cycle(step / duration, rate, softness, limit, rebinding):
-            said = LONG
+            code = LONG
             continue
         along = row[SENSE] * step
         single = row[SINGLY] > 0.0
         if not single and (along < 0.0 or softness * along > _LEAP):
-            _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, True, False)
+            _set(bonds, soonest[m], row, law, True, False)
             single = True
-        if single:
-            follows = _ask(birth[m], due[m], life[m], row, along, duration, law, seed, member)
-            if follows:
-                _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, False, along < 0.0)
-        else:
-            follow(
-                birth[m], due[m], signed[m], unsigned[m], life[m], binding[m, 1], rupture[m, 0], soonest[m, 2],
-                row, along, duration, law, seed, member, work, drawn, words, hands,
-            )  # fmt: skip
+        if not single:
+            follow(bonds, soonest[m], row, along, duration, law, address, space)
+        elif _one_by_one(bonds, row, along, duration, law, address):
+            _set(bonds, soonest[m], row, law, False, along < 0.0)
         gone = math.fabs(row[SLIDER])
         if gone * softness > _FAR or gone > _FAR * limit or row[TIME] * rate > _FAR:
-            _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, row[SINGLY] > 0.0, False)
+            _set(bonds, soonest[m], row, law, row[SINGLY] > 0.0, False)
         row[STEPS] += 1.0
         stamp[m] += 1
-    return said
+    return code
 
 
 @kernel(
-    "void(float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1], boolean[:],"
-    " float64[:], float64[:], float64[:], float64, float64, float64, float64, uint64, uint64[:])"
+    f"void({_TRACKS}, boolean[:], float64[:], float64[:], float64[:], float64, float64, float64, float64,"
+    " uint64, uint64[:])"
 )
-def draw(
-    birth, due, life, soonest, stamp, frame, chosen, speed, share, age, rate, softness, limit, rebinding, seed, members
-):
+def draw(tracks, chosen, speed, share, age, rate, softness, limit, rebinding, seed, members):
     """Draw chosen rows anew: a ``share`` of sites bound, their ages by the survival law of a bond of mean life ``age``.
 
     The density of ages S(t)/⟨T⟩ is log-concave with its mode at 0: rejection under
     min(1, e^(1 − t/⟨T⟩))/⟨T⟩ accepts every second proposal (Devroye, Non-Uniform Random Variate
     Generation, 1986, VII.2). Whatever its age, a bond has still an exponential threshold before it.
     """
+    birth, due, life, soonest, stamp, frame = tracks
     for m in range(due.shape[0]):
         if not chosen[m % chosen.size]:
             continue
@@ -214,6 +210,6 @@ def draw(
         row = frame[m]
         row[:STEPS] = 0.0
         row[SENSE], row[SINGLY] = 1.0, 1.0
-        _set(birth[m], due[m], soonest[m], row, softness, limit < math.inf, False, v < 0.0)
+        _set((birth[m], due[m], life[m]), soonest[m], row, (rate, softness, limit, rebinding), False, v < 0.0)
         row[STEPS] += 1.0
         stamp[m] = np.int64(row[STEPS])

@@ -2,5 +2,3 @@
 
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.models import Contact, Equilibrium, RateDependent
-
-__all__ = ["Adhesion", "Contact", "Equilibrium", "RateDependent", "Solid", "Sphere"]

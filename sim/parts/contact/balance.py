@@ -7,6 +7,7 @@ import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
 from sim.parts.contact.control import Bodies
+from sim.parts.exchange import Array
 from sim.spectrum.finite_contact import Margin
 
 
@@ -29,20 +30,20 @@ class Balance(NamedTuple):
         Work of adhesion at rest [J/m²], the unit of G − w in crack-front kinetics.
     """
 
-    bonded: np.ndarray
-    fluctuating: np.ndarray
-    stress: np.ndarray
+    bonded: Array
+    fluctuating: Array
+    stress: Array
     margin: Margin | None
     bodies: Bodies
     reference: float
 
-    def work(self, radius: np.ndarray) -> np.ndarray:
+    def work(self, radius: Array) -> Array:
         """Work of adhesion left at a radius, before the mean stress takes its share [J/m²]."""
         if self.margin is None:
             return self.bonded - self.fluctuating
         return self.bonded - self.fluctuating * self.margin(radius)
 
-    def reversible(self, radius: np.ndarray) -> np.ndarray:
+    def reversible(self, radius: Array) -> Array:
         """Energy per area that the mean stress would give back if the contact shrank [J/m²].
 
         6 τ0² a/(π E*) for an incompressible half-space.
@@ -50,7 +51,7 @@ class Balance(NamedTuple):
         _, modulus, poisson_ratio = self.bodies
         return np.asarray(mean_stress_energy(radius, self.stress, modulus, poisson_ratio))
 
-    def gained(self, radius: np.ndarray, reversible: float) -> np.ndarray:
+    def gained(self, radius: Array, reversible: float) -> Array:
         """Energy that adhesion has given for the area of a contact: ∫ w dA over its radii [J]."""
         share = 1.0 if self.margin is None else self.margin.mean(radius)
         mean = 2.0 / 3.0 * reversible * self.reversible(radius)
@@ -76,14 +77,14 @@ class ContactState(NamedTuple):
         mean stress takes its share (followed only where it does), and with the work left (where the edge lags).
     """
 
-    work: np.ndarray
-    radius: np.ndarray
-    detached: np.ndarray
-    dissipated: np.ndarray
-    whole: np.ndarray
-    bonded: np.ndarray
-    stressless: np.ndarray
-    settled: np.ndarray
+    work: Array
+    radius: Array
+    detached: Array
+    dissipated: Array
+    whole: Array
+    bonded: Array
+    stressless: Array
+    settled: Array
 
 
 #: A contact before its first touch, in touch, and after a pull-off.

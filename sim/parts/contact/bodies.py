@@ -1,7 +1,6 @@
 """What the contact is made of: the solid, the sphere pressed on it, and their adhesion.
 
-Frozen constants of a scene. The formulas that add a second elastic body are those of
-``sim.laws.halfspace.in_series``.
+Frozen constants of a scene.
 """
 
 from functools import cached_property
@@ -11,6 +10,7 @@ from pydantic import model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from sim.laws.halfspace import in_series
 from sim.units.quantity import Quantity
 
 _SHEAR = Quantity("Pa", "shear modulus", "G", above=0)
@@ -87,10 +87,8 @@ class Solid(Body):
         """
         if self.counter_body is None:
             return self.own_shear_modulus, self.poisson_ratio
-        bodies = (self, self.counter_body)
-        inverse = sum(1.0 / body.own_shear_modulus for body in bodies)
-        share = sum(body.poisson_ratio / body.own_shear_modulus for body in bodies)
-        return 1.0 / inverse, share / inverse
+        other = self.counter_body
+        return in_series(self.own_shear_modulus, self.poisson_ratio, other.own_shear_modulus, other.poisson_ratio)
 
     @cached_property
     def contact_modulus(self) -> float:

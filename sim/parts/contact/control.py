@@ -16,6 +16,7 @@ from sim.laws.reversible import (
     radius_at_indentation_reversible,
     radius_at_load_reversible,
 )
+from sim.parts.exchange import Array
 
 
 class Bodies(NamedTuple):
@@ -26,7 +27,7 @@ class Bodies(NamedTuple):
     poisson_ratio: float
 
 
-def elastic_energy(radius: np.ndarray, indentation: np.ndarray, bodies: Bodies) -> np.ndarray:
+def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
     """Elastic energy of a contact of any radius a and indentation δ [J].
 
     ``E* (a δ² − 2 a³ δ/(3R) + a⁵/(5R²))``: its slope over δ is the load, over the area the energy release
@@ -48,42 +49,39 @@ class LoadControl:
         """True if a detached sphere comes back into contact: where the load is not tensile."""
         return self.load >= 0.0
 
-    def radius(self, work: np.ndarray, stress: np.ndarray, reversible: float, bodies: Bodies) -> np.ndarray:
+    def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
         """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
-        size, modulus, poisson_ratio = bodies
         if reversible == 0.0:
-            return np.asarray(jkr.radius_at_load(self.load, work, size, modulus))
-        return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, size, modulus, poisson_ratio))
+            return np.asarray(jkr.radius_at_load(self.load, work, *bodies[:2]))
+        return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, *bodies))
 
-    def release_rate(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def release_rate(self, radius: Array, bodies: Bodies) -> Array:
         """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
         size, modulus, _ = bodies
         missing = 4.0 / 3.0 * modulus * radius**3 / size - self.load
         return np.copysign(jkr.energy_release_rate(radius, self.load, size, modulus), missing)
 
-    def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Load on the sphere [N]; 0 where the contact is open."""
         return np.where(np.isnan(radius), 0.0, self.load)
 
-    def indentation(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def indentation(self, radius: Array, bodies: Bodies) -> Array:
         """Indentation [m]; nan where the contact is open, since a dead load does not place the sphere."""
         return np.asarray(jkr.indentation_under_load(radius, self.load, bodies.sphere_radius, bodies.modulus))
 
-    def displacement(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def displacement(self, radius: Array, bodies: Bodies) -> Array:
         """Displacement of the base [m]: the indentation, without a spring between."""
         return self.indentation(radius, bodies)
 
-    def energy(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
         """Energy of this contact above that of a free sphere that just touches [J]: elastic, of the load, of adhesion.
 
         0 under tension, where it is not defined: the free sphere moves away.
         """
+        if not self.closes:
+            return 0.0 * radius
         indentation = self.indentation(radius, bodies)
-        return (
-            elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
-            if self.closes
-            else 0.0 * radius
-        )
+        return elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
 
 
 @dataclass(frozen=True)
@@ -98,51 +96,38 @@ class DisplacementControl:
         """True if a detached sphere comes back into contact: at a displacement of zero or more."""
         return self.base >= 0.0
 
-    def radius(self, work: np.ndarray, stress: np.ndarray, reversible: float, bodies: Bodies) -> np.ndarray:
+    def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
         """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
-        size, modulus, poisson_ratio = bodies
-        if math.isinf(self.stiffness):
-            if reversible == 0.0:
-                return np.asarray(jkr.radius_at_indentation(self.base, work, size, modulus))
-            law = radius_at_indentation_reversible
-            return np.asarray(law(self.base, work, stress, reversible, size, modulus, poisson_ratio))
+        rigid, held = math.isinf(self.stiffness), (self.base, self.stiffness)
+        if reversible == 0.0 and rigid:
+            return np.asarray(jkr.radius_at_indentation(self.base, work, *bodies[:2]))
         if reversible == 0.0:
-            return np.asarray(jkr.radius_at_displacement(self.base, self.stiffness, work, size, modulus))
-        held = (self.base, self.stiffness)
-        return np.asarray(
-            radius_at_displacement_reversible(*held, work, stress, reversible, size, modulus, poisson_ratio)
-        )
+            return np.asarray(jkr.radius_at_displacement(*held, work, *bodies[:2]))
+        if rigid:
+            return np.asarray(radius_at_indentation_reversible(self.base, work, stress, reversible, *bodies))
+        return np.asarray(radius_at_displacement_reversible(*held, work, stress, reversible, *bodies))
 
-    def release_rate(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def release_rate(self, radius: Array, bodies: Bodies) -> Array:
         """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
-        size, modulus, _ = bodies
-        missing = radius**2 / size - jkr.indentation_under_displacement(
-            radius, self.base, self.stiffness, size, modulus
-        )
-        rate = jkr.energy_release_rate_at_displacement(radius, self.base, self.stiffness, size, modulus)
-        return np.copysign(rate, missing)
+        held = (radius, self.base, self.stiffness, *bodies[:2])
+        missing = radius**2 / bodies.sphere_radius - jkr.indentation_under_displacement(*held)
+        return np.copysign(jkr.energy_release_rate_at_displacement(*held), missing)
 
-    def normal_load(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Load on the sphere [N]; 0 where the contact is open."""
-        size, modulus, _ = bodies
-        if math.isinf(self.stiffness):
-            load = jkr.load_under_indentation(radius, self.base, size, modulus)
-        else:
-            load = jkr.load_under_displacement(radius, self.base, self.stiffness, size, modulus)
+        load = jkr.load_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
         return np.where(np.isnan(radius), 0.0, load)
 
-    def indentation(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def indentation(self, radius: Array, bodies: Bodies) -> Array:
         """Indentation [m]; the displacement of the base where the contact is open and the spring unloaded."""
-        if math.isinf(self.stiffness):
-            return np.full(radius.shape, self.base)
         found = jkr.indentation_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
         return np.where(np.isnan(radius), self.base, found)
 
-    def displacement(self, radius: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def displacement(self, radius: Array, bodies: Bodies) -> Array:
         """Displacement of the base [m]."""
         return np.full(radius.shape, self.base)
 
-    def energy(self, radius: np.ndarray, gained: np.ndarray, bodies: Bodies) -> np.ndarray:
+    def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
         """Energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""
         indentation = self.indentation(radius, bodies)
         spring = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.base - indentation) ** 2

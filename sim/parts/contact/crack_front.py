@@ -25,11 +25,13 @@ slowly than Hertz's contact grows follows it.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from sim.numerics.jit import device, kernel
+from sim.parts.contact.edge_law import ROUNDING, bare_force, edge_speed, excess, hertz_force, hertz_radius, pushed
+from sim.parts.exchange import Array
 
 _S6 = math.sqrt(6.0)
 _C1, _C2 = (4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0
@@ -46,8 +48,10 @@ TOLERANCE = 1e-8
 _TRIES = 3000
 _TOUCH = 1e-11
 _LEAST = 1e-9
-_ROUNDING = 1e-12
 _LONGEST = 0.2
+
+#: The same for all members, or one for each.
+Number = float | Array
 
 
 class Hold(NamedTuple):
@@ -56,67 +60,29 @@ class Hold(NamedTuple):
     ``stiffness`` 0 is a load and an infinite one an indentation, namely ``displacement``.
     """
 
-    load_before: Any = 0.0
-    load_after: Any = 0.0
-    displacement_before: Any = 0.0
-    displacement_after: Any = 0.0
-    stiffness: Any = 0.0
+    load_before: Number = 0.0
+    load_after: Number = 0.0
+    displacement_before: Number = 0.0
+    displacement_after: Number = 0.0
+    stiffness: Number = 0.0
 
 
 class Kinetics(NamedTuple):
     """The law of the edge: G - w = work (v/speed)^exponent where it opens, with numbers of its own where it heals."""
 
-    work: Any
-    speed: Any
-    exponent: Any
-    heal_speed: Any
-    heal_exponent: Any
+    work: Number
+    speed: Number
+    exponent: Number
+    heal_speed: Number
+    heal_exponent: Number
 
 
 class Advance(NamedTuple):
     """Result of a clock step for each member."""
 
-    radius: np.ndarray
-    detached_at: np.ndarray
-    dissipated: np.ndarray
-
-
-@device
-def _excess(t, a, scene):
-    """The missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
-
-    Below Hertz's radius G goes on as -G: nothing else than a monotone continuation for the inner
-    solver, which never ends there.
-    """
-    modulus, curvature, stiffness, load, load_rate, displacement, displacement_rate, work, work_rate, scale = scene
-    if stiffness == math.inf:
-        spring, yielding = 1.0, 0.0
-    else:
-        yielding = 1.0 / (stiffness + 2.0 * modulus * a)
-        spring = stiffness * yielding
-    hertz = a * a * curvature
-    y = spring * (hertz - displacement - displacement_rate * t)
-    y += yielding * (4.0 / 3.0 * modulus * a * hertz - load - load_rate * t)
-    y_a = 2.0 * a * curvature - 2.0 * modulus * yielding * y
-    y_t = -spring * displacement_rate - yielding * load_rate
-    unit = modulus * abs(y) / (2.0 * math.pi * a * scale)
-    s = unit * y - (work + work_rate * t) / scale
-    return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
-
-
-@device
-def _speed(s, front):
-    """da/dt at an excess s, and its slope with s.
-
-    Closer to equilibrium than rounding resolves the law is a straight line, lest its slope end at 0 or infinity.
-    """
-    speed, power = (front[0], front[1]) if s > 0.0 else (front[2], front[3])
-    near = _ROUNDING if power >= 1.0 else 1e3 * _ROUNDING
-    if abs(s) < near:
-        slope = -speed * math.pow(near, power - 1.0)
-        return slope * s, slope
-    rate = -math.copysign(speed * math.pow(abs(s), power), s)
-    return rate, rate * power / s
+    radius: Array
+    detached_at: Array
+    dissipated: Array
 
 
 @device
@@ -128,15 +94,15 @@ def _slope(running, x, y, start, scene, front):
     """
     if running:
         a = start * math.exp(-x)
-        _, s, s_a, s_t = _excess(y, a, scene)
-        rate, bend = _speed(s, front)
+        _, s, s_a, s_t = excess(y, a, scene)
+        rate, bend = edge_speed(s, front)
         if not rate < 0.0:
             return math.nan, 0.0, 0.0, 0.0
         pace = -a / rate
         growth = bend / rate
         return pace, -pace * growth * s_t, pace * (growth * s_a * a - 1.0), s * a * a
-    _, s, s_a, s_t = _excess(x, y, scene)
-    rate, bend = _speed(s, front)
+    _, s, s_a, s_t = excess(x, y, scene)
+    rate, bend = edge_speed(s, front)
     return rate, bend * s_a, bend * s_t, s * y
 
 
@@ -218,83 +184,30 @@ def _radau(running, x, y, h, size, first, start, scene, front):
 
 
 @device
-def _bare_force(t, scene):
-    """Force of the control on a contact of vanishing radius [N]; the indentation [m] if the stiffness is infinite."""
-    _, _, stiffness, load, load_rate, displacement, displacement_rate, _, _, _ = scene
-    if stiffness == math.inf:
-        return displacement + displacement_rate * t
-    return load + load_rate * t + stiffness * (displacement + displacement_rate * t)
-
-
-@device
-def _hertz_force(a, scene):
-    """The bare force that goes with Hertz's contact of radius a."""
-    if scene[2] == math.inf:
-        return a * a * scene[1]
-    return a * a * scene[1] * (scene[2] + 4.0 / 3.0 * scene[0] * a)
-
-
-@device
-def _hertz(t, scene):
-    """Hertz's radius under the control at t; 0 where nothing presses.
-
-    The force grows with the radius and is convex, so Newton's steps from the right go left.
-    """
-    modulus, curvature, stiffness = scene[0], scene[1], scene[2]
-    force = _bare_force(t, scene)
-    if not force > 0.0:
-        return 0.0
-    if stiffness == math.inf:
-        return math.sqrt(force / curvature)
-    a = np.cbrt(0.75 * force / (curvature * modulus))
-    if stiffness > 0.0:
-        a = min(a, math.sqrt(force / (curvature * stiffness)))
-    for _ in range(60):
-        lower = a - (_hertz_force(a, scene) - force) / (a * curvature * (2.0 * stiffness + 4.0 * modulus * a))
-        if not lower < a:
-            break
-        a = lower
-    return a
-
-
-@device
-def _pushed(t, scene, front):
-    """True if Hertz's contact at t grows faster than the edge heals; and its radius."""
-    a = _hertz(t, scene)
-    modulus, curvature, stiffness, _, load_rate, _, displacement_rate, work, work_rate, scale = scene
-    rate, _ = _speed(-(work + work_rate * t) / scale, front)
-    if stiffness == math.inf:
-        indenting = displacement_rate
-    else:
-        indenting = (load_rate + stiffness * displacement_rate) / (stiffness + 2.0 * modulus * a)
-    return rate <= indenting / (2.0 * a * curvature), a
-
-
-@device
 def _ride(t, a, end, least, scene, front):
     """Follow Hertz's contact from t to ``end`` at most, or to where the edge leaves it.
 
     The energy is that of new area against G = 0, int w a da, exact by Gauss's three points since
     work and force are linear in time; none is counted where w <= 0, where pressing pays for the area.
     """
-    riding, b = _pushed(end, scene, front)
+    riding, b = pushed(end, scene, front)
     if not riding:
         low, high = t, end
         for _ in range(60):
             middle = 0.5 * (low + high)
-            riding, _ = _pushed(middle, scene, front)
+            riding, _ = pushed(middle, scene, front)
             low, high = (middle, high) if riding else (low, middle)
         end = high
-        _, b = _pushed(end, scene, front)
+        _, b = pushed(end, scene, front)
     if b <= least and b < a:
-        b, before, after = min(a, least), _bare_force(t, scene), _bare_force(end, scene)
-        end = t + (end - t) * min(max((before - _hertz_force(b, scene)) / (before - after), 0.0), 1.0)
+        b, before, after = min(a, least), bare_force(t, scene), bare_force(end, scene)
+        end = t + (end - t) * min(max((before - hertz_force(b, scene)) / (before - after), 0.0), 1.0)
     energy = 0.0
     if b > a and scene[7] + scene[8] * 0.5 * (t + end) > 0.0:
-        low, span = _hertz_force(a, scene), _hertz_force(b, scene) - _hertz_force(a, scene)
+        low, span = hertz_force(a, scene), hertz_force(b, scene) - hertz_force(a, scene)
         for node, weight in ((-math.sqrt(0.6), 5.0 / 18.0), (0.0, 8.0 / 18.0), (math.sqrt(0.6), 5.0 / 18.0)):
             c = 0.5 * (a + b) + 0.5 * node * (b - a)
-            moment = t + (end - t) * (_hertz_force(c, scene) - low) / span
+            moment = t + (end - t) * (hertz_force(c, scene) - low) / span
             energy += weight * (b - a) * c * max(0.0, scene[7] + scene[8] * moment) / scene[9]
     return end, b, energy
 
@@ -305,25 +218,25 @@ def _fallback(t, a, stop, least, scene, front):
 
     Takes the root nearest to the present radius, bracketed by stepping, then bisected.
     """
-    _, s, _, _ = _excess(stop, a, scene)
-    rate, _ = _speed(s, front)
+    _, s, _, _ = excess(stop, a, scene)
+    rate, _ = edge_speed(s, front)
     factor, low, energy = (0.98 if s > 0.0 else 1.02), a, 0.0
     for _ in range(4000):
         if rate == 0.0 or not low > least:
             break
         high = low * factor
-        _, s, _, _ = _excess(stop, high, scene)
-        f, _ = _speed(s, front)
+        _, s, _, _ = excess(stop, high, scene)
+        f, _ = edge_speed(s, front)
         if (high - a - (stop - t) * f) * rate >= 0.0:
             for _ in range(60):
                 middle = 0.5 * (low + high)
-                _, s, _, _ = _excess(stop, middle, scene)
-                f, _ = _speed(s, front)
+                _, s, _, _ = excess(stop, middle, scene)
+                f, _ = edge_speed(s, front)
                 low, high = (low, middle) if (middle - a - (stop - t) * f) * rate >= 0.0 else (middle, high)
             break
         energy += abs(s * high * (high - low))
         low = high
-    return max(low, _hertz(stop, scene)), energy
+    return max(low, hertz_radius(stop, scene)), energy
 
 
 @device
@@ -365,9 +278,9 @@ def _piece(t, a, stop, least, tries, scene, front):
     was = cross = shy = refused = False
     while t < stop and tries > 0:
         tries -= 1
-        y, s, s_a, s_t = _excess(t, a, scene)
-        rate, bend = _speed(s, front)
-        if y <= _TOUCH * a * a * scene[1] and _pushed(t, scene, front)[0]:
+        y, s, s_a, s_t = excess(t, a, scene)
+        rate, bend = edge_speed(s, front)
+        if y <= _TOUCH * a * a * scene[1] and pushed(t, scene, front)[0]:
             t, a, more = _ride(t, a, min(stop, t + tick), least, scene, front)
             energy, h = energy + more, 0.0
             if a <= least:
@@ -394,13 +307,13 @@ def _piece(t, a, stop, least, tries, scene, front):
         if not running and a1 < min(least, a):
             cross = True
             continue
-        y1, _, _, _ = _excess(t1, a1, scene)
+        y1, _, _, _ = excess(t1, a1, scene)
         edge = _TOUCH * a1 * a1 * scene[1]
         if y1 < -edge and y > edge:
             h *= max(1e-6, y / (y - y1))
             continue
         t, energy, shy = (stop if whole and not running else min(t1, stop)), energy + more, False
-        a = max(a1, _hertz(t, scene)) if y1 < edge else a1
+        a = max(a1, hertz_radius(t, scene)) if y1 < edge else a1
         if running and whole:
             return t, 0.0, energy, tries
         h *= min(8.0, 0.9 * max(error, 1e-12) ** -0.25)
@@ -410,10 +323,10 @@ def _piece(t, a, stop, least, tries, scene, front):
 @device
 def _member(a, duration, least, scene, front):
     """One member over one clock step: radius or nan, time of detachment or nan, dissipated energy."""
-    a = max(a, _hertz(0.0, scene))
+    a = max(a, hertz_radius(0.0, scene))
     if not a > 0.0:
         return math.nan, math.nan, 0.0
-    ends = (_bare_force(0.0, scene), _bare_force(duration, scene))
+    ends = (bare_force(0.0, scene), bare_force(duration, scene))
     first = _zero(scene[7], scene[7] + scene[8] * duration, duration)
     second = _zero(ends[0], ends[1], duration)
     t, energy, tries = 0.0, 0.0, _TRIES
@@ -458,8 +371,8 @@ def _advance(rows, out):
             continue
         per = 1.0 / duration if duration > 0.0 else 0.0
         power, heal_power = 1.0 / exponent, 1.0 / heal_exponent
-        speed = min(speed, a * per * min(_ROUNDING**-power, 1e250))
-        heal_speed = min(heal_speed, a * per * min(_ROUNDING**-heal_power, 1e250))
+        speed = min(speed, a * per * min(ROUNDING**-power, 1e250))
+        heal_speed = min(heal_speed, a * per * min(ROUNDING**-heal_power, 1e250))
         front = speed, power, heal_speed, heal_power
         held = modulus, 1.0 / sphere_radius, stiffness, load0, (load1 - load0) * per
         scene = held + (displacement0, (displacement1 - displacement0) * per, w0, (w1 - w0) * per, scale)

@@ -5,14 +5,16 @@ from collections.abc import Callable
 
 import numpy as np
 
-Surplus = Callable[[np.ndarray], np.ndarray]
+from sim.parts.exchange import Array, Flags
+
+Surplus = Callable[[Array], Array]
 
 #: Places of the walk inwards, its end over its start, and turns that narrow an interval down to rounding.
 _WALK, _NARROWEST, _TURNS = 128, 1e-4, 40
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 
-def widest_crossing(surplus: Surplus, start: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def widest_crossing(surplus: Surplus, start: Array, low: Array) -> tuple[Array, Flags, Flags]:
     """Radius at which ``surplus`` falls to zero, walking inwards from ``start`` to ``low``, each shape (members, 1).
 
     Where the walk meets no crossing, the least surplus along it is searched, lest two crossings lie between two places.
@@ -37,7 +39,7 @@ def widest_crossing(surplus: Surplus, start: np.ndarray, low: np.ndarray) -> tup
     return _narrowed(surplus, inside, outside), np.asarray(closed), crossed[:, :1]
 
 
-def _dip(surplus: Surplus, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _dip(surplus: Surplus, places: Array) -> tuple[Array, Array]:
     """Where along a walk the surplus is least, by golden section, and the place before."""
     least = np.clip(np.argmin(surplus(places), 1), 1, _WALK - 1)[:, None]
     left, right = np.take_along_axis(places, least + 1, 1), np.take_along_axis(places, least - 1, 1)
@@ -49,7 +51,7 @@ def _dip(surplus: Surplus, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return 0.5 * (left + right), before
 
 
-def _narrowed(surplus: Surplus, inside: np.ndarray, outside: np.ndarray) -> np.ndarray:
+def _narrowed(surplus: Surplus, inside: Array, outside: Array) -> Array:
     """Where the surplus crosses zero between two places, to rounding: Ridders's method, element by element."""
     low, high = surplus(inside), surplus(outside)
     for _ in range(_TURNS):

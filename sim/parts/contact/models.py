@@ -19,7 +19,7 @@ from sim.parts.contact.control import Bodies, Control, DisplacementControl, Load
 from sim.parts.contact.crack_front import Hold, Kinetics
 from sim.parts.contact.crack_front import advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
-from sim.parts.exchange import Motion, Setting, Touching
+from sim.parts.exchange import Array, Flags, Motion, Setting, Touching
 from sim.units.course import Piece, Prescribed, held, prescribed
 from sim.units.quantity import Quantity
 
@@ -107,9 +107,7 @@ class _Controlled:
         return self._control(self.course.at(time, duration))
 
     def _control(self, value: float) -> Control:
-        if self.load is not None:
-            return LoadControl(value)
-        return DisplacementControl(value, self.stiffness or math.inf)
+        return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
 
     @property
     def makes_load(self) -> bool:
@@ -121,7 +119,7 @@ class _Controlled:
         """Whether the control changes in time."""
         return self.course.changes
 
-    def equilibrium_radius(self, work: np.ndarray, sphere_radius: float, modulus: float) -> np.ndarray:
+    def equilibrium_radius(self, work: Array, sphere_radius: float, modulus: float) -> Array:
         """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
         return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
 
@@ -135,23 +133,21 @@ class _Controlled:
             self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape), *phases
         )
 
-    def stopped(self, state: Touching) -> np.ndarray:
+    def stopped(self, state: Touching) -> Flags:
         """True where a trajectory has ended, at the pull-off of a contact that stops there."""
         return np.isnan(state.radius) & ~np.isnan(state.detached) & (self.after_pull_off == "stop")
 
-    def reference_radius(self, phase: np.ndarray, work: np.ndarray, control: Control, bodies: Bodies) -> np.ndarray:
+    def reference_radius(self, phase: Array, work: Array, control: Control, bodies: Bodies) -> Array:
         """Radius of a contact in equilibrium with another work of adhesion [m], 0 where it is open."""
         return np.where(phase == CLOSED, control.radius(work, np.zeros(1), 0.0, bodies), 0.0)
 
-    def _references(self, radius: np.ndarray, balance: Balance) -> tuple[np.ndarray, ...]:
+    def _references(self, radius: Array, balance: Balance) -> tuple[Array, ...]:
         """Works of adhesion of the reference contacts [J/m²]; all adhesion for those that are not followed."""
         whole = np.full(1, balance.reference)
         stressless = balance.work(np.nan_to_num(radius)) if self.reversible else whole
         return whole, balance.bonded, stressless, self._left(radius, balance) if self.lags else whole
 
-    def _phases(
-        self, state: ContactState, control: Control, radius: np.ndarray, balance: Balance
-    ) -> tuple[np.ndarray, ...]:
+    def _phases(self, state: ContactState, control: Control, radius: Array, balance: Balance) -> tuple[Array, ...]:
         """Phases of the reference contacts after a step."""
         phases = state.whole, state.bonded, state.stressless, state.settled
         if min(self.course.extremes) >= 0.0:
@@ -165,20 +161,20 @@ class _Controlled:
             for phase, alone in zip(phases, found, strict=True)
         )
 
-    def _touching(self, state: ContactState, control: Control) -> np.ndarray:
+    def _touching(self, state: ContactState, control: Control) -> Flags:
         """True where an open contact closes: at its first touch, or wherever it reattaches."""
         return (
             np.isnan(state.radius) & (np.isnan(state.detached) | (self.after_pull_off == "reattach")) & control.closes
         )
 
-    def _equilibrium(self, control: Control, balance: Balance) -> np.ndarray:
+    def _equilibrium(self, control: Control, balance: Balance) -> Array:
         """Largest stable radius [m], nan without one."""
         bodies, alpha = balance.bodies, self.reversible
         if balance.margin is None:
             return control.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
         return self._on_disc(control, balance)
 
-    def _on_disc(self, control: Control, balance: Balance) -> np.ndarray:
+    def _on_disc(self, control: Control, balance: Balance) -> Array:
         """Widest radius at which the energy release rate falls to the work left: a search inwards, then bisection.
 
         The share of ΔΓ that a disc pays is not convex in its radius, so neither Newton's method nor a fixed-point
@@ -188,19 +184,18 @@ class _Controlled:
         wide = control.radius(balance.bonded + 0.0 * balance.fluctuating, balance.stress, self.reversible, bodies)
         hertz = np.nan_to_num(control.radius(np.zeros(1), np.zeros(1), 0.0, bodies))[:, None]
 
-        def surplus(radius: np.ndarray) -> np.ndarray:
-            column = Balance(
-                balance.bonded[:, None], balance.fluctuating[:, None], balance.stress[:, None], balance.margin,
-                bodies, balance.reference,
-            )  # fmt: skip
+        bonded, fluctuating, stress = (term[:, None] for term in balance[:3])
+        column = balance._replace(bonded=bonded, fluctuating=fluctuating, stress=stress)
+
+        def surplus(radius: Array) -> Array:
             return control.release_rate(radius, bodies) - self._left(radius, column)
 
         found, closed, at_once = widest_crossing(surplus, wide[:, None], hertz)
         edge = np.where(closed, np.maximum(found, hertz), hertz if control.closes else np.nan)
-        edge = np.where(at_once | (balance.fluctuating[:, None] == 0.0), wide[:, None], edge)  # nothing is taken
+        edge = np.where(at_once | (fluctuating == 0.0), wide[:, None], edge)  # nothing is taken
         return np.where(np.isnan(wide), np.nan, edge[:, 0])
 
-    def _left(self, radius: np.ndarray, balance: Balance) -> np.ndarray:
+    def _left(self, radius: Array, balance: Balance) -> Array:
         """Work of adhesion left at a radius; of an open contact that of a vanishing one."""
         if balance.margin is None and self.reversible == 0.0:
             return balance.work(radius)
@@ -273,7 +268,7 @@ class RateDependent(_Controlled):
         return ContactState(self._left(now.radius, balance), now.radius, now.detached, now.dissipated, *phases)
 
     def _moved(
-        self, state: ContactState, piece: Piece, duration: float, works: Sequence[np.ndarray], balance: Balance
+        self, state: ContactState, piece: Piece, duration: float, works: Sequence[Array], balance: Balance
     ) -> ContactState:
         """The contact after a part of a clock step in which control and work change linearly.
 
@@ -301,7 +296,7 @@ class RateDependent(_Controlled):
         detached = np.where(opens, piece.stop - duration + moved.detached_at, state.detached)
         return state._replace(radius=moved.radius, detached=detached, dissipated=state.dissipated + lost)
 
-    def _bears(self, radius: np.ndarray, work: np.ndarray, control: Control, bodies: Bodies) -> np.ndarray:
+    def _bears(self, radius: Array, work: Array, control: Control, bodies: Bodies) -> Flags:
         """True where a load still has an equilibrium below: under tension not at radii below that at pull-off.
 
         The work of the falling load diverges there as the radius vanishes, and is not counted.
@@ -318,9 +313,8 @@ class RateDependent(_Controlled):
         return Hold(displacement_before=piece.first, displacement_after=piece.last, stiffness=stiffness)
 
     def _kinetics(self, balance: Balance) -> Kinetics:
-        heals = self.front_speed if self.heal_speed is None else self.heal_speed
-        exponent = self.front_exponent if self.heal_exponent is None else self.heal_exponent
-        return Kinetics(balance.reference, self.front_speed, self.front_exponent, heals, exponent)
+        speed, exponent = self.front_speed, self.front_exponent
+        return Kinetics(balance.reference, speed, exponent, self.heal_speed or speed, self.heal_exponent or exponent)
 
 
 def _spot(balance: Balance) -> float:

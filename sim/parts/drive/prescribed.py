@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.parts.exchange import Motion, Resistance, Setting, Times
+from sim.parts.exchange import Array, Motion, Resistance, Setting, Times
 from sim.units.course import Course, Number, Piece, table_pieces
 from sim.units.course import Table as Rows
 from sim.units.quantity import Quantity
@@ -22,8 +22,8 @@ _SPEED = Quantity("m/s", "sliding speed", "V")
 class Slider(NamedTuple):
     """State of a prescribed drive: displacement since the start [m] and speed [m/s]."""
 
-    position: np.ndarray
-    speed: np.ndarray
+    position: Array
+    speed: Array
 
 
 class _Sliding:

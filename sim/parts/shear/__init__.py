@@ -3,18 +3,3 @@
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.modal import FixedProcess, MappedProcess, ModalProcess
 from sim.parts.shear.models import Auto, Banded, Mapped, Mean, Modal, Model, Shear, Uniform
-
-__all__ = [
-    "Auto",
-    "Banded",
-    "BandedProcess",
-    "FixedProcess",
-    "Mapped",
-    "MappedProcess",
-    "Mean",
-    "Modal",
-    "ModalProcess",
-    "Model",
-    "Shear",
-    "Uniform",
-]

@@ -6,6 +6,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from sim.parts.exchange import Array
 from sim.units.quantity import Quantity
 
 Relaxing = Annotated[bool, Field(description="true: only what the correlation renews has the new size")]
@@ -20,7 +21,7 @@ class Constant:
 
     model: Literal["constant"] = "constant"
 
-    def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
+    def factor(self, speed: Array, stress: Array) -> Array:
         """g [1] at the speed [m/s] and mean shear stress [Pa], shape of the argument it reads."""
         return np.ones(1)
 
@@ -42,7 +43,7 @@ class Onset:
     relaxing: Relaxing = False
     model: Literal["onset"] = "onset"
 
-    def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
+    def factor(self, speed: Array, stress: Array) -> Array:
         with np.errstate(divide="ignore", over="ignore"):
             rise = 1.0 / (1.0 + (np.abs(speed) / self.speed) ** (-1.0 / self.width))
         return self.floor + (1.0 - self.floor) * rise
@@ -60,7 +61,7 @@ class Stress:
     relaxing: Relaxing = False
     model: Literal["stress"] = "stress"
 
-    def factor(self, speed: np.ndarray, stress: np.ndarray) -> np.ndarray:
+    def factor(self, speed: Array, stress: Array) -> Array:
         return np.abs(stress) / self.reference
 
 

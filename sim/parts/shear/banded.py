@@ -8,15 +8,15 @@ import numpy as np
 
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Gammas
+from sim.parts.exchange import Array, Gammas
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.bands import Bands
 from sim.parts.shear.correlation import Correlation
-from sim.parts.shear.process import Fluctuation, _Renewing
+from sim.parts.shear.process import Renewing
 
 
 @dataclass(frozen=True)
-class BandedProcess(_Renewing):
+class BandedProcess(Renewing):
     """ΔΓ as a sum of squared Ornstein-Uhlenbeck processes, one for each band of modes.
 
     Notes
@@ -38,48 +38,32 @@ class BandedProcess(_Renewing):
         return (self.bands.weight.size + 1) // 2
 
     @cached_property
-    def half_weight(self) -> np.ndarray:
+    def half_weight(self) -> Array:
         """Energy of a band for X = 1, shape (bands,) [J/m^2]."""
         return 0.5 * self.bands.weight
 
     @cached_property
-    def shapes(self) -> np.ndarray:
+    def shapes(self) -> Array:
         """Shapes of the gamma numbers, shape (bands,)."""
         return 0.5 * (self.bands.freedom - 1.0)
 
-    @property
-    def wavenumber(self) -> np.ndarray:
+    @cached_property
+    def wavenumber(self) -> Array:  # type: ignore[override]
         """Where a mode has each band's rate [rad/m]."""
         return self.bands.wavenumber
 
-    def _empty(self, members: int) -> np.ndarray:
+    def _empty(self, members: int) -> Array:
         return np.zeros((members, self.bands.weight.size))
 
-    def _renewed(
-        self,
-        values: np.ndarray,
-        keep: np.ndarray,
-        renew: np.ndarray,
-        size: np.ndarray,
-        amplitude: np.ndarray,
-        step: int,
-        noise: Noise,
-    ) -> Fluctuation:
+    def _renew(
+        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
+    ) -> tuple[Array, Array]:
         members, bands = values.shape
         after, energy = np.empty_like(values), np.empty(members)
-        _renew_bands(
-            values,
-            noise.normals(step, bands),
-            noise.gammas(step, self.shapes),
-            np.full(bands, keep),
-            np.full(bands, renew),
-            np.full(members, size),
-            self.half_weight,
-            after,
-            energy,
-        )
-        scale = np.ones(1) if self.amplitude.relaxing else amplitude
-        return Fluctuation(scale**2 * energy, amplitude, after)
+        drawn = noise.normals(step, bands), noise.gammas(step, self.shapes)
+        shares = np.full(bands, keep), np.full(bands, renew), np.full(members, size)
+        _renew_bands(values, *drawn, *shares, self.half_weight, after, energy)
+        return energy, after
 
     @property
     def gammas(self) -> Gammas:

@@ -13,11 +13,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from sim.parts.exchange import Array, Indices
 from sim.parts.shear.mode_pairs import Pairs
-
-Array = NDArray[np.float64]
 
 #: Lags at which the autocorrelation of bands is compared.
 _LAGS = 120
@@ -156,14 +154,14 @@ class _Scaled:
 class _Candidate:
     """A band with its share of the errors, and what its best cut in two would gain."""
 
-    entries: NDArray[np.int64]
+    entries: Indices
     score: float
     gain: float
     along: str
     first: int
 
     @classmethod
-    def of(cls, scaled: _Scaled, entries: NDArray[np.int64], tolerance: float) -> "_Candidate":
+    def of(cls, scaled: _Scaled, entries: Indices, tolerance: float) -> "_Candidate":
         moments = scaled.moments[:, entries]
         sums = moments.sum(axis=1)
         score = max(float(scaled.score(sums, tolerance)), 0.0)
@@ -182,13 +180,13 @@ class _Candidate:
             best = max(best, (score - float(left[at]), along, int(cuts[at]) + 1))
         return cls(entries, score, *best)
 
-    def parts(self, scaled: _Scaled) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def parts(self, scaled: _Scaled) -> tuple[Indices, Indices]:
         """The entries on either side of the best cut."""
         order = np.argsort(getattr(scaled, self.along)[self.entries], kind="stable")
         return self.entries[order[: self.first]], self.entries[order[self.first :]]
 
 
-def _merged(scaled: _Scaled, groups: list[NDArray[np.int64]], pairs: Pairs, power: int) -> Bands:
+def _merged(scaled: _Scaled, groups: list[Indices], pairs: Pairs, power: int) -> Bands:
     sums = np.stack([scaled.moments[:, entries].sum(axis=1) for entries in groups], axis=1)
     s1, s2, _, _, by_rate, *_ = sums
     rate = by_rate / s2

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Bonding, Motion
+from sim.parts.exchange import Array, Bonding, Motion
 from sim.parts.shear.modal import DrawsMaps, ModalProcess
 from sim.parts.shear.process import Fluctuation, SmoothProcess
 
@@ -32,18 +32,15 @@ class SiteModes(ModalProcess):
     """
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        pairs = len(self.wavenumber)
-        parts = noise.normals(motion.step, 4 * pairs).reshape(-1, 4, pairs).copy()
-        return self._sized(parts, bonding)
+        return self._sized(noise.normals(motion.step, 4 * self.pairs).reshape(-1, 4, self.pairs).copy(), bonding)
 
     def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        exponents, pairs = self.correlation.exponents(self.wavenumber, motion), len(self.wavenumber)
-        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-        fresh = noise.normals(motion.step, 2 * pairs).reshape(-1, 2, pairs)
+        keep, renew = self._shares(motion)
+        fresh = noise.normals(motion.step, 2 * self.pairs).reshape(-1, 2, self.pairs)
         parts = np.concatenate([state.values[:, :2], keep * state.values[:, 2:] + renew * fresh], axis=1)
         return self._sized(parts, bonding)
 
-    def _sized(self, parts: np.ndarray, bonding: Bonding) -> Fluctuation:
+    def _sized(self, parts: Array, bonding: Bonding) -> Fluctuation:
         """The state of these parts; ``amplitude`` holds the sizes of both, shape (2, 1) or (2, members)."""
         sizes = np.sqrt(np.stack([bonding.frozen, bonding.varying]))
         sizes[0] *= np.where(bonding.stress < 0.0, -1.0, 1.0)
@@ -51,12 +48,12 @@ class SiteModes(ModalProcess):
         energy = np.sum(self.weights * np.sum(np.square(field), axis=1), axis=1)
         return Fluctuation(energy, sizes.T, parts)
 
-    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
+    def complex_amplitudes(self, state: Fluctuation) -> Array:
         field = _combined(state.values, state.amplitude.T)
         return 0.5 * self.deviation * (field[:, 0] + 1j * field[:, 1])
 
 
-def _combined(parts: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+def _combined(parts: Array, sizes: Array) -> Array:
     """The field of both parts at their sizes (2, members), shape (members, 2, pairs)."""
     frozen, varying = sizes[:, :, np.newaxis, np.newaxis]
     return frozen * parts[:, :2] + varying * parts[:, 2:]

@@ -8,15 +8,15 @@ import numpy as np
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Bonding, Gammas, Motion
+from sim.parts.exchange import Array, Bonding, Gammas, Indices, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modes import Modes
-from sim.parts.shear.process import Fluctuation, _Renewing
+from sim.parts.shear.process import Fluctuation, Renewing
 
 
 @dataclass(frozen=True)
-class ModalProcess(_Renewing):
+class ModalProcess(Renewing):
     """Every Fourier mode of the cell as a complex Ornstein-Uhlenbeck process.
 
     Notes
@@ -31,8 +31,6 @@ class ModalProcess(_Renewing):
     modes: Modes
     shear_modulus: float
     poisson_ratio: float
-    infinite_energy: float
-    infinite_variance: float
     correlation: Correlation
     amplitude: Amplitude
 
@@ -42,49 +40,33 @@ class ModalProcess(_Renewing):
         return self.modes.qx.size
 
     @cached_property
-    def weights(self) -> np.ndarray:
+    def weights(self) -> Array:
         """Energy of each pair for a unit normal in each component, shape (pairs,) [J/m^2]."""
         return 0.5 * self.modes.energies(self.shear_modulus, self.poisson_ratio)
 
     @cached_property
-    def deviation(self) -> np.ndarray:
+    def deviation(self) -> Array:
         """Standard deviation of the stress of each pair, shape (pairs,) [Pa]."""
         return np.sqrt(self.modes.variance)
 
     @cached_property
-    def wavenumber(self) -> np.ndarray:
+    def wavenumber(self) -> Array:  # type: ignore[override]
         """\\|q\\| of each pair [rad/m]."""
         return np.hypot(self.modes.qx, self.modes.qy)
 
-    def _empty(self, members: int) -> np.ndarray:
+    def _empty(self, members: int) -> Array:
         return np.zeros((members, 2, self.pairs))
 
-    def _renewed(
-        self,
-        values: np.ndarray,
-        keep: np.ndarray,
-        renew: np.ndarray,
-        size: np.ndarray,
-        amplitude: np.ndarray,
-        step: int,
-        noise: Noise,
-    ) -> Fluctuation:
+    def _renew(
+        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
+    ) -> tuple[Array, Array]:
         members, _, pairs = values.shape
         after, energy = np.empty_like(values), np.empty(members)
-        _renew(
-            values,
-            noise.normals(step, 2 * pairs),
-            np.full(pairs, keep),
-            np.full(pairs, renew),
-            np.full(members, size),
-            self.weights,
-            after,
-            energy,
-        )
-        scale = np.ones(1) if self.amplitude.relaxing else amplitude
-        return Fluctuation(scale**2 * energy, amplitude, after)
+        shares = np.full(pairs, keep), np.full(pairs, renew), np.full(members, size)
+        _renew_modes(values, noise.normals(step, 2 * pairs), *shares, self.weights, after, energy)
+        return energy, after
 
-    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
+    def complex_amplitudes(self, state: Fluctuation) -> Array:
         """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
         scale = np.ones(1) if self.amplitude.relaxing else state.amplitude
         size = 0.5 * scale[:, np.newaxis] * self.deviation
@@ -121,10 +103,10 @@ class FixedProcess(ModalProcess):
         phases = state.values + turn * noise.normals(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(amplitude), amplitude, phases)
 
-    def _energy(self, amplitude: np.ndarray) -> np.ndarray:
+    def _energy(self, amplitude: Array) -> Array:
         return amplitude**2 * (2.0 * np.sum(self.weights))
 
-    def complex_amplitudes(self, state: Fluctuation) -> np.ndarray:
+    def complex_amplitudes(self, state: Fluctuation) -> Array:
         size = np.sqrt(0.5) * state.amplitude[:, np.newaxis] * self.deviation
         return size * np.exp(1j * state.values)
 
@@ -141,7 +123,7 @@ class FixedProcess(ModalProcess):
     "void(float64[:,:,::1], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
     " float64[:,:,::1], float64[::1])"
 )
-def _renew(before, normals, keep, renew, size, weights, after, energy):
+def _renew_modes(before, normals, keep, renew, size, weights, after, energy):
     """One Ornstein-Uhlenbeck step of all modes of all members, and the energy by Parseval.
 
     Two passes, so that the compiler can use vector instructions in the first; the sum of the second
@@ -177,7 +159,7 @@ class DrawsMaps:
 
     modes: Modes
 
-    def maps(self, state: Fluctuation, position: np.ndarray, members: int) -> np.ndarray:
+    def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
         """Stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
 
         The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
@@ -202,7 +184,7 @@ class DrawsMaps:
         return Grid(self.modes.cell, self.modes.points)
 
     @cached_property
-    def _places(self) -> np.ndarray:
+    def _places(self) -> Indices:
         """Where each pair stands in the flattened half spectrum."""
         return self.modes.ix % self.grid.points * (self.grid.points // 2 + 1) + self.modes.iy
 

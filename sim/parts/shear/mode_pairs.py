@@ -9,13 +9,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.laws.halfspace import compliance
-from sim.parts.shear.modes import Indices, grid_reach, half_lattice, modes
+from sim.parts.exchange import Array, Indices
+from sim.parts.shear.modes import grid_reach, half_lattice, modes
 from sim.spectrum.family import Family
-
-Array = NDArray[np.float64]
 
 #: Squares handled at a time.
 _SQUARES = 2**18

@@ -244,8 +244,6 @@ class Modal(_Fluctuating):
             modes(self.spectrum, self.side(cell), self.points),
             shear_modulus,
             poisson_ratio,
-            float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)),
-            float(self.spectrum.variance),
             self.correlation,
             self.amplitude,
         )

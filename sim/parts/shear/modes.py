@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 from pydantic_core import PydanticCustomError
 
 from sim.laws.halfspace import compliance
+from sim.parts.exchange import Array, Indices
 from sim.spectrum.family import Family
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Pairs below this share of the variance are left out: all of them together would not change a bit.
 _NEGLIGIBLE = 1e-22

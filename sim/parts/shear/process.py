@@ -4,12 +4,12 @@ A process is a model of ``parts.shear`` on a given solid and cell.
 """
 
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Bonding, Gammas, Motion
+from sim.parts.exchange import Array, Bonding, Gammas, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 
@@ -28,9 +28,9 @@ class Fluctuation(NamedTuple):
         standard deviation, or phases (members, pairs) [rad]; empty where there are none.
     """
 
-    energy: np.ndarray
-    amplitude: np.ndarray
-    values: np.ndarray
+    energy: Array
+    amplitude: Array
+    values: Array
 
 
 @dataclass(frozen=True)
@@ -58,32 +58,48 @@ class SmoothProcess:
         return {}
 
 
-class _Renewing:
-    """What processes share that renew part of themselves at each step: the start is a whole renewal."""
+class Renewing:
+    """Attributes of processes that renew part of themselves at each step: the start is a whole renewal."""
 
     correlation: Correlation
     amplitude: Amplitude
-    wavenumber: Any
-    _empty: Any
-    _renewed: Any
+    #: Where a mode has the rate of each number of the state [rad/m].
+    wavenumber: Array
     state_class: ClassVar[type[Fluctuation]] = Fluctuation
+
+    def _empty(self, members: int) -> Array:
+        """Numbers of a state without any fluctuation."""
+        raise NotImplementedError
+
+    def _renew(
+        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
+    ) -> tuple[Array, Array]:
+        """Energy and numbers after a step that keeps a share of the numbers and renews the rest at a size."""
+        raise NotImplementedError
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         size = amplitude if self.amplitude.relaxing else np.ones(1)
-        return self._renewed(
-            self._empty(len(noise.members)), np.zeros(1), np.ones(1), size, amplitude, motion.step, noise
-        )
+        empty = self._empty(len(noise.members))
+        return self._scaled(amplitude, *self._renew(empty, np.zeros(1), np.ones(1), size, motion.step, noise))
 
     def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         size = _renewed_size(self.amplitude, state, motion, amplitude)
+        return self._scaled(amplitude, *self._renew(state.values, *self._shares(motion), size, motion.step, noise))
+
+    def _shares(self, motion: Motion) -> tuple[Array, Array]:
+        """Shares of a number that a step keeps and renews, whose squares add up to one."""
         exponents = self.correlation.exponents(self.wavenumber, motion)
-        keep, renew = np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-        return self._renewed(state.values, keep, renew, size, amplitude, motion.step, noise)
+        return np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
+
+    def _scaled(self, amplitude: Array, energy: Array, values: Array) -> Fluctuation:
+        """The state of these numbers, their energy scaled at once unless the amplitude relaxes."""
+        scale = np.ones(1) if self.amplitude.relaxing else amplitude
+        return Fluctuation(scale**2 * energy, amplitude, values)
 
 
-def _renewed_size(law: Amplitude, state: Fluctuation, motion: Motion, amplitude: np.ndarray) -> np.ndarray:
+def _renewed_size(law: Amplitude, state: Fluctuation, motion: Motion, amplitude: Array) -> Array:
     """Amplitude of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
 
     Second order in the step. Its beginning is seen after a jump of the speed; stress has no jumps

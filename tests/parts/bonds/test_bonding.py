@@ -1,5 +1,7 @@
 """What all bonds hand on: the sign of the friction, its slope over slip, and states that stay good."""
 
+from copy import deepcopy
+
 import numpy as np
 import pytest
 from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, scene
@@ -105,7 +107,7 @@ def test_the_stiffness_is_the_slope_of_the_stress_over_slip_at_frozen_time(name,
     part, slip = scenario.population, np.array([np.copysign(1e-10, speed)])
     motion = Motion(41, 41e-3, 1e-18, slip, np.abs(slip), slip / 1e-18, slip / 1e-18)
     after = part.bonding(
-        part.advance(part.copied(state.bonds), motion, state.contact.radius, Noise(5, "bonds", np.arange(3)))
+        part.advance(deepcopy(state.bonds), motion, state.contact.radius, Noise(5, "bonds", np.arange(3)))
     )
     slope = (after.stress - state.bonding.stress) / slip
     assert_allclose(np.broadcast_to(state.bonding.stiffness, slope.shape), slope, rtol=3e-5)

@@ -11,10 +11,12 @@ from numpy.testing import assert_allclose
 from sim.engine import march
 from sim.ensemble.recorded import VARIABLES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
+from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.area import share_kept
 from sim.parts.bonds.rupture import Constant
 from sim.parts.drive import prescribed as drive
+from sim.parts.exchange import Motion
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Time
 from sim.scenario.clock import Clock
@@ -178,23 +180,30 @@ CARRIED = {
 }
 
 
+def over(part, state, radius):
+    """The population over a contact of this radius, no time passing."""
+    still = np.zeros(1)
+    motion = Motion(1, 0.0, 0.0, still, still, still, still)
+    return part.advance(state, motion, np.array([radius]), Noise(5, "bonds", np.arange(1)))
+
+
 @pytest.mark.parametrize("name", CARRIED)
 def test_amplitude_dilutes_bonds_and_shrinkage_takes_them_along(name):
     part = CARRIED[name]
     _, state = last(1, steps=1, bonds=part, drive=drive.Steady(speed=1e-3))
     full, stress, *_ = state.bonding
-    held = part.over(state.bonds, np.array([1e-4]))
+    held = over(part, state.bonds, 1e-4)
     before = part.bonding(held).fraction
     for radius in (1.1e-4, 1.7e-4, 1.7e-4, 5e-4):
-        held = part.over(held, np.array([radius]))
+        held = over(part, held, radius)
         diluted = part.bonding(held)
         assert_allclose(diluted.fraction * radius**2, before * 1e-8, rtol=1e-14)  # n A phi
         assert_allclose(diluted.stress / stress, diluted.fraction / full, rtol=1e-14)
-    shrunk = part.over(held, np.array([2e-4]))
+    shrunk = over(part, held, 2e-4)
     assert np.array_equal(part.bonding(shrunk).fraction, diluted.fraction)
-    opened = part.over(shrunk, np.array([np.nan]))
+    opened = over(part, shrunk, np.nan)
     assert part.bonding(opened).fraction == 0.0  # an open contact has no bonds
-    assert part.bonding(part.over(opened, np.array([1e-4]))).fraction == 0.0
+    assert part.bonding(over(part, opened, 1e-4)).fraction == 0.0
 
 
 def test_the_share_that_amplitude_keeps_is_that_of_the_areas():

@@ -88,18 +88,21 @@ def test_every_rupture_keeps_its_steady_law(name):
     exact = moments(law, speed, 1.0)
     tracks = begin(law, 10_000, 10, speed)
     has_the_law(tracks, exact)
+    first = tracks.life.copy()
     for _ in range(30):
         tracks = go(tracks, speed * 0.1, 0.1, law)
     has_the_law(tracks, exact)
+    assert np.mean(tracks.life > first) > 0.5  # of the sites, other bonds than those drawn at the start
 
 
-def test_bonds_that_only_a_stretch_breaks_give_the_steady_law_of_the_shallow_depth():
+def test_bonds_that_only_a_stretch_breaks_give_the_steady_law_of_the_simpler_model():
     law, speed, rebinding = RuptureRate(0.0, 0.0, 2.0), 3.0, 0.5
     fraction = 1.0 / (1.0 + speed / (2.0 * rebinding))
     tracks = begin(law, 10_000, 10, speed, rebinding=rebinding)
     for _ in range(50):
         tracks = go(tracks, 0.3, 0.1, law, rebinding)
     has_the_law(tracks, [fraction, fraction, fraction * 4 / 3, fraction * 16 / 5])
+    assert 1.99 < np.nanmax(stretches(tracks)) <= 2.0  # up to the limit, all stretches are equally many
 
 
 def test_the_number_bound_is_binomial_and_the_force_has_the_sum_of_the_sites_variances():
@@ -303,6 +306,7 @@ def test_the_words_of_a_life_are_philoxs_at_its_address():
 def test_a_bell_force_beyond_all_stretches_makes_the_rupture_constant():
     soft = ramp(RuptureRate(1.0, 1e-12, math.inf), 1, FORWARD)
     same_lives(soft, ramp(CONSTANT, 1, FORWARD), scale=1.0)
+    assert not np.array_equal(soft[-1][2], ramp(BELL, 1, FORWARD)[-1][2])  # whose lives are others
 
 
 @pytest.mark.parametrize("duration", [500.0, 1e6, 1e300])

@@ -176,9 +176,10 @@ def random_contact(rng, kind, reversible):
 @pytest.mark.parametrize("reversible", [0.0, 0.3])
 @pytest.mark.parametrize("margin", [None, Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)], ids=["plane", "disc"])
 @pytest.mark.parametrize("kind", ["load", "indentation", "displacement"])
-def test_no_contact_is_smaller_than_hertz_and_each_balances(kind, margin, reversible):
+@pytest.mark.parametrize("contacts", [15, pytest.param(60, marks=pytest.mark.verify)])
+def test_no_contact_is_smaller_than_hertz_and_each_balances(contacts, kind, margin, reversible):
     rng = np.random.default_rng(11)
-    for _ in range(15):
+    for _ in range(contacts):
         contact, balance = random_contact(rng, kind, reversible), random_balance(rng, 40, margin)
         control = contact.control(0.0, 1.0)
         a = contact._equilibrium(control, balance)
@@ -197,13 +198,14 @@ def test_no_contact_is_smaller_than_hertz_and_each_balances(kind, margin, revers
 
 
 @pytest.mark.parametrize("kind", ["load", "indentation", "displacement"])
-def test_the_contact_on_a_disc_is_the_widest_that_balances(kind):
+@pytest.mark.parametrize("contacts", [8, pytest.param(20, marks=pytest.mark.verify)])
+def test_the_contact_on_a_disc_is_the_widest_that_balances(contacts, kind):
     # a walk from the right over 4000 places of the surplus G - w(a), G below Hertz's radius counted negative
     rng = np.random.default_rng(13)
     margin = Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)
     places = np.geomspace(4.0, 1e-3, 4000)[:, None]
     wrong = 0
-    for _ in range(8):
+    for _ in range(contacts):
         contact, balance = random_contact(rng, kind, 0.0), random_balance(rng, 30, margin)
         control = contact.control(0.0, 1.0)
         a = contact._equilibrium(control, balance)

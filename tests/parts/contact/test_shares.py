@@ -219,7 +219,8 @@ def test_a_moved_sphere_with_all_its_adhesion_loses_nothing(control):
 
 
 @pytest.mark.parametrize("control", MOVED)
-def test_shares_of_a_moved_sphere_are_those_at_its_present_place(control):
+@pytest.mark.parametrize("records", [(0, 10, 17), pytest.param((0, 3, 10, 17, 20), marks=pytest.mark.verify)])
+def test_shares_of_a_moved_sphere_are_those_at_its_present_place(records, control):
     """Each record of a course is the same as a run at its value: the parts react at once."""
     parts = {"bonds": bonds.Steady(critical_speed=1e-2), "drive": drive.Steady(speed=3e-3)}
     parts["shear"] = shear.Mean(spectrum=Band(rms=60e3, longest=60e-6, shortest=24e-6))
@@ -228,7 +229,7 @@ def test_shares_of_a_moved_sphere_are_those_at_its_present_place(control):
     moved = analysis.share_observables(dataset)
     kind = next(name for name in ("load", "indentation", "displacement") if name in MOVED[control])
     held = MOVED[control] | {kind: [moving.course.at(t, 0.4) for t in dataset["t"].to_numpy()]}
-    for at in (0, 10, 17):
+    for at in records:
         still = run(scene(contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts))
         lost = analysis.share_observables(still)
         for name in ("lost_to_bonds", "lost_to_fluctuations"):

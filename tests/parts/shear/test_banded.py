@@ -122,8 +122,8 @@ def test_the_inverted_characteristic_function_is_the_hypoexponential_law():
     ("name", "tolerance"),
     some(list(itertools.product(SPECTRA, (0.1, 0.01))), *((name, 0.01) for name in SPECTRA), ("band", 0.1)),
 )
-def test_stationary_draws_follow_the_law_of_all_modes(name, tolerance):
-    draws = 20_000
+@pytest.mark.parametrize("draws", [20_000, pytest.param(100_000, marks=pytest.mark.verify)])
+def test_stationary_draws_follow_the_law_of_all_modes(draws, name, tolerance):
     process, weights, _ = process_of(name, tolerance=tolerance)
     exact, banded = law_of(weights), law_of(process.bands.weight, 0.5 * process.bands.freedom)
     changed = np.max(np.abs(banded(banded.x) - exact(banded.x)))
@@ -145,13 +145,14 @@ def test_one_ripple_is_exponentially_distributed():
 
 
 @pytest.mark.parametrize("name", ["band", "self-affine"])
-def test_the_law_is_the_same_after_many_steps(name):
+@pytest.mark.parametrize("steps", [1000, pytest.param(4000, marks=pytest.mark.verify)])
+def test_the_law_is_the_same_after_many_steps(steps, name):
     waves = 1.0
     process, weights, wavenumbers = process_of(name, Wave(waves=waves))
     path = 0.3 * 2.0 * np.pi * waves / wavenumbers.min()  # the slowest keeps e^-0.6 of its energy's deviation
     noise = Noise(8, "shear", np.arange(MEMBERS))
     state, sample = process.start(moved(0), UNLOADED, noise), []
-    for step in range(1, 1001):
+    for step in range(1, steps + 1):
         state = process.advance(state, moved(step, path), UNLOADED, noise)
         if step % 16 == 0:  # by then e^-9.6 of it: the draws count as independent
             sample.append(state.energy)

@@ -32,9 +32,8 @@ def bonding(mean, spread):
 
 
 def process(kind=SiteModes, poisson_ratio=0.5):
-    energy = SPECTRUM.surface_energy(G, poisson_ratio)
     lattice = modes(SPECTRUM, CELL, POINTS)
-    return kind(lattice, G, poisson_ratio, energy, SPECTRUM.variance, Time(time=1.0), Constant())
+    return kind(lattice, G, poisson_ratio, Time(time=1.0), Constant())
 
 
 @pytest.mark.parametrize("poisson_ratio", [0.5, 0.3])
