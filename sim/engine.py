@@ -1,4 +1,4 @@
-"""The engine: in which order the parts act in one step. It knows no physics of its own.
+"""The engine: in which order the parts act in one step; it holds no physics of its own.
 
 drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(fraction) − χ ΔΓ → contact → radius.
 """

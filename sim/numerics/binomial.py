@@ -196,7 +196,7 @@ def _tails(k, n, p, here, work):
 
 @device
 def _expansion(z, n, p):
-    """Where F continued between whole numbers, less 1/2, reaches the normal distribution function at z.
+    """Place at which F continued between whole numbers, less 1/2, is the normal distribution function at z.
 
     Cornish & Fisher's expansion to the sixth cumulant. That of a lattice with its continuity correction is
     that of a smooth law whose even cumulants are less by those of a uniform number in (−1/2, 1/2).

@@ -5,8 +5,8 @@ is x (the sliding direction), axis -1 is y, axes before them are members or time
 ``f(q) = integral of f(x) exp(-i q.x) d2x`` and back ``f(x) = (1/2pi)^2 integral of f(q)
 exp(i q.x) d2q``; on the cell the second integral is the sum over its lattice of wavevectors divided
 by the cell's area. Fields are real, so only the half with qy >= 0 is kept (a *half spectrum*, array
-(..., points, points//2 + 1)); ``multiplicity`` says how many wavevectors each of its columns stands
-for.
+(..., points, points//2 + 1)); ``multiplicity`` is the number of wavevectors that each of its columns
+stands for.
 """
 
 import math

@@ -163,14 +163,14 @@ class Gammas(NamedTuple):
 
 
 class Resistance(NamedTuple):
-    """What a drive that feeds back feels of the contact: friction force [N], its tangent and k_t [N/m]."""
+    """Resistance of the contact to a drive that feeds back: friction force [N], its tangent and k_t [N/m]."""
 
     force: Array
     tangent: Array
     contact_stiffness: Array
 
 
-#: A drive that prescribes the motion feels nothing.
+#: For drives that prescribe the motion.
 NO_RESISTANCE = Resistance(_NONE, _NONE, _NONE)
 
 
@@ -194,40 +194,33 @@ class Storing(Protocol):
         """Elastic energy of the fluctuations per area ΔΓ [J/m²]."""
 
 
-class Touching(Protocol):
-    """State of any contact."""
+class Touching(NamedTuple):
+    """State of a contact.
 
-    @property
-    def work(self) -> Array:
-        """Work of adhesion left at this radius [J/m²]."""
+    Attributes
+    ----------
+    work : array
+        Work of adhesion left at this radius, w [J/m²].
+    radius : array
+        Contact radius [m], nan where it is open.
+    detached : array
+        Time of the last pull-off [s], nan if never.
+    dissipated : array
+        Energy dissipated so far by the opening and closing of the contact [J].
+    whole, bonded, stressless, settled : array
+        Phases (before its first touch, closed, open) of reference contacts, in equilibrium under the same control and
+        rule of ``after_pull_off``: with all adhesion, with that of the bonds, with what fluctuations leave of it before
+        the mean stress takes its share (followed only where it does), and with the work left (where the edge lags).
+    """
 
-    @property
-    def radius(self) -> Array:
-        """Contact radius [m], nan where the contact is open."""
-
-    @property
-    def detached(self) -> Array:
-        """Time of the last detachment [s], nan if never."""
-
-    @property
-    def dissipated(self) -> Array:
-        """Energy that the edge and the jumps of the contact have dissipated so far [J]."""
-
-    @property
-    def whole(self) -> Array:
-        """Phase (before its first touch, closed, open) of a contact with all adhesion."""
-
-    @property
-    def bonded(self) -> Array:
-        """Phase of a contact with the adhesion of the bonds alone."""
-
-    @property
-    def stressless(self) -> Array:
-        """Phase of a contact with the adhesion that fluctuations leave."""
-
-    @property
-    def settled(self) -> Array:
-        """Phase of a contact in equilibrium with the work of adhesion left."""
+    work: Array
+    radius: Array
+    detached: Array
+    dissipated: Array
+    whole: Array
+    bonded: Array
+    stressless: Array
+    settled: Array
 
 
 Own = TypeVar("Own")
@@ -235,15 +228,15 @@ Terms = TypeVar("Terms", contravariant=True)
 
 
 class Part(Protocol):
-    """What every part of a scene declares about itself."""
+    """Attributes that every part of a scene declares."""
 
     @property
     def per_member(self) -> bool:
-        """Whether members differ by this part: a matter of its model and keys, never of data."""
+        """True if members differ by this part: a matter of its model and keys, never of data."""
 
     @property
     def feeds_back(self) -> bool:
-        """Whether a step of this part needs what parts after it have become in the step before.
+        """True if a step of this part needs the state of later parts at the end of the step before.
 
         The order is drive, bonds, shear, contact. Where no part of a scene feeds back, each can be advanced over a
         whole block of steps before the next one.
@@ -276,10 +269,10 @@ class Bonds(Part, Protocol[Own]):
 
     @property
     def in_place(self) -> bool:
-        """Whether ``advance`` works in the arrays of the state that it is given, which is spent then."""
+        """True if ``advance`` works in the arrays of the state that it is given, which is spent then."""
 
     def start(self, motion: Motion, noise: Noise) -> Own:
-        """Population at t = 0, as the scene's ``start`` says."""
+        """Population at t = 0, as the key ``start`` has it."""
 
     def advance(self, state: Own, motion: Motion, radius: Array, noise: Noise) -> Own:
         """Population after a step over a contact that had this ``radius`` [m] at its start, nan where it was open."""
@@ -312,17 +305,17 @@ class Shear(Protocol[Own]):
         """Errors and spreads known before the run [1], by name."""
 
 
-class Contact(Part, Protocol[Own, Terms]):
+class Contact(Part, Protocol[Terms]):
     """Contact of sphere and half-space."""
 
     @property
-    def state_class(self) -> type[Own]:
-        """Class of the state, a ``NamedTuple`` with ``work`` and ``radius``."""
+    def state_class(self) -> type[Touching]:
+        """Class of the state."""
 
-    def start(self, motion: Motion, duration: float, balance: Terms) -> Own:
+    def start(self, motion: Motion, duration: float, balance: Terms) -> Touching:
         """Contact at the start of a run of ``duration`` [s], in equilibrium with the terms of the work of adhesion."""
 
-    def advance(self, state: Own, motion: Motion, duration: float, balance: Terms) -> Own:
+    def advance(self, state: Touching, motion: Motion, duration: float, balance: Terms) -> Touching:
         """Contact after a step, at the end of which the terms of the work of adhesion are ``balance``."""
 
 
@@ -332,4 +325,4 @@ class Parts(NamedTuple):
     drive: Drive[Sliding]
     bonds: Bonds[tuple[object, ...]]
     shear: Shear[Storing]
-    contact: Contact[Touching, tuple[object, ...]]
+    contact: Contact[tuple[object, ...]]

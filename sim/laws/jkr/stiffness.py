@@ -32,7 +32,7 @@ class PullOff(NamedTuple):
 
 @device
 def fold_root(grips, load):
-    """Where F of g = ``grips`` and 1 - g = ``load`` is least over x > 0: from 1 at grips to 3^(1/3) at a load.
+    """Minimum over x > 0 of F for g = ``grips`` and 1 - g = ``load``: from 1 at grips to 3^(1/3) at a load.
 
     x is the root of ``2 g (x^3 - 1) + 3 (1 - g) x^2 (x^3 - 3)``: a rational function right to 5e-4, one
     step of Halley's method (1e-9) and one of Newton's. No branch and no call, for vector instructions.

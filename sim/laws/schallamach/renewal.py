@@ -46,7 +46,7 @@ class Lives(NamedTuple):
 
 
 class Peak(NamedTuple):
-    """Where friction is largest: speed [m/s] and shear stress [Pa]."""
+    """Friction maximum: speed [m/s] and shear stress [Pa]."""
 
     speed: Array
     stress: Array

@@ -1,4 +1,4 @@
-"""What all bond models share, and the dilution of bonds in a growing contact: new area brings unbound sites.
+"""Attributes of all bond models, and the dilution of bonds in a growing contact: new area brings unbound sites.
 
 By default a population is that of the present area, whatever its history: a closure. With ``area =
 "carried"`` the number of bonds is carried: where the contact has grown, the share of bound sites falls as

@@ -81,7 +81,7 @@ def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, segm
 
 @device
 def _alike(weight, width, one, other):
-    """Whether two neighbouring segments have about the same density: a sharp front is not smeared."""
+    """True if two neighbouring segments have about the same density: a sharp front is not smeared."""
     here, there = weight[one] * width[other], weight[other] * width[one]
     return here <= 4.0 * there and there <= 4.0 * here
 

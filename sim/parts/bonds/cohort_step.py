@@ -232,15 +232,17 @@ def step_rows(
             settled = count
         if rules.cell < math.inf:
             travelled = travelled % (1048576.0 * rules.cell)
-        for i in range(count):
-            new_weight[m, i], new_stretch[m, i] = pool[0, i], pool[1, i]
-            if wide:
-                new_width[m, i] = pool[2, i]
-        for i in range(count, capacity):
-            new_weight[m, i], new_stretch[m, i] = 0.0, 0.0
-            if wide:
-                new_width[m, i] = 0.0
+        _write(pool, count, new_weight[m], new_stretch[m], new_width[m])
         new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
+
+
+@device
+def _write(pool, count, weight, stretch, width):
+    """Write the first ``count`` cohorts of a pool into a row, zeros behind them; a row of one width has none."""
+    weight[:count], stretch[:count] = pool[0, :count], pool[1, :count]
+    weight[count:], stretch[count:] = 0.0, 0.0
+    if width.size > 1:
+        width[:count], width[count:] = pool[2, :count], 0.0
 
 
 @kernel("void(float64[:,::1], float64[:,::1], UniTuple(float64, 5), float64[::1])")
@@ -258,15 +260,12 @@ def lost_rows(weight, stretch, law, lost):
 
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
 def settle_steady(speed, numbers, weight, stretch, width, lattice):
-    """The merged steady state of one row; the arrays are zero before."""
+    """The merged steady state of one row."""
     rules = _rules(numbers)
     pool = np.empty((3, weight.shape[1] + 520))
     count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
     count = settle(pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules)
-    for i in range(count):
-        weight[0, i], stretch[0, i] = pool[0, i], pool[1, i]
-        if width.shape[1] > 1:
-            width[0, i] = pool[2, i]
+    _write(pool, count, weight[0], stretch[0], width[0])
     lattice[0, 1] = count
 
 

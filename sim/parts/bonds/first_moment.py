@@ -349,7 +349,7 @@ def _bell(bound, moment, speed, rate, binding, work):
 
 @device
 def _at(i, array):
-    """Where row i is found in an array of one entry or of all rows."""
+    """Index of row i in an array of one entry or of all rows."""
     return min(i, array.size - 1)
 
 

@@ -1,7 +1,7 @@
 """Bond populations: the models there are, and the choice between them.
 
 Simple to full: none, steady, rate, counted without a stretch; rate, cohort, tracked with one. Both
-kinds of rate equation are called ``rate``: a rupture law tells them apart.
+kinds of rate equation are called ``rate``: a rupture law distinguishes them.
 """
 
 import math

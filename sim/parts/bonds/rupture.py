@@ -165,23 +165,25 @@ Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model
 
 @device
 def rupture_integral(stretch, slip, duration, rate, softness):
-    """∫k dt of a bond whose stretch goes from ``stretch`` by ``slip`` at constant speed, of any sign.
+    """∫k dt of a bond whose stretch x goes from ``stretch`` by ``slip`` at constant speed, of any sign.
+
+    The rate is ``rate`` × e^(\\|x\\| ``softness``), the softness of either sign.
 
     Notes
     -----
-    ``rate`` × ``duration`` × the mean of e^\\|y\\| along the way, y = stretch × softness: e^min expm1(d)/d on
-    one side of zero, (expm1\\|y0\\| + expm1\\|y1\\|)/(\\|y0\\| + \\|y1\\|) across it. Nothing cancels.
+    ``rate`` × ``duration`` × the mean of e^y along the way, y = \\|x\\| × softness: e^y0 expm1(d)/d on one side of
+    zero, y0 at the smaller stretch, (expm1(y0) + expm1(y1))/(y0 + y1) across it. Nothing cancels.
     """
-    whole = rate * duration
+    whole, sign = rate * duration, math.copysign(1.0, softness)
     if whole == 0.0:
         return 0.0
     before, change = stretch * softness, slip * softness
     after = before + change
     if before * after >= 0.0:
-        distance = math.fabs(change)
+        distance = sign * math.fabs(change)
         mean = 1.0 if distance == 0.0 else math.expm1(distance) / distance
-        return whole * math.exp(min(math.fabs(before), math.fabs(after))) * mean
-    before, after = math.fabs(before), math.fabs(after)
+        return whole * math.exp(sign * min(math.fabs(before), math.fabs(after))) * mean
+    before, after = sign * math.fabs(before), sign * math.fabs(after)
     return whole * (math.expm1(before) + math.expm1(after)) / (before + after)
 
 
@@ -211,24 +213,11 @@ def time_to_rupture(stretch, speed, threshold, rate, softness, limit):
 
 
 @device
-def _relieved_integral(stretch, slip, duration, rate, relief):
-    """As ``rupture_integral`` for a rate that falls as e^(−\\|x\\| ``relief``)."""
-    before, change = stretch * relief, slip * relief
-    after = before + change
-    if before * after >= 0.0:
-        distance = math.fabs(change)
-        mean = 1.0 if distance == 0.0 else -math.expm1(-distance) / distance
-        return rate * duration * math.exp(-min(math.fabs(before), math.fabs(after))) * mean
-    before, after = math.fabs(before), math.fabs(after)
-    return -rate * duration * (math.expm1(-before) + math.expm1(-after)) / (before + after)
-
-
-@device
 def hazard_integral(stretch, slip, duration, law):
     """∫k dt of a bond under a ``RuptureRate`` whose stretch goes from ``stretch`` by ``slip`` at constant speed."""
     rate, softness, _, catch, relief = law
     slipping = rupture_integral(stretch, slip, duration, rate, softness)
-    return slipping + _relieved_integral(stretch, slip, duration, catch, relief) if catch > 0.0 else slipping
+    return slipping + rupture_integral(stretch, slip, duration, catch, -relief) if catch > 0.0 else slipping
 
 
 @device

@@ -135,7 +135,7 @@ _TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1
 
 @kernel(f"int64({_TRACKS}, float64[:], float64, float64, float64, float64, float64, uint64, uint64[:])")
 def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members):
-    """Advance all rows by one step, in place; the return code that says most.
+    """Advance all rows by one step, in place; the most severe return code.
 
     The frame is the new state's own copy. Rows in which a step is longer than some 300 lives of a site
     are left as they are, their count of steps, too; nothing is touched when the state is spent or a

@@ -55,7 +55,7 @@ class _WithoutStretch(Common):
 
     @property
     def carries_stress(self) -> bool:
-        """Whether there is a shear stress at all."""
+        """True if there is a shear stress at all."""
         return self.stress > 0.0
 
     def bonding(self, state: Population) -> Bonding:

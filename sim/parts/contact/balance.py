@@ -1,4 +1,4 @@
-"""Terms of the effective work of adhesion, and the state of a contact."""
+"""Terms of the effective work of adhesion, and the phases of a contact."""
 
 import math
 from typing import NamedTuple
@@ -56,35 +56,6 @@ class Balance(NamedTuple):
         share = 1.0 if self.margin is None else self.margin.mean(radius)
         mean = 2.0 / 3.0 * reversible * self.reversible(radius)
         return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
-
-
-class ContactState(NamedTuple):
-    """State of the contact.
-
-    Attributes
-    ----------
-    work : array
-        Work of adhesion left at this radius, w [J/m²].
-    radius : array
-        Contact radius [m], nan where it is open.
-    detached : array
-        Time of the last pull-off [s], nan if never.
-    dissipated : array
-        Energy dissipated so far by the opening and closing of the contact [J].
-    whole, bonded, stressless, settled : array
-        Phases (``AHEAD``, ``CLOSED``, ``OPEN``) of reference contacts, in equilibrium under the same control and rule
-        of ``after_pull_off``: with all adhesion, with that of the bonds, with what fluctuations leave of it before the
-        mean stress takes its share (followed only where it does), and with the work left (where the edge lags).
-    """
-
-    work: Array
-    radius: Array
-    detached: Array
-    dissipated: Array
-    whole: Array
-    bonded: Array
-    stressless: Array
-    settled: Array
 
 
 #: A contact before its first touch, in touch, and after a pull-off.

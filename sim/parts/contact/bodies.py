@@ -1,4 +1,4 @@
-"""What the contact is made of: the solid, the sphere pressed on it, and their adhesion.
+"""Bodies in contact: the solid, the sphere pressed on it, and their adhesion.
 
 Frozen constants of a scene.
 """

@@ -346,7 +346,7 @@ def _member(a, duration, least, scene, front):
 
 @device
 def _zero(before, after, duration):
-    """When a number that changes linearly changes sign; the end where it does not."""
+    """Time at which a number that changes linearly changes sign; the end if it does not."""
     if (before < 0.0) == (after < 0.0):
         return duration
     return duration * min(max(before / (before - after), 0.0), 1.0)

@@ -40,7 +40,7 @@ def widest_crossing(surplus: Surplus, start: Array, low: Array) -> tuple[Array, 
 
 
 def _dip(surplus: Surplus, places: Array) -> tuple[Array, Array]:
-    """Where along a walk the surplus is least, by golden section, and the place before."""
+    """Place along a walk at which the surplus is least, by golden section, and the place before."""
     least = np.clip(np.argmin(surplus(places), 1), 1, _WALK - 1)[:, None]
     left, right = np.take_along_axis(places, least + 1, 1), np.take_along_axis(places, least - 1, 1)
     before = right
@@ -52,7 +52,7 @@ def _dip(surplus: Surplus, places: Array) -> tuple[Array, Array]:
 
 
 def _narrowed(surplus: Surplus, inside: Array, outside: Array) -> Array:
-    """Where the surplus crosses zero between two places, to rounding: Ridders's method, element by element."""
+    """Place at which the surplus crosses zero between two places, to rounding: Ridders's method, element by element."""
     low, high = surplus(inside), surplus(outside)
     for _ in range(_TURNS):
         open_ = (np.abs(outside - inside) > 4e-16 * outside) & (low < 0.0) & (high > 0.0)

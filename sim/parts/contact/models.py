@@ -14,7 +14,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance, ContactState
+from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance
 from sim.parts.contact.control import Bodies, Control, DisplacementControl, LoadControl
 from sim.parts.contact.crack_front import Hold, Kinetics
 from sim.parts.contact.crack_front import advance as advance_front
@@ -47,7 +47,7 @@ _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description=
 class _Controlled:
     """A contact under a load, an indentation, or a displacement with a stiffness."""
 
-    state_class: ClassVar[type[ContactState]] = ContactState
+    state_class: ClassVar[type[Touching]] = Touching
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
     #: Whether the edge takes time to reach equilibrium.
@@ -85,16 +85,15 @@ class _Controlled:
                 f"the contact exceeds {_LARGEST_SHARE} of the sphere's radius: the theory is for small contacts"
             )
         if math.isnan(setting.rest_radius):
-            never = (
-                f"the contact is open for the whole run: raise contact.{self.kind} to zero, where the sphere touches"
-            )
-            jumps = f"the contact begins open and jumps in where contact.{self.kind} first reaches zero"
-            said.append(jumps if max(self.course.extremes) >= 0.0 else never)
+            never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
+            jumps = "begins open and jumps in where contact.{} first reaches zero"
+            course = jumps if max(self.course.extremes) >= 0.0 else never
+            said.append(f"the contact {course.format(self.kind)}")
         return said
 
     @cached_property
     def kind(self) -> str:
-        """Which of load, indentation and displacement is prescribed."""
+        """Name of what is prescribed: load, indentation or displacement."""
         return next(name for name in _KINDS if getattr(self, name) is not None)
 
     @cached_property
@@ -116,20 +115,20 @@ class _Controlled:
 
     @property
     def changes(self) -> bool:
-        """Whether the control changes in time."""
+        """True if the control changes in time."""
         return self.course.changes
 
     def equilibrium_radius(self, work: Array, sphere_radius: float, modulus: float) -> Array:
         """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
         return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
 
-    def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:
+    def start(self, motion: Motion, duration: float, balance: Balance) -> Touching:
         """The contact at the start, in equilibrium."""
         control = self.control(motion.time, duration)
         radius = self._equilibrium(control, balance)
         found = (control.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
         phases = (np.where(np.isnan(alone), AHEAD, CLOSED) for alone in found)
-        return ContactState(
+        return Touching(
             self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape), *phases
         )
 
@@ -147,7 +146,7 @@ class _Controlled:
         stressless = balance.work(np.nan_to_num(radius)) if self.reversible else whole
         return whole, balance.bonded, stressless, self._left(radius, balance) if self.lags else whole
 
-    def _phases(self, state: ContactState, control: Control, radius: Array, balance: Balance) -> tuple[Array, ...]:
+    def _phases(self, state: Touching, control: Control, radius: Array, balance: Balance) -> tuple[Array, ...]:
         """Phases of the reference contacts after a step."""
         phases = state.whole, state.bonded, state.stressless, state.settled
         if min(self.course.extremes) >= 0.0:
@@ -161,7 +160,7 @@ class _Controlled:
             for phase, alone in zip(phases, found, strict=True)
         )
 
-    def _touching(self, state: ContactState, control: Control) -> Flags:
+    def _touching(self, state: Touching, control: Control) -> Flags:
         """True where an open contact closes: at its first touch, or wherever it reattaches."""
         return (
             np.isnan(state.radius) & (np.isnan(state.detached) | (self.after_pull_off == "reattach")) & control.closes
@@ -215,7 +214,7 @@ class Equilibrium(_Controlled):
 
     model: Literal["equilibrium"] = "equilibrium"
 
-    def advance(self, state: ContactState, motion: Motion, duration: float, balance: Balance) -> ContactState:
+    def advance(self, state: Touching, motion: Motion, duration: float, balance: Balance) -> Touching:
         control = self.control(motion.time, duration)
         open_ = np.isnan(state.radius)
         stays = open_ & ~self._touching(state, control) if open_.any() else open_
@@ -232,7 +231,7 @@ class Equilibrium(_Controlled):
                 dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
                 detached = np.where(opens, motion.time, detached)
         phases = self._phases(state, control, radius, balance)
-        return ContactState(self._left(radius, balance), radius, detached, dissipated, *phases)
+        return Touching(self._left(radius, balance), radius, detached, dissipated, *phases)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
@@ -254,7 +253,7 @@ class RateDependent(_Controlled):
     heal_exponent: _HealingExponent | None = None
     model: Literal["rate_dependent"] = "rate_dependent"
 
-    def advance(self, state: ContactState, motion: Motion, duration: float, balance: Balance) -> ContactState:
+    def advance(self, state: Touching, motion: Motion, duration: float, balance: Balance) -> Touching:
         last = self._left(state.radius, balance)
         first = np.where(np.isnan(state.radius), last, state.work)
         now = state._replace(radius=np.broadcast_to(state.radius, np.broadcast(state.radius, last).shape))
@@ -265,11 +264,11 @@ class RateDependent(_Controlled):
             works = [np.broadcast_to((1.0 - part) * first + part * last, now.radius.shape) for part in (before, share)]
             now = self._moved(now, piece, motion.duration * (share - before), works, balance)
         phases = self._phases(state, self.control(motion.time, duration), now.radius, balance)
-        return ContactState(self._left(now.radius, balance), now.radius, now.detached, now.dissipated, *phases)
+        return Touching(self._left(now.radius, balance), now.radius, now.detached, now.dissipated, *phases)
 
     def _moved(
-        self, state: ContactState, piece: Piece, duration: float, works: Sequence[Array], balance: Balance
-    ) -> ContactState:
+        self, state: Touching, piece: Piece, duration: float, works: Sequence[Array], balance: Balance
+    ) -> Touching:
         """The contact after a part of a clock step in which control and work change linearly.
 
         Energy still stored where the edge opens counts as dissipated, and so does what a spot gains at a touch.

@@ -30,7 +30,7 @@ class Constant:
 class Onset:
     """A prescribed amplitude around the onset of stick-slip: g = floor + (1 − floor)/(1 + (V/V0)^(−1/width)).
 
-    A stand-in: it says *that* fluctuations set in near ``speed``, as the paper supposes, not why.
+    A stand-in: that fluctuations set in near ``speed`` is the paper's supposition, without a mechanism.
     With ``relaxing`` only what the correlation renews has the new size; otherwise the whole field scales
     at once.
     """

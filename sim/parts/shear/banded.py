@@ -49,7 +49,7 @@ class BandedProcess(Renewing):
 
     @cached_property
     def wavenumber(self) -> Array:  # type: ignore[override]
-        """Where a mode has each band's rate [rad/m]."""
+        """Wavenumber of a mode that has each band's rate [rad/m]."""
         return self.bands.wavenumber
 
     def _empty(self, members: int) -> Array:
@@ -70,7 +70,7 @@ class BandedProcess(Renewing):
         return Gammas(self.bands.weight, 0.5 * self.bands.freedom, self.wavenumber)
 
     def known_errors(self) -> dict[str, float]:
-        """What banding adds to the cell's own mode sum, and the cell's own errors beside it."""
+        """Errors that banding adds to the cell's own mode sum, and the cell's own errors beside them."""
         return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
 
 

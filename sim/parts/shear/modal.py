@@ -185,7 +185,7 @@ class DrawsMaps:
 
     @cached_property
     def _places(self) -> Indices:
-        """Where each pair stands in the flattened half spectrum."""
+        """Index of each pair in the flattened half spectrum."""
         return self.modes.ix % self.grid.points * (self.grid.points // 2 + 1) + self.modes.iy
 
 

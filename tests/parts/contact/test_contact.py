@@ -177,8 +177,9 @@ def test_the_contact_opens_between_the_last_step_before_the_limit_and_the_next(c
     assert np.all(when[first_open:] == scenario.clock.time(first_open))
 
 
-def test_a_contact_that_shrinks_slowly_follows_its_branch_to_the_fold():
-    scenario = maugis(Equilibrium(displacement={"from": 1.0, "to": -1.2}, stiffness=5.0), 4000)
+@pytest.mark.parametrize("steps", [400, pytest.param(4000, marks=pytest.mark.verify)])
+def test_a_contact_that_shrinks_slowly_follows_its_branch_to_the_fold(steps):
+    scenario = maugis(Equilibrium(displacement={"from": 1.0, "to": -1.2}, stiffness=5.0), steps)
     radius, load, depth = course(scenario, "contact_radius", "normal_load", "indentation")
     closed = radius > 0.0
     a = radius[closed]
@@ -292,7 +293,8 @@ def touching(stiffness):
 
 
 @pytest.mark.parametrize("stiffness", [0.3, 5.0, math.inf])
-def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(stiffness):
+@pytest.mark.parametrize("steps", [400, pytest.param(4000, marks=pytest.mark.verify)])
+def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(steps, stiffness):
     """To first order in the step: each of the two jumps comes within a step of its place, where at most the
     pull-off load of 1.5 acts; the trapezoidal rule takes half of either jump, and is of second order elsewhere
     but at the fold, where the load has a square root: of order 3/2."""
@@ -300,14 +302,13 @@ def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(stiffness):
     reach = 2.0 - 2.0 * limit("displacement", stiffness) if math.isfinite(stiffness) else 3.0
     held = {"from": 1.0, "to": 1.0 - reach, "cycles": 1}
     control = {"indentation": held} if math.isinf(stiffness) else {"displacement": held, "stiffness": stiffness}
-    for steps in (400, 4000):
-        scenario = maugis(Equilibrium(**control, after_pull_off="reattach"), steps)
-        load, displacement, lost = course(scenario, "normal_load", "displacement", "dissipated_energy")
-        loop = float(np.sum(0.5 * (load[1:] + load[:-1]) * np.diff(displacement)))
-        width = 2.0 * reach / steps
-        assert lost[-1] > 0.5
-        assert_allclose(lost[-1], exact, rtol=0.0, atol=3.0 * width)
-        assert_allclose(loop, lost[-1], rtol=0.0, atol=6.0 * width)
+    scenario = maugis(Equilibrium(**control, after_pull_off="reattach"), steps)
+    load, displacement, lost = course(scenario, "normal_load", "displacement", "dissipated_energy")
+    loop = float(np.sum(0.5 * (load[1:] + load[:-1]) * np.diff(displacement)))
+    width = 2.0 * reach / steps
+    assert lost[-1] > 0.5
+    assert_allclose(lost[-1], exact, rtol=0.0, atol=3.0 * width)
+    assert_allclose(loop, lost[-1], rtol=0.0, atol=6.0 * width)
 
 
 def fold_of(control, work_at, start, stop):
@@ -397,15 +398,16 @@ KNOTS = {
 
 
 @pytest.mark.parametrize("name", KNOTS)
-def test_an_edge_sees_where_its_control_turns_within_a_clock_step(name):
+@pytest.mark.parametrize("finer", [10, pytest.param(100, marks=pytest.mark.verify)])
+def test_an_edge_follows_turns_of_its_control_within_a_clock_step(finer, name):
     # the edge is good to some 1e-8 of the radius, whatever the step
     contact = RateDependent(**KNOTS[name], front_speed=5.0, heal_speed=2.0, heal_exponent=0.5)
     (coarse, lost), (fine, fine_lost) = (
-        course(maugis(contact, steps), "contact_radius", "dissipated_energy") for steps in (100, 10000)
+        course(maugis(contact, steps), "contact_radius", "dissipated_energy") for steps in (100, 100 * finer)
     )
     assert np.ptp(coarse) > 0.1
-    assert_allclose(coarse, fine[::100], rtol=1e-6)
-    assert_allclose(lost, fine_lost[::100], rtol=1e-6, atol=1e-9)
+    assert_allclose(coarse, fine[::finer], rtol=1e-6)
+    assert_allclose(lost, fine_lost[::finer], rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize("stiffness", [0.3, 5.0, math.inf])
@@ -582,7 +584,8 @@ def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
     assert_allclose(lost[-1], held - math.pi * a**2 * (WORK - disc_energy(spectrum, a, 0.1875)), rtol=1e-7)
 
 
-def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch):
+@pytest.mark.parametrize("steps", [400, pytest.param(2000, marks=pytest.mark.verify)])
+def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch, steps):
     # below the radius at pull-off the falling load gains energy like 1/radius; that is not the edge's
     from sim.parts.contact import models as part
 
@@ -590,7 +593,7 @@ def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_
     found = []
     for spot in (1e-3, 1e-2):
         monkeypatch.setattr(part, "_SPOT", spot)
-        scenario = scene(1, 2000, contact=pulled)
+        scenario = scene(1, steps, contact=pulled)
         *_, last = march(scenario, np.arange(1))
         assert np.isnan(last.contact.radius[0])
         found.append(last.contact.dissipated[0])
