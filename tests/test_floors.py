@@ -5,6 +5,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
+from benchmarks.lines import MOST, code_lines
 
 import sim
 
@@ -107,6 +108,15 @@ def test_outside_its_folder_no_part_is_asked_for_its_class(name):
     taken = {alias.asname or alias.name for alias in named}
     calls = (node for node in ast.walk(tree) if isinstance(node, ast.Call))
     assert not [f"line {call.lineno}: {ast.unparse(call)}" for call in calls if asks_a_class(call, taken)]
+
+
+#: Modules that may be longer than a sitting.
+LONG = {"parts.contact.crack_front"}
+
+
+@pytest.mark.parametrize("name", sorted(MODULES.keys() - LONG))
+def test_a_module_is_read_in_one_sitting(name):
+    assert code_lines(MODULES[name].read_text()) <= MOST
 
 
 def test_nothing_imports_in_a_circle_benchmarks_and_tests_included():
