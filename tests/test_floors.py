@@ -5,9 +5,9 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
-from benchmarks.lines import MOST, code_lines
 
 import sim
+from benchmarks.lines import MOST, code_lines
 
 ROOT = Path(sim.__file__).parent
 #: What is no part of the package but of the tree, by the name under which its modules import each other.
