@@ -95,7 +95,7 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
 
     Notes
     -----
-    Peaks are those of the clock steps, refined by a parabola, where members were recorded; their speed is that of
+    Peaks are those of the clock steps, refined between them, where members were recorded; their speed is that of
     the highest record. nan where there is none: the stress is largest at the last record, or on a ramp at the
     first, or the members fall from the peak of their mean to those by less than five standard errors. A start may
     peak at once, when the stress falls from what it was at rest. In members with noise the largest value lies above

@@ -1,8 +1,7 @@
 """Figures of stress maps: the map and its displacement, and its spectrum."""
 
 import contextlib
-import json
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -12,7 +11,7 @@ from pydantic import TypeAdapter
 from scipy.signal import resample
 
 from sim.analysis import setting
-from sim.analysis.scene import word
+from sim.analysis.scene import resolved, word
 from sim.laws.halfspace import displacement
 from sim.numerics.grid import Grid
 from sim.parts.shear.amplitude import Amplitude
@@ -41,7 +40,7 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     """The last stress map of the first member and the displacement that it makes."""
     at, point = style.first_point(dataset)
     stress = _maps_of(dataset, at).isel(map_member=0)
-    cell = _cell_of(stress)
+    cell = _grid_of(stress).cell
     modulus, ratio = (number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), cell, modulus, ratio)
     radius, speed = (float(_then(dataset, name, at, stress)) for name in ("contact_radius", "speed"))
@@ -97,19 +96,12 @@ def _refined(field: np.ndarray) -> np.ndarray:
     return resample(resample(field, fine, axis=0), fine, axis=1)
 
 
-class _Target(NamedTuple):
-    """The scenario's spectrum of a map, with the factor by which the amplitude raises its density."""
-
-    spectrum: Any
-    raised: float
-    words: str
-
-
-def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _Target:
-    """Spectrum and amplitude at a point of the sweep, rebuilt from the scenario that the dataset carries."""
-    shear = json.loads(dataset.attrs["scenario_resolved"])["shear"]
-    if word(dataset, "shear.model", "").ndim:
-        raise ValueError("the spectrum is swept as a whole table; run the one of interest on its own")
+def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tuple[Any, float, str]:
+    """Spectrum at a point of the sweep, from the scenario of the dataset; the factor of its density; its name."""
+    try:
+        shear = resolved(dataset, "shear")
+    except KeyError:
+        raise ValueError("the spectrum is swept as a whole table; run the one of interest on its own") from None
     for table in ("spectrum", "amplitude"):
         for key in shear[table]:
             with contextlib.suppress(KeyError):
@@ -118,15 +110,17 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> _T
     if spectrum.wavevector is not None:
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
     if shear["amplitude"].get("relaxing"):  # the field lags behind its amplitude: only the shape can be compared
-        cells = modes(spectrum, _cell_of(stress), stress.sizes["x"])
-        return _Target(spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled")
+        grid = _grid_of(stress)
+        cells = modes(spectrum, grid.cell, grid.points)
+        return spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled"
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
     factor = amplitude.factor(*(_then(dataset, name, at, stress) for name in ("speed", "shear_stress")))
-    return _Target(spectrum, float(np.mean(factor**2)), "target")
+    return spectrum, float(np.mean(factor**2)), "target"
 
 
-def _cell_of(stress: xr.DataArray) -> float:
-    return float(stress["x"][1] - stress["x"][0]) * stress.sizes["x"]
+def _grid_of(stress: xr.DataArray) -> Grid:
+    points = stress.sizes["x"]
+    return Grid(float(stress["x"][1] - stress["x"][0]) * points, points)
 
 
 def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
@@ -147,13 +141,13 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
         raise ValueError("the last map holds no stress; record one where fluctuations have grown")
     if word(dataset, "shear.spectrum.model", "") == "bonds":
         raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
-    target = _target(dataset, stress, at)
-    grid = Grid(_cell_of(stress), stress.sizes["x"])
-    wanted = mode_density(modes(target.spectrum, grid.cell, grid.points), grid)
-    expected = target.raised * radial_average(wanted, grid).density
+    (spectrum, raised, name), grid = _target(dataset, stress, at), _grid_of(stress)
+    expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
     fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)
-    density = target.raised * _radial_density(target.spectrum, fine)
+    angle = np.pi * (np.arange(64) + 0.5) / 64
+    qx, qy = fine[:, None] * np.cos(angle), fine[:, None] * np.sin(angle)
+    density = raised * np.mean(spectrum.density(qx, qy), axis=1)
     least = np.min(density[density > 0.0], initial=np.max(expected))
     held = expected > max(0.2 * least, 1e-12 * np.max(expected))  # not where a ring only touches the spectrum
     q, expected = rings[0].q[held], expected[held]
@@ -165,7 +159,7 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     figure, (panel, below) = style.rows([1.9, 1.1])
     dots: Any = {"fmt": "o", "color": BOTH, "markersize": 2.2, "elinewidth": 0.7}
     ring: Any = {"markersize": 4.5, "markerfacecolor": "none", "color": FLUCTUATIONS, "markeredgewidth": 0.7}
-    panel.loglog(fine, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS, label=target.words)
+    panel.loglog(fine, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS, label=name)
     panel.plot(q, expected, "o", label="discretised", **ring)
     panel.errorbar(q, measured, error, label=f"realised, {len(rings)} map{'s' * (len(rings) > 1)}", **dots)
     panel.set_ylabel("spectral density $C$ (Pa² m²)")
@@ -177,9 +171,3 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     below.set_ylabel("realised/discretised")
     style.across(below, q, "log", f"wavenumber $q$ (rad/{length.name})", 0.03)
     return figure
-
-
-def _radial_density(spectrum: Any, q: np.ndarray) -> np.ndarray:
-    """Density averaged over directions."""
-    angle = np.pi * (np.arange(64) + 0.5) / 64
-    return np.mean(spectrum.density(q[:, None] * np.cos(angle), q[:, None] * np.sin(angle)), axis=1)

@@ -60,21 +60,14 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
         if np.any(slides):
             before = float(fraction[~slides][-1]) if not np.all(slides) else float(fraction[0])
             time, stress = time[slides], stress[slides]
-            peak = _peak(dataset, at, rest, time, np.abs(stress))
-            found.append(Start(at, rest, speed, before, time, stress, np.copysign(peak[0], speed), *peak[1:]))
+            k = int(np.argmax(np.abs(stress)))
+            peak, when, step = float(abs(stress[k])), float(time[k]), float(dataset["t"][1] - dataset["t"][0])
+            if "peak_stress" in dataset and "member" not in dataset["peak_stress"].dims:
+                peak, when, step = (number_at(dataset[name], at) for name in ("peak_stress", "peak_time", "clock_step"))
+                when -= rest
+            seen = bool(abs(stress[-1]) < peak and when > _STEPS * step)
+            found.append(Start(at, rest, speed, before, time, stress, float(np.copysign(peak, speed)), when, seen))
     return found
-
-
-def _peak(
-    dataset: xr.Dataset, at: dict[str, int], rest: float, time: np.ndarray, size: np.ndarray
-) -> tuple[float, float, bool]:
-    """Largest size of the stress of a start [Pa], its time since [s], and whether it is resolved."""
-    k = int(np.argmax(size))
-    peak, when, step = float(size[k]), float(time[k]), float(dataset["t"][1] - dataset["t"][0])
-    if "peak_stress" in dataset and "member" not in dataset["peak_stress"].dims:
-        peak, when, step = (number_at(dataset[name], at) for name in ("peak_stress", "peak_time", "clock_step"))
-        when -= rest
-    return peak, when, bool(size[-1] < peak and when > _STEPS * step)
 
 
 def start_figure(dataset: xr.Dataset) -> Figure:
