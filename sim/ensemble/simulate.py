@@ -43,11 +43,7 @@ class OutputBusy(RuntimeError):
 
 
 def run(
-    scenario: Scenario,
-    to: str | os.PathLike | None = None,
-    *,
-    replace: bool = False,
-    progress: Progress | None = None,
+    scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, progress: Progress | None = None
 ) -> Any:
     """Run a scenario with its ensemble and its sweep.
 
@@ -107,12 +103,7 @@ def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None
 
 
 def _record(
-    plan: Plan,
-    point: Scenario,
-    members: np.ndarray,
-    states: Iterator[State],
-    records: range,
-    progress: Progress | None,
+    plan: Plan, point: Scenario, members: np.ndarray, states: Iterator[State], records: range, progress: Progress | None
 ) -> dict[str, np.ndarray]:
     """One part: every variable over a stretch of records, the maps in it, and the state at its end."""
     rows = {one.name: np.empty((len(members) if plan.varies(one) else 1, len(records))) for one in plan.variables}

@@ -72,8 +72,7 @@ def _require_multiple(name: str, long: float, other: str, short: float) -> None:
     below, above = max(math.floor(ratio), 1) * short, (math.floor(ratio) + 1) * short
     cure = f"{above:g} s" if ratio < 1.0 else f"{below:g} s or {above:g} s"
     raise PydanticCustomError(
-        "clock",
-        f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s), such as {cure}",
+        "clock", f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s), such as {cure}"
     )
 
 
