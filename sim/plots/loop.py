@@ -145,7 +145,7 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     if len(pulls) != 1:
         return
     (pull,) = pulls
-    panel.margins(y=0.1)  # a name stands below the lowest line
+    panel.margins(y=0.15)  # a name stands below the lowest line
     dead, grips = r"$-\frac{3}{2}\pi wR$", r"$-\frac{5}{6}\pi wR$"
     low, high = panel.get_ylim()
     near = -_GRIPS * pull < _NAME * (high - low)
