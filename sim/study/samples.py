@@ -1,5 +1,6 @@
 """Runs of a scene for the study: how long they take, and what their members give at some times."""
 
+import itertools
 import time
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -62,18 +63,15 @@ def _group(scenario: Scenario) -> int:
 
 def _paces(scenario: Scenario, members: int, seconds: float, repeats: int) -> list[float]:
     """CPU times per step of a batch of members [s], each of whole runs or of a piece of one that takes long enough."""
-    found, last = [], scenario.clock.steps
-    states = march(scenario, np.arange(members), keep=False)
+    found = []
+    states = (state for _ in itertools.count() for state in march(scenario, np.arange(members), keep=False))
     for _ in range(repeats + 1):
         steps, spent, began, whole = 0, 0.0, time.process_time(), False
         while spent < seconds or not (whole or steps >= _MANY or spent > _LONG * seconds):
-            state = next(states, None)
+            state = next(states)
             spent = time.process_time() - began
-            if state is None:
-                states = march(scenario, np.arange(members), keep=False)
-                continue
             steps += state.step > 0
-            whole = state.step == last
+            whole = state.step == scenario.clock.steps
         found.append(spent / max(steps, 1))
     return found[1:]  # the first compiles and loads
 
@@ -111,9 +109,8 @@ def coupled(scenarios: Sequence[Scenario], members: int, steps: Sequence[int]) -
         others = [march(drawn.into(scene), batch) for scene in scenarios[1:]]
         for state in march(scenarios[0], batch):
             drawn.now = state.shear
-            states: list[Any] = [state]
-            states += [next(run) if not state.step % ratio else None
-                       for run, ratio in zip(others, ratios[1:], strict=True)]  # fmt: skip
+            due = zip(others, ratios[1:], strict=True)
+            states = [state, *(state if state.step % ratio else next(run) for run, ratio in due)]
             if state.step in places:
                 for k, (scene, now) in enumerate(zip(scenarios, states, strict=True)):
                     for q, name in enumerate(QUANTITIES):
