@@ -9,26 +9,14 @@ from typing import NamedTuple, cast, get_type_hints
 
 import numpy as np
 
-from sim.numerics import extremes
 from sim.numerics.noise import Noise
+from sim.parts import extremes
 from sim.parts.contact.balance import Balance
-from sim.parts.exchange import NO_RESISTANCE, Array, Bonding, Indices, Motion, Sliding, Storing, Touching
+from sim.parts.exchange import NO_RESISTANCE, Array, Bonding, Indices, Sliding, Storing, Touching
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, Array]
-_UNKNOWN = np.full(1, np.nan)
-
-
-class Extremes(NamedTuple):
-    """Running maxima over the clock steps, each as ``numerics.extremes`` has it, shape (rows, 4).
-
-    ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
-    is that of the tensile load of a closed contact [N], followed where the control makes the load.
-    """
-
-    stress: Array
-    friction: Array
-    pull: Array
+_NONE = np.zeros(1)
 
 
 class State(NamedTuple):
@@ -44,7 +32,7 @@ class State(NamedTuple):
     bonding: Bonding
     shear: Storing
     contact: Touching
-    extremes: Extremes
+    extremes: extremes.Extremes
 
 
 class Dice(NamedTuple):
@@ -66,7 +54,7 @@ def start(scenario: Scenario, dice: Dice) -> State:
     bonding = population.bonding(bonds)
     shear = process.start(motion, bonding, dice.shear)
     touch = contact.start(motion, scenario.times.duration, balance(scenario, bonding, shear))
-    largest = Extremes(*(extremes.first(values, 0.0) for values in _loads(scenario, bonding, touch, 0)))
+    largest = extremes.first(bonding, touch.radius, _pull(scenario, touch, 0))
     return State(0, slider, bonds, bonding, shear, touch, largest)
 
 
@@ -79,8 +67,9 @@ def advance(scenario: Scenario, state: State, dice: Dice) -> State:
     bonding = population.bonding(bonds)
     shear = process.advance(state.shear, motion, bonding, dice.shear)
     touch = contact.advance(state.contact, motion, times.duration, balance(scenario, bonding, shear))
-    after = State(step, slider, bonds, bonding, shear, touch, state.extremes)
-    return after._replace(extremes=_largest(scenario, state, after, motion))
+    ends, radii = (state.bonding, bonding), (state.contact.radius, touch.radius)
+    largest = extremes.after(state.extremes, ends, radii, _pull(scenario, touch, step), motion)
+    return State(step, slider, bonds, bonding, shear, touch, largest)
 
 
 def march(scenario: Scenario, members: Indices, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -121,29 +110,12 @@ def balance(scenario: Scenario, bonding: Bonding, shear: Storing) -> Balance:
     return Balance(bonded, fluctuating, bonding.strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _loads(scenario: Scenario, bonding: Bonding, touch: Touching, step: int) -> tuple[Array, ...]:
-    """Magnitudes of stress and friction, and the tensile load, whose maxima a run follows."""
-    stress = np.abs(bonding.stress)
-    friction = stress * (np.pi * touch.radius**2)
+def _pull(scenario: Scenario, touch: Touching, step: int) -> Array:
+    """Tensile load of the contact [N], where the control makes it."""
     if not scenario.contact.makes_load:
-        return stress, friction, np.zeros(1)
+        return _NONE
     control = scenario.contact.control(scenario.times.at(step), scenario.times.duration)
-    return stress, friction, -control.normal_load(touch.radius, scenario.bodies)
-
-
-def _largest(scenario: Scenario, before: State, after: State, motion: Motion) -> Extremes:
-    """Maxima so far, those between the two ends of a step included; the area is taken as linear in between."""
-    loads, time = _loads(scenario, after.bonding, after.contact, after.step), motion.time
-    stresses, slopes = [], []
-    for bonding, speed in ((before.bonding, motion.first), (after.bonding, motion.speed)):
-        stresses.append(np.abs(bonding.stress))
-        slopes.append(np.sign(bonding.stress) * (bonding.stiffness * speed + bonding.relaxation))
-    areas = [np.pi * state.contact.radius**2 for state in (before, after)]
-    growth = (areas[1] - areas[0]) / motion.duration
-    frictions = [a * slope + growth * stress for a, slope, stress in zip(areas, slopes, stresses, strict=True)]
-    ends = slopes, frictions, (_UNKNOWN, _UNKNOWN)
-    pairs = zip(before.extremes, loads, ends, strict=True)
-    return Extremes(*(extremes.after(so_far, now, time, motion.duration, *both) for so_far, now, both in pairs))
+    return -control.normal_load(touch.radius, scenario.bodies)
 
 
 def pack(state: State) -> Arrays:
@@ -163,7 +135,7 @@ def _named(state: tuple[object, ...]) -> Iterator[tuple[str, Array]]:
 def unpack(scenario: Scenario, arrays: Arrays) -> State:
     """The state of a scenario that ``pack`` took apart."""
     kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()}
-    kinds |= {"bonding": Bonding, "extremes": Extremes}
+    kinds |= {"bonding": Bonding, "extremes": extremes.Extremes}
     inner = {name: _assembled(kind, _within(arrays, name)) for name, kind in kinds.items()}
     return State(*cast(State, (int(arrays["step"]), *(inner[name] for name in State._fields[1:]))))
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from sim.engine import State, balance
 from sim.laws import jkr
-from sim.numerics import extremes
+from sim.parts import extremes
 from sim.parts.contact.control import Control
 from sim.scenario.scenario import Scenario
 

@@ -90,7 +90,7 @@ def law(function: Callable) -> Callable:
     @functools.cache
     def compiled() -> Callable:
         signature = f"float64({', '.join(['float64'] * count)})"
-        return _build(lambda cache: numba.vectorize([signature], cache=cache)(function))
+        return _build(lambda cache: numba.vectorize([signature], cache=cache)(function)).ufunc
 
     bind = inspect.signature(function).bind
 
@@ -100,10 +100,15 @@ def law(function: Callable) -> Callable:
             bound = bind(*arguments, **keywords)
             bound.apply_defaults()
             arguments = bound.args
+        small = all(map(_is_small, arguments))
         with np.errstate(all="ignore"):
-            return _in_blocks(compiled(), arguments)
+            return compiled()(*arguments) if small else _in_blocks(compiled(), arguments)
 
     return call
+
+
+def _is_small(argument: Any) -> bool:
+    return type(argument) is float or (type(argument) is np.ndarray and argument.size < _BLOCK // 16)
 
 
 @functools.lru_cache(maxsize=64)  # constants of a scene come back at every step

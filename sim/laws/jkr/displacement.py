@@ -130,8 +130,15 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
     >>> print("%.2e %.2e %.2e" % tuple(a))
     6.68e-05 3.83e-05 nan
     """
-    arrays = [np.asarray(value, dtype=float) for value in (displacement, stiffness, work, sphere_radius, modulus)]
-    shape = np.broadcast(*arrays).shape
+    given = displacement, stiffness, work, sphere_radius, modulus
+    shape = np.broadcast(*given).shape
+    if math.prod(shape) <= _BLOCK:
+        small = np.empty((6, *shape))
+        for row, value in enumerate(given):
+            small[row] = value
+        _solve(*small.reshape(6, -1))
+        return small[5][()]
+    arrays = [np.asarray(value, dtype=float) for value in given]
     flat = [array if array.size == 1 or array.shape == shape else np.broadcast_to(array, shape) for array in arrays]
     flat = [array.reshape(-1) for array in flat]
     radii = np.empty(math.prod(shape))

@@ -27,6 +27,8 @@ from sim.units.quantity import Quantity
 _SPOT = 1e-3
 #: Radius of the contact over that of the sphere above which a parabola is a poor sphere.
 _LARGEST_SHARE = 0.3
+#: Reference contacts by the name of their phase.
+_REFERENCES = Touching._fields[4:]
 _KINDS = ("load", "indentation", "displacement")
 
 _Load = held(Quantity("N", "normal load, compression positive", "P"), "load")
@@ -126,11 +128,10 @@ class _Controlled:
         """The contact at the start, in equilibrium."""
         control = self.control(motion.time, duration)
         radius = self._equilibrium(control, balance)
-        found = (control.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
-        phases = (np.where(np.isnan(alone), AHEAD, CLOSED) for alone in found)
-        return Touching(
-            self._left(radius, balance), radius, np.full(radius.shape, np.nan), np.zeros(radius.shape), *phases
-        )
+        unknown, none = np.full(radius.shape, np.nan), np.zeros(radius.shape)
+        state = Touching(self._left(radius, balance), radius, unknown, none, *4 * (np.full(1, CLOSED),))
+        lost = self._without_equilibrium(control, radius, balance)
+        return state._replace(**{name: np.where(gone, AHEAD, CLOSED) for name, gone in lost.items()})
 
     def stopped(self, state: Touching) -> Flags:
         """True where a trajectory has ended, at the pull-off of a contact that stops there."""
@@ -140,25 +141,30 @@ class _Controlled:
         """Radius of a contact in equilibrium with another work of adhesion [m], 0 where it is open."""
         return np.where(phase == CLOSED, control.radius(work, np.zeros(1), 0.0, bodies), 0.0)
 
-    def _references(self, radius: Array, balance: Balance) -> tuple[Array, ...]:
-        """Works of adhesion of the reference contacts [J/m²]; all adhesion for those that are not followed."""
-        whole = np.full(1, balance.reference)
-        stressless = balance.work(np.nan_to_num(radius)) if self.reversible else whole
-        return whole, balance.bonded, stressless, self._left(radius, balance) if self.lags else whole
+    def _without_equilibrium(self, control: Control, radius: Array, balance: Balance) -> dict[str, Flags]:
+        """True where a reference contact has no equilibrium, by name, for those that are followed."""
+        works = {"whole": np.full(1, balance.reference), "bonded": balance.bonded}
+        if self.reversible:
+            works["stressless"] = balance.work(np.nan_to_num(radius))
+        if self.lags:
+            works["settled"] = self._left(radius, balance)
+        found = control.radius(np.concatenate(list(works.values())), np.zeros(1), 0.0, balance.bodies)
+        ends = np.cumsum([len(work) for work in works.values()])
+        return dict(zip(works, np.split(np.isnan(found), ends[:-1]), strict=True))
 
-    def _phases(self, state: Touching, control: Control, radius: Array, balance: Balance) -> tuple[Array, ...]:
-        """Phases of the reference contacts after a step."""
-        phases = state.whole, state.bonded, state.stressless, state.settled
+    def _followed(self, state: Touching, control: Control, radius: Array, balance: Balance) -> Touching:
+        """The state with the phases that its reference contacts have after a step."""
         if min(self.course.extremes) >= 0.0:
-            return phases
+            return state
+        phases = {name: getattr(state, name) for name in _REFERENCES}
         if control.closes:
-            stay_open = self.after_pull_off != "reattach"
-            return tuple(np.where(stay_open & (phase == OPEN), OPEN, CLOSED) for phase in phases)
-        found = (control.radius(work, np.zeros(1), 0.0, balance.bodies) for work in self._references(radius, balance))
-        return tuple(
-            np.where((phase == CLOSED) & np.isnan(alone), OPEN, phase)
-            for phase, alone in zip(phases, found, strict=True)
-        )
+            most = CLOSED if self.after_pull_off == "reattach" else OPEN
+            return state._replace(
+                **{name: np.minimum(np.maximum(phase, CLOSED), most) for name, phase in phases.items()}
+            )
+        lost = self._without_equilibrium(control, radius, balance)
+        opened = {name: np.where((phases[name] == CLOSED) & gone, OPEN, phases[name]) for name, gone in lost.items()}
+        return state._replace(**opened)
 
     def _touching(self, state: Touching, control: Control) -> Flags:
         """True where an open contact closes: at its first touch, or wherever it reattaches."""
@@ -230,8 +236,9 @@ class Equilibrium(_Controlled):
                 over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
                 dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
                 detached = np.where(opens, motion.time, detached)
-        phases = self._phases(state, control, radius, balance)
-        return Touching(self._left(radius, balance), radius, detached, dissipated, *phases)
+        after = self._followed(state, control, radius, balance)
+        work = self._left(radius, balance)
+        return after._replace(work=work, radius=radius, detached=detached, dissipated=dissipated)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
@@ -263,8 +270,8 @@ class RateDependent(_Controlled):
             before, share = share, (piece.stop - begin) / span
             works = [np.broadcast_to((1.0 - part) * first + part * last, now.radius.shape) for part in (before, share)]
             now = self._moved(now, piece, motion.duration * (share - before), works, balance)
-        phases = self._phases(state, self.control(motion.time, duration), now.radius, balance)
-        return Touching(self._left(now.radius, balance), now.radius, now.detached, now.dissipated, *phases)
+        now = self._followed(now, self.control(motion.time, duration), now.radius, balance)
+        return now._replace(work=self._left(now.radius, balance))
 
     def _moved(
         self, state: Touching, piece: Piece, duration: float, works: Sequence[Array], balance: Balance

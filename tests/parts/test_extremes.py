@@ -1,25 +1,35 @@
 """Running maxima: exact for parabolas, honest about jumps, the same after a restart."""
 
+import itertools
+
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.numerics import extremes
+from sim.parts import extremes
+from sim.parts.exchange import Bonding, Motion
 
-UNKNOWN = np.full(1, np.nan)
+ONE = np.full(1, 1.0 / np.sqrt(np.pi))  # radius of a contact of unit area
 
 
-def followed(samples, step=0.5, slopes=None):
-    found = extremes.first(samples[0], 0.0)
-    for number, values in enumerate(samples[1:], 1):
-        ends = (UNKNOWN, UNKNOWN) if slopes is None else (slopes[number - 1], slopes[number])
-        found = extremes.after(found, values, number * step, step, *ends)
+def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE)):
+    """Running maximum of a stress given by its values, slopes where they are known; friction over a growing area."""
+    zero, slopes = np.zeros(1), slopes or [np.full(1, np.nan)] * len(samples)
+    bondings = [Bonding(zero, np.asarray(one), zero, zero, slope) for one, slope in zip(samples, slopes, strict=True)]
+    found = extremes.first(bondings[0], radii[0], zero)
+    for number, ends in enumerate(itertools.pairwise(bondings), 1):
+        motion = Motion(number, number * step, step, zero, zero, zero, zero)
+        found = extremes.after(found, ends, radii, zero, motion)
     return found
+
+
+def stress(*given):
+    return followed(*given).stress
 
 
 def test_a_parabola_is_found_between_its_samples():
     top, where = np.array([3.0, 7.0]), np.array([1.2, 2.9])
     times = 0.5 * np.arange(9)
-    found = followed([top - 0.1 * (t - where) ** 2 for t in times])
+    found = stress([top - 0.1 * (t - where) ** 2 for t in times])
     assert_allclose(found[:, extremes.LARGEST], top, rtol=1e-14)
     assert_allclose(found[:, extremes.WHEN], where, rtol=1e-12)
 
@@ -27,20 +37,20 @@ def test_a_parabola_is_found_between_its_samples():
 def test_a_cubic_is_found_between_its_samples_by_values_and_slopes():
     top, where = np.array([2.0, 7.0]), np.array([1.6, 2.9])
     away = [t - where for t in 0.5 * np.arange(7)]
-    found = followed([top - u**2 * (1.5 - u) for u in away], slopes=[u * (3.0 * u - 3.0) for u in away])
+    found = stress([top - 0.05 * u**2 * (1.5 - u) for u in away], 0.5, [0.15 * u * (u - 1.0) for u in away])
     assert_allclose(found[:, extremes.LARGEST], top, rtol=1e-14)
     assert_allclose(found[:, extremes.WHEN], where, rtol=1e-12)
 
 
 def test_a_jump_keeps_its_sample():
     for samples in ([0.0, 0.0, 5.0, 4.9], [4.0, 4.9, 5.0, 0.0, 1.0], [1.0, 5.0]):
-        found = followed([np.array([value]) for value in samples])
+        found = stress([np.array([value]) for value in samples])
         assert found[0, extremes.LARGEST] == 5.0
         assert found[0, extremes.WHEN] == 0.5 * samples.index(5.0)
 
 
 def test_nothing_is_larger_than_nan():
-    found = followed([np.array([np.nan]), np.array([2.0]), np.array([np.nan])])
+    found = stress([np.array([np.nan]), np.array([2.0]), np.array([np.nan])])
     assert found[0, extremes.LARGEST] == 2.0
 
 
@@ -49,7 +59,7 @@ def test_the_error_is_of_third_order_in_the_step():
     exact, errors = np.sin(np.pi / 4) * np.exp(-np.pi / 4), []
     for count in (40, 80, 160, 320):
         times = 0.013 + np.linspace(0.0, 3.0, count + 1)
-        found = followed([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count)
+        found = stress([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count)
         errors.append(abs(found[0, extremes.LARGEST] / exact - 1.0))
     assert max(errors) < 1e-4 and errors[-1] < 2e-6 and errors[-1] < errors[0] / 100.0
 
@@ -59,7 +69,7 @@ def test_with_slopes_the_error_is_of_fourth_order():
     for count in (10, 20, 40, 80):
         times = 0.013 + np.linspace(0.0, 3.0, count + 1)
         slopes = [np.array([(np.cos(t) - np.sin(t)) * np.exp(-t)]) for t in times]
-        found = followed([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count, slopes)
+        found = stress([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count, slopes)
         errors.append(abs(found[0, extremes.LARGEST] / exact - 1.0))
     # h⁴ f⁗/384 at most, f⁗ = 4 f
     assert np.all(np.array(errors) < (3.0 / np.array([10, 20, 40, 80])) ** 4 / 90.0) and errors[-1] < errors[0] / 100.0
@@ -68,4 +78,13 @@ def test_with_slopes_the_error_is_of_fourth_order():
 def test_one_row_for_all_members_is_each_members_own():
     samples = [np.array([1.0]), np.array([2.0]), np.array([1.5])]
     wide = [np.repeat(values, 3) for values in samples]
-    assert_array_equal(np.repeat(followed(samples), 3, axis=0), followed(wide))
+    assert_array_equal(np.repeat(stress(samples), 3, axis=0), stress(wide))
+
+
+def test_friction_grows_with_the_area_within_a_step():
+    """Stress 1 − (t − 1/2)² over an area that doubles in a step of 1: cubic, (1 + t)(3/4 + t − t²)."""
+    values, slopes = [np.array([0.75]), np.array([0.75])], [np.array([1.0]), np.array([-1.0])]
+    found = followed(values, 1.0, slopes, (ONE, np.sqrt(2.0) * ONE))
+    top = 0.5 * np.sqrt(7.0 / 3.0)  # where 7/4 − 3 t² is 0: 0.76
+    assert_allclose(found.stress[0, extremes.LARGEST :], [1.0, 0.5], rtol=1e-14)
+    assert_allclose(found.friction[0, extremes.LARGEST :], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)
