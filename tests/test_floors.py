@@ -110,11 +110,7 @@ def test_outside_its_folder_no_part_is_asked_for_its_class(name):
     assert not [f"line {call.lineno}: {ast.unparse(call)}" for call in calls if asks_a_class(call, taken)]
 
 
-#: Modules that may be longer than a sitting.
-LONG = {"parts.contact.crack_front"}
-
-
-@pytest.mark.parametrize("name", sorted(MODULES.keys() - LONG))
+@pytest.mark.parametrize("name", sorted(MODULES))
 def test_a_module_is_read_in_one_sitting(name):
     assert code_lines(MODULES[name].read_text()) <= MOST
 
