@@ -407,7 +407,7 @@ def test_what_is_no_dataset_is_told_in_one_line(dataset, here, name):
     for file, said in (
         ("nope.nc", "nope.nc: there is no such file; name a dataset"),
         (".", ".: is a folder; name a dataset"),
-        ("scene.toml", "scene.toml: is not a netCDF file, or is cut short; run the scenario again"),
+        ("scene.toml", "scene.toml: is a scenario; name the dataset that `sim run` makes of it"),
         ("cut.nc", "cut.nc: is not a netCDF file, or is cut short; run the scenario again"),
         ("stub.nc", "stub.nc: is not a netCDF file, or is cut short; run the scenario again"),
         ("empty.nc", "empty.nc: is not a netCDF file, or is cut short; run the scenario again"),

@@ -39,7 +39,8 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
             file = CachingFileManager(netCDF4.Dataset, os.path.abspath(path), mode="r", lock=HDF5)  # type: ignore[type-var]
             dataset = xr.open_dataset(NetCDF4DataStore(file, lock=HDF5))
     except (OSError, ValueError, RuntimeError):
-        raise BadInput([f"{path}: {BROKEN}"]) from None
+        said = "is a scenario; name the dataset that `sim run` makes of it" if str(path).endswith(".toml") else BROKEN
+        raise BadInput([f"{path}: {said}"]) from None
     if "sim_version" not in dataset.attrs:
         dataset.close()
         raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])

@@ -177,8 +177,8 @@ def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
     if needed is not None and needed > reach:
         raise PydanticCustomError(
             "grid_too_coarse",
-            "the shortest wavelength needs at least {needed} points, not {points}; give more points, a "
-            "longer shortest wavelength or a smaller cell",
+            "the shortest wavelength needs at least {needed} points, not {points}; give more points or "
+            "leave them out, a longer shortest wavelength or a smaller cell",
             {"needed": 2 * needed + 1, "points": points},
         )
     return (reach if needed is None else needed), points

@@ -468,8 +468,8 @@ def banded(spectrum=SPECTRUM, **keys):
         ),
         (
             lambda: scene(shear=banded(points=8)),
-            "the shortest wavelength needs at least 9 points, not 8; give more points, a longer shortest wavelength "
-            "or a smaller cell",
+            "the shortest wavelength needs at least 9 points, not 8; give more points or leave them out, a longer "
+            "shortest wavelength or a smaller cell",
         ),
         (
             lambda: scene(shear=banded(Band(1e5, longest=1e-3, shortest=0.9e-3))),
