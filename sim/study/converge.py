@@ -99,7 +99,6 @@ class _Study:
         self.terms = [cell_gammas(base), base.process.gammas]
         self.terms += [row.scenario.process.gammas for row in self.of("shear")]
         self.terms += [cell_gammas(base, count) for count in grids]
-        self.began = time.process_time()
         self.walk = Walk.of(base, self.terms)
         #: The run with exact bonds, once ``judge_bonds`` has found it.
         self.exact = self.walk
@@ -157,6 +156,7 @@ class _Study:
         ratios = [ratio for ratio in (4.0, 2.0) if not self.base.clock.stride % round(ratio)] + [1.0]
         found: list[tuple[Row, Array]] = []
         rest, agree, late = np.zeros(self.yard.shape), False, False
+        end = time.process_time() + seconds  # what has run before may have compiled
         while ratios or not (late or (agree and len(found) > 2) or found[-1][0].ratio <= _FINEST):
             began = time.process_time()
             row = at_step(self.base, ratios.pop(0) if ratios else 0.5 * found[-1][0].ratio)
@@ -166,7 +166,7 @@ class _Study:
             if len(found) > 1:
                 rest = np.fmax(0.5 * rest, self._largest(found[-1][1] - found[-2][1]))
             if row.ratio < 1.0:
-                late = time.process_time() + 2.0 * (time.process_time() - began) > self.began + seconds
+                late = time.process_time() + 2.0 * (time.process_time() - began) > end
                 agree = bool(np.max(rest) <= _FINE * tolerance)
         for row, statistics in found:
             row.error = self._largest(statistics - found[-1][1]) + rest
@@ -252,13 +252,13 @@ def _over(numbers: Array, yard: Array) -> Array:
 
 
 def _sampled_error(deviation: Array, sem: Array, least: float) -> Array:
-    """Largest deviation of at least so many standard errors, and what it may be at most, shape (2, quantities, 3)."""
+    """Largest deviation of at least so many standard errors and its bound, shape (2, quantities, statistics)."""
     size = np.abs(deviation)
     return np.stack([np.fmax.reduce(np.where(size >= least * sem, size, 0.0)), np.fmax.reduce(size + _SURE * sem)])
 
 
 def _yardsticks(statistics: Array) -> Array:
-    """Units of errors, shape (quantities, 3): largest values of a run, nan of a spread that is not known."""
+    """Units of errors, shape (quantities, statistics): largest values of a run, nan of a spread that is not known."""
     yard = np.max(np.abs(statistics), axis=0)
     yard[:2, 1] = yard[:2, 0]
     yard[:, 2] = yard[2, 2] if yard[2, 2] > 0.0 else 1.0
