@@ -16,7 +16,7 @@ from typing import Any, cast
 import netCDF4
 import numpy as np
 
-from sim.engine import State, march, pack
+from sim.engine import State, march
 from sim.ensemble.netcdf import MemoryFile, moments, write_dataset
 from sim.ensemble.part_files import MemoryParts, PartFiles, Parts
 from sim.ensemble.plan import Plan, part_name, work
@@ -105,7 +105,7 @@ def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None
 def _record(
     plan: Plan, point: Scenario, members: np.ndarray, states: Iterator[State], records: range, progress: Progress | None
 ) -> dict[str, np.ndarray]:
-    """One part: every variable over a stretch of records, the maps in it, and the state at its end."""
+    """One part: every variable over a stretch of records and the maps in it."""
     rows = {one.name: np.empty((len(members) if plan.varies(one) else 1, len(records))) for one in plan.variables}
     maps: dict[str, np.ndarray] = {}
     clock, times = point.clock, sorted(point.record.maps)
@@ -129,7 +129,7 @@ def _record(
             rows[one.name] = np.broadcast_to(one.read(point, state), len(members) if plan.varies(one) else 1)
     if not plan.scenario.record.per_member:
         rows |= {one.name: moments(rows[one.name]) for one in recorded if plan.varies(one)}
-    return rows | maps | {f"state.{name}": array for name, array in pack(state).items()}
+    return rows | maps
 
 
 def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:

@@ -49,7 +49,6 @@ _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description=
 class _Controlled:
     """A contact under a load, an indentation, or a displacement with a stiffness."""
 
-    state_class: ClassVar[type[Touching]] = Touching
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
     #: Whether the edge takes time to reach equilibrium.

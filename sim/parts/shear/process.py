@@ -40,7 +40,6 @@ class SmoothProcess:
     energy: float
     amplitude: Amplitude
     pairs: ClassVar[int] = 0
-    state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
@@ -65,7 +64,6 @@ class Renewing:
     amplitude: Amplitude
     #: Where a mode has the rate of each number of the state [rad/m].
     wavenumber: Array
-    state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
     def _empty(self, members: int) -> Array:
         """Numbers of a state without any fluctuation."""
