@@ -9,7 +9,7 @@ lost when the run is killed, a renamed part is not.
 import hashlib
 import importlib.metadata
 import json
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import netCDF4
 import numpy as np
@@ -33,38 +33,25 @@ _STATISTICS = {
 }
 
 
-class MemoryVariable(NamedTuple):
-    """A variable in memory, written to as a variable of a netCDF file is."""
-
-    dimensions: tuple[str, ...]
-    values: np.ndarray
-    attributes: dict[str, Any]
-
-    def __setitem__(self, place: Any, values: Any) -> None:
-        self.values[place] = values
-
-    def set_var_chunk_cache(self, size: int) -> None:
-        """Nothing: the values are in memory."""
-
-    def setncatts(self, attributes: dict[str, Any]) -> None:
-        self.attributes.update(attributes)
-
-
 class MemoryFile:
-    """A dataset in memory, filled by the calls that fill a netCDF file; no HDF5 behind it."""
+    """A dataset in memory, filled by the calls that fill a netCDF file; no HDF5 behind it.
+
+    ``variables`` are dimensions, values and attributes by name.
+    """
 
     def __init__(self) -> None:
         self.sizes: dict[str, int] = {}
-        self.variables: dict[str, MemoryVariable] = {}
+        self.variables: dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]] = {}
         self.attributes: dict[str, Any] = {}
 
     def createDimension(self, name: str, size: int) -> None:
         self.sizes[name] = size
 
-    def createVariable(self, name: str, kind: Any, dimensions: tuple[str, ...], **storage: Any) -> MemoryVariable:
+    def add(self, name: str, kind: Any, dimensions: tuple[str, ...], attributes: dict[str, Any]) -> np.ndarray:
+        """Values of a new variable, to be filled."""
         values = np.empty([self.sizes[size] for size in dimensions], object if kind is str else kind)
-        self.variables[name] = MemoryVariable(dimensions, values, {})
-        return self.variables[name]
+        self.variables[name] = dimensions, values, attributes
+        return values
 
     def setncatts(self, attributes: dict[str, Any]) -> None:
         self.attributes.update(attributes)
@@ -104,12 +91,15 @@ def _variable(
     file: File, name: str, kind: Any, dimensions: tuple[str, ...], unit: str, long_name: str,
     symbol: str = "", chunks: tuple[int, ...] | None = None, **more: Any,
 ) -> Any:  # fmt: skip
+    attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
+    attributes = {key: value for key, value in attributes.items() if not isinstance(value, str) or value}
+    if isinstance(file, MemoryFile):
+        return file.add(name, kind, dimensions, attributes)
     packed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True} if dimensions and kind is not str else {}
     variable = file.createVariable(name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed)
     if chunks:
         variable.set_var_chunk_cache(_CHUNK_CACHE)
-    attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
-    variable.setncatts({key: value for key, value in attributes.items() if not isinstance(value, str) or value})
+    variable.setncatts(attributes)
     return variable
 
 

@@ -57,7 +57,7 @@ def preview(scenario: Scenario) -> str:
         "quantities in SI": _quantities(plan.points),
         "contact at rest": _contact(plan.points),
         "fluctuations": _fluctuations(some),
-        "notes": [(text,) for text in _remarks(some)],
+        "notes": [(text,) for text in remarks(plan)],
         "the run": _run(plan, some),
     }
     return "\n\n".join([scenario.name, *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows)])
@@ -65,11 +65,7 @@ def preview(scenario: Scenario) -> str:
 
 def remarks(plan: Plan) -> list[str]:
     """What is to be known before a run, one sentence each."""
-    return _remarks(_spread(plan.points))
-
-
-def _remarks(points: Sequence[Scenario]) -> list[str]:
-    return list(dict.fromkeys(text for point in points for text in point.remarks()))
+    return list(dict.fromkeys(text for point in _spread(plan.points) for text in point.remarks()))
 
 
 def _spread(points: Sequence[Scenario]) -> list[Scenario]:

@@ -4,17 +4,15 @@ import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 from scipy import special
 
 from sim.laws.disc import energy_factors
-from sim.spectrum.family import Factors
+from sim.spectrum.family import Array, Factors
 from sim.spectrum.finite_contact import disc_sums
 from sim.spectrum.radial import Isotropic
 from sim.units.quantity import Quantity
-
-Array = NDArray[np.float64]
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(80)
 _PHASE, _WEIGHTS = 0.25 * math.pi * (1 + _NODES), 0.25 * math.pi * _WEIGHTS

@@ -15,7 +15,7 @@ import math
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
@@ -23,15 +23,13 @@ from scipy import special
 
 from sim.laws.halfspace import angular_compliance, ripple_energy
 from sim.spectrum.bond_made import BondMade
-from sim.spectrum.family import Factors
-from sim.spectrum.finite_contact import wave_sums
+from sim.spectrum.family import Array, Factors
+from sim.spectrum.finite_contact import Waves
 from sim.spectrum.measured import Measured
 from sim.spectrum.pixels import gaussian_boxes
 from sim.spectrum.radial import Isotropic, PowerLaws, Rowed
 from sim.spectrum.tabulated import Tabulated
 from sim.units.quantity import Quantity
-
-Array = NDArray[np.float64]
 
 Rms = Annotated[float, Quantity("Pa", "root mean square of the shear stress", "σ", above=0)]
 Length = Annotated[float, Quantity("m", "correlation length", "ξ", above=0)]
@@ -104,6 +102,17 @@ class Ripple:
         mean, skew = factors(2 * q * radii)
         level = 2 * math.pi**2 * self.amplitude**2 / q
         return level * mean, level * math.cos(2 * self.angle) * skew
+
+
+class _OfRms:
+    """Attributes of spectra whose key ``rms`` is all that their variance depends on."""
+
+    rms: float
+
+    @property
+    def variance(self) -> float:
+        """Mean square of the stress [Pa²]."""
+        return self.rms**2
 
 
 def _ordered(*wavelengths: tuple[str, float]) -> None:
@@ -209,7 +218,7 @@ class SelfAffine(Rowed):
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Gaussian(Isotropic):
+class Gaussian(_OfRms, Isotropic):
     """Correlation ``σ² exp(-r²/ξ²)``: smooth patches of one size.
 
     Parameters
@@ -232,11 +241,6 @@ class Gaussian(Isotropic):
     rms: Rms
     length: Length
     model: Literal["gaussian"] = "gaussian"
-
-    @property
-    def variance(self) -> float:
-        """Mean square of the stress [Pa²]."""
-        return self.rms**2
 
     def reach(self, radius: float) -> tuple[float, float]:
         """Wavenumbers [rad/m] between which the density varies."""
@@ -264,7 +268,7 @@ class Gaussian(Isotropic):
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class VonKarman(Isotropic):
+class VonKarman(_OfRms, Isotropic):
     """The von Kármán (Matérn) family; H = 1/2 is the correlation ``σ² exp(-r/ξ)``.
 
     Parameters
@@ -290,11 +294,6 @@ class VonKarman(Isotropic):
     length: Length
     hurst: Annotated[float, Quantity("1", "Hurst exponent", "H", above=0, at_most=1)]
     model: Literal["von_karman"] = "von_karman"
-
-    @property
-    def variance(self) -> float:
-        """Mean square of the stress [Pa²]."""
-        return self.rms**2
 
     def reach(self, radius: float) -> tuple[float, float]:
         """Wavenumbers [rad/m] between which the density varies and a disc of this radius [m] stores energy."""
@@ -324,7 +323,7 @@ class VonKarman(Isotropic):
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class AnisotropicGaussian:
+class AnisotropicGaussian(_OfRms, Waves):
     """Correlation ``σ² exp(-x²/a² - y²/b²)`` along two axes, turned by an angle.
 
     Parameters
@@ -356,16 +355,6 @@ class AnisotropicGaussian:
     length_y: Length
     angle: Angle = 0.0
     model: Literal["anisotropic_gaussian"] = "anisotropic_gaussian"
-
-    support: ClassVar[tuple[float, float]] = (0.0, math.inf)
-    breaks: ClassVar[Array] = np.empty(0)
-    wavevector: ClassVar[None] = None
-    bond_made: ClassVar[bool] = False
-
-    @property
-    def variance(self) -> float:
-        """Mean square of the stress [Pa²]."""
-        return self.rms**2
 
     def density(self, qx: ArrayLike, qy: ArrayLike) -> Array:
         """Power spectral density C at wavevector (qx, qy) [rad/m], in Pa² m²."""
@@ -406,10 +395,6 @@ class AnisotropicGaussian:
         level = self.variance * self.length_x * self.length_y / (4 * math.pi)
         edges = step * (np.arange(-reach, reach + 2) - 0.5)
         return level * gaussian_boxes(self._form, edges, edges[reach:])
-
-    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
-        """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
-        return wave_sums(self, factors, radii)
 
 
 #: Any spectrum, by the key ``model`` of a scenario.

@@ -12,18 +12,16 @@ the overlap integral over the autocorrelation in another order, and one-dimensio
 import math
 from collections.abc import Callable
 from functools import cached_property
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy import special
 from scipy.interpolate import CubicSpline
 
 from sim.laws.disc import energy_factors, marginal_factors
 from sim.laws.halfspace import angular_compliance
-from sim.spectrum.family import Factors, Family
-
-Array = NDArray[np.float64]
+from sim.spectrum.family import Array, Factors, Family
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 
@@ -39,20 +37,47 @@ _POINTS, _DECADES = 513, 4
 
 
 class Waves(Protocol):
-    """What a quadrature over wavenumbers reads of a spectrum."""
+    """Base of the families (``sim.spectrum.family``) with a density, whose integrals over discs are quadratures."""
+
+    wavevector: ClassVar[None] = None
+    bond_made: ClassVar[bool] = False
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Wavenumbers [rad/m] between which the density may differ from zero."""
+        return 0.0, math.inf
 
     @property
     def breaks(self) -> Array:
         """Wavenumbers [rad/m] where the density jumps or kinks."""
+        return np.empty(0)
 
     def reach(self, radius: float) -> tuple[float, float]:
         """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
+        return self.support
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
         """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
 
     def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
         """Mean elastic energy per area of an infinite half-space [J/m²]."""
+
+    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
+        """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
+
+        def one(radius: float) -> tuple[float, float]:
+            q, step = _nodes(self, radius)
+            x = 2 * radius * q
+            followed = _window(self, radius, x)
+            mean, skew = factors(x)
+            # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
+            limit = 4.0 / x if factors is energy_factors else 2.0 / x
+            mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
+            skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
+            level, lean = self.harmonics(q)
+            return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
+
+        return disc_sums(self, radii, one)
 
 
 def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
@@ -152,24 +177,6 @@ def disc_sums(spectrum: Waves, radii: Array, one: Callable[[float], tuple[float,
 
     mean, skew = np.array([sums(radius) for radius in radii.ravel().tolist()]).reshape(-1, 2).T
     return mean.reshape(radii.shape), skew.reshape(radii.shape)
-
-
-def wave_sums(spectrum: Waves, factors: Factors, radii: Array) -> tuple[Array, Array]:
-    """``∫ C0 P dq`` and ``∫ C2 S dq`` by quadrature over wavenumbers, for discs of given radii [m]."""
-
-    def one(radius: float) -> tuple[float, float]:
-        q, step = _nodes(spectrum, radius)
-        x = 2 * radius * q
-        followed = _window(spectrum, radius, x)
-        mean, skew = factors(x)
-        # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
-        limit = 4.0 / x if factors is energy_factors else 2.0 / x
-        mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
-        skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
-        level, lean = spectrum.harmonics(q)
-        return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
-
-    return disc_sums(spectrum, radii, one)
 
 
 def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:

@@ -7,29 +7,27 @@ Convention: ``C(q) = ∫ d²x <τ1(x) τ1(0)> e^{-iq·x}`` in Pa² m², q in rad
 import functools
 import math
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 
 from sim.numerics.files import HDF5
 from sim.numerics.grid import Grid
+from sim.spectrum.family import Array
 from sim.spectrum.periodogram import periodogram, radial_average
-from sim.spectrum.radial import PowerLaws, Rowed
-from sim.spectrum.tabulated import Densities, Wavenumbers, by_name, check_rows, file_fault
+from sim.spectrum.radial import PowerLaws
+from sim.spectrum.tabulated import Densities, FromFile, Wavenumbers, by_name, file_fault
 from sim.units.quantity import Quantity
 from sim.units.table import file_path, file_text, matrix
-
-Array = NDArray[np.float64]
 
 _STRESS = Quantity("Pa", "shear stress", "τ1")
 _SPACING = Quantity("m", "distance between neighbouring points of the map", "h", above=0)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Measured(Rowed):
+class Measured(FromFile):
     """The radially averaged spectrum of measured stress maps, used as a table.
 
     Parameters
@@ -89,11 +87,6 @@ class Measured(Rowed):
         except (OSError, ValueError, RuntimeError) as fault:
             raise file_fault(name, fault) from None
         return {**values, "spacing": spacing, "wavenumbers": q.tolist(), "densities": density.tolist()}
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        check_rows(self.wavenumbers, self.densities)
-        return self
 
     @functools.cached_property
     def rows(self) -> PowerLaws:

@@ -4,11 +4,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.numerics.grid import Grid
-
-Array = NDArray[np.float64]
+from sim.spectrum.family import Array
 
 
 def periodogram(field: Array, cell: float, window: str = "none") -> Array:

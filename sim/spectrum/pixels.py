@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic_core import PydanticCustomError
 from scipy import special
 
-Array = NDArray[np.float64]
+from sim.spectrum.family import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
 

@@ -7,24 +7,19 @@ is a chain of power laws, whose integrals are closed forms.
 import functools
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sim.laws.halfspace import angular_compliance
-from sim.spectrum.family import Factors
-from sim.spectrum.finite_contact import Waves, wave_sums
+from sim.spectrum.family import Array
+from sim.spectrum.finite_contact import Waves
 from sim.spectrum.pixels import Radial, radial_quadrant
 
-Array = NDArray[np.float64]
 
-
-class Isotropic(Radial, Waves, Protocol):
-    """Base of the families (``sim.spectrum.family``) whose density depends on the length of the wavevector only."""
-
-    wavevector: ClassVar[None] = None
-    bond_made: ClassVar[bool] = False
+class Isotropic(Waves, Radial, Protocol):
+    """Base of the families whose density depends on the length of the wavevector only."""
 
     @property
     def line_integral(self) -> float:
@@ -32,20 +27,6 @@ class Isotropic(Radial, Waves, Protocol):
 
     def radial_density(self, q: ArrayLike) -> Array:
         """Density C at wavenumber q [rad/m], in Pa² m²; zero outside ``support``."""
-
-    @property
-    def support(self) -> tuple[float, float]:
-        """Wavenumbers [rad/m] between which the density may differ from zero."""
-        return 0.0, math.inf
-
-    @property
-    def breaks(self) -> Array:
-        """Wavenumbers [rad/m] where the density jumps or kinks."""
-        return np.empty(0)
-
-    def reach(self, radius: float) -> tuple[float, float]:
-        """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
-        return self.support
 
     def harmonics(self, q: Array) -> tuple[Array, Array]:
         """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
@@ -68,10 +49,6 @@ class Isotropic(Radial, Waves, Protocol):
         """Variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""
         quadrant = radial_quadrant(self, step, reach)
         return np.concatenate([quadrant[:0:-1], quadrant])
-
-    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
-        """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
-        return wave_sums(self, factors, radii)
 
 
 def _decay(x: Array) -> Array:

@@ -2,7 +2,7 @@
 
 import functools
 import math
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Protocol, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
@@ -23,17 +23,27 @@ _Normalization = Annotated[Literal["in_integral", "in_density"], Field(descripti
 NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
 
 
-def check_rows(wavenumbers: tuple[float, ...], densities: tuple[float, ...]) -> None:
-    """Refuse rows that are no spectrum."""
-    rows, falls = (len(wavenumbers), len(densities)), np.flatnonzero(np.diff(wavenumbers) <= 0.0)
-    if rows[0] != rows[1] or rows[0] < 2:
-        said = "a spectrum needs at least two rows and as many densities as wavenumbers"
-        raise PydanticCustomError("table_too_short", f"{said}, not {rows[0]} and {rows[1]}")
-    if len(falls):
-        said = f"the wavenumbers must increase from row to row, but row {falls[0] + 2} does not exceed the one before"
-        raise PydanticCustomError("table_not_increasing", f"{said}; sort the rows and merge equal ones")
-    if not any(densities):
-        raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
+class FromFile(Rowed, Protocol):
+    """Base of spectra whose rows may be read from a file."""
+
+    wavenumbers: Wavenumbers
+    densities: Densities
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse rows that are no spectrum."""
+        rows, falls = (len(self.wavenumbers), len(self.densities)), np.flatnonzero(np.diff(self.wavenumbers) <= 0.0)
+        if rows[0] != rows[1] or rows[0] < 2:
+            said = "a spectrum needs at least two rows and as many densities as wavenumbers"
+            raise PydanticCustomError("table_too_short", f"{said}, not {rows[0]} and {rows[1]}")
+        if len(falls):
+            said = (
+                f"the wavenumbers must increase from row to row, but row {falls[0] + 2} does not exceed the one before"
+            )
+            raise PydanticCustomError("table_not_increasing", f"{said}; sort the rows and merge equal ones")
+        if not any(self.densities):
+            raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
+        return self
 
 
 def by_name(values: Any, names: tuple[str, ...]) -> Any:
@@ -54,7 +64,7 @@ def file_fault(name: str, fault: Exception) -> PydanticCustomError:
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Tabulated(Rowed):
+class Tabulated(FromFile):
     """A radial density given by rows: power laws between them, zero outside.
 
     Parameters
@@ -99,11 +109,6 @@ class Tabulated(Rowed):
         except TableError as fault:
             raise file_fault(name, fault) from None
         return {**values, "wavenumbers": table["q"].tolist(), "densities": table["C"].tolist()}
-
-    @model_validator(mode="after")
-    def _check(self) -> Self:
-        check_rows(self.wavenumbers, self.densities)
-        return self
 
     @functools.cached_property
     def rows(self) -> PowerLaws:

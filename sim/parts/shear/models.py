@@ -352,13 +352,9 @@ class Auto:
         """
         if self.correlation is None and maps:
             raise PydanticCustomError("maps_need_memory", "maps change in time: give shear.correlation")
-        if self.correlation is None:
-            return Mean(self.spectrum, self.amplitude, self.paid_by_adhesion, self.contact)
-        field = self.spectrum, self.correlation, self.amplitude, self.cell, self.points
-        rest = self.mode_amplitudes, self.paid_by_adhesion, self.contact
-        if maps or self.spectrum.bond_made:
-            return Mapped(*field, *rest) if maps else Modal(*field, *rest)
-        return Banded(*field, *rest, tolerance=self.tolerance)
+        fitting = Modal if self.spectrum.bond_made else Banded
+        kind: type[Mean | Banded | Modal] = Mean if self.correlation is None else Mapped if maps else fitting
+        return kind(**{key.name: getattr(self, key.name) for key in fields(kind) if key.name != "model"})
 
     def why(self, maps: bool) -> str:
         """The reason for the choice, in words."""
