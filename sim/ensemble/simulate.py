@@ -1,6 +1,5 @@
 """Running a scenario: its sweep, its members, in memory or onto the disk."""
 
-import builtins
 import contextlib
 import datetime
 import fcntl
@@ -174,7 +173,7 @@ def _write_file(target: Path, folder: Path, plan: Plan, parts: Parts) -> None:
     beside = folder / "dataset.nc"
     with HDF5, NETCDF4_PYTHON_LOCK, netCDF4.Dataset(beside, "w", format="NETCDF4") as file:
         write_dataset(file, plan, parts)
-    with builtins.open(beside, "rb") as written:
+    with open(beside, "rb") as written:
         os.fsync(written.fileno())
     os.replace(beside, target)
     sync_folder(target.parent)
@@ -186,8 +185,8 @@ def _held(target: Path) -> Iterator[Path]:
     folder = target.with_name(f"{target.name}.parts")
     with explained(target.parent):
         folder.mkdir(exist_ok=True)
-        lock = builtins.open(folder / "lock", "w")  # noqa: SIM115  held for the whole run
-    try:
+        lock = open(folder / "lock", "w")  # noqa: SIM115  held for the whole run
+    with lock:
         try:
             fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError:
@@ -198,8 +197,6 @@ def _held(target: Path) -> Iterator[Path]:
             yield folder
         finally:
             shutil.rmtree(folder, ignore_errors=True)
-    finally:
-        lock.close()
 
 
 def write_log(target: Path, began: float, arguments: list[str]) -> None:
@@ -211,7 +208,7 @@ def write_log(target: Path, began: float, arguments: list[str]) -> None:
         "platform": platform.platform(),
         "arguments": arguments,
     }
-    with explained(target.parent), builtins.open(f"{target}.log", "a", encoding="utf-8") as log:
+    with explained(target.parent), open(f"{target}.log", "a", encoding="utf-8") as log:
         log.write(json.dumps(entry) + "\n")
 
 

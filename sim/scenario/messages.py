@@ -25,7 +25,7 @@ _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")
 _MISSING = ("missing", "missing_argument")
 _NO_TABLE = ("dataclass_type", "dataclass_exact_type", "model_attributes_type", "dict_type", "union_tag_not_found")
 _BUILT_IN = frozenset(get_args(core_schema.ErrorType)) - {"value_error"}
-_FILES = ("table", "bad_table", "no_table", "file_unreadable", "file_not_text")
+_FILES = ("bad_table", "no_table", "file_unreadable", "file_not_text")
 _EXCLUSIVE = ("control", "one_modulus")
 #: What a value must be, by the beginning of the kind of its error.
 _KINDS = {
@@ -77,6 +77,11 @@ def faults(root: type, invalid: ValidationError, document: dict[str, Any]) -> li
     found = [_unknown(root, error, document) if error["type"] in _UNKNOWN else _worded(root, error) for error in errors]
     meant = {fault.near for fault in found} | {fault.path for fault in found if fault.kind != "missing"}
     found = [fault for fault in found if fault.kind != "missing" or fault.path not in meant]
+    return first_at_each(found)
+
+
+def first_at_each(found: list[Fault]) -> list[Fault]:
+    """One fault for each place, the first."""
     return list({fault.path: fault for fault in reversed(found)}.values())[::-1]
 
 

@@ -12,7 +12,7 @@ from pydantic import Field, TypeAdapter, ValidationError
 
 from sim.scenario.checks import CHECKED, faults_across
 from sim.scenario.declared import with_models
-from sim.scenario.messages import Fault, Place, dotted, faults, shown
+from sim.scenario.messages import Fault, Place, dotted, faults, first_at_each, shown
 from sim.scenario.scenario import Scenario
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import Axis, set_key, sweep_axes
@@ -88,7 +88,7 @@ def _validated(
         found = strange + faults(Scenario, invalid, document)
         if not any(error["type"] == "across" for error in invalid.errors(include_url=False)):
             found += _faults_between_sound_parts(document, files)
-        return None, list({fault.path: fault for fault in reversed(found)}.values())[::-1]
+        return None, first_at_each(found)
     return scenario, strange
 
 

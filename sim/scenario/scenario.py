@@ -19,10 +19,8 @@ from sim.parts.contact.control import Bodies
 from sim.parts.drive import Drive
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
-from sim.parts.shear import Model, Shear, Uniform
-from sim.parts.shear.banded import BandedProcess
-from sim.parts.shear.modal import MappedProcess, ModalProcess
-from sim.parts.shear.process import SmoothProcess
+from sim.parts.shear import Model, Process, Shear, Uniform
+from sim.parts.shear.modal import MappedProcess
 from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.declared import as_html, entries, with_models
@@ -107,7 +105,8 @@ class Scenario:
     def origin(self) -> Source:
         """The file that describes this scenario; of one that was changed in Python only the files it has read."""
         source = self.source
-        return source if source.describes(self._parts) else Source(path=source.path, files=source.files)
+        described = bool(source.text) and source.parts == self._parts
+        return source if described else Source(path=source.path, files=source.files)
 
     @cached_property
     def rest_radius(self) -> float:
@@ -136,11 +135,14 @@ class Scenario:
         return {part: reason for part, reason in why.items() if reason}
 
     @cached_property
-    def process(self) -> SmoothProcess | BandedProcess | ModalProcess:
+    def process(self) -> Process:
         """The shear part on this solid and cell."""
-        shear_modulus, poisson_ratio = self.solid.effective
-        cell = math.sqrt(math.pi) * self.rest_radius
-        return self.fluctuations.process(shear_modulus, poisson_ratio, cell)
+        return self.fluctuations.process(*self.solid.effective, self._square)
+
+    @property
+    def _square(self) -> float:
+        """Side of the square that is as large as the contact at rest [m]."""
+        return math.sqrt(math.pi) * self.rest_radius
 
     @property
     def map_size(self) -> tuple[float, int] | None:
@@ -171,16 +173,8 @@ class Scenario:
     def setting(self) -> Setting:
         """Constants by which parts judge themselves."""
         strength = float(self.population.steady(np.zeros(1)).strength[0])
-        return Setting(
-            *self.solid.effective,
-            self.solid.contact_modulus,
-            self.sphere.radius,
-            self.adhesion.work,
-            strength,
-            self.rest_radius,
-            math.sqrt(math.pi) * self.rest_radius,
-            self.times,
-        )
+        bodies = *self.solid.effective, self.solid.contact_modulus, self.sphere.radius
+        return Setting(*bodies, self.adhesion.work, strength, self.rest_radius, self._square, self.times)
 
     @property
     def given(self) -> tuple[Drive, Bonds, Shear, Contact]:

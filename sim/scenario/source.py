@@ -22,10 +22,6 @@ class Source:
     files: dict[str, str] = field(default_factory=dict)
     parts: dict[str, Any] = field(default_factory=dict)
 
-    def describes(self, parts: dict[str, Any]) -> bool:
-        """Whether text and overrides give a scenario of these parts."""
-        return bool(self.text) and self.parts == parts
-
     def changed(self, values: dict[str, Any]) -> "Source":
         """The source of the same text with more overrides, which replace those of the keys inside theirs."""
         inside = tuple(f"{key}." for key in values)

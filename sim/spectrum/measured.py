@@ -18,9 +18,9 @@ from sim.numerics.grid import Grid
 from sim.spectrum.family import Array
 from sim.spectrum.periodogram import periodogram, radial_average
 from sim.spectrum.radial import PowerLaws
-from sim.spectrum.tabulated import Densities, FromFile, Wavenumbers, by_name, file_fault
+from sim.spectrum.tabulated import Densities, FromFile, Wavenumbers, by_name
 from sim.units.quantity import Quantity
-from sim.units.table import file_path, file_text, matrix
+from sim.units.table import file_fault, file_path, file_text, matrix
 
 _STRESS = Quantity("Pa", "shear stress", "τ1")
 _SPACING = Quantity("m", "distance between neighbouring points of the map", "h", above=0)

@@ -11,7 +11,7 @@ from pydantic_core import ArgsKwargs, PydanticCustomError
 
 from sim.spectrum.radial import PowerLaws, Rowed
 from sim.units.quantity import Quantity
-from sim.units.table import TableError, columns, file_text
+from sim.units.table import file_columns
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
 _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0)
@@ -37,10 +37,8 @@ class FromFile(Rowed, Protocol):
             said = "a spectrum needs at least two rows and as many densities as wavenumbers"
             raise PydanticCustomError("table_too_short", f"{said}, not {rows[0]} and {rows[1]}")
         if len(falls):
-            said = (
-                f"the wavenumbers must increase from row to row, but row {falls[0] + 2} does not exceed the one before"
-            )
-            raise PydanticCustomError("table_not_increasing", f"{said}; sort the rows and merge equal ones")
+            said = f"the wavenumbers must increase from row to row, but row {falls[0] + 2} does not exceed the one"
+            raise PydanticCustomError("table_not_increasing", f"{said} before; sort the rows and merge equal ones")
         if not any(self.densities):
             raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
         return self
@@ -55,12 +53,6 @@ def by_name(values: Any, names: tuple[str, ...]) -> Any:
     if not isinstance(values, dict):
         return values
     return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}
-
-
-def file_fault(name: str, fault: Exception) -> PydanticCustomError:
-    """A fault of what a file holds; of libraries' messages the first line."""
-    reason = str(fault).partition("\n")[0]
-    return PydanticCustomError("bad_table", "{file}: {reason}", {"file": name, "reason": reason})
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -104,10 +96,7 @@ class Tabulated(FromFile):
         name = values.get("file")
         if not name or not isinstance(name, str):
             raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
-        try:
-            table = columns(file_text(name, info.context), {"q": _WAVENUMBER, "C": _DENSITY})
-        except TableError as fault:
-            raise file_fault(name, fault) from None
+        table = file_columns(name, info.context, {"q": _WAVENUMBER, "C": _DENSITY})
         return {**values, "wavenumbers": table["q"].tolist(), "densities": table["C"].tolist()}
 
     @functools.cached_property

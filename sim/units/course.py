@@ -15,7 +15,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import Quantity
-from sim.units.table import TableError, columns, file_text
+from sim.units.table import file_columns
 
 _TIME = Quantity("s", "time", "t")
 _CYCLES = Quantity("1", "cycles there and back; 0: one way", at_least=0, at_most=10**6, whole=True)
@@ -92,10 +92,8 @@ class Course:
     @model_validator(mode="after")
     def _log_needs_one_sign(self) -> "Course":
         if self.scale == "log" and self.start * self.stop <= 0.0:
-            raise PydanticCustomError(
-                "log_through_zero",
-                'a logarithmic course cannot reach or pass zero; give two values above zero or scale = "linear"',
-            )
+            said = 'a logarithmic course cannot reach or pass zero; give two values above zero or scale = "linear"'
+            raise PydanticCustomError("log_through_zero", said)
         return self
 
     @property
@@ -180,10 +178,7 @@ class Table:
     def _read_file(cls, given: Any, info: ValidationInfo) -> Any:
         if not isinstance(given, dict) or not isinstance(given.get("file"), str) or "time" in given:
             return given
-        try:
-            found = columns(file_text(given["file"], info.context), {"time": _TIME, cls.column: cls.quantity})
-        except TableError as fault:
-            raise PydanticCustomError("table", "{file}: {said}", {"file": given["file"], "said": str(fault)}) from None
+        found = file_columns(given["file"], info.context, {"time": _TIME, cls.column: cls.quantity})
         return {**given, "time": found["time"], cls.values_in: found[cls.column]}
 
     @model_validator(mode="after")

@@ -204,8 +204,8 @@ class Quantity:
     def _fault(self, kind: str, said: str, **words: str) -> PydanticCustomError:
         """A fault in these words, with those about the quantity itself filled in."""
         pure = self.unit == "1"
-        wanted = "a number" if pure else "a number or text with a unit"
-        own = {"unit": "" if pure else f" {self.unit}", "kind": wanted, "example": self.example, "wanted": self.wanted}
+        own = {"unit": "" if pure else f" {self.unit}", "wanted": "a pure number" if pure else self.unit}
+        own |= {"kind": "a number" if pure else "a number or text with a unit", "example": self.example}
         return PydanticCustomError(kind, said, own | words)
 
     def _integer(self, value: Any) -> int:
@@ -274,11 +274,6 @@ class Quantity:
             said = "is too {size} to be real: {number}{unit}; write for example {example}"
             size = "large" if abs(number) > 1.0 else "small"
             raise self._fault("beyond_measure", said, size=size, number=f"{number:g}")
-
-    @property
-    def wanted(self) -> str:
-        """The unit in words, for messages."""
-        return "a pure number" if self.unit == "1" else self.unit
 
     @property
     def example(self) -> str:

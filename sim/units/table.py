@@ -173,6 +173,20 @@ def file_text(name: str, context: Any) -> str:
         return context["files"].text(name) if context and "files" in context else Path(name).read_text("utf-8")
 
 
+def file_columns(name: str, context: Any, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.float64]]:
+    """Columns of a CSV file that a scenario names; arguments as of ``file_text`` and ``columns``."""
+    try:
+        return columns(file_text(name, context), wanted)
+    except TableError as fault:
+        raise file_fault(name, fault) from None
+
+
+def file_fault(name: str, fault: Exception) -> PydanticCustomError:
+    """A fault of what a file holds; of libraries' messages the first line."""
+    reason = str(fault).partition("\n")[0]
+    return PydanticCustomError("bad_table", "{file}: {reason}", {"file": name, "reason": reason})
+
+
 def file_path(name: str, context: Any) -> Path:
     """Where a file that a scenario names lies; arguments and errors as ``file_text``."""
     with _readable(name):

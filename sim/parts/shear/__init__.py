@@ -2,4 +2,4 @@
 
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.modal import FixedProcess, MappedProcess, ModalProcess
-from sim.parts.shear.models import Auto, Banded, Mapped, Mean, Modal, Model, Shear, Uniform
+from sim.parts.shear.models import Auto, Banded, Mapped, Mean, Modal, Model, Process, Shear, Uniform

@@ -49,7 +49,7 @@ _MOST_WAVES = 1e9
 #: Stored energy over the work of adhesion that is remarked on as implausible.
 _MOST_STORED = 1000.0
 
-_Process = SmoothProcess | BandedProcess | ModalProcess
+Process = SmoothProcess | BandedProcess | ModalProcess
 
 
 class _Model:
@@ -98,7 +98,7 @@ class _Model:
         """The reason for the choice, in words; empty where there is none."""
         return ""
 
-    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> _Process:
+    def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> Process:
         """The process on a given solid, and a cell of this side [m] if none is given."""
         raise NotImplementedError
 

@@ -140,9 +140,8 @@ def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     reach, points = grid_reach(spectrum, cell, points)
     ix, iy, share = half_lattice(spectrum, cell, reach)
     if not len(ix):
-        raise PydanticCustomError(
-            "no_modes", "no wave of the spectrum fits the cell of {cell} m; make the cell longer", {"cell": f"{cell:g}"}
-        )
+        said = f"no wave of the spectrum fits the cell of {cell:g} m; make the cell longer"
+        raise PydanticCustomError("no_modes", said)
     order = np.lexsort((iy, ix, ix**2 + iy**2))
     ix, iy, share = ix[order], iy[order], share[order]
     return _frozen(spectrum, cell, points, ix, iy, step * ix, step * iy, 2 * share)
@@ -167,20 +166,16 @@ def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
     """Largest lattice index below Nyquist and the points of the grid."""
     if points is None:
         if needed is None:
-            raise PydanticCustomError(
-                "points_needed", "the spectrum has no shortest wavelength; give points (such as points = 256)", {}
-            )
+            said = "the spectrum has no shortest wavelength; give points (such as points = 256)"
+            raise PydanticCustomError("points_needed", said)
         points = 2 * (needed + 1)
     elif points < 3:
         raise PydanticCustomError("too_few_points", "points must be at least 3, not {points}", {"points": points})
     reach = (points - 1) // 2
     if needed is not None and needed > reach:
-        raise PydanticCustomError(
-            "grid_too_coarse",
-            "the shortest wavelength needs at least {needed} points, not {points}; give more points or "
-            "leave them out, a longer shortest wavelength or a smaller cell",
-            {"needed": 2 * needed + 1, "points": points},
-        )
+        said = f"the shortest wavelength needs at least {2 * needed + 1} points, not {points}; give more points or"
+        cure = "leave them out, a longer shortest wavelength or a smaller cell"
+        raise PydanticCustomError("grid_too_coarse", f"{said} {cure}")
     return (reach if needed is None else needed), points
 
 
