@@ -13,12 +13,14 @@ from sim.scenario.source import Source
 from sim.units.quantity import Quantity
 
 
+@functools.cache
 def keys(table: type) -> dict[str, FieldInfo]:
     """The keys of a table as they are written in a file, with their declarations."""
     declared: dict[str, FieldInfo] = getattr(table, "__pydantic_fields__", {})
     return {field.alias or name: field for name, field in declared.items() if not field.exclude}
 
 
+@functools.cache
 def model(table: type) -> str | None:
     """The name of a table's model; None where there is only one."""
     return keys(table)["model"].default if "model" in keys(table) else None
@@ -30,6 +32,12 @@ def tables(annotation: Any, tag: str = "") -> dict[str, type]:
     if isinstance(annotation, type) and is_dataclass(annotation):
         return {tag or model(annotation) or "": annotation}
     return {name: table for option in get_args(annotation) for name, table in tables(option, tag).items()}
+
+
+@functools.cache
+def options(table: type) -> dict[str, list[type]]:
+    """The tables that each key of a table admits."""
+    return {key: list(tables(field.annotation).values()) for key, field in keys(table).items()}
 
 
 @functools.cache
@@ -50,15 +58,14 @@ def with_models(table: type, given: Any) -> Any:
     if not isinstance(given, dict):
         return given
     found = dict(given)
-    for key, field in keys(table).items():
-        inner, options = given.get(key), list(tables(field.annotation).values())
+    for key, admitted in options(table).items():
+        inner, simplest = given.get(key), keys(table)[key].default_factory
         if not isinstance(inner, dict):
             continue
-        if len(options) > 1 and "model" not in inner and field.default_factory in options:
-            simplest: Any = field.default_factory
-            others = {word for option in options for word in keys(option)} - keys(simplest).keys()
+        if len(admitted) > 1 and "model" not in inner and isinstance(simplest, type) and simplest in admitted:
+            others = {word for option in admitted for word in keys(option)} - keys(simplest).keys()
             inner = inner if others & inner.keys() else {"model": model(simplest), **inner}
-        chosen = [option for option in options if model(option) == inner.get("model")]
+        chosen = [option for option in admitted if model(option) == inner.get("model")]
         found[key] = with_models(chosen[0], inner) if chosen else inner
     return found
 

@@ -245,6 +245,8 @@ class Scenario:
         BadInput
             If values do not go together, or points would not fit into one dataset.
         """
+        if not self.sweep:
+            return [self]
         values: list[dict[str, Any]] = [{}]
         for axis in self.sweep:
             values = [{**point, **dict(zip(axis.keys, row, strict=True))} for point in values for row in axis.values]

@@ -287,7 +287,7 @@ class RateDependent(_Controlled):
             0.5 * spot,
         )  # fmt: skip
         opens = ~np.isnan(radius) & np.isnan(moved.radius)
-        counts = (self.load is None) | (self._bears(state.radius, works[1], after, bodies) & ~opens)
+        counts = np.full(1, True) if self.load is None else self._bears(state.radius, works[1], after, bodies) & ~opens
         lost = np.where(counts, moved.dissipated, 0.0)
         if touching.any():
             wide = np.fmax(spot, before.radius(np.zeros(1), np.zeros(1), 0.0, bodies))
