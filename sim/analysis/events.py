@@ -45,24 +45,18 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
                 units="J", long_name="energy dissipated by opening and closing, in all", symbol="W"
             )
     with contextlib.suppress(ValueError):
-        cycles = loop_energy(dataset)
-        found = found.merge(cycles.mean("cycle", keep_attrs=True))
+        found = found.merge(loop_energy(dataset).mean("cycle", keep_attrs=True))
     return found
 
 
 def _openings(dataset: xr.Dataset) -> xr.Dataset:
     if "detachment_time" not in dataset:
         return xr.Dataset()
-    latest = dataset["detachment_time"].astype(float)
-    first = latest.fillna(np.inf).min("t")  # the latest opening so far never falls
+    first = dataset["detachment_time"].astype(float).fillna(np.inf).min("t")  # the latest opening so far never falls
     ever = first < np.inf
     text = "time of the first detachment, of the contacts that detached"
-    return xr.Dataset(
-        {
-            "ever_detached": pure(ever.astype(float), "contacts that detached"),
-            "first_detachment": first.where(ever).assign_attrs(units="s", long_name=text, symbol="t_d"),
-        }
-    )
+    first = first.where(ever).assign_attrs(units="s", long_name=text, symbol="t_d")
+    return xr.Dataset({"ever_detached": pure(ever.astype(float), "contacts that detached"), "first_detachment": first})
 
 
 def _masks(dataset: xr.Dataset) -> xr.Dataset:

@@ -43,9 +43,8 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     cycles = _cycles(dataset)
     suffix = "" if "normal_load" in dataset else "_mean"
     going = dataset[f"contact_radius{suffix}"].notnull()
-    load, displacement = (
-        dataset[f"{name}{suffix}"].astype(float).where(going) for name in ("normal_load", "displacement")
-    )
+    held = dataset[[f"normal_load{suffix}", f"displacement{suffix}"]].astype(float).where(going)
+    load, displacement = held.values()
     number = xr.DataArray(np.arange(dataset.sizes["t"]), dims="t")
     done = (0.5 * (load + load.shift(t=1)) * (displacement - displacement.shift(t=1))).where(number > 0, 0.0)
     count = int(cycles.max())

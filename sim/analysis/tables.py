@@ -78,12 +78,6 @@ _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time 
 #: Shares below it are nothing.
 _ROUNDING = 1e-13
 
-#: Observables shown in percent.
-_PERCENT = (
-    ("area_ratio", "lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress", "lost_to_lag")
-    + ("fraction_detached", "fraction_masked", "time_masked", "ever_detached")
-)  # fmt: skip
-
 
 def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """The statistics in about a dozen rows for the terminal.
@@ -154,9 +148,8 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         how much it dissipated, and the friction peak of a start or a ramp.
     """
     found = summary(events(dataset))
-    counts = _thinned({name: dataset.sizes[name] for name in sweep_dims(dataset)}, rows)
-    points = _points(dataset.sizes, counts)
-    shown = _shown(found, points, [column for column in _EVENTS if _of_drive(dataset, column.name)])
+    points = _points(dataset.sizes, _thinned(dataset, rows))
+    shown = _shown(found, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
     cells = _places(dataset, points)
     for heading, texts in shown.items():
         cells[heading] = texts
@@ -197,10 +190,10 @@ def _shown(found: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
         if f"{name}_mean" not in found:
             continue
         mean, sem = (_at(found.get(f"{name}_{kind}"), points) for kind in ("mean", "sem"))
-        if name in _PERCENT:  # differences of areas leave rounding behind
-            mean = np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
+        unit = found[f"{name}_mean"].attrs.get("units", "1")
+        if unit == "1" and name != "bond_fraction":  # a share; differences of areas leave rounding behind
+            unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | np.isnan(mean)):
-            unit = "%" if name in _PERCENT else found[f"{name}_mean"].attrs.get("units", "1")
             cells |= _cells(heading, unit, mean, sem)
     return cells
 
@@ -218,28 +211,27 @@ def _rows(cells: Columns) -> list[dict[str, str]]:
 
 def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
     """Statistics to tabulate, and the index of each row in every dimension of sweep and time."""
-    trajectories, dims = all_observables(dataset), sweep_dims(dataset)
-    if is_stationary(dataset) and dims:
+    trajectories = all_observables(dataset)
+    if is_stationary(dataset) and sweep_dims(dataset):
         trajectories = settled(trajectories)
     found = summary(trajectories).merge(correlation_time(dataset))
     if "applied_load" in dataset:  # it is known of open contacts too
         found["normal_load_mean"] = dataset["applied_load"].fillna(found["normal_load_mean"])
         found["normal_load_sem"] = found["normal_load_sem"].where(dataset["applied_load"].isnull(), 0.0)
-    counts = _thinned({name: dataset.sizes[name] for name in dims}, rows)
+    counts = _thinned(dataset, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
     return found, _points(found.sizes, counts)
 
 
 def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
     """The index of each row in every dimension."""
-    chosen = [_spread(sizes[name], count) for name, count in counts.items()]
-    rowwise = (np.ravel(index) for index in np.meshgrid(*chosen, indexing="ij"))
-    return {name: xr.DataArray(index, dims="row") for name, index in zip(counts, rowwise, strict=True)}
+    chosen = np.meshgrid(*(_spread(sizes[name], count) for name, count in counts.items()), indexing="ij")
+    return {name: xr.DataArray(index.ravel(), dims="row") for name, index in zip(counts, chosen, strict=True)}
 
 
-def _thinned(sizes: dict[str, int], rows: int) -> dict[str, int]:
-    """How many values of each dimension make at most ``rows`` points, two of each at least."""
-    counts = dict(sizes)
+def _thinned(dataset: xr.Dataset, rows: int) -> dict[str, int]:
+    """How many values of each dimension of the sweep make at most ``rows`` points, two of each at least."""
+    counts = {name: dataset.sizes[name] for name in sweep_dims(dataset)}
     while math.prod(counts.values()) > rows and max(counts.values()) > 2:
         counts[max(counts, key=lambda name: counts[name])] -= 1
     return counts
@@ -277,8 +269,12 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     long = frame(dataset)
     units = long.attrs["units"]
     header = [name if units[name] == "1" else f"{name} [{units[name]}]" for name in long]
-    text = long.to_csv(header=header, index=False, na_rep="nan", lineterminator="\n")
-    _write(Path(path), text.encode())
+    text = long.to_csv(header=header, index=False, na_rep="nan", lineterminator="\n").encode()
+    path = Path(path)
+    if path.is_symlink() or (path.exists() and not path.is_file()):  # such as /dev/stdout or a pipe
+        path.write_bytes(text)
+    else:
+        write_whole(path, text)
 
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
@@ -286,29 +282,14 @@ def frame(dataset: xr.Dataset) -> pd.DataFrame:
     found = statistics(dataset)
     with contextlib.suppress(ValueError):  # shares are not known of every dataset
         found = found.merge(shares(dataset))
-    long = _flat(found)
+    flat: dict[str, xr.DataArray] = {}
+    for key, variable in found.data_vars.items():
+        if "quantile" in variable.dims:  # each is a variable of its own
+            stem = str(key).removesuffix("_quantile")
+            flat |= {f"{stem}_q{100 * level:02.0f}": variable.sel(quantile=level, drop=True) for level in QUANTILES}
+        else:
+            flat[str(key)] = variable
+    long = xr.Dataset(flat)
     table = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
     table.attrs["units"] = {str(name): each.attrs.get("units", "1") for name, each in long.variables.items()}
     return table
-
-
-def _flat(found: xr.Dataset) -> xr.Dataset:
-    """Statistics with each quantile as a variable of its own."""
-    flat: dict[str, xr.DataArray] = {}
-    for key, variable in found.data_vars.items():
-        name = str(key)
-        if "quantile" in variable.dims:
-            stem = name.removesuffix("_quantile")
-            flat |= {f"{stem}_q{100 * level:02.0f}": variable.sel(quantile=level, drop=True) for level in QUANTILES}
-        else:
-            flat[name] = variable
-    return xr.Dataset(flat)
-
-
-def _write(path: Path, content: bytes) -> None:
-    """A file whole or not at all; what is no plain file, such as /dev/stdout or a pipe, is written as it is."""
-    if path.is_symlink() or (path.exists() and not path.is_file()):
-        with open(path, "wb") as file:
-            file.write(content)
-    else:
-        write_whole(path, content)

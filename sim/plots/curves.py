@@ -51,9 +51,9 @@ class Line(NamedTuple):
 class Scene(NamedTuple):
     """Statistics laid out for panels: along time or a swept key, one curve for each other point of the sweep.
 
-    ``x`` has shape (curves, points), in the unit of the axis. Points that are categories are not ``joined``;
-    where the speed jumps lines are ``broken``. ``averaged`` is what the curves are means over, in words; ``bar`` a
-    colour bar with its label, in place of the names of many curves.
+    ``x`` has shape (curves, points), in the unit of the axis, which has ``words`` and a ``scale``. Points that are
+    categories are not ``joined``; where the speed jumps lines are ``broken``. ``averaged`` is what the curves are
+    means over, in words; ``bar`` a colour bar with its label, in place of the names of many curves.
     """
 
     found: xr.Dataset
@@ -63,6 +63,9 @@ class Scene(NamedTuple):
     spread: str
     bar: tuple[ScalarMappable, str] | None = None
     x: np.ndarray = np.empty((0, 0))
+    unit: Unit = Unit(1.0, "")
+    words: str = ""
+    scale: str = "linear"
     joined: bool = True
     broken: bool = False
 
@@ -77,18 +80,15 @@ class Scene(NamedTuple):
         return not over_time and max(np.unique(own).size for own in self.x) <= MARKED
 
     @property
-    def room(self) -> float:
-        """Room for markers at the ends of the x axis, where there are any."""
-        return 0.03 if self.marked else 0.0
-
-    @property
     def title(self) -> str:
         """What several curves are means over; a single one says so itself."""
         return "" if self.single else self.averaged
 
-    def placed(self, x: np.ndarray, broken: bool = False) -> "Scene":
-        """With x values: (points,) the same for all curves, or (curves, points)."""
-        return self._replace(x=np.broadcast_to(x, (len(self.lines), self.found.sizes[self.along])), broken=broken)
+    def placed(self, x: np.ndarray, words: str, si: str, scale: str = "linear", broken: bool = False) -> "Scene":
+        """With x values [SI], (points,) the same for all curves or (curves, points), and the words of their axis."""
+        unit = Unit.of(x, si, scale == "log")
+        x = np.broadcast_to(unit.factor * x, (len(self.lines), self.found.sizes[self.along]))
+        return self._replace(x=x, unit=unit, words=unit.label(words), scale=scale, broken=broken)
 
     def apart(self) -> "Scene":
         """With points that are categories, the curves of each side by side."""
@@ -106,9 +106,8 @@ class Scene(NamedTuple):
 
     def look(self, style: Any) -> dict[str, Any]:
         """A line style, or the marker that stands for it where points are not joined."""
-        return (
-            {"linestyle": style} if self.joined else {"linestyle": "none", "marker": _MARKS[style], "markersize": 3.5}
-        )
+        marks = {"linestyle": "none", "marker": _MARKS[style], "markersize": 3.5}
+        return {"linestyle": style} if self.joined else marks
 
     def opened(self, line: Line) -> np.ndarray:
         """Where the contacts of all members are open."""
@@ -300,10 +299,8 @@ def speed_dim(dataset: xr.Dataset) -> str | None:
     return next(varying, None)
 
 
-def over_speed(dataset: xr.Dataset) -> tuple[Scene, str, Unit]:
-    """Statistics over the sliding speed, of a ramp or of steady speeds; with the scale and the unit of its axis."""
+def over_speed(dataset: xr.Dataset) -> Scene:
+    """Statistics over the sliding speed, of a ramp or of steady speeds."""
     scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
     speeds = scene.all("speed_mean")
-    scale = axis_scale(speeds)
-    unit = Unit.of(speeds, "m/s", scale == "log")
-    return scene.placed(unit.factor * speeds, broken=scene.along == "t"), scale, unit
+    return scene.placed(speeds, "sliding speed $V$", "m/s", axis_scale(speeds), broken=scene.along == "t")

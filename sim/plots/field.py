@@ -17,7 +17,6 @@ from sim.numerics.grid import Grid
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.modes import Modes, modes
 from sim.plots import style
-from sim.plots.style import BOTH, FLUCTUATIONS, Unit, number_at
 from sim.spectrum.families import Spectrum
 from sim.spectrum.periodogram import periodogram, radial_average
 
@@ -41,11 +40,11 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     at, point = style.first_point(dataset)
     stress = _maps_of(dataset, at).isel(map_member=0)
     cell = _grid_of(stress).cell
-    modulus, ratio = (number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
+    modulus, ratio = (style.number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), cell, modulus, ratio)
     radius, speed = (float(_then(dataset, name, at, stress)) for name in ("contact_radius", "speed"))
     figure, axes = style.pairs(3.1, shared=True)
-    length = Unit.of(np.array([cell]), "m")
+    length = style.Unit.of(np.array([cell]), "m")
     _draw_map(figure, axes[0], stress.to_numpy(), cell, radius, length, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
     _draw_map(figure, axes[1], moved, cell, radius, length, ("m", "displacement $w_1$", "PuOr_r"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
@@ -67,7 +66,7 @@ def _then(dataset: xr.Dataset, name: str, at: dict[str, int], stress: xr.DataArr
 
 
 def _draw_map(
-    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: Unit, about: tuple
+    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: style.Unit, about: tuple
 ) -> None:
     """One field around the contact, continued periodically where the contact is wider than the cell."""
     si, words, colours = about
@@ -76,7 +75,7 @@ def _draw_map(
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
-    unit = Unit.of(field, si)
+    unit = style.Unit.of(field, si)
     most = unit.factor * float(np.max(np.abs(field))) or 1.0
     reach = (half + 0.5) * cell / points * length.factor
     image = panel.imshow(
@@ -105,7 +104,7 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
     for table in ("spectrum", "amplitude"):
         for key in shear[table]:
             with contextlib.suppress(KeyError):
-                shear[table][key] = number_at(setting(dataset, f"shear.{table}.{key}"), at)
+                shear[table][key] = style.number_at(setting(dataset, f"shear.{table}.{key}"), at)
     spectrum = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
     if spectrum.wavevector is not None:
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
@@ -154,20 +153,20 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     measured = np.mean([ring.density for ring in rings], axis=0)[held]
     error = np.sqrt(np.sum([ring.standard_error**2 for ring in rings], axis=0))[held] / len(rings)
 
-    length = Unit.of(2 * np.pi / q, "m")
+    length = style.Unit.of(2 * np.pi / q, "m")
     q, fine = q / length.factor, fine / length.factor
     figure, (panel, below) = style.rows([1.9, 1.1])
-    dots: Any = {"fmt": "o", "color": BOTH, "markersize": 2.2, "elinewidth": 0.7}
-    ring: Any = {"markersize": 4.5, "markerfacecolor": "none", "color": FLUCTUATIONS, "markeredgewidth": 0.7}
-    panel.loglog(fine, np.where(density > 0.0, density, np.nan), color=FLUCTUATIONS, label=name)
+    dots: Any = {"fmt": "o", "color": style.BOTH, "markersize": 2.2, "elinewidth": 0.7}
+    ring: Any = {"markersize": 4.5, "markerfacecolor": "none", "color": style.FLUCTUATIONS, "markeredgewidth": 0.7}
+    panel.loglog(fine, np.where(density > 0.0, density, np.nan), color=style.FLUCTUATIONS, label=name)
     panel.plot(q, expected, "o", label="discretised", **ring)
     panel.errorbar(q, measured, error, label=f"realised, {len(rings)} map{'s' * (len(rings) > 1)}", **dots)
     panel.set_ylabel("spectral density $C$ (Pa² m²)")
     if np.max(measured) < 100.0 * np.min(measured):
         style.plain_ticks(panel.yaxis)
     style.legend(panel, point)
-    below.axhline(1.0, color=FLUCTUATIONS)
+    below.axhline(1.0, color=style.FLUCTUATIONS)
     below.errorbar(q, measured / expected, error / expected, **dots)
     below.set_ylabel("realised/discretised")
-    style.across(below, q, "log", f"wavenumber $q$ (rad/{length.name})", 0.03)
+    style.across(below, q, f"wavenumber $q$ (rad/{length.name})", "log", 0.03)
     return figure

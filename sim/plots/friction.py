@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from sim.plots.bond_laws import rest_of
 from sim.plots.curves import colour_bar, scene_along
 from sim.plots.panels import friction_panel
-from sim.plots.style import GUIDE, Unit, across, legend, recorded, rows
+from sim.plots.style import GUIDE, across, legend, recorded, rows
 
 
 def turns(dataset: xr.Dataset) -> bool:
@@ -31,11 +31,10 @@ def friction_figure(dataset: xr.Dataset) -> Figure:
         (axes[0], dataset["t"].to_numpy(), "time $t$", "s", 0.0),
         (axes[1], scene.all("slider_position_mean"), "slider position $x$", "m", 0.03),
     ):
-        unit = Unit.of(x, si)
-        placed = scene.placed(unit.factor * x, broken=True)
+        placed = scene.placed(x, words, si, broken=True)
         friction_panel(panel, placed)
         panel.axhline(0.0, **GUIDE)
-        across(panel, placed.x, "linear", unit.label(words), room)
+        across(panel, placed.x, placed.words, room=room)
     legend(axes[0], scene.title)
     colour_bar(figure, axes, scene)
     return figure

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from sim.analysis import control, loop_energy, setting
 from sim.analysis.scene import stays_held
 from sim.laws import jkr
+from sim.plots import style
 from sim.plots.curves import Line, Scene, colour_bar, mark_jumps, scene_along
-from sim.plots.style import GREY, GUIDE, REFERENCE, Unit, across, fill, legend, mean_of, number_at, recorded, rows
 
 #: Radii at which the equilibrium curve is evaluated.
 _FINE = 600
@@ -22,13 +22,8 @@ _GRIPS = 5.0 / 9.0
 #: Height of a name, in that of the panel.
 _NAME = 0.1
 
-#: Axis of each control, in words and as a symbol; the displacement, or the indentation where no stiffness is between.
-_AXES = {
-    "load": ("indentation", r"\delta"),
-    "indentation": ("indentation", r"\delta"),
-    "displacement": ("displacement", r"\Delta"),
-    "": ("displacement, or indentation,", r"\Delta"),
-}
+#: Axis of each control, in words and as a symbol; the indentation where no stiffness is between.
+_AXES = {"displacement": ("displacement", r"\Delta"), "": ("displacement, or indentation,", r"\Delta")}
 
 
 class Theory(NamedTuple):
@@ -77,31 +72,28 @@ def loop_figure(dataset: xr.Dataset) -> Figure:
     fixed grips lose it.
     """
     (kind, stiffness), scene = _held(dataset), scene_along(dataset, "t")
-    words, symbol = _AXES[kind]
-    displacement = scene.all("displacement_mean")
-    unit = Unit.of(displacement, "m")
-    scene = scene.placed(unit.factor * displacement)
-    force, length = Unit.of(scene.all("normal_load_mean"), "N"), Unit.of(scene.all("contact_radius_mean"), "m")
+    words, symbol = _AXES.get(kind, ("indentation", r"\delta"))
+    scene = scene.placed(scene.all("displacement_mean"), f"{words} ${symbol}$", "m")
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     numbers = (work, size, dataset["contact_modulus"], stiffness)
-    theories = [Theory(*(number_at(number, line.point) for number in numbers)) for line in scene.lines]
-    figure, (loads, radii) = rows([2.3, 1.6])
+    theories = [Theory(*(style.number_at(number, line.point) for number in numbers)) for line in scene.lines]
+    figure, (loads, radii) = style.rows([2.3, 1.6])
+    force = style.in_unit(loads.yaxis, "normal load $P$", scene.all("normal_load_mean"), "N")
+    length = style.in_unit(radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m")
     spent, loop = lost_energy(dataset)
     named = scene._replace(lines=_named(scene, symbol, spent, loop))
     for line in named.lines:
-        _cycle(loads, named, "normal_load", line, force.factor, kind)
+        _cycle(loads, named, "normal_load", line, force, kind)
     for line in scene.lines:
-        _cycle(radii, scene, "contact_radius", line, length.factor, kind)
-    _equilibria(loads, radii, scene, theories, (unit.factor, force.factor, length.factor))
-    _levels(loads, theories, force.factor)
-    loads.set_ylabel(force.label("normal load $P$"))
-    radii.set_ylabel(length.label("contact radius $a$"))
+        _cycle(radii, scene, "contact_radius", line, length, kind)
+    _equilibria(loads, radii, scene, theories, (scene.unit.factor, force, length))
+    _levels(loads, theories, force)
     radii.set_ylim(bottom=0.0)
     cycled = "per cycle: dissipated $W$, and the loop enclosed, each jump a straight line between records"
-    legend(loads, "dissipated in all: $W$" if loop is None else cycled, columns=1)
-    legend(radii)
+    style.legend(loads, "dissipated in all: $W$" if loop is None else cycled, columns=1)
+    style.legend(radii)
     colour_bar(figure, [loads, radii], scene)
-    across(radii, scene.x, "linear", unit.label(f"{words} ${symbol}$"), 0.03)
+    style.across(radii, scene.x, scene.words, room=0.03)
     return figure
 
 
@@ -110,10 +102,10 @@ def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind
     x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
     mean, _, low, high = (np.where(gone, np.nan, factor * values) for values in scene.drawn(name, line))
     if np.any(high > low):
-        fill(panel, x, low, high, color=line.colour, alpha=0.18, label="" if loads else scene.spread)
+        style.fill(panel, x, low, high, color=line.colour, alpha=0.18, label="" if loads else scene.spread)
     panel.plot(x, mean, color=line.colour, label=line.label if loads else "")
     if loads:
-        colour = line.colour if scene.single else REFERENCE  # the open spheres of all curves lie on each other
+        colour = line.colour if scene.single else style.REFERENCE  # the open spheres of all curves lie on each other
         panel.plot(x, np.where(gone, 0.0, np.nan), color=colour, linewidth=0.4)
     if kind != "load":  # under a dead load the sphere leaves: no place to draw a jump to
         jumps = np.concatenate(scene.openings(line))
@@ -132,8 +124,8 @@ def _equilibria(
     for theory, most in reached.items():
         if most > 0.0 and not np.isnan(theory.stiffness):
             x, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
-            loads.plot(x, load, "--", **GREY)
-            radii.plot(x, radius, "--", label="JKR, stable and unstable", **GREY)
+            loads.plot(x, load, "--", **style.GREY)
+            radii.plot(x, radius, "--", label="JKR, stable and unstable", **style.GREY)
 
 
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
@@ -141,7 +133,7 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     pulls = {factor * float(jkr.pull_off_load(*theory[:2])) for theory in theories if theory.work > 0.0}
     for pull in pulls:
         for share in (1.0, _GRIPS):
-            panel.axhline(share * pull, **GUIDE)
+            panel.axhline(share * pull, **style.GUIDE)
     if len(pulls) != 1:
         return
     (pull,) = pulls
@@ -153,7 +145,7 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     for share, text, side in names:  # on the left, where spheres are open
         panel.annotate(
             text, (0.0, share * pull), (3, 1.5 if side == "bottom" else -1.5), ha="left", va=side,
-            xycoords=panel.get_yaxis_transform(), textcoords="offset points", color=REFERENCE, fontsize=7,
+            xycoords=panel.get_yaxis_transform(), textcoords="offset points", color=style.REFERENCE, fontsize=7,
         )  # fmt: skip
 
 
@@ -163,26 +155,26 @@ def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]
     Means over the members, with the sweep's dimensions. Where no cycles are made, or a run stopped on the way, the
     energy is that of the whole run, and there is no integral.
     """
-    spent = recorded(dataset, "dissipated_energy")
+    spent = style.recorded(dataset, "dissipated_energy")
     spent = spent.isel(t=spent.notnull().cumsum("t").argmax("t")).drop_vars("t")  # the last record of those that stop
     spent = spent.mean("member") if "member" in spent.dims else spent
     try:
         cycles = setting(dataset, f"contact.{_held(dataset)[0]}.cycles")
     except KeyError:
         return spent, None
-    whole = bool(recorded(dataset, "contact_radius").isel(t=-1).notnull().all())
+    whole = bool(style.recorded(dataset, "contact_radius").isel(t=-1).notnull().all())
     if not whole or not bool((cycles >= 1.0).all()):
         return spent, None
-    return spent / cycles, mean_of(loop_energy(dataset), "loop_energy").mean("cycle")
+    return spent / cycles, style.mean_of(loop_energy(dataset), "loop_energy").mean("cycle")
 
 
 def _named(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray | None) -> list[Line]:
     """The curves, each named with its energies."""
     energies = {"$W$": spent} | ({} if loop is None else {rf"$\oint\,P\,\mathrm{{d}}{symbol}$": loop})
-    unit = Unit.of(np.concatenate([np.ravel(values) for values in energies.values()]), "J")
+    unit = style.Unit.of(np.concatenate([np.ravel(values) for values in energies.values()]), "J")
     named = []
     for line in scene.lines:
-        known = {words: unit.factor * number_at(values, line.point) for words, values in energies.items()}
+        known = {words: unit.factor * style.number_at(values, line.point) for words, values in energies.items()}
         parts = [f"{words} = {value:.3g} {unit.name}" for words, value in known.items() if np.isfinite(value)]
         label = f"{line.label}: {', '.join(parts).replace('-', '−')}" if line.label else ""
         named.append(line._replace(label=label))

@@ -13,7 +13,6 @@ from sim.analysis.scene import stays_held
 from sim.plots import style
 from sim.plots.bond_laws import rest_of
 from sim.plots.curves import Scene, colour_bar, contact_curves, curve, over_speed, scene_along, speed_dim
-from sim.plots.style import BONDS, BOTH, FLUCTUATIONS, GREY, GUIDE, REFERENCE, Unit, legend
 
 Panel = Callable[[Axes, Scene], None]
 
@@ -28,9 +27,7 @@ def series(name: str, words: str, si: str) -> Panel:
     """A panel of one observable."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        unit = Unit.of(scene.all(f"{name}_mean"), si)
-        contact_curves(panel, scene, name, unit.factor)
-        panel.set_ylabel(unit.label(words))
+        contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.all(f"{name}_mean"), si))
 
     return panel_of
 
@@ -40,11 +37,11 @@ friction_panel = series("friction_force", "friction $F$", "N")
 
 def radius_panel(panel: Axes, scene: Scene) -> None:
     """Contact radius between Hertz's and JKR's."""
-    unit = Unit.of(scene.all("contact_radius_mean", "jkr_radius_mean"), "m")
-    contact_curves(panel, scene, "contact_radius", unit.factor)
+    radii = scene.all("contact_radius_mean", "jkr_radius_mean")
+    factor = style.in_unit(panel.yaxis, "contact radius $a$", radii, "m")
+    contact_curves(panel, scene, "contact_radius", factor)
     for which, dashes in (("JKR", "--"), ("Hertz", ":")):
-        _reference(panel, scene, unit.factor * scene.all(f"{which.lower()}_radius_mean"), dashes, which)
-    panel.set_ylabel(unit.label("contact radius $a$"))
+        _reference(panel, scene, factor * scene.all(f"{which.lower()}_radius_mean"), dashes, which)
 
 
 def _reference(panel: Axes, scene: Scene, values: np.ndarray, dashes: str, name: str) -> None:
@@ -59,8 +56,8 @@ def _reference(panel: Axes, scene: Scene, values: np.ndarray, dashes: str, name:
             half = 0.5 * scene.category
             x, y = np.stack([x - half, x + half, x], axis=1).ravel(), np.repeat(y, 3)
             y[2::3] = np.nan
-        panel.plot(x, y, dashes, **GREY | ({} if same else {"color": line.colour}))
-    panel.plot([], [], dashes, label=name, **GREY)
+        panel.plot(x, y, dashes, **style.GREY | ({} if same else {"color": line.colour}))
+    panel.plot([], [], dashes, label=name, **style.GREY)
 
 
 def _broken(values: np.ndarray) -> np.ndarray:
@@ -71,9 +68,9 @@ def _broken(values: np.ndarray) -> np.ndarray:
 
 
 _ENERGIES: Any = (
-    ("bond_work", r"bonds left, $\Delta\gamma(N)$", BONDS, "-."),
-    ("fluctuation_energy", r"fluctuations, $\Delta\Gamma$", FLUCTUATIONS, "--"),
-    ("work_of_adhesion", "left to the contact, $w$", BOTH, "-"),
+    ("bond_work", r"bonds left, $\Delta\gamma(N)$", style.BONDS, "-."),
+    ("fluctuation_energy", r"fluctuations, $\Delta\Gamma$", style.FLUCTUATIONS, "--"),
+    ("work_of_adhesion", "left to the contact, $w$", style.BOTH, "-"),
 )
 
 
@@ -87,18 +84,17 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
     if not scene.single or np.allclose(left, work, rtol=1e-9, atol=0.0, equal_nan=True):
         drawn = [entry for entry in drawn if entry[0] != "bond_work"]
     values = scene.all(*(f"{name}_mean" for name, *_ in drawn))
-    unit = Unit.of(values, "J/m^2")
+    factor = style.in_unit(panel.yaxis, "energy per area", values, "J/m^2")
     for name, text, own, dashes in drawn:
         lines = scene.distinct(name)
         placed = scene.middle() if len(lines) == 1 else scene
         for line, wide in zip(lines, scene.covered(name, lines), strict=True):
-            colour = own if scene.single else REFERENCE if len(lines) == 1 else line.colour
-            curve(panel, placed, name, line, unit.factor, colour, dashes, wide=wide)
-        panel.plot([], [], color=own if scene.single else REFERENCE, label=text, **scene.look(dashes))
+            colour = own if scene.single else style.REFERENCE if len(lines) == 1 else line.colour
+            curve(panel, placed, name, line, factor, colour, dashes, wide=wide)
+        panel.plot([], [], color=own if scene.single else style.REFERENCE, label=text, **scene.look(dashes))
     if np.any(values <= 0.0):
-        panel.axhline(0.0, **GUIDE)
-    panel.set_ylabel(unit.label("energy per area"))
-    legend(panel)
+        panel.axhline(0.0, **style.GUIDE)
+    style.legend(panel)
 
 
 def _small_fluctuations(scene: Scene) -> bool:
@@ -109,12 +105,12 @@ def _small_fluctuations(scene: Scene) -> bool:
 
 def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
     """Fluctuation energy where it is small."""
-    unit = Unit.of(scene.all("fluctuation_energy_mean"), "J/m^2")
+    energies = scene.all("fluctuation_energy_mean")
+    factor = style.in_unit(panel.yaxis, r"fluctuations $\Delta\Gamma$", energies, "J/m^2")
     for line in scene.distinct("fluctuation_energy"):
-        colour = FLUCTUATIONS if scene.single else line.colour
-        curve(panel, scene, "fluctuation_energy", line, unit.factor, colour, "--")
+        colour = style.FLUCTUATIONS if scene.single else line.colour
+        curve(panel, scene, "fluctuation_energy", line, factor, colour, "--")
     panel.set_ylim(bottom=0.0)
-    panel.set_ylabel(unit.label(r"fluctuations $\Delta\Gamma$"))
 
 
 def share_panel(panel: Axes, scene: Scene) -> None:
@@ -122,10 +118,10 @@ def share_panel(panel: Axes, scene: Scene) -> None:
     if scene.single:
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
-    panel.axhline(1.0, linestyle="--", label="JKR", **GREY)
+    panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
     hertz, jkr = (scene.all(f"{name}_radius_mean") for name in ("hertz", "jkr"))
     _reference(panel, scene, (hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2, ":", "Hertz")
-    legend(panel, scene.title)
+    style.legend(panel, scene.title)
     panel.set_ylabel(r"contact area $A/A_\mathrm{JKR}$")
 
 
@@ -137,23 +133,23 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
     steps = np.diff(x)
     if not (np.all(steps >= 0.0) or np.all(steps <= 0.0)):  # shades of there and back would lie on each other
         if scene.varies("lost_to_bonds"):
-            panel.plot(x, bonds, "-.", color=BONDS, label="with the bonds left alone")
+            panel.plot(x, bonds, "-.", color=style.BONDS, label="with the bonds left alone")
         return
     if scene.varies("lost_to_bonds"):
-        style.fill(panel, x, bonds, np.ones_like(bonds), color=BONDS, alpha=_SHADE, label="lost to broken bonds")
+        style.fill(panel, x, bonds, np.ones_like(bonds), color=style.BONDS, alpha=_SHADE, label="lost to broken bonds")
     if scene.varies("lost_to_fluctuations"):
-        style.fill(panel, x, ratio, bonds, color=FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
+        style.fill(panel, x, ratio, bonds, color=style.FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
 
 
 def stacked(
-    scene: Scene, panels: Sequence[tuple[float, Panel]], words: str, scale: str = "linear", room: float = 0.0
+    scene: Scene, panels: Sequence[tuple[float, Panel]], room: float | None = None
 ) -> tuple[Figure, list[Axes]]:
     """Panels of given heights [in] above each other with one x axis and its label, lettered; a colour bar if any."""
     figure, axes = style.rows([height for height, _ in panels])
     for panel, (_, drawing) in zip(axes, panels, strict=True):
         drawing(panel, scene)
     colour_bar(figure, axes, scene)
-    style.across(axes[-1], scene.x, scale, words, room)
+    style.across(axes[-1], scene.x, scene.words, scene.scale, (0.03 if scene.marked else 0.0) if room is None else room)
     return figure, axes
 
 
@@ -178,9 +174,8 @@ def needs_speeds(dataset: xr.Dataset) -> None:
 
 def curve_figure(dataset: xr.Dataset) -> Figure:
     """Contact area with what each mechanism takes of it, energies and friction, over speed."""
-    scene, scale, unit = over_speed(dataset)
-    panels = [(1.9, share_panel), *further_panels(scene)]
-    return stacked(scene, panels, unit.label("sliding speed $V$"), scale, scene.room)[0]
+    scene = over_speed(dataset)
+    return stacked(scene, [(1.9, share_panel), *further_panels(scene)])[0]
 
 
 #: What drives a contact, drawn over time where it changes.
@@ -193,14 +188,12 @@ _DRIVEN = {
 
 def time_figure(dataset: xr.Dataset) -> Figure:
     """Contact radius, energies, friction, and speed, load and displacement that change, over time."""
-    unit = Unit.of(dataset["t"].to_numpy(), "s")
-    scene = scene_along(dataset, "t").placed(unit.factor * dataset["t"].to_numpy())
+    scene = scene_along(dataset, "t").placed(dataset["t"].to_numpy(), "time $t$", "s")
     moved = not bool(stays_held(dataset).all())
     shown = [name for name in _DRIVEN if scene.moves(name) and (name != "displacement" or moved)]
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
-    panels = [(1.6, radius_panel), *further_panels(scene), *driven]
-    figure, axes = stacked(scene, panels, unit.label("time $t$"))
-    legend(axes[0], scene.title)
+    figure, axes = stacked(scene, [(1.6, radius_panel), *further_panels(scene), *driven])
+    style.legend(axes[0], scene.title)
     return figure
 
 
@@ -213,20 +206,17 @@ def sweep_figure(dataset: xr.Dataset) -> Figure:
     """Contact radius, energies and friction over the first swept key; further keys make curves."""
     key = dataset[style.swept(dataset)[0]]
     words = f"{key.attrs.get('long_name', key.name)} {style.symbol(key)}".strip()
-    scene, panels = scene_along(dataset, str(key.name)), [(1.7, radius_panel)]
-    if key.dtype.kind in "fi":
-        values = key.to_numpy().astype(float)
-        scale = style.axis_scale(values)
-        unit = Unit.of(values, key.attrs["units"], scale == "log")
-        scene = scene.placed(unit.factor * values)
-        figure, axes = stacked(scene, [*panels, *further_panels(scene)], unit.label(words), scale, scene.room)
+    scene, room, named = scene_along(dataset, str(key.name)), None, key.dtype.kind not in "fi"
+    if named:
+        scene = scene.placed(np.arange(key.size, dtype=float), words, "1").apart()
+        room = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
     else:
-        values = np.arange(key.size, dtype=float)
-        scene = scene.placed(values).apart()
-        beside = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
-        figure, axes = stacked(scene, [*panels, *further_panels(scene)], words, room=beside)
-        axes[-1].set_xticks(values, [str(value) for value in key.to_numpy()])
-    legend(axes[0], scene.title if is_stationary(dataset) else _at_the_end(dataset, scene.title))
+        values = key.to_numpy().astype(float)
+        scene = scene.placed(values, words, key.attrs["units"], style.axis_scale(values))
+    figure, axes = stacked(scene, [(1.7, radius_panel), *further_panels(scene)], room)
+    if named:
+        axes[-1].set_xticks(range(key.size), [str(value) for value in key.to_numpy()])
+    style.legend(axes[0], scene.title if is_stationary(dataset) else _at_the_end(dataset, scene.title))
     return figure
 
 

@@ -10,7 +10,6 @@ from matplotlib.figure import Figure
 from sim.analysis import setting
 from sim.laws import jkr, profiles
 from sim.plots import style
-from sim.plots.style import BOTH, GUIDE, Unit, first_point, number_at, recorded
 
 #: Points of a profile on one side, and how far it goes in contact radii.
 _POINTS, _REACH = 1500, 2.0
@@ -50,45 +49,40 @@ class Shape(NamedTuple):
 
 def needs_contact(dataset: xr.Dataset) -> None:
     """Refuse a dataset whose first member is never in contact."""
-    if not bool(np.any(_member(dataset, "contact_radius", first_point(dataset)[0]) > 0.0)):
+    if not bool(np.any(_member(dataset, "contact_radius", style.first_point(dataset)[0]) > 0.0)):
         raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
 
 
 def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
     """An observable of the first member over time, or its mean where only that was recorded."""
-    return recorded(dataset, name).isel({"member": 0} | at, missing_dims="ignore").to_numpy()
+    return style.recorded(dataset, name).isel({"member": 0} | at, missing_dims="ignore").to_numpy()
 
 
 class _Drawn(NamedTuple):
-    """The last closed contact with its time [s] and speed [m/s], and the one at rest if there is one."""
+    """The last closed contact with its time [s] and speed [m/s]; it and the one at rest, if any, with their lines."""
 
     last: Shape
-    rest: Shape | None
+    shown: list[tuple[Shape, dict[str, Any]]]
     time: float
     speed: float
-
-    @property
-    def shown(self) -> list[tuple[Shape, dict[str, Any]]]:
-        """Both contacts with their lines, the one at rest beneath."""
-        rest = [(self.rest, style.GREY | {"linestyle": "--", "label": "at rest (JKR)"})] if self.rest else []
-        return [(self.last, {"color": BOTH}), *rest]
 
 
 def shapes_of(dataset: xr.Dataset) -> _Drawn:
     """Contacts of the first member at the first point of the sweep: the last closed one, and at rest."""
-    at = first_point(dataset)[0]
+    at = style.first_point(dataset)[0]
     names = ("contact_radius", "indentation", "shear_stress", "speed")
     radius, depth, stress, speed = (_member(dataset, name, at) for name in names)
     k = int(np.flatnonzero(radius > 0.0)[-1])
-    sphere, work = (number_at(setting(dataset, key), at) for key in ("sphere.radius", "adhesion.work"))
+    sphere, work = (style.number_at(setting(dataset, key), at) for key in ("sphere.radius", "adhesion.work"))
     moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
-    bodies = (sphere, *(number_at(dataset[name], at) for name in moduli))
+    bodies = (sphere, *(style.number_at(dataset[name], at) for name in moduli))
     last = Shape(float(radius[k]), float(depth[k]), float(stress[k]), *bodies)
     full = float(np.ravel(dataset["radius_at_rest"].isel(at))[0])
-    rest = None
+    shown = [(last, {"color": style.BOTH})]
     if full > 0.0:
         rest = Shape(full, float(jkr.indentation_at_radius(full, work, sphere, bodies[1])), 0.0, *bodies)
-    return _Drawn(last, rest, float(dataset["t"][k]), float(speed[k]))
+        shown.append((rest, style.GREY | {"linestyle": "--", "label": "at rest (JKR)"}))
+    return _Drawn(last, shown, float(dataset["t"][k]), float(speed[k]))
 
 
 def profile_figure(dataset: xr.Dataset) -> Figure:
@@ -99,18 +93,18 @@ def profile_figure(dataset: xr.Dataset) -> Figure:
     """
     drawn = shapes_of(dataset)
     reach = _REACH * max(shape.radius for shape, _ in drawn.shown)
-    length = Unit.of(np.array([reach]), "m")
+    length = style.Unit.of(np.array([reach]), "m")
     count = 2 if drawn.last.stress != 0.0 else 1
     figure, axes = style.pairs(0.35 + 2.4 * count, count)
     _pressure_panel(axes[0], drawn, reach, length)
     _surface_panel(axes[1], drawn, reach, length)
     radial = "distance from the axis $r$"
     for panel, words in zip(axes, (radial, radial, "distance from the axis"), strict=False):
-        style.across(panel, length.factor * np.array([-reach, reach]), "linear", length.label(words))
+        style.across(panel, length.factor * np.array([-reach, reach]), length.label(words))
     if count == 2:
         _displacement_panel(axes[2], drawn.last, reach, length)
         _map_panel(figure, axes[3], drawn.last, reach, length)
-    told = [first_point(dataset)[1], f"$t$ = {style.text_of(drawn.time, 's')}"]
+    told = [style.first_point(dataset)[1], f"$t$ = {style.text_of(drawn.time, 's')}"]
     if "$V$" not in told[0]:
         told.append(f"$V$ = {style.text_of(drawn.speed, 'm/s')}")
     axes[0].lines[0].set_label(", ".join(filter(None, told)))
@@ -118,58 +112,54 @@ def profile_figure(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _pressure_panel(panel: Axes, drawn: _Drawn, reach: float, length: Unit) -> None:
+def _pressure_panel(panel: Axes, drawn: _Drawn, reach: float, length: style.Unit) -> None:
     middle = max((float(shape.pressure(np.zeros(1))[0]) for shape, _ in drawn.shown), key=abs)
-    unit = Unit.of(np.array([middle]), "Pa")
+    factor = style.in_unit(panel.yaxis, "normal pressure $p$", np.array([middle]), "Pa")
     for shape, line in drawn.shown:
         x = shape.distances(reach)
         r = np.abs(x)
         pressure = np.where(r == shape.radius, np.nan, shape.pressure(r))  # tension has no bound at the edge
-        panel.plot(length.factor * x, unit.factor * pressure, **line)
-    panel.axhline(0.0, **GUIDE)
-    size = unit.factor * abs(middle)
+        panel.plot(length.factor * x, factor * pressure, **line)
+    panel.axhline(0.0, **style.GUIDE)
+    size = factor * abs(middle)
     panel.set_ylim((-1.6 * size, 1.15 * size) if middle > 0.0 else (-4.0 * size, 0.5 * size))
-    panel.set_ylabel(unit.label("normal pressure $p$"))
 
 
-def _surface_panel(panel: Axes, drawn: _Drawn, reach: float, length: Unit) -> None:
+def _surface_panel(panel: Axes, drawn: _Drawn, reach: float, length: style.Unit) -> None:
     """Sphere and half-space, cut along the axis; between them the gap."""
     x = [shape.distances(reach) for shape, _ in drawn.shown]
     heights = [shape.surfaces(np.abs(own)) for (shape, _), own in zip(drawn.shown, x, strict=True)]
-    unit = Unit.of(np.concatenate([upper for _, upper in heights]), "m")
+    factor = style.in_unit(panel.yaxis, "height $z$", np.concatenate([upper for _, upper in heights]), "m")
     for (_, line), own, surfaces in zip(drawn.shown, x, heights, strict=True):
-        panel.plot(length.factor * own, unit.factor * np.transpose(surfaces), **line)
-    low, ball = unit.factor * np.array(heights[0])
+        panel.plot(length.factor * own, factor * np.transpose(surfaces), **line)
+    low, ball = factor * np.array(heights[0])
     bottom = float(np.min(ball)) - 0.35 * float(np.ptp(ball))
     panel.fill_between(length.factor * x[0], bottom, low, color=style.LINES[6], alpha=0.18, linewidth=0)
     panel.set_ylim(bottom, float(np.max(ball)))
     panel.text(0.5, 0.8, "sphere", transform=panel.transAxes, ha="center", fontsize=7)
     panel.text(0.5, 0.06, "half-space", transform=panel.transAxes, ha="center", fontsize=7)
-    panel.set_ylabel(unit.label("height $z$"))
 
 
-def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: Unit) -> None:
+def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
     """Tangential displacement along and across the sliding direction; the edge as thin lines."""
     distance = reach * np.linspace(-1.0, 1.0, 801)
-    found = profiles.tangential_profiles(
-        distance, shape.radius, shape.stress, shape.shear_modulus, shape.poisson_ratio
-    )  # fmt: skip
-    unit = Unit.of(np.concatenate(found), "m")
+    bodies = shape.shear_modulus, shape.poisson_ratio
+    found = profiles.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
+    factor = style.in_unit(panel.yaxis, "tangential displacement", np.concatenate(found), "m")
     for values, line, words in zip(found, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
-        panel.plot(length.factor * distance, unit.factor * values, line, color=BOTH, label=words)
+        panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
     for edge in (-shape.radius, shape.radius):
-        panel.axvline(length.factor * edge, **GUIDE)
+        panel.axvline(length.factor * edge, **style.GUIDE)
     style.legend(panel)
-    panel.set_ylabel(unit.label("tangential displacement"))
 
 
-def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: Unit) -> None:
+def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
     """Tangential displacement of the surface around the contact circle."""
     extent = reach / shape.radius
     x, moved = profiles.tangential_map(
         shape.radius, shape.stress, shape.shear_modulus, shape.poisson_ratio, points=_MAP, extent=extent
     )  # fmt: skip
-    unit = Unit.of(moved, "m")
+    unit = style.Unit.of(moved, "m")
     x, moved = length.factor * x, unit.factor * moved.T
     side = x[-1] + 0.5 * (x[1] - x[0])
     image = panel.imshow(moved, cmap="viridis", origin="lower", extent=(-side, side, -side, side))

@@ -73,38 +73,35 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
 def start_figure(dataset: xr.Dataset) -> Figure:
     """Stress since the start at the longest rest, one line a speed; peak stress over speed, one line a rest."""
     starts = starts_of(dataset)
-    unit = style.Unit.of(np.concatenate([start.stress for start in starts]), "Pa")
     rests, speeds = ({start.rest for start in starts}, {abs(start.speed) for start in starts})
     longest = sorted((s for s in starts if s.rest == max(rests)), key=lambda s: abs(s.speed))
-    if len(rests) == len(speeds) == 1:
-        figure = style.picture(style.COLUMN, 2.6)
-        axes = [figure.subplots()]
-    else:
-        figure, axes = style.pairs(2.9, shared=True)
-        _peak_panel(axes[1], dataset, starts, len(speeds - {0.0}) > 1, unit)
-    _time_panel(axes[0], longest, unit)
+    figure, axes = style.rows([2.15]) if len(rests) == len(speeds) == 1 else style.pairs(2.9, shared=True)
+    stresses = np.concatenate([start.stress for start in starts])
+    factor = style.in_unit(axes[0].yaxis, r"shear stress $\tau_0$", stresses, "Pa")
+    if len(axes) > 1:
+        _peak_panel(axes[1], dataset, starts, len(speeds - {0.0}) > 1, factor)
+    _time_panel(axes[0], longest, factor)
     others = [name for name in style.swept(dataset) if name not in _varied(dataset)]
     after = f"after {style.text_of(longest[0].rest, 's')} at rest, sliding at"
     style.legend(axes[0], ", ".join([*(style.swept_value(dataset, name, 0) for name in others), after]))
     return figure
 
 
-def _time_panel(panel: Axes, starts: list[Start], unit: style.Unit) -> None:
+def _time_panel(panel: Axes, starts: list[Start], factor: float) -> None:
     """Stress over the time since the start; a dot at each peak that is resolved."""
     several = len(starts) > 1
     times = starts[0].time
     length = style.Unit.of(times, "s", several)
     for start, colour in zip(starts, mpl.colormaps["viridis"](np.linspace(0.0, 0.88, len(starts))), strict=True):
         words = style.rounded(start.speed, "m/s")
-        panel.plot(length.factor * start.time, unit.factor * start.stress, color=colour, label=words)
+        panel.plot(length.factor * start.time, factor * start.stress, color=colour, label=words)
         if start.seen:
-            panel.plot(length.factor * start.when, unit.factor * start.peak, "o", markersize=3, color=colour)
+            panel.plot(length.factor * start.when, factor * start.peak, "o", markersize=3, color=colour)
     ends = length.factor * np.array([times[0] if several else 0.0, times[-1]])
-    style.across(panel, ends, "log" if several else "linear", length.label("time since the start"))
-    panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
+    style.across(panel, ends, length.label("time since the start"), "log" if several else "linear")
 
 
-def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_speed: bool, unit: style.Unit) -> None:
+def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_speed: bool, factor: float) -> None:
     """Peak stress over speed, one line a rest; over the rest where there is one speed only.
 
     Beneath it what closed forms say of Bell bonds: their peak if none rebinds, and of any bonds steady sliding.
@@ -117,14 +114,14 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_spee
         own = [k for k in order if not over_speed or starts[k].rest == rest]
         grey = mpl.colors.to_hex((0.65 * (1.0 - (number + 1) / len(lines)),) * 3)
         look: Any = {"color": grey, "marker": _MARKERS[number % len(_MARKERS)], "markersize": 3.5}
-        x, y = pace.factor * places[own], unit.factor * np.array([starts[k].peak for k in own])
+        x, y = pace.factor * places[own], factor * np.array([starts[k].peak for k in own])
         panel.plot(x, y, label=f"{style.text_of(rest, 's')} at rest" if over_speed else "", **look)
         risen = np.array([not starts[k].seen for k in own])
         panel.plot(x[risen], y[risen], **look | {"linestyle": "none", "mfc": "white"})
     if not all(start.seen for start in starts):
         panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
     if over_speed:
-        _closed_forms(panel, dataset, starts, pace, unit)
+        _closed_forms(panel, dataset, starts, pace.factor, factor)
     panel.set_xscale("log")
     if places.max() < 100.0 * np.min(places[places > 0.0]):
         style.plain_ticks(panel.xaxis)
@@ -133,7 +130,7 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_spee
     style.legend(panel, "peak of the stress")
 
 
-def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: style.Unit, unit: style.Unit) -> None:
+def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: float, factor: float) -> None:
     """Thin lines of what is known in closed form."""
     speeds = np.array([abs(start.speed) for start in starts if start.speed != 0.0])
     fine = np.geomspace(speeds.min(), speeds.max(), _FINE)
@@ -142,6 +139,6 @@ def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: s
         bonds = population_of(dataset, start.at)
         if bonds and bonds.pathway:
             peak = start.fraction * bonds.start_peak(fine)
-            panel.plot(pace.factor * fine, unit.factor * peak, linestyle=":", label="none rebinds", **thin)
+            panel.plot(pace * fine, factor * peak, linestyle=":", label="none rebinds", **thin)
     for law in steady_laws(dataset, starts[0].at, fine)[:1]:
-        panel.plot(pace.factor * fine, unit.factor * law.stress, label="steady sliding", **thin)
+        panel.plot(pace * fine, factor * law.stress, label="steady sliding", **thin)

@@ -13,7 +13,7 @@ from sim.plots.bond_laws import Steady, rest_of, steady_laws
 from sim.plots.curves import Line, Scene, contact_curves, over_speed, speed_dim
 from sim.plots.panels import stacked
 from sim.plots.static_friction import start_figure
-from sim.plots.style import REFERENCE, Unit, legend, recorded, rounded
+from sim.plots.style import HOLLOW, REFERENCE, in_unit, legend, recorded, rounded
 
 #: Speeds at which a closed form is drawn.
 _FINE = 600
@@ -23,10 +23,7 @@ _LAWS: Any = {
     "-": {"linestyle": "-", "color": "#BBBBBB", "linewidth": 0.7, "zorder": 3},
     "--": {"linestyle": "--", "color": REFERENCE, "linewidth": 0.7, "zorder": 1.5},
 }
-_RING: Any = {
-    "linestyle": "none", "marker": "o", "markersize": 5.0, "markerfacecolor": "none", "markeredgewidth": 0.9,
-    "zorder": 4,
-}  # fmt: skip
+_RING: Any = HOLLOW | {"markersize": 5.0, "mfc": "none", "mew": 0.9, "zorder": 4}
 
 
 def needs_stress(dataset: xr.Dataset) -> None:
@@ -47,20 +44,19 @@ def stress_figure(dataset: xr.Dataset) -> Figure:
     """Shear stress with its maximum, and bonds, over speed; for a start from rest the static peaks."""
     if rest_of(dataset) is not None:
         return start_figure(dataset)
-    scene, scale, pace = over_speed(dataset)
-    laws = [law for line in scene.lines for law in _laws_of(dataset, scene, line, scale)]
+    scene = over_speed(dataset)
+    laws = [law for line in scene.lines for law in _laws_of(dataset, scene, line)]
 
     def thin_lines(panel: Axes, values: Callable[[Steady], np.ndarray]) -> None:
         for speed, law in laws:
-            panel.plot(pace.factor * speed, values(law), label=law.words, **_LAWS[law.style])
+            panel.plot(scene.unit.factor * speed, values(law), label=law.words, **_LAWS[law.style])
 
     def stress_panel(panel: Axes, scene: Scene) -> None:
         """Shear stress of the dataset upon closed forms, with the maximum of each curve."""
-        unit = Unit.of(scene.all("shear_stress_mean"), "Pa")
-        contact_curves(panel, scene._replace(lines=_marked(panel, scene, unit.factor)), "shear_stress", unit.factor)
-        thin_lines(panel, lambda law: unit.factor * law.stress)
+        factor = in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa")
+        contact_curves(panel, scene._replace(lines=_marked(panel, scene, factor)), "shear_stress", factor)
+        thin_lines(panel, lambda law: factor * law.stress)
         legend(panel, scene.title)
-        panel.set_ylabel(unit.label(r"shear stress $\tau_0$"))
 
     def fraction_panel(panel: Axes, scene: Scene) -> None:
         thin_lines(panel, lambda law: law.fraction)
@@ -68,18 +64,17 @@ def stress_figure(dataset: xr.Dataset) -> Figure:
         panel.set_ylabel("bond fraction $N/N_0$")
 
     panels = [(2.1, stress_panel), (1.3, fraction_panel)]
-    shown = panels if scene.varies("bond_fraction") else panels[:1]
-    return stacked(scene, shown, pace.label("sliding speed $V$"), scale, scene.room)[0]
+    return stacked(scene, panels if scene.varies("bond_fraction") else panels[:1])[0]
 
 
-def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line, scale: str) -> list[tuple[np.ndarray, Steady]]:
+def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.ndarray, Steady]]:
     """Closed forms over the speeds of a curve, each with the speeds [m/s]."""
     speeds = scene.values("speed_mean", line)
     low, high = float(np.min(speeds)), float(np.max(speeds))
     fine = np.linspace(low, high, _FINE)
-    if scale == "log":
+    if scene.scale == "log":
         fine = np.geomspace(low, high, _FINE)
-    elif scale == "symlog":
+    elif scene.scale == "symlog":
         fine = np.append(0.0, np.geomspace(np.min(speeds[speeds > 0.0]), high, _FINE - 1))
     return [(fine, law) for law in steady_laws(dataset, line.point, fine)]
 

@@ -183,9 +183,15 @@ class Unit(NamedTuple):
         """The unit that suits the largest of some values, on a logarithmic axis the middle of them."""
         sizes = np.abs(values)
         sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]
-        if not sizes.size:
-            return cls(*scaled(0.0, unit))
-        return cls(*scaled(float(np.sqrt(sizes.min() * sizes.max()) if logarithmic else sizes.max()), unit))
+        most = sizes.max(initial=0.0)
+        return cls(*scaled(float(np.sqrt(sizes.min(initial=most) * most) if logarithmic else most), unit))
+
+
+def in_unit(axis: Axis, words: str, values: Any, si: str) -> float:
+    """Label an axis with words and the unit that suits values [SI]; the factor to that unit."""
+    unit = Unit.of(values, si)
+    axis.set_label_text(unit.label(words))
+    return unit.factor
 
 
 def axis_scale(values: np.ndarray) -> str:
@@ -221,7 +227,7 @@ def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: 
         panel.fill_between(x[part], low[part], high[part], linewidth=0, **look)
 
 
-def across(panel: Axes, x: np.ndarray, scale: str, words: str, room: float = 0.0) -> None:
+def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: float = 0.0) -> None:
     """The x axis from the least to the largest value, with some ``room`` for markers at its ends, and its label."""
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
     low, high = known.min(), known.max()

@@ -11,17 +11,16 @@ from sim.analysis import control, is_steady, setting, settled
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
 from sim.plots.curves import choice
-from sim.plots.style import LINES, REFERENCE, Unit
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
-    "jkr": ("JKR; Menga, Carbone & Dini 2019", REFERENCE, "--"),
-    "hertz": ("Hertz", REFERENCE, ":"),
-    "uncorrected": ("Menga et al. 2018, uncorrected", LINES[4], "-"),
-    "savkoor_briggs": ("Savkoor & Briggs, full stick", LINES[1], "-"),
-    "reversible_force": ("reversible, force held", LINES[5], "--"),
-    "reversible_stress": ("reversible, stress held", LINES[2], "-"),
-    "fraction": ("a fraction {share:.3g} reversible", LINES[3], "-."),
+    "jkr": ("JKR; Menga, Carbone & Dini 2019", style.REFERENCE, "--"),
+    "hertz": ("Hertz", style.REFERENCE, ":"),
+    "uncorrected": ("Menga et al. 2018, uncorrected", style.LINES[4], "-"),
+    "savkoor_briggs": ("Savkoor & Briggs, full stick", style.LINES[1], "-"),
+    "reversible_force": ("reversible, force held", style.LINES[5], "--"),
+    "reversible_stress": ("reversible, stress held", style.LINES[2], "-"),
+    "fraction": ("a fraction {share:.3g} reversible", style.LINES[3], "-."),
 }
 
 #: Reversible fraction that is drawn where the dataset has none of its own.
@@ -32,6 +31,9 @@ _FINE, _WIDEST = 1500, 1.6
 
 #: Points of a dataset that are drawn at most.
 _POINTS = 40
+
+#: What areas are drawn over: in words, its unit, and the power of the area that the stress is multiplied by.
+_AXES = ((r"shear stress $\tau$", "Pa", 0), (r"tangential force $T = \tau A$", "N", 1))
 
 #: Control of the contact: the law of all theories under it, its symbol and unit.
 _CONTROLS: Any = {"load": (compare_at_load, "$P$", "N"), "indentation": (compare_at_indentation, r"$\delta$", "m")}
@@ -136,21 +138,19 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     fine = np.geomspace(low, high, _FINE)
     areas = {name: np.pi * radius**2 for name, radius in case.radii(fine).items()}
     figure, axes = style.pairs(3.3, shared=True)
-    unit, full = Unit.of(areas["jkr"], "m^2"), areas["jkr"][0]
-    pace, force = Unit.of(fine, "Pa", logarithmic=True), Unit.of(full * fine, "N", logarithmic=True)
-    stresses = dict.fromkeys(areas, pace.factor * fine)
-    forces = {name: force.factor * values * fine for name, values in areas.items()}
-    _panel(axes[0], case, stresses, areas, (pace.factor * stress, area), unit)
-    _panel(axes[1], case, forces, areas, (force.factor * stress * area, area), unit)
-    ends = np.array([low, high])
-    style.across(axes[0], pace.factor * ends, "log", pace.label(r"shear stress $\tau$"))
-    style.across(axes[1], force.factor * ends * full, "log", force.label(r"tangential force $T = \tau A$"))
-    axes[0].set_ylabel(unit.label("contact area $A$"))
+    full, look = areas["jkr"][0], style.HOLLOW | {"color": style.BOTH, "zorder": 4}
+    factor = style.in_unit(axes[0].yaxis, "contact area $A$", areas["jkr"], "m^2")
+    for panel, (words, si, power) in zip(axes, _AXES, strict=True):
+        unit = style.Unit.of(full**power * fine, si, logarithmic=True)
+        along = {name: unit.factor * values**power * fine for name, values in areas.items()}
+        _panel(panel, case, along, areas, factor)
+        panel.plot(unit.factor * stress * area**power, factor * area, label="simulated", **look)
+        style.across(panel, unit.factor * np.array([low, high]) * full**power, unit.label(words), "log")
     # heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond
     least = float(np.nan_to_num(areas["hertz"][0]))
     bottom = min(least - 0.3 * (full - least), float(np.min(area, initial=least)))
     top = max(_WIDEST * full, 1.05 * float(np.max(area, initial=0.0)))
-    axes[0].set_ylim(unit.factor * max(bottom, 0.0), unit.factor * top)
+    axes[0].set_ylim(factor * max(bottom, 0.0), factor * top)
     _, symbol, si = _CONTROLS[case.held]
     words = f"{symbol} = {style.text_of(case.value, si)}, $w$ = {style.text_of(case.work, 'J/m^2')}"
     axes[1].set_title(words, loc="right")
@@ -159,23 +159,18 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     return figure
 
 
-def _panel(
-    panel: Axes, case: Case, across: dict[str, np.ndarray], areas: dict[str, np.ndarray],
-    points: tuple[np.ndarray, np.ndarray], unit: Unit,
-) -> None:  # fmt: skip
-    """Every theory along its own x, as far as its adhesive branch goes, and the dataset's points."""
+def _panel(panel: Axes, case: Case, along: dict[str, np.ndarray], areas: dict[str, np.ndarray], factor: float) -> None:
+    """Every theory along its own x, as far as its adhesive branch goes."""
     for name, (words, colour, line) in _THEORIES.items():
-        values, label = areas[name], words.format(share=case.reversible)
+        values, label = factor * areas[name], words.format(share=case.reversible)
         if name in ("jkr", "hertz"):  # whatever the shear
-            panel.axhline(unit.factor * values[0], linestyle=line, label=label, **style.GREY)
+            panel.axhline(values[0], linestyle=line, label=label, **style.GREY)
             continue
-        branch = adhesive(values, areas["hertz"])
-        panel.plot(across[name], unit.factor * branch, linestyle=line, color=colour, label=label)
+        branch = adhesive(values, factor * areas["hertz"])
+        panel.plot(along[name], branch, linestyle=line, color=colour, label=label)
         held = np.flatnonzero(np.isfinite(branch))
         if held.size and held[-1] < len(branch) - 1:  # it ends: at a fold with a dot
-            panel.plot(across[name][held[-1]], unit.factor * branch[held[-1]], "o", markersize=3, color=colour)
-    look = style.HOLLOW | {"color": style.BOTH, "zorder": 4}
-    panel.plot(points[0], unit.factor * points[1], label="simulated", **look)
+            panel.plot(along[name][held[-1]], branch[held[-1]], "o", markersize=3, color=colour)
 
 
 def adhesive(areas: np.ndarray, hertz: np.ndarray) -> np.ndarray:
