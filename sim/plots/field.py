@@ -45,10 +45,12 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     radius, speed = (float(_then(dataset, name, at, stress)) for name in ("contact_radius", "speed"))
     figure, axes = style.pairs(3.1, shared=True)
     length = style.Unit.of(np.array([cell]), "m")
-    _draw_map(figure, axes[0], stress.to_numpy(), cell, radius, length, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
-    _draw_map(figure, axes[1], moved, cell, radius, length, ("m", "displacement $w_1$", "PuOr_r"))
+    cell, radius = length.factor * cell, length.factor * radius
+    _draw_map(figure, axes[0], stress.to_numpy(), cell, radius, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
+    _draw_map(figure, axes[1], moved, cell, radius, ("m", "displacement $w_1$", "PuOr_r"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
     for panel in axes:
+        panel.set_xlabel(length.label("$x$"))
         panel.text(
             0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7,
             bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0},
@@ -65,9 +67,7 @@ def _then(dataset: xr.Dataset, name: str, at: dict[str, int], stress: xr.DataArr
     return (values.sel(member=stress["map_member"]) if "member" in values.dims else values).to_numpy()
 
 
-def _draw_map(
-    figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, length: style.Unit, about: tuple
-) -> None:
+def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, about: tuple) -> None:
     """One field around the contact, continued periodically where the contact is wider than the cell."""
     si, words, colours = about
     field = _refined(field)
@@ -77,16 +77,15 @@ def _draw_map(
     index = np.arange(-half, half + 1) % points
     unit = style.Unit.of(field, si)
     most = unit.factor * float(np.max(np.abs(field))) or 1.0
-    reach = (half + 0.5) * cell / points * length.factor
+    reach = (half + 0.5) * cell / points
     image = panel.imshow(
         unit.factor * field[np.ix_(index, index)].T, cmap=colours, vmin=-most, vmax=most, origin="lower",
         extent=(-reach, reach, -reach, reach), interpolation="nearest",
     )  # fmt: skip
     figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
     if 0.0 < radius < 1.5 * cell:
-        style.contact_circle(panel, radius * length.factor)
-    limit = 0.5 * side * length.factor
-    panel.set(xlim=(-limit, limit), ylim=(-limit, limit), xlabel=length.label("$x$"))
+        style.contact_circle(panel, radius)
+    panel.set(xlim=(-0.5 * side, 0.5 * side), ylim=(-0.5 * side, 0.5 * side))
 
 
 def _refined(field: np.ndarray) -> np.ndarray:

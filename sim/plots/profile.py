@@ -155,10 +155,8 @@ def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.U
 
 def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
     """Tangential displacement of the surface around the contact circle."""
-    extent = reach / shape.radius
-    x, moved = profiles.tangential_map(
-        shape.radius, shape.stress, shape.shear_modulus, shape.poisson_ratio, points=_MAP, extent=extent
-    )  # fmt: skip
+    bodies = shape.shear_modulus, shape.poisson_ratio
+    x, moved = profiles.tangential_map(shape.radius, shape.stress, *bodies, points=_MAP, extent=reach / shape.radius)
     unit = style.Unit.of(moved, "m")
     x, moved = length.factor * x, unit.factor * moved.T
     side = x[-1] + 0.5 * (x[1] - x[0])

@@ -70,35 +70,30 @@ class Picture(Figure):
             super().savefig(fname, **({"metadata": undated} | options))
 
 
-def picture(width: float, height: float) -> Figure:
-    """An empty picture [in] with a canvas of its own."""
-    empty = Picture(figsize=(width, height), dpi=200, layout="constrained")
-    FigureCanvasAgg(empty)
-    return empty
-
-
 def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
     """A picture of one column: panels of given heights [in] above each other, lettered; with one x axis if shared."""
-    figure = picture(COLUMN, 0.45 + sum(heights))
-    axes = list(figure.subplots(len(heights), 1, sharex=shared, squeeze=False, height_ratios=heights)[:, 0])
+    size = COLUMN, 0.45 + sum(heights)
+    figure, axes = _panels(size, (len(heights), 1), sharex=shared, height_ratios=heights)
     figure.align_ylabels(axes)
-    return figure, _lettered(axes)
+    return figure, axes
 
 
 def pairs(height: float, count: int = 1, shared: bool = False) -> tuple[Figure, list[Axes]]:
     """A picture of both columns and a height [in]: pairs of panels side by side, lettered; one y axis if shared."""
-    figure = picture(WIDE, height)
-    return figure, _lettered(list(figure.subplots(count, 2, sharey=shared, squeeze=False).flat))
+    return _panels((WIDE, height), (count, 2), sharey=shared)
 
 
-def _lettered(axes: list[Axes]) -> list[Axes]:
-    """Several panels with (a), (b), ... in the order given."""
+def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -> tuple[Figure, list[Axes]]:
+    """A picture of a size [in] with a canvas of its own, and its rows and columns of panels; several are lettered."""
+    figure = Picture(figsize=size, dpi=200, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = list(figure.subplots(*count, squeeze=False, **options).flat)
     for mark, panel in zip("abcdefg", axes if len(axes) > 1 else (), strict=False):
         panel.annotate(
             f"({mark})", (0.0, 1.0), (-2, 4), xycoords="axes fraction", textcoords="offset points",
             ha="right", va="bottom", fontweight="bold",
         )  # fmt: skip
-    return axes
+    return figure, axes
 
 
 def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
