@@ -18,7 +18,7 @@ from pydantic import TypeAdapter
 from sim.ensemble.part_files import Parts
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
-from sim.parts.shear.modal import MappedProcess
+from sim.parts.shear.modal import ModalProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
 from sim.scenario.sweep import Axis, written
@@ -253,7 +253,7 @@ def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
 
 def _maps(file: File, plan: Plan, parts: Parts) -> None:
     scene = plan.points[0]
-    process = cast(MappedProcess, scene.process)
+    process = cast(ModalProcess, scene.process)
     points, cell = process.modes.points, process.modes.cell
     count = min(scene.record.map_members, plan.members)
     file.createDimension("map_member", count)

@@ -22,7 +22,7 @@ from sim.ensemble.plan import Plan, part_name, work
 from sim.ensemble.recorded import DISC_ENERGIES, MAP
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import HDF5, StoreTrouble, explained, sync_folder
-from sim.parts.shear.modal import MappedProcess
+from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import Fluctuation
 from sim.scenario.scenario import Scenario
 
@@ -133,7 +133,7 @@ def _record(
 
 def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
     """Maps of the first members, and in a contact of finite size their energies on its disc, shape (maps, ...)."""
-    process = cast(MappedProcess, point.process)
+    process = cast(ModalProcess, point.process)
     maps = process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)
     found = {MAP[0]: maps}
     if point.margin is not None:
@@ -147,7 +147,7 @@ def _on_the_disc(point: Scenario, state: State, maps: np.ndarray) -> np.ndarray:
 
     ½⟨τ1 w1⟩, and ⟨τ1 w0⟩ with the displacement w0 of the mean stress.
     """
-    cell, solid = cast(MappedProcess, point.process).modes.cell, point.solid.effective
+    cell, solid = cast(ModalProcess, point.process).modes.cell, point.solid.effective
     radius, stress = (
         np.broadcast_to(values, max(len(values), len(maps)))[: len(maps)]
         for values in (state.contact.radius, state.bonding.stress)

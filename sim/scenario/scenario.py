@@ -20,7 +20,7 @@ from sim.parts.drive import Drive
 from sim.parts.drive import Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
-from sim.parts.shear.modal import MappedProcess
+from sim.parts.shear.modal import ModalProcess
 from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.declared import as_html, entries, with_models
@@ -149,7 +149,7 @@ class Scenario:
         """Side of the cell [m] and points along it of the maps that are recorded; None where none is."""
         if not self.record.maps:
             return None
-        modes = cast(MappedProcess, self.process).modes
+        modes = cast(ModalProcess, self.process).modes
         return modes.cell, modes.points
 
     @cached_property

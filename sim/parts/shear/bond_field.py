@@ -12,7 +12,7 @@ import numpy as np
 
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Array, Bonding, Motion
-from sim.parts.shear.modal import DrawsMaps, ModalProcess
+from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import Fluctuation, SmoothProcess
 
 
@@ -57,7 +57,3 @@ def _combined(parts: Array, sizes: Array) -> Array:
     """The field of both parts at their sizes (2, members), shape (members, 2, pairs)."""
     frozen, varying = sizes[:, :, np.newaxis, np.newaxis]
     return frozen * parts[:, :2] + varying * parts[:, 2:]
-
-
-class MappedSiteModes(DrawsMaps, SiteModes):
-    """``SiteModes`` that also draws its map."""

@@ -75,6 +75,35 @@ class ModalProcess(Renewing):
         np.multiply(state.values[:, 1], size, out=values.imag)
         return values
 
+    def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
+        """Stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
+
+        The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
+        e^{iq(x − X)}.
+        """
+        first = state._replace(values=state.values[:members])
+        if len(state.amplitude) > 1:
+            first = first._replace(amplitude=state.amplitude[:members])
+        lattice = np.arange(-self.grid.points, self.grid.points + 1)
+        turns = np.exp(-2j * np.pi / self.grid.cell * position[:members, np.newaxis] * lattice) * self.grid.cell**2
+        amplitudes = self.complex_amplitudes(first)
+        amplitudes *= np.take(turns, self.modes.ix + self.grid.points, axis=1)
+        half = np.zeros((members, self.grid.points * (self.grid.points // 2 + 1)), dtype=complex)
+        half[:, self._places] = amplitudes
+        edge = self.modes.iy == 0  # the column q_y = 0 holds both of a pair
+        half[:, -self.modes.ix[edge] % self.grid.points * (self.grid.points // 2 + 1)] = amplitudes[:, edge].conj()
+        return self.grid.inverse(half.reshape(members, self.grid.points, -1))
+
+    @cached_property
+    def grid(self) -> Grid:
+        """The grid of the map."""
+        return Grid(self.modes.cell, self.modes.points)
+
+    @cached_property
+    def _places(self) -> Indices:
+        """Index of each pair in the flattened half spectrum."""
+        return self.modes.ix % self.grid.points * (self.grid.points // 2 + 1) + self.modes.iy
+
     @property
     def gammas(self) -> Gammas:
         return Gammas(2.0 * self.weights, np.ones(self.pairs), self.wavenumber)
@@ -152,46 +181,3 @@ def _renew_modes(before, normals, keep, renew, size, weights, after, energy):
         for lane in range(8):
             total += lanes[lane]
         energy[m] = total
-
-
-class DrawsMaps:
-    """A process whose stress map can be drawn."""
-
-    modes: Modes
-
-    def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
-        """Stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
-
-        The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
-        e^{iq(x − X)}.
-        """
-        first = state._replace(values=state.values[:members])
-        if len(state.amplitude) > 1:
-            first = first._replace(amplitude=state.amplitude[:members])
-        lattice = np.arange(-self.grid.points, self.grid.points + 1)
-        turns = np.exp(-2j * np.pi / self.grid.cell * position[:members, np.newaxis] * lattice) * self.grid.cell**2
-        amplitudes = self.complex_amplitudes(first)  # type: ignore[attr-defined]
-        amplitudes *= np.take(turns, self.modes.ix + self.grid.points, axis=1)
-        half = np.zeros((members, self.grid.points * (self.grid.points // 2 + 1)), dtype=complex)
-        half[:, self._places] = amplitudes
-        edge = self.modes.iy == 0  # the column q_y = 0 holds both of a pair
-        half[:, -self.modes.ix[edge] % self.grid.points * (self.grid.points // 2 + 1)] = amplitudes[:, edge].conj()
-        return self.grid.inverse(half.reshape(members, self.grid.points, -1))
-
-    @cached_property
-    def grid(self) -> Grid:
-        """The grid of the map."""
-        return Grid(self.modes.cell, self.modes.points)
-
-    @cached_property
-    def _places(self) -> Indices:
-        """Index of each pair in the flattened half spectrum."""
-        return self.modes.ix % self.grid.points * (self.grid.points // 2 + 1) + self.modes.iy
-
-
-class MappedProcess(DrawsMaps, ModalProcess):
-    """``ModalProcess`` that also draws its map."""
-
-
-class MappedFixedProcess(DrawsMaps, FixedProcess):
-    """``FixedProcess`` that also draws its map."""

@@ -18,9 +18,9 @@ from sim.parts.exchange import Setting
 from sim.parts.shear.amplitude import Amplitude, Constant
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.bands import Bands, group
-from sim.parts.shear.bond_field import MappedSiteModes, SiteMean, SiteModes
+from sim.parts.shear.bond_field import SiteMean, SiteModes
 from sim.parts.shear.correlation import Correlation
-from sim.parts.shear.modal import FixedProcess, MappedFixedProcess, MappedProcess, ModalProcess
+from sim.parts.shear.modal import FixedProcess, ModalProcess
 from sim.parts.shear.mode_pairs import cell_pairs
 from sim.parts.shear.modes import cell_variance, modes
 from sim.parts.shear.process import SmoothProcess
@@ -234,19 +234,12 @@ class Modal(_Fluctuating):
     model: Literal["modal"] = "modal"
 
     keeps_modes: ClassVar[bool] = True
-    #: Classes of the process: of free and of fixed mode amplitudes, and of a field that bonds make.
-    kinds: ClassVar[tuple[type[ModalProcess], ...]] = (ModalProcess, FixedProcess, SiteModes)
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
-        free, fixed, of_bonds = self.kinds
-        kind = of_bonds if self.spectrum.bond_made else fixed if self.mode_amplitudes == "fixed" else free
-        return kind(
-            modes(self.spectrum, self.side(cell), self.points),
-            shear_modulus,
-            poisson_ratio,
-            self.correlation,
-            self.amplitude,
-        )
+        free_or_fixed = FixedProcess if self.mode_amplitudes == "fixed" else ModalProcess
+        kind = SiteModes if self.spectrum.bond_made else free_or_fixed
+        found = modes(self.spectrum, self.side(cell), self.points)
+        return kind(found, shear_modulus, poisson_ratio, self.correlation, self.amplitude)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -259,7 +252,6 @@ class Mapped(Modal):
     model: Literal["mapped"] = "mapped"  # type: ignore[assignment]
 
     draws_maps: ClassVar[bool] = True
-    kinds: ClassVar[tuple[type[ModalProcess], ...]] = (MappedProcess, MappedFixedProcess, MappedSiteModes)
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
         process = super().process(shear_modulus, poisson_ratio, cell)

@@ -11,7 +11,7 @@ from scipy.integrate import quad
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding, Motion
 from sim.parts.shear.amplitude import Constant
-from sim.parts.shear.bond_field import MappedSiteModes, SiteMean, SiteModes
+from sim.parts.shear.bond_field import SiteMean, SiteModes
 from sim.parts.shear.correlation import Time
 from sim.parts.shear.modes import modes
 from sim.spectrum.bond_made import BondMade
@@ -108,7 +108,7 @@ def test_the_sign_of_the_mean_force_turns_the_frozen_pattern():
 def test_a_map_of_the_bonds_field_has_the_energy_of_its_modes():
     from sim.laws.halfspace import surface_energy
 
-    field, noise = process(MappedSiteModes), Noise(3, "shear", np.arange(2))
+    field, noise = process(), Noise(3, "shear", np.arange(2))
     state = field.start(moved(0), bonding(0.8, 0.6), noise)
     maps = field.maps(state, np.zeros(1), 2)
     assert_allclose([surface_energy(one, CELL, G) for one in maps], state.energy, rtol=1e-12)
