@@ -165,10 +165,8 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
         return []
     powers = [_power(point) for point in points]
     rms = [math.sqrt(power * spectrum.variance) for power, spectrum in zip(powers, spectra, strict=True)]
-    energies = [
-        power * float(point.fluctuations.spectrum.surface_energy(*point.solid.effective))
-        for power, point in zip(powers, points, strict=True)
-    ]
+    plane = [float(point.fluctuations.spectrum.surface_energy(*point.solid.effective)) for point in points]
+    energies = [power * energy for power, energy in zip(powers, plane, strict=True)]
     settled = any(spectrum.bond_made for spectrum in spectra)
     when = "in steady sliding at the last speed" if settled else "at amplitude 1"
     rows: Rows = [
@@ -226,8 +224,7 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
-    return [
-        *rows,
+    return rows + [
         ("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core"),
         ("memory", f"about {_size(held)}"),
         ("file", f"{_size(_bytes(plan, some[0]))} at most, before compression"),

@@ -148,10 +148,8 @@ def _on_the_disc(point: Scenario, state: State, maps: np.ndarray) -> np.ndarray:
     ½⟨τ1 w1⟩, and ⟨τ1 w0⟩ with the displacement w0 of the mean stress.
     """
     cell, solid = cast(ModalProcess, point.process).modes.cell, point.solid.effective
-    radius, stress = (
-        np.broadcast_to(values, max(len(values), len(maps)))[: len(maps)]
-        for values in (state.contact.radius, state.bonding.stress)
-    )
+    found, count = (state.contact.radius, state.bonding.stress), len(maps)
+    radius, stress = (np.broadcast_to(values, max(len(values), count))[:count] for values in found)
     radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
     own = disc_energy_of_map(maps, cell, radius, *solid)
     return np.stack([own, cross_energy_of_map(maps, cell, radius, stress, *solid)])

@@ -71,9 +71,8 @@ def _require_multiple(name: str, long: float, other: str, short: float) -> None:
         return
     below, above = max(math.floor(ratio), 1) * short, (math.floor(ratio) + 1) * short
     cure = f"{above:g} s" if ratio < 1.0 else f"{below:g} s or {above:g} s"
-    raise PydanticCustomError(
-        "clock", f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s), such as {cure}"
-    )
+    said = f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s)"
+    raise PydanticCustomError("clock", f"{said}, such as {cure}")
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

@@ -140,10 +140,8 @@ def _row_faults(
 def _swept(fault: Fault, axis: Axis, places: list[int], zipped: bool) -> Fault:
     """A fault of some values of a sweep, placed at the first of them."""
     paths = {key: tuple(key.split(".")) for key in axis.keys}
-    inside = (
-        key for key, path in paths.items() if all(one == other for one, other in zip(path, fault.path, strict=False))
-    )
-    key = next(inside, axis.keys[0])
+    near = [key for key, path in paths.items() if all(a == b for a, b in zip(path, fault.path, strict=False))]
+    key = near[0] if near else axis.keys[0]
     if fault.kind in ("unknown", "renamed") and paths[key][: len(fault.path)] == fault.path:
         meant = dotted((*fault.near, *paths[key][len(fault.path) :]))
         said = f'is now called "{meant}"' if fault.kind == "renamed" else f'is not a key; did you mean "{meant}"?'

@@ -33,6 +33,7 @@ from sim.units.refusals import BadInput
 
 #: Relative error of a cell against the infinite plane that is remarked on.
 _CELL_ERROR = 0.05
+_Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
 #: Columns that a part has read from its file, read anew where its table changes.
 _FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
 
@@ -69,9 +70,7 @@ class Scenario:
     ensemble: Ensemble = Field(default_factory=Ensemble)
     record: Record = Field(default_factory=Record)
     sweep: Annotated[tuple[Any, ...], BeforeValidator(lambda sweep: read_sweep(sweep))] = ()
-    name: Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")] = (
-        "sliding contact"
-    )
+    name: _Title = "sliding contact"
     seed: Annotated[int, Quantity("1", "seed of the run", at_least=0, at_most=2**64 - 1, whole=True)] = 0
     source: Annotated[Any, Field(exclude=True)] = Source()
 
@@ -86,10 +85,8 @@ class Scenario:
 
     @model_validator(mode="after")
     def _across_parts(self) -> "Scenario":
-        faults = [
-            InitErrorDetails(type=PydanticCustomError("across", text), loc=where, input=None)
-            for where, text in faults_across({name: getattr(self, name) for name in CHECKED})
-        ]
+        across = faults_across({name: getattr(self, name) for name in CHECKED})
+        faults = [InitErrorDetails(type=PydanticCustomError("across", text), loc=at, input=None) for at, text in across]
         if faults:
             raise ValidationError.from_exception_data("Scenario", faults)
         if self.source.text and not self.source.parts:

@@ -1,15 +1,7 @@
 """Power spectral density of the fluctuating shear stress: families, tables, measured maps, finite contacts."""
 
 from sim.spectrum.bond_made import BondMade
-from sim.spectrum.families import (
-    AnisotropicGaussian,
-    Band,
-    Gaussian,
-    Ripple,
-    SelfAffine,
-    Spectrum,
-    VonKarman,
-)
+from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Spectrum, VonKarman
 from sim.spectrum.finite_contact import disc_energy, marginal_energy
 from sim.spectrum.measured import Measured
 from sim.spectrum.periodogram import periodogram, radial_average

@@ -126,10 +126,8 @@ def _coordinate_spacing(data: Any, spacing: float | None) -> float | None:
         step = float(np.mean(steps))
         uneven = not np.allclose(steps, step, rtol=1e-4, atol=0.0)
         if uneven or (spacing is not None and not math.isclose(abs(step), spacing, rel_tol=1e-4)):
-            raise ValueError(
-                f"the coordinate {axis} is not spaced by one step, equal in x and y and to the key spacing; "
-                "interpolate the map onto a square lattice"
-            )
+            said = f"the coordinate {axis} is not spaced by one step, equal in x and y and to the key spacing"
+            raise ValueError(f"{said}; interpolate the map onto a square lattice")
         spacing = abs(step) if spacing is None else spacing
     return spacing
 

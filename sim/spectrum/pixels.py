@@ -125,10 +125,8 @@ def _integrate(spectrum: Radial, step: float, line: Array, start: Array, end: Ar
         if np.count_nonzero(rough) > 8 * len(total[0]) + 10_000:
             break
         line, owner = (np.concatenate([a[rough], a[rough]]) for a in (line, owner))
-        start, end = (
-            np.concatenate([start[rough], middle[rough]]),
-            np.concatenate([middle[rough], end[rough]]),
-        )
+        start, middle, end = start[rough], middle[rough], end[rough]
+        start, end = np.concatenate([start, middle]), np.concatenate([middle, end])
         whole = np.concatenate([left[:, rough], right[:, rough]], axis=1)
     raise ArithmeticError("the pixel integrals of the spectrum do not converge")
 

@@ -121,18 +121,15 @@ class Course:
             return []
         half = duration / (2.0 * self.cycles)
         first, last = math.floor(start / half), math.ceil(stop / half)
-        return [
-            (k * half, self.stop if k % 2 else self.start)
-            for k in range(first, last + 1)
-            if start + _SAME * duration < k * half < stop - _SAME * duration
-        ]
+        low, high = start + _SAME * duration, stop - _SAME * duration
+        inside = [k for k in range(first, last + 1) if low < k * half < high]
+        return [(k * half, self.stop if k % 2 else self.start) for k in inside]
 
     def _piece(self, start: float, first: float, stop: float, last: float, duration: float) -> Piece:
         if self.scale == "linear":
             return linear_piece(start, stop, first, last)
-        rate = math.copysign(
-            math.log(self.stop / self.start) * max(1, 2 * self.cycles) / duration, abs(last) - abs(first)
-        )
+        rate = math.log(self.stop / self.start) * max(1, 2 * self.cycles) / duration
+        rate = math.copysign(rate, abs(last) - abs(first))
         integral = first * math.expm1(rate * (stop - start)) / rate if rate else first * (stop - start)
         return Piece(start, stop, first, last, integral, abs(integral))
 

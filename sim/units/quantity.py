@@ -231,9 +231,8 @@ class Quantity:
         if match is None or (match["unit"] and _COMMA.match(text)):
             cure = "write decimals with a point" if _COMMA.match(text) else "write a number"
             cure += "" if self.unit == "1" else " and a unit"
-            raise self._fault(
-                "not_a_quantity", 'cannot be read: "{text}"; {cure}, such as {example}', text=text[:40], cure=cure
-            )
+            said = 'cannot be read: "{text}"; {cure}, such as {example}'
+            raise self._fault("not_a_quantity", said, text=text[:40], cure=cure)
         number = float(match["number"])
         if match["unit"] is not None:
             return _times(number, self._factor(match["unit"]))
@@ -297,10 +296,8 @@ class Quantity:
         return all(_BOUNDS[name][1](number, bound) for name, bound in self._bounds.items())
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        kind = int if self.whole else float
-        return core_schema.no_info_plain_validator_function(
-            self.read, serialization=core_schema.plain_serializer_function_ser_schema(kind)
-        )
+        written = core_schema.plain_serializer_function_ser_schema(int if self.whole else float)
+        return core_schema.no_info_plain_validator_function(self.read, serialization=written)
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict:
         described: dict[str, Any] = {"type": ["number", "string"], "description": f"{self.meaning} [{self.unit}]"}

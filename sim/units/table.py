@@ -59,10 +59,8 @@ def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.floa
         raise TableError(f"line {number}: no rows follow the header; add rows of numbers below it")
     for at, cells in rows:
         if len(cells) != len(header):
-            raise TableError(
-                f"line {at}: {len(cells)} cells where the header has {len(header)}; separate cells by "
-                "commas, write decimals with a point"
-            )
+            said = f"{len(cells)} cells where the header has {len(header)}"
+            raise TableError(f"line {at}: {said}; separate cells by commas, write decimals with a point")
     return {
         name: np.array([_number(at, name, cells[place], unit, wanted[name]) for at, cells in rows])
         for name, (place, unit) in found.items()

@@ -76,7 +76,7 @@ class ModalProcess(Renewing):
         return values
 
     def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
-        """Stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
+        """Stress maps τ1(x, y) on the grid of the first ``members``, shape (members, points, points) [Pa].
 
         The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
         e^{iq(x − X)}.
