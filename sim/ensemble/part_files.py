@@ -3,19 +3,10 @@
 import io
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from sim.numerics.files import explained, write_whole
-
-
-class Parts(Protocol):
-    """Where parts are kept until the dataset is made."""
-
-    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None: ...
-
-    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]: ...
 
 
 class MemoryParts(dict):
@@ -44,3 +35,7 @@ class PartFiles:
         """The arrays whose names begin so, without reading the others."""
         with explained(self.folder), np.load(self.folder / f"{name}.npz", allow_pickle=False) as arrays:
             return {key: arrays[key] for key in arrays.files if key.startswith(beginning)}
+
+
+#: Where parts are kept until the dataset is made.
+Parts = MemoryParts | PartFiles

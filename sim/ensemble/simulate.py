@@ -93,9 +93,8 @@ def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None
     """Advance every group of members at every point of the sweep and save the parts."""
     for number, point in enumerate(plan.points):
         for group, members in enumerate(plan.groups()):
-            stretches = plan.stretches(point)
             states = march(point, members, keep=False)
-            for index, records in enumerate(stretches):
+            for index, records in enumerate(plan.stretches(point)):
                 arrays = _record(plan, point, members, states, records, progress)
                 parts.save(part_name(number, group, index), arrays)
         point.release()

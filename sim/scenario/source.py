@@ -1,15 +1,14 @@
 """Where a scenario was read from: its text and the files it names."""
 
 import errno
-from dataclasses import dataclass as plain_dataclass
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 _MOST_BYTES = 2**28
 
 
-@plain_dataclass(frozen=True)
+@dataclass(frozen=True)
 class Source:
     """Where a scenario came from: the file's text, what was changed on top, and every file it names.
 
@@ -29,7 +28,7 @@ class Source:
         return Source(self.path, self.text, kept | values, self.files)
 
 
-@plain_dataclass(frozen=True)
+@dataclass(frozen=True)
 class Files:
     """The files that a scenario names, relative to its own folder; remembers the text of each."""
 

@@ -365,7 +365,7 @@ def test_a_counted_cell_is_grouped_like_the_listed_one():
     [
         (Band(RMS, 300e-6, 250e-6), None, "make the cell longer"),
         (Band(RMS, 300e-6, 250e-6), 1024, "make the cell longer"),
-        (Band(RMS, 50e-6, 7e-6), 20, "give more points, a longer shortest wavelength or a smaller cell"),
+        (Band(RMS, 50e-6, 7e-6), 20, "give more points or leave them out, a longer shortest wavelength or"),
         (Gaussian(RMS, 8e-6), None, "give points"),
         (Gaussian(RMS, 8e-6), 2, "at least 3"),
         (Ripple(RMS, 5e-6), 20, "give more points"),
