@@ -9,6 +9,7 @@ import numpy as np
 from sim.engine import State, balance
 from sim.laws import jkr
 from sim.parts import extremes
+from sim.parts.contact.balance import BONDED, CLOSED, SETTLED, STRESSLESS, WHOLE
 from sim.parts.contact.control import Control
 from sim.scenario.scenario import Scenario
 
@@ -59,30 +60,36 @@ def _hertz_radius(scene: Scenario, state: State) -> np.ndarray:
     return np.nan_to_num(_control(scene, state).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
 
 
-def _reference(scene: Scenario, state: State, phase: np.ndarray, work: np.ndarray) -> np.ndarray:
-    """Radius of the contact in equilibrium with another work of adhesion [m], 0 where that one is open."""
-    return scene.contact.reference_radius(phase, work, _control(scene, state), scene.bodies)
+def _where_closed(state: State, reference: int, radius: np.ndarray) -> np.ndarray:
+    """Radius of a reference contact [m], 0 where it is open."""
+    return np.where(state.contact.phases[: len(radius), reference] == CLOSED, radius, 0.0)
+
+
+def _with_work(scene: Scenario, state: State, reference: int, work: np.ndarray) -> np.ndarray:
+    """Radius of a reference contact in equilibrium with a work of adhesion [m]."""
+    return _where_closed(state, reference, _control(scene, state).radius(work, np.zeros(1), 0.0, scene.bodies))
 
 
 def _jkr_radius(scene: Scenario, state: State) -> np.ndarray:
-    return _reference(scene, state, state.contact.whole, np.full(1, scene.adhesion.work))
+    return _with_work(scene, state, WHOLE, np.full(1, scene.adhesion.work))
 
 
 def _bonds_radius(scene: Scenario, state: State) -> np.ndarray:
-    return _reference(scene, state, state.contact.bonded, balance(scene, state.bonding, state.shear).bonded)
+    return _with_work(scene, state, BONDED, balance(scene, state.bonding, state.shear).bonded)
 
 
 def _stressless_radius(scene: Scenario, state: State) -> np.ndarray:
     if not scene.contact.reversible:
         return _equilibrium_radius(scene, state)
-    work = balance(scene, state.bonding, state.shear).work(_radius(scene, state))
-    return _reference(scene, state, state.contact.stressless, work)
+    terms = balance(scene, state.bonding, state.shear).without_stress()
+    return _where_closed(state, STRESSLESS, scene.contact.equilibrium(_control(scene, state), terms))
 
 
 def _equilibrium_radius(scene: Scenario, state: State) -> np.ndarray:
     if not scene.contact.lags:
         return _radius(scene, state)
-    return _reference(scene, state, state.contact.settled, state.contact.work)
+    terms = balance(scene, state.bonding, state.shear)
+    return _where_closed(state, SETTLED, scene.contact.equilibrium(_control(scene, state), terms))
 
 
 def _pulled(state: State, column: int, sign: float) -> np.ndarray:

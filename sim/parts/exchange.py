@@ -207,20 +207,18 @@ class Touching(NamedTuple):
         Time of the last pull-off [s], nan if never.
     dissipated : array
         Energy dissipated so far by the opening and closing of the contact [J].
-    whole, bonded, stressless, settled : array
-        Phases (before its first touch, closed, open) of reference contacts, in equilibrium under the same control and
-        rule of ``after_pull_off``: with all adhesion, with that of the bonds, with what fluctuations leave of it before
-        the mean stress takes its share (followed only where it does), and with the work left (where the edge lags).
+    phases : array, shape (1, 4) or (members, 4)
+        Phases (before its first touch, closed, open) of four reference contacts, in equilibrium under the same control
+        and rule of ``after_pull_off``: with all adhesion, with that of the bonds, with what fluctuations leave of it
+        before the mean stress takes its share (followed only where it does), and with the work left (where the edge
+        lags).
     """
 
     work: Array
     radius: Array
     detached: Array
     dissipated: Array
-    whole: Array
-    bonded: Array
-    stressless: Array
-    settled: Array
+    phases: Array
 
 
 Own = TypeVar("Own")

@@ -10,6 +10,8 @@ from sim.parts.exchange import Array, Bonding, Motion
 
 #: Arrays that are read alone, as they come.
 _READ = "Array(float64, 1, 'A', readonly=True), "
+#: Change over a step, by the slope at one of its ends, over the value, up to which a cubic holds.
+_RESOLVED = 5.0
 #: Columns of a running maximum: the last value but one, the last value, the maximum so far, and its time [s].
 BEFORE, LAST, LARGEST, WHEN = range(4)
 
@@ -49,7 +51,8 @@ def after(
     -----
     The slope of the stress over time is ``stiffness`` × speed + ``relaxation``, and the area is taken as linear within
     a step. Where the slopes are known, a maximum between the ends is that of the cubic through values and slopes, of
-    fourth order. Where they are not, and for the pull, a sample above its two neighbours is refined by the parabola
+    fourth order, if neither slope alone would change the value by more than five times its size within the step. Where
+    they are not, and for the pull, a sample above its two neighbours is refined by the parabola
     through the three, of third order, if both neighbours have more than half of its value: a quantity that jumps is
     not smooth there.
     """
@@ -77,7 +80,7 @@ def _load(i, stress, stiffness, relaxation, speed, radius):
     """Magnitude of the stress, its slope over time, and the area."""
     value, area = _of(stress, i), math.pi * _of(radius, i) ** 2
     slope = _of(stiffness, i) * _of(speed, i) + _of(relaxation, i)
-    return math.fabs(value), (slope if value > 0.0 else -slope), area
+    return math.fabs(value), (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)), area
 
 
 @kernel(f"void({3 * 'float64[:, ::1], '}{11 * _READ}float64, float64, {', '.join(3 * ['float64[:, ::1]'])})")
@@ -104,7 +107,7 @@ def _keep(maximum, now, rise, slope, time, step, kept):
     if now > largest:
         largest, when = now, time
     peak, back = -math.inf, 0.0
-    if rise > 0.0 > slope:
+    if rise > 0.0 > slope and step * max(rise, -slope) < _RESOLVED * max(last, now):
         peak, back = _top(last, now, step * rise, step * slope)
     elif math.isnan(rise + slope) and last >= before and last > now and min(before, now) > 0.5 * last:
         back = 1.0 - 0.5 * (before - now) / (before - 2.0 * last + now)

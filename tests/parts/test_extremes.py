@@ -3,6 +3,7 @@
 import itertools
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.parts import extremes
@@ -62,6 +63,21 @@ def test_the_error_is_of_third_order_in_the_step():
         found = stress([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count)
         errors.append(abs(found[0, extremes.LARGEST] / exact - 1.0))
     assert max(errors) < 1e-4 and errors[-1] < 2e-6 and errors[-1] < errors[0] / 100.0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_peak_within_the_first_step_from_zero_is_found(sign):
+    """Hermite's cubic from 0 with slope 1 to 0.3 with slope −0.01, of either sign."""
+    slopes = [np.array([sign]), np.array([sign * -0.01])]
+    found = stress([np.zeros(1), np.array([sign * 0.3])], 1.0, slopes)
+    t = np.linspace(0.0, 1.0, 100_001)
+    cubic = 0.3 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.01 * t**2 * (t - 1.0)
+    assert_allclose(found[0, extremes.LARGEST], cubic.max(), rtol=1e-9)
+
+
+def test_slopes_that_no_cubic_could_follow_leave_the_sample():
+    found = stress([np.zeros(1), np.ones(1)], 1.0, [np.full(1, 30.0), np.full(1, -1.0)])
+    assert found[0, extremes.LARGEST] == 1.0
 
 
 def test_with_slopes_the_error_is_of_fourth_order():

@@ -37,6 +37,10 @@ class Balance(NamedTuple):
     bodies: Bodies
     reference: float
 
+    def without_stress(self) -> "Balance":
+        """The terms without that of the mean stress."""
+        return self._replace(stress=np.zeros(1))
+
     def work(self, radius: Array) -> Array:
         """Work of adhesion left at a radius, before the mean stress takes its share [J/m²]."""
         if self.margin is None:
@@ -59,4 +63,6 @@ class Balance(NamedTuple):
 
 
 #: A contact before its first touch, in touch, and after a pull-off.
-AHEAD, CLOSED, OPEN = 0, 1, 2
+AHEAD, CLOSED, OPEN = 0.0, 1.0, 2.0
+#: Columns of the phases of reference contacts.
+WHOLE, BONDED, STRESSLESS, SETTLED = range(4)

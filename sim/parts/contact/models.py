@@ -27,8 +27,6 @@ from sim.units.quantity import Quantity
 _SPOT = 1e-3
 #: Radius of the contact over that of the sphere above which a parabola is a poor sphere.
 _LARGEST_SHARE = 0.3
-#: Reference contacts by the name of their phase.
-_REFERENCES = Touching._fields[4:]
 _KINDS = ("load", "indentation", "displacement")
 
 _Load = held(Quantity("N", "normal load, compression positive", "P"), "load")
@@ -126,44 +124,35 @@ class _Controlled:
     def start(self, motion: Motion, duration: float, balance: Balance) -> Touching:
         """The contact at the start, in equilibrium."""
         control = self.control(motion.time, duration)
-        radius = self._equilibrium(control, balance)
-        unknown, none = np.full(radius.shape, np.nan), np.zeros(radius.shape)
-        state = Touching(self._left(radius, balance), radius, unknown, none, *4 * (np.full(1, CLOSED),))
-        lost = self._without_equilibrium(control, radius, balance)
-        return state._replace(**{name: np.where(gone, AHEAD, CLOSED) for name, gone in lost.items()})
+        radius = self.equilibrium(control, balance)
+        phases = np.where(self._without_equilibrium(control, balance), AHEAD, CLOSED)
+        work, unknown, none = self._left(radius, balance), np.full(radius.shape, np.nan), np.zeros(radius.shape)
+        return Touching(work, radius, unknown, none, phases)
 
     def stopped(self, state: Touching) -> Flags:
         """True where a trajectory has ended, at the pull-off of a contact that stops there."""
         return np.isnan(state.radius) & ~np.isnan(state.detached) & (self.after_pull_off == "stop")
 
-    def reference_radius(self, phase: Array, work: Array, control: Control, bodies: Bodies) -> Array:
-        """Radius of a contact in equilibrium with another work of adhesion [m], 0 where it is open."""
-        return np.where(phase == CLOSED, control.radius(work, np.zeros(1), 0.0, bodies), 0.0)
+    def _without_equilibrium(self, control: Control, balance: Balance) -> Flags:
+        """True where a reference contact has no equilibrium, shape (rows, 4); those not followed are as the first."""
+        works = np.concatenate([np.full(1, balance.reference), balance.bonded])
+        found = control.radius(works, np.zeros(1), 0.0, balance.bodies)
+        stressless = self.equilibrium(control, balance.without_stress()) if self.reversible else found[:1]
+        settled = self.equilibrium(control, balance) if self.lags else found[:1]
+        references = found[:1], found[1:], stressless, settled
+        lost = np.empty((max(map(len, references)), len(references)), dtype=bool)
+        for column, radius in enumerate(references):
+            lost[:, column] = np.isnan(radius)
+        return lost
 
-    def _without_equilibrium(self, control: Control, radius: Array, balance: Balance) -> dict[str, Flags]:
-        """True where a reference contact has no equilibrium, by name, for those that are followed."""
-        works = {"whole": np.full(1, balance.reference), "bonded": balance.bonded}
-        if self.reversible:
-            works["stressless"] = balance.work(np.nan_to_num(radius))
-        if self.lags:
-            works["settled"] = self._left(radius, balance)
-        found = control.radius(np.concatenate(list(works.values())), np.zeros(1), 0.0, balance.bodies)
-        ends = np.cumsum([len(work) for work in works.values()])
-        return dict(zip(works, np.split(np.isnan(found), ends[:-1]), strict=True))
-
-    def _followed(self, state: Touching, control: Control, radius: Array, balance: Balance) -> Touching:
-        """The state with the phases that its reference contacts have after a step."""
+    def _phases(self, state: Touching, control: Control, balance: Balance) -> Array:
+        """Phases of the reference contacts after a step."""
         if min(self.course.extremes) >= 0.0:
-            return state
-        phases = {name: getattr(state, name) for name in _REFERENCES}
+            return state.phases
         if control.closes:
-            most = CLOSED if self.after_pull_off == "reattach" else OPEN
-            return state._replace(
-                **{name: np.minimum(np.maximum(phase, CLOSED), most) for name, phase in phases.items()}
-            )
-        lost = self._without_equilibrium(control, radius, balance)
-        opened = {name: np.where((phases[name] == CLOSED) & gone, OPEN, phases[name]) for name, gone in lost.items()}
-        return state._replace(**opened)
+            return np.minimum(np.maximum(state.phases, CLOSED), CLOSED if self.after_pull_off == "reattach" else OPEN)
+        lost = self._without_equilibrium(control, balance)
+        return np.where((state.phases == CLOSED) & lost, OPEN, state.phases)
 
     def _touching(self, state: Touching, control: Control) -> Flags:
         """True where an open contact closes: at its first touch, or wherever it reattaches."""
@@ -171,8 +160,8 @@ class _Controlled:
             np.isnan(state.radius) & (np.isnan(state.detached) | (self.after_pull_off == "reattach")) & control.closes
         )
 
-    def _equilibrium(self, control: Control, balance: Balance) -> Array:
-        """Largest stable radius [m], nan without one."""
+    def equilibrium(self, control: Control, balance: Balance) -> Array:
+        """Largest stable radius in equilibrium with the work left there [m], nan without one."""
         bodies, alpha = balance.bodies, self.reversible
         if balance.margin is None:
             return control.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
@@ -226,7 +215,7 @@ class Equilibrium(_Controlled):
         if stays.all():
             radius = np.full(np.broadcast(open_, balance.bonded, balance.fluctuating).shape, np.nan)
         else:
-            radius = self._equilibrium(control, balance)
+            radius = self.equilibrium(control, balance)
             radius = np.where(stays, np.nan, radius) if stays.any() else radius
         opens = np.isnan(radius) & ~open_
         detached, dissipated = state.detached, state.dissipated
@@ -235,9 +224,8 @@ class Equilibrium(_Controlled):
                 over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
                 dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
                 detached = np.where(opens, motion.time, detached)
-        after = self._followed(state, control, radius, balance)
-        work = self._left(radius, balance)
-        return after._replace(work=work, radius=radius, detached=detached, dissipated=dissipated)
+        phases = self._phases(state, control, balance)
+        return Touching(self._left(radius, balance), radius, detached, dissipated, phases)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
@@ -253,7 +241,9 @@ class RateDependent(_Controlled):
 
     lags: ClassVar[bool] = True
 
-    front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G = 2 w", "v_0", above=0)]
+    front_speed: Annotated[
+        float, Quantity("m/s", "speed of an opening edge at G - w = work at rest", "v_0", above=0)
+    ]
     front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
     heal_speed: _Healing | None = None
     heal_exponent: _HealingExponent | None = None
@@ -269,8 +259,8 @@ class RateDependent(_Controlled):
             before, share = share, (piece.stop - begin) / span
             works = [np.broadcast_to((1.0 - part) * first + part * last, now.radius.shape) for part in (before, share)]
             now = self._moved(now, piece, motion.duration * (share - before), works, balance)
-        now = self._followed(now, self.control(motion.time, duration), now.radius, balance)
-        return now._replace(work=self._left(now.radius, balance))
+        phases = self._phases(state, self.control(motion.time, duration), balance)
+        return now._replace(work=self._left(now.radius, balance), phases=phases)
 
     def _moved(
         self, state: Touching, piece: Piece, duration: float, works: Sequence[Array], balance: Balance
