@@ -5,7 +5,7 @@ drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(f
 
 from collections.abc import Iterator
 from copy import deepcopy
-from typing import NamedTuple
+from typing import NamedTuple, cast, get_type_hints
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from sim.parts.contact.balance import Balance
 from sim.parts.exchange import NO_RESISTANCE, Array, Bonding, Indices, Sliding, Storing, Touching
 from sim.scenario.scenario import Scenario
 
+Arrays = dict[str, Array]
 _NONE = np.zeros(1)
 
 
@@ -115,3 +116,38 @@ def _pull(scenario: Scenario, touch: Touching, step: int) -> Array:
         return _NONE
     control = scenario.contact.control(scenario.times.at(step), scenario.times.duration)
     return -control.normal_load(touch.radius, scenario.bodies)
+
+
+def pack(state: State) -> Arrays:
+    """A state as named arrays, ``{"bonds.bound": ...}``, from which ``unpack`` makes it again."""
+    return dict(_named(state))
+
+
+def _named(state: tuple[object, ...]) -> Iterator[tuple[str, Array]]:
+    """The arrays of a state with their names, those of a state inside it with a dotted one."""
+    for name, value in zip(get_type_hints(type(state)), state, strict=True):
+        if isinstance(value, tuple):
+            yield from ((f"{name}.{inner}", array) for inner, array in _named(value))
+        else:
+            yield name, np.array(value)
+
+
+def unpack(scenario: Scenario, arrays: Arrays) -> State:
+    """The state of a scenario that ``pack`` took apart."""
+    kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()}
+    kinds |= {"bonding": Bonding, "extremes": extremes.Extremes}
+    inner = {name: _assembled(kind, _within(arrays, name)) for name, kind in kinds.items()}
+    return State(*cast(State, (int(arrays["step"]), *(inner[name] for name in State._fields[1:]))))
+
+
+def _assembled(kind: type, arrays: Arrays) -> tuple[object, ...]:
+    """A state of a part from its arrays."""
+    inner = {name: (hint, _within(arrays, name)) for name, hint in get_type_hints(kind).items()}
+    values = {name: _assembled(*found) if found[1] else arrays[name] for name, found in inner.items()}
+    made: tuple[object, ...] = kind(**values)
+    return made
+
+
+def _within(arrays: Arrays, name: str) -> Arrays:
+    """The arrays of what stands under a name."""
+    return {key.removeprefix(f"{name}."): array for key, array in arrays.items() if key.startswith(f"{name}.")}

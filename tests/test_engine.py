@@ -6,10 +6,9 @@ import math
 import numpy as np
 import pytest
 from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, scene
-from helpers.states import arrays, laid_aside
 from numpy.testing import assert_allclose
 
-from sim.engine import march
+from sim.engine import march, pack, unpack
 
 DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
 
@@ -47,25 +46,25 @@ def covering():
 
 def same(one, two):
     """Whether two states agree to the last bit, nan equal to nan."""
-    left, right = arrays(one), arrays(two)
+    left, right = pack(one), pack(two)
     return left.keys() == right.keys() and all(np.array_equal(left[k], right[k], equal_nan=True) for k in left)
 
 
 def rows(state, row, members):
     """The arrays of one member of a state."""
-    return {k: (v[row : row + 1] if v.ndim and v.shape[0] == members else v) for k, v in arrays(state).items()}
+    return {k: (v[row : row + 1] if v.ndim and v.shape[0] == members else v) for k, v in pack(state).items()}
 
 
 def check_case(case, members=3, steps=6):
     scenario = scene(members, steps, **{part: DEPTHS[part][name] for part, name in case.items()})
     straight = list(march(scenario, np.arange(members)))
     assert len(straight) == steps + 1
-    restarted = list(march(scenario, np.arange(members), laid_aside(straight[2])))
+    restarted = list(march(scenario, np.arange(members), unpack(scenario, pack(straight[2]))))
     assert all(same(one, two) for one, two in zip(straight[3:], restarted, strict=True))
     alone = list(march(scenario, np.array([1])))
     for together, single in zip(straight, alone, strict=True):
         found = rows(together, 1, members)
-        assert all(np.array_equal(found[k], v, equal_nan=True) for k, v in arrays(single).items())
+        assert all(np.array_equal(found[k], v, equal_nan=True) for k, v in pack(single).items())
     for state in straight:
         check_waist(scenario, state, members)
 

@@ -247,6 +247,10 @@ class Part(Protocol):
 class Drive(Part, Protocol[Own]):
     """Motion of the slider."""
 
+    @property
+    def state_class(self) -> type[Own]:
+        """Class of the state, a ``NamedTuple`` with ``position`` and ``speed``."""
+
     def begin(self, times: Times) -> tuple[Own, Motion]:
         """State and motion at t = 0: no slip, and the speed with which the run begins."""
 
@@ -256,6 +260,10 @@ class Drive(Part, Protocol[Own]):
 
 class Bonds(Part, Protocol[Own]):
     """A population of bonds between slider and half-space."""
+
+    @property
+    def state_class(self) -> type[Own]:
+        """Class of the state."""
 
     @property
     def in_place(self) -> bool:
@@ -277,6 +285,10 @@ class Bonds(Part, Protocol[Own]):
 class Shear(Protocol[Own]):
     """Process of the shear-stress fluctuations: a shear model on a given solid and cell."""
 
+    @property
+    def state_class(self) -> type[Own]:
+        """Class of the state, a ``NamedTuple`` with ``energy``."""
+
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Own:
         """Stationary fluctuations at t = 0."""
 
@@ -293,6 +305,10 @@ class Shear(Protocol[Own]):
 
 class Contact(Part, Protocol[Terms]):
     """Contact of sphere and half-space."""
+
+    @property
+    def state_class(self) -> type[Touching]:
+        """Class of the state."""
 
     def start(self, motion: Motion, duration: float, balance: Terms) -> Touching:
         """Contact at the start of a run of ``duration`` [s], in equilibrium with the terms of the work of adhesion."""

@@ -104,6 +104,7 @@ class FirstMoment(OverArea, _Separable):
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
+    state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
@@ -157,6 +158,8 @@ class Cohort(OverArea, _Stretched):
     area: Area = "present"
     model: Literal["cohort"] = "cohort"
 
+    state_class: ClassVar[type[Ages]] = Ages
+
     def start(self, motion: Motion, noise: Noise) -> Ages:
         recipe = self.law, self.rebinding_rate
         if self.start_from == "steady":
@@ -199,6 +202,7 @@ class Tracked(_Separable):
     start_from: Start = "steady"
     model: Literal["tracked"] = "tracked"
 
+    state_class: ClassVar[type[Tracks]] = Tracks
     in_place: ClassVar[bool] = True
 
     @property

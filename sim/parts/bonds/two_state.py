@@ -47,6 +47,7 @@ class Population(NamedTuple):
 class _WithoutStretch(Common):
     """Attributes of all models without a stretch: their strength is proportional to the fraction."""
 
+    state_class: ClassVar[type[Population]] = Population
     stretched: ClassVar[bool] = False
     knows_forces: ClassVar[bool] = False
     critical_speed: float

@@ -47,6 +47,7 @@ _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description=
 class _Controlled:
     """A contact under a load, an indentation, or a displacement with a stiffness."""
 
+    state_class: ClassVar[type[Touching]] = Touching
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
     #: Whether the edge takes time to reach equilibrium.
@@ -241,9 +242,7 @@ class RateDependent(_Controlled):
 
     lags: ClassVar[bool] = True
 
-    front_speed: Annotated[
-        float, Quantity("m/s", "speed of an opening edge at G - w = work at rest", "v_0", above=0)
-    ]
+    front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G - w = work at rest", "v_0", above=0)]
     front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
     heal_speed: _Healing | None = None
     heal_exponent: _HealingExponent | None = None

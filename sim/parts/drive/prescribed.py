@@ -29,6 +29,7 @@ class Slider(NamedTuple):
 class _Sliding:
     """Motion as a given function of time; a subclass gives ``pieces``."""
 
+    state_class: ClassVar[type[Slider]] = Slider
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
 

@@ -40,6 +40,7 @@ class SmoothProcess:
     energy: float
     amplitude: Amplitude
     pairs: ClassVar[int] = 0
+    state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
@@ -64,6 +65,7 @@ class Renewing:
     amplitude: Amplitude
     #: Where a mode has the rate of each number of the state [rad/m].
     wavenumber: Array
+    state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
     def _empty(self, members: int) -> Array:
         """Numbers of a state without any fluctuation."""

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from helpers.cases import some
 from helpers.scenes import SHEARS, scene
-from helpers.states import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.engine import march
+from sim.engine import march, pack
 from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
 from sim.parts.bonds import models as bonds
@@ -490,8 +489,8 @@ def test_a_field_for_which_adhesion_does_not_pay_leaves_jkr_to_the_bit(name):
     contact = Equilibrium(load=load, after_pull_off="reattach")
     plain = march(scene(2, 8, contact=contact, **held), np.arange(2))
     for one, two in zip(plain, march(scene(2, 8, contact=contact, shear=free, **held), np.arange(2)), strict=True):
-        for key, value in arrays(one.contact).items():
-            found = arrays(two.contact)[key]
+        for key, value in pack(one.contact).items():
+            found = pack(two.contact)[key]
             assert np.array_equal(np.broadcast_to(value, found.shape), found, equal_nan=True), key
 
 

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from helpers.cases import some
 from helpers.scenes import CELL, SPECTRUM, scene
-from helpers.states import arrays, laid_aside
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 from scipy.stats import expon, kstest, ncx2
 
-from sim.engine import march
+from sim.engine import march, pack, unpack
 from sim.ensemble import simulate as ensemble
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
@@ -381,12 +380,12 @@ def test_members_restarts_and_records_leave_every_bit(correlation, relaxing):
     for batch in ([3], [4, 3], [0, 3, 200, 10**6]):
         row = batch.index(3)
         for together, state in zip(straight, march(scenario, np.array(batch)), strict=True):
-            for one, other in zip(arrays(together).values(), arrays(state).values(), strict=True):
+            for one, other in zip(pack(together).values(), pack(state).values(), strict=True):
                 if one.ndim and len(one) == members:
                     assert np.array_equal(other[row], one[3], equal_nan=True)
-    restarted = list(march(scenario, np.arange(members), laid_aside(straight[2])))
+    restarted = list(march(scenario, np.arange(members), unpack(scenario, pack(straight[2]))))
     for one, other in zip(straight[3:], restarted, strict=True):
-        left, right = arrays(one), arrays(other)
+        left, right = pack(one), pack(other)
         assert all(np.array_equal(left[key], right[key], equal_nan=True) for key in left)
     often = ensemble.run(scenario)
     seldom = ensemble.run(scene(5, clock=Clock(duration=6e-3, step=1e-3, record=3e-3), **parts))
