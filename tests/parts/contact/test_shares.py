@@ -160,6 +160,16 @@ def test_mean_stress_alone_takes_what_the_reversible_law_says():
         np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
 
 
+def test_the_equilibrium_of_a_lagging_edge_is_at_its_own_radius():
+    """Under a growing load, where the mean stress takes a share that depends on the radius."""
+    control = {"load": {"from": 4e-3, "to": 20e-3}, "reversible": 0.02}
+    parts = {"bonds": bonds.Unbroken(stress=1e5), "shear": shear.Uniform()}
+    lagging = run(scene(contact=RateDependent(front_speed=1e-7, **control), **parts))
+    settled = run(scene(contact=Equilibrium(**control), **parts))
+    np.testing.assert_allclose(lagging["equilibrium_radius"], settled["contact_radius"], rtol=1e-14)
+    assert float(lagging["contact_radius"][-1]) < 0.99 * float(settled["contact_radius"][-1])
+
+
 def test_what_a_rate_dependent_edge_has_still_to_lose_is_no_ones_loss():
     """A jump of the speed breaks half of the bonds at once; the edge follows within a few records."""
     jump = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(0.0, 0.0, 1e-2, 1e-2))
