@@ -43,7 +43,7 @@ class Path:
         balance = Balance(bonded, np.array([self.fluctuating * WORK]), self.stress, self.margin, MAUGIS, WORK)
         contact = Equilibrium(**self.control(value), reversible=self.reversible)
         control = contact.control(0.0, 1.0)
-        return control, balance, contact._equilibrium(control, balance)
+        return control, balance, contact.equilibrium(control, balance)
 
     def stored(self, part):
         """Energy of the contact and its machine, adhesion included: int w dA in closed form."""
@@ -182,7 +182,7 @@ def test_no_contact_is_smaller_than_hertz_and_each_balances(contacts, kind, marg
     for _ in range(contacts):
         contact, balance = random_contact(rng, kind, reversible), random_balance(rng, 40, margin)
         control = contact.control(0.0, 1.0)
-        a = contact._equilibrium(control, balance)
+        a = contact.equilibrium(control, balance)
         left = contact._left(a, balance)
         hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS)
         closed = np.isfinite(a)
@@ -208,7 +208,7 @@ def test_the_contact_on_a_disc_is_the_widest_that_balances(contacts, kind):
     for _ in range(contacts):
         contact, balance = random_contact(rng, kind, 0.0), random_balance(rng, 30, margin)
         control = contact.control(0.0, 1.0)
-        a = contact._equilibrium(control, balance)
+        a = contact.equilibrium(control, balance)
         depth = control.indentation(places, MAUGIS)
         rate = jkr.energy_release_rate_at_indentation(places, depth, 1.0, 0.75)
         pull = np.where(places**2 > depth, rate, -rate)
