@@ -1,4 +1,4 @@
-"""What closed forms say of the bonds that a dataset was made with."""
+"""Closed forms for the bonds that a dataset was made with."""
 
 import contextlib
 import math
@@ -69,7 +69,7 @@ def population_of(dataset: xr.Dataset, at: dict[str, int]) -> Population | None:
 
 
 def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> list[Steady]:
-    """What closed forms say of the dataset's bonds in steady sliding.
+    """Closed forms of the dataset's bonds in steady sliding.
 
     Parameters
     ----------

@@ -75,13 +75,13 @@ class Scene(NamedTuple):
 
     @property
     def marked(self) -> bool:
-        """Whether each point carries a marker: where curves over anything but time have few."""
+        """True if each point carries a marker: where curves over anything but time have few."""
         over_time = self.along == "t" and not self.broken
         return not over_time and max(np.unique(own).size for own in self.x) <= MARKED
 
     @property
     def title(self) -> str:
-        """What several curves are means over; a single one says so itself."""
+        """Words for what several curves are means over; a single one says so itself."""
         return "" if self.single else self.averaged
 
     def placed(self, x: np.ndarray, words: str, si: str, scale: str = "linear", broken: bool = False) -> "Scene":
@@ -110,7 +110,7 @@ class Scene(NamedTuple):
         return {"linestyle": style} if self.joined else marks
 
     def opened(self, line: Line) -> np.ndarray:
-        """Where the contacts of all members are open."""
+        """True where the contacts of all members are open."""
         return self.values("fraction_detached_mean", line) >= 1.0
 
     def openings(self, line: Line) -> tuple[np.ndarray, np.ndarray]:
@@ -147,7 +147,7 @@ class Scene(NamedTuple):
         return [np.insert(values, at, np.nan) for values in (self.x[line.number], *several)]
 
     def covered(self, name: str, lines: list[Line]) -> list[bool]:
-        """Which of a few curves a later one would hide: it is nowhere farther than a hundredth of what all span."""
+        """Curves that a later one hides, nowhere farther from it than a hundredth of what all span."""
         values = np.stack([self.values(f"{name}_mean", line) for line in lines])
         if len(lines) > _FEW or not np.any(np.isfinite(values)):
             return [False] * len(lines)
@@ -162,11 +162,11 @@ class Scene(NamedTuple):
         return list(kept.values())
 
     def varies(self, name: str) -> bool:
-        """Whether the observable is there and changes along the axis or between the curves."""
+        """True if the observable is there and changes along the axis or between the curves."""
         return _changes(self.all(f"{name}_mean"))
 
     def moves(self, name: str) -> bool:
-        """Whether the observable changes along the axis."""
+        """True if the observable changes along the axis."""
         return any(_changes(values) for values in self.all(f"{name}_mean"))
 
 

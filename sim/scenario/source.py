@@ -1,4 +1,4 @@
-"""Where a scenario was read from: its text and the files it names."""
+"""Origin of a scenario: its text and the files it names."""
 
 import errno
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ _MOST_BYTES = 2**28
 
 @dataclass(frozen=True)
 class Source:
-    """Where a scenario came from: the file's text, what was changed on top, and every file it names.
+    """Origin of a scenario: the file's text, what was changed on top, and every file it names.
 
     ``parts`` are those of the first scenario made from it, the one that text and overrides describe.
     """
@@ -36,7 +36,7 @@ class Files:
     texts: dict[str, str] = field(default_factory=dict)
 
     def path(self, name: str) -> Path:
-        """Where the file is."""
+        """Path of the file."""
         return self.folder / name
 
     def text(self, name: str) -> str:

@@ -1,4 +1,4 @@
-"""What ``sim converge`` found, in words: a table for the terminal, its explanation and a recommendation.
+"""Findings of ``sim converge`` in words: a table for the terminal, its explanation and a recommendation.
 
 Everything is read from the dataset.
 """
@@ -59,7 +59,7 @@ def percent(error: float) -> str:
 
 
 def differing(dataset: xr.Dataset) -> NDArray[np.bool_]:
-    """Where a sample is not what is expected, for whatever reason but chance; shape as ``deviation``."""
+    """True where a sample differs from what is expected, for whatever reason but chance; shape as ``deviation``."""
     off = np.abs(dataset["deviation"].to_numpy()) - _SMALL
     return off > _DIFFERS * dataset["standard_error"].to_numpy()
 
@@ -120,7 +120,7 @@ def _time(median: float, low: float, high: float) -> str:
 
 
 def explanation(dataset: xr.Dataset) -> str:
-    """What was studied and what the columns of the table are, in sentences."""
+    """Subject of the study, and what the columns of the table are, in sentences."""
     members, steps = int(dataset.attrs["members_of_run"]), int(dataset.attrs["steps"])
     run = f"{members:,} member{'s' if members > 1 else ''}, {steps:,} steps of {_step(dataset.attrs['clock_step'])}"
     said = [f"Studied: {dataset.attrs['point']}."] if dataset.attrs["point"] else []
@@ -238,7 +238,7 @@ def _as_written(dataset: xr.Dataset, own: Choice) -> str:
 
 
 def _shorter(dataset: xr.Dataset, chosen: Choice, tolerance: float) -> str:
-    """Which step might do where the finest that was tried does not."""
+    """Advice on a step where the finest that was tried does not."""
     step = chosen.rows[-1]
     errors = dataset["error"].to_numpy()[step]
     if not np.nanmax(errors, initial=0.0) > 0.5 * tolerance:
@@ -248,7 +248,7 @@ def _shorter(dataset: xr.Dataset, chosen: Choice, tolerance: float) -> str:
 
 
 def _sight(dataset: xr.Dataset, best: Choice) -> str:
-    """What the samples can tell."""
+    """Resolution of the samples."""
     wrong, sem = dataset["row"].to_numpy()[_wrong(dataset)], dataset["standard_error"].to_numpy()
     if wrong.size:
         return f"Beware: samples of {', '.join(map(str, wrong))} are not what is expected: a fault of the program."

@@ -7,7 +7,7 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohort_merging import settle
-from sim.parts.bonds.rupture import fresh_integral, growth, hazard_integral, hazard_time
+from sim.parts.bonds.rupture import fresh_integral, growth, hazard_integral, hazard_time, rate_at
 
 
 class Rules(NamedTuple):
@@ -248,14 +248,11 @@ def _write(pool, count, weight, stretch, width):
 @kernel("void(float64[:,::1], float64[:,::1], UniTuple(float64, 5), float64[::1])")
 def lost_rows(weight, stretch, law, lost):
     """Stretch per site that rupture takes in unit time, ∑ w x k(\\|x\\|), of each row [m/s]."""
-    rate, softness, _, catch, relief = law
     for m in range(len(weight)):
         lost[m] = 0.0
         for i in range(weight.shape[1]):
             if weight[m, i] > 0.0:
-                size = math.fabs(stretch[m, i])
-                breaking = rate * math.exp(size * softness) + catch * math.exp(-size * relief)
-                lost[m] += weight[m, i] * stretch[m, i] * breaking
+                lost[m] += weight[m, i] * stretch[m, i] * rate_at(stretch[m, i], law)
 
 
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")

@@ -57,8 +57,8 @@ class RuptureRate(NamedTuple):
 class _Law:
     """Attributes of all rupture laws.
 
-    ``depends_on_stretch``: the rate, below any limit, does. ``separable``: ∫k dt of a bond is a factor of its own
-    times a clock common to all, on which the first moment and tracked bonds rest.
+    ``depends_on_stretch``: the rupture does, by a limit or below it. ``separable``: ∫k dt of a bond is a factor of its
+    own times a clock common to all, on which the first moment and tracked bonds rest.
     """
 
     depends_on_stretch: ClassVar[bool] = True
@@ -164,6 +164,14 @@ Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model
 
 
 @device
+def rate_at(stretch, law):
+    """Rupture rate of a bond of a stretch below any limit under a ``RuptureRate``."""
+    rate, softness, _, catch, relief = law
+    size = math.fabs(stretch)
+    return rate * math.exp(size * softness) + catch * math.exp(-size * relief)
+
+
+@device
 def rupture_integral(stretch, slip, duration, rate, softness):
     """∫k dt of a bond whose stretch x goes from ``stretch`` by ``slip`` at constant speed, of any sign.
 
@@ -245,7 +253,7 @@ def hazard_time(stretch, speed, threshold, law):
 
     With a catch pathway by Newton's method within a bracket; the slip pathway alone takes longer.
     """
-    rate, softness, limit, catch, relief = law
+    rate, softness, limit, catch, _ = law
     slipping = time_to_rupture(stretch, speed, threshold, rate, softness, limit)
     if catch == 0.0:
         return slipping
@@ -257,8 +265,7 @@ def hazard_time(stretch, speed, threshold, law):
             high = time
         else:
             low = time
-        size = math.fabs(stretch + speed * time)
-        better = time - over / (rate * math.exp(size * softness) + catch * math.exp(-size * relief))
+        better = time - over / rate_at(stretch + speed * time, law)
         better = better if low < better < high else 0.5 * (low + high)
         if math.fabs(better - time) <= 1e-15 * time:
             break
