@@ -85,8 +85,7 @@ def run(
     if target.exists() and not force:
         _fail(f"{target} exists; replace it with --force or name another output with -o", EXISTS)
 
-    from sim.ensemble import plan as plans
-    from sim.ensemble import preview, simulate
+    from sim.ensemble import plan as plans, preview, simulate
 
     began = time.time()
     plan = plans.Plan.of(scene)

@@ -71,11 +71,7 @@ def check_case(case, members=3, steps=6):
 
 def check_waist(scenario, state, members):
     """Shapes follow from the classes; w is the balance of its parts; no contact is smaller than Hertz."""
-    values = {
-        "bonds": state.bonding.fraction,
-        "shear": state.shear.energy,
-        "contact": state.contact.radius,
-    }
+    values = {"bonds": state.bonding.fraction, "shear": state.shear.energy, "contact": state.contact.radius}
     for part, value in values.items():
         assert value.shape == ((members,) if scenario.varies[part] else (1,)), part
     work = balance_of(scenario, state)

@@ -18,10 +18,7 @@ BESIDE |= {f"helpers.{path.stem}": path for path in sorted((ROOT.parent / "tests
 FLOORS = ("units", "numerics", "laws", "spectrum", "parts", "scenario", "engine", "ensemble")
 FLOORS += ("analysis", "plots", "study", "cli", "__main__")
 #: What a floor must not read although it stands below.
-FORBIDDEN = {
-    "analysis": {"parts", "scenario", "engine", "ensemble"},
-    "plots": {"engine", "ensemble"},
-}
+FORBIDDEN = {"analysis": {"parts", "scenario", "engine", "ensemble"}, "plots": {"engine", "ensemble"}}
 
 
 def module_name(path):

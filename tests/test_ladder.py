@@ -9,9 +9,7 @@ from numpy.testing import assert_allclose
 
 from sim.engine import march
 from sim.laws import jkr
-from sim.parts.bonds import cohorts
-from sim.parts.bonds import models as bonds
-from sim.parts.bonds import tracked as tracks
+from sim.parts.bonds import cohorts, models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive

@@ -25,12 +25,7 @@ import math
 
 import numpy as np
 
-from sim.laws.jkr import (
-    hertz_radius_at_indentation,
-    hertz_radius_at_load,
-    radius_at_indentation,
-    radius_at_load,
-)
+from sim.laws.jkr import hertz_radius_at_indentation, hertz_radius_at_load, radius_at_indentation, radius_at_load
 from sim.laws.jkr.scales import twice_pull_off
 from sim.laws.reversible import (
     compressible,

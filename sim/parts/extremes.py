@@ -39,11 +39,7 @@ def _started(values: Array) -> Array:
 
 
 def after(
-    so_far: Extremes,
-    ends: tuple[Bonding, Bonding],
-    radii: tuple[Array, Array],
-    pull: Array,
-    motion: Motion,
+    so_far: Extremes, ends: tuple[Bonding, Bonding], radii: tuple[Array, Array], pull: Array, motion: Motion
 ) -> Extremes:
     """Maxima one step later, from bonds and contact radii [m] at its beginning and end, and the pull at its end.
 

@@ -179,11 +179,7 @@ def curve_figure(dataset: xr.Dataset) -> Figure:
 
 
 #: What drives a contact, drawn over time where it changes.
-_DRIVEN = {
-    "speed": ("speed $V$", "m/s"),
-    "normal_load": ("load $P$", "N"),
-    "displacement": (r"base $\Delta$", "m"),
-}
+_DRIVEN = {"speed": ("speed $V$", "m/s"), "normal_load": ("load $P$", "N"), "displacement": (r"base $\Delta$", "m")}
 
 
 def time_figure(dataset: xr.Dataset) -> Figure:

@@ -10,8 +10,7 @@ from pydantic import ValidationError
 from pydantic_core import PydanticCustomError
 
 from sim.laws import jkr
-from sim.parts.bonds import Cohort, Tracked
-from sim.parts.bonds import Model as BondModel
+from sim.parts.bonds import Cohort, Model as BondModel, Tracked
 from sim.parts.contact import Contact
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import Drive

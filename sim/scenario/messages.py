@@ -28,11 +28,7 @@ _BUILT_IN = frozenset(get_args(core_schema.ErrorType)) - {"value_error"}
 _FILES = ("bad_table", "no_table", "file_unreadable", "file_not_text")
 _EXCLUSIVE = ("control", "one_modulus")
 #: What a value must be, by the beginning of the kind of its error.
-_KINDS = {
-    "bool": "true or false, without quotes",
-    "string": "text in quotes",
-    "tuple": 'a list such as ["1 s", "2 s"]',
-}
+_KINDS = {"bool": "true or false, without quotes", "string": "text in quotes", "tuple": 'a list such as ["1 s", "2 s"]'}
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 

@@ -11,13 +11,11 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, model
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
-from sim.parts.bonds import Bonds, Unbroken
-from sim.parts.bonds import Model as BondModel
+from sim.parts.bonds import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.control import Bodies
-from sim.parts.drive import Drive
-from sim.parts.drive import Steady as SteadyDrive
+from sim.parts.drive import Drive, Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
 from sim.parts.shear.modal import ModalProcess

@@ -17,8 +17,7 @@ from numpy.testing import assert_allclose
 import sim
 from sim import cli
 from sim.engine import march
-from sim.ensemble import plan as plans
-from sim.ensemble import simulate as ensemble
+from sim.ensemble import plan as plans, simulate as ensemble
 from sim.ensemble.netcdf import variable_name
 from sim.ensemble.plan import Plan
 from sim.ensemble.recorded import VARIABLES

@@ -6,8 +6,7 @@ from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Constant as ConstantAmplitude
-from sim.parts.shear.amplitude import Onset, Stress
+from sim.parts.shear.amplitude import Constant as ConstantAmplitude, Onset, Stress
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario

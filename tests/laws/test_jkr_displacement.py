@@ -13,8 +13,7 @@ import mpmath
 import numpy as np
 import pytest
 from helpers.cases import some
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.laws import jkr

@@ -10,8 +10,7 @@ from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Onset, Stress
 from sim.parts.shear.modes import modes
-from sim.plots import field as field_figures
-from sim.plots import kinds as plots
+from sim.plots import field as field_figures, kinds as plots
 from sim.scenario.clock import Ensemble, Record
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
 

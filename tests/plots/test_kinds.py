@@ -13,8 +13,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.plots import kinds as plots
-from sim.plots import style as pictures
+from sim.plots import kinds as plots, style as pictures
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.spectrum.families import Band
 

@@ -10,8 +10,7 @@ from sim.laws import jkr
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
-from sim.plots import kinds as plots
-from sim.plots import style as pictures
+from sim.plots import kinds as plots, style as pictures
 from sim.plots.loop import lost_energy
 from sim.plots.style import recorded
 from sim.scenario.clock import Clock, Ensemble, Record

@@ -10,9 +10,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.plots import bond_laws, static_friction
-from sim.plots import kinds as plots
-from sim.plots import style as pictures
+from sim.plots import bond_laws, kinds as plots, static_friction, style as pictures
 from sim.plots.stress import maximum_of
 from sim.scenario.clock import Clock, Ensemble, Record
 

@@ -13,9 +13,7 @@ from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.plots import kinds as plots
-from sim.plots import style as pictures
-from sim.plots import theories as rival_figures
+from sim.plots import kinds as plots, style as pictures, theories as rival_figures
 from sim.plots.profile import shapes_of
 from sim.scenario.clock import Clock, Ensemble, Record
 
@@ -142,11 +140,7 @@ def test_without_adhesion_or_contact_there_is_nothing_to_compare():
 
 @pytest.mark.parametrize(
     "changes",
-    [
-        {"drive": RAMP},
-        {"bonds": bonds.Unbroken()},
-        {"drive": RAMP, "record": Record(per_member=False)},
-    ],
+    [{"drive": RAMP}, {"bonds": bonds.Unbroken()}, {"drive": RAMP, "record": Record(per_member=False)}],
     ids=["ramp", "no stress", "statistics only"],
 )
 def test_every_scene_at_a_load_can_be_compared(changes):

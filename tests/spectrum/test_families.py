@@ -272,10 +272,7 @@ def test_quantities_may_carry_units():
             "rolloff .* is shorter than shortest",
         ),
         ({"model": "self_affine", "rms": 1, "hurst": 1, "longest": 2, "rolloff": 2, "shortest": 2}, "no band"),
-        (
-            {"model": "self_affine", "rms": 1, "hurst": 1.1, "longest": 5, "rolloff": 3, "shortest": 1},
-            "at most 1",
-        ),
+        ({"model": "self_affine", "rms": 1, "hurst": 1.1, "longest": 5, "rolloff": 3, "shortest": 1}, "at most 1"),
         ({"model": "von_karman", "rms": 1, "length": 1, "hurst": 0}, "above 0"),
         ({"model": "gaussian", "rms": 0, "length": 1}, "above 0"),
         ({"model": "gaussian", "rms": 1, "length": "1 Pa"}, "not a unit of m"),

@@ -26,17 +26,12 @@ from sim.study.converge import converge, explanation, figure, recommendation, ta
 from sim.study.estimates import estimates
 from sim.study.exact_law import QUANTITIES, READ, STATISTICS, Walk, cell_gammas, gamma_nodes, memory
 from sim.study.samples import Times, coupled, sampled, timed
-from sim.study.settings import REFERENCE, at_step, number_of_sites, plain, settings
-from sim.study.settings import table as keys
+from sim.study.settings import REFERENCE, at_step, number_of_sites, plain, settings, table as keys
 from sim.study.verdicts import choices, chosen, differing
 
 ROUGH = SelfAffine(rms=150e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=8e-6)
 BANDED = shear.Banded(spectrum=ROUGH, cell=CELL, correlation=Wave(waves=1.0))
-STEADY = {
-    "shear": BANDED,
-    "drive": drive.Steady(speed=3e-4),
-    "clock": Clock(duration=0.64, step=0.01, record=0.02),
-}
+STEADY = {"shear": BANDED, "drive": drive.Steady(speed=3e-4), "clock": Clock(duration=0.64, step=0.01, record=0.02)}
 #: A jump of the speed and a reversal, under cohorts.
 JUMP = {
     "bonds": bonds.Cohort(rupture=BELL, **STRETCHED, tolerance=1e-3),

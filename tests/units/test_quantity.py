@@ -7,8 +7,7 @@ from typing import Annotated
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticCustomError

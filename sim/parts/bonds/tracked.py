@@ -51,13 +51,7 @@ class Tracks(NamedTuple):
 
 
 def start(
-    rupture: RuptureRate,
-    rebinding_rate: float,
-    sites: int,
-    speed: Array,
-    begin: str,
-    seed: int,
-    members: Array,
+    rupture: RuptureRate, rebinding_rate: float, sites: int, speed: Array, begin: str, seed: int, members: Array
 ) -> Tracks:
     """Bonds at the start of a run.
 
@@ -109,13 +103,7 @@ def start(
 
 
 def advance(
-    tracks: Tracks,
-    slip: Array,
-    duration: float,
-    rupture: RuptureRate,
-    rebinding_rate: float,
-    seed: int,
-    members: Array,
+    tracks: Tracks, slip: Array, duration: float, rupture: RuptureRate, rebinding_rate: float, seed: int, members: Array
 ) -> Tracks:
     """Bonds after a step at constant speed.
 

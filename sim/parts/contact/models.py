@@ -16,8 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance
 from sim.parts.contact.control import Bodies, Control, DisplacementControl, LoadControl
-from sim.parts.contact.crack_front import Hold, Kinetics
-from sim.parts.contact.crack_front import advance as advance_front
+from sim.parts.contact.crack_front import Hold, Kinetics, advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
 from sim.parts.exchange import Array, Flags, Motion, Setting, Touching
 from sim.units.course import Piece, Prescribed, held, prescribed

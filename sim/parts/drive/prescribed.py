@@ -12,8 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.parts.exchange import Array, Motion, Resistance, Setting, Times
-from sim.units.course import Course, Number, Piece, table_pieces
-from sim.units.course import Table as Rows
+from sim.units.course import Course, Number, Piece, Table as Rows, table_pieces
 from sim.units.quantity import Quantity
 
 _SPEED = Quantity("m/s", "sliding speed", "V")

@@ -79,8 +79,7 @@ def test_radius_follows_the_reference_trajectories_in_few_or_many_steps(density)
 
 @pytest.mark.parametrize("clock", [50.0, 0.5, 0.01])
 @pytest.mark.parametrize(
-    ("hold", "time"),
-    [(at_load(-1.6), 31.04428727), (at_load(-3.0), 0.75322748), (at_indentation(-1.2), 2.06972015)],
+    ("hold", "time"), [(at_load(-1.6), 31.04428727), (at_load(-3.0), 0.75322748), (at_indentation(-1.2), 2.06972015)]
 )
 def test_detachment_comes_at_its_time(hold, time, clock):
     steps = math.ceil(1.1 * time / clock)

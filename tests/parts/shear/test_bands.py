@@ -94,11 +94,7 @@ def test_mean_and_variance_are_those_of_all_modes(name, correlation, points, poi
     weights, _ = listed(name, points, poisson_ratio)
     for tolerance in (0.3, 0.01):
         recipe = shear.Banded(
-            spectrum=FAMILIES[name],
-            correlation=MEMORIES[correlation][0],
-            cell=CELL,
-            points=points,
-            tolerance=tolerance,
+            spectrum=FAMILIES[name], correlation=MEMORIES[correlation][0], cell=CELL, points=points, tolerance=tolerance
         )
         bands = recipe.process(G, poisson_ratio, 1.0).bands
         for moment, found in ((1, bands.mean), (2, bands.variance)):
