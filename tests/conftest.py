@@ -1,9 +1,14 @@
 """What tests of several folders are given."""
 
 import contextlib
+import os
 import resource
 
 import pytest
+
+# Tests run on all cores at once already: threads of the linear algebra only wait for each other, a hundred times as
+# long as they work. Read when numpy is imported first, here and in every process that a test starts.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 @pytest.fixture

@@ -54,7 +54,7 @@ def contact_stiffness(work, sphere_radius, modulus):
 
 
 def exact(displacement, stiffness, work, sphere_radius, modulus):
-    """Radius and displacement of the fold in fifty digits, bisected to forty; no radius beyond the fold."""
+    """Radius and displacement of the fold in fifty digits, solved to forty; no radius beyond the fold."""
     with mpmath.workdps(50):
         displacement, stiffness, work, sphere_radius, modulus = map(
             mpmath.mpf, (displacement, stiffness, work, sphere_radius, modulus)
@@ -70,21 +70,27 @@ def exact(displacement, stiffness, work, sphere_radius, modulus):
             load = 8 * modulus * x**5 / sphere_radius - 3 * mpmath.sqrt(8 * mpmath.pi * work * modulus) * x**2
             return indentation + load / stiffness
 
+        def bend(x):
+            load = 40 * modulus * x**4 / sphere_radius - 6 * mpmath.sqrt(8 * mpmath.pi * work * modulus) * x
+            return 12 * x**2 / sphere_radius + load / stiffness
+
         unit = mpmath.sqrt(mpmath.cbrt(mpmath.pi * work * sphere_radius**2 / (8 * modulus)))
-        last = bisected(slope, 0.9 * unit, 1.5 * unit, 0)
+        last = from_the_right(slope, bend, 1.5 * unit, 0)
         if needed(last) > displacement:
             return None, needed(last)
         high = 2 * last
         while needed(high) < displacement:
             high *= 4
-        return bisected(needed, last, high, displacement) ** 2, needed(last)
+        return from_the_right(needed, slope, high, displacement) ** 2, needed(last)
 
 
-def bisected(function, low, high, target):
-    while high - low > mpmath.mpf(10) ** -40 * high:
-        middle = (low + high) / 2
-        low, high = (middle, high) if function(middle) < target else (low, middle)
-    return high
+def from_the_right(function, slope, x, target):
+    """Where a convex function rises to a target, by Newton's method from above, which comes down on it."""
+    change = x
+    while abs(change) > mpmath.mpf(10) ** -40 * x:
+        change = (function(x) - target) / slope(x)
+        x -= change
+    return x
 
 
 def random_states(count, seed):

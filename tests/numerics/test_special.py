@@ -1,4 +1,4 @@
-"""Exponential integrals and Lambert's W against fifty digits."""
+"""Exponential integrals against thirty digits, Lambert's W against fifty."""
 
 import math
 
@@ -14,30 +14,30 @@ ORDERS = [0, 1, 2]
 
 
 def by_residues(z, order):
-    """e^z E(z) from the poles of Gamma(s)/s^(j + 1) z^-s: z up to some 40."""
-    with mp.workdps(80):
+    """e^z E(z) from the poles of Gamma(s)/s^(j + 1) z^-s: z up to 20, where 17 of 60 digits are lost."""
+    with mp.workdps(60):
         z = mp.mpf(z)
         at_zero = mp.taylor(lambda s: mp.gamma(1 + s) * z**-s, 0, order + 1)[order + 1]
-        poles = (z**n * (-1) ** n / mp.factorial(n) / mp.mpf(-n) ** (order + 1) for n in range(1, 250))
+        poles = (z**n * (-1) ** n / mp.factorial(n) / mp.mpf(-n) ** (order + 1) for n in range(1, 150))
         return mp.exp(z) * (at_zero + mp.fsum(poles))
 
 
 def by_quadrature(z, order):
     """e^z E(z) from int (ln(1 + w/z))^j e^-w/(z + w) dw/j!, scaled to 1 for the absolute tolerance of mpmath."""
-    with mp.workdps(50):
+    with mp.workdps(30):
         z, edges = mp.mpf(z), [0, 1, 4, 12, 30, 70, 150]
-        integral = mp.quad(lambda w: (z * mp.log1p(w / z)) ** order * mp.exp(-w) / (1 + w / z), edges)
+        integral = mp.quad(lambda w: (z * mp.log1p(w / z)) ** order * mp.exp(-w) / (1 + w / z), edges, method="gauss-legendre")
         return integral / mp.factorial(order) / z ** (order + 1)
 
 
 def test_the_two_references_agree():
     for order in ORDERS:
-        assert abs(by_residues(5, order) / by_quadrature(5, order) - 1) < 1e-30
+        assert abs(by_residues(5, order) / by_quadrature(5, order) - 1) < 1e-28
     assert abs(by_residues(0.3, 0) / (mp.exp(0.3) * mp.expint(1, 0.3)) - 1) < 1e-14
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_the_integrals_to_fifty_digits(order):
+def test_the_integrals_to_thirty_digits(order):
     # rounding: 1e-15 / E(1/2) in the series, 2e-14 in the weights of the quadrature
     small = np.array([1e-300, 1e-100, 1e-9, 1e-6, 1e-3, 0.07, 0.3, 0.4999, 0.5001, 0.9, 2.0, 6.0, 20.0])
     large = np.array([50.0, 700.0, 1e6, 1e9, 1e16, 1e18, 1e100])

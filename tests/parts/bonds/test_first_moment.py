@@ -1,5 +1,6 @@
 """The step of number and mean stretch: exact where it is linear, controlled under Bell's rate."""
 
+import functools
 import math
 
 import mpmath
@@ -30,7 +31,8 @@ def slide(state, speed, duration, rupture, rebinding, pieces=1):
 # --- linear: constant rate and cut-off
 
 
-def exact_linear(bound, moment, slip, binding, breaking, displacement):
+@functools.cache
+def propagator(slip, binding, breaking, displacement):
     """The matrix exponential of d(N, M, 1)/dt over a step as the unit of time, with 60 digits."""
     with mpmath.workdps(60):
         binding, breaking, displacement = mpmath.mpf(binding), mpmath.mpf(breaking), mpmath.mpf(displacement)
@@ -41,7 +43,13 @@ def exact_linear(bound, moment, slip, binding, breaking, displacement):
                 [0, 0, 0],
             ]
         )
-        after = mpmath.expm(matrix) * mpmath.matrix([mpmath.mpf(bound), mpmath.mpf(moment), 1])
+        return mpmath.expm(matrix)
+
+
+def exact_linear(bound, moment, *rates):
+    """Bonds and first moment after a step."""
+    with mpmath.workdps(60):
+        after = propagator(*rates) * mpmath.matrix([mpmath.mpf(bound), mpmath.mpf(moment), 1])
         return float(after[0]), float(after[1])
 
 
