@@ -26,7 +26,11 @@ def by_quadrature(z, order):
     """e^z E(z) from int (ln(1 + w/z))^j e^-w/(z + w) dw/j!, scaled to 1 for the absolute tolerance of mpmath."""
     with mp.workdps(30):
         z, edges = mp.mpf(z), [0, 1, 4, 12, 30, 70, 150]
-        integral = mp.quad(lambda w: (z * mp.log1p(w / z)) ** order * mp.exp(-w) / (1 + w / z), edges, method="gauss-legendre")
+
+        def scaled(w):
+            return (z * mp.log1p(w / z)) ** order * mp.exp(-w) / (1 + w / z)
+
+        integral = mp.quad(scaled, edges, method="gauss-legendre")
         return integral / mp.factorial(order) / z ** (order + 1)
 
 
