@@ -7,6 +7,7 @@ import json
 import os
 import platform
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -165,10 +166,10 @@ def _in_memory(plan: Plan, progress: Progress | None) -> Any:
 
 def _write_file(target: Path, folder: Path, plan: Plan, parts: Parts) -> None:
     """Make the dataset beside the parts, sync it and rename it into place."""
-    from xarray.backends.netCDF4_ import NETCDF4_PYTHON_LOCK  # of who reads a dataset lazily in another thread
-
+    # of who reads a dataset lazily in another thread; where xarray is not imported nobody does
+    reading = getattr(sys.modules.get("xarray.backends.netCDF4_"), "NETCDF4_PYTHON_LOCK", contextlib.nullcontext())
     beside = folder / "dataset.nc"
-    with HDF5, NETCDF4_PYTHON_LOCK, netCDF4.Dataset(beside, "w", format="NETCDF4") as file:
+    with HDF5, reading, netCDF4.Dataset(beside, "w", format="NETCDF4") as file:
         write_dataset(file, plan, parts)
     with open(beside, "rb") as written:
         os.fsync(written.fileno())

@@ -11,6 +11,7 @@ from pydantic.dataclasses import dataclass
 
 from sim.laws.schallamach import relax_fraction, steady_fraction, transition_probabilities
 from sim.numerics.binomial import binomial_numbers
+from sim.numerics.jit import law
 from sim.numerics.noise import Noise
 from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
 from sim.parts.exchange import Array, Bonding, Motion
@@ -75,10 +76,14 @@ class _WithoutStretch(Common):
         return np.full(1, 1.0 if start == "bonded" else 0.0)
 
 
-def _sense(motion: Motion, before: Array) -> Array:
+@law
+def _sign_of_slip(speed, slip, before):
     """Sign of the last slip at the end of a step: that of the speed, of the step's slip once it has stopped."""
-    moved = np.where(motion.slip == 0.0, before, motion.slip)
-    return np.sign(np.where(motion.speed == 0.0, moved, motion.speed))
+    return np.sign(before if speed == slip == 0.0 else slip if speed == 0.0 else speed)
+
+
+def _sense(motion: Motion, before: Array) -> Array:
+    return np.asarray(_sign_of_slip(motion.speed, motion.slip, before))
 
 
 _STILL = np.zeros(1)

@@ -147,7 +147,7 @@ class _Controlled:
 
     def _phases(self, state: Touching, control: Control, balance: Balance) -> Array:
         """Phases of the reference contacts after a step."""
-        if min(self.course.extremes) >= 0.0:
+        if min(self.course.extremes) >= 0.0 or not (control.closes or (state.phases == CLOSED).any()):
             return state.phases
         if control.closes:
             return np.minimum(np.maximum(state.phases, CLOSED), CLOSED if self.after_pull_off == "reattach" else OPEN)
@@ -212,18 +212,16 @@ class Equilibrium(_Controlled):
         control = self.control(motion.time, duration)
         open_ = np.isnan(state.radius)
         stays = open_ & ~self._touching(state, control) if open_.any() else open_
-        if stays.all():
-            radius = np.full(np.broadcast(open_, balance.bonded, balance.fluctuating).shape, np.nan)
-        else:
-            radius = self.equilibrium(control, balance)
-            radius = np.where(stays, np.nan, radius) if stays.any() else radius
-        opens = np.isnan(radius) & ~open_
+        radius = self.equilibrium(control, balance)
+        radius = np.where(stays, np.nan, radius) if stays.any() else radius
+        now_open = np.isnan(radius)
         detached, dissipated = state.detached, state.dissipated
-        for happens, size, sign in ((opens, state.radius, 1.0), (open_ & ~np.isnan(radius), radius, -1.0)):
-            if happens.any():
+        if open_.any() or now_open.any():
+            opens = now_open & ~open_
+            for happens, size, sign in ((opens, state.radius, 1.0), (open_ & ~now_open, radius, -1.0)):
                 over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
                 dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
-                detached = np.where(opens, motion.time, detached)
+            detached = np.where(opens, motion.time, detached)
         phases = self._phases(state, control, balance)
         return Touching(self._left(radius, balance), radius, detached, dissipated, phases)
 
@@ -250,12 +248,12 @@ class RateDependent(_Controlled):
     def advance(self, state: Touching, motion: Motion, duration: float, balance: Balance) -> Touching:
         last = self._left(state.radius, balance)
         first = np.where(np.isnan(state.radius), last, state.work)
-        now = state._replace(radius=np.broadcast_to(state.radius, np.broadcast(state.radius, last).shape))
+        now = state._replace(radius=state.radius + np.zeros(last.shape))
         pieces = self.course.pieces(motion.time - motion.duration, motion.time, duration)
         begin, span, share = pieces[0].start, pieces[-1].stop - pieces[0].start, 0.0
         for piece in pieces:
             before, share = share, (piece.stop - begin) / span
-            works = [np.broadcast_to((1.0 - part) * first + part * last, now.radius.shape) for part in (before, share)]
+            works = [(1.0 - part) * first + part * last for part in (before, share)]
             now = self._moved(now, piece, motion.duration * (share - before), works, balance)
         phases = self._phases(state, self.control(motion.time, duration), balance)
         return now._replace(work=self._left(now.radius, balance), phases=phases)
@@ -274,9 +272,10 @@ class RateDependent(_Controlled):
             radius, works, self._hold(piece), self._kinetics(balance), duration, bodies.sphere_radius, bodies.modulus,
             0.5 * spot,
         )  # fmt: skip
-        opens = ~np.isnan(radius) & np.isnan(moved.radius)
-        counts = np.full(1, True) if self.load is None else self._bears(state.radius, works[1], after, bodies) & ~opens
-        lost = np.where(counts, moved.dissipated, 0.0)
+        opens, lost, counts = ~np.isnan(radius) & np.isnan(moved.radius), moved.dissipated, np.full(1, True)
+        if self.load is not None:
+            counts = ~opens & (after.closes or self._bears(state.radius, works[1], bodies))
+            lost = np.where(counts, lost, 0.0)
         if touching.any():
             wide = np.fmax(spot, before.radius(np.zeros(1), np.zeros(1), 0.0, bodies))
             gained = -before.energy(wide, math.pi * wide**2 * works[0], bodies)
@@ -289,14 +288,14 @@ class RateDependent(_Controlled):
         detached = np.where(opens, piece.stop - duration + moved.detached_at, state.detached)
         return state._replace(radius=moved.radius, detached=detached, dissipated=state.dissipated + lost)
 
-    def _bears(self, radius: Array, work: Array, control: Control, bodies: Bodies) -> Flags:
-        """True where a load still has an equilibrium below: under tension not at radii below that at pull-off.
+    def _bears(self, radius: Array, work: Array, bodies: Bodies) -> Flags:
+        """True where a tensile load still has an equilibrium below: not at radii below that at pull-off.
 
         The work of the falling load diverges there as the radius vanishes, and is not counted.
         """
         size, modulus, _ = bodies
         fold = np.cbrt(9.0 * math.pi * np.maximum(work, 0.0) * size**2 / (8.0 * modulus))
-        return np.asarray(control.closes | np.isnan(radius) | (radius >= fold))
+        return np.asarray(np.isnan(radius) | (radius >= fold))
 
     def _hold(self, piece: Piece) -> Hold:
         """Control during a part of a clock step."""

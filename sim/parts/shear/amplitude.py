@@ -1,11 +1,13 @@
 """Laws for the amplitude of the stress fluctuations."""
 
+import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
+from sim.numerics.jit import law
 from sim.parts.exchange import Array
 from sim.units.quantity import Quantity
 
@@ -44,9 +46,12 @@ class Onset:
     model: Literal["onset"] = "onset"
 
     def factor(self, speed: Array, stress: Array) -> Array:
-        with np.errstate(divide="ignore", over="ignore"):
-            rise = 1.0 / (1.0 + (np.abs(speed) / self.speed) ** (-1.0 / self.width))
-        return self.floor + (1.0 - self.floor) * rise
+        return np.asarray(_onset(speed, self.speed, -1.0 / self.width, self.floor))
+
+
+@law
+def _onset(speed, onset, exponent, floor):
+    return floor + (1.0 - floor) * (1.0 / (1.0 + math.pow(math.fabs(speed) / onset, exponent)))
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
