@@ -27,7 +27,7 @@ def text() -> str:
     sections: dict[tuple, tuple[list[str], dict[str, type]]] = {}
     for path, field in all_tables(Scenario):
         options = tables(field.annotation)
-        same = (path[-1:] if len(options) < 2 or "[table]" not in options else path[:1], *map(_form, options))
+        same = (path[-1:], *map(_form, options))
         same += tuple(key for table in options.values() for key in keys(table))
         sections.setdefault(same, ([], options))[0].append(f"[{'.'.join(path)}]" if path else "top of the file")
     lines = [HEAD]

@@ -1,8 +1,7 @@
 """Quantities of a dataset: recorded at each time, known of each scene, drawn as maps; with unit, name and symbol."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,13 +13,12 @@ from sim.parts.contact.control import Control
 from sim.scenario.scenario import Scenario
 
 
-@dataclass(frozen=True)
-class Variable:
-    """One recorded quantity.
+class Variable(NamedTuple):
+    """One recorded quantity, or one number of a scene.
 
-    ``part`` names the part whose class decides whether members differ; ``read`` takes the scenario
-    and a state and gives an array of shape (1,) or (members,). ``there`` says for which scenes it is recorded, with
-    ``condition`` in words.
+    ``part`` names the part whose class decides whether members differ, "" for a number of the scene. ``read`` takes
+    the scenario and a state and gives an array of shape (1,) or (members,), that of a number the scenario alone.
+    ``there`` says for which scenes it is recorded, with ``condition`` in words.
     """
 
     name: str
@@ -28,7 +26,7 @@ class Variable:
     long_name: str
     symbol: str
     part: str
-    read: Callable[[Scenario, State], np.ndarray]
+    read: Callable[..., Any]
     there: Callable[[Scenario], bool] = lambda scene: True
     condition: str = ""
 
@@ -100,8 +98,8 @@ def _pulled(state: State, column: int, sign: float) -> np.ndarray:
 
 #: Quantities of a whole run, read at its end.
 LARGEST = (
-    Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start",
-          "tau_p", "bonds", lambda scene, state: state.extremes.stress[:, extremes.LARGEST]),
+    Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
+          " open contacts count", "tau_p", "bonds", lambda scene, state: state.extremes.stress[:, extremes.LARGEST]),
     Variable("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
           "F_p", "contact", lambda scene, state: state.extremes.friction[:, extremes.LARGEST]),
     Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds",
@@ -162,30 +160,20 @@ VARIABLES = (
 )  # fmt: skip
 
 
-class Number(NamedTuple):
-    """A number of a scene, written for each point of the sweep; ``there`` and ``condition`` as of ``Variable``."""
-
-    name: str
-    unit: str
-    long_name: str
-    symbol: str
-    read: Callable[[Scenario], float]
-    there: Callable[[Scenario], bool] = lambda scene: True
-    condition: str = ""
-
-
+#: Numbers of a scene, written for each point of the sweep.
 NUMBERS = (
-    Number("contact_modulus", "Pa", "contact modulus", "E*", lambda scene: scene.solid.contact_modulus),
-    Number("effective_shear_modulus", "Pa", "shear modulus of the tangential compliance", "G",
-           lambda scene: scene.solid.effective[0]),
-    Number("effective_poisson_ratio", "1", "Poisson ratio of the tangential compliance", "nu",
-           lambda scene: scene.solid.effective[1]),
-    Number("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", lambda scene: scene.rest_radius),
-    Number("radius_without_adhesion", "m", "Hertz radius", "a_H", lambda scene: scene.contact.equilibrium_radius(
-        np.zeros(1), scene.sphere.radius, scene.solid.contact_modulus)[0]),
-    Number("jkr_pull_off_load", "N", "load at pull-off with the full work of adhesion", "P_c",
-           lambda scene: jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius),
-           lambda scene: scene.contact.load is not None, "contact.load"),
+    Variable("contact_modulus", "Pa", "contact modulus", "E*", "", lambda scene: scene.solid.contact_modulus),
+    Variable("effective_shear_modulus", "Pa", "shear modulus of the tangential compliance", "G", "",
+          lambda scene: scene.solid.effective[0]),
+    Variable("effective_poisson_ratio", "1", "Poisson ratio of the tangential compliance", "nu", "",
+          lambda scene: scene.solid.effective[1]),
+    Variable("radius_at_rest", "m", "JKR radius at the full work of adhesion", "a_0", "",
+          lambda scene: scene.rest_radius),
+    Variable("radius_without_adhesion", "m", "Hertz radius", "a_H", "", lambda scene: scene.contact.equilibrium_radius(
+          np.zeros(1), scene.sphere.radius, scene.solid.contact_modulus)[0]),
+    Variable("jkr_pull_off_load", "N", "load at pull-off with the full work of adhesion", "P_c", "",
+          lambda scene: jkr.pull_off_load(scene.adhesion.work, scene.sphere.radius),
+          lambda scene: scene.contact.load is not None, "contact.load"),
 )  # fmt: skip
 
 #: Long names of what a process knows of its errors and spreads before the run, all relative but for two counts.

@@ -41,9 +41,9 @@ class Piece(NamedTuple):
 def linear_piece(start: float, stop: float, first: float, last: float) -> Piece:
     """A piece in which the value changes linearly."""
     integral = 0.5 * (first + last) * (stop - start)
-    if first * last >= 0.0:
-        return Piece(start, stop, first, last, integral, abs(integral))
-    path = 0.5 * (first**2 + last**2) / abs(last - first) * (stop - start)
+    path = abs(integral)
+    if first * last < 0.0:
+        path = 0.5 * (first**2 + last**2) / abs(last - first) * (stop - start)
     return Piece(start, stop, first, last, integral, path)
 
 
@@ -180,7 +180,7 @@ class Table:
 
     @model_validator(mode="after")
     def _rows_in_order(self) -> "Table":
-        if len(self.time) != len(self.values):
+        if len(self.time) != len(self.extremes):
             raise PydanticCustomError("short_table", "a table needs as many values as times")
         if len(self.time) < 2:
             raise PydanticCustomError("short_table", "a table needs two rows or more")
@@ -189,17 +189,13 @@ class Table:
         return self
 
     @property
-    def values(self) -> tuple[float, ...]:
+    def extremes(self) -> tuple[float, ...]:
         """The column beside the times."""
         return tuple(getattr(self, self.values_in))
 
     @cached_property
     def _rows(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.array(self.time), np.array(self.values)
-
-    @property
-    def extremes(self) -> tuple[float, ...]:
-        return self.values
+        return np.array(self.time), np.array(self.extremes)
 
     @property
     def end(self) -> float:
@@ -238,6 +234,7 @@ def held(unit: Quantity, name: str) -> Any:
         quantity: ClassVar[Quantity] = unit
         column: ClassVar[str] = name
         value: tuple[Annotated[float, unit], ...]
+        file: Annotated[str, Field(description=f"CSV with the columns `time` and `{name}`, in place of these")] = ""
 
     number, course = Annotated[float, unit, Tag("[value]")], Annotated[_Course, Tag("[course]")]
     return Annotated[number | course | Annotated[_Table, Tag("[table]")], Discriminator(_kind)]
