@@ -7,8 +7,7 @@ peak); ``summary`` turns both into statistics over the members.
 """
 
 from sim.analysis.correlation import IntegralTime, correlation_time, integral_time
-from sim.analysis.events import events, peaks
-from sim.analysis.loops import loop_energy
+from sim.analysis.events import events, loop_energy, peaks
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, sweep_dims
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary, where

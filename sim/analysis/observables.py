@@ -137,13 +137,10 @@ def all_observables(dataset: xr.Dataset) -> xr.Dataset:
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     """``fraction_masked``; of statistics alone it is known where all contacts are closed, else nan."""
     text = "closed contacts without work of adhesion"
-    if "in_contact" in dataset and ("masked" in dataset or "work_of_adhesion" in dataset):
-        without = dataset["masked"] == 1 if "masked" in dataset else dataset["work_of_adhesion"] <= 0.0
-        return {"fraction_masked": pure((without & (dataset["in_contact"] == 1)).astype(float), text)}
-    if "masked_mean" in dataset:
-        closed = dataset["in_contact_mean"] == 1.0
-        return {f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text) for kind in KEPT}
-    return {}
+    if "masked" in dataset:
+        return {"fraction_masked": pure(dataset["masked"].astype(float), text)}
+    closed = dataset["in_contact_mean"] == 1.0
+    return {f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text) for kind in KEPT}
 
 
 def settled(trajectories: xr.Dataset) -> xr.Dataset:

@@ -97,10 +97,9 @@ def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
     if label is not None:
         # labels that would be alike carry a number
         return label.copy(data=np.array([str(text).split(" ")[0] for text in label.to_numpy()]))
-    try:
+    with contextlib.suppress(KeyError):
         return xr.DataArray(str(resolved(dataset, key)))
-    except KeyError:
-        return xr.DataArray(default)
+    return xr.DataArray(default)
 
 
 def resolved(dataset: xr.Dataset, key: str) -> Any:

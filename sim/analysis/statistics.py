@@ -17,6 +17,8 @@ from sim.units.refusals import renamed
 
 QUANTILES = (0.05, 0.5, 0.95)
 
+_OF = {"mean": "ensemble mean", "std": "standard deviation", "sem": "standard error of the ensemble mean"}
+
 #: How far from a swept value, in parts of it, one may be chosen: as far as rounding to three digits.
 _NEAR = 5e-3
 
@@ -99,10 +101,8 @@ def summary(trajectories: xr.Dataset) -> xr.Dataset:
             found[name] = variable
             continue
         for kind, values in _statistics_of(variable.astype(float)).items():
-            text = {"mean": "ensemble mean", "std": "standard deviation", "sem": "standard error of the ensemble mean"}
-            found[f"{name}_{kind}"] = values.assign_attrs(
-                variable.attrs, long_name=f"{text.get(kind, 'quantiles')} of {variable.attrs.get('long_name', name)}"
-            )
+            text = f"{_OF.get(kind, 'quantiles')} of {variable.attrs.get('long_name', name)}"
+            found[f"{name}_{kind}"] = values.assign_attrs(variable.attrs, long_name=text)
     return xr.Dataset(found)
 
 

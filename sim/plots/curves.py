@@ -156,10 +156,8 @@ class Scene(NamedTuple):
 
     def distinct(self, name: str) -> list[Line]:
         """Curves that do not lie on an earlier one."""
-        kept: dict[bytes, Line] = {}
-        for line in self.lines:
-            kept.setdefault(self.values(f"{name}_mean", line).tobytes(), line)
-        return list(kept.values())
+        values = [self.values(f"{name}_mean", line).tobytes() for line in self.lines]
+        return [line for line, own in zip(self.lines, values, strict=True) if values.index(own) == line.number]
 
     def varies(self, name: str) -> bool:
         """True if the observable is there and changes along the axis or between the curves."""
@@ -259,11 +257,10 @@ def curve(
     colour = colour or line.colour
     x, mean, sem, low, high = scene.parted(line, *(factor * values for values in scene.drawn(name, line)))
     shade: Any = {"color": colour, "alpha": 0.18, "label": spread}
-    if not np.any(high > low):
-        pass
-    elif scene.joined:
+    spreads = np.any(high > low)
+    if spreads and scene.joined:
         fill(panel, x, low, high, **shade)
-    else:
+    elif spreads:
         panel.vlines(x, low, high, linewidth=5.0, **shade)
     dots: Any = {"marker": "o", "markersize": 2.6} if scene.marked else {}
     width = {"linewidth": _UNDERNEATH} if wide and scene.joined else {}

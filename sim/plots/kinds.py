@@ -11,15 +11,14 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
+from sim.plots import panels
 from sim.plots.bond_laws import rest_of
 from sim.plots.field import map_figure, needs_maps, spectrum_figure
-from sim.plots.friction import friction_figure, needs_friction, turns
 from sim.plots.loop import loop_figure, needs_course
-from sim.plots.panels import curve_figure, needs_speeds, needs_sweep, sweep_figure, time_figure
-from sim.plots.profile import needs_contact, profile_figure
+from sim.plots.profile import profile_figure, shapes_of
 from sim.plots.stress import needs_stress, stress_figure
 from sim.plots.style import STYLE, swept_value
-from sim.plots.theories import needs_control, sweeps_theories, theories_figure
+from sim.plots.theories import case_of, sweeps_theories, theories_figure
 from sim.units.refusals import renamed
 
 
@@ -39,15 +38,15 @@ class Kind(NamedTuple):
 #: What can be drawn, by name; the first line of what draws it is its help. The default is the first kind that fits.
 KINDS: dict[str, Kind] = {
     "loop": Kind(loop_figure, needs_course, lambda dataset: True),
-    "theories": Kind(theories_figure, needs_control, sweeps_theories),
+    "theories": Kind(theories_figure, case_of, sweeps_theories),
     "stress": Kind(stress_figure, needs_stress, lambda dataset: rest_of(dataset) is not None),
-    "friction": Kind(friction_figure, needs_friction, turns),
-    "curve": Kind(curve_figure, needs_speeds, lambda dataset: not turns(dataset)),
-    "sweep": Kind(sweep_figure, needs_sweep, lambda dataset: True),
-    "time": Kind(time_figure, fits=lambda dataset: True),
+    "friction": Kind(panels.friction_figure, panels.needs_friction, panels.turns),
+    "curve": Kind(panels.curve_figure, panels.needs_speeds, lambda dataset: not panels.turns(dataset)),
+    "sweep": Kind(panels.sweep_figure, panels.needs_sweep, lambda dataset: True),
+    "time": Kind(panels.time_figure, fits=lambda dataset: True),
     "map": Kind(map_figure, needs_maps),
     "spectrum": Kind(spectrum_figure, needs_maps),
-    "profile": Kind(profile_figure, needs_contact),
+    "profile": Kind(profile_figure, shapes_of),
 }
 
 

@@ -1,5 +1,6 @@
 """The figure of a loop: load and contact radius over the displacement of what holds the sphere, and the energy lost."""
 
+import contextlib
 from typing import NamedTuple
 
 import numpy as np
@@ -8,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import control, loop_energy, setting
+from sim.analysis.events import cycles_of
 from sim.analysis.scene import stays_held
 from sim.laws import jkr
 from sim.plots import style
@@ -42,26 +44,10 @@ class Theory(NamedTuple):
 
 
 def needs_course(dataset: xr.Dataset) -> None:
-    """Refuse a dataset in which what holds the sphere stays.
-
-    Raises
-    ------
-    ValueError
-        With the cure; also for a file without the displacement.
-    """
+    """Refuse a dataset in which what holds the sphere stays."""
     if bool(stays_held(dataset).all()):
         cure = '[contact] indentation = { from = "2 um", to = "-12 um", cycles = 1 }'
         raise ValueError(f"what holds the sphere stays the same, so that there is no loop; move it: {cure}")
-    if not any(name in dataset for name in ("displacement", "displacement_mean")):
-        raise ValueError("the dataset does not hold the displacement; run the scenario again")
-
-
-def _held(dataset: xr.Dataset) -> tuple[str, xr.DataArray]:
-    """Control of the sphere and the stiffness behind it [N/m]; "" and nan where the whole table [contact] is swept."""
-    try:
-        return control(dataset)
-    except KeyError:
-        return "", xr.DataArray(np.nan)
 
 
 def loop_figure(dataset: xr.Dataset) -> Figure:
@@ -71,7 +57,9 @@ def loop_figure(dataset: xr.Dataset) -> Figure:
     the full work of adhesion: every equilibrium, the unstable ones as well, and the loads at which a dead load and
     fixed grips lose it.
     """
-    (kind, stiffness), scene = _held(dataset), scene_along(dataset, "t")
+    kind, stiffness, scene = "", xr.DataArray(np.nan), scene_along(dataset, "t")
+    with contextlib.suppress(KeyError):  # the whole table [contact] is swept
+        kind, stiffness = control(dataset)
     words, symbol = _AXES.get(kind, ("indentation", r"\delta"))
     scene = scene.placed(scene.all("displacement_mean"), f"{words} ${symbol}$", "m")
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
@@ -158,10 +146,7 @@ def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]
     spent = style.recorded(dataset, "dissipated_energy")
     spent = spent.isel(t=spent.notnull().cumsum("t").argmax("t")).drop_vars("t")  # the last record of those that stop
     spent = spent.mean("member") if "member" in spent.dims else spent
-    try:
-        cycles = setting(dataset, f"contact.{_held(dataset)[0]}.cycles")
-    except KeyError:
-        return spent, None
+    cycles = cycles_of(dataset)
     whole = bool(style.recorded(dataset, "contact_radius").isel(t=-1).notnull().all())
     if not whole or not bool((cycles >= 1.0).all()):
         return spent, None

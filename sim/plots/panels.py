@@ -1,4 +1,4 @@
-"""Panels of one observable each, and the figures that are stacked of them: over speed, over time, over a swept key."""
+"""Panels of one observable each, and the figures made of them: over speed, time or a swept key, and friction loops."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -190,6 +190,37 @@ def time_figure(dataset: xr.Dataset) -> Figure:
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
     figure, axes = stacked(scene, [(1.6, radius_panel), *further_panels(scene), *driven])
     style.legend(axes[0], scene.title)
+    return figure
+
+
+def turns(dataset: xr.Dataset) -> bool:
+    """Whether the speed does not only rise, or only fall, in time: a curve over it would lie on itself."""
+    change = dataset["speed"].diff("t")
+    return rest_of(dataset) is None and bool(((change > 0.0).any("t") & (change < 0.0).any("t")).any())
+
+
+def needs_friction(dataset: xr.Dataset) -> None:
+    """Refuse a dataset without friction, or whose slider does not move."""
+    if not bool((style.recorded(dataset, "friction_force") != 0.0).any()):
+        raise ValueError('there is no friction; give the bonds a stress, such as [bonds] stress = "0.3 MPa"')
+    if not bool((dataset["slider_position"] != 0.0).any()):
+        raise ValueError('the slider does not move; let it: [drive] speed = "1 mm/s"')
+
+
+def friction_figure(dataset: xr.Dataset) -> Figure:
+    """Friction force over time and over the slider's position: the friction loop."""
+    scene = scene_along(dataset, "t")
+    figure, axes = style.rows([1.7, 2.1], shared=False)
+    for panel, x, words, si, room in (
+        (axes[0], dataset["t"].to_numpy(), "time $t$", "s", 0.0),
+        (axes[1], scene.all("slider_position_mean"), "slider position $x$", "m", 0.03),
+    ):
+        placed = scene.placed(x, words, si, broken=True)
+        friction_panel(panel, placed)
+        panel.axhline(0.0, **style.GUIDE)
+        style.across(panel, placed.x, placed.words, room=room)
+    style.legend(axes[0], scene.title)
+    colour_bar(figure, axes, scene)
     return figure
 
 

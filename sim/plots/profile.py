@@ -47,42 +47,41 @@ class Shape(NamedTuple):
         return np.append(-r[:0:-1], r)
 
 
-def needs_contact(dataset: xr.Dataset) -> None:
-    """Refuse a dataset whose first member is never in contact."""
-    if not bool(np.any(_member(dataset, "contact_radius", style.first_point(dataset)[0]) > 0.0)):
-        raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
-
-
 def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
     """An observable of the first member over time, or its mean where only that was recorded."""
     return style.recorded(dataset, name).isel({"member": 0} | at, missing_dims="ignore").to_numpy()
 
 
-class _Drawn(NamedTuple):
-    """The last closed contact with its time [s] and speed [m/s]; it and the one at rest, if any, with their lines."""
-
-    last: Shape
-    shown: list[tuple[Shape, dict[str, Any]]]
-    time: float
-    speed: float
+#: Contacts with the look of their lines.
+_Shown = list[tuple[Shape, dict[str, Any]]]
 
 
-def shapes_of(dataset: xr.Dataset) -> _Drawn:
-    """Contacts of the first member at the first point of the sweep: the last closed one, and at rest."""
+def shapes_of(dataset: xr.Dataset) -> tuple[_Shown, float, float]:
+    """Contacts of the first member at the first point of the sweep: the last closed one, and any at rest.
+
+    Also the time [s] and the speed [m/s] of the former.
+
+    Raises
+    ------
+    ValueError
+        If the member is never in contact.
+    """
     at = style.first_point(dataset)[0]
     names = ("contact_radius", "indentation", "shear_stress", "speed")
     radius, depth, stress, speed = (_member(dataset, name, at) for name in names)
+    if not np.any(radius > 0.0):
+        raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
     k = int(np.flatnonzero(radius > 0.0)[-1])
     sphere, work = (style.number_at(setting(dataset, key), at) for key in ("sphere.radius", "adhesion.work"))
     moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
     bodies = (sphere, *(style.number_at(dataset[name], at) for name in moduli))
     last = Shape(float(radius[k]), float(depth[k]), float(stress[k]), *bodies)
     full = float(np.ravel(dataset["radius_at_rest"].isel(at))[0])
-    shown = [(last, {"color": style.BOTH})]
+    shown: _Shown = [(last, {"color": style.BOTH})]
     if full > 0.0:
         rest = Shape(full, float(jkr.indentation_at_radius(full, work, sphere, bodies[1])), 0.0, *bodies)
         shown.append((rest, style.GREY | {"linestyle": "--", "label": "at rest (JKR)"}))
-    return _Drawn(last, shown, float(dataset["t"][k]), float(speed[k]))
+    return shown, float(dataset["t"][k]), float(speed[k])
 
 
 def profile_figure(dataset: xr.Dataset) -> Figure:
@@ -91,31 +90,31 @@ def profile_figure(dataset: xr.Dataset) -> Figure:
     The surfaces are cut along the axis of the sphere; heights are not to the scale of the lengths. The
     shear stress is the mean one, uniform over the contact; without any its displacement is left out.
     """
-    drawn = shapes_of(dataset)
-    reach = _REACH * max(shape.radius for shape, _ in drawn.shown)
+    shown, time, speed = shapes_of(dataset)
+    last, reach = shown[0][0], _REACH * max(shape.radius for shape, _ in shown)
     length = style.Unit.of(np.array([reach]), "m")
-    count = 2 if drawn.last.stress != 0.0 else 1
+    count = 2 if last.stress != 0.0 else 1
     figure, axes = style.pairs(0.35 + 2.4 * count, count)
-    _pressure_panel(axes[0], drawn, reach, length)
-    _surface_panel(axes[1], drawn, reach, length)
+    _pressure_panel(axes[0], shown, reach, length)
+    _surface_panel(axes[1], shown, reach, length)
     radial = "distance from the axis $r$"
     for panel, words in zip(axes, (radial, radial, "distance from the axis"), strict=False):
         style.across(panel, length.factor * np.array([-reach, reach]), length.label(words))
     if count == 2:
-        _displacement_panel(axes[2], drawn.last, reach, length)
-        _map_panel(figure, axes[3], drawn.last, reach, length)
-    told = [style.first_point(dataset)[1], f"$t$ = {style.text_of(drawn.time, 's')}"]
+        _displacement_panel(axes[2], last, reach, length)
+        _map_panel(figure, axes[3], last, reach, length)
+    told = [style.first_point(dataset)[1], f"$t$ = {style.text_of(time, 's')}"]
     if "$V$" not in told[0]:
-        told.append(f"$V$ = {style.text_of(drawn.speed, 'm/s')}")
+        told.append(f"$V$ = {style.text_of(speed, 'm/s')}")
     axes[0].lines[0].set_label(", ".join(filter(None, told)))
     style.legend(axes[0])
     return figure
 
 
-def _pressure_panel(panel: Axes, drawn: _Drawn, reach: float, length: style.Unit) -> None:
-    middle = max((float(shape.pressure(np.zeros(1))[0]) for shape, _ in drawn.shown), key=abs)
+def _pressure_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
+    middle = max((float(shape.pressure(np.zeros(1))[0]) for shape, _ in shown), key=abs)
     factor = style.in_unit(panel.yaxis, "normal pressure $p$", np.array([middle]), "Pa")
-    for shape, line in drawn.shown:
+    for shape, line in shown:
         x = shape.distances(reach)
         r = np.abs(x)
         pressure = np.where(r == shape.radius, np.nan, shape.pressure(r))  # tension has no bound at the edge
@@ -125,12 +124,12 @@ def _pressure_panel(panel: Axes, drawn: _Drawn, reach: float, length: style.Unit
     panel.set_ylim((-1.6 * size, 1.15 * size) if middle > 0.0 else (-4.0 * size, 0.5 * size))
 
 
-def _surface_panel(panel: Axes, drawn: _Drawn, reach: float, length: style.Unit) -> None:
+def _surface_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
     """Sphere and half-space, cut along the axis; between them the gap."""
-    x = [shape.distances(reach) for shape, _ in drawn.shown]
-    heights = [shape.surfaces(np.abs(own)) for (shape, _), own in zip(drawn.shown, x, strict=True)]
+    x = [shape.distances(reach) for shape, _ in shown]
+    heights = [shape.surfaces(np.abs(own)) for (shape, _), own in zip(shown, x, strict=True)]
     factor = style.in_unit(panel.yaxis, "height $z$", np.concatenate([upper for _, upper in heights]), "m")
-    for (_, line), own, surfaces in zip(drawn.shown, x, heights, strict=True):
+    for (_, line), own, surfaces in zip(shown, x, heights, strict=True):
         panel.plot(length.factor * own, factor * np.transpose(surfaces), **line)
     low, ball = factor * np.array(heights[0])
     bottom = float(np.min(ball)) - 0.35 * float(np.ptp(ball))

@@ -37,27 +37,16 @@ HOLLOW: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "n
 
 _TICKS = {"direction": "in", "labelsize": 7.5, "major.width": 0.6, "minor.width": 0.4}
 STYLE: Any = {
-    "font.family": "STIXGeneral",
-    "mathtext.fontset": "stix",
-    "font.size": 8.0,
-    "axes.labelsize": 8.0,
-    "axes.titlesize": 8.0,
-    "legend.fontsize": 7.0,
-    "axes.linewidth": 0.6,
-    "lines.linewidth": 1.2,
+    "font.family": "STIXGeneral", "mathtext.fontset": "stix",
+    "font.size": 8.0, "axes.labelsize": 8.0, "axes.titlesize": 8.0, "legend.fontsize": 7.0,
+    "axes.linewidth": 0.6, "lines.linewidth": 1.2,
     **{f"{axis}tick.{key}": value for axis in "xy" for key, value in _TICKS.items()},
-    "xtick.top": True,
-    "ytick.right": True,
-    "legend.frameon": False,
-    "legend.handlelength": 1.6,
-    "legend.columnspacing": 1.2,
-    "axes.formatter.use_mathtext": True,
-    "axes.formatter.useoffset": False,
-    "figure.constrained_layout.h_pad": 0.03,
-    "figure.constrained_layout.w_pad": 0.03,
-    "pdf.fonttype": 42,
-    "svg.hashsalt": "sim",
-}
+    "xtick.top": True, "ytick.right": True,
+    "legend.frameon": False, "legend.handlelength": 1.6, "legend.columnspacing": 1.2,
+    "axes.formatter.use_mathtext": True, "axes.formatter.useoffset": False,
+    "figure.constrained_layout.h_pad": 0.03, "figure.constrained_layout.w_pad": 0.03,
+    "pdf.fonttype": 42, "svg.hashsalt": "sim",
+}  # fmt: skip
 
 
 class Picture(Figure):

@@ -1,5 +1,6 @@
 """The figure of the competing theories: contact area under shear by each of them, and what was simulated."""
 
+import contextlib
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,16 +63,10 @@ class Case(NamedTuple):
         return float(np.sqrt(np.pi * self.modulus * self.work / (6.0 * radius)))
 
 
-def needs_control(dataset: xr.Dataset) -> None:
-    """Refuse a dataset whose sphere is not held at one load or indentation, with adhesion and in contact."""
-    found = _numbers(dataset)
-    if not float(found["work"].max()) > 0.0:
-        raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
-    if not bool((dataset["radius_at_rest"] > 0.0).any()):
-        raise ValueError("there is no contact at rest; raise the load or the indentation")
-    for values in found.values():
-        if float(values.min()) < float(values.max()):
-            raise ValueError(f"theories are of one contact; {choice(dataset, str(values.dims[0]))}")
+def _fractions(dataset: xr.Dataset) -> np.ndarray:
+    with contextlib.suppress(KeyError):  # the whole table is swept
+        return setting(dataset, "contact.reversible").to_numpy().ravel()
+    return np.empty(0)
 
 
 def sweeps_theories(dataset: xr.Dataset) -> bool:
@@ -79,37 +74,33 @@ def sweeps_theories(dataset: xr.Dataset) -> bool:
     return _fractions(dataset).size > 1
 
 
-def _fractions(dataset: xr.Dataset) -> np.ndarray:
-    try:
-        return setting(dataset, "contact.reversible").to_numpy().ravel()
-    except KeyError:  # the whole table is swept
-        return np.empty(0)
+def case_of(dataset: xr.Dataset) -> Case:
+    """The scene of the theories, with the first reversible fraction of the dataset that no other theory stands for.
 
-
-def _numbers(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
-    """What the theories need, with the sweep's dimensions."""
-    try:
+    Raises
+    ------
+    ValueError
+        If the sphere is not held at one load or indentation, with adhesion and in contact.
+    """
+    found: dict[str, xr.DataArray] = {}
+    with contextlib.suppress(KeyError):
         held = control(dataset).kind
-        value = setting(dataset, f"contact.{held}")
-    except KeyError:
-        held = ""
-    if held not in _CONTROLS:
+        found["value"] = setting(dataset, f"contact.{held}")
+    if not found or held not in _CONTROLS:
         cure = 'run it with [contact] load = "4 mN", or with an indentation'
         raise ValueError(f"theories need a load or an indentation that stays; {cure}")
-    return {
-        "value": value,
-        "work": setting(dataset, "adhesion.work"),
-        "sphere_radius": setting(dataset, "sphere.radius"),
-        "modulus": dataset["contact_modulus"],
-        "poisson_ratio": dataset["effective_poisson_ratio"],
-    }
-
-
-def case_of(dataset: xr.Dataset) -> Case:
-    """The scene of the theories, with the first reversible fraction of the dataset that no other theory stands for."""
-    shares = [share for share in _fractions(dataset) if 0.0 < share != 1.0]
-    numbers = {key: float(found.max()) for key, found in _numbers(dataset).items()}
-    return Case(control(dataset).kind, reversible=float(shares[0]) if shares else _FRACTION, **numbers)
+    found |= {"work": setting(dataset, "adhesion.work"), "sphere_radius": setting(dataset, "sphere.radius")}
+    found |= {"modulus": dataset["contact_modulus"], "poisson_ratio": dataset["effective_poisson_ratio"]}
+    if not float(found["work"].max()) > 0.0:
+        raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
+    if not bool((dataset["radius_at_rest"] > 0.0).any()):
+        raise ValueError("there is no contact at rest; raise the load or the indentation")
+    for values in found.values():
+        if float(values.min()) < float(values.max()):
+            raise ValueError(f"theories are of one contact; {choice(dataset, str(values.dims[0]))}")
+    shares = [float(share) for share in _fractions(dataset) if 0.0 < share != 1.0]
+    numbers = {key: float(values.max()) for key, values in found.items()}
+    return Case(held, reversible=(shares or [_FRACTION])[0], **numbers)
 
 
 def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:

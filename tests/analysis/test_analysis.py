@@ -27,7 +27,7 @@ def known(ramp):
     closed = np.ones(numbers.shape, "i1")
     closed[4] = 0
     dims = ("member", "t")
-    masked = (dims, (numbers <= 0.0).astype(float))
+    masked = (dims, ((numbers <= 0.0) & (closed == 1)).astype(float))
     return five.assign(
         work_of_adhesion=(dims, numbers, ramp["work_of_adhesion"].attrs), in_contact=(dims, closed), masked=masked
     )

@@ -10,8 +10,8 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.plots import bond_laws, kinds as plots, static_friction, style as pictures
-from sim.plots.stress import maximum_of
+from sim.plots import bond_laws, kinds as plots, style as pictures
+from sim.plots.stress import maximum_of, starts_of
 from sim.scenario.clock import Clock, Ensemble, Record
 
 #: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.
@@ -216,14 +216,14 @@ def test_peaks_that_the_run_does_not_resolve_are_hollow():
 
 
 def test_a_stress_that_still_rises_at_the_end_has_no_peak_yet():
-    (rising,) = static_friction.starts_of(started(drive=drive.Start(rest=1.9, speed=1e-7)))
+    (rising,) = starts_of(started(drive=drive.Start(rest=1.9, speed=1e-7)))
     assert not rising.seen and rising.peak == rising.stress[-1]
 
 
 def test_peaks_do_not_depend_on_the_records(starts):
     seldom = started(clock=Clock(duration=2.0, step=5e-3, record=0.1), sweep={"drive.speed": [1e-7, 3e-7, 1e-6]})
-    found = [(start.peak, start.when, start.seen) for start in static_friction.starts_of(seldom)]
-    often = [start for start in static_friction.starts_of(starts) if start.rest == 1.0]
+    found = [(start.peak, start.when, start.seen) for start in starts_of(seldom)]
+    often = [start for start in starts_of(starts) if start.rest == 1.0]
     assert found == [(start.peak, start.when, start.seen) for start in often] and all(start.seen for start in often)
 
 
@@ -232,7 +232,7 @@ def test_peaks_of_members_are_those_of_their_mean_and_sliding_back_they_are_nega
                           site_density=9e16, sites=40)  # fmt: skip
     parts = {"bonds": sites, "drive": drive.Start(rest=0.1, speed=-1e-6), "clock": Clock(duration=0.3, step=5e-3)}
     dataset = started(**parts, ensemble=Ensemble(members=3))
-    (start,) = static_friction.starts_of(dataset)
+    (start,) = starts_of(dataset)
     assert_allclose(start.peak, dataset["shear_stress"].mean("member").min(), rtol=1e-12)
     assert start.peak < 0.0
 

@@ -212,9 +212,9 @@ def test_a_contact_that_came_off_is_drawn_as_it_last_was():
     ramp = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
     closed = np.flatnonzero(ramp["in_contact"].to_numpy())
     assert closed[-1] < ramp.sizes["t"] - 1
-    drawn = shapes_of(ramp)
-    assert drawn.time == float(ramp["t"][closed[-1]])
-    assert drawn.last.radius == float(ramp["contact_radius"][closed[-1]])
+    shown, time, _ = shapes_of(ramp)
+    assert time == float(ramp["t"][closed[-1]])
+    assert shown[0][0].radius == float(ramp["contact_radius"][closed[-1]])
     plots.draw(ramp, "profile")
     with pytest.raises(ValueError, match=r"never closed; raise the load.*drawn as: stress, curve, time"):
         plots.draw(simulated(contact=Equilibrium(load=-1.0), shear=shear.Uniform()), "profile")
@@ -233,7 +233,7 @@ def test_a_contact_that_came_off_is_drawn_as_it_last_was():
 )
 def test_every_contact_has_profiles(changes):
     dataset = plain(**changes)
-    radius = shapes_of(dataset).last.radius
+    radius = shapes_of(dataset)[0][0][0].radius
     pressure, surfaces, *_ = plots.draw(dataset, "profile").axes
     ((x, p),) = data_of(pressure, pictures.BOTH)
     (_, low), (_, high) = data_of(surfaces, pictures.BOTH)
