@@ -244,7 +244,7 @@ def test_a_full_disk_ends_with_74_and_its_reason(here, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("sim.ensemble.part_files.write_whole", full)
+    monkeypatch.setattr("sim.ensemble.netcdf.write_whole", full)
     done = sim("run", "scene.toml")
     assert done.exit_code == 74
     assert done.stderr.strip().endswith("No space left on device")

@@ -8,16 +8,18 @@ lost when the run is killed, a renamed part is not.
 
 import hashlib
 import importlib.metadata
+import io
 import json
-from typing import Any, cast
+from pathlib import Path
+from typing import Any, NamedTuple, cast
 
 import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
-from sim.ensemble.part_files import Parts
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
+from sim.numerics.files import explained, write_whole
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
@@ -31,6 +33,37 @@ _STATISTICS = {
     "std": "standard deviation over the ensemble of",
     "sem": "standard error of the ensemble mean of",
 }
+
+
+class MemoryParts(dict):
+    """Parts kept in memory."""
+
+    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None:
+        self[name] = arrays
+
+    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]:
+        return {key: array for key, array in self[name].items() if key.startswith(beginning)}
+
+
+class PartFiles(NamedTuple):
+    """Parts kept as files of a folder: built in memory, written, synced, then renamed into place."""
+
+    folder: Path
+
+    def save(self, name: str, arrays: dict[str, np.ndarray]) -> None:
+        buffer = io.BytesIO()
+        np.savez(buffer, allow_pickle=False, **arrays)
+        with explained(self.folder):
+            write_whole(self.folder / f"{name}.npz", buffer.getbuffer())
+
+    def load(self, name: str, beginning: str) -> dict[str, np.ndarray]:
+        """The arrays whose names begin so, without reading the others."""
+        with explained(self.folder), np.load(self.folder / f"{name}.npz", allow_pickle=False) as arrays:
+            return {key: arrays[key] for key in arrays.files if key.startswith(beginning)}
+
+
+#: Where parts are kept until the dataset is made.
+Parts = MemoryParts | PartFiles
 
 
 class MemoryFile:
@@ -66,10 +99,8 @@ def write_dataset(file: File, plan: Plan, parts: Parts) -> None:
     _attributes(file, plan)
     _scenario_variables(file, plan)
     _derived_variables(file, plan)
-    for variable in plan.variables:
+    for variable in plan.variables + plan.largest:
         _recorded(file, plan, parts, variable)
-    for variable in plan.largest:
-        _recorded(file, plan, parts, variable, whole=True)
     if plan.scenario.record.maps:
         _maps(file, plan, parts)
 
@@ -202,9 +233,9 @@ def _derived_variables(file: File, plan: Plan) -> None:
             file.setncatts({name: max(values, key=abs)})
 
 
-def _recorded(file: File, plan: Plan, parts: Parts, recorded: Variable, whole: bool = False) -> None:
-    """A quantity at each record, or of each ``whole`` run."""
-    shape, varies = _sweep_shape(plan), plan.varies(recorded)
+def _recorded(file: File, plan: Plan, parts: Parts, recorded: Variable) -> None:
+    """A quantity at each record, or of each whole run."""
+    shape, varies, whole = _sweep_shape(plan), plan.varies(recorded), recorded in plan.largest
     each = varies and plan.scenario.record.per_member
     dimensions = (*_sweep_names(plan), *(("member",) if each else ()), *(() if whole else ("t",)))
     chunks = (*np.ones(len(shape), int).tolist(), *((plan.group,) if each else ()), plan.stretch)

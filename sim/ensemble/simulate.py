@@ -17,8 +17,7 @@ import netCDF4
 import numpy as np
 
 from sim.engine import State, march
-from sim.ensemble.netcdf import MemoryFile, moments, write_dataset
-from sim.ensemble.part_files import MemoryParts, PartFiles, Parts
+from sim.ensemble.netcdf import MemoryFile, MemoryParts, PartFiles, Parts, moments, write_dataset
 from sim.ensemble.plan import Plan, part_name, work
 from sim.ensemble.recorded import DISC_ENERGIES, MAP
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
@@ -132,27 +131,20 @@ def _record(
 
 
 def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
-    """Maps of the first members, and in a contact of finite size their energies on its disc, shape (maps, ...)."""
+    """Maps of the first members, and in a contact of finite size the energies per area that they store on its disc.
+
+    ½⟨τ1 w1⟩, and ⟨τ1 w0⟩ with the displacement w0 of the mean stress [J/m²], shape (maps,).
+    """
     process = cast(ModalProcess, point.process)
     maps = process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)
-    found = {MAP[0]: maps}
-    if point.margin is not None:
-        energies = _on_the_disc(point, state, maps)
-        found |= {name: values for (name, *_), values in zip(DISC_ENERGIES, energies, strict=True)}
-    return found
-
-
-def _on_the_disc(point: Scenario, state: State, maps: np.ndarray) -> np.ndarray:
-    """Energies per area that the maps store on the contact's own disc, shape (2, maps) [J/m²].
-
-    ½⟨τ1 w1⟩, and ⟨τ1 w0⟩ with the displacement w0 of the mean stress.
-    """
-    cell, solid = cast(ModalProcess, point.process).modes.cell, point.solid.effective
-    found, count = (state.contact.radius, state.bonding.stress), len(maps)
-    radius, stress = (np.broadcast_to(values, max(len(values), count))[:count] for values in found)
+    if point.margin is None:
+        return {MAP[0]: maps}
+    cell, solid, found = process.modes.cell, point.solid.effective, (state.contact.radius, state.bonding.stress)
+    radius, stress = (np.broadcast_to(values, max(len(values), drawn))[:drawn] for values in found)
     radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
     own = disc_energy_of_map(maps, cell, radius, *solid)
-    return np.stack([own, cross_energy_of_map(maps, cell, radius, stress, *solid)])
+    cross = cross_energy_of_map(maps, cell, radius, stress, *solid)
+    return {MAP[0]: maps, DISC_ENERGIES[0][0]: own, DISC_ENERGIES[1][0]: cross}
 
 
 def _in_memory(plan: Plan, progress: Progress | None) -> Any:

@@ -7,7 +7,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,6 @@ from scipy.special import gammainccinv, gammaincinv, ndtr
 
 from sim.engine import balance, march
 from sim.ensemble.recorded import VARIABLES
-from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding, Gammas, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
@@ -89,9 +88,7 @@ class Expected(Renewing):
     def _empty(self, members: int) -> Array:
         return np.zeros(self.wavenumber.size)
 
-    def _renew(
-        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
-    ) -> tuple[Array, Array]:
+    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, *_: Any) -> tuple[Array, Array]:
         return np.empty(0), keep**2 * values + (renew * size) ** 2
 
     def _scaled(self, amplitude: Array, energy: Array, values: Array) -> Fluctuation:
@@ -122,8 +119,7 @@ def quiet(scenario: Scenario, sets: Sequence[Gammas]) -> Scenario:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Walk:
+class Walk(NamedTuple):
     """A run without noise at its records.
 
     Attributes

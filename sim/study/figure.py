@@ -8,7 +8,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter
 from matplotlib.transforms import Bbox
 
 from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, plain_ticks, rows
@@ -64,17 +63,13 @@ def figure(dataset: xr.Dataset) -> Figure:
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error")
         panel.set_ylim(0.4 * floor, 2.5 * height.max())
         panel.margins(x=0.15)
-        panel.yaxis.set_major_formatter(FuncFormatter(lambda value, _: _decade(value, floor)))
+        panel.yaxis.set_major_formatter(lambda y, _: "exact" if y <= 1.5 * floor else f"$10^{{{round(np.log10(y))}}}$")
         if np.ptp(np.log10(panel.get_xlim())) < 1.5:
             plain_ticks(panel.xaxis)
         legend(panel, handles=_handles([name for name in _PARTS if name in part]))
         ends = np.stack([dataset["time_low"].to_numpy(), height, dataset["time_high"].to_numpy(), height], axis=1)
         _label(panel, dataset["row"].to_numpy(), np.stack([time, height], axis=1), ends, part, own)
     return drawn
-
-
-def _decade(value: float, floor: float) -> str:
-    return "exact" if value <= 1.5 * floor else f"$10^{{{round(np.log10(value))}}}$"
 
 
 def _label(panel: Axes, names: Any, points: Any, ends: Any, part: Any, own: Any) -> None:

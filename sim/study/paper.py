@@ -25,8 +25,7 @@ What the paper does not settle, or settles twice (``docs/paper.md`` has the deta
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -47,8 +46,7 @@ DISC, TURN = (RADIUS, STRESS, SHEAR), np.pi * np.arange(64) / 32
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(400)
 
 
-@dataclass(frozen=True)
-class Check:
+class Check(NamedTuple):
     """One line of ``sim paper``: a computed value, the expected one, and their relative difference.
 
     Parameters

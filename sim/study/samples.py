@@ -3,7 +3,7 @@
 import itertools
 import time
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,26 +24,18 @@ _GROUP, _STATE_NUMBERS = 64, 2**25
 _FEWEST, _MOST_VALUES = 16, 2**20
 
 
-class Times(NamedTuple):
-    """Median, least and largest CPU time of a run [s]."""
-
-    median: float
-    low: float
-    high: float
-
-
 def fluctuates(scenario: Scenario) -> bool:
     """Whether members differ."""
     return any(scenario.varies.values())
 
 
-def timed(scenario: Scenario, seconds: float) -> Times:
-    """CPU time of the scene's run, all members, from some repeats within a time to spend [s]."""
+def timed(scenario: Scenario, seconds: float) -> list[float]:
+    """CPU time of the scene's run, all members [s]: median, least and largest of repeats within a time to spend [s]."""
     members = scenario.ensemble.members if fluctuates(scenario) else 1
     together = min(_group(scenario), members)
     paces = _paces(scenario, together, max(seconds / (_REPEATS + 1), _LEAST), _REPEATS)
     steps = -(-members // together) * scenario.clock.steps
-    return Times(*(steps * pace for pace in (float(np.median(paces)), min(paces), max(paces))))
+    return [steps * pace for pace in (float(np.median(paces)), min(paces), max(paces))]
 
 
 def affordable(scenario: Scenario, steps: int, seconds: float, times: int) -> int:

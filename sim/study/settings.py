@@ -33,10 +33,6 @@ _USUAL_TOLERANCE = 0.01
 _ANY = TypeAdapter(Any)
 
 
-def _unknown() -> NDArray[np.float64]:
-    return np.full((4, 4), np.nan)
-
-
 @dataclass
 class Row:
     """A setting of the study, and what was found of it.
@@ -75,8 +71,8 @@ class Row:
     toml: str
     own: int = 0
     ratio: float = 1.0
-    error: NDArray[np.float64] = field(default_factory=_unknown)
-    bound: NDArray[np.float64] = field(default_factory=_unknown)
+    error: NDArray[np.float64] = field(default_factory=lambda: np.full((4, 4), np.nan))
+    bound: NDArray[np.float64] = field(default_factory=lambda: np.full((4, 4), np.nan))
     time: float = math.nan
     time_low: float = math.nan
     time_high: float = math.nan

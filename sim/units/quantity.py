@@ -41,16 +41,9 @@ _BOUNDS = {
     "at_most": ("maximum", operator.le),
 }
 _TYPICAL = {
-    "m": "2 mm",
-    "Pa": "1.6 MPa",
-    "N": "4 mN",
-    "s": "10 ms",
-    "m/s": "1 mm/s",
-    "J/m^2": "42 mJ/m^2",
-    "1/s": "500 1/s",
-    "m^2/s": "1 um^2/s",
-    "rad": "30 deg",
-}
+    "m": "2 mm", "Pa": "1.6 MPa", "N": "4 mN", "s": "10 ms", "m/s": "1 mm/s", "J/m^2": "42 mJ/m^2", "1/s": "500 1/s",
+    "m^2/s": "1 um^2/s", "rad": "30 deg",
+}  # fmt: skip
 
 
 @functools.cache

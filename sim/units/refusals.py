@@ -5,22 +5,11 @@ from collections.abc import Iterable
 
 #: Old names of keys, models, words, dataset variables, dimensions and kinds of figure.
 RENAMED = {
-    "healing": "rebinding_rate",
-    "hazard": "rupture",
-    "memory": "correlation",
-    "growth": "amplitude",
-    "amplitudes": "mode_amplitudes",
-    "on_detach": "after_pull_off",
-    "travel": "displacement",
-    "trips": "cycles",
-    "lagging": "rate_dependent",
-    "convention": "normalization",
-    "menga": "in_integral",
-    "persson": "in_density",
-    "realization": "member",
-    "snapshot": "map_time",
-    "rivals": "theories",
-}
+    "healing": "rebinding_rate", "hazard": "rupture", "memory": "correlation", "growth": "amplitude",
+    "amplitudes": "mode_amplitudes", "on_detach": "after_pull_off", "travel": "displacement", "trips": "cycles",
+    "lagging": "rate_dependent", "convention": "normalization", "menga": "in_integral", "persson": "in_density",
+    "realization": "member", "snapshot": "map_time", "rivals": "theories",
+}  # fmt: skip
 #: Variables and dimensions that only a dataset of version 0.1.0 has.
 _OLD_VARIABLES = {"travel", "travel_mean", "realization", "map_realization", "snapshot"}
 _OLD = re.compile(rf"(?<![A-Za-z])({'|'.join(RENAMED)})(?![A-Za-z])")
