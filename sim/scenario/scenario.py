@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import fields
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -32,6 +32,8 @@ from sim.units.refusals import BadInput
 #: Relative error of a cell against the infinite plane that is remarked on.
 _CELL_ERROR = 0.05
 _Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
+#: Points of a sweep that differ elsewhere share it with its spline.
+_margin = lru_cache(maxsize=32)(Margin)
 #: Columns that a part has read from its file, read anew where its table changes.
 _FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
 
@@ -157,7 +159,7 @@ class Scenario:
         """Share of ΔΓ that a contact of finite radius pays when it grows; None where waves are taken as short."""
         shear = self.fluctuations
         solid = *self.solid.effective, self.sphere.radius
-        return None if shear.contact == "plane" else Margin(shear.spectrum, *solid)
+        return None if shear.contact == "plane" else _margin(shear.spectrum, *solid)
 
     @cached_property
     def times(self) -> Times:

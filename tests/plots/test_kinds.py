@@ -343,22 +343,28 @@ def test_the_work_of_the_bonds_is_drawn_where_the_contact_has_less():
 # -- saving -----------------------------------------------------------------------------------
 
 
-def test_equal_figures_give_equal_files(ramp, tmp_path):
+@pytest.fixture(scope="module")
+def saved(ramp, tmp_path_factory):
+    """A figure drawn and saved twice, with matplotlib's settings before and after."""
+    folder, before = tmp_path_factory.mktemp("figures"), dict(mpl.rcParams)
     for name in ("first", "second"):
         figure = plots.draw(ramp, "friction")
         for suffix in ("png", "pdf"):
-            figure.savefig(tmp_path / f"{name}.{suffix}")
+            figure.savefig(folder / f"{name}.{suffix}")
+    return folder, before, dict(mpl.rcParams)
+
+
+def test_equal_figures_give_equal_files(saved):
+    folder, _, _ = saved
     for suffix in ("png", "pdf"):
-        assert (tmp_path / f"first.{suffix}").read_bytes() == (tmp_path / f"second.{suffix}").read_bytes()
+        assert (folder / f"first.{suffix}").read_bytes() == (folder / f"second.{suffix}").read_bytes()
 
 
-def test_figures_are_one_or_two_columns_wide_at_200_dpi(ramp, tmp_path):
-    widths = {}
-    for name, figure in (("friction", plots.draw(ramp, "friction")), ("map", plots.draw(mapped(), "map"))):
-        figure.savefig(tmp_path / f"{name}.png")
-        header = (tmp_path / f"{name}.png").read_bytes()[16:20]
-        widths[name] = int.from_bytes(header, "big")
-    assert widths == {"friction": 680, "map": 1400}
+def test_figures_are_one_or_two_columns_wide_at_200_dpi(saved):
+    folder, _, _ = saved
+    plots.draw(mapped(), "map").savefig(folder / "map.png")
+    widths = [int.from_bytes((folder / f"{name}.png").read_bytes()[16:20], "big") for name in ("first", "map")]
+    assert widths == [680, 1400]
 
 
 def test_an_unknown_extension_is_refused(ramp, tmp_path):
@@ -366,10 +372,9 @@ def test_an_unknown_extension_is_refused(ramp, tmp_path):
         plots.draw(ramp, "friction").savefig(tmp_path / "figure.docx")
 
 
-def test_drawing_leaves_the_settings_of_matplotlib_alone(ramp, tmp_path):
-    before = dict(mpl.rcParams)
-    plots.draw(ramp, "friction").savefig(tmp_path / "figure.png")
-    assert dict(mpl.rcParams) == before
+def test_drawing_leaves_the_settings_of_matplotlib_alone(saved):
+    _, before, after = saved
+    assert after == before
 
 
 def test_drawing_needs_no_pyplot():

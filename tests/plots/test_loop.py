@@ -18,6 +18,7 @@ from sim.scenario.clock import Clock, Ensemble, Record
 JKR = (42e-3, 2e-3, 6.4e6)
 BACK = {"from": 2e-6, "to": -4e-6, "cycles": 2}
 RECORD = 2.0 * 2.0 * 6e-6 * 2e-3  # displacement of one record [m]: cycles of 12 um in 1 s, 2 ms
+COARSE = Clock(duration=1.0, step=2e-2)
 GRIPS = Equilibrium(indentation=BACK, after_pull_off="reattach")
 MACHINE = Equilibrium(displacement=BACK, stiffness=340.0, after_pull_off="reattach")
 
@@ -132,7 +133,7 @@ def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine
 
 
 def test_a_dead_load_has_no_jump_to_draw_but_a_cross():
-    dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}))
+    dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}), clock=COARSE)
     loads, radii = plots.draw(dataset, "loop").axes
     assert radii.get_xlabel() == r"indentation $\delta$ (µm)"
     assert not loads.collections and len(marks(loads, "x")) == 1 and not marks(loads, "o")
@@ -159,7 +160,7 @@ def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
         Equilibrium(indentation=BACK, after_pull_off="stop"),
         Equilibrium(indentation={"time": [0.0, 0.5, 1.0], "value": [2e-6, -2e-6, 1e-6]}),
     ):
-        dataset = moved(contact)
+        dataset = moved(contact, clock=COARSE)
         spent, loop = lost_energy(dataset)
         assert loop is None and float(spent) > 0.0
         assert_allclose(spent, dataset["dissipated_energy"].max(), rtol=1e-14)
@@ -168,13 +169,13 @@ def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
 
 
 def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
-    dataset = moved(MACHINE, sweep={"contact.stiffness": [100.0, 1e3]})
+    dataset = moved(MACHINE, clock=COARSE, sweep={"contact.stiffness": [100.0, 1e3]})
     loads, radii = plots.draw(dataset).axes
     assert [line.get_color() for line in radii.lines if line.get_linestyle() == "--"] == [pictures.REFERENCE] * 2
     words = [text.get_text() for text in loads.get_legend().get_texts()]
     assert [text.split(":")[0] for text in words] == ["$k$ = 0.1 kN/m", "$k$ = 1 kN/m"]
     # of works of adhesion each has its folds, which then no name fits
-    panel = plots.draw(moved(sweep={"adhesion.work": [0.0, 21e-3, 42e-3]})).axes[0]
+    panel = plots.draw(moved(clock=COARSE, sweep={"adhesion.work": [0.0, 21e-3, 42e-3]})).axes[0]
     assert sum(line.get_linewidth() == 0.5 for line in panel.lines) == 4
     assert not any("pi" in text.get_text() for text in panel.texts)
 
@@ -192,7 +193,7 @@ def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
     ids=["members", "statistics only", "never closed", "whole tables"],
 )  # fmt: skip
 def test_every_shape_of_dataset_can_be_drawn(changes):
-    dataset = moved(**changes)
+    dataset = moved(**changes, clock=COARSE)
     loads, radii = plots.draw(dataset, "loop").axes
     assert loads.get_ylabel().startswith("normal load") and radii.get_ylabel().startswith("contact radius")
     closed = any(np.isfinite(y).any() for _, y in lines_of(radii))

@@ -241,15 +241,15 @@ def test_a_free_sphere_jumps_into_contact_where_it_touches(held, radius):
     assert len(set(when[~np.isnan(when)])) == 2
 
 
-@pytest.mark.parametrize("policy", ["stay_open", "reattach", "stop"])
-def test_a_hundred_cycles_through_pull_off_are_all_alike(policy):
-    held = {"indentation": {"from": 1.0, "to": -2.0, "cycles": 128}}
-    scenario = maugis(Equilibrium(**held, after_pull_off=policy), 128 * 32)
+@pytest.mark.parametrize(("policy", "cycles"), [("stay_open", 8), ("reattach", 128), ("stop", 8)])
+def test_a_hundred_cycles_through_pull_off_are_all_alike(policy, cycles):
+    held = {"indentation": {"from": 1.0, "to": -2.0, "cycles": cycles}}
+    scenario = maugis(Equilibrium(**held, after_pull_off=policy), cycles * 32)
     radius, lost = course(scenario, "contact_radius", "dissipated_energy")
     if policy == "reattach":
-        cycles = radius[:-1].reshape(128, 32)
-        assert_array_equal(cycles, np.broadcast_to(cycles[0], cycles.shape))
-        assert_allclose(lost[32::32], lost[32] * np.arange(1, 129), rtol=1e-13)
+        each = radius[:-1].reshape(cycles, 32)
+        assert_array_equal(each, np.broadcast_to(each[0], each.shape))
+        assert_allclose(lost[32::32], lost[32] * np.arange(1, cycles + 1), rtol=1e-13)
     else:
         assert lost[-1] == lost[32] > 0.0
 

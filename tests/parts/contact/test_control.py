@@ -18,6 +18,7 @@ MAUGIS = Bodies(1.0, 0.75, 0.5)
 WORK = 1.0 / math.pi
 PATCHES = Gaussian(rms=1.0, length=0.4)
 SHEAR_MODULUS = 0.1875
+DISC = Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(60)
 
 
@@ -32,7 +33,7 @@ class Path:
     def __init__(self, control, ends, reversible=0.0, fluctuating=0.0, changing=0.0):
         self.control, self.ends, self.reversible = control, ends, reversible
         self.fluctuating, self.changing = fluctuating, changing
-        self.margin = Margin(PATCHES, SHEAR_MODULUS, 0.5, 1.0 * 4.0) if fluctuating else None
+        self.margin = DISC if fluctuating else None
         self.stress = np.array([0.25])
 
     def state(self, part):
@@ -174,7 +175,7 @@ def random_contact(rng, kind, reversible):
 
 
 @pytest.mark.parametrize("reversible", [0.0, 0.3])
-@pytest.mark.parametrize("margin", [None, Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)], ids=["plane", "disc"])
+@pytest.mark.parametrize("margin", [None, DISC], ids=["plane", "disc"])
 @pytest.mark.parametrize("kind", ["load", "indentation", "displacement"])
 @pytest.mark.parametrize("contacts", [15, pytest.param(60, marks=pytest.mark.verify)])
 def test_no_contact_is_smaller_than_hertz_and_each_balances(contacts, kind, margin, reversible):
@@ -202,17 +203,16 @@ def test_no_contact_is_smaller_than_hertz_and_each_balances(contacts, kind, marg
 def test_the_contact_on_a_disc_is_the_widest_that_balances(contacts, kind):
     # a walk from the right over 4000 places of the surplus G - w(a), G below Hertz's radius counted negative
     rng = np.random.default_rng(13)
-    margin = Margin(PATCHES, SHEAR_MODULUS, 0.5, 4.0)
     places = np.geomspace(4.0, 1e-3, 4000)[:, None]
     wrong = 0
     for _ in range(contacts):
-        contact, balance = random_contact(rng, kind, 0.0), random_balance(rng, 30, margin)
+        contact, balance = random_contact(rng, kind, 0.0), random_balance(rng, 30, DISC)
         control = contact.control(0.0, 1.0)
         a = contact.equilibrium(control, balance)
         depth = control.indentation(places, MAUGIS)
         rate = jkr.energy_release_rate_at_indentation(places, depth, 1.0, 0.75)
         pull = np.where(places**2 > depth, rate, -rate)
-        below = pull <= balance.bonded - balance.fluctuating * margin(places)
+        below = pull <= balance.bonded - balance.fluctuating * DISC(places)
         crossed = below.any(0)
         widest = places[np.argmax(below, 0), 0]
         hertz = np.nan_to_num(control.radius(np.zeros(1), np.zeros(1), 0.0, MAUGIS))

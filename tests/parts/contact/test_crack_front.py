@@ -181,7 +181,7 @@ def test_one_inner_step_is_of_order_five_per_unit_time():
             a += front._radau(False, t, a, h, a, (rate, slope, drift), a, scene, law)[0]
         return a
 
-    exact = end(64)
+    exact = end(32)
     errors = [abs(end(count) - exact) for count in (2, 4, 8)]
     orders = [math.log2(coarse / fine) for coarse, fine in itertools.pairwise(errors)]
     assert min(orders) > 4.5, orders
