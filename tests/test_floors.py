@@ -1,6 +1,7 @@
 """The house: folders are floors, and a module imports only from floors below its own."""
 
 import ast
+import functools
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -30,6 +31,7 @@ def is_module(name):
     return path.with_suffix(".py").exists() or (path / "__init__.py").exists()
 
 
+@functools.cache
 def imports(path):
     """Names of modules, and of what is taken from them, that a file imports, wherever in it."""
     found = set()
@@ -90,11 +92,11 @@ OUTSIDE = sorted(name for name in MODULES if floor(name) != "parts" and name != 
 
 def asks_a_class(call, taken):
     """Whether a call asks a part for its class: isinstance of a class taken from parts, or a test for an attribute."""
-    name, *arguments = (ast.unparse(node) for node in (call.func, *call.args))
+    name = call.func.id if isinstance(call.func, ast.Name) else ""
     if name == "isinstance":
         return bool(taken & {node.id for node in ast.walk(call.args[1]) if isinstance(node, ast.Name)})
-    tested = name == "hasattr" or (name == "getattr" and len(arguments) == 3)
-    return tested and bool(PARTS & set(arguments[0].replace("(", ".").replace(",", ".").split(".")))
+    tested = name == "hasattr" or (name == "getattr" and len(call.args) == 3)
+    return tested and bool(PARTS & set(ast.unparse(call.args[0]).replace("(", ".").replace(",", ".").split(".")))
 
 
 @pytest.mark.parametrize("name", OUTSIDE)

@@ -519,20 +519,17 @@ def test_errors_of_a_thousand_seeds_are_standard_normal(tmp_path, correlation):
 
 
 def draw_scores(scores, path):
-    import matplotlib
-
-    matplotlib.use("Agg")
-    from matplotlib import pyplot as plt
+    from matplotlib.figure import Figure
     from scipy.stats import norm
 
-    figure, axes = plt.subplots(1, len(scores), figsize=(4 * len(scores), 3), sharey=True, layout="constrained")
+    figure = Figure(figsize=(4 * len(scores), 3), layout="constrained")
+    axes = figure.subplots(1, len(scores), sharey=True)
     z = np.linspace(-5.0, 5.0, 200)
     for axis, (name, values) in zip(axes, scores.items(), strict=True):
         axis.hist(values, bins=40, density=True)
         axis.plot(z, norm.pdf(z))
         axis.set_xlabel(f"z of the {name}")
     figure.savefig(path)
-    plt.close(figure)
 
 
 @pytest.mark.verify
