@@ -1,7 +1,7 @@
 """Integral correlation times of the fluctuations in a stationary run."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -112,15 +112,12 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
         stationary = energy.astype(float).where((speed == speed.isel(t=0)).all("t"))  # nan has no correlation time
-        times = xr.apply_ufunc(
-            lambda values: integral_time(values, step), stationary,
-            input_core_dims=[[MEMBERS, "t"]], output_core_dims=[[]] * 3, vectorize=True,
-        )  # fmt: skip
+        dims: Any = {"input_core_dims": [[MEMBERS, "t"]], "output_core_dims": [[]] * 3}
+        times = xr.apply_ufunc(lambda values: integral_time(values, step), stationary, vectorize=True, **dims)
     about = "integral correlation time of the fluctuation energy"
     texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"what the {about} is below"}
-    found = {
-        f"correlation_time{suffix}": values.drop_attrs().assign_attrs(units="s", long_name=text)
-        for (suffix, text), values in zip(texts.items(), times, strict=True)
-    }
+    found = xr.Dataset()
+    for (suffix, text), values in zip(texts.items(), times, strict=True):
+        found[f"correlation_time{suffix}"] = values.drop_attrs().assign_attrs(units="s", long_name=text)
     found["correlation_time"].attrs["symbol"] = "t_c"
-    return xr.Dataset(found)
+    return found

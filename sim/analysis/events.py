@@ -1,6 +1,7 @@
 """Events of a run, once per member: first pull-off, time masked, friction peak, energy dissipated."""
 
 import contextlib
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -14,6 +15,8 @@ _ROUNDING = 1e-9
 _ERRORS = 5.0
 #: A loop below this share of what is put in and given back is nothing.
 _NOTHING = 1e-12
+#: Names of a peak, beginning of those of its time and speed, and the quantity that it is of with its unit.
+_PEAKS = (("peak_stress", "peak", "shear_stress", "Pa"), ("peak_friction", "peak_friction", "friction_force", "N"))
 
 
 def events(dataset: xr.Dataset) -> xr.Dataset:
@@ -96,10 +99,9 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     ramp, start = drive == "ramp", drive == "start"
     if not bool((ramp | start).any()):
         return xr.Dataset()
-    found, slides = {}, (ramp | start) & _sliding(dataset)
-    for name, prefix, source, unit in (
-        ("peak_stress", "peak", "shear_stress", "Pa"), ("peak_friction", "peak_friction", "friction_force", "N")
-    ):  # fmt: skip
+    found, between = {}, float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
+    slides = (ramp | start) & (dataset["t"] >= _beginning(dataset) - 1e-6 * between)  # the record of the start counts
+    for name, prefix, source, unit in _PEAKS:
         suffix = "" if source in dataset else "_mean"
         recorded = dataset[source + suffix].astype(float)
         size = abs(recorded).where(slides)
@@ -128,12 +130,6 @@ def _beginning(dataset: xr.Dataset) -> xr.DataArray:
         return setting(dataset, "drive.rest")
     first = (dataset["speed"] != 0.0).argmax("t")
     return dataset["t"].isel(t=(first - 1).clip(0)).drop_vars("t")
-
-
-def _sliding(dataset: xr.Dataset) -> xr.DataArray:
-    """Records from where sliding starts on; that of the start itself counts."""
-    between = float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
-    return dataset["t"] >= _beginning(dataset) - 1e-6 * between
 
 
 def _maximum(values: xr.DataArray, ramp: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
@@ -233,10 +229,7 @@ def _per_cycle(series: xr.DataArray, period: xr.DataArray, times: xr.DataArray, 
     """Growth of a series in each cycle; nan beyond the last one."""
     ends = period * xr.DataArray(np.arange(count + 1), dims="end")
     ends = ends.where(ends <= times[-1] + 1e-6 * period)
-    at = xr.apply_ufunc(
-        np.interp, ends, times, series,
-        input_core_dims=[["end"], ["t"], ["t"]], output_core_dims=[["end"]], vectorize=True,
-    )  # fmt: skip
-    at = at.where(ends.notnull())
+    dims: Any = {"input_core_dims": [["end"], ["t"], ["t"]], "output_core_dims": [["end"]]}
+    at = xr.apply_ufunc(np.interp, ends, times, series, vectorize=True, **dims).where(ends.notnull())
     gained = at.diff("end").rename(end="cycle").assign_coords(cycle=np.arange(1, count + 1))
     return gained.transpose(..., *(name for name in (MEMBERS, "cycle") if name in gained.dims))

@@ -5,6 +5,7 @@ recorded contact is at that time.
 """
 
 import contextlib
+import itertools
 
 import numpy as np
 import xarray as xr
@@ -95,10 +96,9 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     levels = [full, *(level.where(area.notnull()) for level in left), area]
     texts = {"lost_to_bonds": "broken bonds, which are charged first"}
     texts |= {name + suffix: text for name, (_, text) in charged.items()}
-    found = {
-        name: pure((before - after) / full, f"share of JKR's area lost to {text}")
-        for (name, text), before, after in zip(texts.items(), levels, levels[1:], strict=False)
-    }
+    lost = [(before - after) / full for before, after in itertools.pairwise(levels)]
+    words = zip(texts.items(), lost, strict=False)
+    found = {name: pure(share, f"share of JKR's area lost to {text}") for (name, text), share in words}
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
             found[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")

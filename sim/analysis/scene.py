@@ -124,9 +124,8 @@ def resolved(dataset: xr.Dataset, key: str) -> Any:
 def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
     """The labels that a key is swept by, None where it is not."""
     name = key.replace(".", "_")
-    if name in dataset.variables and dataset[name].dtype.kind in "OUST" and dataset[name].ndim == 1:
-        return dataset[name]
-    return None
+    swept = name in dataset.variables and dataset[name].dtype.kind in "OUST" and dataset[name].ndim == 1
+    return dataset[name] if swept else None
 
 
 class Control(NamedTuple):

@@ -181,7 +181,7 @@ def scenario_json(scenario: Scenario) -> str:
 def _attributes(file: File, plan: Plan) -> None:
     scene, source = plan.scenario, plan.scenario.origin
     resolved = scenario_json(scene)
-    digest = hashlib.sha256(resolved.encode())
+    digest = hashlib.sha256(resolved.encode()).hexdigest()[:16]
     versions = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
     sim_version = importlib.metadata.version("sliding-sim")
     files = {n: {"sha256": hashlib.sha256(t.encode()).hexdigest(), "text": t} for n, t in source.files.items()}
@@ -189,8 +189,7 @@ def _attributes(file: File, plan: Plan) -> None:
         "Conventions": "CF-1.11",
         "title": scene.name,
         "source": f"sliding-sim {sim_version}, simulation of an adhesive sliding interface",
-        "history": f"sim run; scenario {digest.hexdigest()[:16]}; "
-        + ", ".join(f"{name} {version}" for name, version in versions.items()),
+        "history": f"sim run; scenario {digest}; {', '.join(f'{n} {version}' for n, version in versions.items())}",
         "references": "N. Menga, G. Carbone, D. Dini, arXiv:1710.06506; J. Mech. Phys. Solids 112 (2018) 145 and"
         " 133 (2019) 103744 (corrigendum)",
         "scenario_toml": source.text,
@@ -210,8 +209,7 @@ def _scenario_variables(file: File, plan: Plan) -> None:
     swept = {key for axis in plan.scenario.sweep for key in axis.keys}
     for key, (quantity, value) in tables[0].items():
         if key not in swept and all(key in table and table[key][1] == value for table in tables):
-            described = quantity.unit, quantity.meaning, quantity.symbol
-            _variable(file, variable_name(key), "f8", (), *described)[...] = value
+            _variable(file, variable_name(key), "f8", (), quantity.unit, quantity.meaning, quantity.symbol)[...] = value
 
 
 def _derived_variables(file: File, plan: Plan) -> None:

@@ -28,11 +28,7 @@ _MOST_POINTS = 8
 _MOST_WORDS = 6
 #: Keys that stand elsewhere than among the quantities.
 _ELSEWHERE = ("name", "sweep", *(f"{part}.model" for part in Parts._fields))
-_ERRORS = {
-    "cell_error_": "error of the cell",
-    "banded_error_": "error of the bands",
-    "member_spread_": "spread of a member",
-}
+_ROWS = {"cell_error": "error of the cell", "banded_error": "error of the bands", "member_spread": "spread of a member"}
 
 Rows = list[tuple[str, ...]]
 
@@ -169,10 +165,8 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
     energies = [power * energy for power, energy in zip(powers, plane, strict=True)]
     settled = any(spectrum.bond_made for spectrum in spectra)
     when = "in steady sliding at the last speed" if settled else "at amplitude 1"
-    rows: Rows = [
-        ("rms of the stress", f"{_span(rms, 'Pa')} {when}"),
-        ("stored energy", f"{_span(energies, 'J/m^2')} {when}, on the infinite plane"),
-    ]
+    rows: Rows = [("rms of the stress", f"{_span(rms, 'Pa')} {when}")]
+    rows.append(("stored energy", f"{_span(energies, 'J/m^2')} {when}, on the infinite plane"))
     cells = {point.fluctuations.side(point.setting.cell): point for point in points}
     sides = [side for side in cells if math.isfinite(side)]
     if sides:
@@ -183,8 +177,8 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
     for point in points:
         for name, value in point.process.known_errors().items():
             errors.setdefault(name, []).append(value)
-    for start, title in _ERRORS.items():
-        found = {name.removeprefix(start): errors.pop(name) for name in list(errors) if name.startswith(start)}
+    for start, title in _ROWS.items():
+        found = {name.removeprefix(f"{start}_"): errors.pop(name) for name in list(errors) if name.startswith(start)}
         if found:
             each = (f"{name.replace('_', ' ')} {_percent(values)}" for name, values in found.items())
             rows.append((title, ", ".join(each)))
@@ -217,18 +211,14 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     held = _PROGRAM_BYTES + 8.0 * sample.group * (numbers + 2.0 * len(plan.variables) * sample.stretch)
     held += 2.0 * _map_bytes(some[0], sample.group)  # a part, and what is written of it
     alike = ", all alike, so one is computed" if scene.ensemble.members > plan.members else ""
-    rows: Rows = [
-        ("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records"),
-        ("members", f"{scene.ensemble.members:,}{alike}"),
-    ]
+    rows: Rows = [("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records")]
+    rows.append(("members", f"{scene.ensemble.members:,}{alike}"))
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
-    return rows + [
-        ("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core"),
-        ("memory", f"about {_size(held)}"),
-        ("file", f"{_size(_bytes(plan, some[0]))} at most, before compression"),
-    ]
+    rows.append(("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core"))
+    rows.append(("memory", f"about {_size(held)}"))
+    return [*rows, ("file", f"{_size(_bytes(plan, some[0]))} at most, before compression")]
 
 
 def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:

@@ -73,7 +73,12 @@ def run(
     """
     plan = Plan.of(scenario)
     if to is None:
-        return _in_memory(plan, progress)
+        import xarray  # heavy
+
+        memory, file = MemoryParts(), MemoryFile()
+        simulate(plan, memory, progress)
+        write_dataset(file, plan, memory)
+        return xarray.Dataset(file.variables, attrs=file.attributes)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
         raise OutputExists(f"{target} is no plain file; name another output")
@@ -147,15 +152,6 @@ def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
     return {MAP[0]: maps, DISC_ENERGIES[0][0]: own, DISC_ENERGIES[1][0]: cross}
 
 
-def _in_memory(plan: Plan, progress: Progress | None) -> Any:
-    import xarray
-
-    parts, file = MemoryParts(), MemoryFile()
-    simulate(plan, parts, progress)
-    write_dataset(file, plan, parts)
-    return xarray.Dataset(file.variables, attrs=file.attributes)
-
-
 def _write_file(target: Path, folder: Path, plan: Plan, parts: Parts) -> None:
     """Make the dataset beside the parts, sync it and rename it into place."""
     # of who reads a dataset lazily in another thread; where xarray is not imported nobody does
@@ -191,13 +187,9 @@ def _held(target: Path) -> Iterator[Path]:
 
 def write_log(target: Path, began: float, arguments: list[str]) -> None:
     """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments."""
-    entry = {
-        "began": datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds"),
-        "seconds": round(time.time() - began, 2),
-        "host": platform.node(),
-        "platform": platform.platform(),
-        "arguments": arguments,
-    }
+    when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
+    machine = {"host": platform.node(), "platform": platform.platform(), "arguments": arguments}
+    entry = {"began": when, "seconds": round(time.time() - began, 2), **machine}
     with explained(target.parent), open(f"{target}.log", "a", encoding="utf-8") as log:
         log.write(json.dumps(entry) + "\n")
 

@@ -10,7 +10,7 @@ from pydantic import TypeAdapter
 
 from sim.analysis import setting
 from sim.laws import schallamach
-from sim.parts.bonds.rupture import Rupture, RuptureRate
+from sim.parts.bonds.rupture import Rupture
 from sim.plots.style import number_at
 
 _PREFIX = "bonds_rupture_"
@@ -38,20 +38,16 @@ class Population(NamedTuple):
     density: float
 
     @property
-    def rate(self) -> RuptureRate:
-        return self.rupture.law(self.stiffness)
-
-    @property
     def pathway(self) -> tuple[float, float, float] | tuple[()]:
         """Rate [1/s], Bell force [N] and stiffness [N/m] where all rupture is by one pathway that force opens."""
-        rate, softness, limit, catch, _ = self.rate
+        rate, softness, limit, catch, _ = self.rupture.law(self.stiffness)
         bell = softness > 0.0 and catch == 0.0 and limit == math.inf
         return (rate, self.stiffness / softness, self.stiffness) if bell else ()
 
     @property
     def at_rest(self) -> float:
         """Share of the sites that are bound at rest."""
-        return float(schallamach.rest_share(self.rate.at_rest, self.rebinding))
+        return float(schallamach.rest_share(self.rupture.law(self.stiffness).at_rest, self.rebinding))
 
     def start_peak(self, speed: np.ndarray) -> np.ndarray:
         """Static peak at speeds [m/s] after a long rest, of bonds with one pathway of which none rebinds [Pa]."""

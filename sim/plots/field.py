@@ -49,12 +49,10 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     _draw_map(figure, axes[0], stress.to_numpy(), cell, radius, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
     _draw_map(figure, axes[1], moved, cell, radius, ("m", "displacement $w_1$", "PuOr_r"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
+    box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0}
     for panel in axes:
         panel.set_xlabel(length.label("$x$"))
-        panel.text(
-            0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7,
-            bbox={"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0},
-        )  # fmt: skip
+        panel.text(0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7, bbox=box)
     axes[0].set_ylabel(length.label("$y$"))
     then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}, $V$ = {style.text_of(speed, 'm/s')}"
     axes[0].set_title(", ".join(filter(None, [point, then])))
@@ -70,28 +68,22 @@ def _then(dataset: xr.Dataset, name: str, at: dict[str, int], stress: xr.DataArr
 def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, about: tuple) -> None:
     """One field around the contact, continued periodically where the contact is wider than the cell."""
     si, words, colours = about
-    field = _refined(field)
-    points = field.shape[0]
+    # between its samples by its own Fourier series: nothing is smoothed
+    points = field.shape[0] * -(-PIXELS // field.shape[0])
+    field = resample(resample(field, points, axis=0), points, axis=1)
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
     unit = style.Unit.of(field, si)
     most = unit.factor * float(np.max(np.abs(field))) or 1.0
     reach = (half + 0.5) * cell / points
-    image = panel.imshow(
-        unit.factor * field[np.ix_(index, index)].T, cmap=colours, vmin=-most, vmax=most, origin="lower",
-        extent=(-reach, reach, -reach, reach), interpolation="nearest",
-    )  # fmt: skip
+    look: Any = {"cmap": colours, "vmin": -most, "vmax": most, "origin": "lower", "interpolation": "nearest"}
+    tiled = unit.factor * field[np.ix_(index, index)].T
+    image = panel.imshow(tiled, extent=(-reach, reach, -reach, reach), **look)
     figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
     if 0.0 < radius < 1.5 * cell:
         style.contact_circle(panel, radius)
     panel.set(xlim=(-0.5 * side, 0.5 * side), ylim=(-0.5 * side, 0.5 * side))
-
-
-def _refined(field: np.ndarray) -> np.ndarray:
-    """A periodic field between its samples, by its own Fourier series: nothing is smoothed."""
-    fine = field.shape[0] * -(-PIXELS // field.shape[0])
-    return resample(resample(field, fine, axis=0), fine, axis=1)
 
 
 def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tuple[Any, float, str]:

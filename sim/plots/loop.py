@@ -1,7 +1,7 @@
 """The figure of a loop: load and contact radius over the displacement of what holds the sphere, and the energy lost."""
 
 import contextlib
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -101,9 +101,7 @@ def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind
     mark_jumps(panel, scene, name, line, factor, named=not loads)
 
 
-def _equilibria(
-    loads: Axes, radii: Axes, scene: Scene, theories: list[Theory], factors: tuple[float, float, float]
-) -> None:
+def _equilibria(loads: Axes, radii: Axes, scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:
     """JKR's equilibria, each different curve once, as far as its contacts reached."""
     reached: dict[Theory, float] = {}
     for line, theory in zip(scene.lines, theories, strict=True):
@@ -130,11 +128,10 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
     low, high = panel.get_ylim()
     near = -_GRIPS * pull < _NAME * (high - low)
     names = [(1.0, f"{grips}, {dead}", "top")] if near else [(1.0, dead, "top"), (_GRIPS, grips, "bottom")]
+    look: Any = {"textcoords": "offset points", "ha": "left", "color": style.REFERENCE, "fontsize": 7}
     for share, text, side in names:  # on the left, where spheres are open
-        panel.annotate(
-            text, (0.0, share * pull), (3, 1.5 if side == "bottom" else -1.5), ha="left", va=side,
-            xycoords=panel.get_yaxis_transform(), textcoords="offset points", color=style.REFERENCE, fontsize=7,
-        )  # fmt: skip
+        at, off = (0.0, share * pull), (3, 1.5 if side == "bottom" else -1.5)
+        panel.annotate(text, at, off, va=side, xycoords=panel.get_yaxis_transform(), **look)
 
 
 def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]:

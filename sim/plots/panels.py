@@ -1,6 +1,6 @@
 """Panels of one observable each, and the figures made of them: over speed, time or a swept key, and friction loops."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -141,9 +141,7 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
         style.fill(panel, x, ratio, bonds, color=style.FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
 
 
-def stacked(
-    scene: Scene, panels: Sequence[tuple[float, Panel]], room: float | None = None
-) -> tuple[Figure, list[Axes]]:
+def stacked(scene: Scene, panels: list[tuple[float, Panel]], room: float | None = None) -> tuple[Figure, list[Axes]]:
     """Panels of given heights [in] above each other with one x axis and its label, lettered; a colour bar if any."""
     figure, axes = style.rows([height for height, _ in panels])
     for panel, (_, drawing) in zip(axes, panels, strict=True):

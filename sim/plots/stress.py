@@ -13,7 +13,7 @@ from sim.analysis import is_steady, setting, sweep_dims
 from sim.plots import style
 from sim.plots.bond_laws import Steady, population_of, rest_of, steady_laws
 from sim.plots.curves import Line, Scene, contact_curves, over_speed, speed_dim
-from sim.plots.panels import stacked
+from sim.plots.panels import Panel, stacked
 
 #: Speeds at which a closed form is drawn.
 _FINE = 600
@@ -66,7 +66,7 @@ def stress_figure(dataset: xr.Dataset) -> Figure:
         contact_curves(panel, scene, "bond_fraction", 1.0)
         panel.set_ylabel("bond fraction $N/N_0$")
 
-    panels = [(2.1, stress_panel), (1.3, fraction_panel)]
+    panels: list[tuple[float, Panel]] = [(2.1, stress_panel), (1.3, fraction_panel)]
     return stacked(scene, panels if scene.varies("bond_fraction") else panels[:1])[0]
 
 

@@ -77,11 +77,9 @@ def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -
     figure = Picture(figsize=size, dpi=200, layout="constrained")
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(*count, squeeze=False, **options).flat)
+    corner: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "bottom"}
     for mark, panel in zip("abcdefg", axes if len(axes) > 1 else (), strict=False):
-        panel.annotate(
-            f"({mark})", (0.0, 1.0), (-2, 4), xycoords="axes fraction", textcoords="offset points",
-            ha="right", va="bottom", fontweight="bold",
-        )  # fmt: skip
+        panel.annotate(f"({mark})", (0.0, 1.0), (-2, 4), fontweight="bold", **corner)
     return figure, axes
 
 

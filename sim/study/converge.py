@@ -18,16 +18,13 @@ from numpy.typing import NDArray
 from sim.analysis import engineering
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
-from sim.study.estimates import Estimates, estimates
 from sim.study.exact_law import QUANTITIES, STATISTICS, Walk, cell_gammas, memory
 from sim.study.figure import figure
-from sim.study.samples import affordable, coupled, fluctuates, sampled, timed
+from sim.study.samples import Array, Estimates, affordable, coupled, estimates, fluctuates, sampled, timed
 from sim.study.settings import Row, at_step, number_of_sites, plain, settings, tolerance_of
 from sim.study.verdicts import explanation, recommendation, table
 
 __all__ = ["converge", "explanation", "figure", "recommendation", "table"]
-
-Array = NDArray[np.float64]
 
 #: Shares of the budget: runs without noise, times, samples.
 _WALKS, _TIMES, _SAMPLES = 0.4, 0.2, 0.4
@@ -107,7 +104,7 @@ class _Study:
         self.lawful: NDArray[np.bool_] = np.all(np.isfinite(law), axis=0)
         self.lawful[0] |= not self.walk.stretched
         self.lawful[[0, 1, 3], 2] = self.lawful[:, 3] = True
-        self.yard = _yardsticks(self._meant(law, self.walk))
+        self.yard = _yardsticks(_meant(law, self.walk))
 
     def of(self, part: str) -> list[Row]:
         """The rows that change one part."""
@@ -116,13 +113,6 @@ class _Study:
     def _largest(self, difference: Array) -> Array:
         """Largest difference over the records in units of the yardsticks, shape (quantities, statistics)."""
         return np.max(_over(np.abs(difference), self.yard), axis=0)
-
-    @staticmethod
-    def _meant(statistics: Array, walk: Walk) -> Array:
-        """Statistics with means of a run without noise where they have no law."""
-        mean = statistics[:, 1:, 0]
-        statistics[:, 1:, 0] = np.where(np.isnan(mean), walk.means[:, 1:], mean)
-        return statistics
 
     def judge_models(self) -> None:
         """Errors of shear models and of grids, by the terms of ΔΓ that they draw."""
@@ -142,10 +132,10 @@ class _Study:
                  for row in rows if math.isinf(row.sites)]  # fmt: skip
         if walks:
             self.exact = walks[-1]
-        exact = self._meant(self.exact.statistics(0, self.sites), self.exact)
+        exact = _meant(self.exact.statistics(0, self.sites), self.exact)
         for row, walk in zip(rows, walks + [self.exact] * (len(rows) - len(walks)), strict=True):
             row.law = walk.statistics(1, row.sites)
-            row.error = self._largest(self._meant(walk.statistics(0, row.sites), walk) - exact)
+            row.error = self._largest(_meant(walk.statistics(0, row.sites), walk) - exact)
 
     def judge_steps(self, tolerance: float, seconds: float) -> None:
         """Errors of clock steps: from the longest that the records allow, halved until they agree or the time is up.
@@ -162,7 +152,7 @@ class _Study:
             row = at_step(self.base, ratios.pop(0) if ratios else 0.5 * found[-1][0].ratio)
             exact = at_step(self.exact.scenario, row.ratio).scenario
             walk = self.exact if row.own else Walk.of(exact, self.terms[:2])
-            found.append((row, self._meant(walk.statistics(0, self.own_sites), walk)))
+            found.append((row, _meant(walk.statistics(0, self.own_sites), walk)))
             if len(found) > 1:
                 rest = np.fmax(0.5 * rest, self._largest(found[-1][1] - found[-2][1]))
             if row.ratio < 1.0:
@@ -242,6 +232,13 @@ class _Study:
         for row in self.of("step"):
             if row.ratio < finest.ratio:
                 self._take(row, _REST * errors[1])
+
+
+def _meant(statistics: Array, walk: Walk) -> Array:
+    """Statistics with means of a run without noise where they have no law."""
+    mean = statistics[:, 1:, 0]
+    statistics[:, 1:, 0] = np.where(np.isnan(mean), walk.means[:, 1:], mean)
+    return statistics
 
 
 def _over(numbers: Array, yard: Array) -> Array:

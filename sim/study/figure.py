@@ -11,18 +11,13 @@ from matplotlib.lines import Line2D
 from matplotlib.transforms import Bbox
 
 from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, plain_ticks, rows
-from sim.study.verdicts import choices, chosen
+from sim.study.verdicts import PARTS, choices, chosen
 
 #: The least error that has a place of its own; exact settings stand a decade below the least of the others.
 _LEAST = 1e-8
 
-#: Colour, marker and name of what a setting changes.
-_PARTS = {
-    "shear": (FLUCTUATIONS, "o", "shear model"),
-    "bonds": (BONDS, "s", "bond model"),
-    "grid": (LINES[4], "P", "grid"),
-    "step": (LINES[3], "^", "clock step"),
-}
+#: Colour and marker of what a setting changes.
+_LOOKS = {"shear": (FLUCTUATIONS, "o"), "bonds": (BONDS, "s"), "grid": (LINES[4], "P"), "step": (LINES[3], "^")}
 #: Where a label may stand, in points from its marker.
 _PLACES = (
     (5, 0, "left"), (-5, 0, "right"), (0, 6, "center"), (0, -7, "center"), (5, 6, "left"), (5, -7, "left"),
@@ -52,7 +47,7 @@ def figure(dataset: xr.Dataset) -> Figure:
         floor = max(0.1 * shown[shown > _LEAST].min(), _LEAST)
         height, time = np.maximum(error, floor), dataset["time"].to_numpy()
         off = [time - dataset["time_low"].to_numpy(), dataset["time_high"].to_numpy() - time]
-        for name, (colour, marker, _) in _PARTS.items():
+        for name, (colour, marker) in _LOOKS.items():
             here = part == name
             style: dict[str, Any] = {"color": colour, "marker": marker, "markersize": 3.6, "linewidth": 0.6}
             panel.errorbar(time[here], height[here], xerr=np.array(off)[:, here], elinewidth=0.6, **style)
@@ -66,7 +61,7 @@ def figure(dataset: xr.Dataset) -> Figure:
         panel.yaxis.set_major_formatter(lambda y, _: "exact" if y <= 1.5 * floor else f"$10^{{{round(np.log10(y))}}}$")
         if np.ptp(np.log10(panel.get_xlim())) < 1.5:
             plain_ticks(panel.xaxis)
-        legend(panel, handles=_handles([name for name in _PARTS if name in part]))
+        legend(panel, handles=_handles([name for name in _LOOKS if name in part]))
         ends = np.stack([dataset["time_low"].to_numpy(), height, dataset["time_high"].to_numpy(), height], axis=1)
         _label(panel, dataset["row"].to_numpy(), np.stack([time, height], axis=1), ends, part, own)
     return drawn
@@ -81,11 +76,9 @@ def _label(panel: Axes, names: Any, points: Any, ends: Any, part: Any, own: Any)
     taken = [Bbox.from_bounds(x - 6.0, y - 6.0, 12.0, 12.0) for x, y in pixels]
     taken += [Bbox(panel.transData.transform(row.reshape(2, 2)) + [[0.0, -2.0], [0.0, 2.0]]) for row in ends]
     for row in sorted(range(len(names)), key=lambda row: not own[row]):
+        look: Any = {"textcoords": "offset points", "va": "center", "fontsize": 6, "color": _LOOKS[part[row]][0]}
         for right, up, side in _PLACES:
-            text = panel.annotate(
-                str(names[row]), points[row], (right, up), textcoords="offset points", ha=side, va="center", fontsize=6,
-                color=_PARTS[part[row]][0],
-            )  # fmt: skip
+            text = panel.annotate(str(names[row]), points[row], (right, up), ha=side, **look)
             box = text.get_window_extent(renderer)
             inside = panel.bbox.containsx(box.x0) and panel.bbox.containsx(box.x1) and panel.bbox.containsy(box.y0)
             if inside and panel.bbox.containsy(box.y1) and not any(box.overlaps(other) for other in taken):
@@ -95,8 +88,8 @@ def _label(panel: Axes, names: Any, points: Any, ends: Any, part: Any, own: Any)
 
 
 def _handles(names: list[str]) -> list[Line2D]:
-    handles = [Line2D([], [], color=_PARTS[name][0], marker=_PARTS[name][1], markersize=3.6, linewidth=0.6,
-                      label=_PARTS[name][2]) for name in names]  # fmt: skip
+    look: dict[str, Any] = {"markersize": 3.6, "linewidth": 0.6}
+    handles = [Line2D([], [], color=_LOOKS[n][0], marker=_LOOKS[n][1], label=PARTS[n], **look) for n in names]
     alone: Any = {"linestyle": "none", "color": "black"}
     handles.append(Line2D([], [], marker="o", markerfacecolor="none", markersize=6.0, label="as written", **alone))
     handles.append(Line2D([], [], marker="*", markersize=6.0, label="recommended", **alone))

@@ -31,6 +31,8 @@ _MOST_SITES = {"tracked": 1e5, "counted": 1e9}
 _MOST_POINTS = 2**14
 _USUAL_TOLERANCE = 0.01
 _ANY = TypeAdapter(Any)
+#: Models, each with the keys that are changed.
+_Tried = list[tuple[str, dict[str, Any]]]
 
 
 @dataclass
@@ -131,7 +133,7 @@ def _shears(scenario: Scenario, left_out: list[str]) -> list[Row]:
     if "cell" not in table(scenario.shear):
         return []
     tolerances = sorted({*_BANDS, tolerance_of(scenario)}, reverse=True)
-    bands: list[tuple[str, dict[str, Any]]] = [("banded", {"tolerance": each}) for each in tolerances]
+    bands: _Tried = [("banded", {"tolerance": each}) for each in tolerances]
     tried = [("mean", {}), *bands, ("modal", {}), ("mapped", {})]
     found = _models("shear", scenario, _SHEARS, tried, left_out)
     errors = [row.scenario.process.known_errors() if "tolerance" in row.toml else None for row in found]
@@ -144,7 +146,7 @@ def _bonds(scenario: Scenario, left_out: list[str]) -> list[Row]:
     given, models = table(scenario.bonds), _TWO_STATE
     if "rebinding_rate" not in given:
         return []
-    tried: list[tuple[str, dict[str, Any]]] = [("steady", {}), ("rate", {})]
+    tried: _Tried = [("steady", {}), ("rate", {})]
     if "rupture" in given:
         models, own = _STRETCHED, given.get("tolerance", REFERENCE)
         tried = [("rate", {}), *(("cohort", {"tolerance": each}) for each in sorted({*_COHORTS, REFERENCE, own})[::-1])]
@@ -158,9 +160,7 @@ def _bonds(scenario: Scenario, left_out: list[str]) -> list[Row]:
     return _models("bonds", scenario, models, tried, left_out)
 
 
-def _models(
-    part: str, scenario: Scenario, models: dict[str, type], tried: list[tuple[str, dict[str, Any]]], left_out: list[str]
-) -> list[Row]:
+def _models(part: str, scenario: Scenario, models: dict[str, type], tried: _Tried, left_out: list[str]) -> list[Row]:
     """The scene with other models of one part, which keep as many of its keys as they take."""
     given = {key: value for key, value in table(getattr(scenario, part)).items() if value is not None}
     found = []

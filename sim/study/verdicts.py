@@ -207,10 +207,9 @@ def recommendation(dataset: xr.Dataset) -> str:
     named, off = f"“{', '.join(dataset['row'].values[list(best.rows)])}”", f"off by at most {largest(best.error)}"
     if equal:
         same = f"; {equal - 1} more take as long within the spread of the times, this is the most accurate"
-        verdict = (
-            f"{'It' if best is own else named} is the cheapest combination that keeps {percent(tolerance)}: {off}, "
-            f"{_time(best.time, best.low, best.high)} of CPU time{same if equal > 1 else ''}."
-        )
+        cost = f"{_time(best.time, best.low, best.high)} of CPU time{same if equal > 1 else ''}"
+        it = "It" if best is own else named
+        verdict = f"{it} is the cheapest combination that keeps {percent(tolerance)}: {off}, {cost}."
     else:
         shorter = _shorter(dataset, best, tolerance)
         verdict = f"No combination keeps {percent(tolerance)}: {named} comes nearest, {off}. {shorter}".rstrip()
@@ -218,9 +217,8 @@ def recommendation(dataset: xr.Dataset) -> str:
     return text if best is own else f"{text}\nWrite:\n\n{_toml(dataset, best, own)}"
 
 
-_PARTS = {"shear": "shear model", "bonds": "bond model", "grid": "grid", "step": "clock step"}
-
-
+#: Names of what a setting changes.
+PARTS = {"shear": "shear model", "bonds": "bond model", "grid": "grid", "step": "clock step"}
 #: Tables of the scenario file that hold what the parts of another name change.
 _TABLES = {"grid": "shear", "step": "clock"}
 
@@ -231,7 +229,7 @@ def _as_written(dataset: xr.Dataset, own: Choice) -> str:
     if not found.error > _ROUNDING:
         return "As it is written the scene is exact: nothing in it errs by its models, its clock step or its grid."
     shares = dataset["error"].to_numpy()[list(own.rows), found.quantity, found.statistic]
-    parts = [_PARTS[str(dataset["part"].values[row])] for row in own.rows]
+    parts = [PARTS[str(dataset["part"].values[row])] for row in own.rows]
     ordered = sorted(zip(shares, parts, strict=True), key=lambda share: -np.nan_to_num(share[0]))
     of = ", ".join(f"{percent(share)} by its {part}" for share, part in ordered if share > _ROUNDING)
     return f"As it is written the scene is off by at most {found}: {of}."
@@ -263,10 +261,8 @@ def _sight(dataset: xr.Dataset, best: Choice) -> str:
     least = np.where(sem > 0.0, sem, -np.inf)[:, :, quantity].max(axis=1)
     least = np.where(least > 0.0, least, np.inf).min(axis=0)
     seen = [f"the {name} to {percent(2.0 * size)}" for name, size in zip(_SHORT, least, strict=True) if size < math.inf]
-    return (
-        "Measured differences are all below what this budget can see, which of "
-        f"{_OF[quantity]} is {', '.join(seen)} in the row that was sampled best."
-    )
+    sight = f"{_OF[quantity]} is {', '.join(seen)} in the row that was sampled best"
+    return f"Measured differences are all below what this budget can see, which of {sight}."
 
 
 def _toml(dataset: xr.Dataset, chosen: Choice, own: Choice) -> str:

@@ -122,8 +122,7 @@ class Course:
         half = duration / (2.0 * self.cycles)
         first, last = math.floor(start / half), math.ceil(stop / half)
         low, high = start + _SAME * duration, stop - _SAME * duration
-        inside = [k for k in range(first, last + 1) if low < k * half < high]
-        return [(k * half, self.stop if k % 2 else self.start) for k in inside]
+        return [(k * half, self.stop if k % 2 else self.start) for k in range(first, last + 1) if low < k * half < high]
 
     def _piece(self, start: float, first: float, stop: float, last: float, duration: float) -> Piece:
         if self.scale == "linear":
@@ -209,11 +208,9 @@ class Table:
 
 
 def _kind(value: Any) -> str:
-    if isinstance(value, dict):
-        return "[table]" if "file" in value or "time" in value else "[course]"
-    if isinstance(value, Course):
-        return "[course]"
-    return "[table]" if isinstance(value, Table) else "[value]"
+    if isinstance(value, Table) or (isinstance(value, dict) and ("file" in value or "time" in value)):
+        return "[table]"
+    return "[course]" if isinstance(value, dict | Course) else "[value]"
 
 
 def held(unit: Quantity, name: str) -> Any:

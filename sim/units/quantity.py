@@ -17,9 +17,8 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 _NUMBER = r"[+-]?(?:(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|inf(?:inity)?|nan)"
-_TEXT = re.compile(
-    rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>[^\s0-9+,-](?:.*\S)?|1\s*/.*\S)?\s*", re.IGNORECASE | re.DOTALL
-)
+_REST = r"(?P<unit>[^\s0-9+,-](?:.*\S)?|1\s*/.*\S)?"
+_TEXT = re.compile(rf"\s*(?P<number>{_NUMBER})\s*{_REST}\s*", re.IGNORECASE | re.DOTALL)
 _COMMA = re.compile(r"\s*[+-]?[0-9]+,[0-9]+(?![0-9,])")
 
 # Only products of names with small whole powers reach pint, so that no text makes it compute.

@@ -23,9 +23,8 @@ from sim.parts.shear.correlation import Slip, Time, Wave
 from sim.scenario.clock import Clock, Record
 from sim.spectrum.families import Gaussian, Ripple, SelfAffine
 from sim.study.converge import converge, explanation, figure, recommendation, table
-from sim.study.estimates import estimates
 from sim.study.exact_law import QUANTITIES, READ, STATISTICS, Walk, cell_gammas, gamma_nodes, memory
-from sim.study.samples import coupled, sampled, timed
+from sim.study.samples import coupled, estimates, sampled, timed
 from sim.study.settings import REFERENCE, at_step, number_of_sites, plain, settings, table as keys
 from sim.study.verdicts import choices, chosen, differing
 
