@@ -6,7 +6,7 @@ import resource
 
 import pytest
 
-# Tests run on all cores at once already: threads of the linear algebra only wait for each other, a hundred times as
+# Tests run on all cores at once already: threads of the linear algebra would wait for each other, many times as
 # long as they work. Read when numpy is imported first, here and in every process that a test starts.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
