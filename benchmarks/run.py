@@ -27,7 +27,7 @@ from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
-from sim.parts.exchange import Bonding
+from sim.parts.exchange import Bonding, Motions
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Ensemble
@@ -127,7 +127,7 @@ def modal() -> list[Row]:
     def ours() -> None:
         state["step"] += 1
         moved = drive.Steady(speed=exponent * 5e-6).motion(state["step"], 0.0, 1.0, 1.0)
-        state["now"] = process.advance(state["now"], moved, stress, noise)
+        state["now"] = process.step(state["now"], moved, stress, noise)
 
     rows = []
     counter = itertools.count(10**6)
@@ -159,7 +159,7 @@ def step() -> list[Row]:
 
     def alone() -> None:
         moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
-        scenario.process.advance(fluctuation, moved, Bonding(np.ones(1), np.zeros(1), np.zeros(1)), noise)
+        scenario.process.step(fluctuation, moved, Bonding(np.ones(1), np.zeros(1), np.zeros(1)), noise)
 
     return [compare("engine step, modal 256²", whole, "its modes alone", alone, "", 4)]
 
@@ -180,7 +180,7 @@ def lens(exponent: float, points: int, members: int, recipe: shear.Modal | shear
 
     def program() -> None:
         moved = drive.Steady(speed=exponent * 5e-6).motion(next(counter), 0.0, 1.0, 1.0)
-        state[0] = process.advance(state[0], moved, stress, noise)
+        state[0] = process.step(state[0], moved, stress, noise)
 
     return program
 
@@ -234,7 +234,7 @@ def maps() -> list[Row]:
 
     def drawn() -> None:
         moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
-        state[0] = process.advance(state[0], moved, stress, noise)
+        state[0] = process.step(state[0], moved, stress, noise)
         process.maps(state[0], np.zeros(1), 1)
 
     def parts() -> None:
@@ -280,11 +280,11 @@ def population(part, members: int, motion) -> Callable:
     """A program that advances a population of bonds by one step and tells its moments, for a batch of members."""
     noise, state = Noise(1, "bonds", np.arange(members)), []
     state.append(part.start(motion, noise))
-    motions = itertools.cycle([motion._replace(step=step) for step in range(1, 4097)])
+    columns = [np.reshape(value, (1, -1)) for value in (*motion[1:], motion.slip)]
+    motions = itertools.cycle([Motions(step, *columns) for step in range(1, 4097)])
 
     def program() -> None:
-        state[0] = part.advance(state[0], next(motions), np.ones(1), noise)
-        part.bonding(state[0])
+        state[0], _ = part.advance(state[0], next(motions), np.ones(1), noise)
 
     return program
 

@@ -16,7 +16,8 @@ from sim.parts.exchange import NO_RESISTANCE, Array, Bonding, Indices, Sliding, 
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, Array]
-_NONE = np.zeros(1)
+#: Most numbers of one quantity in a block of steps: they stay in the cache.
+_BLOCK_NUMBERS = 2**16
 
 
 class State(NamedTuple):
@@ -33,6 +34,27 @@ class State(NamedTuple):
     shear: Storing
     contact: Touching
     extremes: extremes.Extremes
+
+
+class Course(NamedTuple):
+    """What a batch of members goes through, with the time as first axis and the member as second.
+
+    ``time`` [s], ``position`` [m] and ``speed`` [m/s] of the slider; ``fraction``, ``stress`` and ``strength`` of the
+    bonds as of ``Bonding``; ``energy`` ΔΓ [J/m²]; ``work`` and the rest as of ``Touching``.
+    """
+
+    time: Array
+    position: Array
+    speed: Array
+    fraction: Array
+    stress: Array
+    strength: Array
+    energy: Array
+    work: Array
+    radius: Array
+    detached: Array
+    dissipated: Array
+    phases: Array
 
 
 class Dice(NamedTuple):
@@ -53,23 +75,25 @@ def start(scenario: Scenario, dice: Dice) -> State:
     bonds = population.start(motion, dice.bonds)
     bonding = population.bonding(bonds)
     shear = process.start(motion, bonding, dice.shear)
-    touch = contact.start(motion, scenario.times.duration, balance(scenario, bonding, shear))
-    largest = extremes.first(bonding, touch.radius, _pull(scenario, touch, 0))
+    terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy)
+    touch = contact.start(motion, scenario.times.duration, terms)
+    largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
 
 
-def advance(scenario: Scenario, state: State, dice: Dice) -> State:
-    """The state one clock step later."""
+def advance(scenario: Scenario, state: State, dice: Dice, steps: range) -> tuple[State, Course]:
+    """The state after a block of clock steps, of a single one where a part feeds back, and what it went through."""
     drive, population, process, contact = scenario.parts
-    step, times = state.step + 1, scenario.times
-    slider, motion = drive.advance(state.drive, NO_RESISTANCE, times, step)
-    bonds = population.advance(state.bonds, motion, state.contact.radius, dice.bonds)
-    bonding = population.bonding(bonds)
-    shear = process.advance(state.shear, motion, bonding, dice.shear)
-    touch = contact.advance(state.contact, motion, times.duration, balance(scenario, bonding, shear))
-    ends, radii = (state.bonding, bonding), (state.contact.radius, touch.radius)
-    largest = extremes.after(state.extremes, ends, radii, _pull(scenario, touch, step), motion)
-    return State(step, slider, bonds, bonding, shear, touch, largest)
+    slider, motions = drive.advance(state.drive, NO_RESISTANCE, scenario.times, steps)
+    bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, dice.bonds)
+    shear, energy = process.advance(state.shear, motions, bonding, dice.shear)
+    terms = balance(scenario, bonding.fraction, bonding.strength, energy)
+    touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
+    before, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
+    largest = extremes.after(state.extremes, before, bonding, touch.radius, pull, motions)
+    end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
+    of_bonds = bonding.fraction, bonding.stress, bonding.strength
+    return end, Course(motions.time, motions.position, motions.speed, *of_bonds, energy, *touch)
 
 
 def march(scenario: Scenario, members: Indices, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -99,23 +123,52 @@ def march(scenario: Scenario, members: Indices, state: State | None = None, keep
     while state.step < scenario.times.steps:
         if keep and scenario.parts.bonds.in_place:
             state = state._replace(bonds=deepcopy(state.bonds))
-        state = advance(scenario, state, dice)
+        state, _ = advance(scenario, state, dice, range(state.step + 1, state.step + 2))
         yield state
 
 
-def balance(scenario: Scenario, bonding: Bonding, shear: Storing) -> Balance:
+def follow(scenario: Scenario, dice: Dice, state: State | None, steps: range) -> tuple[State, Course]:
+    """Advance a batch of members from a state, or from the start, to the last of some evenly spaced steps.
+
+    Returns
+    -------
+    state : State
+        That at the last of the ``steps``.
+    course : Course
+        What was passed at each of them; the same numbers, bit for bit, as a march gives.
+    """
+    kept = []
+    if state is None:
+        state = start(scenario, dice)
+        kept.append(course_of(scenario, state))
+    rows = len(dice.shear.members)
+    longest = 1 if any(part.feeds_back for part in scenario.chosen) else max(1, _BLOCK_NUMBERS // rows)
+    while state.step < steps[-1]:
+        block = range(state.step + 1, min(state.step + longest, steps[-1]) + 1)
+        state, passed = advance(scenario, state, dice, block)
+        wanted = slice((steps.start - block.start) % steps.step, None, steps.step)
+        kept.append(Course(*(values[wanted] for values in passed)))
+    return state, Course(*map(np.concatenate, zip(*kept, strict=True)))
+
+
+def course_of(scenario: Scenario, state: State) -> Course:
+    """What a march passes at one state, with a time axis of length 1."""
+    time, drive, bonds = np.full(1, scenario.times.at(state.step)), state.drive, state.bonding
+    moving = time, drive.position, drive.speed, bonds.fraction, bonds.stress, bonds.strength
+    return Course(*(values[np.newaxis] for values in (*moving, state.shear.energy, *state.contact)))
+
+
+def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array) -> Balance:
     """The terms of the effective work of adhesion w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*)."""
-    bonded = scenario.adhesion.work_of_bonds(bonding.fraction)
-    fluctuating = scenario.fluctuations.paid_by_adhesion * shear.energy
-    return Balance(bonded, fluctuating, bonding.strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
+    bonded, fluctuating = scenario.adhesion.work_of_bonds(fraction), scenario.fluctuations.paid_by_adhesion * energy
+    return Balance(bonded, fluctuating, strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _pull(scenario: Scenario, touch: Touching, step: int) -> Array:
+def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:
     """Tensile load of the contact [N], where the control makes it."""
     if not scenario.contact.makes_load:
-        return _NONE
-    control = scenario.contact.control(scenario.times.at(step), scenario.times.duration)
-    return -control.normal_load(touch.radius, scenario.bodies)
+        return np.zeros((*radius.shape[:-1], 1))
+    return -scenario.contact.control(time, scenario.times.duration).normal_load(radius, scenario.bodies)
 
 
 def pack(state: State) -> Arrays:

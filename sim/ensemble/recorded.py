@@ -1,15 +1,15 @@
 """Quantities of a dataset: recorded at each time, known of each scene, drawn as maps; with unit, name and symbol."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.engine import State, balance
+from sim.engine import Course, State, balance
 from sim.laws import jkr
 from sim.parts import extremes
-from sim.parts.contact.balance import BONDED, CLOSED, SETTLED, STRESSLESS, WHOLE
-from sim.parts.contact.control import Control
+from sim.parts.contact.balance import BONDED, CLOSED, SETTLED, STRESSLESS, WHOLE, Balance
+from sim.parts.contact.control import Control, LoadControl
 from sim.scenario.scenario import Scenario
 
 
@@ -17,7 +17,8 @@ class Variable(NamedTuple):
     """One recorded quantity, or one number of a scene.
 
     ``part`` names the part whose class decides whether members differ, "" for a number of the scene. ``read`` takes
-    the scenario and a state and gives an array of shape (1,) or (members,), that of a number the scenario alone.
+    the scenario and what a batch went through, a ``Course``, and gives an array that broadcasts to shape (times,
+    members); that of a quantity of the whole run takes the state at its end, that of a number the scenario alone.
     ``there`` says for which scenes it is recorded, with ``condition`` in words.
     """
 
@@ -31,63 +32,71 @@ class Variable(NamedTuple):
     condition: str = ""
 
 
-def _until_stopped(read: Callable[[Scenario, State], np.ndarray]) -> Callable[[Scenario, State], np.ndarray]:
+def _until_stopped(read: Callable[[Scenario, Course], np.ndarray]) -> Callable[[Scenario, Course], np.ndarray]:
     """A reading that is nan once a member's trajectory has stopped at its pull-off."""
-    return lambda scene, state: np.where(scene.contact.stopped(state.contact), np.nan, read(scene, state))
+
+    def running(scene: Scenario, course: Course) -> np.ndarray:
+        return np.where(scene.contact.stopped(course.radius, course.detached), np.nan, read(scene, course))
+
+    return running
 
 
-def _radius(scene: Scenario, state: State) -> np.ndarray:
-    return np.nan_to_num(state.contact.radius, nan=0.0)
+def _radius(scene: Scenario, course: Course) -> np.ndarray:
+    return np.nan_to_num(course.radius, nan=0.0)
 
 
-def _area(scene: Scenario, state: State) -> np.ndarray:
-    return np.pi * _radius(scene, state) ** 2
+def _area(scene: Scenario, course: Course) -> np.ndarray:
+    return np.pi * _radius(scene, course) ** 2
 
 
-def _control(scene: Scenario, state: State) -> Control:
-    return scene.contact.control(scene.clock.time(state.step), scene.clock.duration)
+def _control(scene: Scenario, course: Course) -> Control:
+    return scene.contact.control(course.time, scene.clock.duration)
 
 
-def _applied_load(scene: Scenario, state: State) -> np.ndarray:
+def _applied_load(scene: Scenario, course: Course) -> np.ndarray:
     if scene.contact.load is None:
-        return np.full(1, np.nan)
-    return np.full(1, scene.contact.course.at(scene.clock.time(state.step), scene.clock.duration))
+        return np.full(course.time.shape, np.nan)
+    return np.broadcast_to(cast(LoadControl, _control(scene, course)).load, course.time.shape)
 
 
-def _hertz_radius(scene: Scenario, state: State) -> np.ndarray:
-    return np.nan_to_num(_control(scene, state).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
+def _terms(scene: Scenario, course: Course) -> Balance:
+    return balance(scene, course.fraction, course.strength, course.energy)
 
 
-def _where_closed(state: State, reference: int, radius: np.ndarray) -> np.ndarray:
+def _hertz_radius(scene: Scenario, course: Course) -> np.ndarray:
+    return np.nan_to_num(_control(scene, course).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
+
+
+def _where_closed(course: Course, reference: int, radius: np.ndarray) -> np.ndarray:
     """Radius of a reference contact [m], 0 where it is open."""
-    return np.where(state.contact.phases[: len(radius), reference] == CLOSED, radius, 0.0)
+    return np.where(course.phases[:, : radius.shape[1], reference] == CLOSED, radius, 0.0)
 
 
-def _with_work(scene: Scenario, state: State, reference: int, work: np.ndarray) -> np.ndarray:
+def _with_work(scene: Scenario, course: Course, reference: int, work: np.ndarray) -> np.ndarray:
     """Radius of a reference contact in equilibrium with a work of adhesion [m]."""
-    return _where_closed(state, reference, _control(scene, state).radius(work, np.zeros(1), 0.0, scene.bodies))
+    return _where_closed(course, reference, _control(scene, course).radius(work, np.zeros(1), 0.0, scene.bodies))
 
 
-def _jkr_radius(scene: Scenario, state: State) -> np.ndarray:
-    return _with_work(scene, state, WHOLE, np.full(1, scene.adhesion.work))
+def _jkr_radius(scene: Scenario, course: Course) -> np.ndarray:
+    return _with_work(scene, course, WHOLE, np.full(course.time.shape, scene.adhesion.work))
 
 
-def _bonds_radius(scene: Scenario, state: State) -> np.ndarray:
-    return _with_work(scene, state, BONDED, balance(scene, state.bonding, state.shear).bonded)
+def _bonds_radius(scene: Scenario, course: Course) -> np.ndarray:
+    return _with_work(scene, course, BONDED, _terms(scene, course).bonded)
 
 
-def _stressless_radius(scene: Scenario, state: State) -> np.ndarray:
+def _stressless_radius(scene: Scenario, course: Course) -> np.ndarray:
     if not scene.contact.reversible:
-        return _equilibrium_radius(scene, state)
-    terms = balance(scene, state.bonding, state.shear).without_stress()
-    return _where_closed(state, STRESSLESS, scene.contact.equilibrium(_control(scene, state), terms))
+        return _equilibrium_radius(scene, course)
+    terms = _terms(scene, course).without_stress()
+    return _where_closed(course, STRESSLESS, scene.contact.equilibrium(_control(scene, course), terms))
 
 
-def _equilibrium_radius(scene: Scenario, state: State) -> np.ndarray:
+def _equilibrium_radius(scene: Scenario, course: Course) -> np.ndarray:
     if not scene.contact.lags:
-        return _radius(scene, state)
-    terms = balance(scene, state.bonding, state.shear)
-    return _where_closed(state, SETTLED, scene.contact.equilibrium(_control(scene, state), terms))
+        return _radius(scene, course)
+    terms = _terms(scene, course)
+    return _where_closed(course, SETTLED, scene.contact.equilibrium(_control(scene, course), terms))
 
 
 def _pulled(state: State, column: int, sign: float) -> np.ndarray:
@@ -113,35 +122,35 @@ LARGEST = (
 )  # fmt: skip
 
 VARIABLES = (
-    Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, state: state.drive.speed),
+    Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, course: course.speed),
     Variable("slider_position", "m", "displacement of the slider", "X", "drive",
-          lambda scene, state: state.drive.position),
+          lambda scene, course: course.position),
     Variable("bond_fraction", "1", "bonds over bonds at rest", "N/N_0", "bonds",
-          lambda scene, state: state.bonding.fraction),
+          lambda scene, course: course.fraction),
     Variable("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds",
-          lambda scene, state: state.bonding.stress),
+          lambda scene, course: course.stress),
     Variable("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
-          "DeltaGamma", "shear", lambda scene, state: state.shear.energy),
+          "DeltaGamma", "shear", lambda scene, course: course.energy),
     Variable("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
-          _until_stopped(lambda scene, state: state.contact.work)),
+          _until_stopped(lambda scene, course: course.work)),
     Variable("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),
     Variable("contact_area", "m^2", "contact area", "A", "contact", _until_stopped(_area)),
     Variable("normal_load", "N", "normal load on the sphere, compression positive", "P", "contact",
-          _until_stopped(lambda scene, state: _control(scene, state).normal_load(state.contact.radius, scene.bodies))),
+          _until_stopped(lambda scene, course: _control(scene, course).normal_load(course.radius, scene.bodies))),
     Variable("indentation", "m", "indentation of the sphere", "delta", "contact",
-          _until_stopped(lambda scene, state: _control(scene, state).indentation(state.contact.radius, scene.bodies))),
+          _until_stopped(lambda scene, course: _control(scene, course).indentation(course.radius, scene.bodies))),
     Variable("displacement", "m", "displacement of what holds the sphere", "Delta", "contact",
-          _until_stopped(lambda scene, state: _control(scene, state).displacement(state.contact.radius, scene.bodies))),
+          _until_stopped(lambda scene, course: _control(scene, course).displacement(course.radius, scene.bodies))),
     Variable("friction_force", "N", "friction force, shear stress times contact area", "F", "contact",
-          _until_stopped(lambda scene, state: state.bonding.stress * _area(scene, state))),
+          _until_stopped(lambda scene, course: course.stress * _area(scene, course))),
     Variable("in_contact", "1", "whether the contact is closed", "", "contact",
-          lambda scene, state: (state.contact.radius > 0.0).astype(float)),
+          lambda scene, course: (course.radius > 0.0).astype(float)),
     Variable("masked", "1", "whether no work of adhesion is left, so that the contact is Hertz's", "", "contact",
-          lambda scene, state: ((state.contact.work <= 0.0) & (state.contact.radius > 0.0)).astype(float)),
+          lambda scene, course: ((course.work <= 0.0) & (course.radius > 0.0)).astype(float)),
     Variable("detachment_time", "s", "time of the last detachment", "t_d", "contact",
-          lambda scene, state: state.contact.detached),
+          lambda scene, course: course.detached),
     Variable("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
-          lambda scene, state: state.contact.dissipated),
+          lambda scene, course: course.dissipated),
     Variable("jkr_radius", "m", "radius in equilibrium with the full work of adhesion, under the same control and rule"
           " after pull-off; 0 while that contact is open", "a_JKR", "drive", _jkr_radius),
     Variable("hertz_radius", "m", "radius without adhesion, under the same control; 0 where nothing presses", "a_H",

@@ -16,7 +16,7 @@ from typing import Any, cast
 import netCDF4
 import numpy as np
 
-from sim.engine import State, march
+from sim.engine import Dice, State, follow
 from sim.ensemble.netcdf import MemoryFile, MemoryParts, PartFiles, Parts, moments, write_dataset
 from sim.ensemble.plan import Plan, part_name, work
 from sim.ensemble.recorded import DISC_ENERGIES, MAP
@@ -27,6 +27,8 @@ from sim.parts.shear.process import Fluctuation
 from sim.scenario.scenario import Scenario
 
 Progress = Callable[[int], None]
+#: Steps after which progress is reported, at the next record.
+_STEPS = 1024
 
 
 class OutputExists(FileExistsError):
@@ -98,41 +100,52 @@ def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None
     """Advance every group of members at every point of the sweep and save the parts."""
     for number, point in enumerate(plan.points):
         for group, members in enumerate(plan.groups()):
-            states = march(point, members, keep=False)
+            dice, state = Dice.of(point.seed, members), None
             for index, records in enumerate(plan.stretches(point)):
-                arrays = _record(plan, point, members, states, records, progress)
+                state, arrays = _record(plan, point, dice, state, records, progress)
                 parts.save(part_name(number, group, index), arrays)
         point.release()
 
 
 def _record(
-    plan: Plan, point: Scenario, members: np.ndarray, states: Iterator[State], records: range, progress: Progress | None
-) -> dict[str, np.ndarray]:
-    """One part: every variable over a stretch of records and the maps in it."""
-    rows = {one.name: np.empty((len(members) if plan.varies(one) else 1, len(records))) for one in plan.variables}
+    plan: Plan, point: Scenario, dice: Dice, state: State | None, records: range, progress: Progress | None
+) -> tuple[State, dict[str, np.ndarray]]:
+    """One part: every variable over a stretch of records and the maps in it; and the state at its end."""
+    clock, members = point.clock, dice.shear.members
+    rows_of = 1, len(members)
+    rows = {one.name: np.empty((rows_of[plan.varies(one)], len(records))) for one in plan.variables}
     maps: dict[str, np.ndarray] = {}
-    clock, times = point.clock, sorted(point.record.maps)
-    snapshots = {round(time / clock.duration * clock.steps): number for number, time in enumerate(times)}
     drawn = int(np.sum(members < point.record.map_members))
-    for column, record in enumerate(records):
-        state = next(states)
-        while state.step < record * clock.stride:
-            state = next(states)
+    snapshots = [round(time / clock.duration * (clock.records - 1)) for time in sorted(point.record.maps)]
+    for some in _cut(records, snapshots, max(1, _STEPS // clock.stride)):
+        before = -1 if state is None else state.step
+        state, course = follow(point, dice, state, clock.steps_of(some))
+        columns = slice(some[0] - records[0], some[-1] + 1 - records[0])
         for one in plan.variables:
-            rows[one.name][:, column] = one.read(point, state)
-        if state.step in snapshots and drawn:
+            part = rows[one.name][:, columns]
+            part[:] = np.broadcast_to(one.read(point, course), part.T.shape).T
+        if drawn and some[-1] in snapshots:
             for name, values in _maps(point, state, drawn).items():
-                maps[f"map.{name}.{snapshots[state.step]}"] = values
+                maps[f"map.{name}.{snapshots.index(some[-1])}"] = values
         if progress is not None:
-            progress(len(members) * (clock.stride if record else 1))
-    recorded = plan.variables
+            progress(len(members) * (state.step - before))
+    end, recorded = cast(State, state), plan.variables
     if records.stop == clock.records:
         recorded += plan.largest
-        for one in plan.largest:
-            rows[one.name] = np.broadcast_to(one.read(point, state), len(members) if plan.varies(one) else 1)
+        for largest in plan.largest:
+            rows[largest.name] = np.broadcast_to(largest.read(point, end), rows_of[plan.varies(largest)])
     if not plan.scenario.record.per_member:
         rows |= {one.name: moments(rows[one.name]) for one in recorded if plan.varies(one)}
-    return rows | maps
+    return end, rows | maps
+
+
+def _cut(records: range, ends: list[int], longest: int) -> Iterator[range]:
+    """Pieces of a stretch of records, each up to one of the ``ends`` and at most so long."""
+    first = records.start
+    while first < records.stop:
+        stop = min(first + longest, records.stop, *(end + 1 for end in ends if end >= first))
+        yield range(first, stop)
+        first = stop
 
 
 def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:

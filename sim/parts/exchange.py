@@ -2,11 +2,14 @@
 
     drive ── slip, speed ─► bonds ── fraction, stress, … ─► shear ── energy ΔΓ ─► contact ── radius
 
-Every array has the member as first axis, or length 1 there where all members agree. The state of a part is a
+Parts advance by blocks of clock steps: of one where the state of a part feeds back into an earlier one, else of
+many. What they hand on during a block has the step as first axis and the member as second, of length 1 where all
+members agree; a state, and what is of one step, has the member as first axis. The state of a part is a
 ``NamedTuple`` of arrays of its own (or of such tuples); others read of it only what its protocol names. Sliding
 in +x is positive.
 """
 
+from collections.abc import Iterator
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -95,6 +98,34 @@ class Motion(NamedTuple):
     speed: Array
 
 
+class Motions(NamedTuple):
+    """Sliding during a block of clock steps, each array of shape (steps, 1) or (steps, members).
+
+    Attributes
+    ----------
+    step : int
+        Number of the first step.
+    time, duration, slip, path, first, speed : array
+        As of ``Motion``.
+    position : array
+        Displacement of the slider since the start, at the end of each step [m].
+    """
+
+    step: int
+    time: Array
+    duration: Array
+    slip: Array
+    path: Array
+    first: Array
+    speed: Array
+    position: Array
+
+    def each(self) -> Iterator[Motion]:
+        """The motion of one step after the other."""
+        for k, (time, duration) in enumerate(zip(self.time.flat, self.duration.flat, strict=True)):
+            yield Motion(self.step + k, time, duration, self.slip[k], self.path[k], self.first[k], self.speed[k])
+
+
 def _constant(value: float) -> Array:
     array = np.full(1, value)
     array.setflags(write=False)
@@ -105,7 +136,9 @@ _NONE, _UNKNOWN = _constant(0.0), _constant(np.nan)
 
 
 class Bonding(NamedTuple):
-    """Bonds at the end of a step, for shear, contact, drive and recorder; each array of shape (1,) or (members,).
+    """Bonds for shear, contact, drive and recorder; arrays of shape (1,) or (members,) at the end of a step.
+
+    Of a block of steps they have the shape (steps, 1) or (steps, members), or (1,) where a number stays.
 
     Attributes
     ----------
@@ -139,6 +172,10 @@ class Bonding(NamedTuple):
     varying: Array = _UNKNOWN
     stored: Array = _NONE
     dissipated: Array = _NONE
+
+    def at(self, k: int) -> "Bonding":
+        """The bonds at the end of step k of a block."""
+        return Bonding(*(values[k] if values.ndim > 1 else values for values in self))
 
 
 class Gammas(NamedTuple):
@@ -195,7 +232,7 @@ class Storing(Protocol):
 
 
 class Touching(NamedTuple):
-    """State of a contact.
+    """State of a contact; of a block of steps with the step as first axis.
 
     Attributes
     ----------
@@ -219,6 +256,10 @@ class Touching(NamedTuple):
     detached: Array
     dissipated: Array
     phases: Array
+
+    def at(self, k: int) -> "Touching":
+        """The contact at the end of step k of a block."""
+        return Touching(*(values[k] for values in self))
 
 
 Own = TypeVar("Own")
@@ -254,8 +295,8 @@ class Drive(Part, Protocol[Own]):
     def begin(self, times: Times) -> tuple[Own, Motion]:
         """State and motion at t = 0: no slip, and the speed with which the run begins."""
 
-    def advance(self, state: Own, resistance: Resistance, times: Times, step: int) -> tuple[Own, Motion]:
-        """State at the end of a step and the exact motion in it; ``resistance`` is that at its start."""
+    def advance(self, state: Own, resistance: Resistance, times: Times, steps: range) -> tuple[Own, Motions]:
+        """State at the end of a block of steps and the exact motion in it; ``resistance`` is that at its start."""
 
 
 class Bonds(Part, Protocol[Own]):
@@ -272,11 +313,14 @@ class Bonds(Part, Protocol[Own]):
     def start(self, motion: Motion, noise: Noise) -> Own:
         """Population at t = 0, as the key ``start`` has it."""
 
-    def advance(self, state: Own, motion: Motion, radius: Array, noise: Noise) -> Own:
-        """Population after a step over a contact that had this ``radius`` [m] at its start, nan where it was open."""
+    def advance(self, state: Own, motions: Motions, radius: Array, noise: Noise) -> tuple[Own, Bonding]:
+        """Population after a block of steps, and what others read of it at the end of each.
+
+        ``radius`` is that of the contact at the start of the block [m], nan where it was open.
+        """
 
     def bonding(self, state: Own) -> Bonding:
-        """Everything that others read of a population, computed once a step."""
+        """Everything that others read of a population."""
 
     def steady(self, speed: Array) -> Bonding:
         """Ensemble mean in steady sliding at speeds [m/s], arrays of their shape or (1,)."""
@@ -292,8 +336,8 @@ class Shear(Protocol[Own]):
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Own:
         """Stationary fluctuations at t = 0."""
 
-    def advance(self, state: Own, motion: Motion, bonding: Bonding, noise: Noise) -> Own:
-        """Fluctuations after a step, at the end of which the bonds are ``bonding``."""
+    def advance(self, state: Own, motions: Motions, bonding: Bonding, noise: Noise) -> tuple[Own, Array]:
+        """Fluctuations after a block of steps, at the ends of which the bonds are ``bonding``; ΔΓ at each [J/m²]."""
 
     @property
     def gammas(self) -> Gammas:
@@ -313,8 +357,8 @@ class Contact(Part, Protocol[Terms]):
     def start(self, motion: Motion, duration: float, balance: Terms) -> Touching:
         """Contact at the start of a run of ``duration`` [s], in equilibrium with the terms of the work of adhesion."""
 
-    def advance(self, state: Touching, motion: Motion, duration: float, balance: Terms) -> Touching:
-        """Contact after a step, at the end of which the terms of the work of adhesion are ``balance``."""
+    def advance(self, state: Touching, motions: Motions, duration: float, balance: Terms) -> Touching:
+        """Contact at the end of each step of a block, where the terms of the work of adhesion are ``balance``."""
 
 
 class Parts(NamedTuple):

@@ -6,10 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.exchange import Array, Bonding, Motion
+from sim.parts.exchange import Array, Bonding, Motions
 
 #: Arrays that are read alone, as they come.
-_READ = "Array(float64, 1, 'A', readonly=True), "
+_READ = "Array(float64, 2, 'A', readonly=True), "
+#: What a stress and its slope follow from.
+_OF_THE_STRESS = "stress", "stiffness", "relaxation"
 #: Change over a step, by the slope at one of its ends, over the value, up to which a cubic holds.
 _RESOLVED = 5.0
 #: Columns of a running maximum: the last value but one, the last value, the maximum so far, and its time [s].
@@ -39,9 +41,11 @@ def _started(values: Array) -> Array:
 
 
 def after(
-    so_far: Extremes, ends: tuple[Bonding, Bonding], radii: tuple[Array, Array], pull: Array, motion: Motion
+    so_far: Extremes, before: tuple[Bonding, Array], bonding: Bonding, radius: Array, pull: Array, motions: Motions
 ) -> Extremes:
-    """Maxima one step later, from bonds and contact radii [m] at its beginning and end, and the pull at its end.
+    """Maxima a block of steps later, from the bonds, contact radius [m] and pull [N] at the end of each.
+
+    ``before`` are bonds and contact radius at its start.
 
     Notes
     -----
@@ -52,53 +56,65 @@ def after(
     through the three, of third order, if both neighbours have more than half of its value: a quantity that jumps is
     not smooth there.
     """
-    (one, two), (radius_one, radius_two) = ends, radii
-    rows = max(len(so_far.stress), len(two.stress))
-    members = max(rows, len(so_far.friction), len(radius_two))
-    stress, friction = np.empty((rows, 4)), np.empty((members, 4))
-    pulled = np.empty((max(len(so_far.pull), len(pull)), 4))
-    _follow(
-        *so_far, one.stress, one.stiffness, one.relaxation, motion.first, radius_one,
-        two.stress, two.stiffness, two.relaxation, motion.speed, radius_two,
-        pull, motion.time, motion.duration, stress, friction, pulled,
-    )  # fmt: skip
-    return Extremes(stress, friction, pulled)
+    start, radius_before = before
+    stress, stiffness, relaxation = (
+        _with_start(getattr(start, name), getattr(bonding, name), len(radius)) for name in _OF_THE_STRESS
+    )
+    radii = _with_start(radius_before, radius, len(radius))
+    rows = max(len(so_far.stress), stress.shape[1])
+    members = max(rows, len(so_far.friction), radii.shape[1])
+    found = (
+        np.array(np.broadcast_to(values, (count, 4)))
+        for values, count in zip(so_far, (rows, members, max(len(so_far.pull), pull.shape[1])), strict=True)
+    )
+    largest = Extremes(*found)
+    ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
+    _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
+    return largest
+
+
+def _with_start(before: Array, values: Array, steps: int) -> Array:
+    """Values at the start of a block and at the end of each step, shape (steps + 1, rows)."""
+    if values.ndim == 1:
+        return np.broadcast_to(values, (steps + 1, len(values)))
+    return np.concatenate([before[np.newaxis], values])
 
 
 @device
-def _of(values, i):
-    """The value of a member, where all may share one."""
-    return values[i] if len(values) > 1 else values[0]
+def _of(values, k, i):
+    """The value of a member at a time, where all may share one."""
+    return values[k, i] if values.shape[1] > 1 else values[k, 0]
 
 
 @device
-def _load(i, stress, stiffness, relaxation, speed, radius):
-    """Magnitude of the stress, its slope over time, and the area."""
-    value, area = _of(stress, i), math.pi * _of(radius, i) ** 2
-    slope = _of(stiffness, i) * _of(speed, i) + _of(relaxation, i)
+def _load(k, i, stress, stiffness, relaxation, speed, radius):
+    """Magnitude of the stress, its slope over time at a speed, and the area."""
+    value, area = _of(stress, k, i), math.pi * _of(radius, k, i) ** 2
+    slope = _of(stiffness, k, i) * speed + _of(relaxation, k, i)
     return math.fabs(value), (slope if value > 0.0 else -slope if value < 0.0 else math.fabs(slope)), area
 
 
-@kernel(f"void({3 * 'float64[:, ::1], '}{11 * _READ}float64, float64, {', '.join(3 * ['float64[:, ::1]'])})")
-def _follow(
-    stresses, frictions, pulls, s0, k0, r0, v0, a0, s1, k1, r1, v1, a1, pull, time, step, stress, friction, pulled
-):
-    for i in range(len(friction)):
-        value0, slope0, area0 = _load(i, s0, k0, r0, v0, a0)
-        value1, slope1, area1 = _load(i, s1, k1, r1, v1, a1)
-        if i < len(stress):
-            _keep(stresses[i if len(stresses) > 1 else 0], value1, slope0, slope1, time, step, stress[i])
-        growth = (area1 - area0) / step
-        rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
-        _keep(frictions[i if len(frictions) > 1 else 0], value1 * area1, rise, slope, time, step, friction[i])
-    for i in range(len(pulled)):
-        _keep(pulls[i if len(pulls) > 1 else 0], _of(pull, i), math.nan, math.nan, time, step, pulled[i])
+@kernel(f"void({7 * _READ}{2 * 'float64[:], '}{', '.join(3 * ['float64[:, ::1]'])})")
+def _follow(stresses, stiffness, relaxation, radii, pulls, first, speed, times, steps, stress, friction, pull):
+    bonds = stresses, stiffness, relaxation
+    for k in range(len(times)):
+        time, step = times[k], steps[k]
+        for i in range(len(friction)):
+            value0, slope0, area0 = _load(k, i, *bonds, _of(first, k, i), radii)
+            value1, slope1, area1 = _load(k + 1, i, *bonds, _of(speed, k, i), radii)
+            if i < len(stress):
+                _keep(value1, slope0, slope1, time, step, stress[i])
+            growth = (area1 - area0) / step
+            rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
+            _keep(value1 * area1, rise, slope, time, step, friction[i])
+        for i in range(len(pull)):
+            _keep(_of(pulls, k, i), math.nan, math.nan, time, step, pull[i])
 
 
 @device
-def _keep(maximum, now, rise, slope, time, step, kept):
-    """Maximum after a value ``now`` at ``time``, with slopes at both ends of the step, nan where not known."""
-    before, last, largest, when = maximum[BEFORE], maximum[LAST], maximum[LARGEST], maximum[WHEN]
+def _keep(now, rise, slope, time, step, kept):
+    """Replace a maximum by that after a value ``now`` at ``time``; slopes at both ends of the step, nan if unknown."""
+    before, last, largest, when = kept[BEFORE], kept[LAST], kept[LARGEST], kept[WHEN]
     now = 0.0 if math.isnan(now) else now
     if now > largest:
         largest, when = now, time

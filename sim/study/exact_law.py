@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainccinv, gammaincinv, ndtr
 
-from sim.engine import balance, march
+from sim.engine import balance, course_of, march
 from sim.ensemble.recorded import VARIABLES
-from sim.parts.exchange import Bonding, Gammas, Motion
+from sim.parts.exchange import Gammas, Motion
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.mode_pairs import cell_pairs
@@ -158,7 +158,7 @@ class Walk(NamedTuple):
             cumulants = np.outer(np.ones(len(sets)), [float(state.shear.energy[0]), 0.0, 0.0])
             if calm.fluctuations.per_member:
                 cumulants = process.cumulants(state.shear)
-            now = [READ[name](calm, state)[0] for name in QUANTITIES]
+            now = [np.ravel(READ[name](calm, course_of(calm, state)))[0] for name in QUANTITIES]
             records.append((state.step, now, state.bonding.strength[0], state.bonding.varying[0], cumulants))
         steps, means, strength, varying, sums = (np.array(column) for column in zip(*records, strict=True))
         density, rest = (given["site_density"], bonds.bound_at_rest) if "rupture" in given else (math.nan, 1.0)
@@ -226,8 +226,7 @@ class Walk(NamedTuple):
     def _equilibrium(self, record: int, energy: Array, fraction: Array) -> Array:
         """Equilibrium radius for values of ΔΓ and of the bond fraction [m]; nan without one."""
         scene, none, strength = self.calm, np.zeros(1), self.strength[record : record + 1]
-        bonding = Bonding(np.maximum(fraction, 0.0), strength, strength)
-        terms = balance(scene, bonding, Fluctuation(np.maximum(energy, 0.0), none, none))
+        terms = balance(scene, np.maximum(fraction, 0.0), strength, np.maximum(energy, 0.0))
         motion = Motion(0, scene.times.at(int(self.steps[record])), 0.0, none, none, none, none)
         return scene.contact.start(motion, scene.times.duration, terms).radius
 

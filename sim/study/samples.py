@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.engine import march
+from sim.engine import course_of, march
 from sim.scenario.scenario import Scenario
 from sim.study.exact_law import QUANTITIES, READ
 
@@ -116,7 +116,7 @@ def coupled(scenarios: Sequence[Scenario], members: int, steps: Sequence[int]) -
             if state.step in places:
                 for k, (scene, now) in enumerate(zip(scenarios, states, strict=True)):
                     for q, name in enumerate(QUANTITIES):
-                        kept[k, q, batch, places[state.step]] = READ[name](scene, now)
+                        kept[k, q, batch, places[state.step]] = READ[name](scene, course_of(scene, now))[0]
             if state.step == steps[-1]:
                 break
     return kept
@@ -130,7 +130,8 @@ class _Drawn:
     def start(self, *_: Any) -> Any:
         return self.now
 
-    advance = start
+    def advance(self, *_: Any) -> Any:
+        return self.now, self.now.energy[np.newaxis]
 
     def into(self, scenario: Scenario) -> Scenario:
         """The scene under this process."""

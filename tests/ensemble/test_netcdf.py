@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim import cli
-from sim.engine import march
+from sim.engine import course_of, march
 from sim.ensemble import plan as plans, simulate as ensemble
 from sim.ensemble.netcdf import variable_name
 from sim.ensemble.plan import Plan
@@ -42,7 +42,9 @@ def test_the_dataset_is_what_the_engine_marched():
     for record, state in enumerate(march(scenario, np.arange(5))):
         for variable in Plan.of(scenario).variables:
             found = dataset[variable.name].isel(t=record).values
-            assert np.array_equal(np.atleast_1d(found), variable.read(scenario, state), equal_nan=True), variable.name
+            assert np.array_equal(
+                np.atleast_1d(found), np.ravel(variable.read(scenario, course_of(scenario, state))), equal_nan=True
+            ), variable.name
 
 
 def test_every_variable_has_unit_and_long_name_and_stands_on_its_page():

@@ -1,10 +1,13 @@
 """Small scenes for the tests: one builder and the depths of every part."""
 
+import numpy as np
+
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
+from sim.parts.exchange import Motions
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Constant as ConstantAmplitude, Onset, Stress
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
@@ -123,3 +126,8 @@ def scene(members=3, steps=8, **parts):
         ensemble=Ensemble(members=members),
         **parts,
     )
+
+
+def one_step(step, *given):
+    """A block of one step: time, duration, slip, path, speeds at its ends."""
+    return Motions(step, *(np.reshape(value, (1, -1)) for value in (*given, given[2])))

@@ -1,13 +1,11 @@
 """Running maxima: exact for parabolas, honest about jumps, the same after a restart."""
 
-import itertools
-
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.parts import extremes
-from sim.parts.exchange import Bonding, Motion
+from sim.parts.exchange import Bonding, Motions
 
 ONE = np.full(1, 1.0 / np.sqrt(np.pi))  # radius of a contact of unit area
 
@@ -17,10 +15,23 @@ def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE)):
     zero, slopes = np.zeros(1), slopes or [np.full(1, np.nan)] * len(samples)
     bondings = [Bonding(zero, np.asarray(one), zero, zero, slope) for one, slope in zip(samples, slopes, strict=True)]
     found = extremes.first(bondings[0], radii[0], zero)
-    for number, ends in enumerate(itertools.pairwise(bondings), 1):
-        motion = Motion(number, number * step, step, zero, zero, zero, zero)
-        found = extremes.after(found, ends, radii, zero, motion)
+    whole = _after(found, bondings, radii, step, 1)
+    for number in range(1, len(bondings)):
+        found = _after(found, bondings[number - 1 : number + 1], radii, step, number)
+    for one, other in zip(found, whole, strict=True):
+        assert_array_equal(one, other)
     return found
+
+
+def _after(found, bondings, radii, step, number):
+    """Maxima after a block of steps."""
+    steps = len(bondings) - 1
+    still, times = np.zeros((steps, 1)), step * np.arange(number, number + steps)[:, None]
+    motions = Motions(number, times, np.full((steps, 1), step), still, still, still, still, still)
+    bonding = Bonding(*(np.array(values[1:]) for values in zip(*bondings, strict=True)))
+    # the radius jumps at the beginning of a step: only the last row of a block is its end
+    ends = np.repeat(radii[1][None], steps, axis=0)
+    return extremes.after(found, (bondings[0], radii[0]), bonding, ends, still, motions)
 
 
 def stress(*given):

@@ -10,7 +10,7 @@ from helpers.scenes import BELL, BONDS, CELL, CONTACTS, CUT_OFF, DRIVES, SHEARS,
 from numpy.testing import assert_allclose
 
 import sim.study.converge as converge_module
-from sim.engine import march
+from sim.engine import Dice, follow
 from sim.laws.schallamach import bell_stress, first_moment_stress
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant
@@ -278,11 +278,10 @@ def test_a_clock_step_keeps_the_records():
 
 def run_of(scenario, members, every=1):
     """The quantities at the records of a scene, shape (4, members, records), by the engine alone."""
-    kept = []
-    for state in march(scenario, np.arange(members)):
-        if state.step % (scenario.clock.stride * every) == 0:
-            kept.append([np.broadcast_to(READ[name](scenario, state), members) for name in QUANTITIES])
-    return np.array(kept).transpose(1, 2, 0)
+    steps = range(0, scenario.clock.steps + 1, scenario.clock.stride * every)
+    _, passed = follow(scenario, Dice.of(scenario.seed, np.arange(members)), None, steps)
+    read = (np.broadcast_to(READ[name](scenario, passed), (len(steps), members)) for name in QUANTITIES)
+    return np.array([values.T for values in read])
 
 
 def keeps_its_promise(scenario, budget, members, tolerance=None):
@@ -469,15 +468,18 @@ def test_a_model_whose_variance_is_ten_percent_off_is_found_out(monkeypatch, qui
     rows = [row for row in settings(scene(**STEADY), []) if row.own]
     monkeypatch.setattr(converge_module, "settings", lambda scenario, _: [replace(rows[0], scenario=scenario)])
 
-    def wrong(advance):
-        def spread(self, *arguments):
-            state = advance(self, *arguments)
-            return state._replace(energy=self.bands.mean + math.sqrt(1.1) * (state.energy - self.bands.mean))
+    start, advance = BandedProcess.start, BandedProcess.advance
 
-        return spread
+    def spread(process, state, energy):
+        wider = [process.bands.mean + math.sqrt(1.1) * (one - process.bands.mean) for one in (state.energy, energy)]
+        return state._replace(energy=wider[0]), wider[1]
 
-    for name in ("start", "advance"):
-        monkeypatch.setattr(BandedProcess, name, wrong(getattr(BandedProcess, name)))
+    def wrong_start(self, *arguments):
+        state = start(self, *arguments)
+        return spread(self, state, state.energy)[0]
+
+    monkeypatch.setattr(BandedProcess, "start", wrong_start)
+    monkeypatch.setattr(BandedProcess, "advance", lambda self, *given: spread(self, *advance(self, *given)))
     parts = STEADY | {"shear": replace(BANDED, correlation=Time(time=0.02))}
     dataset = converge(scene(**parts), 0.1)
     off = of(dataset, "banded 0.01", "fluctuation_energy", "standard deviation", "deviation")[0]

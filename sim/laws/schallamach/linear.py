@@ -17,7 +17,7 @@ any length at a mean speed is exact, for the mean and for the probabilities of a
 
 import math
 
-from sim.numerics.jit import law
+from sim.numerics.jit import device, law
 
 
 @law
@@ -106,6 +106,12 @@ def relax_fraction(fraction, path, duration, critical_speed, rebinding_rate):
     >>> print(f"{once:.6f} {twice:.6f} {relax_fraction(1.0, 1.0, 100.0, 1e-2, 200.0):.6f}")
     0.724664 0.724664 0.500000
     """
+    return relaxed(fraction, path, duration, critical_speed, rebinding_rate)
+
+
+@device
+def relaxed(fraction, path, duration, critical_speed, rebinding_rate):
+    """Body of ``relax_fraction``, for compiled loops."""
     total = duration + path / critical_speed
     if total == 0.0:
         return fraction

@@ -17,13 +17,13 @@ import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.first_moment as first_moment
 import sim.parts.bonds.tracked as tracks
 from sim.numerics.noise import Noise
-from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
+from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea, by_step
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import Tracks
 from sim.parts.bonds.tracked_step import CYCLES
 from sim.parts.bonds.two_state import Start
-from sim.parts.exchange import Array, Bonding, Motion, Setting
+from sim.parts.exchange import Array, Bonding, Motion, Motions, Setting
 from sim.units.quantity import Quantity
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
@@ -116,7 +116,10 @@ class FirstMoment(OverArea, _Separable):
         rows = self.rows(noise)
         return Stretches(rows * bound, rows * stretch)
 
-    def advance(self, state: Stretches, motion: Motion, radius: Array, noise: Noise) -> Stretches:
+    def advance(self, state: Stretches, motions: Motions, radius: Array, noise: Noise) -> tuple[Stretches, Bonding]:
+        return by_step(self, state, motions, radius, noise)
+
+    def step(self, state: Stretches, motion: Motion, radius: Array, noise: Noise) -> Stretches:
         share, seen = self.kept(state.seen, radius)
         slid, rates = (motion.slip, motion.path, motion.duration), (self.law, self.rebinding_rate)
         return Stretches(*first_moment.advance(state.bound * share, state.stretch * share, *slid, *rates), seen)
@@ -171,7 +174,10 @@ class Cohort(OverArea, _Stretched):
         rows = len(self.rows(noise))
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
-    def advance(self, state: Ages, motion: Motion, radius: Array, noise: Noise) -> Ages:
+    def advance(self, state: Ages, motions: Motions, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
+        return by_step(self, state, motions, radius, noise)
+
+    def step(self, state: Ages, motion: Motion, radius: Array, noise: Noise) -> Ages:
         share, seen = self.kept(state.seen, radius)
         before = cohorts.diluted(state.cohorts, share) if self.area == "carried" else state.cohorts
         recipe = self.law, self.rebinding_rate, self.tolerance
@@ -216,7 +222,10 @@ class Tracked(_Separable):
     def start(self, motion: Motion, noise: Noise) -> Tracks:
         return tracks.start(self.law, self.rebinding_rate, self.sites, motion.first, self.start_from, *noise.address())
 
-    def advance(self, state: Tracks, motion: Motion, radius: Array, noise: Noise) -> Tracks:
+    def advance(self, state: Tracks, motions: Motions, radius: Array, noise: Noise) -> tuple[Tracks, Bonding]:
+        return by_step(self, state, motions, radius, noise)
+
+    def step(self, state: Tracks, motion: Motion, radius: Array, noise: Noise) -> Tracks:
         return tracks.advance(state, motion.slip, motion.duration, self.law, self.rebinding_rate, *noise.address())
 
     def followed(self, speeds: Array, step: float) -> float:

@@ -9,12 +9,13 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.laws.schallamach import relax_fraction, steady_fraction, transition_probabilities
+from sim.laws.schallamach import steady_fraction, transition_probabilities
+from sim.laws.schallamach.linear import relaxed
 from sim.numerics.binomial import binomial_numbers
-from sim.numerics.jit import law
+from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise
 from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
-from sim.parts.exchange import Array, Bonding, Motion
+from sim.parts.exchange import Array, Bonding, Motion, Motions
 from sim.units.quantity import Quantity
 
 Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
@@ -59,6 +60,16 @@ class _WithoutStretch(Common):
         """True if there is a shear stress at all."""
         return self.stress > 0.0
 
+    def advance(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Population, Bonding]:
+        bound, seen = self._bound(state, motions, radius, noise)
+        sense = np.empty(motions.slip.shape)
+        _last_signs(motions.speed[:, 0], motions.slip[:, 0], state.sense[0], sense[:, 0])
+        return Population(bound[-1], sense[-1], seen), self.bonding(Population(bound, sense))
+
+    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
+        """Bonds at the end of each step, shape (steps, 1) or (steps, members), and the contact radius seen."""
+        raise NotImplementedError
+
     def bonding(self, state: Population) -> Bonding:
         strength = self.stress * state.bound
         return Bonding(state.bound, state.sense * strength, strength)
@@ -76,27 +87,31 @@ class _WithoutStretch(Common):
         return np.full(1, 1.0 if start == "bonded" else 0.0)
 
 
-@law
-def _sign_of_slip(speed, slip, before):
-    """Sign of the last slip at the end of a step: that of the speed, of the step's slip once it has stopped."""
-    return np.sign(before if speed == slip == 0.0 else slip if speed == 0.0 else speed)
+@kernel("void(float64[:], float64[:], float64, float64[:])")
+def _last_signs(speed, slip, last, sense):
+    """Sign of the last slip at the end of each step: that of the speed, of the step's slip once it has stopped."""
+    for k in range(len(sense)):
+        last = speed[k] if speed[k] != 0.0 else slip[k] if slip[k] != 0.0 else last
+        sense[k] = last = np.sign(last)
 
 
-def _sense(motion: Motion, before: Array) -> Array:
-    return np.asarray(_sign_of_slip(motion.speed, motion.slip, before))
-
-
-_STILL = np.zeros(1)
+@kernel("void(float64[::1], float64[:], float64[:], float64, float64, float64[:, ::1])")
+def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound):
+    """Bond fractions at the end of each step, those before being ``bound``."""
+    for k in range(len(path)):
+        for m in range(len(bound)):
+            before = bound[m] if k == 0 else relaxed_bound[k - 1, m]
+            relaxed_bound[k, m] = relaxed(before, path[k], duration[k], critical_speed, rebinding_rate)
 
 
 class _AtOnce(_WithoutStretch):
     """Bonds that are steady at every speed."""
 
     def start(self, motion: Motion, noise: Noise) -> Population:
-        return Population(self._steady_fraction(motion.speed), _sense(motion, _STILL))
+        return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
 
-    def advance(self, state: Population, motion: Motion, radius: Array, noise: Noise) -> Population:
-        return Population(self._steady_fraction(motion.speed), _sense(motion, state.sense))
+    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
+        return self._steady_fraction(motions.speed), state.seen
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -107,7 +122,7 @@ class Unbroken(_AtOnce):
     model: Literal["none"] = "none"
 
     def _steady_fraction(self, speed: Array) -> Array:
-        return np.ones(1)
+        return np.ones(speed.shape)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -135,13 +150,14 @@ class Rate(OverArea, _WithoutStretch):
 
     def start(self, motion: Motion, noise: Noise) -> Population:
         first = self.rows(noise) * self._first_fraction(self.start_from, motion)
-        return Population(first, _sense(motion, _STILL))
+        return Population(first, np.sign(motion.speed))
 
-    def advance(self, state: Population, motion: Motion, radius: Array, noise: Noise) -> Population:
+    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
         share, seen = self.kept(state.seen, radius)
-        rates = self.critical_speed, self.rebinding_rate
-        bound = relax_fraction(state.bound * share, motion.path, motion.duration, *rates)
-        return Population(np.asarray(bound), _sense(motion, state.sense), seen)
+        before = state.bound * share
+        bound, rates = np.empty((len(motions.path), len(before))), (self.critical_speed, self.rebinding_rate)
+        _relax(before, motions.path[:, 0], motions.duration[:, 0], *rates, bound)
+        return bound, seen
 
     def bonding(self, state: Population) -> Bonding:
         bonding = super().bonding(state)
@@ -177,14 +193,17 @@ class Counted(_WithoutStretch):
     def start(self, motion: Motion, noise: Noise) -> Population:
         first = self._first_fraction(self.start_from, motion)
         uniform = noise.uniforms(motion.step, 2)
-        return Population(_binomial(uniform[:, 0], np.array([float(self.sites)]), first), _sense(motion, _STILL))
+        return Population(_binomial(uniform[:, 0], np.array([float(self.sites)]), first), np.sign(motion.speed))
 
-    def advance(self, state: Population, motion: Motion, radius: Array, noise: Noise) -> Population:
-        stay, bind = transition_probabilities(motion.path, motion.duration, self.critical_speed, self.rebinding_rate)
-        uniform = noise.uniforms(motion.step, 2)
-        kept = _binomial(uniform[:, 0], state.bound, stay)
-        bound = kept + _binomial(uniform[:, 1], self.sites - state.bound, bind)
-        return Population(bound, _sense(motion, state.sense))
+    def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
+        stay, bind = transition_probabilities(motions.path, motions.duration, self.critical_speed, self.rebinding_rate)
+        bound = np.empty((len(stay), len(noise.members)))
+        before = state.bound
+        for k in range(len(stay)):
+            uniform = noise.uniforms(motions.step + k, 2)
+            kept = _binomial(uniform[:, 0], before, stay[k])
+            before = bound[k] = kept + _binomial(uniform[:, 1], self.sites - before, bind[k])
+        return bound, state.seen
 
 
 def _binomial(uniform: Array, number: Array, probability: Array) -> Array:

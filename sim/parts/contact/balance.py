@@ -12,7 +12,7 @@ from sim.spectrum.finite_contact import Margin
 
 
 class Balance(NamedTuple):
-    """Inputs of the contact at one step.
+    """Inputs of the contact at one step, or at each step of a block.
 
     Attributes
     ----------
@@ -36,6 +36,10 @@ class Balance(NamedTuple):
     margin: Margin | None
     bodies: Bodies
     reference: float
+
+    def at(self, k: int) -> "Balance":
+        """The terms at the end of step k of a block."""
+        return self._replace(bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=self.stress[k])
 
     def without_stress(self) -> "Balance":
         """The terms without that of the mean stress."""

@@ -1,4 +1,6 @@
-"""Load control, displacement control, or displacement behind a stiffness at one time; and the JKR contact under each.
+"""Load control, displacement control, or displacement behind a stiffness; and the JKR contact under each.
+
+What is controlled is a number at one time, an array of shape (times, 1) at many.
 
 Each control gives the stable equilibrium for a work of adhesion and, for any radius, the load, the indentation
 and the energy. Radii are arrays, shape (1,) or (members,), nan where the contact is open.
@@ -16,7 +18,7 @@ from sim.laws.reversible import (
     radius_at_indentation_reversible,
     radius_at_load_reversible,
 )
-from sim.parts.exchange import Array
+from sim.parts.exchange import Array, Flags
 
 
 class Bodies(NamedTuple):
@@ -38,14 +40,23 @@ def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
     return bodies.modulus * (a * indentation**2 - 2.0 / 3.0 * third * indentation + 0.2 * third * a**2 * curvature)
 
 
+def _at(values: float | Array, k: int) -> float:
+    """What is controlled at one of many times, where it may be constant."""
+    return float(values[k, 0]) if isinstance(values, np.ndarray) else values
+
+
 @dataclass(frozen=True)
 class LoadControl:
     """Dead load, compression positive [N]."""
 
-    load: float
+    load: float | Array
+
+    def at(self, k: int) -> "LoadControl":
+        """The control at one of many times."""
+        return LoadControl(_at(self.load, k))
 
     @property
-    def closes(self) -> bool:
+    def closes(self) -> bool | Flags:
         """True if a detached sphere comes back into contact: where the load is not tensile."""
         return self.load >= 0.0
 
@@ -78,21 +89,25 @@ class LoadControl:
 
         0 under tension, where it is not defined: the free sphere moves away.
         """
-        if not self.closes:
-            return 0.0 * radius
+        radius = np.where(self.closes, radius, np.nan)
         indentation = self.indentation(radius, bodies)
-        return elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
+        energy = elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
+        return np.where(self.closes, energy, 0.0)
 
 
 @dataclass(frozen=True)
 class DisplacementControl:
     """Displacement of the base [m] behind a stiffness [N/m]; an infinite stiffness makes it the indentation."""
 
-    base: float
+    base: float | Array
     stiffness: float = math.inf
 
+    def at(self, k: int) -> "DisplacementControl":
+        """The control at one of many times."""
+        return DisplacementControl(_at(self.base, k), self.stiffness)
+
     @property
-    def closes(self) -> bool:
+    def closes(self) -> bool | Flags:
         """True if a detached sphere comes back into contact: at a displacement of zero or more."""
         return self.base >= 0.0
 
@@ -125,7 +140,7 @@ class DisplacementControl:
 
     def displacement(self, radius: Array, bodies: Bodies) -> Array:
         """Displacement of the base [m]."""
-        return np.full(radius.shape, self.base)
+        return self.base + np.zeros(radius.shape)
 
     def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
         """Energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""

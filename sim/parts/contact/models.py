@@ -14,11 +14,12 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from sim.numerics.jit import kernel
 from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance
 from sim.parts.contact.control import Bodies, Control, DisplacementControl, LoadControl
 from sim.parts.contact.crack_front import Hold, Kinetics, advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
-from sim.parts.exchange import Array, Flags, Motion, Setting, Touching
+from sim.parts.exchange import Array, Flags, Motion, Motions, Setting, Touching
 from sim.units.course import Piece, Prescribed, held, prescribed
 from sim.units.quantity import Quantity
 
@@ -100,11 +101,13 @@ class _Controlled:
         """The load, indentation or displacement over time."""
         return prescribed(getattr(self, self.kind))
 
-    def control(self, time: float, duration: float) -> Control:
-        """The control at a time of a run of ``duration`` [s]."""
-        return self._control(self.course.at(time, duration))
+    def control(self, time: float | Array, duration: float) -> Control:
+        """The control at a time of a run of ``duration`` [s], or at many, shape (times, 1)."""
+        if not self.changes or not isinstance(time, np.ndarray):
+            return self._control(self.course.at(0.0 if isinstance(time, np.ndarray) else time, duration))
+        return self._control(np.array([[self.course.at(one, duration)] for one in time.flat]))
 
-    def _control(self, value: float) -> Control:
+    def _control(self, value: float | Array) -> Control:
         return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
 
     @property
@@ -129,30 +132,34 @@ class _Controlled:
         work, unknown, none = self._left(radius, balance), np.full(radius.shape, np.nan), np.zeros(radius.shape)
         return Touching(work, radius, unknown, none, phases)
 
-    def stopped(self, state: Touching) -> Flags:
+    def stopped(self, radius: Array, detached: Array) -> Flags:
         """True where a trajectory has ended, at the pull-off of a contact that stops there."""
-        return np.isnan(state.radius) & ~np.isnan(state.detached) & (self.after_pull_off == "stop")
+        return np.isnan(radius) & ~np.isnan(detached) & (self.after_pull_off == "stop")
 
     def _without_equilibrium(self, control: Control, balance: Balance) -> Flags:
-        """True where a reference contact has no equilibrium, shape (rows, 4); those not followed are as the first."""
-        works = np.concatenate([np.full(1, balance.reference), balance.bonded])
-        found = control.radius(works, np.zeros(1), 0.0, balance.bodies)
-        stressless = self.equilibrium(control, balance.without_stress()) if self.reversible else found[:1]
-        settled = self.equilibrium(control, balance) if self.lags else found[:1]
-        references = found[:1], found[1:], stressless, settled
-        lost = np.empty((max(map(len, references)), len(references)), dtype=bool)
+        """True where a reference contact has no equilibrium, shape (..., rows, 4); those not followed as the first."""
+        whole = np.full((*balance.bonded.shape[:-1], 1), balance.reference)
+        found = control.radius(np.concatenate([whole, balance.bonded], axis=-1), np.zeros(1), 0.0, balance.bodies)
+        stressless = self.equilibrium(control, balance.without_stress()) if self.reversible else found[..., :1]
+        settled = self.equilibrium(control, balance) if self.lags else found[..., :1]
+        references = found[..., :1], found[..., 1:], stressless, settled
+        rows = max(radius.shape[-1] for radius in references)
+        lost = np.empty((*whole.shape[:-1], rows, len(references)), dtype=bool)
         for column, radius in enumerate(references):
-            lost[:, column] = np.isnan(radius)
+            lost[..., column] = np.isnan(radius)
         return lost
 
     def _phases(self, state: Touching, control: Control, balance: Balance) -> Array:
-        """Phases of the reference contacts after a step."""
-        if min(self.course.extremes) >= 0.0 or not (control.closes or (state.phases == CLOSED).any()):
-            return state.phases
-        if control.closes:
-            return np.minimum(np.maximum(state.phases, CLOSED), CLOSED if self.after_pull_off == "reattach" else OPEN)
-        lost = self._without_equilibrium(control, balance)
-        return np.where((state.phases == CLOSED) & lost, OPEN, state.phases)
+        """Phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
+        if min(self.course.extremes) >= 0.0:
+            return np.broadcast_to(state.phases, (len(balance.bonded), *state.phases.shape))
+        return self._followed(state.phases, control, self._without_equilibrium(control, balance))
+
+    def _followed(self, phases: Array, control: Control, lost: Flags) -> Array:
+        """Phases of contacts at the end of each step, shape (steps, rows, contacts), where equilibrium is ``lost``."""
+        after, closes = np.empty(lost.shape), np.full((len(lost), 1), control.closes)
+        _follow(phases, closes[:, 0], lost, self.after_pull_off == "reattach", after)
+        return after
 
     def _touching(self, state: Touching, control: Control) -> Flags:
         """True where an open contact closes: at its first touch, or wherever it reattaches."""
@@ -162,10 +169,11 @@ class _Controlled:
 
     def equilibrium(self, control: Control, balance: Balance) -> Array:
         """Largest stable radius in equilibrium with the work left there [m], nan without one."""
-        bodies, alpha = balance.bodies, self.reversible
         if balance.margin is None:
-            return control.radius(balance.work(np.zeros(1)), balance.stress, alpha, bodies)
-        return self._on_disc(control, balance)
+            return control.radius(balance.work(np.zeros(1)), balance.stress, self.reversible, balance.bodies)
+        if balance.bonded.ndim == 1:
+            return self._on_disc(control, balance)
+        return np.array([self._on_disc(control.at(k), balance.at(k)) for k in range(len(balance.bonded))])
 
     def _on_disc(self, control: Control, balance: Balance) -> Array:
         """Widest radius at which the energy release rate falls to the work left: a search inwards, then bisection.
@@ -208,22 +216,26 @@ class Equilibrium(_Controlled):
 
     model: Literal["equilibrium"] = "equilibrium"
 
-    def advance(self, state: Touching, motion: Motion, duration: float, balance: Balance) -> Touching:
-        control = self.control(motion.time, duration)
-        open_ = np.isnan(state.radius)
-        stays = open_ & ~self._touching(state, control) if open_.any() else open_
+    def advance(self, state: Touching, motions: Motions, duration: float, balance: Balance) -> Touching:
+        control = self.control(motions.time, duration)
         radius = self.equilibrium(control, balance)
-        radius = np.where(stays, np.nan, radius) if stays.any() else radius
-        now_open = np.isnan(radius)
-        detached, dissipated = state.detached, state.dissipated
-        if open_.any() or now_open.any():
-            opens = now_open & ~open_
-            for happens, size, sign in ((opens, state.radius, 1.0), (open_ & ~now_open, radius, -1.0)):
+        detached, dissipated = (np.broadcast_to(values, radius.shape) for values in (state.detached, state.dissipated))
+        if np.isnan(radius).any() or np.isnan(state.radius).any():
+            phase = np.where(np.isnan(state.radius), np.where(np.isnan(state.detached), AHEAD, OPEN), CLOSED)
+            followed = self._followed(phase[:, np.newaxis], control, np.isnan(radius)[:, :, np.newaxis])
+            radius = np.where(followed[:, :, 0] == CLOSED, radius, np.nan)
+            before = np.concatenate([state.radius[np.newaxis], radius[:-1]])
+            opens, closes = (np.isnan(one) & ~np.isnan(other) for one, other in ((radius, before), (before, radius)))
+            lost = np.zeros(radius.shape)
+            for happens, size, sign in ((opens, before, 1.0), (closes, radius, -1.0)):
                 over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
-                dissipated = dissipated + np.where(happens, np.maximum(sign * over, 0.0), 0.0)
-            detached = np.where(opens, motion.time, detached)
-        phases = self._phases(state, control, balance)
-        return Touching(self._left(radius, balance), radius, detached, dissipated, phases)
+                lost += np.where(happens, np.maximum(sign * over, 0.0), 0.0)
+            dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
+            gone = np.where(opens, motions.time, np.nan)
+            detached = np.fmax.accumulate(np.concatenate([detached[:1], gone]))[1:]
+        return Touching(
+            self._left(radius, balance), radius, detached, dissipated, self._phases(state, control, balance)
+        )
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
@@ -245,7 +257,15 @@ class RateDependent(_Controlled):
     heal_exponent: _HealingExponent | None = None
     model: Literal["rate_dependent"] = "rate_dependent"
 
-    def advance(self, state: Touching, motion: Motion, duration: float, balance: Balance) -> Touching:
+    def advance(self, state: Touching, motions: Motions, duration: float, balance: Balance) -> Touching:
+        phases, found = self._phases(state, self.control(motions.time, duration), balance), []
+        for k, motion in enumerate(motions.each()):
+            state = self._step(state, motion, duration, balance.at(k))
+            found.append(state)
+        return Touching(*map(np.array, zip(*found, strict=True)))._replace(phases=phases)
+
+    def _step(self, state: Touching, motion: Motion, duration: float, balance: Balance) -> Touching:
+        """The contact after one step, but for the phases of the reference contacts."""
         last = self._left(state.radius, balance)
         first = np.where(np.isnan(state.radius), last, state.work)
         now = state._replace(radius=state.radius + np.zeros(last.shape))
@@ -255,8 +275,7 @@ class RateDependent(_Controlled):
             before, share = share, (piece.stop - begin) / span
             works = [(1.0 - part) * first + part * last for part in (before, share)]
             now = self._moved(now, piece, motion.duration * (share - before), works, balance)
-        phases = self._phases(state, self.control(motion.time, duration), balance)
-        return now._replace(work=self._left(now.radius, balance), phases=phases)
+        return now._replace(work=self._left(now.radius, balance))
 
     def _moved(
         self, state: Touching, piece: Piece, duration: float, works: Sequence[Array], balance: Balance
@@ -307,6 +326,21 @@ class RateDependent(_Controlled):
     def _kinetics(self, balance: Balance) -> Kinetics:
         speed, exponent = self.front_speed, self.front_exponent
         return Kinetics(balance.reference, speed, exponent, self.heal_speed or speed, self.heal_exponent or exponent)
+
+
+@kernel("void(float64[:, :], boolean[:], boolean[:, :, :], boolean, float64[:, :, ::1])")
+def _follow(phases, closes, lost, again, after):
+    """Phases of contacts at the end of each step, ``phases`` being those before."""
+    steps, rows, contacts = after.shape
+    for m in range(rows):
+        for c in range(contacts):
+            phase = phases[m if len(phases) > 1 else 0, c]
+            for k in range(steps):
+                if closes[k] and (again or phase != OPEN):
+                    phase = CLOSED
+                if phase == CLOSED and lost[k, m, c]:
+                    phase = OPEN
+                after[k, m, c] = phase
 
 
 def _spot(balance: Balance) -> float:

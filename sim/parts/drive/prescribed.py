@@ -4,6 +4,7 @@ A prescribed drive is a function of time, the same for all members. It gives the
 step, never the speed times the step, so that parts that live on slip see no step error.
 """
 
+import itertools
 import math
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.parts.exchange import Array, Motion, Resistance, Setting, Times
+from sim.parts.exchange import Array, Motion, Motions, Resistance, Setting, Times
 from sim.units.course import Course, Number, Piece, Table as Rows, table_pieces
 from sim.units.quantity import Quantity
 
@@ -36,9 +37,14 @@ class _Sliding:
         motion = self.motion(0, 0.0, 0.0, times.duration)
         return Slider(np.zeros(1), motion.speed), motion
 
-    def advance(self, state: Slider, resistance: Resistance, times: Times, step: int) -> tuple[Slider, Motion]:
-        motion = self.motion(step, times.at(step - 1), times.at(step), times.duration)
-        return Slider(state.position + motion.slip, motion.speed), motion
+    def advance(self, state: Slider, resistance: Resistance, times: Times, steps: range) -> tuple[Slider, Motions]:
+        ends = [times.at(step) for step in range(steps.start - 1, steps.stop)]
+        spans = itertools.pairwise(ends)
+        columns = np.array([self._over(*span, times.duration) for span in spans]).T[:, :, np.newaxis]
+        time, duration, slip, path, first, speed = columns
+        position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
+        motions = Motions(steps.start, time, duration, slip, path, first, speed, position)
+        return Slider(position[-1], speed[-1]), motions
 
     def remarks(self, setting: Setting) -> list[str]:
         return []
@@ -49,16 +55,14 @@ class _Sliding:
 
     def motion(self, step: int, start: float, stop: float, duration: float) -> Motion:
         """Slip, path and final speed from time ``start`` to ``stop`` of a run of ``duration`` [s]."""
+        time, span, *sums = self._over(start, stop, duration)
+        return Motion(step, time, span, *np.array(sums)[:, np.newaxis])
+
+    def _over(self, start: float, stop: float, duration: float) -> tuple[float, ...]:
+        """End and length of a step [s], slip and path in it [m], speeds at its ends [m/s]."""
         pieces = self.pieces(start, stop, duration)
-        return Motion(
-            step=step,
-            time=stop,
-            duration=stop - start,
-            slip=np.array([math.fsum(piece.integral for piece in pieces)]),
-            path=np.array([math.fsum(piece.path for piece in pieces)]),
-            first=np.array([pieces[0].first]),
-            speed=np.array([pieces[-1].last]),
-        )
+        slip, path = math.fsum(piece.integral for piece in pieces), math.fsum(piece.path for piece in pieces)
+        return stop, stop - start, slip, path, pieces[0].first, pieces[-1].last
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

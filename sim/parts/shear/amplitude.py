@@ -25,7 +25,7 @@ class Constant:
 
     def factor(self, speed: Array, stress: Array) -> Array:
         """g [1] at the speed [m/s] and mean shear stress [Pa], shape of the argument it reads."""
-        return np.ones(1)
+        return np.ones(speed.shape)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

@@ -20,8 +20,8 @@ from sim.parts.shear.process import Fluctuation, SmoothProcess
 class SiteMean(SmoothProcess):
     """The ensemble mean of ΔΓ: ``energy`` is that for n E[f²] = 1 N²/m²."""
 
-    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        return Fluctuation((bonding.frozen + bonding.varying) * self.energy, np.ones(1), np.empty(0))
+    def _level(self, speed: Array, bonding: Bonding) -> tuple[Array, Array]:
+        return (bonding.frozen + bonding.varying) * self.energy, np.ones(speed.shape)
 
 
 class SiteModes(ModalProcess):
@@ -34,7 +34,7 @@ class SiteModes(ModalProcess):
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         return self._sized(noise.normals(motion.step, 4 * self.pairs).reshape(-1, 4, self.pairs).copy(), bonding)
 
-    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+    def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         keep, renew = self._shares(motion)
         fresh = noise.normals(motion.step, 2 * self.pairs).reshape(-1, 2, self.pairs)
         parts = np.concatenate([state.values[:, :2], keep * state.values[:, 2:] + renew * fresh], axis=1)

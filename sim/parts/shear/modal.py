@@ -126,7 +126,7 @@ class FixedProcess(ModalProcess):
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(amplitude), amplitude, phases)
 
-    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+    def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         turn = np.sqrt(2.0 * self.correlation.exponents(self.wavenumber, motion))
         phases = state.values + turn * noise.normals(motion.step, len(self.wavenumber))

@@ -9,7 +9,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Gammas, Motion
+from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 
@@ -43,11 +43,18 @@ class SmoothProcess:
     state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
-        return Fluctuation(amplitude**2 * self.energy, amplitude, np.empty(0))
+        return Fluctuation(*self._level(motion.speed, bonding), np.empty(0))
 
-    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        return self.start(motion, bonding, noise)
+    def advance(
+        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
+        energy, amplitude = self._level(motions.speed, bonding)
+        return Fluctuation(energy[-1], amplitude[-1], np.empty(0)), energy
+
+    def _level(self, speed: Array, bonding: Bonding) -> tuple[Array, Array]:
+        """Energy [J/m²] and amplitude [1] of the fluctuations at a speed [m/s]."""
+        amplitude = self.amplitude.factor(speed, bonding.strength)
+        return amplitude**2 * self.energy, amplitude
 
     @property
     def gammas(self) -> Gammas:
@@ -83,7 +90,17 @@ class Renewing:
         empty = self._empty(len(noise.members))
         return self._scaled(amplitude, *self._renew(empty, np.zeros(1), np.ones(1), size, motion.step, noise))
 
-    def advance(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+    def advance(
+        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
+        energies = []
+        for k, motion in enumerate(motions.each()):
+            state = self.step(state, motion, bonding.at(k), noise)
+            energies.append(state.energy)
+        return state, np.array(energies)
+
+    def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        """Fluctuations after one step, at the end of which the bonds are ``bonding``."""
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         size = _renewed_size(self.amplitude, state, motion, amplitude)
         return self._scaled(amplitude, *self._renew(state.values, *self._shares(motion), size, motion.step, noise))

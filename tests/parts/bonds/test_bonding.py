@@ -4,15 +4,14 @@ from copy import deepcopy
 
 import numpy as np
 import pytest
-from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, scene
+from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.engine import march
+from sim.engine import course_of, march
 from sim.ensemble.recorded import VARIABLES
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
-from sim.parts.exchange import Motion
 
 READ = {variable.name: variable.read for variable in VARIABLES}
 FORTH_AND_BACK = drive.Table(
@@ -38,7 +37,7 @@ def mirrored(motion):
 def records(names, members=3, steps=16, **parts):
     scenario = scene(members, steps, **parts)
     states = list(march(scenario, np.arange(members)))
-    return [np.array([READ[name](scenario, state) for state in states]) for name in names]
+    return [np.array([READ[name](scenario, course_of(scenario, state))[0] for state in states]) for name in names]
 
 
 @pytest.mark.parametrize("motion", MOTIONS)
@@ -105,10 +104,9 @@ def test_the_stiffness_is_the_slope_of_the_stress_over_slip_at_frozen_time(name,
     scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=speed))
     *_, state = march(scenario, np.arange(3))
     part, slip = scenario.population, np.array([np.copysign(1e-10, speed)])
-    motion = Motion(41, 41e-3, 1e-18, slip, np.abs(slip), slip / 1e-18, slip / 1e-18)
-    after = part.bonding(
-        part.advance(deepcopy(state.bonds), motion, state.contact.radius, Noise(5, "bonds", np.arange(3)))
-    )
+    motions = one_step(41, 41e-3, 1e-18, slip, np.abs(slip), slip / 1e-18, slip / 1e-18)
+    noise = Noise(5, "bonds", np.arange(3))
+    after = part.advance(deepcopy(state.bonds), motions, state.contact.radius, noise)[1].at(0)
     slope = (after.stress - state.bonding.stress) / slip
     assert_allclose(np.broadcast_to(state.bonding.stiffness, slope.shape), slope, rtol=3e-5)
 
@@ -121,8 +119,8 @@ def test_the_relaxation_is_the_rate_of_the_stress_at_frozen_slip(name):
     scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=4e-3))
     *_, state = march(scenario, np.arange(3))
     part, still = scenario.population, np.zeros(1)
-    motion = Motion(41, 41e-3, 1e-9, still, still, still, still)
-    after = part.bonding(part.advance(state.bonds, motion, state.contact.radius, Noise(5, "bonds", np.arange(3))))
+    motions = one_step(41, 41e-3, 1e-9, still, still, still, still)
+    after = part.advance(state.bonds, motions, state.contact.radius, Noise(5, "bonds", np.arange(3)))[1].at(0)
     rate = (after.stress - state.bonding.stress) / 1e-9
     assert_allclose(np.broadcast_to(state.bonding.relaxation, rate.shape), rate, rtol=3e-5)
 

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from helpers.scenes import BELL, BONDS, CELL, STRETCHED, scene
+from helpers.scenes import BELL, BONDS, CELL, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose
 
-from sim.engine import march
+from sim.engine import course_of, march
 from sim.ensemble.recorded import VARIABLES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
 from sim.numerics.noise import Noise
@@ -16,7 +16,6 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.area import share_kept
 from sim.parts.bonds.rupture import Constant
 from sim.parts.drive import prescribed as drive
-from sim.parts.exchange import Motion
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Time
 from sim.scenario.clock import Clock
@@ -37,7 +36,9 @@ CELLED = {"spectrum": FIELD, "cell": CELL, "points": 32, "correlation": Time(tim
 def marched(name, members=1, **parts):
     """One record of a scene, shape (steps + 1, members or 1)."""
     scenario = scene(members, **parts)
-    return np.array([READ[name](scenario, state) for state in march(scenario, np.arange(members))])
+    return np.array(
+        [READ[name](scenario, course_of(scenario, state))[0] for state in march(scenario, np.arange(members))]
+    )
 
 
 def last(members=1, **parts):
@@ -183,8 +184,8 @@ CARRIED = {
 def over(part, state, radius):
     """The population over a contact of this radius, no time passing."""
     still = np.zeros(1)
-    motion = Motion(1, 0.0, 0.0, still, still, still, still)
-    return part.advance(state, motion, np.array([radius]), Noise(5, "bonds", np.arange(1)))
+    motions = one_step(1, 0.0, 0.0, still, still, still, still)
+    return part.advance(state, motions, np.array([radius]), Noise(5, "bonds", np.arange(1)))[0]
 
 
 @pytest.mark.parametrize("name", CARRIED)

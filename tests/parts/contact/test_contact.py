@@ -10,7 +10,7 @@ from helpers.cases import some
 from helpers.scenes import SHEARS, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.engine import march, pack
+from sim.engine import course_of, march, pack
 from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
 from sim.parts.bonds import models as bonds
@@ -44,7 +44,10 @@ def maugis(contact, steps=100, duration=1.0, **parts):
 def course(scenario, *names):
     """Recorded quantities of the first member at every step."""
     states = list(march(scenario, np.arange(scenario.ensemble.members)))
-    return [np.array([GAUGE[name].read(scenario, state)[0] for state in states]) for name in names]
+    return [
+        np.array([np.ravel(GAUGE[name].read(scenario, course_of(scenario, state)))[0] for state in states])
+        for name in names
+    ]
 
 
 # --- what holds the sphere in time ---
