@@ -18,6 +18,8 @@ from sim.scenario.scenario import Scenario
 Arrays = dict[str, Array]
 #: Most numbers of one quantity in a block of steps: they stay in the cache.
 _BLOCK_NUMBERS = 2**16
+#: Mode pairs of a process whose step takes much longer than the rest.
+_MANY_PAIRS = 64
 
 
 class State(NamedTuple):
@@ -141,8 +143,8 @@ def follow(scenario: Scenario, dice: Dice, state: State | None, steps: range) ->
     if state is None:
         state = start(scenario, dice)
         kept.append(course_of(scenario, state))
-    rows = len(dice.shear.members)
-    longest = 1 if any(part.feeds_back for part in scenario.chosen) else max(1, _BLOCK_NUMBERS // rows)
+    rows, numbers = len(dice.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
+    longest = 1 if any(part.feeds_back for part in scenario.chosen) else max(1, _BLOCK_NUMBERS // (rows * numbers))
     while state.step < steps[-1]:
         block = range(state.step + 1, min(state.step + longest, steps[-1]) + 1)
         state, passed = advance(scenario, state, dice, block)

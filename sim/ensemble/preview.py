@@ -10,7 +10,6 @@ import numpy as np
 
 from sim.ensemble.plan import Plan, work
 from sim.laws import jkr
-from sim.numerics.noise import steps_per_block
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.clock import Record
@@ -18,9 +17,9 @@ from sim.scenario.declared import entries
 from sim.scenario.scenario import Scenario
 
 # Rough costs of one core, for the estimate only [s]: starting up; a point of a sweep; a part file; a step and a record
-# of a batch; a step of a counted population, a number drawn for it, an event of a bond that is followed; a byte.
+# of a batch; a step of a counted population, an event of a bond that is followed; a byte.
 _START, _POINT, _PART, _STEP, _RECORD = 3.0, 15e-3, 5e-3, 150e-6, 150e-6
-_COUNTED, _DRAWN, _EVENT, _BYTE = 2e-6, 40e-9, 1e-7, 50e-9
+_COUNTED, _EVENT, _BYTE = 3e-7, 1e-7, 50e-9
 _PROGRAM_BYTES, _SCENARIO_BYTES = 200e6, 2e4
 _STATISTICS = 3
 #: Points of a sweep whose cells are looked at.
@@ -228,19 +227,13 @@ def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:
     member = 0.0
     for point in some:
         pairs, bonds = point.process.pairs, point.population
-        member += _drawn(clock.steps, 2 * pairs) * pairs * point.fluctuations.pair_seconds
+        member += (clock.steps + 1) * pairs * point.fluctuations.pair_seconds
         if bonds.per_member and not bonds.feeds_back:
-            member += clock.steps * _COUNTED + _drawn(clock.steps, 2) * 2 * _DRAWN
+            member += clock.steps * _COUNTED
             member += clock.steps * _EVENT * bonds.followed(point.speeds(21), clock.step)
     batches, points = max(1.0, plan.members / group), len(plan.points)
     computed = points * (_POINT + batches * batch + plan.members * member / len(some))
     return _START + computed + _BYTE * _bytes(plan, some[0])
-
-
-def _drawn(steps: int, count: int) -> int:
-    """Steps for which a member draws ``count`` numbers each: whole noise blocks."""
-    block = steps_per_block(count)
-    return math.ceil((steps + 1) / block) * block
 
 
 def _bytes(plan: Plan, point: Scenario) -> float:

@@ -15,11 +15,12 @@ from scipy.special import gammainccinv, gammaincinv, ndtr
 
 from sim.engine import balance, course_of, march
 from sim.ensemble.recorded import VARIABLES
-from sim.parts.exchange import Gammas, Motion
+from sim.numerics.noise import Noise
+from sim.parts.exchange import Bonding, Gammas, Motion, Motions
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.mode_pairs import cell_pairs
-from sim.parts.shear.process import Fluctuation, Renewing
+from sim.parts.shear.process import Fluctuation, Renewing, renewed_size
 from sim.scenario.scenario import Scenario
 from sim.study.settings import REFERENCE, table
 
@@ -85,14 +86,23 @@ class Expected(Renewing):
         constants = np.array([terms.constant for terms in sets])
         return cls(np.bincount(place, waves) / count, tables, constants, correlation, amplitude)
 
-    def _empty(self, members: int) -> Array:
-        return np.zeros(self.wavenumber.size)
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
+        size = amplitude if self.amplitude.relaxing else np.ones(1)
+        return self._with_energy(amplitude, size**2 * np.ones(self.wavenumber.size))
 
-    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, *_: Any) -> tuple[Array, Array]:
-        return np.empty(0), keep**2 * values + (renew * size) ** 2
+    def advance(
+        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
+        amplitude, energies = self.amplitude.factor(motions.speed, bonding.strength), []
+        sizes = renewed_size(self.amplitude, state, motions, amplitude)
+        for now, size, keep, renew in zip(amplitude, sizes, *self._shares(motions), strict=True):
+            state = self._with_energy(now, keep**2 * state.values + (renew * size) ** 2)
+            energies.append(state.energy)
+        return state, np.array(energies)
 
-    def _scaled(self, amplitude: Array, energy: Array, values: Array) -> Fluctuation:
-        state = Fluctuation(energy, amplitude, values)
+    def _with_energy(self, amplitude: Array, values: Array) -> Fluctuation:
+        state = Fluctuation(values, amplitude, values)
         return state._replace(energy=self.cumulants(state)[0, :1])
 
     def cumulants(self, state: Fluctuation) -> Array:

@@ -131,3 +131,8 @@ def scene(members=3, steps=8, **parts):
 def one_step(step, *given):
     """A block of one step: time, duration, slip, path, speeds at its ends."""
     return Motions(step, *(np.reshape(value, (1, -1)) for value in (*given, given[2])))
+
+
+def advanced(process, state, motion, bonding, noise):
+    """The state of a shear process after one step."""
+    return process.advance(state, one_step(*motion), bonding, noise)[0]

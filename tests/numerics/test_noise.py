@@ -1,97 +1,175 @@
-"""Random numbers by address."""
+"""Random numbers by address: words, streams, uniforms and normals."""
 
 import numpy as np
 import pytest
+from helpers.draws import FIVE_SIGMA, fits, states_at, words_from
 from numpy.testing import assert_allclose
-from scipy.stats import kstest, norm
+from scipy.stats import binom, kstest, norm, poisson
 
-from sim.numerics.noise import BLOCK_NUMBERS, PARTS, Noise, steps_per_block
+from sim.numerics import noise
+from sim.numerics.noise import PARTS, Noise
 
 
 def numbers(members, step, count, seed=7, part="shear"):
     return Noise(seed, part, np.array(members)).normals(step, count)
 
 
-def test_a_member_draws_the_same_alone_and_in_any_batch():
-    alone = numbers([11], 5, 6)
-    assert np.array_equal(numbers([3, 11, 40], 5, 6)[1:2], alone)
-    assert np.array_equal(numbers([11, 3], 5, 6)[:1], alone)
+@pytest.mark.parametrize("kind", ["normals", "uniforms"])
+def test_a_member_draws_the_same_alone_and_in_any_batch(kind):
+    def drawn(members):
+        return getattr(Noise(7, "shear", np.array(members)), kind)(5, 6)
+
+    assert np.array_equal(drawn([3, 11, 40])[1:2], drawn([11]))
+    assert np.array_equal(drawn([11, 3])[:1], drawn([11]))
 
 
 def test_a_step_can_be_asked_for_in_any_order():
     noise = Noise(7, "shear", np.arange(4))
-    late, early = noise.normals(90_000, 5).copy(), noise.normals(2, 5).copy()
+    late, early = noise.normals(90_000, 5), noise.normals(2, 5)
     assert np.array_equal(late, numbers(range(4), 90_000, 5))
     assert np.array_equal(early, numbers(range(4), 2, 5))
 
 
-@pytest.mark.parametrize("count", [1, 2, 3, 1000, 2**13, 2**13 + 1, 10**6])
-def test_a_block_is_a_power_of_two_of_steps_and_bounded(count):
-    steps = steps_per_block(count)
-    assert steps & (steps - 1) == 0
-    assert steps == 1 or steps * count <= BLOCK_NUMBERS
-
-
-def philox(seed, part, block, member, lane, counters):
-    """Words of numpy's own generator at an address, shape (4, counters)."""
-    key, counter = np.array([seed, part], dtype=np.uint64), np.array([0, block, member, lane], dtype=np.uint64)
-    return np.random.Philox(key=key, counter=counter).random_raw(4 * counters).reshape(-1, 4).T
-
-
-def unit(words):
-    return (words >> np.uint64(12)) * 2.0**-52
+def test_how_many_numbers_are_drawn_changes_none():
+    assert np.array_equal(numbers([3], 5, 100)[:, :7], numbers([3], 5, 7))
 
 
 @pytest.mark.parametrize(("seed", "member"), [(0, 0), (7, 3), (2**64 - 1, 10**7), (2**63 + 5, 2**40)])
-def test_the_words_are_those_of_numpys_philox(seed, member):
-    found = Noise(seed, "bonds", np.array([member])).uniforms(7 * 2**10, 8)
-    assert steps_per_block(8) == 2**10
-    words = philox(seed, PARTS["bonds"], 7, member, 256 * 8 + 1, 1024)
-    assert np.array_equal(found[0], unit(words).ravel()[:8])
+@pytest.mark.parametrize(("step", "lane"), [(0, 0), (1, 0), (10**9, 3)])
+def test_a_stream_begins_at_the_words_of_numpys_philox(seed, member, step, lane):
+    found = states_at([(seed, PARTS["bonds"], member, step, lane)])
+    counter = step + (member << 128) + ((256 + lane) << 192)  # which numpy raises by one before it draws
+    generator = np.random.Philox(key=np.array([seed, PARTS["bonds"]], dtype=np.uint64), counter=counter - 1)
+    assert np.array_equal(found[0], generator.random_raw(4))
 
 
-def test_the_normals_are_box_and_mullers_of_the_words():
-    count = 8192
-    found = Noise(11, "shear", np.array([2])).normals(3, count)[0].reshape(2, 4, 1024)
-    words = philox(11, PARTS["shear"], 3, 2, 256 * count, 2048)
-    for run in range(2):
-        u, v = (unit(words[first::2, run * 1024 : (run + 1) * 1024]) for first in (0, 1))
-        radius = np.sqrt(-2.0 * np.log(1.0 - u))
-        # a few units in the last place of the radius, which is 8.5 at the most
-        assert_allclose(found[run, 0::2], radius * np.cos(2 * np.pi * v), rtol=0, atol=4e-15)
-        assert_allclose(found[run, 1::2], radius * np.sin(2 * np.pi * v), rtol=0, atol=4e-15)
+@pytest.mark.parametrize(
+    ("state", "wanted"),
+    [
+        (
+            (1, 2, 3, 4),
+            (41943041, 58720359, 3588806011781223, 3591011842654386, 9228616714210784205, 9973669472204895162,
+             14011001112246962877, 12406186145184390807, 15849039046786891736, 10450023813501588000),
+        ),
+        (
+            (0, 0, 0, 1),
+            (0x0000000000800000, 0x0000000000800011, 0x0002200000800011, 0x0002200044000020, 0x00022000448008A1,
+             0x01102100802208A0, 0x0114002284200880, 0x0402896644A64095, 0x8A14A0A244ACC891, 0x8C88BA4680B20495),
+        ),
+    ],
+)  # fmt: skip
+def test_words_are_those_of_the_authors_program(state, wanted):
+    # outputs of the program by Blackman & Vigna that implementations in other languages publish
+    assert words_from([state], 10)[0].tolist() == list(wanted)
 
 
-def test_the_normals_are_standard_normal():
-    sample = Noise(5, "shear", np.arange(100)).normals(1, 20_000).ravel()
-    assert kstest(sample, "norm").pvalue > 5.7e-7
-    beyond = 4.0
-    expected = 2 * norm.sf(beyond) * sample.size
-    assert abs(np.sum(np.abs(sample) > beyond) - expected) < 5.0 * np.sqrt(expected)
-    for power, moment, spread in ((2, 1.0, 2.0), (4, 3.0, 96.0), (6, 15.0, 10170.0)):
+def test_the_layers_of_the_ziggurat_have_equal_areas_under_the_curve():
+    widths, heights = noise._WIDTHS, noise._HEIGHTS
+    assert len(widths) == 256
+    assert_allclose(heights[1:-1], np.exp(-0.5 * widths[1:] ** 2), rtol=1e-13)
+    area = widths[1] * heights[1] + np.sqrt(2.0 * np.pi) * norm.sf(widths[1])
+    # heights near 1 are good to 1e-16, their differences to 1e-16 of 0.01
+    assert_allclose(widths * np.diff(heights), area, rtol=1e-13)
+    assert heights[0] == 0.0
+    assert heights[-1] == 1.0
+
+
+@pytest.mark.parametrize("draws", [4 * 10**6, pytest.param(2 * 10**8, marks=pytest.mark.verify)])
+def test_the_normals_have_the_normal_law_in_fine_bins_and_far_tails(draws):
+    edges, source = np.round(np.arange(-6.0, 6.005, 0.01), 2), Noise(5, "shear", np.arange(1000))
+    seen = np.zeros(len(edges) + 1)
+    for step in range(draws // 10**6):
+        sample = source.normals(step, 1000).ravel()
+        seen += np.bincount(np.searchsorted(edges, sample), minlength=len(seen))
+    below = norm.cdf(-edges[edges >= 0.0])[::-1]  # of the lower half, as exact as it is small
+    half = draws * np.diff(np.append(0.0, below))
+    fits(seen, np.append(half, half[::-1]))
+    # about the first width, 3.654, where a tail begins, and down to a probability of 1e-6 in both
+    for level in (3.6, 3.66, 4.0, 4.5, 4.9):
+        first = np.searchsorted(edges, level - 0.005)
+        for count in (seen[first + 1 :].sum(), seen[: len(edges) - first].sum()):
+            mean = draws * norm.sf(level)
+            assert min(poisson.cdf(count, mean), poisson.sf(count - 1, mean)) > 0.5 * FIVE_SIGMA
+
+
+def test_the_normals_have_normal_moments_and_follow_each_other_without_correlation():
+    sample = Noise(5, "shear", np.arange(100)).normals(1, 20_000)
+    assert kstest(sample.ravel(), "norm").pvalue > FIVE_SIGMA
+    for power, moment, spread in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0), (6, 15.0, 10170.0)):
         assert abs(np.mean(sample**power) - moment) < 5.0 * np.sqrt(spread / sample.size)
-    pairs = sample.reshape(100, -1)
-    assert abs(np.mean(pairs[:, :1024] * pairs[:, 1024:2048])) < 5.0 / np.sqrt(100 * 1024)
+    for lag in (1, 2, 3):
+        products = sample[:, lag:] * sample[:, :-lag]
+        assert abs(products.mean()) < 5.0 / np.sqrt(products.size)
 
 
 def test_seeds_parts_members_and_steps_differ():
     base = numbers([1], 1, 4)
     for other in (numbers([1], 1, 4, seed=8), numbers([1], 1, 4, part="bonds"), numbers([2], 1, 4), numbers([1], 2, 4)):
         assert not np.any(np.isin(base, other))
+    assert len(np.unique([states_at([(7, 2, 3, 4, lane)])[0, 0] for lane in range(4)])) == 4
 
 
 def test_numbers_are_uncorrelated_between_members_and_steps():
-    noise = Noise(1, "shear", np.arange(50))
-    sample = np.stack([noise.normals(step, 8).ravel() for step in range(1, 401)])
+    source = Noise(1, "shear", np.arange(50))
+    sample = np.stack([source.normals(step, 8).ravel() for step in range(1, 401)])
     correlations = np.corrcoef(sample.T)[np.triu_indices(400, 1)]
     # 79,800 correlations of 400 numbers each have the standard deviation 1/20; their mean square is 1/400 on average
     assert abs(np.mean(correlations**2) * 400 - 1.0) < 5.0 * np.sqrt(2.0 / correlations.size)
 
 
-def test_numbers_of_another_law_or_layout_are_others():
-    noise = Noise(3, "shear", np.arange(20))
-    # the first normal and the first uniforms of one step, the same words if they shared an address
-    uniform = noise.uniforms(1, 8)
-    for other in (noise.normals(1, 8), noise.gammas(1, np.full(8, 0.5)), noise.uniforms(1, 9)[:, :8]):
-        assert abs(np.corrcoef(uniform.ravel(), np.abs(other).ravel())[0, 1]) < 5.0 / np.sqrt(160)
-    assert not np.any(np.isin(noise.uniforms(1, 9), noise.uniforms(0, 8)))
+NEIGHBOURS = {"seed": 0, "part": 1, "member": 2, "step": 3, "lane": 4}
+
+
+@pytest.fixture(params=NEIGHBOURS)
+def neighbours(request):
+    """The first words of streams at addresses that differ by one in turn, shape (streams, words)."""
+    addresses = np.tile(np.array([2026, 2, 7, 100, 0], dtype=np.uint64), (4096, 1))
+    addresses[:, NEIGHBOURS[request.param]] += np.arange(4096, dtype=np.uint64)
+    return words_from(states_at(addresses), 256)
+
+
+BYTES = range(0, 64, 8)
+
+
+@pytest.mark.verify
+def test_bytes_of_neighbouring_streams_are_equally_frequent_and_so_are_pairs(neighbours):
+    for shift in BYTES:
+        byte = ((neighbours >> np.uint64(shift)) & np.uint64(255)).astype(int)
+        fits(np.bincount(byte.ravel(), minlength=256), np.full(256, byte.size / 256.0))
+        # serial test: with the next word of the stream, and with the same one of the next stream
+        for one, other in ((byte[:, :-1], byte[:, 1:]), (byte[:-1], byte[1:])):
+            fits(np.bincount((256 * one + other).ravel(), minlength=65536), np.full(65536, one.size / 65536.0))
+
+
+@pytest.mark.verify
+def test_gaps_between_small_words_of_neighbouring_streams_are_geometric(neighbours):
+    for order in (neighbours, neighbours.T):  # along a stream, and across them
+        for high in (np.uint64(61), np.uint64(0)):  # the three highest bits, the three lowest
+            small = ((order.ravel() >> high) & np.uint64(7)) == 0
+            gaps = np.diff(np.flatnonzero(small)) - 1
+            chance = 0.125 * 0.875 ** np.arange(gaps.max() + 1)
+            fits(np.bincount(gaps), chance * gaps.size)
+
+
+@pytest.mark.verify
+def test_birthdays_of_neighbouring_streams_have_spacings_that_agree_as_often_as_by_chance(neighbours):
+    # Marsaglia: m birthdays in a year of d days have about m³/4d equal spacings, a Poisson number; here 4096 in 2^32
+    mean = 4096.0**3 / 2.0**34
+    for low in (0, 16, 32):
+        days = np.sort((neighbours >> np.uint64(low)) & np.uint64(2**32 - 1), axis=0)
+        spacings = np.sort(np.diff(days, axis=0), axis=0)
+        equal = np.sum(np.diff(spacings, axis=0) == 0, axis=0)
+        fits(np.bincount(equal, minlength=30)[:30], neighbours.shape[1] * poisson.pmf(np.arange(30), mean))
+
+
+@pytest.mark.verify
+def test_neighbouring_streams_differ_in_half_of_their_bits(neighbours):
+    for one, other in ((neighbours[:-1], neighbours[1:]), (neighbours[:, :-1], neighbours[:, 1:])):
+        different = np.bitwise_count(one ^ other).ravel()
+        fits(np.bincount(different, minlength=65), different.size * binom.pmf(np.arange(65), 64, 0.5))
+    # each bit of a word against each of the word of the next stream: 4096 correlations
+    some = np.ascontiguousarray(neighbours[:, :32])
+    bits = np.unpackbits(some.view(np.uint8), axis=1).reshape(*some.shape, 64) - 0.5
+    one, other = bits[:-1].reshape(-1, 64), bits[1:].reshape(-1, 64)
+    found = 4.0 * (one.T @ other) / len(one)
+    assert np.abs(found).max() * np.sqrt(len(one)) < norm.isf(0.5 * FIVE_SIGMA / found.size)

@@ -220,13 +220,15 @@ class Tracked(_Separable):
         return 3 * self.sites
 
     def start(self, motion: Motion, noise: Noise) -> Tracks:
-        return tracks.start(self.law, self.rebinding_rate, self.sites, motion.first, self.start_from, *noise.address())
+        laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
+        return tracks.start(*laws, self.sites, motion.first, self.start_from, *address)
 
     def advance(self, state: Tracks, motions: Motions, radius: Array, noise: Noise) -> tuple[Tracks, Bonding]:
         return by_step(self, state, motions, radius, noise)
 
     def step(self, state: Tracks, motion: Motion, radius: Array, noise: Noise) -> Tracks:
-        return tracks.advance(state, motion.slip, motion.duration, self.law, self.rebinding_rate, *noise.address())
+        laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
+        return tracks.advance(state, motion.slip, motion.duration, *laws, *address)
 
     def followed(self, speeds: Array, step: float) -> float:
         lives = step / (tracks.mean_life(speeds, self.law) + 1.0 / self.rebinding_rate)

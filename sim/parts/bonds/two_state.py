@@ -11,9 +11,9 @@ from pydantic.dataclasses import dataclass
 
 from sim.laws.schallamach import steady_fraction, transition_probabilities
 from sim.laws.schallamach.linear import relaxed
-from sim.numerics.binomial import binomial_numbers
+from sim.numerics.binomial import binomial
 from sim.numerics.jit import kernel
-from sim.numerics.noise import Noise
+from sim.numerics.noise import Noise, stream
 from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
 from sim.parts.exchange import Array, Bonding, Motion, Motions
 from sim.units.quantity import Quantity
@@ -171,9 +171,7 @@ class Counted(_WithoutStretch):
     Notes
     -----
     Over a step each bound site stays bound with probability p and each free one binds with
-    probability r, both exact, so the next number is Binomial(n, p) + Binomial(sites − n, r). Each
-    binomial is the inverse of its distribution function at one addressed uniform number: two
-    numbers a step whatever the state, and members keep their noise across sweep values.
+    probability r, both exact, so the next number is Binomial(n, p) + Binomial(sites − n, r).
     """
 
     critical_speed: CriticalSpeed
@@ -191,22 +189,29 @@ class Counted(_WithoutStretch):
         return super().bonding(state._replace(bound=state.bound / self.sites))
 
     def start(self, motion: Motion, noise: Noise) -> Population:
+        bound = np.zeros(len(noise.members))
         first = self._first_fraction(self.start_from, motion)
-        uniform = noise.uniforms(motion.step, 2)
-        return Population(_binomial(uniform[:, 0], np.array([float(self.sites)]), first), np.sign(motion.speed))
+        return Population(self._counted(bound, first, first, motion.step, noise)[0], np.sign(motion.speed))
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
-        stay, bind = transition_probabilities(motions.path, motions.duration, self.critical_speed, self.rebinding_rate)
-        bound = np.empty((len(stay), len(noise.members)))
-        before = state.bound
-        for k in range(len(stay)):
-            uniform = noise.uniforms(motions.step + k, 2)
-            kept = _binomial(uniform[:, 0], before, stay[k])
-            before = bound[k] = kept + _binomial(uniform[:, 1], self.sites - before, bind[k])
-        return bound, state.seen
+        over = motions.path[:, 0], motions.duration[:, 0]
+        stay, bind = transition_probabilities(*over, self.critical_speed, self.rebinding_rate)
+        return self._counted(state.bound, stay, bind, motions.step, noise), state.seen
+
+    def _counted(self, bound: Array, stay: Array, bind: Array, step: int, noise: Noise) -> Array:
+        """Bound sites at the end of each step, in which each bound and free one is bound with given probabilities."""
+        counted = np.empty((len(stay), len(bound)))
+        _count(bound, stay, bind, self.sites, *noise.at(step), counted)
+        return counted
 
 
-def _binomial(uniform: Array, number: Array, probability: Array) -> Array:
-    """Binomial numbers by inversion at ``uniform`` in [0, 1), as floats of shape (members,)."""
-    # a uniform of 0, whose inverse is 0 whatever the chance, counts as the smallest number above it
-    return binomial_numbers(np.maximum(uniform, 2.0**-54), number, probability)
+@kernel("void(float64[:], float64[:], float64[:], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])")
+def _count(bound, stay, bind, sites, seed, part, members, step, counted):
+    """Bound sites of all members at the end of each step."""
+    for m in range(members.size):
+        before = bound[m]
+        for k in range(stay.size):
+            numbers = stream(seed, part, members[m], step + k, 0)
+            kept, numbers = binomial(before, stay[k], numbers)
+            new, numbers = binomial(sites - before, bind[k], numbers)
+            counted[k, m] = before = kept + new

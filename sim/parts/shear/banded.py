@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from sim.numerics.jit import kernel
-from sim.numerics.noise import Noise
+from sim.numerics.noise import Noise, gamma, normal, stream
 from sim.parts.exchange import Array, Gammas
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.bands import Bands
@@ -55,15 +55,10 @@ class BandedProcess(Renewing):
     def _empty(self, members: int) -> Array:
         return np.zeros((members, self.bands.weight.size))
 
-    def _renew(
-        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
-    ) -> tuple[Array, Array]:
-        members, bands = values.shape
-        after, energy = np.empty_like(values), np.empty(members)
-        drawn = noise.normals(step, bands), noise.gammas(step, self.shapes)
-        shares = np.full(bands, keep), np.full(bands, renew), np.full(members, size)
-        _renew_bands(values, *drawn, *shares, self.half_weight, after, energy)
-        return energy, after
+    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
+        energy = np.empty((len(keep), len(values)))
+        _renew_bands(values, keep, renew, size, self.shapes, self.half_weight, *noise.at(step), energy)
+        return energy
 
     @property
     def gammas(self) -> Gammas:
@@ -75,20 +70,25 @@ class BandedProcess(Renewing):
 
 
 @kernel(
-    "void(float64[:,::1], float64[:,:], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
-    " float64[:,::1], float64[::1])"
+    "void(float64[:,::1], float64[:,:], float64[:,:], float64[:,:], float64[::1], float64[::1],"
+    " uint64, uint64, uint64[::1], int64, float64[:,::1])"
 )
-def _renew_bands(before, normals, gammas, keep, renew, size, half_weight, after, energy):
-    """One exact step of all bands of all members, and their energy."""
-    members, bands = before.shape
-    for m in range(members):
-        total = 0.0
-        for k in range(bands):
-            kick = renew[k] * size[m]
-            moved = kick * normals[m, k] + keep[k] * math.sqrt(before[m, k])
-            x = moved * moved + 2.0 * kick * kick * gammas[m, k]
-            if renew[k] == 0.0:  # nothing has passed: not even a rounding
-                x = before[m, k]
-            after[m, k] = x
-            total += half_weight[k] * x
-        energy[m] = total
+def _renew_bands(values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy):
+    """Exact steps of all bands of all members in place, and their energy at the end of each."""
+    many = keep.shape[1] > 1
+    for m in range(members.size):
+        for s in range(len(keep)):
+            numbers = stream(seed, part, members[m], step + s, 0)
+            total, unit = 0.0, size[s, m % size.shape[1]]
+            for k in range(shapes.size):
+                i = k if many else 0
+                x, share = values[m, k], renew[s, i]
+                if share != 0.0:  # else nothing has passed: not even a rounding
+                    one, numbers = normal(numbers)
+                    rest, numbers = gamma(shapes[k], numbers)
+                    kick = share * unit
+                    moved = kick * one + keep[s, i] * math.sqrt(x)
+                    x = moved * moved + 2.0 * kick * kick * rest
+                values[m, k] = x
+                total += half_weight[k] * x
+            energy[s, m] = total

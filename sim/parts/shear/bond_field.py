@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Motion
-from sim.parts.shear.modal import ModalProcess
-from sim.parts.shear.process import Fluctuation, SmoothProcess
+from sim.parts.exchange import Array, Bonding, Motion, Motions
+from sim.parts.shear.modal import ModalProcess, renew_modes
+from sim.parts.shear.process import Fluctuation, SmoothProcess, by_step
 
 
 @dataclass(frozen=True)
@@ -32,13 +32,26 @@ class SiteModes(ModalProcess):
     """
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        return self._sized(noise.normals(motion.step, 4 * self.pairs).reshape(-1, 4, self.pairs).copy(), bonding)
+        parts = np.zeros((len(noise.members), 4, self.pairs))
+        for row in (0, 2):
+            self._renew_rows(parts, row, np.zeros((1, 1)), np.ones((1, 1)), motion.step, noise)
+        return self._sized(parts, bonding)
+
+    def advance(
+        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
+        return by_step(self, state, motions, bonding, noise)
 
     def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
+        parts = state.values.copy()
         keep, renew = self._shares(motion)
-        fresh = noise.normals(motion.step, 2 * self.pairs).reshape(-1, 2, self.pairs)
-        parts = np.concatenate([state.values[:, :2], keep * state.values[:, 2:] + renew * fresh], axis=1)
+        self._renew_rows(parts, 2, keep[np.newaxis], renew[np.newaxis], motion.step, noise)
         return self._sized(parts, bonding)
+
+    def _renew_rows(self, parts: Array, row: int, keep: Array, renew: Array, step: int, noise: Noise) -> None:
+        """Renew a share of Z (``row`` 0) or Y (2) in place."""
+        energy = np.empty((1, len(parts)))
+        renew_modes(parts, keep, renew, np.ones((1, 1)), self.weights, *noise.at(step), row, energy)
 
     def _sized(self, parts: Array, bonding: Bonding) -> Fluctuation:
         """The state of these parts; ``amplitude`` holds the sizes of both, shape (2, 1) or (2, members)."""

@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.parts.exchange import Array, Motion
+from sim.parts.exchange import Array, Motion, Motions
 from sim.units.quantity import Quantity
 
 
@@ -24,9 +24,9 @@ class Time:
     time: Annotated[float, Quantity("s", "correlation time of the fluctuations", "t_m", above=0)]
     model: Literal["time"] = "time"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
-        """∫λdt over the step, shape (1,) or that of ``wavenumber`` [rad/m]."""
-        return np.array([motion.duration / self.time])
+    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
+        """∫λdt over a step, shape (1,) or that of ``wavenumber`` [rad/m]; of a block with the step as first axis."""
+        return np.atleast_1d(motion.duration / self.time)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -39,7 +39,7 @@ class Slip:
     length: Annotated[float, Quantity("m", "correlation length of the fluctuations", "l", above=0)]
     model: Literal["slip"] = "slip"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
+    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
         return motion.path / self.length
 
 
@@ -53,7 +53,7 @@ class Wave:
     waves: Annotated[float, Quantity("1", "own wavelengths after which a mode renews", "n", above=0)]
     model: Literal["wave"] = "wave"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
+    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
         return wavenumber * (motion.path / (2.0 * np.pi * self.waves))
 
 
@@ -67,7 +67,7 @@ class Diffusion:
     diffusivity: Annotated[float, Quantity("m^2/s", "diffusivity of the fluctuations", "D", above=0)]
     model: Literal["diffusion"] = "diffusion"
 
-    def exponents(self, wavenumber: Array, motion: Motion) -> Array:
+    def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
         return wavenumber**2 * (self.diffusivity * motion.duration)
 
 

@@ -7,12 +7,12 @@ import numpy as np
 
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
-from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Gammas, Indices, Motion
+from sim.numerics.noise import Noise, normal, stream
+from sim.parts.exchange import Array, Bonding, Gammas, Indices, Motion, Motions
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modes import Modes
-from sim.parts.shear.process import Fluctuation, Renewing
+from sim.parts.shear.process import Fluctuation, Renewing, by_step
 
 
 @dataclass(frozen=True)
@@ -57,14 +57,10 @@ class ModalProcess(Renewing):
     def _empty(self, members: int) -> Array:
         return np.zeros((members, 2, self.pairs))
 
-    def _renew(
-        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
-    ) -> tuple[Array, Array]:
-        members, _, pairs = values.shape
-        after, energy = np.empty_like(values), np.empty(members)
-        shares = np.full(pairs, keep), np.full(pairs, renew), np.full(members, size)
-        _renew_modes(values, noise.normals(step, 2 * pairs), *shares, self.weights, after, energy)
-        return energy, after
+    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
+        energy = np.empty((len(keep), len(values)))
+        renew_modes(values, keep, renew, size, self.weights, *noise.at(step), 0, energy)
+        return energy
 
     def complex_amplitudes(self, state: Fluctuation) -> Array:
         """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
@@ -126,6 +122,11 @@ class FixedProcess(ModalProcess):
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
         return Fluctuation(self._energy(amplitude), amplitude, phases)
 
+    def advance(
+        self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
+    ) -> tuple[Fluctuation, Array]:
+        return by_step(self, state, motions, bonding, noise)
+
     def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         turn = np.sqrt(2.0 * self.correlation.exponents(self.wavenumber, motion))
@@ -149,35 +150,26 @@ class FixedProcess(ModalProcess):
 
 
 @kernel(
-    "void(float64[:,:,::1], float64[:,:], float64[:], float64[:], float64[:], float64[::1],"
-    " float64[:,:,::1], float64[::1])"
+    "void(float64[:,:,::1], float64[:,:], float64[:,:], float64[:,:], float64[::1],"
+    " uint64, uint64, uint64[::1], int64, int64, float64[:,::1])"
 )
-def _renew_modes(before, normals, keep, renew, size, weights, after, energy):
-    """One Ornstein-Uhlenbeck step of all modes of all members, and the energy by Parseval.
+def renew_modes(values, keep, renew, size, weights, seed, part, members, step, row, energy):
+    """Ornstein-Uhlenbeck steps of all modes of all members in place, and the energy by Parseval at the end of each.
 
-    Two passes, so that the compiler can use vector instructions in the first; the sum of the second
-    runs in eight lanes, in the same order for every batch.
+    The amplitudes of a member stand in two rows from ``row`` on, which is also the lane of their numbers.
     """
-    members, _, pairs = before.shape
-    part, lanes = np.empty(pairs), np.empty(8)
-    for m in range(members):
-        real, imaginary = before[m, 0], before[m, 1]
-        new_real, new_imaginary = after[m, 0], after[m, 1]
-        for k in range(pairs):
-            kick = renew[k] * size[m]
-            x = keep[k] * real[k] + kick * normals[m, k]
-            y = keep[k] * imaginary[k] + kick * normals[m, pairs + k]
-            new_real[k] = x
-            new_imaginary[k] = y
-            part[k] = weights[k] * (x * x + y * y)
-        lanes[:] = 0.0
-        whole = pairs - pairs % 8
-        for first in range(0, whole, 8):
-            for lane in range(8):
-                lanes[lane] += part[first + lane]
-        total = 0.0
-        for k in range(whole, pairs):
-            total += part[k]
-        for lane in range(8):
-            total += lanes[lane]
-        energy[m] = total
+    many = keep.shape[1] > 1
+    for m in range(members.size):
+        for s in range(len(keep)):
+            numbers = stream(seed, part, members[m], step + s, row)
+            total, unit = 0.0, size[s, m % size.shape[1]]
+            for k in range(weights.size):
+                one, numbers = normal(numbers)
+                other, numbers = normal(numbers)
+                i = k if many else 0
+                kept, kick = keep[s, i], renew[s, i] * unit
+                x = kept * values[m, row, k] + kick * one
+                y = kept * values[m, row + 1, k] + kick * other
+                values[m, row, k], values[m, row + 1, k] = x, y
+                total += weights[k] * (x * x + y * y)
+            energy[s, m] = total

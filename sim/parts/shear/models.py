@@ -59,7 +59,7 @@ class _Model:
     draws_maps: ClassVar[bool] = False
     keeps_modes: ClassVar[bool] = False
     #: Rough time that one step of a mode pair takes on one core, for estimates [s].
-    pair_seconds: ClassVar[float] = 20e-9
+    pair_seconds: ClassVar[float] = 10e-9
     spectrum: Spectrum
     amplitude: Amplitude
     paid_by_adhesion: float

@@ -3,11 +3,13 @@
 A process is a model of ``parts.shear`` on a given solid and cell.
 """
 
+import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
+from sim.numerics.jit import device, kernel
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
 from sim.parts.shear.amplitude import Amplitude
@@ -78,51 +80,82 @@ class Renewing:
         """Numbers of a state without any fluctuation."""
         raise NotImplementedError
 
-    def _renew(
-        self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise
-    ) -> tuple[Array, Array]:
-        """Energy and numbers after a step that keeps a share of the numbers and renews the rest at a size."""
+    def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
+        """Keep a share of the numbers, in place, and renew the rest at a size, in one step after the other.
+
+        Shares have the shape (steps, 1) or (steps, numbers of a member), sizes (steps, 1) or (steps, members). Returns
+        the energy of the numbers at the end of each step, shape (steps, members).
+        """
         raise NotImplementedError
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         size = amplitude if self.amplitude.relaxing else np.ones(1)
-        empty = self._empty(len(noise.members))
-        return self._scaled(amplitude, *self._renew(empty, np.zeros(1), np.ones(1), size, motion.step, noise))
+        values = self._empty(len(noise.members))
+        energy = self._renew(values, np.zeros((1, 1)), np.ones((1, 1)), size[np.newaxis], motion.step, noise)
+        return Fluctuation(self._scaled(amplitude, energy[0]), amplitude, values)
 
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
-        energies = []
-        for k, motion in enumerate(motions.each()):
-            state = self.step(state, motion, bonding.at(k), noise)
-            energies.append(state.energy)
-        return state, np.array(energies)
+        amplitude, values = self.amplitude.factor(motions.speed, bonding.strength), state.values.copy()
+        size = renewed_size(self.amplitude, state, motions, amplitude)
+        energy = self._renew(values, *self._shares(motions), size, motions.step, noise)
+        energy = self._scaled(amplitude, energy)
+        return Fluctuation(energy[-1], amplitude[-1], values), energy
+
+    def _shares(self, motions: Motion | Motions) -> tuple[Array, Array]:
+        """Shares of a number that a step keeps and renews, whose squares add up to one."""
+        exponents = self.correlation.exponents(self.wavenumber, motions)
+        keep, renew = np.empty_like(exponents), np.empty_like(exponents)
+        _shares(exponents.ravel(), keep.ravel(), renew.ravel())
+        return keep, renew
+
+    def _scaled(self, amplitude: Array, energy: Array) -> Array:
+        """The energy of numbers, scaled at once unless the amplitude relaxes."""
+        return energy if self.amplitude.relaxing else amplitude**2 * energy
+
+
+class _ByStep(Protocol):
+    """A process that advances one step after the other."""
 
     def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         """Fluctuations after one step, at the end of which the bonds are ``bonding``."""
-        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
-        size = _renewed_size(self.amplitude, state, motion, amplitude)
-        return self._scaled(amplitude, *self._renew(state.values, *self._shares(motion), size, motion.step, noise))
-
-    def _shares(self, motion: Motion) -> tuple[Array, Array]:
-        """Shares of a number that a step keeps and renews, whose squares add up to one."""
-        exponents = self.correlation.exponents(self.wavenumber, motion)
-        return np.exp(-exponents), np.sqrt(-np.expm1(-2.0 * exponents))
-
-    def _scaled(self, amplitude: Array, energy: Array, values: Array) -> Fluctuation:
-        """The state of these numbers, their energy scaled at once unless the amplitude relaxes."""
-        scale = np.ones(1) if self.amplitude.relaxing else amplitude
-        return Fluctuation(scale**2 * energy, amplitude, values)
 
 
-def _renewed_size(law: Amplitude, state: Fluctuation, motion: Motion, amplitude: Array) -> Array:
+def by_step(
+    process: _ByStep, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
+) -> tuple[Fluctuation, Array]:
+    """Fluctuations after a block of steps that are made one after the other, and their energy at the end of each."""
+    energies = []
+    for k, motion in enumerate(motions.each()):
+        state = process.step(state, motion, bonding.at(k), noise)
+        energies.append(state.energy)
+    return state, np.array(energies)
+
+
+def renewed_size(law: Amplitude, state: Fluctuation, motions: Motions, amplitude: Array) -> Array:
     """Amplitude of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
 
     Second order in the step. Its beginning is seen after a jump of the speed; stress has no jumps
     but under bonds that follow the speed at once.
     """
     if not law.relaxing:
-        return np.ones(1)
-    before = state.amplitude if law.reads_stress else law.factor(motion.first, np.zeros(1))
+        return np.ones((len(amplitude), 1))
+    before = np.concatenate([state.amplitude[np.newaxis], amplitude[:-1]])
+    if not law.reads_stress:
+        before = law.factor(motions.first, np.zeros(1))
     return np.sqrt(0.5 * (amplitude**2 + before**2))
+
+
+@device
+def shares(exponent):
+    """Shares of a number that are kept and renewed over an ``exponent`` ∫λdt; their squares add up to one."""
+    lost = -math.expm1(-exponent)
+    return 1.0 - lost, math.sqrt(lost * (2.0 - lost))
+
+
+@kernel("void(float64[:], float64[:], float64[:])")
+def _shares(exponents, keep, renew):
+    for k in range(exponents.size):
+        keep[k], renew[k] = shares(exponents[k])

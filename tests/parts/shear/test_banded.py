@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 from helpers.cases import some
-from helpers.scenes import CELL, SPECTRUM, scene
+from helpers.scenes import CELL, SPECTRUM, advanced, scene
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
 from scipy.stats import expon, kstest, ncx2
@@ -153,7 +153,7 @@ def test_the_law_is_the_same_after_many_steps(steps, name):
     noise = Noise(8, "shear", np.arange(MEMBERS))
     state, sample = process.start(moved(0), UNLOADED, noise), []
     for step in range(1, steps + 1):
-        state = process.step(state, moved(step, path), UNLOADED, noise)
+        state = advanced(process, state, moved(step, path), UNLOADED, noise)
         if step % 16 == 0:  # by then e^-9.6 of it: the draws count as independent
             sample.append(state.energy)
     assert kstest(np.concatenate(sample), law_of(weights)).pvalue > FIVE_SIGMA
@@ -170,7 +170,7 @@ def stepped(process, start, durations, seed=1):
     noise = Noise(seed, "shear", np.arange(25))
     state = Fluctuation(np.zeros(25), np.ones(1), np.full((25, len(process.bands.weight)), float(start)))
     for step, duration in enumerate(durations, 1):
-        state = process.step(state, moved(step, 0.0, duration), UNLOADED, noise)
+        state = advanced(process, state, moved(step, 0.0, duration), UNLOADED, noise)
     return state.values.ravel()
 
 
@@ -205,7 +205,7 @@ def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit(correlation):
     first = process.start(moved(0), UNLOADED, noise)
     state = first
     for step in range(1, 4):
-        state = process.step(state, moved(step, 0.0), UNLOADED, noise)
+        state = advanced(process, state, moved(step, 0.0), UNLOADED, noise)
         assert np.array_equal(state.values, first.values)
         assert np.array_equal(state.energy, first.energy)
 
@@ -215,7 +215,7 @@ def two_times(process, step_of, draws, seed=6, members=MEMBERS):
     noise, found = Noise(seed, "shear", np.arange(members)), []
     for pair in range(draws // members):
         before = process.start(moved(2 * pair), UNLOADED, noise)
-        after = process.step(before, step_of(2 * pair + 1), UNLOADED, noise)
+        after = advanced(process, before, step_of(2 * pair + 1), UNLOADED, noise)
         found.append((before.energy, after.energy))
     return np.concatenate(found, axis=1)
 
@@ -280,7 +280,7 @@ def test_the_joint_law_holds_through_a_jump_of_the_speed():
         energies = [state.energy]
         for i in range(3):
             step = motion.motion(4 * run + i + 1, times[i], times[i + 1], 1e-3)
-            state = process.step(state, step, UNLOADED, noise)
+            state = advanced(process, state, step, UNLOADED, noise)
             energies.append(state.energy)
         found.append(energies)
     found = np.concatenate(found, axis=1)
@@ -326,7 +326,9 @@ def test_relaxing_amplitude_follows_the_law_of_all_modes_after_a_jump():
         state = process.start(motion.motion(8 * run, 0.0, 0.0, 1.0), UNLOADED, noise)
         energies = [state.energy]
         for i in range(4):
-            state = process.step(state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), UNLOADED, noise)
+            state = advanced(
+                process, state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), UNLOADED, noise
+            )
             energies.append(state.energy)
         found.append(energies)
     law = law_of(weights)
@@ -347,7 +349,7 @@ def test_relaxing_amplitude_renews_with_the_mean_variance_of_the_ends_of_a_step(
         energies = [state.energy]
         for i in range(3):
             motion = ramp.motion(8 * run + i + 1, times[i], times[i + 1], 4e-3)
-            state = process.step(state, motion, UNLOADED, noise)
+            state = advanced(process, state, motion, UNLOADED, noise)
             energies.append(state.energy)
         found.append(energies)
     squares = [amplitude.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.scenes import advanced
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
@@ -79,7 +80,7 @@ def test_the_modes_hold_the_energy_of_frozen_and_varying_forces(members, mean, s
     noise = Noise(1, "shear", np.arange(members))
     state = field.start(moved(0), bonding(mean, spread), noise)
     for step in range(1, 4):
-        state = field.step(state, moved(step, 0.7), bonding(mean, spread), noise)
+        state = advanced(field, state, moved(step, 0.7), bonding(mean, spread), noise)
     expected = 2.0 * np.sum(field.weights)
     spread_of_mean = 2.0 * math.sqrt(np.sum(field.weights**2) / members)
     assert abs(state.energy.mean() - expected) < 5.0 * spread_of_mean
@@ -91,7 +92,7 @@ def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_n
     field, noise = process(), Noise(2, "shear", np.arange(members))
     carried = bonding(-0.8, 0.6)
     first = field.start(moved(0), carried, noise)
-    then = field.step(first, moved(1, 1.0), carried, noise)
+    then = advanced(field, first, moved(1, 1.0), carried, noise)
     before, after = (field.complex_amplitudes(state) for state in (first, then))
     kept = np.real(np.mean(before * after.conj())) / np.mean(np.abs(before) ** 2)
     count = before.size
@@ -101,7 +102,7 @@ def test_forces_that_differ_are_forgotten_and_the_pattern_of_the_mean_force_is_n
 def test_the_sign_of_the_mean_force_turns_the_frozen_pattern():
     field, noise = process(), Noise(2, "shear", np.arange(3))
     first = field.start(moved(0), bonding(0.8, 0.0), noise)
-    back = field.step(first, moved(1, 1.0), bonding(-0.8, 0.0), noise)
+    back = advanced(field, first, moved(1, 1.0), bonding(-0.8, 0.0), noise)
     assert_allclose(field.complex_amplitudes(back), -field.complex_amplitudes(first), rtol=1e-14)
 
 
