@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -102,7 +103,7 @@ def lens(duration: int, members: int, *parts: str) -> str:
     return LENS.format(duration=duration, members=members) + "".join(parts)
 
 
-#: Scenes whose steps are marched.
+#: Scenes whose steps are made as a run makes them.
 STEPS = {
     "banded step, 64 members": lens(400, 64, RAMP, RATE, BANDED, LOAD),
     "modal step, 256² modes": lens(20, 1, RAMP, RATE, FIELD.format(model="modal", more="points = 256"), LOAD),
@@ -128,7 +129,7 @@ WHOLE = "whole small run"
 def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
     """What is timed in a tree, by the name of its row; called in the tree's own process."""
     import sim
-    from sim.engine import march
+    from sim import engine
     from sim.laws import jkr
 
     assert Path(sim.__file__).is_relative_to(tree), f"{sim.__file__} is not of {tree}"
@@ -143,7 +144,15 @@ def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
 
     def steps(text: str) -> Callable[[], object]:
         scene = cache(lambda: sim.load(written("scene", text)))
-        return lambda: sum(1 for _ in march(scene(), np.arange(scene().ensemble.members), keep=False))
+
+        def marched() -> None:
+            members = np.arange(scene().ensemble.members)
+            if hasattr(engine, "follow"):  # by blocks of steps where nothing feeds back, as a run does
+                engine.follow(scene(), engine.Dice.of(1, members), None, range(scene().clock.steps + 1))
+            else:
+                deque(engine.march(scene(), members, keep=False), maxlen=0)
+
+        return marched
 
     random = np.random.default_rng(1)
     load, depth, work = (
