@@ -142,9 +142,9 @@ def follow(scenario: Scenario, dice: Dice, state: State | None, steps: range) ->
     kept = []
     if state is None:
         state = start(scenario, dice)
-        kept.append(course_of(scenario, state))
+        kept += [course_of(scenario, state)] if steps.start == 0 else []
     rows, numbers = len(dice.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
-    longest = 1 if any(part.feeds_back for part in scenario.chosen) else max(1, _BLOCK_NUMBERS // (rows * numbers))
+    longest = 1 if scenario.by_steps else max(1, _BLOCK_NUMBERS // (rows * numbers))
     while state.step < steps[-1]:
         block = range(state.step + 1, min(state.step + longest, steps[-1]) + 1)
         state, passed = advance(scenario, state, dice, block)

@@ -8,9 +8,9 @@ import numpy as np
 from sim.ensemble.recorded import LARGEST, VARIABLES, Variable
 from sim.scenario.scenario import Scenario
 
-_GROUP = 64
+_GROUP = 256
 _PART_NUMBERS = 2**22
-_STATE_NUMBERS = 2**25
+_STATE_NUMBERS = 2**23
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ class Plan:
 
     @cached_property
     def group(self) -> int:
-        """Members of one part: as many as keep its state below a quarter of a gigabyte, 64 at the most."""
+        """Members of one part."""
         some = self.points[:: max(1, len(self.points) // 4)]
-        numbers = max(2 * point.process.pairs + point.population.numbers for point in some)
+        most = min(together(point) for point in some)
         for point in some:
             point.release()
-        return min(_GROUP, self.members, max(1, _STATE_NUMBERS // numbers))
+        return min(self.members, most)
 
     @property
     def stretch(self) -> int:
@@ -70,6 +70,11 @@ class Plan:
     def varies(self, variable: Variable) -> bool:
         """Whether the variable has the member dimension."""
         return any(point.varies[variable.part] for point in self.points)
+
+
+def together(scenario: Scenario) -> int:
+    """Members that are best advanced together: as many as keep their state below 64 MB, 256 at the most."""
+    return min(_GROUP, max(1, _STATE_NUMBERS // (2 * scenario.process.pairs + scenario.population.numbers)))
 
 
 def work(plan: Plan) -> int:

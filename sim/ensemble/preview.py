@@ -17,9 +17,10 @@ from sim.scenario.declared import entries
 from sim.scenario.scenario import Scenario
 
 # Rough costs of one core, for the estimate only [s]: starting up; a point of a sweep; a part file; a step and a record
-# of a batch; a step of a counted population, an event of a bond that is followed; a byte.
-_START, _POINT, _PART, _STEP, _RECORD = 3.0, 15e-3, 5e-3, 150e-6, 150e-6
-_COUNTED, _EVENT, _BYTE = 3e-7, 1e-7, 50e-9
+# of a batch, a step of one where a part feeds back; a step and a record of a member; a step of a counted population, an
+# event of a bond that is followed; a byte.
+_START, _POINT, _PART, _STEP, _RECORD, _ALONE = 3.0, 15e-3, 5e-3, 5e-6, 5e-6, 150e-6
+_OF_MEMBER, _RECORD_OF_MEMBER, _COUNTED, _EVENT, _BYTE = 5e-8, 2e-7, 3e-7, 1e-7, 50e-9
 _PROGRAM_BYTES, _SCENARIO_BYTES = 200e6, 2e4
 _STATISTICS = 3
 #: Points of a sweep whose cells are looked at.
@@ -223,8 +224,9 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
 def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:
     """Time of the whole run on one core, linear in the members."""
     clock, group = plan.points[0].clock, Plan(plan.scenario, tuple(some)).group
-    batch = (clock.steps + 1) * _STEP + clock.records * _RECORD + _PART
-    member = 0.0
+    batch, member = clock.records * _RECORD + _PART, clock.steps * _OF_MEMBER + clock.records * _RECORD_OF_MEMBER
+    batch += clock.steps * max(_STEP + _ALONE * point.by_steps + _own(point) for point in some)
+    member *= len(some)
     for point in some:
         pairs, bonds = point.process.pairs, point.population
         member += (clock.steps + 1) * pairs * point.fluctuations.pair_seconds
@@ -234,6 +236,11 @@ def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:
     batches, points = max(1.0, plan.members / group), len(plan.points)
     computed = points * (_POINT + batches * batch + plan.members * member / len(some))
     return _START + computed + _BYTE * _bytes(plan, some[0])
+
+
+def _own(point: Scenario) -> float:
+    """Time that parts which go step by step take for a step of a batch [s]."""
+    return point.population.step_seconds + point.contact.step_seconds
 
 
 def _bytes(plan: Plan, point: Scenario) -> float:

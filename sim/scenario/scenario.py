@@ -206,6 +206,11 @@ class Scenario:
         sheared = self.fluctuations.per_member or (self.fluctuations.reads_stress and bonded)
         return {"drive": self.drive.per_member, "bonds": bonded, "shear": sheared, "contact": bonded or sheared}
 
+    @property
+    def by_steps(self) -> bool:
+        """True if a part feeds back, so that a run goes step by step and not by blocks of steps."""
+        return any(part.feeds_back for part in self.chosen)
+
     def remarks(self) -> list[str]:
         """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""
         said = [remark for part in self.chosen for remark in part.remarks(self.setting)]

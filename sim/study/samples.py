@@ -6,7 +6,6 @@ a member's own times are correlated. Two estimates that share members, and so no
 influences of the shared ones.
 """
 
-import itertools
 import time
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -14,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.engine import course_of, march
+from sim.engine import Dice, course_of, follow, march
+from sim.ensemble.plan import together
 from sim.scenario.scenario import Scenario
 from sim.study.exact_law import QUANTITIES, READ
 
@@ -24,8 +24,8 @@ Array = NDArray[np.float64]
 _REPEATS, _LEAST = 5, 0.005
 #: A repeat ends with a run, or after so many steps, or after so many times its length.
 _MANY, _LONG = 64, 20.0
-#: Members advanced together, and the numbers that their state may hold, as in a run.
-_GROUP, _STATE_NUMBERS = 64, 2**25
+#: Steps that are timed at once.
+_PIECE = 512
 #: Fewest members of a sample, and the most values of each quantity that it keeps.
 _FEWEST, _MOST_VALUES = 16, 2**20
 #: Independent values without which a spread is not estimated, and those of them that must differ from the most common.
@@ -42,9 +42,9 @@ def fluctuates(scenario: Scenario) -> bool:
 def timed(scenario: Scenario, seconds: float) -> list[float]:
     """CPU time of the scene's run, all members [s]: median, least and largest of repeats within a time to spend [s]."""
     members = scenario.ensemble.members if fluctuates(scenario) else 1
-    together = min(_group(scenario), members)
-    paces = _paces(scenario, together, max(seconds / (_REPEATS + 1), _LEAST), _REPEATS)
-    steps = -(-members // together) * scenario.clock.steps
+    batch = min(together(scenario), members)
+    paces = _paces(scenario, batch, max(seconds / (_REPEATS + 1), _LEAST), _REPEATS)
+    steps = -(-members // batch) * scenario.clock.steps
     return [steps * pace for pace in (float(np.median(paces)), min(paces), max(paces))]
 
 
@@ -52,29 +52,26 @@ def affordable(scenario: Scenario, steps: int, seconds: float, times: int) -> in
     """Members that so many steps of a scene can be sampled for within a time [s]; 0 if only a few."""
     if not fluctuates(scenario):
         return 1
-    together = _group(scenario)
-    pace = min(_paces(scenario, together, _LEAST, 2))
-    members = int(min(seconds / (pace * (steps + 1)) * together, _MOST_VALUES // times))
+    batch = together(scenario)
+    pace = min(_paces(scenario, batch, _LEAST, 2))
+    members = int(min(seconds / (pace * (steps + 1)) * batch, _MOST_VALUES // times))
     return members if members >= _FEWEST else 0
-
-
-def _group(scenario: Scenario) -> int:
-    numbers = 2 * scenario.process.pairs + scenario.population.numbers
-    return max(1, min(_GROUP, _STATE_NUMBERS // max(numbers, 1)))
 
 
 def _paces(scenario: Scenario, members: int, seconds: float, repeats: int) -> list[float]:
     """CPU times per step of a batch of members [s], each of whole runs or of a piece of one that takes long enough."""
-    found = []
-    states = (state for _ in itertools.count() for state in march(scenario, np.arange(members), keep=False))
+    found, piece, state, last = [], 1, None, scenario.clock.steps
+    dice = Dice.of(scenario.seed, np.arange(members))
     for _ in range(repeats + 1):
         steps, spent, began, whole = 0, 0.0, time.process_time(), False
         while spent < seconds or not (whole or steps >= _MANY or spent > _LONG * seconds):
-            state = next(states)
-            spent = time.process_time() - began
-            steps += state.step > 0
-            whole = state.step == scenario.clock.steps
-        found.append(spent / max(steps, 1))
+            before = state.step if state is not None and state.step < last else 0
+            stop = min(before + piece, last)
+            state, _ = follow(scenario, dice, state if before else None, range(before + 1, stop + 1))
+            spent, piece = time.process_time() - began, min(2 * piece, _PIECE)
+            steps += stop - before
+            whole = stop == last
+        found.append(spent / steps)
     return found[1:]  # the first compiles and loads
 
 
@@ -104,9 +101,9 @@ def coupled(scenarios: Sequence[Scenario], members: int, steps: Sequence[int]) -
     ratios = [round(scene.clock.step / scenarios[0].clock.step) for scene in scenarios]
     places = {step: k for k, step in enumerate(steps)}
     kept = np.empty((len(scenarios), len(QUANTITIES), members, len(steps)))
-    together = _group(scenarios[0])
-    for first in range(0, members, together):
-        batch = np.arange(first, min(first + together, members))
+    most = together(scenarios[0])
+    for first in range(0, members, most):
+        batch = np.arange(first, min(first + most, members))
         drawn = _Drawn()
         others = [march(drawn.into(scene), batch) for scene in scenarios[1:]]
         for state in march(scenarios[0], batch):

@@ -113,7 +113,7 @@ class Course:
 
     def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
         ends = [(start, self.at(start, duration)), *self._turns(start, stop, duration), (stop, self.at(stop, duration))]
-        return [self._piece(*ends[k], *ends[k + 1], duration) for k in range(len(ends) - 1)]
+        return [self.smooth(*ends[k], *ends[k + 1], duration) for k in range(len(ends) - 1)]
 
     def _turns(self, start: float, stop: float, duration: float) -> list[tuple[float, float]]:
         """Times strictly between two others at which the course turns back, and its values there."""
@@ -124,7 +124,8 @@ class Course:
         low, high = start + _SAME * duration, stop - _SAME * duration
         return [(k * half, self.stop if k % 2 else self.start) for k in range(first, last + 1) if low < k * half < high]
 
-    def _piece(self, start: float, first: float, stop: float, last: float, duration: float) -> Piece:
+    def smooth(self, start: float, first: float, stop: float, last: float, duration: float) -> Piece:
+        """The way between two values, in between which the course does not turn."""
         if self.scale == "linear":
             return linear_piece(start, stop, first, last)
         rate = math.log(self.stop / self.start) * max(1, 2 * self.cycles) / duration

@@ -57,6 +57,8 @@ class Common:
     """Attributes of all models, as they are where all members share one population."""
 
     in_place: ClassVar[bool] = False
+    #: Rough time of a step of a batch where it is made alone, for estimates [s].
+    step_seconds: ClassVar[float] = 0.0
 
     @property
     def numbers(self) -> int:

@@ -38,6 +38,7 @@ class _Stretched(Common):
 
     stretched: ClassVar[bool] = True
     knows_forces: ClassVar[bool] = True
+    step_seconds: ClassVar[float] = 80e-6
     carries_stress: ClassVar[bool] = True
 
     rupture: Rupture

@@ -52,6 +52,8 @@ class _Controlled:
     feeds_back: ClassVar[bool] = False
     #: Whether the edge takes time to reach equilibrium.
     lags: ClassVar[bool] = False
+    #: Rough time of a step of a batch where it is made alone, for estimates [s].
+    step_seconds: ClassVar[float] = 0.0
 
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
@@ -250,6 +252,7 @@ class RateDependent(_Controlled):
     """
 
     lags: ClassVar[bool] = True
+    step_seconds: ClassVar[float] = 120e-6
 
     front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G - w = work at rest", "v_0", above=0)]
     front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6

@@ -6,6 +6,7 @@ step, never the speed times the step, so that parts that live on slip see no ste
 
 import itertools
 import math
+from collections.abc import Iterator
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -39,9 +40,8 @@ class _Sliding:
 
     def advance(self, state: Slider, resistance: Resistance, times: Times, steps: range) -> tuple[Slider, Motions]:
         ends = [times.at(step) for step in range(steps.start - 1, steps.stop)]
-        spans = itertools.pairwise(ends)
-        columns = np.array([self._over(*span, times.duration) for span in spans]).T[:, :, np.newaxis]
-        time, duration, slip, path, first, speed = columns
+        rows = [_sums(start, stop, pieces) for start, stop, pieces in self.each(ends, times.duration)]
+        time, duration, slip, path, first, speed = np.array(rows).T[:, :, np.newaxis]
         position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
         motions = Motions(steps.start, time, duration, slip, path, first, speed, position)
         return Slider(position[-1], speed[-1]), motions
@@ -53,16 +53,23 @@ class _Sliding:
         """The speed from ``start`` to ``stop`` [s] in pieces."""
         raise NotImplementedError
 
+    def each(self, ends: list[float], duration: float) -> Iterator[tuple[float, float, list[Piece]]]:
+        """Start and end of each step [s], and the speed in it in pieces."""
+        return ((*span, self.pieces(*span, duration)) for span in itertools.pairwise(ends))
+
     def motion(self, step: int, start: float, stop: float, duration: float) -> Motion:
         """Slip, path and final speed from time ``start`` to ``stop`` of a run of ``duration`` [s]."""
-        time, span, *sums = self._over(start, stop, duration)
+        time, span, *sums = _sums(start, stop, self.pieces(start, stop, duration))
         return Motion(step, time, span, *np.array(sums)[:, np.newaxis])
 
-    def _over(self, start: float, stop: float, duration: float) -> tuple[float, ...]:
-        """End and length of a step [s], slip and path in it [m], speeds at its ends [m/s]."""
-        pieces = self.pieces(start, stop, duration)
+
+def _sums(start: float, stop: float, pieces: list[Piece]) -> tuple[float, ...]:
+    """End and length of a step [s], slip and path in it [m], speeds at its ends [m/s]."""
+    first, last = pieces[0], pieces[-1]
+    slip, path = first.integral, first.path
+    if len(pieces) > 1:
         slip, path = math.fsum(piece.integral for piece in pieces), math.fsum(piece.path for piece in pieces)
-        return stop, stop - start, slip, path, pieces[0].first, pieces[-1].last
+    return stop, stop - start, slip, path, first.first, last.last
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -116,6 +123,11 @@ class Ramp(Course, _Sliding):
     start: Annotated[float, _SPEED, Field(alias="from")]
     stop: Annotated[float, _SPEED, Field(alias="to")]
     model: Literal["ramp"] = "ramp"
+
+    def each(self, ends: list[float], duration: float) -> Iterator[tuple[float, float, list[Piece]]]:
+        speeds = [self.at(end, duration) for end in ends]
+        for start, stop, first, last in zip(ends[:-1], ends[1:], speeds[:-1], speeds[1:], strict=True):
+            yield start, stop, [self.smooth(start, first, stop, last, duration)]
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})

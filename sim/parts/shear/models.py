@@ -271,7 +271,7 @@ class Banded(_Fluctuating):
     variance of the stationary field are exact.
     """
 
-    pair_seconds: ClassVar[float] = 130e-9
+    pair_seconds: ClassVar[float] = 80e-9
 
     tolerance: _Tolerance = 0.01
     model: Literal["banded"] = "banded"
