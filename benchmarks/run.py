@@ -6,6 +6,7 @@ Every ratio is the median over the turns of (time of the other) / (time of ours)
 the middle half of the turns; absolute times are only as seen. Machines are noisy, so compare ratios.
 """
 
+import functools
 import itertools
 import sys
 import time
@@ -21,6 +22,7 @@ from rich.table import Table
 from scipy import fft
 
 from sim.engine import Dice, advance, march, start
+from sim.laws.schallamach import transition_probabilities
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell
@@ -115,33 +117,20 @@ def mean_field() -> list[Row]:
 
 
 def modal() -> list[Row]:
-    """One Ornstein-Uhlenbeck step of all modes of a 256² grid and its energy."""
-    points, cell, exponent = 256, 0.24e-3, 0.1
-    recipe = shear.Modal(spectrum=SPECTRUM, cell=cell, points=points, correlation=Slip(length=5e-6))
-    scenario = scene(1, shear=recipe)
-    process, noise = scenario.process, Noise(1, "shear", np.arange(1))
-    motion = scenario.drive.motion(0, 0.0, 0.0, 0.2)
-    stress = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
-    state = {"now": process.start(motion, stress, noise), "step": 0}
-
-    def ours() -> None:
-        state["step"] += 1
-        moved = drive.Steady(speed=exponent * 5e-6).motion(state["step"], 0.0, 1.0, 1.0)
-        state["now"] = process.step(state["now"], moved, stress, noise)
-
-    rows = []
-    counter = itertools.count(10**6)
-    numbers = np.empty((1, 2 * process.pairs))
-    generator = np.random.Generator(np.random.Philox(1))
-    textbook = plain.TextbookModes(points, cell, SPECTRUM.radial_density, 1.6e6, 1)
-    half = plain.HalfSpectrumModes(points, cell, SPECTRUM.radial_density, 1.6e6, 1)
-    for name, program, promise in (
-        ("numpy, noise by rfft2", lambda: textbook.step(exponent), "2 or more"),
-        ("numpy, half spectrum drawn", lambda: half.step(exponent), ""),
-        ("numpy's normals alone", lambda: generator.standard_normal(out=numbers), ""),
-        ("our normals alone", lambda: noise.normals(next(counter), 2 * process.pairs), "1/2 or more"),
-    ):
-        rows.append(compare(f"modal step, 256² ({process.pairs} pairs)", ours, name, program, promise, 4))
+    """One Ornstein-Uhlenbeck step of all modes of a grid and its energy."""
+    rows, cell, exponent = [], 0.24e-3, 0.1
+    for points in (256, 512):
+        recipe = shear.Modal(spectrum=SPECTRUM, cell=cell, points=points, correlation=SLIP)
+        ours, pairs = lens(exponent, points, 1, recipe), recipe.process(1.6e6, 0.5, cell).pairs
+        generator, numbers = np.random.default_rng(1), np.empty(2 * pairs)
+        textbook = plain.TextbookModes(points, cell, SPECTRUM.radial_density, 1.6e6, 1)
+        half = plain.HalfSpectrumModes(points, cell, SPECTRUM.radial_density, 1.6e6, 1)
+        for name, program, promise in (
+            ("numpy, noise by rfft2", lambda plan=textbook: plan.step(exponent), "6 or more"),
+            ("numpy, half spectrum drawn", lambda plan=half: plan.step(exponent), ""),
+            ("numpy's normals alone", lambda out=numbers, draw=generator: draw.standard_normal(out=out), ""),
+        ):
+            rows.append(compare(f"modal step, {points}² ({pairs} pairs)", ours, name, program, promise, 40))
     return rows
 
 
@@ -356,31 +345,33 @@ def tracked_as_exactly() -> list[Row]:
 
 
 def counted() -> list[Row]:
-    """Two-state bonds at V = Vc in steps of h dt = 1/2, beside numpy's Gillespie of all members at once."""
+    """Two-state bonds at V = Vc in steps of h dt = 1/2, beside numpy's Gillespie of all members and binomials."""
     rows, random = [], np.random.default_rng(1)
     motion = drive.Steady(speed=1e-2).motion(1, 0.0, 1e-3, 1.0)
+    stay, bind = transition_probabilities(1e-2 * 1e-3, 1e-3, 1e-2, 500.0)
     for sites, members, others, promise in (
         (100, 64, 64, ""),
-        (10_000, 64, 64, "500 or more"),
+        (10_000, 100, 100, "500 or more"),
         (10_000, 1000, 1000, "500 or more"),
         (100_000, 1000, 200, "500 or more"),
     ):
         part = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=sites)
-        first = np.full(others, sites // 2)
+        name, ours, first = (
+            f"counted, {sites:,} bonds, {members} members",
+            population(part, members, motion),
+            sites // 2,
+        )
+        events = functools.partial(
+            bonds_plain.counted_gillespie_numpy, np.full(others, first), sites, 1.0, 500.0, 1e-3, random
+        )
+        rows.append(compare(name, ours, "numpy, Gillespie", events, promise, 20, 1, members, others))
+        state = [np.full(members, first)]
+
+        def binomials(state: list = state, sites: int = sites) -> None:
+            state[0] = random.binomial(state[0], stay) + random.binomial(sites - state[0], bind)
+
         rows.append(
-            compare(
-                f"counted, {sites:,} bonds, {members} members",
-                population(part, members, motion),
-                "numpy, Gillespie",
-                lambda first=first, sites=sites: bonds_plain.counted_gillespie_numpy(
-                    first, sites, 1.0, 500.0, 1e-3, random
-                ),
-                promise,
-                20,
-                1,
-                members,
-                others,
-            )
+            compare(name, ours, "numpy, Generator.binomial", binomials, "1/1.1 or more", 20, 20, members, members)
         )
     return rows
 

@@ -62,7 +62,8 @@ def _counted_up(n, p, numbers):
 @device
 def _rejected(n, p, numbers):
     """A binomial number of a mean of ten or more and p <= 1/2."""
-    spread = math.sqrt(n * p * (1.0 - p))
+    variance, most = n * p * (1.0 - p), math.floor((n + 1.0) * p)
+    spread = math.sqrt(variance)
     b = 1.15 + 2.53 * spread
     a = 0.0248 * b + 0.01 * p - 0.0873
     size, sure = (2.83 + 5.1 / b) * spread, 0.92 - 4.2 / b
@@ -78,8 +79,15 @@ def _rejected(n, p, numbers):
             return k, numbers
         if k < 0.0 or k > n:
             continue
-        most = _log_chance(math.floor((n + 1.0) * p), n, p)
-        if logarithm(v * size / (a / (room * room) + b)) <= _log_chance(k, n, p) - most:
+        bar, off = logarithm(v * size / (a / (room * room) + b)), abs(k - most)
+        if off < 0.5 * variance - 1.0:  # Kachitvichyanukul & Schmeiser's bounds (Comm. ACM 31, 1988)
+            about = -0.5 * off * off / variance
+            doubt = ((off * (off / 3.0 + 0.625) + 1.0 / 6.0) / variance + 0.5) * off / variance
+            if bar < about - doubt:
+                return k, numbers
+            if bar > about + doubt:
+                continue
+        if bar <= _log_chance(k, n, p) - _log_chance(most, n, p):
             return k, numbers
 
 
