@@ -60,13 +60,17 @@ def _counted_up(n, p, numbers):
 
 
 @device
+def _hat(spread, p):
+    """Hörmann's constants a, b, α and v_r for a standard deviation and p."""
+    b = 1.15 + 2.53 * spread
+    return 0.0248 * b + 0.01 * p - 0.0873, b, (2.83 + 5.1 / b) * spread, 0.92 - 4.2 / b
+
+
+@device
 def _rejected(n, p, numbers):
     """A binomial number of a mean of ten or more and p <= 1/2."""
     variance, most = n * p * (1.0 - p), math.floor((n + 1.0) * p)
-    spread = math.sqrt(variance)
-    b = 1.15 + 2.53 * spread
-    a = 0.0248 * b + 0.01 * p - 0.0873
-    size, sure = (2.83 + 5.1 / b) * spread, 0.92 - 4.2 / b
+    a, b, size, sure = _hat(math.sqrt(variance), p)
     while True:
         u, numbers = uniform(numbers)
         v, numbers = uniform(numbers)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from sim.numerics import noise
-from sim.numerics.binomial import _log_chance, binomial
+from sim.numerics.binomial import _hat, _log_chance, binomial
 from sim.numerics.jit import kernel
 
 #: Two-sided probability of five standard deviations.
@@ -49,6 +49,17 @@ def _log_chances(number, trials, chance, found):
         found[i] = _log_chance(number[i], trials, chance)
 
 
+@kernel("void(float64, float64, float64[::1])")
+def _hats(spread, chance, found):
+    found[0], found[1], found[2], found[3] = _hat(spread, chance)
+
+
+@kernel("void(uint64, uint64, uint64[::1], int64, float64[::1])")
+def _tails(seed, part, members, step, drawn):
+    for m in range(members.size):
+        drawn[m], _ = noise._beyond(m % 2 - 1, noise.stream(seed, part, members[m], step, 0))
+
+
 def words_from(states, count):
     """Words drawn from given states of the generator, shape (states, count)."""
     states = np.ascontiguousarray(states, dtype=_U)
@@ -77,6 +88,20 @@ def binomials(trials, chance, address, count=1):
     drawn = np.empty((len(address[2]), count))
     _binomials(trials, chance, *address, drawn)
     return drawn
+
+
+def tails(address):
+    """Normals of the tails that the ziggurat draws apart, of both sides in turn, shape (members,)."""
+    drawn = np.empty(len(address[2]))
+    _tails(*address, drawn)
+    return drawn
+
+
+def hat(spread, chance):
+    """Constants a, b, α and v_r of the rejection of binomials."""
+    found = np.empty(4)
+    _hats(spread, chance, found)
+    return found
 
 
 def log_chances(number, trials, chance):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.draws import FIVE_SIGMA, fits, states_at, words_from
+from helpers.draws import FIVE_SIGMA, fits, states_at, tails, words_from
 from numpy.testing import assert_allclose
 from scipy.stats import binom, kstest, norm, poisson
 
@@ -90,6 +90,13 @@ def test_the_normals_have_the_normal_law_in_fine_bins_and_far_tails(draws):
         for count in (seen[first + 1 :].sum(), seen[: len(edges) - first].sum()):
             mean = draws * norm.sf(level)
             assert min(poisson.cdf(count, mean), poisson.sf(count - 1, mean)) > 0.5 * FIVE_SIGMA
+
+
+def test_what_lies_beyond_the_layers_has_the_law_of_a_tail():
+    sample = tails(Noise(5, "shear", np.arange(200_000)).at(1))
+    assert np.all(sample[::2] < 0.0)
+    assert np.all(sample[1::2] > 0.0)
+    assert kstest(norm.sf(np.abs(sample)) / norm.sf(noise._WIDTHS[1]), "uniform").pvalue > FIVE_SIGMA
 
 
 def test_the_normals_have_normal_moments_and_follow_each_other_without_correlation():
