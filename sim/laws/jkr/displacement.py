@@ -74,7 +74,10 @@ def _solve(displacements, stiffnesses, works, sphere_radii, moduli, radii):
         known = excess >= 0.0 and stiffness >= 0.0 and sphere_radius > 0.0 and modulus > 0.0 and work < math.inf
         known = known and 1e-300 < contact < math.inf and (excess < math.inf or displacement == math.inf)
         known = known and (sticks or excess > 0.0 or displacement == 0.0 or stiffness == 0.0)
-        radii[i] = unit * (root + t) * (root + t) if known else math.nan
+        radius = unit * (root + t) * (root + t)
+        if load == 0.0 and not sticks:
+            radius = math.sqrt(displacement) * math.sqrt(sphere_radius)  # of any size: no product leaves the numbers
+        radii[i] = radius if known else math.nan
 
 
 def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus):

@@ -4,31 +4,11 @@ import math
 
 import numpy as np
 
-from sim.laws.jkr.scales import fold_indentation, fold_radius
-from sim.numerics.jit import device, law
+from sim.laws.jkr.displacement import radius_at_displacement
+from sim.laws.jkr.scales import fold_indentation
+from sim.numerics.jit import law
 
 
-@device
-def _above_fold(excess):
-    """The root t >= 0 of t^4 + 4 t^3 + 6 t^2 = 3 excess, for a finite excess >= 0.
-
-    The left side grows and is convex, so Newton's steps from a point right of the root go left and
-    never pass it; each of the three terms alone gives such a point. A step that no longer goes
-    left is rounding, and ends the search.
-    """
-    t = min(math.sqrt(0.5 * excess), np.cbrt(0.75 * excess), math.sqrt(math.sqrt(3.0 * excess)))
-    for _ in range(60):
-        slope = 4.0 * t * (t * (t + 3.0) + 3.0)
-        if slope <= 0.0:
-            break
-        lower = t - (t * t * (t * (t + 4.0) + 6.0) - 3.0 * excess) / slope
-        if not lower < t:
-            break
-        t = lower
-    return t
-
-
-@law
 def radius_at_indentation(indentation, work, sphere_radius, modulus):
     """Contact radius at a given indentation ("fixed grips").
 
@@ -56,10 +36,10 @@ def radius_at_indentation(indentation, work, sphere_radius, modulus):
 
         ``t^2 (6 + 4 t + t^2) = 3 excess``
 
-    The wider, stable contact is its one root t >= 0, for lifted and pressed spheres alike, found
-    by Newton's method from the right. No scale can overflow in it, and its accuracy ends only
-    where the excess itself cancels: at a relative distance d from the fold, a relative change e
-    of an input moves the radius by about e/sqrt(d).
+    The wider, stable contact is its one root t >= 0, for lifted and pressed spheres alike: that of
+    ``radius_at_displacement`` behind an infinite stiffness. Its accuracy ends only where the excess itself
+    cancels: at a relative distance d from the fold, a relative change e of an input moves the radius by
+    about e/sqrt(d).
 
     Examples
     --------
@@ -69,16 +49,7 @@ def radius_at_indentation(indentation, work, sphere_radius, modulus):
     >>> print("%.2e %.2e %.2e" % tuple(a))
     5.48e-05 3.44e-05 nan
     """
-    if work <= 0.0:
-        return math.sqrt(indentation) * math.sqrt(sphere_radius)
-    fold = fold_indentation(work, sphere_radius, modulus)
-    if not indentation >= fold:
-        return math.nan
-    excess = (indentation - fold) / -fold
-    if not excess < 1e300:  # adhesion is lost in rounding
-        return math.sqrt(indentation) * math.sqrt(sphere_radius)
-    stretch = 1.0 + _above_fold(excess)
-    return fold_radius(work, sphere_radius, modulus) * stretch * stretch
+    return radius_at_displacement(indentation, np.inf, work, sphere_radius, modulus)
 
 
 @law

@@ -22,7 +22,7 @@ def fold_radius(work, sphere_radius, modulus):
 def fold_indentation(work, sphere_radius, modulus):
     """Indentation at which it ends: -3 a^2/R with that radius [m]."""
     a = fold_radius(work, sphere_radius, modulus)
-    return -3.0 * a * (a / sphere_radius)
+    return -3.0 * (a * (a / sphere_radius))
 
 
 @device
