@@ -294,9 +294,8 @@ def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
 def _energy(field, pixel, radius, poisson_ratio):
     index, _, share = _coverage(field.shape[-1], radius / pixel)
     grid, kernel = _free_kernel(_padded_size(radius / pixel), poisson_ratio)
-    spectrum = scipy.fft.rfft2(field[index[:, None], index] * share, s=(grid.points, grid.points))
-    power = np.square(spectrum.real) + np.square(spectrum.imag)
-    return 0.5 * pixel**3 * grid.mode_sum(kernel * power) / (grid.points**2 * math.pi * radius**2)
+    power = grid.weighted_power(field[index[:, None], index] * share, kernel)
+    return 0.5 * pixel**3 * power / (grid.points**2 * math.pi * radius**2)
 
 
 def cross_energy_of_map(field, cell, radius, mean_stress, shear_modulus, poisson_ratio=0.5):

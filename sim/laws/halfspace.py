@@ -488,6 +488,4 @@ def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
     """
     field = np.asarray(field, dtype=float)
     grid, unit = _unit_compliance(float(cell), field.shape[-1], float(poisson_ratio))
-    spectrum = grid.forward(field)
-    power = np.square(spectrum.real) + np.square(spectrum.imag)
-    return 0.5 * grid.mode_sum(unit * power) / (grid.cell**4 * np.asarray(shear_modulus))
+    return 0.5 * grid.weighted_power(field, unit) / (grid.cell**4 * np.asarray(shear_modulus))
