@@ -1,7 +1,6 @@
 """Closed forms for the bonds that a dataset was made with."""
 
 import contextlib
-import math
 from typing import NamedTuple, get_args
 
 import numpy as np
@@ -40,9 +39,8 @@ class Population(NamedTuple):
     @property
     def pathway(self) -> tuple[float, float, float] | tuple[()]:
         """Rate [1/s], Bell force [N] and stiffness [N/m] where all rupture is by one pathway that force opens."""
-        rate, softness, limit, catch, _ = self.rupture.law(self.stiffness)
-        bell = softness > 0.0 and catch == 0.0 and limit == math.inf
-        return (rate, self.stiffness / softness, self.stiffness) if bell else ()
+        law = self.rupture.law(self.stiffness)
+        return (law.rate, self.stiffness / law.softness, self.stiffness) if law.one_pathway else ()
 
     @property
     def at_rest(self) -> float:

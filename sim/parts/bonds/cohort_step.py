@@ -7,13 +7,13 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohort_merging import settle
-from sim.parts.bonds.rupture import fresh_integral, growth, hazard_integral, hazard_time, rate_at
+from sim.parts.bonds.rupture import LAW, fresh_integral, growth, hazard_integral, hazard_time, law_of, rate_at
 
 
 class Rules(NamedTuple):
     """Numbers that all rows of a population share."""
 
-    law: tuple[float, float, float, float, float]  # RuptureRate
+    law: tuple[float, ...]  # RuptureRate
     limit: float  # its limit [m]
     steepness: float  # largest relative change of the rupture rate per stretch [1/m]
     rebinding: float
@@ -26,8 +26,8 @@ class Rules(NamedTuple):
 
 @device
 def _rules(numbers):
-    law = (numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
-    return Rules(law, numbers[2], numbers[5], numbers[6], numbers[7], numbers[8], numbers[9], numbers[10], numbers[11])
+    own = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7]
+    return Rules(law_of(numbers[8:]), *own)
 
 
 @device
@@ -245,7 +245,7 @@ def _write(pool, count, weight, stretch, width):
         width[:count], width[count:] = pool[2, :count], 0.0
 
 
-@kernel("void(float64[:,::1], float64[:,::1], UniTuple(float64, 5), float64[::1])")
+@kernel(f"void(float64[:,::1], float64[:,::1], {LAW}, float64[::1])")
 def lost_rows(weight, stretch, law, lost):
     """Stretch per site that rupture takes in unit time, ∑ w x k(\\|x\\|), of each row [m/s]."""
     for m in range(len(weight)):

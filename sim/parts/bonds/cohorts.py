@@ -216,9 +216,9 @@ def _numbers(rupture: RuptureRate, rebinding_rate: float, tolerance: float, larg
     width times its share at most.
     """
     cell, most = _cell(rupture, tolerance), _most(rupture, tolerance)
-    return np.array(
-        [*rupture, rupture.steepness, rebinding_rate, tolerance, largest, cell, _KINK * tolerance, most], dtype=float
-    )
+    heavy = _KINK * tolerance
+    own = rupture.limit, rupture.steepness, rebinding_rate, tolerance, largest, cell, heavy, most
+    return np.array([*own, *rupture], dtype=float)
 
 
 def _cell(rupture: RuptureRate, tolerance: float) -> float:

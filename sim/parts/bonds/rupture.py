@@ -53,6 +53,15 @@ class RuptureRate(NamedTuple):
         """Largest relative change of the rate per stretch [1/m]."""
         return max(self.softness, self.relief if self.catch > 0.0 else 0.0)
 
+    @property
+    def one_pathway(self) -> bool:
+        """True if all rupture is by one pathway that force opens, as Bell's."""
+        return self.softness > 0.0 and self.catch == 0.0 and self.limit == math.inf
+
+
+#: Type of a law in signatures of kernels.
+LAW = f"UniTuple(float64, {len(RuptureRate._fields)})"
+
 
 class _Law:
     """Attributes of all rupture laws.
@@ -161,6 +170,12 @@ class Catch(_Law):
 
 
 Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model")]
+
+
+@device
+def law_of(numbers):
+    """The law of which an array holds the numbers."""
+    return numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
 
 
 @device
