@@ -41,7 +41,8 @@ class Plan:
         return self._there(LARGEST)
 
     def _there(self, variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
-        return tuple(one for one in variables if any(one.there(point) for point in self.points))
+        kept = [one for one in variables if self.scenario.record.keeps(one.name)]
+        return tuple(one for one in kept if any(one.there(point) for point in self.points))
 
     @cached_property
     def group(self) -> int:

@@ -10,6 +10,14 @@ from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import Quantity
 
+#: Quantities that may be recorded, of which ``record.quantities`` chooses.
+Recorded = Literal[
+    "speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion",
+    "contact_radius", "contact_area", "normal_load", "indentation", "displacement", "friction_force", "in_contact",
+    "masked", "detachment_time", "dissipated_energy", "jkr_radius", "hertz_radius", "bonds_radius",
+    "fluctuations_radius", "equilibrium_radius", "applied_load",
+    "peak_stress", "peak_friction", "peak_time", "pull_off_load", "pull_off_time",
+]  # fmt: skip
 _Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
 _MOST_RECORDS = 10_000_000
 _MOST_STEPS = 10**9
@@ -95,4 +103,11 @@ class Record:
     ] = True
     maps: tuple[Annotated[float, Quantity("s", "time of a stress map", "t", at_least=0)], ...] = ()
     map_members: Annotated[int, Quantity("1", "members whose maps are kept", at_least=1, at_most=10**4, whole=True)] = 1
+    quantities: Annotated[
+        tuple[Recorded, ...] | None, Field(description="what is kept beside contact_radius; not given: all")
+    ] = None
     precision: Annotated[Literal["float64", "float32"], Field(description="of trajectories in the file")] = "float64"
+
+    def keeps(self, name: str) -> bool:
+        """Whether a quantity is recorded; the contact radius always is."""
+        return self.quantities is None or name in ("contact_radius", *self.quantities)

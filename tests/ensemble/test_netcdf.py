@@ -3,6 +3,7 @@
 import json
 import pickle
 import sys
+import typing
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -20,11 +21,11 @@ from sim.engine import course_of, march
 from sim.ensemble import plan as plans, simulate as ensemble
 from sim.ensemble.netcdf import variable_name
 from sim.ensemble.plan import Plan
-from sim.ensemble.recorded import VARIABLES
+from sim.ensemble.recorded import LARGEST, VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
-from sim.scenario.clock import Clock, Record
+from sim.scenario.clock import Clock, Record, Recorded
 from sim.scenario.declared import all_tables, keys, quantities, tables
 from sim.scenario.scenario import Scenario, read_sweep
 
@@ -102,6 +103,22 @@ def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
         assert_allclose(pooled[f"{name}_std"], values.std(0, ddof=1), rtol=1e-11)
         assert_allclose(pooled[f"{name}_sem"], values.std(0, ddof=1) / np.sqrt(5), rtol=1e-11)
     assert pooled["bond_fraction"].dims == ("t",)
+
+
+def test_names_that_may_be_recorded_are_the_quantities():
+    assert typing.get_args(Recorded) == tuple(variable.name for variable in VARIABLES + LARGEST)
+
+
+@pytest.mark.parametrize("per_member", [True, False])
+def test_a_quantity_that_is_kept_alone_has_the_bits_of_the_whole_run(per_member):
+    chosen = ("fluctuation_energy", "jkr_radius", "peak_stress", "applied_load")  # the last is not of this scene
+    whole = ensemble.run(sample(record=Record(per_member=per_member)))
+    reduced = sample(record=Record(per_member=per_member, quantities=chosen))
+    some, names = ensemble.run(reduced), {variable.name for variable in VARIABLES + LARGEST}
+    xr.testing.assert_identical(some.drop_attrs(), whole[list(some.variables)].drop_attrs())
+    assert names & {str(name).removesuffix("_mean") for name in some} == {"contact_radius", *chosen[:-1]}
+    kept = [variable.name for variable in Plan.of(reduced).variables + Plan.of(reduced).largest]
+    assert sorted(kept) == sorted(("contact_radius", *chosen[:-1]))
 
 
 def test_maps_are_those_of_the_members_and_times_asked_for():

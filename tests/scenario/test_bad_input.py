@@ -325,6 +325,8 @@ def test_lists_and_choices_of_the_record_are_checked(refusal):
         assert told(found[line - END - 2], line, f"record.{key}", words)
     (problem,) = refusal(text=LENS + '[record]\nmaps = ["1 s", "2 kg"]\n')
     assert told(problem, END + 2, "record.maps", 'value 2: ...unit "kg"')
+    (problem,) = refusal(text=LENS + '[record]\nquantities = ["speed", "contact_aria"]\n')
+    assert told(problem, END + 2, "record.quantities", 'value 2: ..."contact_aria"...did you mean "contact_area"')
 
 
 # --- what does not go together ---
