@@ -101,7 +101,21 @@ class Grid:
 
     def inverse(self, spectrum: np.ndarray) -> np.ndarray:
         """Field of a half spectrum: undoes ``forward``."""
-        return scipy.fft.irfft2(spectrum, s=(self.points, self.points)) / self.spacing**2
+        shape, fields = spectrum.shape[-2:], np.empty((*spectrum.shape[:-2], self.points, self.points))
+        between = np.empty(shape, dtype=complex)
+        for one, field in zip(spectrum.reshape(-1, *shape), fields.reshape(-1, *fields.shape[-2:]), strict=True):
+            self.superpose(one, between, field)
+            field /= self.cell**2
+        return fields
+
+    def superpose(self, amplitudes: np.ndarray, between: np.ndarray, field: np.ndarray) -> None:
+        """Write the sum over all wavevectors of amplitude × exp(i q.x), of a half spectrum, to ``field``.
+
+        ``between`` has the shape of the amplitudes and is overwritten. Arrays used again save the system's time
+        for new ones, as long as the transforms themselves.
+        """
+        np.fft.ifft(amplitudes, axis=0, norm="forward", out=between)
+        np.fft.irfft(between, self.points, axis=1, norm="forward", out=field)
 
     def mode_sum(self, values: np.ndarray) -> np.ndarray:
         """Sum over all wavevectors of a real, even function given on the half spectrum.

@@ -61,9 +61,8 @@ class SiteModes(ModalProcess):
         energy = np.sum(self.weights * np.sum(np.square(field), axis=1), axis=1)
         return Fluctuation(energy, sizes.T, parts)
 
-    def complex_amplitudes(self, state: Fluctuation) -> Array:
-        field = _combined(state.values, state.amplitude.T)
-        return 0.5 * self.deviation * (field[:, 0] + 1j * field[:, 1])
+    def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
+        return _combined(state.values, state.amplitude.T), np.array([0.5])
 
 
 def _combined(parts: Array, sizes: Array) -> Array:

@@ -1,5 +1,6 @@
 """Every Fourier mode of the stress field as an Ornstein-Uhlenbeck process, and maps of the field."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -8,7 +9,7 @@ import numpy as np
 from sim.numerics.grid import Grid
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, normal, stream
-from sim.parts.exchange import Array, Bonding, Gammas, Indices, Motion, Motions
+from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modes import Modes
@@ -62,14 +63,14 @@ class ModalProcess(Renewing):
         renew_modes(values, keep, renew, size, self.weights, *noise.at(step), 0, energy)
         return energy
 
+    def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
+        """Real and imaginary parts, shape (members, 2, pairs), and the size that multiplies each with its deviation."""
+        return state.values, 0.5 * (np.ones(1) if self.amplitude.relaxing else state.amplitude)
+
     def complex_amplitudes(self, state: Fluctuation) -> Array:
         """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
-        scale = np.ones(1) if self.amplitude.relaxing else state.amplitude
-        size = 0.5 * scale[:, np.newaxis] * self.deviation
-        values = np.empty((len(state.values), self.pairs), dtype=complex)
-        np.multiply(state.values[:, 0], size, out=values.real)
-        np.multiply(state.values[:, 1], size, out=values.imag)
-        return values
+        parts, size = self._standard(state)
+        return size[:, np.newaxis] * self.deviation * (parts[:, 0] + 1j * parts[:, 1])
 
     def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
         """Stress maps τ1(x, y) on the grid of the first ``members``, shape (members, points, points) [Pa].
@@ -80,15 +81,18 @@ class ModalProcess(Renewing):
         first = state._replace(values=state.values[:members])
         if len(state.amplitude) > 1:
             first = first._replace(amplitude=state.amplitude[:members])
-        lattice = np.arange(-self.grid.points, self.grid.points + 1)
-        turns = np.exp(-2j * np.pi / self.grid.cell * position[:members, np.newaxis] * lattice) * self.grid.cell**2
-        amplitudes = self.complex_amplitudes(first)
-        amplitudes *= np.take(turns, self.modes.ix + self.grid.points, axis=1)
-        half = np.zeros((members, self.grid.points * (self.grid.points // 2 + 1)), dtype=complex)
-        half[:, self._places] = amplitudes
-        edge = self.modes.iy == 0  # the column q_y = 0 holds both of a pair
-        half[:, -self.modes.ix[edge] % self.grid.points * (self.grid.points // 2 + 1)] = amplitudes[:, edge].conj()
-        return self.grid.inverse(half.reshape(members, self.grid.points, -1))
+        parts, size = self._standard(first)
+        maps, points = np.empty((members, self.grid.points, self.grid.points)), self.grid.points
+        shifts, sizes = (np.broadcast_to(values, members) for values in (2.0 * np.pi / self.grid.cell * position, size))
+        try:
+            half, between = self._spare.pop()
+        except IndexError:  # the first map, or another thread has them
+            half, between = np.zeros((2, points, points // 2 + 1), dtype=complex)
+        for part, shift, one, field in zip(parts, shifts, sizes, maps, strict=True):
+            spread_modes(part, one, self.deviation, self.modes.ix, self.modes.iy, shift, half)
+            self.grid.superpose(half, between, field)
+        self._spare.append((half, between))
+        return maps
 
     @cached_property
     def grid(self) -> Grid:
@@ -96,9 +100,9 @@ class ModalProcess(Renewing):
         return Grid(self.modes.cell, self.modes.points)
 
     @cached_property
-    def _places(self) -> Indices:
-        """Index of each pair in the flattened half spectrum."""
-        return self.modes.ix % self.grid.points * (self.grid.points // 2 + 1) + self.modes.iy
+    def _spare(self) -> list[tuple[Array, Array]]:
+        """Half spectra that no map is being made of; the first of two is zero but at the modes."""
+        return []
 
     @property
     def gammas(self) -> Gammas:
@@ -136,9 +140,8 @@ class FixedProcess(ModalProcess):
     def _energy(self, amplitude: Array) -> Array:
         return amplitude**2 * (2.0 * np.sum(self.weights))
 
-    def complex_amplitudes(self, state: Fluctuation) -> Array:
-        size = np.sqrt(0.5) * state.amplitude[:, np.newaxis] * self.deviation
-        return size * np.exp(1j * state.values)
+    def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
+        return np.stack([np.cos(state.values), np.sin(state.values)], axis=1), np.sqrt(0.5) * state.amplitude
 
     @property
     def gammas(self) -> Gammas:
@@ -173,3 +176,20 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, r
                 values[m, row, k], values[m, row + 1, k] = x, y
                 total += weights[k] * (x * x + y * y)
             energy[s, m] = total
+
+
+@kernel(
+    "void(float64[:,::1], float64, float64[::1], Array(int64, 1, 'C', readonly=True),"
+    " Array(int64, 1, 'C', readonly=True), float64, complex128[:,::1])"
+)
+def spread_modes(parts, size, deviation, ix, iy, shift, half):
+    """Amplitudes of mode pairs, each turned by exp(−i ix shift), at their places in a half spectrum."""
+    points = len(half)
+    turns = np.empty(2 * points + 1, np.complex128)
+    for j in range(turns.size):
+        turns[j] = complex(math.cos((j - points) * shift), -math.sin((j - points) * shift))
+    for k in range(ix.size):
+        value = size * deviation[k] * complex(parts[0, k], parts[1, k]) * turns[ix[k] + points]
+        half[ix[k] if ix[k] >= 0 else ix[k] + points, iy[k]] = value
+        if iy[k] == 0:  # this column holds both of a pair
+            half[-ix[k] if ix[k] <= 0 else points - ix[k], 0] = value.conjugate()

@@ -113,6 +113,23 @@ def test_a_frozen_pattern_moves_with_the_slider(amplitudes):
         assert_allclose(moved, np.roll(maps[0], cells, axis=1), rtol=0, atol=1e-9 * np.abs(maps[0]).max())
 
 
+@pytest.mark.parametrize("points", [12, 13])
+@pytest.mark.parametrize("amplitudes", ["gaussian", "fixed"])
+def test_a_map_is_the_sum_of_its_waves_whatever_map_was_made_before(points, amplitudes):
+    part = shear.Mapped(
+        spectrum=SPECTRUM, cell=CELL, points=points, correlation=Slip(length=3e-6), mode_amplitudes=amplitudes
+    )
+    scenario, found = states(part, 2, Clock(duration=2e-3, step=1e-3), drive.Steady(speed=1e-3))
+    process, position = scenario.process, np.array([0.37, -5.3]) * CELL
+    x = np.arange(points) * CELL / points
+    for state in found:
+        turned = process.complex_amplitudes(state.shear) * np.exp(-1j * position[:, np.newaxis] * process.modes.qx)
+        along, across = (np.exp(1j * np.multiply.outer(q, x)) for q in (process.modes.qx, process.modes.qy))
+        expected = 2.0 * np.einsum("mk,kx,ky->mxy", turned, along, across).real
+        maps = process.maps(state.shear, position, 2)
+        assert_allclose(maps, expected, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
 def test_mapped_and_modal_give_the_same_energy_number_for_number():
     recipe = {"spectrum": SPECTRUM, "cell": CELL, "points": 12, "correlation": Slip(length=3e-6)}
     clock = Clock(duration=5e-3, step=1e-3)
