@@ -436,3 +436,12 @@ def test_converge_prints_a_table_a_recommendation_and_its_files(tmp_path, monkey
     assert (tmp_path / "outputs" / "scene-converge.png").exists()
     refused = CliRunner().invoke(cli.cli, ["converge", str(path), "--budget", "2 kg"])
     assert refused.exception is not None and "budget" in str(refused.exception)
+
+
+def test_a_reduced_file_has_a_table_and_names_what_a_figure_misses(here):
+    done = sim("run", "scene.toml", "-o", "out.nc", "--set", 'record.quantities=["speed"]')
+    assert done.exit_code == 0 and "V" in done.output and "A/A_JKR" not in done.output
+    assert sim("stats", "out.nc", "--csv", "out.csv").exit_code == 0
+    drawn = sim("plot", "out.nc", "stress")
+    assert drawn.exit_code == cli.BAD_INPUT and "out.nc: shear_stress" in drawn.output
+    assert 'add "shear_stress" to record.quantities' in drawn.output

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.fft
 import xarray as xr
 
-from sim.analysis.scene import MEMBERS
+from sim.analysis.scene import MEMBERS, steady_points
 
 #: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
 _WINDOW = 6.0
@@ -107,11 +107,11 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         ``correlation_time``, ``correlation_time_sem`` and, where records are too coarse for a number,
         ``correlation_time_below`` [s] with the sweep's dimensions.
     """
-    energy, speed = dataset.get("fluctuation_energy"), dataset["speed"]
+    energy = dataset.get("fluctuation_energy")
     times = [xr.full_like(dataset["contact_modulus"], math.nan)] * 3
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
-        stationary = energy.astype(float).where((speed == speed.isel(t=0)).all("t"))  # nan has no correlation time
+        stationary = energy.astype(float).where(steady_points(dataset))  # nan has no correlation time
         dims: Any = {"input_core_dims": [[MEMBERS, "t"]], "output_core_dims": [[]] * 3}
         times = xr.apply_ufunc(lambda values: integral_time(values, step), stationary, vectorize=True, **dims)
     about = "integral correlation time of the fluctuation energy"

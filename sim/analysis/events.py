@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from sim.analysis.observables import masks, ordered, pure
-from sim.analysis.scene import MEMBERS, control, setting, word
+from sim.analysis.scene import MEMBERS, answered, control, setting, where_recorded, word
 
 #: A maximum is one if it stands above the ends of the run by more than rounding.
 _ROUNDING = 1e-9
@@ -41,13 +41,16 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
-    found = _openings(dataset).merge(_masks(dataset)).merge(peaks(dataset))
+    found = _openings(dataset)
+    for part in (_masks, peaks):
+        with where_recorded():
+            found = found.merge(part(dataset))
     for suffix in ("", "_mean", "_std", "_sem"):
         if f"dissipated_energy{suffix}" in dataset:
             lost = dataset[f"dissipated_energy{suffix}"].astype(float).isel(t=-1, drop=True)
             text = "energy dissipated by opening and closing, in all"
             found[f"total_dissipated{suffix}"] = lost.assign_attrs(units="J", long_name=text, symbol="W")
-    with contextlib.suppress(ValueError):
+    with contextlib.suppress(ValueError), answered():
         found = found.merge(loop_energy(dataset).mean("cycle", keep_attrs=True))
     return found
 

@@ -10,7 +10,7 @@ import itertools
 import numpy as np
 import xarray as xr
 
-from sim.analysis.scene import MEMBERS, setting, stays_held
+from sim.analysis.scene import MEMBERS, answered, setting, stays_held, where_recorded
 
 KEPT = ("mean", "std", "sem")
 
@@ -113,23 +113,23 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     no work of adhesion is left (Hertz's contact): their ensemble means are the fractions.
     """
     found = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
-    full = full_area(dataset)
     for suffix in ("", *(f"_{kind}" for kind in KEPT)):
-        if f"contact_area{suffix}" in found:
-            ratio = found[f"contact_area{suffix}"].astype(float) / full
+        if f"contact_area{suffix}" in found and {"jkr_radius", "hertz_radius"} <= set(found):
+            ratio = found[f"contact_area{suffix}"].astype(float) / full_area(dataset)
             found[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
         if f"in_contact{suffix}" in found:
             closed = found[f"in_contact{suffix}"].astype(float)
             opened = closed if suffix in ("_std", "_sem") else 1.0 - closed
             found[f"fraction_detached{suffix}"] = pure(opened, "open contacts")
-    found = found.assign(masks(dataset))
+    with where_recorded():
+        found = found.assign(masks(dataset))
     return found.drop_vars([n for n in found if str(n).startswith(("in_contact", "masked"))])
 
 
 def all_observables(dataset: xr.Dataset) -> xr.Dataset:
     """``observables``, with the shares of the lost area where they are known."""
     found = observables(dataset)
-    with contextlib.suppress(ValueError):
+    with contextlib.suppress(ValueError), answered():
         found = found.merge(share_observables(dataset))
     return found
 

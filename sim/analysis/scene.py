@@ -6,7 +6,9 @@ A number of the scenario is a variable, a swept one a coordinate; the resolved s
 import contextlib
 import json
 import os
-from typing import Any, NamedTuple
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple, get_args
 
 import netCDF4
 import numpy as np
@@ -14,12 +16,15 @@ import xarray as xr
 from xarray.backends import CachingFileManager, NetCDF4DataStore
 
 from sim.numerics.files import HDF5
+from sim.units.recorded import Recorded
 from sim.units.refusals import BadInput, refuse_old
 
 MEMBERS = "member"
 #: What is said of a file that cannot be read.
 BROKEN = "is not a netCDF file, or is cut short; run the scenario again"
 
+#: A missing variable in the words of xarray, without the ending of a statistic.
+_MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
 _CONTROLS = ("load", "indentation", "displacement")
 
 
@@ -48,15 +53,46 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     return dataset
 
 
+@contextlib.contextmanager
+def answered() -> Iterator[None]:
+    """A context in which a quantity that a dataset lacks is refused with the key that records it.
+
+    Raises
+    ------
+    BadInput
+        With one sentence.
+    """
+    try:
+        yield
+    except KeyError as fault:
+        name = found[1] if (found := _MISSING.search(str(fault.args[0]))) else ""
+        if name not in get_args(Recorded):
+            raise
+        raise BadInput([f'{name} was not recorded; add "{name}" to record.quantities and run again']) from None
+
+
+@contextlib.contextmanager
+def where_recorded() -> Iterator[None]:
+    """A context that is left where a dataset lacks a quantity, without a refusal."""
+    with contextlib.suppress(BadInput), answered():
+        yield
+
+
 def sweep_dims(dataset: xr.Dataset) -> tuple[str, ...]:
     """Names of the sweep's dimensions, outermost first."""
     return tuple(str(name) for name in dataset["contact_modulus"].dims)
 
 
+def steady_points(dataset: xr.Dataset) -> xr.DataArray:
+    """True at the points of the sweep where the speed is constant in time; unrecorded, where the drive is steady."""
+    if "speed" not in dataset:
+        return word(dataset, "drive.model", "") == "steady"
+    return (dataset["speed"] == dataset["speed"].isel(t=0)).all("t")
+
+
 def is_steady(dataset: xr.Dataset) -> bool:
     """True if the speed is constant in time at every point of the sweep."""
-    speed = dataset["speed"]
-    return bool((speed == speed.isel(t=0)).all())
+    return bool(steady_points(dataset).all())
 
 
 def is_stationary(dataset: xr.Dataset) -> bool:
@@ -162,8 +198,10 @@ def stays_held(dataset: xr.Dataset) -> xr.DataArray:
     It is not where the scenario gives one course for all points, nor where the contacts with all adhesion and with
     none change, which depend on nothing else.
     """
-    radii, moves = dataset[["jkr_radius", "hertz_radius"]], False
+    radii, moves = [dataset[name] for name in ("jkr_radius", "hertz_radius") if name in dataset], False
     with contextlib.suppress(KeyError):
         moves = isinstance(resolved(dataset, f"contact.{control(dataset).kind}"), dict)
-    still = (radii == radii.isel(t=0)).all("t")
-    return (still["jkr_radius"] & still["hertz_radius"] & (not moves)).broadcast_like(dataset["contact_modulus"])
+    still = xr.ones_like(dataset["contact_modulus"], bool) & (not moves)
+    for radius in radii:
+        still = still & (radius == radius.isel(t=0)).all("t")
+    return still

@@ -15,7 +15,7 @@ import xarray as xr
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import all_observables, settled
-from sim.analysis.scene import is_stationary, stays_held, sweep_dims, word
+from sim.analysis.scene import answered, is_stationary, stays_held, sweep_dims, word
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary
 from sim.numerics.files import write_whole
 from sim.units.notation import concise, scaled
@@ -280,7 +280,7 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
     found = statistics(dataset)
-    with contextlib.suppress(ValueError):  # shares are not known of every dataset
+    with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         found = found.merge(shares(dataset))
     flat: dict[str, xr.DataArray] = {}
     for key, variable in found.data_vars.items():

@@ -11,23 +11,25 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
+from sim.analysis.scene import answered
 from sim.plots import panels
 from sim.plots.bond_laws import rest_of
 from sim.plots.field import map_figure, needs_maps, spectrum_figure
 from sim.plots.loop import loop_figure, needs_course
 from sim.plots.profile import profile_figure, shapes_of
 from sim.plots.stress import needs_stress, stress_figure
-from sim.plots.style import STYLE, swept_value
+from sim.plots.style import STYLE, recorded, swept_value
 from sim.plots.theories import case_of, sweeps_theories, theories_figure
 from sim.units.refusals import renamed
 
 
 class Kind(NamedTuple):
-    """A kind of figure: what draws it, what refuses a dataset that lacks something, and which datasets it fits best."""
+    """A kind of figure: what draws it, what refuses a dataset, which datasets it fits best, and what it reads."""
 
     draw: Callable[[xr.Dataset], Figure]
     needs: Callable[[xr.Dataset], object] = lambda dataset: None
     fits: Callable[[xr.Dataset], bool] = lambda dataset: False
+    reads: tuple[str, ...] = ()
 
     @property
     def shows(self) -> str:
@@ -35,13 +37,14 @@ class Kind(NamedTuple):
         return (self.draw.__doc__ or "").partition("\n")[0]
 
 
+_OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
 #: What can be drawn, by name; the first line of what draws it is its help. The default is the first kind that fits.
 KINDS: dict[str, Kind] = {
-    "loop": Kind(loop_figure, needs_course, lambda dataset: True),
-    "theories": Kind(theories_figure, case_of, sweeps_theories),
-    "stress": Kind(stress_figure, needs_stress, lambda dataset: rest_of(dataset) is not None),
-    "friction": Kind(panels.friction_figure, panels.needs_friction, panels.turns),
-    "curve": Kind(panels.curve_figure, panels.needs_speeds, lambda dataset: not panels.turns(dataset)),
+    "loop": Kind(loop_figure, needs_course, lambda dataset: True, ("normal_load", "displacement")),
+    "theories": Kind(theories_figure, case_of, sweeps_theories, ("shear_stress", "contact_area")),
+    "stress": Kind(stress_figure, needs_stress, lambda dataset: rest_of(dataset) is not None, ("speed",)),
+    "friction": Kind(panels.friction_figure, panels.needs_friction, panels.turns, ("speed",)),
+    "curve": Kind(panels.curve_figure, panels.needs_speeds, lambda dataset: not panels.turns(dataset), _OF_CURVE),
     "sweep": Kind(panels.sweep_figure, panels.needs_sweep, lambda dataset: True),
     "time": Kind(panels.time_figure, fits=lambda dataset: True),
     "map": Kind(map_figure, needs_maps),
@@ -52,7 +55,7 @@ KINDS: dict[str, Kind] = {
 
 def default(dataset: xr.Dataset) -> str:
     """The kind of figure that fits a dataset best."""
-    return next(name for name, kind in KINDS.items() if kind.fits(dataset) and not _missing(dataset, name))
+    return next(name for name, kind in KINDS.items() if not _missing(dataset, name) and kind.fits(dataset))
 
 
 def drawable(dataset: xr.Dataset) -> list[str]:
@@ -63,7 +66,10 @@ def drawable(dataset: xr.Dataset) -> list[str]:
 def _missing(dataset: xr.Dataset, kind: str) -> str:
     """What a dataset lacks for a kind of figure, with the cure; "" for nothing."""
     try:
-        KINDS[kind].needs(dataset)
+        with answered():
+            KINDS[kind].needs(dataset)
+            for name in KINDS[kind].reads:
+                recorded(dataset, name)
     except ValueError as fault:
         return str(fault)
     return ""
@@ -98,7 +104,7 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
     missing = _missing(dataset, kind)
     if missing:
         raise ValueError(f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}")
-    with mpl.rc_context(STYLE):
+    with mpl.rc_context(STYLE), answered():
         figure = KINDS[kind].draw(dataset)
         fixed = [swept_value(dataset, name, 0) for name in sweep_dims(dataset) if dataset.sizes[name] == 1]
         if fixed:

@@ -99,7 +99,9 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
 
 def _small_fluctuations(scene: Scene) -> bool:
     """Whether the fluctuation energy changes, but would be a line at zero beside the work left to the contact."""
-    most, work = (float(np.nanmax(scene.all(f"{n}_mean"))) for n in ("fluctuation_energy", "work_of_adhesion"))
+    most, work = (
+        float(np.max(np.nan_to_num(scene.all(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
+    )
     return 0.0 < most < _SMALL * work and scene.varies("fluctuation_energy")
 
 

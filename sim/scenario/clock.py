@@ -9,15 +9,8 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import Quantity
+from sim.units.recorded import Recorded
 
-#: Quantities that may be recorded, of which ``record.quantities`` chooses.
-Recorded = Literal[
-    "speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion",
-    "contact_radius", "contact_area", "normal_load", "indentation", "displacement", "friction_force", "in_contact",
-    "masked", "detachment_time", "dissipated_energy", "jkr_radius", "hertz_radius", "bonds_radius",
-    "fluctuations_radius", "equilibrium_radius", "applied_load",
-    "peak_stress", "peak_friction", "peak_time", "pull_off_load", "pull_off_time",
-]  # fmt: skip
 _Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
 _MOST_RECORDS = 10_000_000
 _MOST_STEPS = 10**9

@@ -9,12 +9,14 @@ import pytest
 from helpers import lens
 from helpers.lens import scene
 
+import sim
 from sim import analysis
 from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
+from sim.scenario.clock import Record
 from sim.units.quantity import Quantity
 from sim.units.table import columns
 
@@ -40,6 +42,22 @@ def test_table_leaves_out_what_tells_nothing():
     rows = analysis.table(run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform())), rows=5)
     assert len(rows) == 5
     assert list(rows[0]) == ["t\n(ms)", "V\n(mm/s)", "w\n(mJ/m²)", "a\n(µm)", "A/A_JKR\n(%)"]
+
+
+@pytest.mark.parametrize("per_member", [True, False])
+def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
+    kept = ("fluctuation_energy", "speed")
+    whole, some = (
+        run(scene(drive=drive.Steady(speed=1e-2), record=Record(per_member=per_member, quantities=quantities)))
+        for quantities in (None, kept)
+    )
+    rows = analysis.table(some)
+    assert "A/A_JKR\n(%)" not in rows[0] and {"a\n(µm)", "ΔΓ\n(mJ/m²)"} < set(rows[0])
+    for full, row in zip(analysis.table(whole), rows, strict=True):
+        assert row.items() <= full.items()
+    alone = run(scene(record=Record(per_member=per_member, quantities=())))
+    assert [set(row) for row in analysis.table(alone)] == 12 * [{"t\n(ms)", "a\n(µm)"}]
+    assert analysis.highlights(alone) == [] and "contact_radius_mean" in sim.stats(alone)
 
 
 @pytest.mark.parametrize(("loads", "shares", "rows"), [(2, 1, 2), (5, 1, 5), (30, 1, 12), (3, 2, 6), (6, 5, 12)])

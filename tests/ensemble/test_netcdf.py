@@ -25,9 +25,10 @@ from sim.ensemble.recorded import LARGEST, VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
-from sim.scenario.clock import Clock, Record, Recorded
+from sim.scenario.clock import Clock, Record
 from sim.scenario.declared import all_tables, keys, quantities, tables
 from sim.scenario.scenario import Scenario, read_sweep
+from sim.units.recorded import Recorded
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
 

@@ -321,6 +321,14 @@ def test_every_shape_of_dataset_can_be_drawn(changes):
         )
 
 
+def test_a_figure_of_what_was_not_recorded_names_the_quantity_and_the_key():
+    dataset = simulated(record=Record(quantities=("speed", "friction_force", "jkr_radius", "hertz_radius")))
+    for kind, name in (("curve", "contact_area"), ("stress", "shear_stress"), ("friction", "slider_position")):
+        with pytest.raises(ValueError, match=f'^{name} was not recorded; add "{name}" to record.quantities'):
+            plots.draw(dataset, kind)
+    assert plots.default(dataset) == "time" and rendered(plots.draw(dataset))
+
+
 @pytest.mark.parametrize("load", [-1.0, -3e-4], ids=["never closed", "pulled off"])
 def test_layout_stands_without_a_contact(load):
     figure = rendered(plots.draw(simulated(contact=Equilibrium(load=load), shear=shear.Uniform())))
