@@ -62,7 +62,7 @@ def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture):
     members, recipe = 400, {"rupture": rupture, **STRETCHED, "start_from": "bonded"}
     dense = bonds.Cohort(**recipe)
     exact = last(bonds=dense, drive=STARTED)
-    share, stress = cohorts.moments(exact.bonds.cohorts)[0][0], exact.bonding.stress[0]
+    share, stress = cohorts.bound(exact.bonds.cohorts)[0], exact.bonding.stress[0]
     varying = exact.bonding.varying[0]
     for sites in (10**2, 10**3, 10**4):
         few = bonds.Tracked(**recipe, sites=sites)

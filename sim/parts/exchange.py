@@ -126,6 +126,11 @@ class Motions(NamedTuple):
             yield Motion(self.step + k, time, duration, self.slip[k], self.path[k], self.first[k], self.speed[k])
 
 
+def during(values: Array, steps: int) -> Array:
+    """What stays during a block, with the step as first axis."""
+    return values[np.newaxis] if steps == 1 else np.repeat(values[np.newaxis], steps, axis=0)
+
+
 def _constant(value: float) -> Array:
     array = np.full(1, value)
     array.setflags(write=False)

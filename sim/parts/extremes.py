@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.exchange import Array, Bonding, Motions
+from sim.parts.exchange import Array, Bonding, Motions, during
 
 #: Arrays that are read alone, as they come.
 _READ = "Array(float64, 2, 'A', readonly=True), "
@@ -63,10 +63,8 @@ def after(
     radii = _with_start(radius_before, radius, len(radius))
     rows = max(len(so_far.stress), stress.shape[1])
     members = max(rows, len(so_far.friction), radii.shape[1])
-    found = (
-        np.array(np.broadcast_to(values, (count, 4)))
-        for values, count in zip(so_far, (rows, members, max(len(so_far.pull), pull.shape[1])), strict=True)
-    )
+    counts = rows, members, max(len(so_far.pull), pull.shape[1])
+    found = (values + np.zeros((count, 1)) for values, count in zip(so_far, counts, strict=True))
     largest = Extremes(*found)
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
     _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
@@ -76,7 +74,7 @@ def after(
 def _with_start(before: Array, values: Array, steps: int) -> Array:
     """Values at the start of a block and at the end of each step, shape (steps + 1, rows)."""
     if values.ndim == 1:
-        return np.broadcast_to(values, (steps + 1, len(values)))
+        return during(values, steps + 1)
     return np.concatenate([before[np.newaxis], values])
 
 

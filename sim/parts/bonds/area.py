@@ -115,5 +115,5 @@ class OverArea(Common):
         """
         if self.area == "present":
             return _ALL, seen
-        now = np.nan_to_num(radius, nan=0.0)
+        now = np.where(np.isnan(radius), 0.0, radius)
         return np.where(now > 0.0, share_kept(seen, now), 0.0), now  # an open contact has no bonds to fill

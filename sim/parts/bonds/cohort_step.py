@@ -245,14 +245,19 @@ def _write(pool, count, weight, stretch, width):
         width[:count], width[count:] = pool[2, :count], 0.0
 
 
-@kernel(f"void(float64[:,::1], float64[:,::1], {LAW}, float64[::1])")
-def lost_rows(weight, stretch, law, lost):
-    """Stretch per site that rupture takes in unit time, ∑ w x k(\\|x\\|), of each row [m/s]."""
+@kernel(f"void(float64[:,::1], float64[:,::1], float64[:,::1], {LAW}, float64[:,::1])")
+def sum_rows(weight, stretch, width, law, sums):
+    """∑ w, ∑ w x, ∑ w (x² + width²/12) and ∑ w x k(\\|x\\|) over the cohorts of each row, shape (4, rows)."""
     for m in range(len(weight)):
-        lost[m] = 0.0
+        bound, first, second, lost = 0.0, 0.0, 0.0, 0.0
         for i in range(weight.shape[1]):
-            if weight[m, i] > 0.0:
-                lost[m] += weight[m, i] * stretch[m, i] * rate_at(stretch[m, i], law)
+            w, x, d = weight[m, i], stretch[m, i], (width[m, i] if width.shape[1] > 1 else 0.0)
+            if w > 0.0:
+                bound += w
+                first += w * x
+                second += w * (x * x + d * d / 12.0)
+                lost += w * x * rate_at(x, law)
+        sums[0, m], sums[1, m], sums[2, m], sums[3, m] = bound, first, second, lost
 
 
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")

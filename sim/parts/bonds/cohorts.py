@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.parts.bonds.cohort_step import lost_rows, settle_steady, step_rows
+from sim.parts.bonds.cohort_step import settle_steady, step_rows, sum_rows
 from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.exchange import Array
 
@@ -53,8 +53,8 @@ def resting(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> Co
     Examples
     --------
     >>> half = resting(RuptureRate(rate=2.0, softness=1e9, limit=math.inf), rebinding_rate=2.0, tolerance=1e-4)
-    >>> float(bound(half)[0]), float(first_moment(half)[0])
-    (0.5, 0.0)
+    >>> float(bound(half)[0])
+    0.5
     """
     rest = empty(rupture, tolerance)
     if rebinding_rate > 0.0:
@@ -151,26 +151,15 @@ def bound(cohorts: Cohorts) -> Array:
     return np.sum(cohorts.weight, axis=1)
 
 
-def first_moment(cohorts: Cohorts) -> Array:
-    """Stretch per site [m], shape (rows,): the sum of w x."""
-    return np.sum(cohorts.weight * cohorts.stretch, axis=1)
+def moments(cohorts: Cohorts, rupture: RuptureRate) -> Array:
+    """Sums over the cohorts per site, shape (4, rows).
 
-
-def second_moment(cohorts: Cohorts) -> Array:
-    """Square stretch per site [m^2], shape (rows,): the sum of w x², that within the width of a cohort included."""
-    return np.sum(cohorts.weight * (cohorts.stretch**2 + cohorts.width**2 / 12.0), axis=1)
-
-
-def moments(cohorts: Cohorts) -> tuple[Array, Array, Array]:
-    """Share of the sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each shape (rows,)."""
-    return bound(cohorts), first_moment(cohorts), second_moment(cohorts)
-
-
-def lost_moment(cohorts: Cohorts, rupture: RuptureRate) -> Array:
-    """Stretch per site that thermal rupture takes in unit time [m/s], shape (rows,): the sum of w x k(|x|)."""
-    lost = np.empty(len(cohorts.weight))
-    lost_rows(cohorts.weight, cohorts.stretch, tuple(rupture), lost)
-    return lost
+    Share of the sites bound [1]; stretch [m], the sum of w x; square stretch [m^2], that within the width of a cohort
+    included; stretch that thermal rupture takes in unit time [m/s], the sum of w x k(|x|).
+    """
+    found = np.empty((4, len(cohorts.weight)))
+    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, tuple(rupture), found)
+    return found
 
 
 def at_limit(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:

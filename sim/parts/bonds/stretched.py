@@ -186,8 +186,8 @@ class Cohort(OverArea, _Stretched):
 
     def bonding(self, state: Ages) -> Bonding:
         breaking = cohorts.at_limit(state.cohorts, self.law, self.tolerance)
-        lost = cohorts.lost_moment(state.cohorts, self.law)
-        return self._bonding(*cohorts.moments(state.cohorts), breaking, lost)
+        bound, stretch, square, lost = cohorts.moments(state.cohorts, self.law)
+        return self._bonding(bound, stretch, square, breaking, lost)
 
     def steady(self, speed: Array) -> Bonding:
         rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]

@@ -19,7 +19,7 @@ from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance
 from sim.parts.contact.control import Bodies, Control, DisplacementControl, LoadControl
 from sim.parts.contact.crack_front import Hold, Kinetics, advance as advance_front
 from sim.parts.contact.crossing import widest_crossing
-from sim.parts.exchange import Array, Flags, Motion, Motions, Setting, Touching
+from sim.parts.exchange import Array, Flags, Motion, Motions, Setting, Touching, during
 from sim.units.course import Piece, Prescribed, held, prescribed
 from sim.units.quantity import Quantity
 
@@ -154,7 +154,7 @@ class _Controlled:
     def _phases(self, state: Touching, control: Control, balance: Balance) -> Array:
         """Phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
         if min(self.course.extremes) >= 0.0:
-            return np.broadcast_to(state.phases, (len(balance.bonded), *state.phases.shape))
+            return during(state.phases, len(balance.bonded))
         return self._followed(state.phases, control, self._without_equilibrium(control, balance))
 
     def _followed(self, phases: Array, control: Control, lost: Flags) -> Array:
@@ -221,7 +221,7 @@ class Equilibrium(_Controlled):
     def advance(self, state: Touching, motions: Motions, duration: float, balance: Balance) -> Touching:
         control = self.control(motions.time, duration)
         radius = self.equilibrium(control, balance)
-        detached, dissipated = (np.broadcast_to(values, radius.shape) for values in (state.detached, state.dissipated))
+        detached, dissipated = during(state.detached, len(radius)), during(state.dissipated, len(radius))
         if np.isnan(radius).any() or np.isnan(state.radius).any():
             phase = np.where(np.isnan(state.radius), np.where(np.isnan(state.detached), AHEAD, OPEN), CLOSED)
             followed = self._followed(phase[:, np.newaxis], control, np.isnan(radius)[:, :, np.newaxis])

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.special import lambertw
 
-from sim.parts.bonds.cohorts import advance, bound, diluted, empty, first_moment, resting, second_moment, steady
+from sim.parts.bonds.cohorts import advance, bound, diluted, empty, moments as sums, resting, steady
 from sim.parts.bonds.rupture import RuptureRate
 
 BELL = RuptureRate(rate=1.0, softness=1.0, limit=math.inf)
@@ -33,7 +33,7 @@ TABLE = [
 
 
 def moments(cohorts):
-    return np.array([bound(cohorts)[0], first_moment(cohorts)[0], second_moment(cohorts)[0]])
+    return sums(cohorts, RuptureRate(0.0, 0.0, math.inf))[:3, 0]
 
 
 def march(cohorts, speeds, duration, rupture, rebinding, tolerance, **more):
