@@ -14,8 +14,8 @@ DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
 
 
 def model(depth):
-    """What a depth is by its class, by what is held, and by whether its ΔΓ is that of a disc."""
-    held = [key for key in ("load", "indentation", "displacement") if getattr(depth, key, None) is not None]
+    """What a depth is by its class, by what is held and paid for, and by whether its ΔΓ is that of a disc."""
+    held = [key for key in ("load", "indentation", "displacement", "reversible") if getattr(depth, key, None)]
     return (type(depth).__name__, *held, getattr(depth, "contact", "plane"))
 
 

@@ -39,7 +39,8 @@ class Balance(NamedTuple):
 
     def at(self, k: int) -> "Balance":
         """The terms at the end of step k of a block."""
-        return self._replace(bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=self.stress[k])
+        stress = self.stress[k] if self.stress.ndim > 1 else self.stress
+        return self._replace(bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=stress)
 
     def without_stress(self) -> "Balance":
         """The terms without that of the mean stress."""
