@@ -80,6 +80,29 @@ def lambert(x):
 
 
 @device
+def sine_integral(x):
+    """``∫ sin(t)/t dt`` from 0 to x >= 0, to rounding: its series, beyond 3 the continued fraction of E1(ix)."""
+    if x < 3.0:
+        term = total = x
+        for k in range(1, 16):
+            term *= -x * x / (2 * k * (2 * k + 1))
+            total += term / (2 * k + 1)
+        return total
+    below = complex(1.0, x)
+    ratio, inverse = complex(math.inf, 0.0), 1.0 / below
+    fraction = inverse
+    for k in range(1, 200):  # Lentz's method
+        below += 2.0
+        inverse = 1.0 / (below - k * k * inverse)
+        ratio = below - (k * k / ratio if k > 1 else 0.0)
+        change = ratio * inverse
+        fraction *= change
+        if abs(change.real - 1.0) + abs(change.imag) < 3e-16:
+            break
+    return 0.5 * math.pi + fraction.imag * math.cos(x) - fraction.real * math.sin(x)
+
+
+@device
 def cube_root(x):
     """Cube root of x >= 0, right to one unit in the last place; nan below zero.
 

@@ -21,6 +21,8 @@ from scipy.interpolate import CubicSpline
 
 from sim.laws.disc import energy_factors, marginal_factors
 from sim.laws.halfspace import angular_compliance
+from sim.numerics.jit import device
+from sim.numerics.special import sine_integral
 from sim.spectrum.family import Array, Factors, Family
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -243,16 +245,47 @@ class Margin:
             share = law(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
             return np.where(np.isnan(radius), np.nan, share)
         low, high = self._ends
-        if law not in self._splines:
-            self._splines[law] = self._splined(law)
-        share = self._splines[law](np.log(np.clip(radius, low, high)))
+        share = self._spline(law)(np.log(np.clip(radius, low, high)))
         return np.where(radius < low, share * np.maximum(radius, 0.0) / low, share)
+
+    @cached_property
+    def terms(self) -> tuple[tuple[float, float, float], tuple[float, float, float], Array]:
+        """Inputs of ``share_of``: the wave of a ripple or (0, 0, 0), beginning and pieces of the spline, its cubics."""
+        (low, high), wave = self._ends, self.spectrum.wavevector
+        if wave is not None and self._plane > 0.0:
+            level, swing = angular_compliance(np.asarray(self.solid[1], float))
+            square = wave[0] ** 2 + wave[1] ** 2
+            lean = float(swing) * (wave[0] ** 2 - wave[1] ** 2) / square
+            whole = 0.5 * math.pi * (float(level) + lean)
+            return (2.0 * math.sqrt(square), float(level) / whole, -lean / whole), (0.0, 0.0, 0.0), np.zeros((1, 4))
+        count, spline = _POINTS - 1, self._spline(marginal_energy)
+        step = math.log(high / low) / count
+        cubics = np.ascontiguousarray(spline.c.T * step ** np.arange(3, -1, -1))
+        return (0.0, 0.0, 0.0), (low, math.log(low), 1.0 / step), cubics
 
     @cached_property
     def _plane(self) -> float:
         return float(self.spectrum.surface_energy(*self.solid))
 
-    def _splined(self, law: Callable[..., Array]) -> CubicSpline:
-        radii = np.geomspace(*self._ends, _POINTS)
-        energies = law(self.spectrum, radii, *self.solid) if self._plane > 0.0 else np.zeros(_POINTS)
-        return CubicSpline(np.log(radii), energies / (self._plane or 1.0))
+    def _spline(self, law: Callable[..., Array]) -> CubicSpline:
+        if law not in self._splines:
+            radii = np.geomspace(*self._ends, _POINTS)
+            energies = law(self.spectrum, radii, *self.solid) if self._plane > 0.0 else np.zeros(_POINTS)
+            self._splines[law] = CubicSpline(np.log(radii), energies / (self._plane or 1.0))
+        return self._splines[law]
+
+
+@device
+def share_of(radius, wave, ends, cubics):
+    """``Margin`` in compiled loops at a radius above 0, given its ``terms``."""
+    double, level, lean = wave
+    if double > 0.0:
+        x = double * radius
+        integral, half = sine_integral(x), math.sin(0.5 * x)
+        return level * integral + lean * (4.0 * half * half / x - integral)
+    low, begin, rate = ends
+    place = min(rate * (math.log(max(radius, low)) - begin), float(len(cubics)))
+    i = min(int(max(place, 0.0)), len(cubics) - 1)
+    s = place - i
+    share = ((cubics[i, 0] * s + cubics[i, 1]) * s + cubics[i, 2]) * s + cubics[i, 3]
+    return share if radius >= low else share * radius / low

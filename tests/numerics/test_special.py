@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import exp1
 
-from sim.numerics.special import lambert_w, reduced_exponential_integral, scaled_exponential_integral
+from sim.numerics.special import lambert_w, reduced_exponential_integral, scaled_exponential_integral, sine_integral
 
 ORDERS = [0, 1, 2]
 
@@ -79,6 +79,13 @@ def test_the_derivative_of_each_integral_is_the_one_below():
         here, below = scaled_exponential_integral(z, order), scaled_exponential_integral(z, order - 1)
         up, down = (scaled_exponential_integral(z * (1 + s), order) for s in (h, -h))
         assert_allclose((up - down) / (2 * h * z), here - below / z, rtol=1e-7, atol=0)
+
+
+def test_the_sine_integral_is_right_to_rounding_on_both_sides_of_its_seam():
+    x = [0.0, 1e-9, 0.1, 1.0, 2.0, 2.999999, 3.0, 3.3, 5.0, 8.0, 20.0, 1e2, 1e3, 1e5]
+    with mp.workdps(40):
+        exact = [float(mp.si(mp.mpf(value))) for value in x]
+    assert_allclose([sine_integral(value) for value in x], exact, rtol=8 * np.finfo(float).eps, atol=0)
 
 
 def test_lambert_w_to_fifty_digits():

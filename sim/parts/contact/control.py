@@ -40,20 +40,16 @@ def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
     return bodies.modulus * (a * indentation**2 - 2.0 / 3.0 * third * indentation + 0.2 * third * a**2 * curvature)
 
 
-def _at(values: float | Array, k: int) -> float:
-    """What is controlled at one of many times, where it may be constant."""
-    return float(values[k, 0]) if isinstance(values, np.ndarray) else values
-
-
 @dataclass(frozen=True)
 class LoadControl:
     """Dead load, compression positive [N]."""
 
     load: float | Array
 
-    def at(self, k: int) -> "LoadControl":
-        """The control at one of many times."""
-        return LoadControl(_at(self.load, k))
+    @property
+    def held(self) -> tuple[float | Array, float | Array, float]:
+        """Load [N], displacement of the base [m] and stiffness behind it [N/m]; 0 what is not."""
+        return self.load, 0.0, 0.0
 
     @property
     def closes(self) -> bool | Flags:
@@ -65,12 +61,6 @@ class LoadControl:
         if reversible == 0.0:
             return np.asarray(jkr.radius_at_load(self.load, work, *bodies[:2]))
         return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, *bodies))
-
-    def release_rate(self, radius: Array, bodies: Bodies) -> Array:
-        """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
-        size, modulus, _ = bodies
-        missing = 4.0 / 3.0 * modulus * radius**3 / size - self.load
-        return np.copysign(jkr.energy_release_rate(radius, self.load, size, modulus), missing)
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Load on the sphere [N]; 0 where the contact is open."""
@@ -102,9 +92,10 @@ class DisplacementControl:
     base: float | Array
     stiffness: float = math.inf
 
-    def at(self, k: int) -> "DisplacementControl":
-        """The control at one of many times."""
-        return DisplacementControl(_at(self.base, k), self.stiffness)
+    @property
+    def held(self) -> tuple[float | Array, float | Array, float]:
+        """Load [N], displacement of the base [m] and stiffness behind it [N/m]; 0 what is not."""
+        return 0.0, self.base, self.stiffness
 
     @property
     def closes(self) -> bool | Flags:
@@ -121,12 +112,6 @@ class DisplacementControl:
         if rigid:
             return np.asarray(radius_at_indentation_reversible(self.base, work, stress, reversible, *bodies))
         return np.asarray(radius_at_displacement_reversible(*held, work, stress, reversible, *bodies))
-
-    def release_rate(self, radius: Array, bodies: Bodies) -> Array:
-        """Energy release rate at a radius [J/m²], negative below Hertz's radius."""
-        held = (radius, self.base, self.stiffness, *bodies[:2])
-        missing = radius**2 / bodies.sphere_radius - jkr.indentation_under_displacement(*held)
-        return np.copysign(jkr.energy_release_rate_at_displacement(*held), missing)
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Load on the sphere [N]; 0 where the contact is open."""

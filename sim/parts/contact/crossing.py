@@ -1,73 +1,113 @@
-"""Inward root search: the largest radius at which a function falls through zero, for many members at once."""
+"""Equilibrium of a contact on a disc: the widest radius at which the energy release rate falls to the work left.
+
+The share of ΔΓ that a disc pays is not convex in its radius, so neither Newton's method nor a fixed-point iteration
+is safe. A walk inwards starts from the radius without fluctuations; between the two places where the sign changes
+Ridders's method goes down to rounding. Where the walk meets no crossing, the least surplus along it is searched, lest
+two crossings lie between two places.
+"""
 
 import math
-from collections.abc import Callable
 
-import numpy as np
-
-from sim.parts.exchange import Array, Flags
-
-Surplus = Callable[[Array], Array]
+from sim.laws.jkr.scales import series_shares
+from sim.numerics.jit import device, kernel
+from sim.spectrum.finite_contact import share_of
 
 #: Places of the walk inwards, its end over its start, and turns that narrow an interval down to rounding.
 _WALK, _NARROWEST, _TURNS = 128, 1e-4, 40
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+_TURN = 0.5 / math.pi
 
 
-def widest_crossing(surplus: Surplus, start: Array, low: Array) -> tuple[Array, Flags, Flags]:
-    """Radius at which ``surplus`` falls to zero, walking inwards from ``start`` to ``low``, each shape (members, 1).
-
-    Where the walk meets no crossing, the least surplus along it is searched, lest two crossings lie between two places.
-    The walk never goes below 1e-4 of its start.
-
-    Returns
-    -------
-    edge, closed, at_once : array, shape (members, 1)
-        The radius; whether there is one; whether nothing is in surplus at the start already.
-    """
-    low = np.maximum(low, _NARROWEST * start)
-    places = start * (low / start) ** np.linspace(0.0, 1.0, _WALK + 1)
-    places[:, -1:] = np.broadcast_to(low, places[:, -1:].shape)
-    crossed = surplus(places) <= 0.0
-    first = np.maximum(np.argmax(crossed, 1), 1)[:, None]
-    closed = crossed.any(1, keepdims=True)
-    inside, outside = np.take_along_axis(places, first, 1), np.take_along_axis(places, first - 1, 1)
-    if not closed.all():
-        dip, before = _dip(surplus, places)
-        inside, outside = np.where(closed, inside, dip), np.where(closed, outside, before)
-        closed |= surplus(dip) <= 0.0
-    return _narrowed(surplus, inside, outside), np.asarray(closed), crossed[:, :1]
+@device
+def _surplus(radius, terms, bodies, wave, ends, cubics):
+    """Energy release rate, negative below Hertz's radius, less the work of adhesion left at a radius [J/m²]."""
+    load, base, bonded, fluctuating, reversible = terms
+    curvature, modulus, stiffness = bodies
+    inverse, hertz = 1.0 / radius, radius * radius * curvature
+    missing = 2.0 / 3.0 * hertz - 0.5 * load / modulus * inverse
+    if stiffness > 0.0:
+        grips, dead = series_shares(stiffness, 2.0 * modulus * radius)
+        missing = grips * (hertz - base) + dead * (2.0 / 3.0 * hertz)
+    rate = _TURN * modulus * inverse * missing * abs(missing)
+    return rate - (bonded - fluctuating * share_of(radius, wave, ends, cubics) - reversible * radius)
 
 
-def _dip(surplus: Surplus, places: Array) -> tuple[Array, Array]:
-    """Place along a walk at which the surplus is least, by golden section, and the place before."""
-    least = np.clip(np.argmin(surplus(places), 1), 1, _WALK - 1)[:, None]
-    left, right = np.take_along_axis(places, least + 1, 1), np.take_along_axis(places, least - 1, 1)
-    before = right
+@device
+def _dip(inside, outside, terms, bodies, wave, ends, cubics):
+    """Place between two others at which the surplus is least, by golden section."""
+    one, two = outside - _GOLDEN * (outside - inside), inside + _GOLDEN * (outside - inside)
+    first, second = _surplus(one, terms, bodies, wave, ends, cubics), _surplus(two, terms, bodies, wave, ends, cubics)
     for _ in range(_TURNS):
-        one, two = right - _GOLDEN * (right - left), left + _GOLDEN * (right - left)
-        inner = surplus(one) < surplus(two)
-        left, right = np.where(inner, left, one), np.where(inner, two, right)
-    return 0.5 * (left + right), before
+        if first < second:
+            outside, two, second = two, one, first
+            one = outside - _GOLDEN * (outside - inside)
+            first = _surplus(one, terms, bodies, wave, ends, cubics)
+        else:
+            inside, one, first = one, two, second
+            two = inside + _GOLDEN * (outside - inside)
+            second = _surplus(two, terms, bodies, wave, ends, cubics)
+    return 0.5 * (inside + outside)
 
 
-def _narrowed(surplus: Surplus, inside: Array, outside: Array) -> Array:
-    """Place at which the surplus crosses zero between two places, to rounding: Ridders's method, element by element."""
-    low, high = surplus(inside), surplus(outside)
+@device
+def _narrowed(inside, outside, terms, bodies, wave, ends, cubics):
+    """Place at which the surplus crosses zero between two places, to rounding: Ridders's method."""
+    low = _surplus(inside, terms, bodies, wave, ends, cubics)
+    high = _surplus(outside, terms, bodies, wave, ends, cubics)
+    before = 0.0
     for _ in range(_TURNS):
-        open_ = (np.abs(outside - inside) > 4e-16 * outside) & (low < 0.0) & (high > 0.0)
-        if not open_.any():
+        if not (outside - inside > 4e-16 * outside and low < 0.0 and high > 0.0):
             break
         middle = 0.5 * (inside + outside)
-        value = surplus(middle)
-        root = np.sqrt(np.where(open_, value * value - low * high, 1.0))
-        guess = np.where(open_, middle + (middle - inside) * (-value) / root, inside)
-        guess = np.clip(guess, np.minimum(inside, outside), np.maximum(inside, outside))
-        at = surplus(guess)
+        value = _surplus(middle, terms, bodies, wave, ends, cubics)
+        guess = middle + (middle - inside) * (-value) / math.sqrt(value * value - low * high)
+        guess = min(max(guess, inside), outside)
+        if abs(guess - before) <= 4e-16 * guess:
+            return guess
+        before, at = guess, _surplus(guess, terms, bodies, wave, ends, cubics)
         for place, found in ((middle, value), (guess, at)):
-            within = open_ & (place > inside) & (place < outside)
-            below = within & (found <= 0.0)
-            inside, low = np.where(below, place, inside), np.where(below, found, low)
-            above = within & (found > 0.0)
-            outside, high = np.where(above, place, outside), np.where(above, found, high)
-    return np.where(high == 0.0, outside, inside)
+            if inside < place < outside:
+                if found <= 0.0:
+                    inside, low = place, found
+                else:
+                    outside, high = place, found
+    return outside if high == 0.0 else inside
+
+
+@device
+def _widest(start, hertz, terms, bodies, wave, ends, cubics):
+    """Radius of one contact, see ``widest_crossings``."""
+    if not start > 0.0 or terms[3] == 0.0 or _surplus(start, terms, bodies, wave, ends, cubics) <= 0.0:
+        return start  # nothing is taken
+    low = max(hertz if hertz > 0.0 else 0.0, _NARROWEST * start)
+    ratio = (low / start) ** (1.0 / _WALK)
+    outside, inside, least, lowest = start, start, math.inf, start
+    for k in range(1, _WALK + 1):
+        outside, inside = inside, low if k == _WALK else inside * ratio
+        value = _surplus(inside, terms, bodies, wave, ends, cubics)
+        if value <= 0.0:
+            return max(_narrowed(inside, outside, terms, bodies, wave, ends, cubics), low)
+        if value < least and k < _WALK:
+            least, lowest = value, inside
+    dip = _dip(lowest * ratio, lowest / ratio, terms, bodies, wave, ends, cubics)
+    if _surplus(dip, terms, bodies, wave, ends, cubics) <= 0.0:
+        return max(_narrowed(dip, lowest / ratio, terms, bodies, wave, ends, cubics), low)
+    return hertz
+
+
+@kernel(
+    "void(float64[:, ::1], UniTuple(float64, 3), UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1],"
+    " float64[::1])"
+)
+def widest_crossings(contacts, bodies, wave, ends, cubics, radius):
+    """Largest stable radius of contacts on discs, written to ``radius`` [m].
+
+    Rows of ``contacts``: radius without fluctuations [m], nan without a contact; Hertz's radius [m], nan where pulled;
+    load [N] and displacement of the base [m], one of them 0; work of adhesion of the bonds left and energy of the
+    fluctuations [J/m²]; energy that the mean stress takes, over the radius [J/m³]. ``bodies``: curvature of the
+    sphere, contact modulus, stiffness, 0 at a load. The rest is a margin's ``terms``. The walk never goes below
+    1e-4 of its start.
+    """
+    for i in range(radius.size):
+        terms = contacts[2, i], contacts[3, i], contacts[4, i], contacts[5, i], contacts[6, i]
+        radius[i] = _widest(contacts[0, i], contacts[1, i], terms, bodies, wave, ends, cubics)

@@ -18,7 +18,7 @@ from sim.numerics.jit import kernel
 from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance
 from sim.parts.contact.control import Bodies, Control, DisplacementControl, LoadControl
 from sim.parts.contact.crack_front import Hold, Kinetics, advance as advance_front
-from sim.parts.contact.crossing import widest_crossing
+from sim.parts.contact.crossing import widest_crossings
 from sim.parts.exchange import Array, Flags, Motion, Motions, Setting, Touching, during
 from sim.units.course import Piece, Prescribed, held, prescribed
 from sim.units.quantity import Quantity
@@ -173,30 +173,16 @@ class _Controlled:
         """Largest stable radius in equilibrium with the work left there [m], nan without one."""
         if balance.margin is None:
             return control.radius(balance.work(np.zeros(1)), balance.stress, self.reversible, balance.bodies)
-        if balance.bonded.ndim == 1:
-            return self._on_disc(control, balance)
-        return np.array([self._on_disc(control.at(k), balance.at(k)) for k in range(len(balance.bonded))])
-
-    def _on_disc(self, control: Control, balance: Balance) -> Array:
-        """Widest radius at which the energy release rate falls to the work left: a search inwards, then bisection.
-
-        The share of ΔΓ that a disc pays is not convex in its radius, so neither Newton's method nor a fixed-point
-        iteration is safe. The search starts from the radius without fluctuations.
-        """
         bodies = balance.bodies
         wide = control.radius(balance.bonded + 0.0 * balance.fluctuating, balance.stress, self.reversible, bodies)
-        hertz = np.nan_to_num(control.radius(np.zeros(1), np.zeros(1), 0.0, bodies))[:, None]
-
-        bonded, fluctuating, stress = (term[:, None] for term in balance[:3])
-        column = balance._replace(bonded=bonded, fluctuating=fluctuating, stress=stress)
-
-        def surplus(radius: Array) -> Array:
-            return control.release_rate(radius, bodies) - self._left(radius, column)
-
-        found, closed, at_once = widest_crossing(surplus, wide[:, None], hertz)
-        edge = np.where(closed, np.maximum(found, hertz), hertz if control.closes else np.nan)
-        edge = np.where(at_once | (fluctuating == 0.0), wide[:, None], edge)  # nothing is taken
-        return np.where(np.isnan(wide), np.nan, edge[:, 0])
+        hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, bodies)
+        taken = self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
+        terms = (wide, hertz, *control.held[:2], balance.bonded, balance.fluctuating, taken)
+        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(len(terms), -1)
+        radius = np.empty(contacts.shape[1])
+        sphere = 1.0 / bodies.sphere_radius, bodies.modulus
+        widest_crossings(contacts, (*sphere, control.held[2]), *balance.margin.terms, radius)
+        return radius.reshape(wide.shape)
 
     def _left(self, radius: Array, balance: Balance) -> Array:
         """Work of adhesion left at a radius; of an open contact that of a vanishing one."""

@@ -23,7 +23,7 @@ from sim.parts.shear.amplitude import Onset
 from sim.scenario.clock import Clock
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
-from sim.spectrum.finite_contact import Margin, marginal_energy
+from sim.spectrum.finite_contact import Margin, marginal_energy, share_of
 
 WORK = 1.0 / math.pi
 GAUGE = {variable.name: variable for variable in VARIABLES}
@@ -531,6 +531,15 @@ def test_the_share_that_a_disc_pays_is_its_marginal_energy(name):
     radius = 2e-3 * 10.0 ** np.random.default_rng(3).uniform(-4.0, 0.0, 60)
     exact = marginal_energy(spectrum, radius, 1.6e6, 0.5) / float(spectrum.surface_energy(1.6e6, 0.5))
     assert_allclose(Margin(spectrum, 1.6e6, 0.5, 2e-3)(radius), exact, rtol=0.0, atol=claim)
+
+
+@pytest.mark.parametrize("name", SPECTRA)
+def test_the_share_in_compiled_loops_is_that_of_the_margin(name):
+    margin = Margin(SPECTRA[name][0], 1.6e6, 0.5, 2e-3)
+    radius = 2e-3 * 10.0 ** np.random.default_rng(5).uniform(-5.0, 0.3, 100)
+    shares = [share_of(one, *margin.terms) for one in radius.tolist()]
+    # the place of a radius among 512 pieces of slope below 1 has 512 times the rounding of ln a
+    assert_allclose(shares, margin(radius), rtol=0.0, atol=512 * 8 * np.finfo(float).eps)
 
 
 def test_a_disc_of_many_waves_pays_for_all_and_a_vanishing_one_for_nothing():
