@@ -71,9 +71,10 @@ def cli() -> None:
 @click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
 @click.option("--force", is_flag=True, help="Replace an existing output.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
+@click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
 def run(
     scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
-    force: bool, quiet: bool,
+    force: bool, quiet: bool, bare: bool,
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
@@ -95,8 +96,9 @@ def run(
         simulate.run(scene, target, replace=force, progress=advance)
     simulate.write_log(target, began, sys.argv[1:])
     if not quiet:
-        with _opened(target) as dataset:
-            _print_tables(dataset)
+        if not bare:
+            with _opened(target) as dataset:
+                _print_tables(dataset)
         click.echo(str(target))
 
 

@@ -108,8 +108,11 @@ def test_help_imports_nothing_heavy():
     assert not loaded("run", "--help") & heavy
 
 
-def test_check_imports_neither_xarray_nor_figures_nor_statistics():
-    assert not loaded("check", LENS) & {"xarray", "pandas", "matplotlib", "scipy.stats", "rich", "dask"}
+def test_check_and_a_run_without_its_table_import_neither_xarray_nor_figures_nor_statistics(here):
+    heavy = {"xarray", "pandas", "matplotlib", "scipy.stats", "rich", "dask"}
+    assert not loaded("check", LENS) & heavy
+    assert not loaded("run", "scene.toml", "--no-table") & heavy
+    assert Path("outputs/scene.nc").exists()
 
 
 def test_an_interrupt_ends_with_130_and_without_traceback(here):

@@ -27,6 +27,13 @@ from sim.scenario.sweep import Axis, written
 
 #: What HDF5 keeps of a variable in memory [byte]; its own 64 MiB hold every variable of a usual run whole.
 _CHUNK_CACHE = 4 * 2**20
+#: How netCDF packs a variable, by ``record.compression``; six digits are within 5e-7 (20 bits and the leading one).
+_ZLIB: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+_PACKED: dict[str, dict[str, Any]] = {
+    "none": {},
+    "zlib": _ZLIB,
+    "digits": _ZLIB | {"significant_digits": 6, "quantize_mode": "BitGroom"},
+}
 _FLAGS = "detached in_contact"
 _STATISTICS = {
     "mean": "ensemble mean of",
@@ -120,13 +127,13 @@ def _sweep_shape(plan: Plan) -> tuple[int, ...]:
 
 def _variable(
     file: File, name: str, kind: Any, dimensions: tuple[str, ...], unit: str, long_name: str,
-    symbol: str = "", chunks: tuple[int, ...] | None = None, **more: Any,
+    symbol: str = "", chunks: tuple[int, ...] | None = None, compression: str = "zlib", **more: Any,
 ) -> Any:  # fmt: skip
     attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
     attributes = {key: value for key, value in attributes.items() if not isinstance(value, str) or value}
     if isinstance(file, MemoryFile):
         return file.add(name, kind, dimensions, attributes)
-    packed: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True} if dimensions and kind is not str else {}
+    packed = _PACKED[compression] if dimensions and kind is not str else {}
     variable = file.createVariable(name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed)
     if chunks:
         variable.set_var_chunk_cache(_CHUNK_CACHE)
@@ -240,9 +247,10 @@ def _recorded(file: File, plan: Plan, parts: Parts, recorded: Variable) -> None:
     variables = {}
     for statistic, of in (_STATISTICS if varies and not each else {"": ""}).items():
         kind = "f4" if plan.scenario.record.precision == "float32" and not (statistic or whole) else "f8"
-        flags: dict[str, Any] = {}
+        flags: dict[str, Any] = {} if whole else {"compression": plan.scenario.record.compression}
         if recorded.name == "in_contact" and not statistic:
-            kind, flags = "i1", {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
+            kind, flags = "i1", {"compression": flags["compression"].replace("digits", "zlib")}
+            flags |= {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
         named = "_".join(filter(None, (recorded.name, statistic)))
         described = recorded.unit, f"{of} {recorded.long_name}".strip(), recorded.symbol
         variables[statistic] = _variable(file, named, kind, dimensions, *described, None if whole else chunks, **flags)

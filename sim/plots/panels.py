@@ -249,7 +249,9 @@ def sweep_figure(dataset: xr.Dataset) -> Figure:
 
 def _at_the_end(dataset: xr.Dataset, averaged: str) -> str:
     """The last time and the speed then, which may differ between the points of the sweep, and what a mean is over."""
-    speed = style.recorded(dataset, "speed").isel(t=-1)
-    ends = dict.fromkeys(style.text_of(float(end), "m/s") for end in (speed.min(), speed.max()))
-    words = f"at the end: $t$ = {style.text_of(float(dataset['t'][-1]), 's')}, $V$ = {' to '.join(ends)}"
-    return ", ".join(filter(None, [words, averaged]))
+    words = [f"at the end: $t$ = {style.text_of(float(dataset['t'][-1]), 's')}"]
+    if "speed" in dataset:
+        speed = dataset["speed"].isel(t=-1)
+        ends = dict.fromkeys(style.text_of(float(end), "m/s") for end in (speed.min(), speed.max()))
+        words.append(f"$V$ = {' to '.join(ends)}")
+    return ", ".join(filter(None, [*words, averaged]))

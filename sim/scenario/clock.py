@@ -100,6 +100,9 @@ class Record:
         tuple[Recorded, ...] | None, Field(description="what is kept beside contact_radius; not given: all")
     ] = None
     precision: Annotated[Literal["float64", "float32"], Field(description="of trajectories in the file")] = "float64"
+    compression: Annotated[
+        Literal["none", "zlib", "digits"], Field(description="of trajectories in the file; digits: zlib of six digits")
+    ] = "zlib"
 
     def keeps(self, name: str) -> bool:
         """Whether a quantity is recorded; the contact radius always is."""

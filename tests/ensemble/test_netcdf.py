@@ -284,6 +284,23 @@ def test_no_variable_that_is_recorded_has_the_name_of_a_key():
     assert len(found) > 50 and not found & (set(ensemble.run(mapped).variables) - own)
 
 
+def test_six_digits_are_kept_in_a_plain_file(tmp_path):
+    def written(compression):
+        return ensemble.run(sample(record=Record(compression=compression)), tmp_path / f"{compression}.nc")
+
+    none, whole, digits = map(written, ("none", "zlib", "digits"))
+    with netCDF4.Dataset(none) as bare, netCDF4.Dataset(whole) as exact, netCDF4.Dataset(digits) as file:
+        assert not bare["contact_radius"].filters()["zlib"]
+        assert file["contact_radius"].quantization() == (6, "BitGroom")
+        for variable in VARIABLES:
+            if not variable.condition:
+                values = exact[variable.name][:]
+                assert np.array_equal(bare[variable.name][:], values, equal_nan=True), variable.name
+                assert_allclose(file[variable.name][:], values, rtol=1e-6, err_msg=variable.name)
+        assert not np.array_equal(file["contact_radius"][:], exact["contact_radius"][:])
+        assert np.array_equal(file["t"][:], exact["t"][:]) and np.array_equal(file["peak_stress"], exact["peak_stress"])
+
+
 def test_reading_one_map_reads_one_map(tmp_path):
     path = ensemble.run(sample(shear=MAPPED, record=Record(maps=(2e-3, 4e-3), map_members=2)), tmp_path / "out.nc")
     with netCDF4.Dataset(path) as file:
