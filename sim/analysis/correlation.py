@@ -118,6 +118,7 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
     texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"what the {about} is below"}
     found = xr.Dataset()
     for (suffix, text), values in zip(texts.items(), times, strict=True):
-        found[f"correlation_time{suffix}"] = values.drop_attrs().assign_attrs(units="s", long_name=text)
+        found[f"correlation_time{suffix}"] = values
+        found[f"correlation_time{suffix}"].attrs = {"units": "s", "long_name": text}
     found["correlation_time"].attrs["symbol"] = "t_c"
     return found
