@@ -37,7 +37,12 @@ def key_lines(text: str) -> dict[Path, int]:
     last: dict[Path, int] = {}  # the place of the last table of each [[name]]
     table: Path = ()
     plain = _TEXT.sub(lambda part: "\n" * part[0].count("\n") if part["long"] else part[0], text)
+    depth = 0  # brackets open at the start of a line: what stands in them is a value
     for number, line in enumerate(plain.split("\n"), start=1):
+        inside, bare = depth > 0, _TEXT.sub("", line)
+        depth += sum((mark in "[{") - (mark in "]}") for mark in bare)
+        if inside:
+            continue
         if header := _HEADER.match(line):
             table = ()
             for word in words_of(header[2]):

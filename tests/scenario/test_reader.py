@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, strategies as st
+from hypothesis import example, given, strategies as st
 
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
@@ -122,6 +122,7 @@ def written(value, breaks):
     return json.dumps(value)
 
 
+@example({"a": [[0]]}, [True, False])  # a line of a list that reads like a table
 @given(st.dictionaries(words, values, min_size=1, max_size=4), st.lists(st.booleans(), min_size=1, max_size=5))
 def test_the_keys_that_begin_a_line_are_found_and_nothing_else(document, broken):
     breaks = itertools.cycle(broken)
