@@ -29,7 +29,7 @@ from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
-from sim.parts.exchange import Bonding, Motions
+from sim.parts.exchange import Bonding, Motion, Motions
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Ensemble
@@ -116,6 +116,11 @@ def mean_field() -> list[Row]:
     return rows
 
 
+def block(motion: Motion) -> Motions:
+    """One step as a block of steps."""
+    return Motions(motion.step, *(np.reshape(value, (1, -1)) for value in (*motion[1:], motion.slip)))
+
+
 def modal() -> list[Row]:
     """One Ornstein-Uhlenbeck step of all modes of a grid and its energy."""
     rows, cell, exponent = [], 0.24e-3, 0.1
@@ -148,7 +153,7 @@ def step() -> list[Row]:
 
     def alone() -> None:
         moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
-        scenario.process.step(fluctuation, moved, Bonding(np.ones(1), np.zeros(1), np.zeros(1)), noise)
+        scenario.process.advance(fluctuation, block(moved), Bonding(np.ones(1), np.zeros(1), np.zeros(1)), noise)
 
     return [compare("engine step, modal 256²", whole, "its modes alone", alone, "", 4)]
 
@@ -169,7 +174,7 @@ def lens(exponent: float, points: int, members: int, recipe: shear.Modal | shear
 
     def program() -> None:
         moved = drive.Steady(speed=exponent * 5e-6).motion(next(counter), 0.0, 1.0, 1.0)
-        state[0] = process.step(state[0], moved, stress, noise)
+        state[0], _ = process.advance(state[0], block(moved), stress, noise)
 
     return program
 
@@ -223,7 +228,7 @@ def maps() -> list[Row]:
 
     def drawn() -> None:
         moved = drive.Steady(speed=5e-7).motion(next(counter), 0.0, 1.0, 1.0)
-        state[0] = process.step(state[0], moved, stress, noise)
+        state[0], _ = process.advance(state[0], block(moved), stress, noise)
         process.maps(state[0], np.zeros(1), 1)
 
     def parts() -> None:
@@ -269,8 +274,7 @@ def population(part, members: int, motion) -> Callable:
     """A program that advances a population of bonds by one step and tells its moments, for a batch of members."""
     noise, state = Noise(1, "bonds", np.arange(members)), []
     state.append(part.start(motion, noise))
-    columns = [np.reshape(value, (1, -1)) for value in (*motion[1:], motion.slip)]
-    motions = itertools.cycle([Motions(step, *columns) for step in range(1, 4097)])
+    motions = itertools.cycle([block(motion._replace(step=step)) for step in range(1, 4097)])
 
     def program() -> None:
         state[0], _ = part.advance(state[0], next(motions), np.ones(1), noise)
