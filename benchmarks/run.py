@@ -147,7 +147,8 @@ def step() -> list[Row]:
     state = {"now": start(scenario, dice)}
 
     def whole() -> None:
-        state["now"] = advance(scenario, state["now"], dice) if state["now"].step < 200 else start(scenario, dice)
+        before = state["now"] if state["now"].step < 200 else start(scenario, dice)
+        state["now"], _ = advance(scenario, before, dice, range(before.step + 1, before.step + 2))
 
     fluctuation, noise, counter = state["now"].shear, Noise(1, "shear", np.arange(1)), itertools.count(1)
 
