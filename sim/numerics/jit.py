@@ -3,35 +3,47 @@
 Four decorators: ``device`` for a scalar helper that compiles into its callers, ``inlined`` for one whose body must
 stand in the calling loop for vector instructions, ``kernel`` for a loop over arrays, ``law`` for a formula that
 broadcasts as a numpy ufunc but keeps its Python signature, defaults and docstring. Kernels and laws compile at their
-first call and are cached on disk, in a folder named by a hash of all compiled sources: numba itself does not notice a
-change in a helper of another file. A cache that is broken, read-only or full costs time, never a run.
+first call. Their machine code is kept on disk, one file each, in a folder named by a hash of all compiled sources; it
+is loaded without numba's tables of what it can compile, which take half a second to set up. A cache that is broken,
+read-only or full costs time, never a run.
 """
 
+import contextlib
 import functools
 import hashlib
 import inspect
 import os
-import tempfile
-import threading
+import pickle
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numba
 import numpy as np
-from numba.core import config
+from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
+from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
+from numba.np.ufunc import _internal  # type: ignore[attr-defined]
+from numba.np.ufunc.ufuncbuilder import UFuncDispatcher
+from numba.np.ufunc.wrappers import build_ufunc_wrapper
 
 device = numba.njit(error_model="numpy")
 inlined = numba.njit(error_model="numpy", inline="always")
-_building = threading.RLock()
+#: Every kernel and law that was imported, by its name in the cache; calling one compiles or loads it.
+compiled: dict[str, Callable[[], Callable]] = {}
+#: Called with the name of each kernel or law that is about to be compiled, as it is not in the cache.
+on_compiling: list[Callable[[str], None]] = []
 _BLOCK = 4096
 
 
 @functools.cache
 def _cache_folder() -> str:
-    """Folder of compiled code, named by a hash of all sources that import this module."""
+    """Folder of compiled code, named by a hash of versions and of all sources that import this module."""
     package = Path(__file__).parents[1]
-    digest = hashlib.sha256(numba.__version__.encode())
+    digest = hashlib.sha256(f"{sys.version} {numba.__version__} {np.__version__}".encode())
     for source in sorted(package.rglob("*.py")):
         text = source.read_bytes()
         if b"sim.numerics.jit" in text or source.name == "jit.py":
@@ -40,39 +52,66 @@ def _cache_folder() -> str:
     return str(Path(base).expanduser() / "sliding-sim" / digest.hexdigest()[:16])
 
 
-def _build(compile_it: Callable[[bool], Any]) -> Any:
-    """Compile with the disk cache; if the cache is at fault in any way, compile without it.
+def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: Callable[..., Callable]) -> Callable:
+    """What ``load`` makes of the code in the cache; where that fails in any way, what ``make`` compiles.
 
-    A bad cache raises whatever numba's file layer or unpickler meets (OSError, EOFError,
-    UnpicklingError, RuntimeError, ...), so every exception leads to the second try, where a fault
-    of the code itself shows again.
+    Unpickling and rebuilding raise whatever they meet (EOFError, UnpicklingError, AttributeError, ...), so every
+    exception leads to compilation, where a fault of the function itself shows again.
     """
-    with _building:
-        before = config.CACHE_DIR  # type: ignore[attr-defined]
-        try:
-            folder = _cache_folder()
-            os.makedirs(folder, exist_ok=True)
-            tempfile.TemporaryFile(dir=folder).close()
-            config.CACHE_DIR = folder  # type: ignore[attr-defined]
-            return compile_it(True)
-        except Exception:
-            return compile_it(False)
-        finally:
-            config.CACHE_DIR = before  # type: ignore[attr-defined]
+    with global_compiler_lock:
+        rtsys.initialize(cpu_target.target_context)
+        machine = hashlib.sha256(repr(cpu_target.target_context.codegen().magic_tuple()).encode()).hexdigest()
+        path = Path(_cache_folder(), f"{_name(function)}.{machine[:8]}")
+        with contextlib.suppress(Exception):
+            content = path.read_bytes()
+            if content[:32] == hashlib.sha256(content[32:]).digest():
+                return load(*pickle.loads(content[32:]))
+        for tell in on_compiling:
+            tell(_name(function))
+        made, code = make()
+        with contextlib.suppress(Exception):
+            _store(path, dumps(code()))
+        return made
+
+
+def _store(path: Path, content: bytes) -> None:
+    """Write a file of the cache with its checksum, whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        part.write_bytes(hashlib.sha256(content).digest() + content)
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _name(function: Callable) -> str:
+    return f"{function.__module__}.{function.__qualname__}"
 
 
 def kernel(signature: str) -> Callable[[Callable], Callable]:
     """Compile a loop over arrays for one ``signature``, at the first call."""
 
     def decorate(function: Callable) -> Callable:
+        def make() -> tuple[Callable, Callable]:
+            dispatcher = numba.njit(signature, error_model="numpy")(function)
+            return dispatcher, next(iter(dispatcher.overloads.values()))._reduce
+
+        def load(*code: Any) -> Callable:
+            dispatcher = device(function)
+            dispatcher.add_overload(CompileResult._rebuild(cpu_target.target_context, *code))
+            dispatcher.disable_compile()
+            return dispatcher
+
         @functools.cache
-        def compiled() -> Callable:
-            return _build(lambda cache: numba.njit(signature, cache=cache, error_model="numpy")(function))
+        def built() -> Callable:
+            return _built(function, make, load)
 
         @functools.wraps(function)
         def call(*arguments):
-            return compiled()(*arguments)
+            return built()(*arguments)
 
+        compiled[_name(function)] = built
         return call
 
     return decorate
@@ -87,10 +126,25 @@ def law(function: Callable) -> Callable:
     parameters = inspect.signature(function).parameters
     count = len(parameters)
 
-    @functools.cache
-    def compiled() -> Callable:
+    def made(library: Any, name: str) -> Callable:
+        pointer, doubles = library.get_pointer_to_function(name), [np.dtype(float).num] * (count + 1)
+        named = function.__name__, function.__doc__
+        return _internal.fromfunc(*named, [pointer], [doubles], count, 1, [None], [library], _internal.PyUFunc_None)
+
+    def make() -> tuple[Callable, Callable]:
         signature = f"float64({', '.join(['float64'] * count)})"
-        return _build(lambda cache: numba.vectorize([signature], cache=cache)(function)).ufunc
+        one = UFuncDispatcher(function, targetoptions={"nopython": True}).compile(signature)
+        inner = one.library, one.target_context, one.fndesc.llvm_func_name, one.signature
+        library, _, name = build_ufunc_wrapper(*inner, False, one)
+        library.enable_object_caching()
+        return made(library, name), lambda: (library.serialize_using_object_code(), name)
+
+    def load(code: Any, name: str) -> Callable:
+        return made(cpu_target.target_context.codegen().unserialize_library(code), name)
+
+    @functools.cache
+    def built() -> Callable:
+        return _built(function, make, load)
 
     bind = inspect.signature(function).bind
 
@@ -102,8 +156,9 @@ def law(function: Callable) -> Callable:
             arguments = bound.args
         small = all(map(_is_small, arguments))
         with np.errstate(all="ignore"):
-            return compiled()(*arguments) if small else _in_blocks(compiled(), arguments)
+            return built()(*arguments) if small else _in_blocks(built(), arguments)
 
+    compiled[_name(function)] = built
     return call
 
 

@@ -63,20 +63,26 @@ def compiled_in(tmp_path, monkeypatch):
     jit._cache_folder.cache_clear()
 
 
-def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path, compiled_in, room):
+def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path, compiled_in, room, monkeypatch):
+    compilings = []
+    monkeypatch.setattr(jit, "on_compiling", [compilings.append])
     fresh = compiled_in(tmp_path / "cache")
-    files = [path for path in (tmp_path / "cache").rglob("*") if path.suffix in (".nbi", ".nbc")]
-    assert len(files) == 2
+    files = [path for path in (tmp_path / "cache").rglob("*") if path.is_file()]
+    assert len(files) == 1
     before = [path.read_bytes() for path in files]
+    compilings.clear()
     again = compiled_in(tmp_path / "cache")
     assert [path.read_bytes() for path in files] == before
-    for path in files:
-        path.write_bytes(b"broken")
-    broken = compiled_in(tmp_path / "cache")
+    assert not compilings
+    for wrong in (b"broken", before[0][:-100], before[0].replace(b"cubed", b"cuned")):
+        files[0].write_bytes(wrong)
+        assert compiled_in(tmp_path / "cache") == fresh
+        assert compilings.pop() == "little.cubed"
+        assert files[0].read_bytes() != wrong
     (tmp_path / "file").write_text("no folder")
     no_folder = compiled_in(tmp_path / "file")
     unmakeable = compiled_in("/proc/no-such-place")
     with room(100):
         no_room = compiled_in(tmp_path / "full")
-    assert not list((tmp_path / "full").rglob("*.nb?"))
-    assert fresh == again == broken == no_folder == unmakeable == no_room
+    assert not [path for path in (tmp_path / "full").rglob("*") if path.is_file()]
+    assert fresh == again == no_folder == unmakeable == no_room
