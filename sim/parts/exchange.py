@@ -20,6 +20,7 @@ from sim.numerics.noise import Noise
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.int64]
+Moment = TypeVar("Moment", float, Array)
 
 
 class Times(NamedTuple):
@@ -29,8 +30,8 @@ class Times(NamedTuple):
     steps: int
     duration: float
 
-    def at(self, step: int) -> float:
-        """Time at the end of a step [s]; never accumulated."""
+    def at(self, step: Moment) -> Moment:
+        """Time at the end of a step, or of each of many [s]; never accumulated."""
         return self.duration * (step / self.steps)
 
 

@@ -3,13 +3,12 @@
 Sliding speeds and what holds the sphere are given in these three ways alike.
 """
 
-import itertools
 import math
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Discriminator, Field, Tag, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
@@ -17,34 +16,67 @@ from pydantic_core import PydanticCustomError
 from sim.units.quantity import Quantity
 from sim.units.table import file_columns
 
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 _TIME = Quantity("s", "time", "t")
 _CYCLES = Quantity("1", "cycles there and back; 0: one way", at_least=0, at_most=10**6, whole=True)
 #: Times nearer than this share of the run are meant to be the same.
 _SAME = 1e-9
 
 
-class Piece(NamedTuple):
-    """A stretch of time over which a prescribed value changes smoothly.
+class Pieces(NamedTuple):
+    """Stretches of time, one after the other, in each of which a prescribed value changes smoothly: arrays (pieces,).
 
-    ``start`` and ``stop`` are its ends [s], ``first`` and ``last`` the values there; ``integral`` is that of the value
-    over time, ``path`` that of its magnitude.
+    ``interval`` is the number of the interval in which a piece lies; each interval has one or more. ``start`` and
+    ``stop`` are the piece's ends [s], ``first`` and ``last`` the values there; ``integral`` is that of the value over
+    time, ``path`` that of its magnitude.
     """
 
-    start: float
-    stop: float
-    first: float
-    last: float
-    integral: float
-    path: float
+    interval: Indices
+    start: Array
+    stop: Array
+    first: Array
+    last: Array
+    integral: Array
+    path: Array
+
+    @property
+    def joined(self) -> "Pieces":
+        """One piece for each interval, whose sums are rounded once."""
+        opening = np.flatnonzero(np.diff(self.interval, prepend=-1))
+        if len(opening) == len(self.interval):
+            return self
+        closing = np.append(opening[1:], len(self.interval)) - 1
+        sums = np.add.reduceat([self.integral, self.path], opening, axis=1)
+        for k in np.flatnonzero(closing - opening > 1):
+            inside = slice(opening[k], closing[k] + 1)
+            sums[:, k] = math.fsum(self.integral[inside]), math.fsum(self.path[inside])
+        ends = self.start[opening], self.stop[closing], self.first[opening], self.last[closing]
+        return Pieces(self.interval[opening], *ends, *sums)
 
 
-def linear_piece(start: float, stop: float, first: float, last: float) -> Piece:
-    """A piece in which the value changes linearly."""
+def linear_pieces(interval: Indices, start: Array, stop: Array, first: Array, last: Array) -> Pieces:
+    """Pieces in which the value changes linearly."""
     integral = 0.5 * (first + last) * (stop - start)
-    path = abs(integral)
-    if first * last < 0.0:
-        path = 0.5 * (first**2 + last**2) / abs(last - first) * (stop - start)
-    return Piece(start, stop, first, last, integral, path)
+    path, turns = np.abs(integral), first * last < 0.0
+    if turns.any():
+        one, other, span = first[turns], last[turns], (stop - start)[turns]
+        path[turns] = 0.5 * (one**2 + other**2) / np.abs(other - one) * span
+    return Pieces(interval, start, stop, first, last, integral, path)
+
+
+def _within(ends: Array, times: Array, apart: float = 0.0) -> tuple[Array, Indices]:
+    """Times strictly between neighbouring ``ends``, further than ``apart`` from both; places where they belong."""
+    times = times[(ends[0] < times) & (times < ends[-1])]
+    places = np.searchsorted(ends, times, "right")
+    inside = (ends[places - 1] + apart < times) & (times < ends[places] - apart)
+    return times[inside], places[inside]
+
+
+def _intervals(ends: Array, places: Indices) -> Indices:
+    """The interval between ``ends`` of each piece, where times at these places cut some of them."""
+    count = len(ends) - 1
+    return np.repeat(np.arange(count), 1 + np.bincount(places - 1, minlength=count))
 
 
 class Number(NamedTuple):
@@ -64,13 +96,14 @@ class Number(NamedTuple):
         """Values among which are the least and the largest of the run."""
         return (self.value,)
 
-    def at(self, time: float, duration: float) -> float:
-        """The value at a time [s] of a run of ``duration`` [s]; where it jumps, that after the jump."""
-        return self.value
+    def at(self, time: Array, duration: float) -> Array:
+        """The value at times [s] of a run of ``duration`` [s]; where it jumps, that after the jump."""
+        return np.full(time.shape, self.value)
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
-        """The way from one time to another [s], cut where the value turns or jumps; at least one piece."""
-        return [linear_piece(start, stop, self.value, self.value)]
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        """The way through the intervals between some times [s], cut where the value turns or jumps."""
+        values = self.at(ends, duration)
+        return linear_pieces(np.arange(len(ends) - 1), ends[:-1], ends[1:], values[:-1], values[1:])
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
@@ -100,57 +133,65 @@ class Course:
     def extremes(self) -> tuple[float, ...]:
         return self.start, self.stop
 
-    def at(self, time: float, duration: float) -> float:
-        part = time / duration if duration > 0.0 else 0.0
+    def at(self, time: Array, duration: float) -> Array:
+        part = time / duration if duration > 0.0 else np.zeros(time.shape)
         if self.cycles:
             turn = 2.0 * self.cycles * part % 2.0
-            part = turn if turn <= 1.0 else 2.0 - turn
+            part = np.where(turn <= 1.0, turn, 2.0 - turn)
         if self.scale == "log":
-            return self.start * (self.stop / self.start) ** part
+            # the library's scalar power: that of numpy differs between processors
+            ratio = self.stop / self.start
+            return self.start * np.array([ratio**share for share in part.ravel().tolist()]).reshape(part.shape)
         value = self.start + (self.stop - self.start) * part
         # a course that reaches zero but for rounding reaches it: there a free sphere touches
-        return value if abs(value) > 1e-13 * max(abs(self.start), abs(self.stop)) else 0.0
+        return np.where(np.abs(value) > 1e-13 * max(abs(self.start), abs(self.stop)), value, 0.0)
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
-        ends = [(start, self.at(start, duration)), *self._turns(start, stop, duration), (stop, self.at(stop, duration))]
-        return [self.smooth(*ends[k], *ends[k + 1], duration) for k in range(len(ends) - 1)]
-
-    def _turns(self, start: float, stop: float, duration: float) -> list[tuple[float, float]]:
-        """Times strictly between two others at which the course turns back, and its values there."""
-        if not self.cycles:
-            return []
-        half = duration / (2.0 * self.cycles)
-        first, last = math.floor(start / half), math.ceil(stop / half)
-        low, high = start + _SAME * duration, stop - _SAME * duration
-        return [(k * half, self.stop if k % 2 else self.start) for k in range(first, last + 1) if low < k * half < high]
-
-    def smooth(self, start: float, first: float, stop: float, last: float, duration: float) -> Piece:
-        """The way between two values, in between which the course does not turn."""
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        values, interval = self.at(ends, duration), np.arange(len(ends) - 1)
+        if self.cycles:
+            half = duration / (2.0 * self.cycles)
+            turns = np.arange(math.floor(ends[0] / half), math.ceil(ends[-1] / half) + 1) * half
+            turns, places = _within(ends, turns, _SAME * duration)
+            odd = np.round(turns / half) % 2.0 == 1.0
+            values, interval = np.insert(values, places, np.where(odd, self.stop, self.start)), _intervals(ends, places)
+            ends = np.insert(ends, places, turns)
+        pieces = linear_pieces(interval, ends[:-1], ends[1:], values[:-1], values[1:])
         if self.scale == "linear":
-            return linear_piece(start, stop, first, last)
+            return pieces
         rate = math.log(self.stop / self.start) * max(1, 2 * self.cycles) / duration
-        rate = math.copysign(rate, abs(last) - abs(first))
-        integral = first * math.expm1(rate * (stop - start)) / rate if rate else first * (stop - start)
-        return Piece(start, stop, first, last, integral, abs(integral))
+        if rate == 0.0:
+            return pieces
+        rates = np.copysign(rate, np.abs(pieces.last) - np.abs(pieces.first))
+        growth = [math.expm1(share) for share in (rates * (pieces.stop - pieces.start)).tolist()]
+        integral = pieces.first * np.array(growth) / rates
+        return pieces._replace(integral=integral, path=np.abs(integral))
 
 
-def table_pieces(times: np.ndarray, values: np.ndarray, start: float, stop: float, duration: float) -> list[Piece]:
+def table_pieces(times: Array, values: Array, ends: Array, duration: float) -> Pieces:
     """Pieces of a table that is linear between its rows and keeps its last value; two rows at one time are a jump."""
-    start, stop = _snapped(times, start, duration), _snapped(times, stop, duration)
-    inside = times[(times > start) & (times < stop)]
-    edges: Sequence[float] = np.unique([start, *inside, stop]).tolist() if stop > start else [start, stop]
-    pieces = []
-    for left, right in itertools.pairwise(edges):
-        row = int(np.searchsorted(times, 0.5 * (left + right), "right")) - 1
-        ends = np.interp([left, right], times[row : row + 2], values[row : row + 2])
-        pieces.append(linear_piece(left, right, *ends.tolist()))
-    return pieces
+    ends = _snapped(times, ends, duration)
+    rows, places = _within(ends, np.unique(times[slice(*np.searchsorted(times, ends[[0, -1]], "right"))]))
+    edges = np.insert(ends, places, rows)
+    start, stop = edges[:-1], edges[1:]
+    row = np.searchsorted(times, 0.5 * (start + stop), "right") - 1
+    first, last = (_interpolated(times, values, row, edge) for edge in (start, stop))
+    return linear_pieces(_intervals(ends, places), start, stop, first, last)
 
 
-def _snapped(times: np.ndarray, time: float, duration: float) -> float:
-    """The row's time where a clock time is meant to be the same but for rounding."""
-    nearest = float(times[np.argmin(np.abs(times - time))])
-    return nearest if abs(nearest - time) <= _SAME * duration else time
+def _snapped(times: Array, ends: Array, duration: float) -> Array:
+    """Clock times, those of rows where they are meant to be the same but for rounding."""
+    after = np.searchsorted(times, ends).clip(max=len(times) - 1)
+    left, right = times[np.maximum(after - 1, 0)], times[after]
+    nearest = np.where(np.abs(left - ends) <= np.abs(right - ends), left, right)
+    return np.where(np.abs(nearest - ends) <= _SAME * duration, nearest, ends)
+
+
+def _interpolated(times: Array, values: Array, row: Indices, time: Array) -> Array:
+    """Values on the lines from some rows to the next, and beyond the last row its value."""
+    after = np.minimum(row + 1, len(times) - 1)
+    span, rise = times[after] - times[row], values[after] - values[row]
+    slope = np.divide(rise, span, out=np.zeros(span.shape), where=span > 0.0)
+    return np.where(time >= times[after], values[after], slope * (time - times[row]) + values[row])
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
@@ -194,18 +235,20 @@ class Table:
         return tuple(getattr(self, self.values_in))
 
     @cached_property
-    def _rows(self) -> tuple[np.ndarray, np.ndarray]:
+    def _rows(self) -> tuple[Array, Array]:
         return np.array(self.time), np.array(self.extremes)
 
     @property
     def end(self) -> float:
         return self.time[-1]
 
-    def at(self, time: float, duration: float) -> float:
-        return table_pieces(*self._rows, time, time, duration)[0].first
+    def at(self, time: Array, duration: float) -> Array:
+        times, values = self._rows
+        time = _snapped(times, time, duration)
+        return _interpolated(times, values, np.searchsorted(times, time, "right") - 1, time)
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
-        return table_pieces(*self._rows, start, stop, duration)
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        return table_pieces(*self._rows, ends, duration)
 
 
 def _kind(value: Any) -> str:

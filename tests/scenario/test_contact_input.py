@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from sim.scenario.reader import BadInput, load
@@ -187,12 +188,13 @@ def test_an_edge_needs_its_speed(folder):
 
 
 def test_every_way_of_holding_a_sphere_is_read(folder):
+    half = np.float64(0.5)
     assert sound('load = "4 mN"').load == 4e-3
-    assert sound('load = { from = "4 mN", to = "-1 mN" }').load.at(0.5, 1.0) == 1.5e-3
-    assert sound('load = { from = "4 mN", to = "-1 mN", cycles = 2 }').load.at(0.5, 1.0) == 4e-3
-    assert sound('load = { file = "loads.csv" }').load.at(0.5, 1.0) == 1e-3
-    assert sound('indentation = { file = "loads.csv" }').indentation.at(1.0, 1.0) == 5e-9
+    assert sound('load = { from = "4 mN", to = "-1 mN" }').load.at(half, 1.0) == 1.5e-3
+    assert sound('load = { from = "4 mN", to = "-1 mN", cycles = 2 }').load.at(half, 1.0) == 4e-3
+    assert sound('load = { file = "loads.csv" }').load.at(half, 1.0) == 1e-3
+    assert sound('indentation = { file = "loads.csv" }').indentation.at(2.0 * half, 1.0) == 5e-9
     contact = sound('displacement = { file = "loads.csv" }\nstiffness = "1 kN/m"')
-    assert (contact.displacement.at(0.5, 1.0), contact.stiffness) == (0.0, 1e3)
-    assert sound('load = { time = ["0 s", "1000 ms"], value = ["1 mN", "2 mN"] }').load.at(0.5, 1.0) == 1.5e-3
-    assert -1.0001e-4 < sound('load = { from = -1e-3, to = -1e-5, scale = "log" }').load.at(0.5, 1.0) < -0.9999e-4
+    assert (contact.displacement.at(half, 1.0), contact.stiffness) == (0.0, 1e3)
+    assert sound('load = { time = ["0 s", "1000 ms"], value = ["1 mN", "2 mN"] }').load.at(half, 1.0) == 1.5e-3
+    assert -1.0001e-4 < sound('load = { from = -1e-3, to = -1e-5, scale = "log" }').load.at(half, 1.0) < -0.9999e-4

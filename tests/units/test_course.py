@@ -1,13 +1,15 @@
 """Prescribed courses: values, cuts where they turn or jump, exact integrals between."""
 
 import itertools
+import math
 
+import numpy as np
 import pytest
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from pydantic import TypeAdapter
 from scipy.integrate import quad
 
-from sim.units.course import held, prescribed
+from sim.units.course import Pieces, held, prescribed, table_pieces
 from sim.units.quantity import Quantity
 
 DURATION = 1.2
@@ -28,31 +30,54 @@ def course(name):
     return prescribed(TypeAdapter(kind).validate_python(COURSES[name][0]))
 
 
+def pieces(name, *ends):
+    """The pieces of a course between some times, one after the other."""
+    found = course(name).pieces(np.array(ends), DURATION)
+    return [Pieces(*row) for row in zip(*found, strict=True)]
+
+
+def at(name, time):
+    return float(course(name).at(np.asarray(time), DURATION))
+
+
 @pytest.mark.parametrize("name", COURSES)
 @pytest.mark.parametrize(("start", "stop"), [(0.0, DURATION), (0.13, 1.07), (0.31, 0.59)])
 def test_pieces_hold_the_integral_and_the_path_of_the_value(name, start, stop):
     # the zeros of the linear courses, besides their turns, are kinks of the magnitude
     kinks = [t for t in (*TURNS, 0.2, 0.4, 0.5 + 0.3 * 0.25, 0.8, 1.0) if start < t < stop]
-    held = course(name)
-    pieces = held.pieces(start, stop, DURATION)
     exact = [
-        quad(lambda t, f=f: f(held.at(t, DURATION)), start, stop, points=kinks, epsabs=0.0, epsrel=1e-12)[0]
+        quad(lambda t, f=f: f(at(name, t)), start, stop, points=kinks, epsabs=0.0, epsrel=1e-12)[0]
         for f in (float, abs)
     ]
-    found = [sum(piece.integral for piece in pieces), sum(piece.path for piece in pieces)]
-    assert_allclose(found, exact, rtol=1e-11, atol=1e-15)
+    found = pieces(name, start, stop)
+    assert_allclose([sum(piece.integral for piece in found), sum(piece.path for piece in found)], exact, rtol=1e-11)
+    whole = course(name).pieces(np.array([start, stop]), DURATION).joined
+    assert_allclose([whole.integral, whole.path], np.transpose([exact]), rtol=1e-11)
+    assert (whole.start, whole.stop, whole.first) == (start, stop, found[0].first)
+
+
+@pytest.mark.parametrize("name", COURSES)
+def test_the_pieces_of_a_block_of_intervals_are_those_of_each(name):
+    ends = DURATION * (np.arange(12) / 11)
+    block = course(name).pieces(ends, DURATION)
+    alone = [pieces(name, *span) for span in itertools.pairwise(ends)]
+    assert [Pieces(*row)[1:] for row in zip(*block, strict=True)] == [piece[1:] for few in alone for piece in few]
+    assert block.interval.tolist() == [k for k, few in enumerate(alone) for _ in few]
+    joined = course(name).pieces(ends, DURATION).joined
+    assert_array_equal(joined.interval, np.arange(11))
+    assert_array_equal(joined.integral, [math.fsum(piece.integral for piece in few) for few in alone])
+    assert_array_equal(course(name).at(ends, DURATION), [at(name, time) for time in ends])
 
 
 @pytest.mark.parametrize("name", COURSES)
 def test_a_course_is_cut_where_it_turns_or_jumps_and_nowhere_else(name):
-    held, turns = course(name), COURSES[name][1]
-    pieces = held.pieces(0.0, DURATION, DURATION)
-    assert_allclose([piece.stop for piece in pieces], [*turns, DURATION], rtol=1e-15)
-    for piece in pieces:
-        assert_allclose(piece.first, held.at(piece.start, DURATION), rtol=1e-14)
-        before = held.at(piece.stop - 1e-7, DURATION)
+    turns, found = COURSES[name][1], pieces(name, 0.0, DURATION)
+    assert_allclose([piece.stop for piece in found], [*turns, DURATION], rtol=1e-15)
+    for piece in found:
+        assert_allclose(piece.first, at(name, piece.start), rtol=1e-14)
+        before = at(name, piece.stop - 1e-7)
         assert_allclose(piece.last, before, rtol=1e-5)
-    for before, after in itertools.pairwise(pieces):
+    for before, after in itertools.pairwise(found):
         assert before.stop == after.start
         assert (before.last == after.first) == (name != "table" or before.stop != 0.5)
 
@@ -61,10 +86,19 @@ def test_a_course_is_cut_where_it_turns_or_jumps_and_nowhere_else(name):
 def test_a_step_that_ends_at_a_turn_but_for_rounding_has_one_piece(name):
     for turn in COURSES[name][1]:
         for time in (turn * (1.0 - 3e-16), turn, turn * (1.0 + 3e-16)):
-            assert len(course(name).pieces(turn - 0.1, time, DURATION)) == 1
-            assert len(course(name).pieces(time, turn + 0.1, DURATION)) == 1
+            assert len(pieces(name, turn - 0.1, time)) == 1
+            assert len(pieces(name, time, turn + 0.1)) == 1
 
 
 def test_an_instant_is_one_piece_with_the_value_after_a_jump():
-    (piece,) = course("table").pieces(0.5, 0.5, DURATION)
-    assert piece == (0.5, 0.5, -0.5, -0.5, 0.0, 0.0)
+    (piece,) = pieces("table", 0.5, 0.5)
+    assert piece == (0, 0.5, 0.5, -0.5, -0.5, 0.0, 0.0)
+
+
+def test_the_values_of_rows_are_their_own_and_sums_over_many_rows_are_rounded_once():
+    random = np.random.default_rng(1)
+    times, values = np.linspace(0.0, 1.0, 201), random.normal(size=201)
+    found = table_pieces(times, values, np.array([0.0, 0.3, 0.7, 1.0]), 1.0)
+    assert_array_equal(found.last, values[1:])
+    sums = [math.fsum(found.integral[found.interval == k]) for k in range(3)]
+    assert_array_equal(found.joined.integral, sums)

@@ -20,7 +20,7 @@ from sim.parts.contact.control import Bodies, Control, DisplacementControl, Load
 from sim.parts.contact.crack_front import Hold, Kinetics, advance as advance_front
 from sim.parts.contact.crossing import widest_crossings
 from sim.parts.exchange import Array, Flags, Motion, Motions, Setting, Touching, during
-from sim.units.course import Piece, Prescribed, held, prescribed
+from sim.units.course import Pieces, Prescribed, held, prescribed
 from sim.units.quantity import Quantity
 
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
@@ -105,9 +105,15 @@ class _Controlled:
 
     def control(self, time: float | Array, duration: float) -> Control:
         """The control at a time of a run of ``duration`` [s], or at many, shape (times, 1)."""
-        if not self.changes or not isinstance(time, np.ndarray):
-            return self._control(self.course.at(0.0 if isinstance(time, np.ndarray) else time, duration))
-        return self._control(np.array([[self.course.at(one, duration)] for one in time.flat]))
+        if not self.changes:
+            return self._steady
+        value = self.course.at(np.asarray(time), duration)
+        return self._control(value if isinstance(time, np.ndarray) else value.item())
+
+    @cached_property
+    def _steady(self) -> Control:
+        """The control where it does not change."""
+        return self._control(self.course.at(np.zeros(()), 0.0).item())
 
     def _control(self, value: float | Array) -> Control:
         return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
@@ -216,6 +222,8 @@ class Equilibrium(_Controlled):
             opens, closes = (np.isnan(one) & ~np.isnan(other) for one, other in ((radius, before), (before, radius)))
             lost = np.zeros(radius.shape)
             for happens, size, sign in ((opens, before, 1.0), (closes, radius, -1.0)):
+                if not happens.any():
+                    continue
                 over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
                 lost += np.where(happens, np.maximum(sign * over, 0.0), 0.0)
             dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
@@ -248,26 +256,29 @@ class RateDependent(_Controlled):
 
     def advance(self, state: Touching, motions: Motions, duration: float, balance: Balance) -> Touching:
         phases, found = self._phases(state, self.control(motions.time, duration), balance), []
+        ends = np.append(motions.time[0] - motions.duration[0], motions.time)
+        pieces = self.course.pieces(ends, duration)
         for k, motion in enumerate(motions.each()):
-            state = self._step(state, motion, duration, balance.at(k))
+            within = Pieces(*(values[pieces.interval == k] for values in pieces))
+            state = self._step(state, motion, within, balance.at(k))
             found.append(state)
         return Touching(*map(np.array, zip(*found, strict=True)))._replace(phases=phases)
 
-    def _step(self, state: Touching, motion: Motion, duration: float, balance: Balance) -> Touching:
+    def _step(self, state: Touching, motion: Motion, pieces: Pieces, balance: Balance) -> Touching:
         """The contact after one step, but for the phases of the reference contacts."""
         last = self._left(state.radius, balance)
         first = np.where(np.isnan(state.radius), last, state.work)
         now = state._replace(radius=state.radius + np.zeros(last.shape))
-        pieces = self.course.pieces(motion.time - motion.duration, motion.time, duration)
-        begin, span, share = pieces[0].start, pieces[-1].stop - pieces[0].start, 0.0
-        for piece in pieces:
+        begin, span, share = pieces.start[0], pieces.stop[-1] - pieces.start[0], 0.0
+        for row in zip(*pieces, strict=True):
+            piece = Pieces(*row)
             before, share = share, (piece.stop - begin) / span
             works = [(1.0 - part) * first + part * last for part in (before, share)]
             now = self._moved(now, piece, motion.duration * (share - before), works, balance)
         return now._replace(work=self._left(now.radius, balance))
 
     def _moved(
-        self, state: Touching, piece: Piece, duration: float, works: Sequence[Array], balance: Balance
+        self, state: Touching, piece: Pieces, duration: float, works: Sequence[Array], balance: Balance
     ) -> Touching:
         """The contact after a part of a clock step in which control and work change linearly.
 
@@ -305,7 +316,7 @@ class RateDependent(_Controlled):
         fold = np.cbrt(9.0 * math.pi * np.maximum(work, 0.0) * size**2 / (8.0 * modulus))
         return np.asarray(np.isnan(radius) | (radius >= fold))
 
-    def _hold(self, piece: Piece) -> Hold:
+    def _hold(self, piece: Pieces) -> Hold:
         """Control during a part of a clock step."""
         if self.load is not None:
             return Hold(load_before=piece.first, load_after=piece.last)

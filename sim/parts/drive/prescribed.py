@@ -4,9 +4,8 @@ A prescribed drive is a function of time, the same for all members. It gives the
 step, never the speed times the step, so that parts that live on slip see no step error.
 """
 
-import itertools
 import math
-from collections.abc import Iterator
+from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -14,7 +13,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.parts.exchange import Array, Motion, Motions, Resistance, Setting, Times
-from sim.units.course import Course, Number, Piece, Table as Rows, table_pieces
+from sim.units.course import Course, Number, Pieces, Table as Rows, table_pieces
 from sim.units.quantity import Quantity
 
 _SPEED = Quantity("m/s", "sliding speed", "V")
@@ -25,6 +24,10 @@ class Slider(NamedTuple):
 
     position: Array
     speed: Array
+
+
+#: Steps of which the motion is made at once for those who go one by one.
+_AHEAD = 1024
 
 
 class _Sliding:
@@ -39,37 +42,46 @@ class _Sliding:
         return Slider(np.zeros(1), motion.speed), motion
 
     def advance(self, state: Slider, resistance: Resistance, times: Times, steps: range) -> tuple[Slider, Motions]:
-        ends = [times.at(step) for step in range(steps.start - 1, steps.stop)]
-        rows = [_sums(start, stop, pieces) for start, stop, pieces in self.each(ends, times.duration)]
-        time, duration, slip, path, first, speed = np.array(rows).T[:, :, np.newaxis]
+        found = self._of_steps(times, steps) if len(steps) > 1 else self._of_one(times, steps.start)
+        time, duration, slip, path, first, speed = found
         position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
         motions = Motions(steps.start, time, duration, slip, path, first, speed, position)
         return Slider(position[-1], speed[-1]), motions
 
+    def _of_steps(self, times: Times, steps: range) -> Array:
+        """Rows of ``_sums`` for a block of steps, shape (6, steps, 1)."""
+        ends = times.at(np.arange(steps.start - 1.0, steps.stop))
+        return np.array(self._sums(ends, times.duration))[:, :, np.newaxis]
+
+    def _of_one(self, times: Times, step: int) -> Array:
+        """Rows of ``_sums`` for a single step, made for many at once and kept."""
+        before = (step - 1) // _AHEAD * _AHEAD
+        if (known := self._kept.get((times, before))) is None:
+            known = self._of_steps(times, range(before + 1, min(before + _AHEAD, times.steps) + 1))
+            self._kept.clear()
+            self._kept[times, before] = known
+        return known[:, step - before - 1 : step - before]
+
+    @cached_property
+    def _kept(self) -> dict[tuple[Times, int], Array]:
+        return {}
+
     def remarks(self, setting: Setting) -> list[str]:
         return []
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
-        """The speed from ``start`` to ``stop`` [s] in pieces."""
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        """The speed in the intervals between some times [s], in pieces."""
         raise NotImplementedError
-
-    def each(self, ends: list[float], duration: float) -> Iterator[tuple[float, float, list[Piece]]]:
-        """Start and end of each step [s], and the speed in it in pieces."""
-        return ((*span, self.pieces(*span, duration)) for span in itertools.pairwise(ends))
 
     def motion(self, step: int, start: float, stop: float, duration: float) -> Motion:
         """Slip, path and final speed from time ``start`` to ``stop`` of a run of ``duration`` [s]."""
-        time, span, *sums = _sums(start, stop, self.pieces(start, stop, duration))
-        return Motion(step, time, span, *np.array(sums)[:, np.newaxis])
+        time, span, *sums = self._sums(np.array([start, stop]), duration)
+        return Motion(step, time.item(), span.item(), *sums)
 
-
-def _sums(start: float, stop: float, pieces: list[Piece]) -> tuple[float, ...]:
-    """End and length of a step [s], slip and path in it [m], speeds at its ends [m/s]."""
-    first, last = pieces[0], pieces[-1]
-    slip, path = first.integral, first.path
-    if len(pieces) > 1:
-        slip, path = math.fsum(piece.integral for piece in pieces), math.fsum(piece.path for piece in pieces)
-    return stop, stop - start, slip, path, first.first, last.last
+    def _sums(self, ends: Array, duration: float) -> tuple[Array, ...]:
+        """End and length of each interval between times [s], slip and path in it [m], speeds at its ends [m/s]."""
+        pieces = self.pieces(ends, duration).joined
+        return ends[1:], np.diff(ends), pieces.integral, pieces.path, pieces.first, pieces.last
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -85,8 +97,8 @@ class Steady(_Sliding):
 
     end: ClassVar[float] = math.inf
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
-        return Number(self.speed).pieces(start, stop, duration)
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        return Number(self.speed).pieces(ends, duration)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -108,9 +120,9 @@ class Start(_Sliding):
         still = "the slider rests for the whole run: shorten drive.rest or lengthen clock.duration"
         return [still] if self.rest >= setting.times.duration else []
 
-    def pieces(self, start: float, stop: float, duration: float) -> list[Piece]:
+    def pieces(self, ends: Array, duration: float) -> Pieces:
         times, speeds = np.array([0.0, self.rest, self.rest]), np.array([0.0, 0.0, self.speed])
-        return table_pieces(times, speeds, start, stop, duration)
+        return table_pieces(times, speeds, ends, duration)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
@@ -123,11 +135,6 @@ class Ramp(Course, _Sliding):
     start: Annotated[float, _SPEED, Field(alias="from")]
     stop: Annotated[float, _SPEED, Field(alias="to")]
     model: Literal["ramp"] = "ramp"
-
-    def each(self, ends: list[float], duration: float) -> Iterator[tuple[float, float, list[Piece]]]:
-        speeds = [self.at(end, duration) for end in ends]
-        for start, stop, first, last in zip(ends[:-1], ends[1:], speeds[:-1], speeds[1:], strict=True):
-            yield start, stop, [self.smooth(start, first, stop, last, duration)]
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})

@@ -238,7 +238,7 @@ def test_shares_of_a_moved_sphere_are_those_at_its_present_place(records, contro
     dataset = run(scene(contact=moving, **parts))
     moved = analysis.share_observables(dataset)
     kind = next(name for name in ("load", "indentation", "displacement") if name in MOVED[control])
-    held = MOVED[control] | {kind: [moving.course.at(t, 0.4) for t in dataset["t"].to_numpy()]}
+    held = MOVED[control] | {kind: moving.course.at(dataset["t"].to_numpy(), 0.4).tolist()}
     for at in records:
         still = run(scene(contact=Equilibrium(**(held | {kind: float(held[kind][at])})), **parts))
         lost = analysis.share_observables(still)
