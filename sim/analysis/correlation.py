@@ -4,7 +4,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-import scipy.fft
+import scipy
 import xarray as xr
 
 from sim.analysis.scene import MEMBERS, steady_points

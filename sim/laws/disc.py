@@ -14,11 +14,11 @@ import functools
 import math
 
 import numpy as np
-import scipy.fft
-import scipy.special
+import scipy
 
 from sim.laws.halfspace import angular_compliance, disc_displacement
 from sim.numerics.grid import Grid
+from sim.numerics.special import sine_integral
 
 #: A disc smaller than this many pixels stores nothing that a number could hold.
 _LEAST_RADIUS = 1e-12
@@ -26,9 +26,9 @@ _LEAST_RADIUS = 1e-12
 _SERIES_END = 3.0
 _TERM = np.arange(16)
 _MEAN_SERIES = 0.5 * np.sqrt(np.pi) * (-1.0) ** _TERM / (2 * _TERM + 1)
-_MEAN_SERIES /= scipy.special.factorial(_TERM) * scipy.special.gamma(_TERM + 2.5)
+_MEAN_SERIES /= [math.factorial(n) * math.gamma(n + 2.5) for n in range(len(_TERM))]
 _SKEW_SERIES = -0.5 * np.sqrt(np.pi) * (-1.0) ** _TERM / ((_TERM + 2) * (2 * _TERM + 3))
-_SKEW_SERIES /= scipy.special.factorial(_TERM) * scipy.special.gamma(_TERM + 3.5)
+_SKEW_SERIES /= [math.factorial(n) * math.gamma(n + 3.5) for n in range(len(_TERM))]
 
 
 def _series(x, mean_growth, skew_growth):
@@ -71,7 +71,7 @@ def energy_factors(x):
     x = np.asarray(x, dtype=float)
     near = _series(x, 2.0, 2.0)
     far = np.clip(x, _SERIES_END, 1e300)
-    sine, cosine, integral = np.sin(far) / far, np.cos(far), scipy.special.sici(far)[0]
+    sine, cosine, integral = np.sin(far) / far, np.cos(far), sine_integral(far)
     mean = integral + (cosine - sine) / far
     skew = (4.0 - 3.0 * sine - cosine) / far - integral
     return np.where(x < _SERIES_END, near[0], mean), np.where(x < _SERIES_END, near[1], skew)
@@ -105,7 +105,7 @@ def marginal_factors(x):
     x = np.asarray(x, dtype=float)
     near = _series(x, 2 * _TERM + 3.0, 2 * _TERM + 5.0)
     far = np.clip(x, _SERIES_END, 1e300)
-    integral = scipy.special.sici(far)[0]
+    integral = sine_integral(far)
     skew = 4.0 * np.sin(0.5 * far) ** 2 / far - integral
     return np.where(x < _SERIES_END, near[0], integral), np.where(x < _SERIES_END, near[1], skew)
 

@@ -16,7 +16,7 @@ import functools
 import math
 
 import numpy as np
-import scipy.special
+import scipy
 
 from sim.numerics.grid import Grid
 from sim.numerics.jit import device, law

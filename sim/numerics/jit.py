@@ -12,7 +12,6 @@ import contextlib
 import functools
 import hashlib
 import inspect
-import os
 import pickle
 import sys
 from collections.abc import Callable
@@ -29,6 +28,8 @@ from numba.core.serialize import dumps
 from numba.np.ufunc import _internal  # type: ignore[attr-defined]
 from numba.np.ufunc.ufuncbuilder import UFuncDispatcher
 from numba.np.ufunc.wrappers import build_ufunc_wrapper
+
+from sim.units import kept
 
 device = numba.njit(error_model="numpy")
 inlined = numba.njit(error_model="numpy", inline="always")
@@ -48,8 +49,7 @@ def _cache_folder() -> str:
         text = source.read_bytes()
         if b"sim.numerics.jit" in text or source.name == "jit.py":
             digest.update(text)
-    base = os.environ.get("SIM_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return str(Path(base).expanduser() / "sliding-sim" / digest.hexdigest()[:16])
+    return str(kept.folder() / digest.hexdigest()[:16])
 
 
 def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: Callable[..., Callable]) -> Callable:
@@ -63,26 +63,13 @@ def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: C
         machine = hashlib.sha256(repr(cpu_target.target_context.codegen().magic_tuple()).encode()).hexdigest()
         path = Path(_cache_folder(), f"{_name(function)}.{machine[:8]}")
         with contextlib.suppress(Exception):
-            content = path.read_bytes()
-            if content[:32] == hashlib.sha256(content[32:]).digest():
-                return load(*pickle.loads(content[32:]))
+            return load(*pickle.loads(kept.read(path) or b""))
         for tell in on_compiling:
             tell(_name(function))
         made, code = make()
         with contextlib.suppress(Exception):
-            _store(path, dumps(code()))
+            kept.store(path, dumps(code()))
         return made
-
-
-def _store(path: Path, content: bytes) -> None:
-    """Write a file of the cache with its checksum, whole or not at all."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f"{path.name}.{os.getpid()}.part")
-    try:
-        part.write_bytes(hashlib.sha256(content).digest() + content)
-        part.replace(path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _name(function: Callable) -> str:

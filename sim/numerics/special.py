@@ -80,7 +80,7 @@ def lambert(x):
 
 
 @device
-def sine_integral(x):
+def si(x):
     """``∫ sin(t)/t dt`` from 0 to x >= 0, to rounding: its series, beyond 3 the continued fraction of E1(ix)."""
     if x < 3.0:
         term = total = x
@@ -200,3 +200,49 @@ def lambert_w(x):
     0.567143
     """
     return lambert(x)
+
+
+@law
+def erf_between(low, high):
+    """``erf(high) - erf(low)``, without cancellation in either tail.
+
+    Parameters
+    ----------
+    low, high : float or array
+        Ends [1]; they broadcast.
+
+    Returns
+    -------
+    float or array
+        [1]; of 0 and infinity 1.
+
+    Examples
+    --------
+    >>> erf_between(0.0, math.inf).item()
+    1.0
+    """
+    if low > 0.0:
+        low, high = -high, -low
+    return math.erfc(-high) - math.erfc(-low) if high < 0.0 else math.erf(high) - math.erf(low)
+
+
+@law
+def sine_integral(x):
+    """``Si(x)``, the integral of ``sin(t)/t`` from 0 to x.
+
+    Parameters
+    ----------
+    x : float or array
+        Upper end [1], at least 0.
+
+    Returns
+    -------
+    float or array
+        [1]; 0 at 0, π/2 at infinity.
+
+    Examples
+    --------
+    >>> print(f"{sine_integral(math.pi):.12f}")
+    1.851937051982
+    """
+    return si(x)

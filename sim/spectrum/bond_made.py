@@ -4,9 +4,9 @@ import math
 from typing import Annotated, ClassVar, Literal
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
-from scipy import special
 
 from sim.laws.disc import energy_factors
 from sim.spectrum.family import Array, Factors
@@ -67,7 +67,7 @@ class BondMade(Isotropic):
     def radial_density(self, q: ArrayLike) -> Array:
         """Density C at wavenumber q [rad/m], in Pa² m²."""
         x = np.asarray(q, float) * self.footprint
-        return np.square(np.where(x == 0.0, 1.0, 2.0 * special.j1(x) / np.where(x == 0.0, 1.0, x)))
+        return np.square(np.where(x == 0.0, 1.0, 2.0 * scipy.special.j1(x) / np.where(x == 0.0, 1.0, x)))
 
     def cumulative(self, q: ArrayLike) -> Array:
         """Variance within wavenumber q [Pa²]: (1 − J0² − J1²)/(πb²), by its series where that cancels."""
@@ -94,4 +94,4 @@ class BondMade(Isotropic):
 
     def _outside(self, q: ArrayLike) -> Array:
         x = np.asarray(q, float) * self.footprint
-        return special.j0(x) ** 2 + special.j1(x) ** 2
+        return scipy.special.j0(x) ** 2 + scipy.special.j1(x) ** 2

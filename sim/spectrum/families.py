@@ -15,11 +15,11 @@ import math
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
-from scipy import special
 
 from sim.laws.halfspace import angular_compliance, ripple_energy
 from sim.spectrum.bond_made import BondMade
@@ -318,7 +318,7 @@ class VonKarman(_OfRms, Isotropic):
     @property
     def line_integral(self) -> float:
         """∫ C dq [Pa² m]."""
-        ratio = special.poch(self.hurst, 0.5)  # Γ(H + ½) / Γ(H)
+        ratio = scipy.special.poch(self.hurst, 0.5)  # Γ(H + ½) / Γ(H)
         return float(2 * math.pi**1.5 * self.length * self.variance * ratio)
 
 
@@ -366,8 +366,8 @@ class AnisotropicGaussian(_OfRms, Waves):
         """Mean energy per area [J/m²] stored in an infinite half-space (see Notes)."""
         a, b, cosine = self.length_x, self.length_y, math.cos(self.angle)
         scale = self.variance * a * b / (3 * math.sqrt(math.pi))
-        along = scale * b**2 * special.elliprd(0.0, a**2, b**2)
-        across = scale * a**2 * special.elliprd(0.0, b**2, a**2)
+        along = scale * b**2 * scipy.special.elliprd(0.0, a**2, b**2)
+        across = scale * a**2 * scipy.special.elliprd(0.0, b**2, a**2)
         level, swing = angular_compliance(np.asarray(poisson_ratio, float))
         turned = swing * (along - across) * (2 * cosine**2 - 1)
         return (level * (along + across) + turned) / (2 * np.asarray(shear_modulus, float))
@@ -388,7 +388,7 @@ class AnisotropicGaussian(_OfRms, Waves):
         a, b = self.length_x, self.length_y
         level = 2 * math.pi**2 * a * b * self.variance * np.exp(-((min(a, b) * q) ** 2) / 4)
         bend = (a - b) * (a + b) / 8 * q**2
-        return level * special.ive(0, bend), -level * special.ive(1, bend) * math.cos(2 * self.angle)
+        return level * scipy.special.ive(0, bend), -level * scipy.special.ive(1, bend) * math.cos(2 * self.angle)
 
     def pixels(self, step: float, reach: int) -> Array:
         """Variance in the pixels of a wavevector lattice [Pa²], see ``Family``."""

@@ -15,14 +15,13 @@ from functools import cached_property
 from typing import ClassVar, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy import special
-from scipy.interpolate import CubicSpline
 
 from sim.laws.disc import energy_factors, marginal_factors
 from sim.laws.halfspace import angular_compliance
 from sim.numerics.jit import device
-from sim.numerics.special import sine_integral
+from sim.numerics.special import erf_between, si
 from sim.spectrum.family import Array, Factors, Family
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
@@ -215,8 +214,8 @@ def _window(spectrum: Waves, radius: float, x: Array) -> Array:
     """1 where the oscillation of P and S is followed, falling smoothly to 0 elsewhere."""
     followed = np.zeros_like(x)
     for number, (begin, end) in enumerate(_followed(spectrum, radius)):
-        rise = special.erfc((begin - x) / _FADING) if number else 2.0
-        followed += 0.25 * rise * special.erfc((x - end) / _FADING)
+        rise = erf_between((begin - x) / _FADING, math.inf) if number else 2.0
+        followed += 0.25 * rise * erf_between((x - end) / _FADING, math.inf)
     return followed
 
 
@@ -230,7 +229,7 @@ class Margin:
     def __init__(self, spectrum: Family, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
         self.spectrum, self.solid = spectrum, (shear_modulus, poisson_ratio)
         self._ends = sphere_radius * 10.0**-_DECADES, sphere_radius
-        self._splines: dict[Callable[..., Array], CubicSpline] = {}
+        self._splines: dict[Callable[..., Array], scipy.interpolate.CubicSpline] = {}
 
     def __call__(self, radius: Array) -> Array:
         """Share at contact radii [m]; nan at nan."""
@@ -267,11 +266,11 @@ class Margin:
     def _plane(self) -> float:
         return float(self.spectrum.surface_energy(*self.solid))
 
-    def _spline(self, law: Callable[..., Array]) -> CubicSpline:
+    def _spline(self, law: Callable[..., Array]) -> "scipy.interpolate.CubicSpline":
         if law not in self._splines:
             radii = np.geomspace(*self._ends, _POINTS)
             energies = law(self.spectrum, radii, *self.solid) if self._plane > 0.0 else np.zeros(_POINTS)
-            self._splines[law] = CubicSpline(np.log(radii), energies / (self._plane or 1.0))
+            self._splines[law] = scipy.interpolate.CubicSpline(np.log(radii), energies / (self._plane or 1.0))
         return self._splines[law]
 
 
@@ -281,7 +280,7 @@ def share_of(radius, wave, ends, cubics):
     double, level, lean = wave
     if double > 0.0:
         x = double * radius
-        integral, half = sine_integral(x), math.sin(0.5 * x)
+        integral, half = si(x), math.sin(0.5 * x)
         return level * integral + lean * (4.0 * half * half / x - integral)
     low, begin, rate = ends
     place = min(rate * (math.log(max(radius, low)) - begin), float(len(cubics)))

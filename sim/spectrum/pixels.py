@@ -10,8 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic_core import PydanticCustomError
-from scipy import special
 
+from sim.numerics.special import erf_between
 from sim.spectrum.family import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(6)
@@ -186,13 +186,5 @@ def gaussian_boxes(form: tuple[float, float, float], x_edges: NDArray, y_edges: 
     weight = np.tile(weight / 2, panels) / panels
     u = x_edges[:-1, None] + step[:, None] * node
     ends = root * (y_edges + (xy / yy) * u[..., None])
-    mass = math.sqrt(math.pi) / (2 * root) * _erf_between(ends[..., :-1], ends[..., 1:])
+    mass = math.sqrt(math.pi) / (2 * root) * erf_between(ends[..., :-1], ends[..., 1:])
     return np.einsum("ik,ikj->ij", np.exp(-(xx - xy**2 / yy) * u**2) * weight * step[:, None], mass)
-
-
-def _erf_between(low: Array, high: Array) -> Array:
-    """erf(high) - erf(low), without cancellation in either tail."""
-    flip = low > 0.0
-    a, b = np.where(flip, -high, low), np.where(flip, -low, high)
-    tail = b < 0.0
-    return np.where(tail, special.erfc(-b) - special.erfc(-a), special.erf(b) - special.erf(a))

@@ -7,14 +7,19 @@ the JSON schema, the netCDF attributes and ``sim check``. SI inside, always.
 
 import difflib
 import functools
+import json
 import math
 import operator
 import re
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from sim.units import kept
 
 _NUMBER = r"[+-]?(?:(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|inf(?:inity)?|nan)"
 _REST = r"(?P<unit>[^\s0-9+,-](?:.*\S)?|1\s*/.*\S)?"
@@ -27,6 +32,7 @@ _POWER = re.compile(rf"({_NAME})\s*(?:\^|\*\*)?\s*(-?[0-9]+)")
 _FACTOR = rf"{_NAME}(?:\s*(?:\^|\*\*)\s*-?[1-9][0-9]?|-?[1-9][0-9]?)?"
 _UNIT = re.compile(rf"(?:1?\s*/\s*)?{_FACTOR}(?:\s*[*/]\s*{_FACTOR}|\s+{_FACTOR})*")
 _LONGEST_TEXT, _LONGEST_UNIT = 200, 60
+_MOST_SCALES = 512
 _TYPESET = str.maketrans("−·⋅×⁄⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-***/-0123456789")
 
 # Beyond these nothing is measurable, and products of a few such numbers leave the range of floats.
@@ -62,9 +68,27 @@ def _written(unit: str) -> str:
     return re.sub(r"^/", "1/", _POWER.sub(r"\1^\2", unit))
 
 
+@functools.lru_cache(maxsize=1)
+def _known_scales() -> tuple[Path, dict[str, float]]:
+    """Factors between units that pint has found before, by both texts, and their file."""
+    path = kept.folder() / f"units-{version('pint')}"
+    return path, json.loads(kept.read(path) or b"{}")
+
+
 @functools.lru_cache(maxsize=1024)
 def _scale(unit: str, target: str) -> float | None:
     """Factor from ``unit`` to ``target``; None where the dimensions differ, ValueError if unknown."""
+    (path, known), both = _known_scales(), f"{unit} in {target}"
+    if both in known:
+        return known[both]
+    scale = _found_scale(unit, target)
+    if scale is not None and len(known) < _MOST_SCALES:
+        known[both] = scale
+        kept.store(path, json.dumps(known).encode())
+    return scale
+
+
+def _found_scale(unit: str, target: str) -> float | None:
     registry = _units()
     try:
         given = registry.Quantity(1.0, registry.parse_units(unit))

@@ -8,7 +8,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.special import exp1
 
-from sim.numerics.special import lambert_w, reduced_exponential_integral, scaled_exponential_integral, sine_integral
+from sim.numerics.special import (
+    erf_between,
+    lambert_w,
+    reduced_exponential_integral,
+    scaled_exponential_integral,
+    sine_integral,
+)
 
 ORDERS = [0, 1, 2]
 
@@ -85,7 +91,7 @@ def test_the_sine_integral_is_right_to_rounding_on_both_sides_of_its_seam():
     x = [0.0, 1e-9, 0.1, 1.0, 2.0, 2.999999, 3.0, 3.3, 5.0, 8.0, 20.0, 1e2, 1e3, 1e5]
     with mp.workdps(40):
         exact = [float(mp.si(mp.mpf(value))) for value in x]
-    assert_allclose([sine_integral(value) for value in x], exact, rtol=8 * np.finfo(float).eps, atol=0)
+    assert_allclose(sine_integral(x), exact, rtol=8 * np.finfo(float).eps, atol=0)
 
 
 def test_lambert_w_to_fifty_digits():
@@ -94,3 +100,11 @@ def test_lambert_w_to_fifty_digits():
         exact = [float(mp.lambertw(mp.mpf(value)).real) for value in x]
     assert_allclose(lambert_w(x), exact, rtol=1e-15, atol=0)
     assert_array_equal(lambert_w([0.0, math.inf]), [0.0, math.inf])
+
+
+def test_erf_between_keeps_its_digits_in_both_tails():
+    low = np.array([-30.0, -9.0, -1.0, -0.1, 0.3, 8.0, 20.0])
+    high = np.array([-20.0, -8.5, 2.0, 0.1, 0.4, 9.0, np.inf])
+    with mp.workdps(450):
+        exact = [float(mp.erf(h) - mp.erf(a)) for a, h in zip(low, high, strict=True)]
+    assert_allclose(erf_between(low, high), exact, rtol=8 * np.finfo(float).eps, atol=0)

@@ -183,11 +183,15 @@ def test_a_declaration_validates_and_describes_itself():
 def fresh_registry(monkeypatch, tmp_path):
     """A registry of units made anew from a cache folder of its own."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    quantity._units.cache_clear()
-    quantity._scale.cache_clear()
+    monkeypatch.delenv("SIM_CACHE_DIR", raising=False)
+    _forget()
     yield tmp_path
-    quantity._units.cache_clear()
-    quantity._scale.cache_clear()
+    _forget()
+
+
+def _forget():
+    for known in (quantity._units, quantity._scale, quantity._known_scales):
+        known.cache_clear()
 
 
 def test_units_are_read_where_the_cache_folder_is_a_file(fresh_registry, monkeypatch):
@@ -208,8 +212,7 @@ def test_units_are_read_where_the_cache_is_broken(fresh_registry):
     assert kept
     for path in kept:
         path.write_bytes(path.read_bytes()[:7])
-    quantity._units.cache_clear()
-    quantity._scale.cache_clear()
+    _forget()
     assert LENGTH.read("3 mm") == 3e-3
 
 

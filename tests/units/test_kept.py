@@ -1,0 +1,66 @@
+"""What is kept between runs: a store that is missing, broken, read-only or full costs time, never a run."""
+
+import pytest
+
+from sim.units import kept, quantity
+from sim.units.quantity import Quantity
+
+
+@pytest.fixture
+def anew(tmp_path, monkeypatch):
+    """Forget what this process knows of units; what pint is asked goes into a list."""
+    asked = []
+    find = quantity._found_scale
+    monkeypatch.setattr(quantity, "_found_scale", lambda *units: asked.append(units) or find(*units))
+
+    def forget(folder):
+        monkeypatch.setenv("SIM_CACHE_DIR", str(folder))
+        quantity._known_scales.cache_clear()
+        quantity._scale.cache_clear()
+        asked.clear()
+        return asked
+
+    yield forget
+    quantity._known_scales.cache_clear()
+    quantity._scale.cache_clear()
+
+
+def test_a_file_is_read_only_as_it_was_stored(tmp_path):
+    path = tmp_path / "new" / "file"
+    assert kept.read(path) is None
+    kept.store(path, b"content")
+    assert kept.read(path) == b"content"
+    assert [entry.name for entry in path.parent.iterdir()] == ["file"]
+    path.write_bytes(path.read_bytes().replace(b"content", b"kontent"))
+    assert kept.read(path) is None
+
+
+def test_a_unit_is_looked_up_once_and_kept_for_other_processes(anew, tmp_path):
+    work = Quantity("J/m^2", "work of adhesion")
+    asked = anew(tmp_path)
+    first = work.read("42.7 mJ/m^2")
+    assert len(asked) == 1
+    asked = anew(tmp_path)
+    assert work.read("42.7 mJ/m^2") == first
+    assert not asked
+    for fault in ("42 mN/m^2", "42 mJoules/m^2"):  # what is refused is refused by pint each time
+        with pytest.raises(ValueError, match="unit"):
+            work.read(fault)
+    assert len(asked) == 2
+
+
+def test_a_store_of_units_that_cannot_be_used_changes_no_number(anew, tmp_path, room):
+    length = Quantity("m", "length")
+    (tmp_path / "file").write_text("no folder")
+    asked = anew(tmp_path)
+    exact = length.read("3.3 nm")
+    stored = next(path for path in tmp_path.rglob("units*"))
+    stored.write_bytes(b"broken")
+    for folder in (tmp_path, tmp_path / "file", "/proc/no-such-place"):
+        asked = anew(folder)
+        assert length.read("3.3 nm") == exact
+        assert asked
+    with room(10):
+        anew(tmp_path / "full")
+        assert length.read("3.3 nm") == exact
+    assert not [path for path in (tmp_path / "full").rglob("*") if path.is_file()]
