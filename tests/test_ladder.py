@@ -68,7 +68,7 @@ def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture):
         few = bonds.Tracked(**recipe, sites=sites)
         found = last(members, bonds=few, drive=STARTED)
         for values, mean, spread in (
-            (tracks.moments(found.bonds)[0], share, math.sqrt(share * (1.0 - share) / sites)),
+            (tracks.moments(found.bonds.frame, sites)[0], share, math.sqrt(share * (1.0 - share) / sites)),
             (found.bonding.stress, stress, math.sqrt(STRETCHED["site_density"] * varying / sites)),
         ):
             # cohorts are good to 1e-4 themselves; one site's excess kurtosis is below 10, that of N below 10/N

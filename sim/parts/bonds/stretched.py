@@ -225,19 +225,20 @@ class Tracked(_Separable):
         return tracks.start(*laws, self.sites, motion.first, self.start_from, *address)
 
     def advance(self, state: Tracks, motions: Motions, radius: Array, noise: Noise) -> tuple[Tracks, Bonding]:
-        return by_step(self, state, motions, radius, noise)
-
-    def step(self, state: Tracks, motion: Motion, radius: Array, noise: Noise) -> Tracks:
         laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
-        return tracks.advance(state, motion.slip, motion.duration, *laws, *address)
+        state, frames = tracks.advance(state, motions.slip, motions.duration[:, 0], *laws, *address)
+        return state, self._read(frames)
 
     def followed(self, speeds: Array, step: float) -> float:
         lives = step / (tracks.mean_life(speeds, self.law) + 1.0 / self.rebinding_rate)
         return float(self.sites * np.mean(np.minimum(lives, CYCLES)))
 
     def bonding(self, state: Tracks) -> Bonding:
+        return self._read(state.frame)
+
+    def _read(self, frames: Array) -> Bonding:
         # one bond after the other breaks, at a limit or by itself
-        return self._bonding(*tracks.moments(state), np.zeros(1), _UNKNOWN)
+        return self._bonding(*tracks.moments(frames, self.sites), np.zeros(1), _UNKNOWN)
 
     def steady(self, speed: Array) -> Bonding:
         return Cohort(self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density).steady(speed)

@@ -16,7 +16,7 @@ import numpy as np
 from sim.numerics.special import reduced_exponential_integral, scaled_exponential_integral
 from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
-from sim.parts.bonds.tracked_step import ENDLESS, LONG, SPENT, draw, live
+from sim.parts.bonds.tracked_step import ENDLESS, SPENT, draw, live
 from sim.parts.exchange import Array
 
 
@@ -24,9 +24,8 @@ class Tracks(NamedTuple):
     """State of the bonds of all members; plain arrays, so that it can be written and read back.
 
     ``advance`` works in the large arrays themselves, which the states of a run share: only the newest
-    state can go on, an older one raises an error. The frames are each state's own, so ``bound``,
-    ``mean_stretch`` and ``mean_square_stretch`` of an older state stay right. Copies of all arrays
-    make a state that goes on by itself.
+    state can go on, an older one raises an error. The frames are each state's own, so the moments of an older state
+    stay right. Copies of all arrays make a state that goes on by itself.
 
     Attributes
     ----------
@@ -85,7 +84,8 @@ def start(
     >>> law, still, fast = RuptureRate(1.0, 1e9, math.inf), np.zeros(1), np.array([1e-8])
     >>> for speed in still, fast:
     ...     tracks = start(law, 1.0, 10**5, speed, "steady", 1, np.arange(1))
-    ...     print("%.2f of the sites, mean stretch %.2f nm" % (bound(tracks)[0] / 1e5, 1e9 * mean_stretch(tracks)[0]))
+    ...     share, mean, _ = moments(tracks.frame, 10**5)
+    ...     print("%.2f of the sites, mean stretch %.2f nm" % (share[0], 1e9 * mean[0]))
     0.50 of the sites, mean stretch 0.00 nm
     0.17 of the sites, mean stretch 0.20 nm
     """
@@ -103,20 +103,27 @@ def start(
 
 
 def advance(
-    tracks: Tracks, slip: Array, duration: float, rupture: RuptureRate, rebinding_rate: float, seed: int, members: Array
-) -> Tracks:
-    """Bonds after a step at constant speed.
+    tracks: Tracks, slip: Array, duration: Array, rupture: RuptureRate, rebinding_rate: float, seed: int, members: Array
+) -> tuple[Tracks, Array]:
+    """Bonds after steps of constant speed each.
 
     Parameters
     ----------
     tracks : Tracks
-        State before the step; spent afterwards, but for its moments.
-    slip : array, shape (1,) or (members,)
-        Displacement of the slider over the step, either sign [m].
-    duration : float
-        Length of the step [s], above 0.
+        State before the steps; spent afterwards, but for its moments.
+    slip : array, shape (steps, 1) or (steps, members)
+        Displacement of the slider over each step, either sign [m].
+    duration : array, shape (steps,)
+        Length of each step [s], above 0.
     rupture, rebinding_rate, seed, members
         As at the start. Only the rates may have changed since.
+
+    Returns
+    -------
+    tracks : Tracks
+        State at the end.
+    frames : array, shape (steps, members, columns)
+        Frames after each step, of which ``moments`` reads; the same, bit for bit, however many steps are made at once.
 
     Raises
     ------
@@ -127,43 +134,43 @@ def advance(
 
     Notes
     -----
-    Exact for any length of the step. One of more than about 300 lives of a site ends in the
+    Exact for any length of a step. One of more than about 300 lives of a site ends in the
     stationary law of its speed, and is drawn from it.
     """
-    slip, members = np.asarray(slip, dtype=float), np.asarray(members, dtype=np.uint64)
-    after = tracks._replace(frame=tracks.frame.copy())
-    code = live(tuple(after), slip, duration, *rupture[:3], rebinding_rate, seed, members)
-    if code == SPENT:
-        raise RuntimeError("these tracks have been advanced already: go on from the newest state, or from copies")
-    if code == ENDLESS:
-        raise ValueError("slip and duration of a step must be finite, and its duration positive")
-    if code == LONG:
-        chosen = after.frame[:, STEPS] == tracks.frame[:, STEPS]
-        _draw(after, chosen, "steady", slip / duration, rupture, rebinding_rate, seed, members)
-    return after
+    members, after = np.asarray(members, dtype=np.uint64), tracks._replace(frame=tracks.frame.copy())
+    frames, done = np.empty((*after.frame.shape, len(duration))), 0
+    while done < len(duration):
+        done = live(tuple(after), slip, duration, *rupture[:3], rebinding_rate, seed, members, done, frames)
+        if done == SPENT:
+            raise RuntimeError("these tracks have been advanced already: go on from the newest state, or from copies")
+        if done == ENDLESS:
+            raise ValueError("slip and duration of a step must be finite, and its duration positive")
+        left = after.frame[:, STEPS] < tracks.frame[:, STEPS] + done
+        if left.any():
+            _draw(after, left, "steady", slip[done - 1] / duration[done - 1], rupture, rebinding_rate, seed, members)
+            frames[:, :, done - 1] = after.frame
+    return after, frames.transpose(2, 0, 1)
 
 
-def bound(tracks: Tracks) -> Array:
-    """Number of bound sites, shape (members,)."""
-    return tracks.frame[:, BOUND]
+def bound(frames: Array) -> Array:
+    """Number of bound sites of frames of shape (..., columns), shape (...)."""
+    return frames[..., BOUND]
 
 
-def mean_stretch(tracks: Tracks) -> Array:
-    """Sum of all stretches, with sign, over the number of sites, shape (members,) [m]."""
-    frame = tracks.frame
-    return frame[:, SENSE] * (frame[:, BOUND] * frame[:, SLIDER] - frame[:, SUM]) / tracks.due.shape[1]
+def mean_stretch(frames: Array, sites: int) -> Array:
+    """Sum of all stretches, with sign, over the number of sites [m]."""
+    return frames[..., SENSE] * (frames[..., BOUND] * frames[..., SLIDER] - frames[..., SUM]) / sites
 
 
-def mean_square_stretch(tracks: Tracks) -> Array:
-    """Sum of all squared stretches over the number of sites, shape (members,) [m^2]."""
-    frame = tracks.frame
-    number, slider, total, squares = frame[:, BOUND], frame[:, SLIDER], frame[:, SUM], frame[:, SQUARES]
-    return np.maximum(slider * (number * slider - 2.0 * total) + squares, 0.0) / tracks.due.shape[1]
+def mean_square_stretch(frames: Array, sites: int) -> Array:
+    """Sum of all squared stretches over the number of sites [m^2]."""
+    number, slider, total, squares = (frames[..., column] for column in (BOUND, SLIDER, SUM, SQUARES))
+    return np.maximum(slider * (number * slider - 2.0 * total) + squares, 0.0) / sites
 
 
-def moments(tracks: Tracks) -> tuple[Array, Array, Array]:
-    """Share of sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each shape (members,)."""
-    return bound(tracks) / tracks.due.shape[1], mean_stretch(tracks), mean_square_stretch(tracks)
+def moments(frames: Array, sites: int) -> tuple[Array, Array, Array]:
+    """Share of sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each of the frames' shape."""
+    return bound(frames) / sites, mean_stretch(frames, sites), mean_square_stretch(frames, sites)
 
 
 def mean_life(speed: Array, rupture: RuptureRate) -> Array:

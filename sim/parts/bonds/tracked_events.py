@@ -1,18 +1,18 @@
-"""Bonds whose stretch has the sign of the motion: one step of a row of them, touching only those that break or bind.
+"""Bonds whose stretch has the sign of the motion: the lives of a row of them over many steps, event by event.
 
 A row is one member. All its sites follow one slider, so Bell's rupture separates: ∫k dt of bond i is
 e^(−s x_i) times a clock common to all, Φ(t) = ∫ rate e^(s x) dt, with s the softness, x the position of
 the slider and x_i that at the bond's birth, both counted along the motion from where the frame was
-last set. A bond therefore breaks when Φ passes a number fixed at its birth, its ``due``, and a step
-looks only at the least due of each block of sites.
+last set. A bond therefore breaks when Φ passes a number fixed at its birth, its ``due``: what a step costs is its
+events, and blocks of sites without one in all the steps are passed over by their least due.
 
 One array holds two kinds of due: a bound site's, never negative, and minus the time at which a free
 site binds. Read as unsigned whole numbers, the bits of such floats have the first rupture as their
 least; read as signed ones, the first binding: whole numbers are compared by vector instructions. A
 free site keeps the threshold of its next bond in its ``birth``.
 
-Events are processed in batches of a few hundred, one array pass per operation, so that memory latency and vector
-arithmetic overlap.
+Site after site lives through all the steps and adds each event to the sums of its step. What a step adds up is thus in
+the order of the sites, however many steps are made at once.
 """
 
 import math
@@ -20,23 +20,42 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device
-from sim.numerics.noise import PARTS, exponential, fill_words, logarithm
+from sim.numerics.noise import PARTS, exponential, logarithm, words_at
 
 #: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), whether bonds
 #: are stepped one by one, bound sites, sum of their births, of the births squared, steps done.
 SLIDER, TIME, CLOCK, SENSE, SINGLY, BOUND, SUM, SQUARES, STEPS = range(9)
 COLUMNS = 9
 
-#: Sites of one block, whose events are the bits of one number: at most 62.
+#: Sites of one block.
 BLOCK = 16
+
+#: Steps made at once, at most.
+AT_ONCE = 1024
 
 _U = np.uint64
 PART = _U(PARTS["bonds"])
 LIVES = 4096  # of one site in one step: a stop for nonsense, since the rule for long steps comes first
 TINY = 2.2250738585072014e-308
-_AT_ONCE = 512  # events in hand from which they are done
-_PIECE = 32  # blocks looked at together, also bits of one number
-HANDS = _AT_ONCE + _PIECE * BLOCK + 1  # most events in hand
+
+#: Columns of a step: slider, time and clock at its beginning, the rate of a bond born at the frame's origin then and
+#: its ratio to ``rate``, relative growth of that rate in unit time, length and speed.
+_X, _T, _CLOCK, _RATE, _GROWN, _PACE, _DURATION, _SPEED = range(8)
+_STEP_COLUMNS = 8
+#: Rows of what has an event by the end of a step: bonds of less due, free sites of less time, bonds of less birth.
+_RUPTURE, _BINDING, _CUT = range(3)
+#: Bits of a number that are left out where a step is looked up, 128 ranges for each power of two; most ranges.
+_LEFT_OUT, _RANGES = np.int64(45), 4096
+
+
+@device
+def room():
+    """Arrays to work in: columns of steps, their ends, changes of bound sites and their sums in each, an index of ends.
+
+    Beside the index stands the number of its first range.
+    """
+    steps, index = np.empty((AT_ONCE, _STEP_COLUMNS)), np.empty((2, _RANGES), np.int16)
+    return steps, np.empty((3, AT_ONCE)), np.empty((3, AT_ONCE)), index, np.empty(2, np.int64)
 
 
 @device
@@ -47,176 +66,131 @@ def views(due, soonest):
 
 
 @device
-def least(seen, birth, blocks, count, bounded):
-    """Take anew the first binding, the first rupture and the rearmost bond of the first ``count`` blocks named."""
+def least(seen, birth, block, bounded):
+    """Take anew the first binding, the first rupture and the rearmost bond of a block."""
     signed, unsigned, binding, rupture, rear = seen
-    for e in range(count):
-        first = blocks[e] * _U(BLOCK)
-        size = min(BLOCK, np.int64(_U(signed.size) - first))
-        soonest, earliest = signed[first], unsigned[first]
-        if size == BLOCK:  # of known length, for vector instructions
-            for j in range(BLOCK):
-                soonest = min(soonest, signed[first + _U(j)])
-                earliest = min(earliest, unsigned[first + _U(j)])
-        else:
-            for j in range(size):
-                soonest = min(soonest, signed[first + _U(j)])
-                earliest = min(earliest, unsigned[first + _U(j)])
-        binding[blocks[e]], rupture[blocks[e]] = soonest, earliest
-        if bounded:
-            least = math.inf
-            for j in range(size):
-                i = first + _U(j)
-                least = birth[i] if signed[i] >= 0 and birth[i] < least else least
-            rear[blocks[e]] = least
-
-
-@device
-def _lowest(bits):
-    """Number of the lowest bit that is set: the exponent of that bit as a float."""
-    return _U((np.float64(bits & -bits).view(np.int64) >> 52) - 1023)
-
-
-@device
-def _find(seen, birth, known, count, clock_bits, time_bits, bounded, cut, work, hands):
-    """Add the sites of blocks ``known`` to ``count`` that break or bind to those in ``hands``, which counts both."""
-    signed, unsigned, _, _, _ = seen
-    breaking, starting, blocks = work[0], work[1], work[2]
-    breaks, starts = hands[0], hands[1]
-    for e in range(known, count):
-        first = blocks[e] * _U(BLOCK)
-        size = min(BLOCK, np.int64(_U(signed.size) - first))
-        found = np.int64(0)
+    first = _U(block) * _U(BLOCK)
+    size = min(BLOCK, np.int64(_U(signed.size) - first))
+    soonest, earliest = signed[first], unsigned[first]
+    if size == BLOCK:  # of known length, for vector instructions
+        for j in range(BLOCK):
+            soonest = min(soonest, signed[first + _U(j)])
+            earliest = min(earliest, unsigned[first + _U(j)])
+    else:
+        for j in range(size):
+            soonest = min(soonest, signed[first + _U(j)])
+            earliest = min(earliest, unsigned[first + _U(j)])
+    binding[block], rupture[block] = soonest, earliest
+    if bounded:
+        least = math.inf
         for j in range(size):
             i = first + _U(j)
-            found |= np.int64((unsigned[i] <= clock_bits) | (signed[i] <= time_bits)) << np.int64(j)
-        if bounded:
-            for j in range(size):
-                i = first + _U(j)
-                found |= np.int64((signed[i] >= 0) & (birth[i] <= cut)) << j
-        while found:
-            i = first + _lowest(found)
-            found &= found - 1
-            free = signed[i] < 0
-            breaking[breaks], starting[starts] = i, i
-            breaks += 0 if free else 1
-            starts += 1 if free else 0
-    hands[0], hands[1] = breaks, starts
+            least = birth[i] if signed[i] >= 0 and birth[i] < least else least
+        rear[block] = least
 
 
 @device
-def _break(sites, count, bonds, row, step, address, drawn, words):
-    """Break the bonds of the first ``count`` sites, exactly in time; how many bind again in this step, put first."""
-    (birth, due, life), (seed, member) = bonds, address
-    x0, t0, clock, first, _, pace, duration, speed, limit, rebinding = step
-    for e in range(count):  # fetch all before the first is needed
-        i = sites[e]
-        number = life[i] + np.uint32(1)
-        life[i] = number
-        words[2, e], words[3, e] = i + _U(1), _U(number)
-        drawn[2, e], drawn[3, e] = due[i] - clock, birth[i]
-    fill_words(seed, PART, words[2], words[3], member, _U(0), count, words)
-    for e in range(count):
-        drawn[0, e], drawn[1, e] = exponential(words[0, e]), exponential(words[1, e])
-        time = drawn[2, e] / first
-        u = 1.0 + pace * time  # ln u/(u - 1) takes back what the sum has rounded: log1p
-        drawn[2, e] = time * (1.0 if u == 1.0 else logarithm(u) / (u - 1.0))
-    again, end = 0, t0 + duration
-    bound, total, squares = 0.0, 0.0, 0.0
-    for e in range(count):
-        i, moment, x = sites[e], drawn[2, e], drawn[3, e]
-        if speed > 0.0 and limit < math.inf:
-            cut = (x + limit - x0) / speed
-            moment = moment if moment < cut else cut
-        moment = min(moment, duration) if moment > 0.0 else 0.0
-        bound += 1.0
-        total += x
-        squares += x * x
-        binding = max(t0 + moment + drawn[1, e] / rebinding, TINY) if rebinding > 0.0 else math.inf
-        birth[i], due[i] = drawn[0, e], -binding
-        sites[again] = i
-        again += 1 if binding <= end else 0
-    row[BOUND] -= bound
-    row[SUM] -= total
-    row[SQUARES] -= squares
-    return again
+def lay_out(step, slip, duration, x, time, clock, law, space):
+    """Write a step that begins with the slider at ``x`` and a ``time`` and ``clock``; clock at its end."""
+    (rate, softness, limit, _), (steps, ends, _, _, _) = law, space
+    grown, bell = math.exp(softness * x), softness * slip
+    first, speed = rate * grown, slip / duration
+    after = clock + first * duration * (math.expm1(bell) / bell if bell > 0.0 else 1.0)
+    column = steps[step]
+    column[_X], column[_T], column[_CLOCK], column[_RATE] = x, time, clock, first
+    column[_GROWN], column[_PACE], column[_DURATION], column[_SPEED] = grown, speed * softness, duration, speed
+    ends[_RUPTURE, step], ends[_BINDING, step], ends[_CUT, step] = after, time + duration, x + slip - limit
+    return after
 
 
 @device
-def _bind(sites, count, bonds, row, step, last_clock, cut, drawn):
-    """Bind the first ``count`` sites, exactly in place; how many of them break again in this step, put first."""
-    birth, due, _ = bonds
-    x0, t0, clock, first, amplitude, pace, _, speed, _, _ = step
-    again = 0
-    bound, total, squares = 0.0, 0.0, 0.0
-    for e in range(count):
-        drawn[0, e], drawn[1, e] = max(-due[sites[e]] - t0, 0.0), birth[sites[e]]
-    for e in range(count):
-        i, time = sites[e], drawn[0, e]
-        x = x0 + speed * time
-        bell = pace * time
-        more = math.expm1(bell)
-        clock_there = clock + first * time * (more / bell if bell > 0.0 else 1.0)
-        breaks = clock_there + drawn[1, e] * amplitude * (1.0 + more)
-        due[i], birth[i] = breaks, x
-        bound += 1.0
-        total += x
-        squares += x * x
-        sites[again] = i
-        again += 1 if breaks <= last_clock or x <= cut else 0
-    row[BOUND] += bound
-    row[SUM] += total
-    row[SQUARES] += squares
-    return again
+def _range(value):
+    """Number of the range that a positive number lies in, by its leading bits."""
+    return np.float64(value).view(np.int64) >> _LEFT_OUT
 
 
 @device
-def _live_on(work, hands, bonds, row, step, last_clock, cut, address, drawn, words):
-    """Break and bind the sites in hand again and again, until the next event of each is in a later step."""
-    breaking, starting = work[0], work[1]
-    breaks, starts = hands[0], hands[1]
-    for _ in range(LIVES):
-        more = _bind(starting, starts, bonds, row, step, last_clock, cut, drawn)
-        for e in range(more):
-            breaking[breaks + e] = starting[e]
-        starts = _break(breaking, breaks + more, bonds, row, step, address, drawn, words)
-        if starts == 0:
-            break
-        breaks = 0
-        starting, breaking = breaking, starting
+def look_up(count, space):
+    """Index ``count`` steps by their ends: the first that ends in each range of numbers, or later."""
+    _, ends, _, index, lowest = space
+    for row in range(2):
+        lowest[row], filled = _range(ends[row, 0]), 0
+        for k in range(count):
+            last = min(_range(ends[row, k]) - lowest[row], _RANGES - 1)
+            while filled <= last:
+                index[row, filled] = k
+                filled += 1
 
 
 @device
-def follow(bonds, soonest, row, slip, duration, law, address, space):
-    """One step of a row whose bonds all have the sign of the motion; ``slip`` >= 0 along it.
+def _moment(passed, rate, pace, cut, duration):
+    """Time within a step at which the clock has passed so much, or a bond is cut; of ``duration`` at most."""
+    time = passed / rate
+    u = 1.0 + pace * time  # ln u/(u - 1) takes back what the sum has rounded: log1p
+    moment = time * (1.0 if u == 1.0 else logarithm(u) / (u - 1.0))
+    moment = moment if moment < cut else cut
+    return min(moment, duration) if moment > 0.0 else 0.0
 
-    ``bonds`` are its births, dues and lives, ``address`` seed and member of its draws, ``space`` arrays to work in.
+
+@device
+def follow(bonds, soonest, count, law, address, space):
+    """Lives of a row whose bonds all have the sign of the motion over the first ``count`` steps of the ``space``.
+
+    ``bonds`` are its births, dues and lives, ``address`` seed and member of its draws. Arrays are not passed on from
+    the loop over events: counting their references takes as long as an event.
     """
-    (birth, due, _), (work, drawn, words, hands), (rate, softness, limit, rebinding) = bonds, space, law
-    seen = views(due, soonest)
-    _, _, binding, rupture, rear = seen
-    x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
-    amplitude, bell = math.exp(softness * x0), softness * slip
-    first, speed = rate * amplitude, slip / duration
-    step = (x0, t0, clock, first, amplitude, speed * softness, duration, speed, limit, rebinding)
-    last_clock = clock + first * duration * (math.expm1(bell) / bell if bell > 0.0 else 1.0)
-    end, cut = t0 + duration, x0 + slip - limit
-    clock_bits, time_bits = np.float64(last_clock).view(np.uint64), np.float64(-end).view(np.int64)
-    touched = work[2]
-    blocks, bounded = rear.size, limit < math.inf
-    hands[:], touches = 0, 0
-    for piece in range(0, blocks, _PIECE):
-        known, first, hits = touches, _U(piece), np.int64(0)
-        for j in range(min(_PIECE, blocks - piece)):
-            k = first + _U(j)
-            hits |= np.int64((rupture[k] <= clock_bits) | (binding[k] <= time_bits) | (rear[k] <= cut)) << np.int64(j)
-        while hits:
-            touched[touches] = first + _lowest(hits)
-            hits &= hits - 1
-            touches += 1
-        _find(seen, birth, known, touches, clock_bits, time_bits, bounded, cut, work, hands)
-        if touches > 0 and (hands[0] + hands[1] > _AT_ONCE or piece + _PIECE >= blocks):
-            _live_on(work, hands, bonds, row, step, last_clock, cut, address, drawn, words)
-            least(seen, birth, touched, touches, bounded)
-            hands[:], touches = 0, 0
-    row[SLIDER], row[TIME], row[CLOCK] = x0 + slip, end, last_clock
+    (birth, due, life), (steps, ends, changes, index, lowest), (_, _, limit, rebinding) = bonds, space, law
+    seen, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
+    signed, unsigned, binding, rupture, rear = seen
+    clock, time, cut = ends[_RUPTURE, count - 1], ends[_BINDING, count - 1], ends[_CUT, count - 1]
+    clock_bits, time_bits = np.float64(clock).view(np.uint64), np.float64(-time).view(np.int64)
+    changes[:, :count] = 0.0
+    for block in range(rear.size):
+        if not (rupture[block] <= clock_bits or binding[block] <= time_bits or rear[block] <= cut):
+            continue
+        for i in range(block * BLOCK, min((block + 1) * BLOCK, due.size)):
+            if not (unsigned[i] <= clock_bits or signed[i] <= time_bits or (bounded and birth[i] <= cut)):
+                continue
+            at, x, k, events, number = due[i], birth[i], 0, 0, life[i]
+            bound = signed[i] >= 0
+            while True:
+                row, value, next_ = (_RUPTURE if bound else _BINDING), math.fabs(at), count
+                if value <= ends[row, count - 1]:
+                    place = min(max(_range(value) - lowest[row], 0), _RANGES - 1)
+                    next_ = max(k, np.int64(index[row, place]))
+                    while ends[row, next_] < value:
+                        next_ += 1
+                if bound and x <= cut:
+                    by_cut = k
+                    while ends[_CUT, by_cut] < x:
+                        by_cut += 1
+                    next_ = min(next_, by_cut)
+                events = events + 1 if next_ == k else 1
+                if events > LIVES:
+                    next_, events = next_ + 1, 1
+                k = next_
+                if k >= count:
+                    break
+                rate, pace, speed = steps[k, _RATE], steps[k, _PACE], steps[k, _SPEED]
+                if bound:
+                    changes[0, k] -= 1.0
+                    changes[1, k] -= x
+                    changes[2, k] -= x * x
+                    number += np.uint32(1)
+                    one, two, _, _ = words_at(seed, PART, _U(i + 1), _U(number), member, _U(0))
+                    end = (x + limit - steps[k, _X]) / speed if bounded and speed > 0.0 else math.inf
+                    passed = _moment(at - steps[k, _CLOCK], rate, pace, end, steps[k, _DURATION])
+                    x, wait = exponential(one), exponential(two) / rebinding
+                    at = -max(steps[k, _T] + passed + wait, TINY) if rebinding > 0.0 else -math.inf
+                else:
+                    passed = max(value - steps[k, _T], 0.0)
+                    bell = pace * passed
+                    more = math.expm1(bell)
+                    clock = steps[k, _CLOCK] + rate * passed * (more / bell if bell > 0.0 else 1.0)
+                    at, x = clock + x * steps[k, _GROWN] * (1.0 + more), steps[k, _X] + speed * passed
+                    changes[0, k] += 1.0
+                    changes[1, k] += x
+                    changes[2, k] += x * x
+                bound = not bound
+            due[i], birth[i], life[i] = at, x, number
+        least(seen, birth, block, bounded)

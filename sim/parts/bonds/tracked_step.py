@@ -13,9 +13,10 @@ from sim.numerics.jit import device, kernel
 from sim.numerics.noise import exponential, unit_at, words_at
 from sim.parts.bonds.rupture import rupture_integral, time_to_rupture
 from sim.parts.bonds.tracked_events import (
+    AT_ONCE,
     BOUND,
     CLOCK,
-    HANDS,
+    COLUMNS,
     LIVES,
     PART,
     SENSE,
@@ -27,12 +28,15 @@ from sim.parts.bonds.tracked_events import (
     TIME,
     TINY,
     follow,
+    lay_out,
     least,
+    look_up,
+    room,
     views,
 )
 
-#: Return codes of ``live``: done; some rows must be drawn from the stationary law; state advanced already; not finite.
-DONE, LONG, SPENT, ENDLESS = range(4)
+#: What ``live`` returns instead of a number of steps: the state has been advanced already; a number is not finite.
+SPENT, ENDLESS = -1, -2
 
 _U = np.uint64
 #: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
@@ -123,8 +127,9 @@ def _set(bonds, soonest, row, law, singly, turn):
         squares += x * x
     if not singly:
         soonest[2] = math.inf
-        blocks = np.arange(soonest.shape[1]).astype(np.uint64)
-        least(views(due, soonest), birth, blocks, blocks.size, limit < math.inf)
+        seen = views(due, soonest)
+        for block in range(soonest.shape[1]):
+            least(seen, birth, block, limit < math.inf)
     row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
     row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = 1.0 if singly else 0.0, bound, total, squares
 
@@ -133,45 +138,114 @@ def _set(bonds, soonest, row, law, singly, turn):
 _TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1]))"
 
 
-@kernel(f"int64({_TRACKS}, float64[:], float64, float64, float64, float64, float64, uint64, uint64[:])")
-def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members):
-    """Advance all rows by one step, in place; the most severe return code.
+@device
+def _far(x, time, law):
+    """Whether a frame is to be set anew with the slider at ``x`` after a ``time``."""
+    rate, softness, limit, _ = law
+    gone = math.fabs(x)
+    return gone * softness > _FAR or gone > _FAR * limit or time * rate > _FAR
 
-    The frame is the new state's own copy. Rows in which a step is longer than some 300 lives of a site
-    are left as they are, their count of steps, too; nothing is touched when the state is spent or a
-    number endless.
+
+@device
+def _together(row, slip, duration, law, space):
+    """Lay out the steps that a row's bonds can follow together, up to one after which its frame is set anew; how many.
+
+    ``slip`` and ``duration`` are those of the steps ahead.
+    """
+    x, time, clock, count = row[SLIDER], row[TIME], row[CLOCK], 0
+    while count < min(duration.size, AT_ONCE) and not (count > 0 and _far(x, time, law)):
+        along = row[SENSE] * slip[count]
+        if along < 0.0 or law[1] * along > _LEAP:
+            break
+        clock = lay_out(count, along, duration[count], x, time, clock, law, space)
+        x, time = x + along, time + duration[count]
+        count += 1
+    if count > 0:
+        look_up(count, space)
+    return count
+
+
+@device
+def _keep(row, slip, duration, count, space, frames):
+    """Write the frames of a row after each of ``count`` steps that were followed together."""
+    _, ends, changes, _, _ = space
+    for k in range(count):
+        row[SLIDER], row[TIME], row[CLOCK] = row[SLIDER] + row[SENSE] * slip[k], row[TIME] + duration[k], ends[0, k]
+        row[BOUND] += changes[0, k]
+        row[SUM] += changes[1, k]
+        row[SQUARES] += changes[2, k]
+        row[STEPS] += 1.0
+        frames[:, k] = row
+
+
+@device
+def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, shared, frames):
+    """Some of the steps ahead of a row, and its frame after each of them; how many.
+
+    ``laid`` is the frame of a row whose steps are laid out, and their number; these serve all rows of a ``shared`` slip
+    that stand there.
+    """
+    count = 0
+    if row[SINGLY] == 0.0:
+        here = shared and row[STEPS] == laid[STEPS] and np.all(row[:SINGLY] == laid[:SINGLY])
+        if not (here and laid[COLUMNS] <= duration.size):
+            laid[:COLUMNS], laid[COLUMNS] = row, _together(row, slip, duration, law, space)
+        count = np.int64(laid[COLUMNS])
+    if count > 0:
+        follow(bonds, soonest, count, law, address, space)
+        _keep(row, slip, duration, count, space, frames)
+    else:
+        if row[SINGLY] == 0.0:
+            _set(bonds, soonest, row, law, True, False)
+        along, count = row[SENSE] * slip[0], 1
+        if _one_by_one(bonds, row, along, duration[0], law, address):
+            _set(bonds, soonest, row, law, False, along < 0.0)
+        row[STEPS] += 1.0
+    if _far(row[SLIDER], row[TIME], law):
+        _set(bonds, soonest, row, law, row[SINGLY] > 0.0, False)
+    frames[:, count - 1] = row
+    return count
+
+
+@kernel(
+    f"int64({_TRACKS}, float64[:,:], float64[:], float64, float64, float64, float64, uint64, uint64[:], int64,"
+    " float64[:,:,::1])"
+)
+def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members, first, frames):
+    """Advance all rows from step ``first`` on, in place; how many steps are done, or why none is.
+
+    The frame is the new state's own copy; ``frames``, of shape (rows, columns, steps), get that after each step. A row
+    in which a step is longer than some 300 lives of a site is left as it is before that step, its count of steps, too,
+    and no row goes on beyond it. Nothing is touched when the state is spent or a number endless.
     """
     birth, due, life, soonest, stamp, frame = tracks
-    rows = len(due)
+    law, rows, end = (rate, softness, limit, rebinding), len(due), first
     for m in range(rows):
         if stamp[m] != np.int64(frame[m, STEPS]):
             return SPENT
-        if not (math.fabs(slip[m % slip.size]) < math.inf and 0.0 < duration < math.inf):
+    long = np.zeros(rows, np.bool_)
+    while end < duration.size and not long.any():
+        if not (0.0 < duration[end] < math.inf and np.all(np.abs(slip[end]) < math.inf)):
             return ENDLESS
-    law, code = (rate, softness, limit, rebinding), DONE
-    work, words = np.empty((3, HANDS), np.uint64), np.empty((4, HANDS), np.uint64)
-    space = (work, np.empty((4, HANDS)), words, np.zeros(2, np.int64))
-    for m in range(rows):
-        row, step = frame[m], slip[m % slip.size]
-        bonds, address = (birth[m], due[m], life[m]), (seed, members[m])
-        if duration > CYCLES * _cycle(step / duration, rate, softness, limit, rebinding):
-            code = LONG
-            continue
-        along = row[SENSE] * step
-        single = row[SINGLY] > 0.0
-        if not single and (along < 0.0 or softness * along > _LEAP):
-            _set(bonds, soonest[m], row, law, True, False)
-            single = True
-        if not single:
-            follow(bonds, soonest[m], row, along, duration, law, address, space)
-        elif _one_by_one(bonds, row, along, duration, law, address):
-            _set(bonds, soonest[m], row, law, False, along < 0.0)
-        gone = math.fabs(row[SLIDER])
-        if gone * softness > _FAR or gone > _FAR * limit or row[TIME] * rate > _FAR:
-            _set(bonds, soonest[m], row, law, row[SINGLY] > 0.0, False)
-        row[STEPS] += 1.0
-        stamp[m] += 1
-    return code
+        for m in range(rows):
+            speed = slip[end, m % slip.shape[1]] / duration[end]
+            long[m] = duration[end] > CYCLES * _cycle(speed, rate, softness, limit, rebinding)
+        end += 1
+    space, laid, shared, start = room(), np.full(COLUMNS + 1, math.nan), slip.shape[1] == 1, first
+    while start < end:
+        stop = end
+        for m in range(rows):
+            bonds, address, k = (birth[m], due[m], life[m]), (seed, members[m]), start
+            own = min(stop, end - 1 if long[m] else end)
+            while k < own:
+                ahead = slip[k:own, m % slip.shape[1]], duration[k:own]
+                row, after = frame[m], frames[m, :, k:own]
+                k += _advance(bonds, soonest[m], row, *ahead, law, address, space, laid, shared, after)
+                if m == 0:  # what is laid out serves the other rows
+                    own = stop = k
+            stamp[m] = np.int64(frame[m, STEPS])
+        start = stop
+    return end
 
 
 @kernel(

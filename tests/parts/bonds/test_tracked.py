@@ -10,8 +10,9 @@ from scipy.integrate import cumulative_trapezoid, quad
 from scipy.stats import kstwo
 
 from sim.numerics.noise import PARTS
+from sim.parts.bonds import tracked
 from sim.parts.bonds.rupture import RuptureRate
-from sim.parts.bonds.tracked import advance, bound, mean_life, mean_square_stretch, mean_stretch, start
+from sim.parts.bonds.tracked import advance, mean_life, start
 from sim.parts.bonds.tracked_events import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS
 
 BELL, CONSTANT, CUT = RuptureRate(1.0, 1.0, math.inf), RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.3, 0.0, 2.0)
@@ -26,7 +27,21 @@ def begin(law, sites, members=1, speed=0.0, how="steady", rebinding=1.0, seed=5)
 
 def go(tracks, slip, duration, law, rebinding=1.0, seed=5, members=None):
     members = np.arange(len(tracks.stamp)) if members is None else members
-    return advance(tracks, np.atleast_1d(slip), duration, law, rebinding, seed, members)
+    after, frames = advance(tracks, np.atleast_2d(slip), np.array([duration]), law, rebinding, seed, members)
+    assert np.array_equal(frames[-1], after.frame, equal_nan=True)
+    return after
+
+
+def bound(tracks):
+    return tracked.bound(tracks.frame)
+
+
+def mean_stretch(tracks):
+    return tracked.mean_stretch(tracks.frame, tracks.due.shape[1])
+
+
+def mean_square_stretch(tracks):
+    return tracked.mean_square_stretch(tracks.frame, tracks.due.shape[1])
 
 
 def copied(tracks):
@@ -271,6 +286,27 @@ def test_a_run_taken_up_from_copies_is_the_same_to_the_bit():
     assert equal(many_steps(first, 30, members), many_steps(kept, 30, members))
 
 
+LEAPS = np.concatenate([np.full(60, 3.0), [400.0, 2.0], np.full(30, 40.0)])
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("speeds", [FORWARD, BACK_AND_FORTH, LEAPS], ids=["forward", "reversing", "leaps"])
+@pytest.mark.parametrize("shared", [True, False], ids=["one slip", "own slips"])
+def test_many_steps_at_once_are_the_same_to_the_bit_as_one_after_the_other(name, speeds, shared):
+    law, members = LAWS[name], np.arange(3)
+    duration = np.where(np.arange(len(speeds)) == 17, 700.0, 0.1)  # one of more than 300 lives
+    slip = speeds[:, np.newaxis] * duration[:, np.newaxis] * (np.ones(1) if shared else np.array([1.0, -1.0, 0.3]))
+    for rebinding in (1.0, 40.0):
+        steps = law, rebinding, 5, members
+        at_once, frames = advance(begin(law, 100, 3, 1.0, rebinding=rebinding), slip, duration, *steps)
+        alone = begin(law, 100, 3, 1.0, rebinding=rebinding)
+        for k in range(len(speeds)):
+            alone, after = advance(alone, slip[k : k + 1], duration[k : k + 1], *steps)
+            assert np.array_equal(after[0], frames[k])
+        assert equal(at_once, alone)
+        assert at_once.life.mean() > 2
+
+
 def test_a_member_alone_is_the_member_of_a_batch_to_the_bit():
     batch = many_steps(begin(BELL, 300, 6, 1.0), 40, np.arange(6))
     alone = start(BELL, 1.0, 300, np.ones(1), "steady", 5, np.array([3]))
@@ -332,11 +368,11 @@ def test_a_step_below_that_rule_has_many_lives_and_the_steady_law_too():
 def test_only_the_members_whose_step_is_long_are_drawn_anew():
     tracks = begin(BELL, 500, 2, 1.0)
     kept = copied(tracks)
-    mixed = advance(tracks, np.array([1.0, 1e9]), 5.0, BELL, 1e3, 5, np.arange(2))
-    plain = advance(kept, np.ones(1), 5.0, BELL, 1e3, 5, np.arange(2))
+    mixed = go(tracks, np.array([1.0, 1e9]), 5.0, BELL, 1e3)
+    plain = go(kept, 1.0, 5.0, BELL, 1e3)
     assert np.array_equal(mixed.birth[0], plain.birth[0])
     assert not np.array_equal(mixed.birth[1], plain.birth[1])
-    advance(mixed, np.ones(1), 1.0, BELL, 1e3, 5, np.arange(2))
+    go(mixed, 1.0, 1.0, BELL, 1e3)
 
 
 @pytest.mark.parametrize("slip", [0.0, 5e-324, 1e-300, -1e-12, 1e3, -1e300, 1.7e308])
@@ -412,12 +448,11 @@ def test_the_state_takes_less_than_25_bytes_a_site():
 @pytest.mark.verify
 def test_ten_million_steps_gather_no_error():
     """Steps of 1e-5 lives of a few sites: the sums and the law after 100 lives."""
-    tracks, members = begin(BELL, 16, 1, 3.0), np.zeros(1, np.uint64)
-    slip = np.array([3e-5])
-    for _ in range(10**7):
-        tracks = advance(tracks, slip, 1e-5, BELL, 1.0, 5, members)
+    tracks = begin(BELL, 16, 1, 3.0)
+    for _ in range(10**3):
+        tracks, _ = advance(tracks, np.full((10**4, 1), 3e-5), np.full(10**4, 1e-5), BELL, 1.0, 5, np.zeros(1))
     coarse = begin(BELL, 16, 1, 3.0)
     for _ in range(10**3):
-        coarse = advance(coarse, np.array([0.3]), 0.1, BELL, 1.0, 5, members)
+        coarse = go(coarse, 0.3, 0.1, BELL)
     assert np.array_equal(tracks.life, coarse.life)
     assert_allclose(stretches(tracks), stretches(coarse), rtol=0, atol=1e-8)
