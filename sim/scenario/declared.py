@@ -2,9 +2,9 @@
 
 import functools
 import html
-from collections.abc import Iterable, Iterator
+from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, cast, get_args
 
 from pydantic import Tag
 from pydantic.fields import FieldInfo
@@ -80,16 +80,25 @@ class Entry(NamedTuple):
 
 def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
     """Every value of a scenario or one of its parts, table by table; the model of a table comes first."""
-    declared = getattr(type(part), "__pydantic_fields__", {})
-    for item in sorted(fields(part), key=lambda item: item.name != "model"):
-        value, field = getattr(part, item.name), declared.get(item.name)
-        key = prefix + ((field and field.alias) or item.name)
-        if is_dataclass(value) and not isinstance(value, Source):
-            yield from entries(value, f"{key}.")
-        elif field is not None and not isinstance(value, Source):
+    for name, key, quantity in _listed(cast(Hashable, type(part))):
+        value = getattr(part, name)
+        if is_dataclass(value):
+            yield from () if isinstance(value, Source) else entries(value, f"{prefix}{key}.")
+        elif quantity is not None:
             number = isinstance(value, int | float) and not isinstance(value, bool)
-            meaning = field.description or item.name.replace("_", " ")
-            yield Entry(key, value, declaration(field) or Quantity("1", meaning) if number else None)
+            yield Entry(prefix + key, value, quantity if number else None)
+
+
+@functools.cache
+def _listed(table: type) -> list[tuple[str, str, Quantity | None]]:
+    """Name, key and declaration as a number of each field of a table, None for one that no file gives."""
+    listed = []
+    for item in sorted(fields(table), key=lambda item: item.name != "model"):
+        field = getattr(table, "__pydantic_fields__", {}).get(item.name)
+        meaning = (field and field.description) or item.name.replace("_", " ")
+        quantity = None if field is None else declaration(field) or Quantity("1", meaning)
+        listed.append((item.name, (field and field.alias) or item.name, quantity))
+    return listed
 
 
 def as_html(title: str, listed: Iterable[Entry]) -> str:

@@ -1,8 +1,9 @@
 """A scenario: one of each part, a clock, and what must hold between them."""
 
 import math
+from collections.abc import Hashable
 from dataclasses import fields
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -34,6 +35,14 @@ _CELL_ERROR = 0.05
 _Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
 #: Points of a sweep that differ elsewhere share it with its spline.
 _margin = lru_cache(maxsize=32)(Margin)
+
+
+@cache
+def _adapter(table: Any) -> TypeAdapter[Any]:
+    """What checks and dumps a table."""
+    return TypeAdapter(table)
+
+
 #: Columns that a part has read from its file, read anew where its table changes.
 _FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
 
@@ -230,14 +239,18 @@ class Scenario:
         BadInput
             If a key is unknown or a value is not admissible.
         """
-        document = TypeAdapter(Scenario).dump_python(self, by_alias=True, exclude={"source", "sweep"})
+        document = {
+            item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("source", "sweep")
+        }
+        for name in {key.partition(".")[0] for key in values if "." in key} & document.keys():  # the rest stays checked
+            document[name] = _adapter(cast(Hashable, type(document[name]))).dump_python(document[name], by_alias=True)
         for key, value in values.items():
             set_key(document, key, value)
             _forget_file(document, key)
         document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
         files = Files(Path(self.source.path).parent, self.source.files)
         with in_plain_words(Scenario, document):
-            return TypeAdapter(Scenario).validate_python(with_models(Scenario, document), context={"files": files})
+            return _adapter(Scenario).validate_python(with_models(Scenario, document), context={"files": files})
 
     def points(self) -> list["Scenario"]:
         """The scenario at each point of its sweep, the last axis fastest; one point where there is none.
@@ -268,6 +281,8 @@ class Scenario:
 def _forget_file(document: dict[str, Any], key: str) -> None:
     """Drop what a table has read from its file where one of the table's other keys was changed."""
     *tables, last = key.split(".")
+    if not tables:
+        return
     for name in tables:
         document = document[name]
     if document.get("file") and last not in _FILE_COLUMNS:
