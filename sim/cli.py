@@ -30,7 +30,7 @@ def main() -> None:
     try:
         cli.main(standalone_mode=False)
     except (click.Abort, KeyboardInterrupt):
-        _fail("stopped; nothing was written to the output", INTERRUPTED)
+        _fail("stopped; what was computed is kept: go on with --resume", INTERRUPTED)
     except click.ClickException as fault:
         fault.show()
         sys.exit(fault.exit_code)
@@ -69,12 +69,13 @@ def cli() -> None:
 @_SET
 @click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
 @click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
-@click.option("--force", is_flag=True, help="Replace an existing output.")
+@click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
+@click.option("--resume", is_flag=True, help="Go on with an unfinished run, bit for bit as if nothing had happened.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
 def run(
     scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
-    force: bool, quiet: bool, bare: bool,
+    force: bool, resume: bool, quiet: bool, bare: bool,
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
@@ -83,7 +84,9 @@ def run(
     scene = load(scenario, _overrides(changes, seed, members), option="--set")
     if target.is_dir() or (target.exists() and target.samefile(scenario)):
         _fail(f"{target} is {'a folder' if target.is_dir() else 'the scenario'}; name a file with -o", BAD_INPUT)
-    if target.exists() and not force:
+    if force and resume:
+        raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
+    if target.exists() and not (force or resume):
         _fail(f"{target} exists; replace it with --force or name another output with -o", EXISTS)
 
     from sim.ensemble import plan as plans, preview, simulate
@@ -93,7 +96,7 @@ def run(
     for remark in [] if quiet else preview.remarks(plan):
         click.echo(f"note: {remark}", err=True)
     with contextlib.nullcontext() if quiet else progress_bar(plans.work(plan)) as advance:
-        simulate.run(scene, target, replace=force, progress=advance)
+        simulate.run(scene, target, replace=force, resume=resume, progress=advance)
     simulate.write_log(target, began, sys.argv[1:])
     if not quiet:
         if not bare:

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import resource
+import sys
 
 import pytest
 
@@ -18,10 +19,12 @@ def room():
     @contextlib.contextmanager
     def limited(size):
         soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+        bytecode, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # Python would leave half of a file
         resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
         try:
             yield
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+            sys.dont_write_bytecode = bytecode
 
     return limited

@@ -116,7 +116,7 @@ def test_check_and_a_run_without_its_table_import_neither_xarray_nor_figures_nor
 
 
 def test_an_interrupt_ends_with_130_and_without_traceback(here):
-    points = 'sweep={"contact.load"={from=1e-3, to=4e-3, count=200}}'
+    points = 'sweep={"contact.load"={from=1e-3, to=4e-3, count=1000}}'
     long = ["run", "scene.toml", "--set", 'clock.duration="20 s"', "--set", points]
     run = subprocess.Popen(
         [sys.executable, "-m", "sim", *long],
@@ -126,14 +126,20 @@ def test_an_interrupt_ends_with_130_and_without_traceback(here):
     )
     parts = here / "outputs" / "scene.nc.parts"
     # once the first point is written, all is compiled and loaded and another point is marched
-    while not list(parts.glob("*.npz")) and run.poll() is None:
+    while not list(parts.glob("*.part")) and run.poll() is None:
         time.sleep(0.02)
     run.send_signal(signal.SIGINT)
     _, errors = run.communicate(timeout=60)
     assert run.returncode == 130
     lines = [line for line in errors.splitlines() if line.strip() and " % of " not in line]
-    assert lines == ["stopped; nothing was written to the output"]
+    assert lines == ["stopped; what was computed is kept: go on with --resume"]
     assert not (here / "outputs" / "scene.nc").exists()
+    kept = {part: part.stat().st_mtime_ns for part in parts.glob("*.part")}
+    assert kept
+    other = sim(*long[:-1], 'sweep={"contact.load"={from=1e-3, to=4e-3, count=100}}', "--resume")
+    assert other.exit_code == 2
+    assert "outputs/scene.nc.parts is of another run: scenario.sweep.contact.load was [0.001, 0.00" in other.stderr
+    assert {part: part.stat().st_mtime_ns for part in parts.glob("*.part")} == kept
 
 
 def test_a_reader_that_leaves_early_is_no_error():
@@ -241,7 +247,7 @@ def test_a_full_disk_ends_with_74_and_its_reason(here, monkeypatch):
     def full(*_):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("sim.ensemble.netcdf.write_whole", full)
+    monkeypatch.setattr("sim.ensemble.part_files.write_whole", full)
     done = sim("run", "scene.toml")
     assert done.exit_code == 74
     assert done.stderr.strip().endswith("No space left on device")

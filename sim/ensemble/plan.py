@@ -1,7 +1,10 @@
-"""Division of a run into points, groups of members and stretches of time."""
+"""Division of a run into points, groups of members and blocks of steps, by the scenario alone."""
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,6 +14,37 @@ from sim.scenario.scenario import Scenario
 _GROUP = 256
 _PART_NUMBERS = 2**22
 _STATE_NUMBERS = 2**23
+# Rough costs of one core [s]: a step of a batch, of one where a part feeds back; of a member, of a counted population,
+# an event of a bond that is followed.
+_STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
+_SCENARIO_BYTES, _STATISTICS, _MOST_STEPS = 2e4, 3, 10**9
+#: Time of one core that a block takes at most by its counted work [s].
+_BLOCK_SECONDS = 5.0
+
+
+class Block(NamedTuple):
+    """Steps that are computed and kept as one: from after step ``start`` (-1 before a run) to ``end``."""
+
+    start: int
+    end: int
+    stride: int
+
+    @property
+    def records(self) -> range:
+        """Numbers of the records among the steps."""
+        return range(self.start // self.stride + 1, self.end // self.stride + 1)
+
+    def pieces(self, most: int, snapshots: list[int]) -> Iterator[range]:
+        """Recorded steps, at most so many together and none after one at which maps are drawn; without any its end."""
+        records, stride = self.records, self.stride
+        if not records:
+            yield range(self.end, self.end + 1)
+        first = records.start
+        while first < records.stop:
+            drawn = (step // stride + 1 for step in snapshots if step >= first * stride)
+            stop = min(first + most, records.stop, *drawn)
+            yield range(first * stride, (stop - 1) * stride + 1, stride)
+            first = stop
 
 
 @dataclass(frozen=True)
@@ -24,11 +58,15 @@ class Plan:
     def of(cls, scenario: Scenario) -> "Plan":
         return cls(scenario, tuple(scenario.points()))
 
-    @property
+    @cached_property
     def members(self) -> int:
         """Members that are advanced: one where no part differs between members."""
-        varies = any(any(point.varies.values()) for point in self.points)
-        return self.scenario.ensemble.members if varies else 1
+        return self.scenario.ensemble.members if any(self._vary.values()) else 1
+
+    @cached_property
+    def _vary(self) -> dict[str, bool]:
+        """For each part whether members differ in it, at any point."""
+        return {part: any(point.varies[part] for point in self.points) for part in self.points[0].varies}
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -45,32 +83,83 @@ class Plan:
         return tuple(one for one in kept if any(one.there(point) for point in self.points))
 
     @cached_property
-    def group(self) -> int:
-        """Members of one part."""
-        some = self.points[:: max(1, len(self.points) // 4)]
-        most = min(together(point) for point in some)
-        for point in some:
+    def _pieces(self) -> tuple[int, int]:
+        """Members of a group and most steps of a block, by the first and the last point of the sweep."""
+        group, steps = self.members, _MOST_STEPS
+        for point in {0: self.points[0], len(self.points): self.points[-1]}.values():
+            group = min(group, together(point))
+            steps = min(steps, int(_BLOCK_SECONDS / seconds_a_step(point, group)))
             point.release()
-        return min(self.members, most)
+        return group, max(1, steps)
 
     @property
-    def stretch(self) -> int:
-        """Records of one part."""
-        most = max(1, _PART_NUMBERS // (self.group * len(VARIABLES)))
-        return min(self.points[0].clock.records, most)
+    def group(self) -> int:
+        """Members that are advanced together and kept in one part."""
+        return self._pieces[0]
+
+    def records_of_block(self, point: Scenario) -> int:
+        """Records of a block; 0 where a record's steps take longer than a block."""
+        return min(self._pieces[1] // point.clock.stride, self.most_records, point.clock.records)
+
+    @property
+    def most_records(self) -> int:
+        """Records of a block that bounds its numbers."""
+        return max(1, _PART_NUMBERS // (self.group * len(VARIABLES)))
+
+    def blocks(self, point: Scenario) -> list[Block]:
+        """Blocks of a group: of whole records, or where one takes too long, of some steps between two records.
+
+        Where maps are large, each ends a block.
+        """
+        clock, longest = point.clock, self._pieces[1]
+        if records := self.records_of_block(point):
+            ends = {*range((records - 1) * clock.stride, clock.steps, records * clock.stride), clock.steps}
+        else:
+            intervals = (range(first, first + clock.stride, longest) for first in range(0, clock.steps, clock.stride))
+            ends = {clock.steps, *itertools.chain(*intervals)}
+        if point.map_size is not None:
+            numbers = min(self.group, point.record.map_members) * point.map_size[1] ** 2
+            ends |= {*self.snapshots(point)[:: max(1, _PART_NUMBERS // numbers)]}
+        stops = sorted(ends)
+        return [Block(start, end, clock.stride) for start, end in zip([-1, *stops], stops, strict=False)]
+
+    @cached_property
+    def packs(self) -> list[range]:
+        """Points of the sweep that are kept in one part: neighbours on its last axis whose whole runs are short."""
+        first, along = self.points[0], len(self.scenario.sweep[-1].values) if self.scenario.sweep else 1
+        together = 1
+        alike = not first.record.maps and all(point.clock == first.clock for point in self.points)
+        if alike and len(self.blocks(first)) == 1:
+            by_work, by_records = self._pieces[1] // (first.clock.steps + 1), self.most_records // first.clock.records
+            together = min(along, max(1, min(by_work, by_records)))
+        rows = range(0, len(self.points), along)
+        return [range(a, min(a + together, row + along)) for row in rows for a in range(row, row + along, together)]
+
+    def snapshots(self, point: Scenario) -> list[int]:
+        """Clock steps at which maps are drawn."""
+        clock = point.clock
+        return [round(time / clock.duration * (clock.records - 1)) * clock.stride for time in sorted(point.record.maps)]
 
     def groups(self) -> list[np.ndarray]:
         """The members of each group."""
         return [np.arange(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
 
-    def stretches(self, point: Scenario) -> list[range]:
-        """The records of each stretch."""
-        records = point.clock.records
-        return [range(first, min(first + self.stretch, records)) for first in range(0, records, self.stretch)]
+    @cached_property
+    def bytes(self) -> float:
+        """Size of all that is recorded, before compression [byte]."""
+        record, points = self.scenario.record, len(self.points)
+        each = 4.0 if record.precision == "float32" else 8.0
+        total = _SCENARIO_BYTES + points * map_bytes(self.points[0], self.members)
+        for variable in self.variables:
+            rows, size = 1, each
+            if self.varies(variable):
+                rows, size = (self.members, each) if record.per_member else (_STATISTICS, 8.0)
+            total += rows * size * self.points[0].clock.records * points
+        return total
 
     def varies(self, variable: Variable) -> bool:
         """Whether the variable has the member dimension."""
-        return any(point.varies[variable.part] for point in self.points)
+        return self._vary[variable.part]
 
 
 def together(scenario: Scenario) -> int:
@@ -78,11 +167,27 @@ def together(scenario: Scenario) -> int:
     return min(_GROUP, max(1, _STATE_NUMBERS // (2 * scenario.process.pairs + scenario.population.numbers)))
 
 
+def seconds_a_step(point: Scenario, members: int) -> float:
+    """Rough time of one core for a step of a batch [s], which does not depend on the machine."""
+    bonds, batch = point.population, _STEP + _ALONE * point.by_steps + point.population.step_seconds
+    member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds
+    if bonds.per_member and not bonds.feeds_back:
+        member += _COUNTED + _EVENT * bonds.followed(point.speeds(21), point.clock.step)
+    return batch + point.contact.step_seconds + members * member
+
+
+def map_bytes(point: Scenario, members: int) -> float:
+    """Size of the maps of some members at one point of a sweep [byte]."""
+    if point.map_size is None:
+        return 0.0
+    return 8.0 * min(point.record.map_members, members) * len(point.record.maps) * point.map_size[1] ** 2
+
+
 def work(plan: Plan) -> int:
     """Member-steps that a plan takes."""
     return sum(plan.members * (point.clock.steps + 1) for point in plan.points)
 
 
-def part_name(point: int, group: int, stretch: int) -> str:
+def part_name(point: int, group: int, block: int) -> str:
     """Name of a part, the same in every run of a scenario."""
-    return f"point{point:06d}-group{group:06d}-stretch{stretch:06d}"
+    return f"point{point:06d}-group{group:06d}-block{block:06d}"

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.ensemble.plan import Plan, work
+from sim.ensemble.plan import Plan, map_bytes, seconds_a_step, work
 from sim.laws import jkr
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
@@ -16,13 +16,10 @@ from sim.scenario.clock import Record
 from sim.scenario.declared import entries
 from sim.scenario.scenario import Scenario
 
-# Rough costs of one core, for the estimate only [s]: starting up; a point of a sweep; a part file; a step and a record
-# of a batch, a step of one where a part feeds back; a step and a record of a member; a step of a counted population, an
-# event of a bond that is followed; a byte.
-_START, _POINT, _PART, _STEP, _RECORD, _ALONE = 3.0, 15e-3, 5e-3, 5e-6, 5e-6, 150e-6
-_OF_MEMBER, _RECORD_OF_MEMBER, _COUNTED, _EVENT, _BYTE = 5e-8, 2e-7, 3e-7, 1e-7, 50e-9
-_PROGRAM_BYTES, _SCENARIO_BYTES = 200e6, 2e4
-_STATISTICS = 3
+# Rough costs of one core, for the estimate only [s]: starting up; a point of a sweep; a part file; a record of a batch,
+# of a member; a byte.
+_START, _POINT, _PART, _RECORD, _RECORD_OF_MEMBER, _BYTE = 3.0, 15e-3, 5e-3, 5e-6, 2e-7, 50e-9
+_PROGRAM_BYTES = 200e6
 #: Points of a sweep whose cells are looked at.
 _MOST_POINTS = 8
 _MOST_WORDS = 6
@@ -208,8 +205,8 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     scene, clock = plan.scenario, plan.points[0].clock
     sample = Plan(scene, tuple(some))
     numbers = max(8 * point.process.pairs + point.population.numbers for point in some)
-    held = _PROGRAM_BYTES + 8.0 * sample.group * (numbers + 2.0 * len(plan.variables) * sample.stretch)
-    held += 2.0 * _map_bytes(some[0], sample.group)  # a part, and what is written of it
+    held = _PROGRAM_BYTES + 8.0 * sample.group * (numbers + 2.0 * len(plan.variables) * sample.most_records)
+    held += 2.0 * map_bytes(some[0], sample.group)  # a part, and what is written of it
     alike = ", all alike, so one is computed" if scene.ensemble.members > plan.members else ""
     rows: Rows = [("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records")]
     rows.append(("members", f"{scene.ensemble.members:,}{alike}"))
@@ -218,49 +215,16 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
     rows.append(("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core"))
     rows.append(("memory", f"about {_size(held)}"))
-    return [*rows, ("file", f"{_size(_bytes(plan, some[0]))} at most, before compression")]
+    return [*rows, ("file", f"{_size(plan.bytes)} at most, before compression")]
 
 
 def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:
     """Time of the whole run on one core, linear in the members."""
-    clock, group = plan.points[0].clock, Plan(plan.scenario, tuple(some)).group
-    batch, member = clock.records * _RECORD + _PART, clock.steps * _OF_MEMBER + clock.records * _RECORD_OF_MEMBER
-    batch += clock.steps * max(_STEP + _ALONE * point.by_steps + _own(point) for point in some)
-    member *= len(some)
-    for point in some:
-        pairs, bonds = point.process.pairs, point.population
-        member += (clock.steps + 1) * pairs * point.fluctuations.pair_seconds
-        if bonds.per_member and not bonds.feeds_back:
-            member += clock.steps * _COUNTED
-            member += clock.steps * _EVENT * bonds.followed(point.speeds(21), clock.step)
+    clock, group = plan.points[0].clock, min(plan.members, Plan(plan.scenario, tuple(some)).group)
     batches, points = max(1.0, plan.members / group), len(plan.points)
-    computed = points * (_POINT + batches * batch + plan.members * member / len(some))
-    return _START + computed + _BYTE * _bytes(plan, some[0])
-
-
-def _own(point: Scenario) -> float:
-    """Time that parts which go step by step take for a step of a batch [s]."""
-    return point.population.step_seconds + point.contact.step_seconds
-
-
-def _bytes(plan: Plan, point: Scenario) -> float:
-    """Size of the trajectories and maps [byte]."""
-    record, points = plan.scenario.record, len(plan.points)
-    each = 4.0 if record.precision == "float32" else 8.0
-    total = _SCENARIO_BYTES + points * _map_bytes(point, plan.members)
-    for variable in plan.variables:
-        rows, size = 1, each
-        if plan.varies(variable):
-            rows, size = (plan.members, each) if record.per_member else (_STATISTICS, 8.0)
-        total += rows * size * point.clock.records * points
-    return total
-
-
-def _map_bytes(point: Scenario, members: int) -> float:
-    """Size of the maps of some members at one point of a sweep [byte]."""
-    if point.map_size is None:
-        return 0.0
-    return 8.0 * min(point.record.map_members, members) * len(point.record.maps) * point.map_size[1] ** 2
+    records = clock.records * (_RECORD + group * _RECORD_OF_MEMBER)
+    steps = clock.steps * sum(seconds_a_step(point, group) for point in some) / len(some)
+    return _START + points * (_POINT + batches * (records + steps + _PART)) + _BYTE * plan.bytes
 
 
 def _size(count: float) -> str:

@@ -2,12 +2,16 @@
 
 import contextlib
 import errno
+import fcntl
 import os
 import shutil
+import stat
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+#: What a file system without locks answers.
+_NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
 # HDF5 reports trouble with its file as a RuntimeError
 _WRITE_TROUBLE = (OSError, RuntimeError)
 
@@ -51,12 +55,20 @@ def write_whole(path: Path, content: memoryview | bytes) -> None:
     except BaseException:
         beside.unlink(missing_ok=True)
         raise
-    sync_folder(path.parent)
+    sync(path.parent)
 
 
-def sync_folder(folder: Path) -> None:
-    """Flush a folder to disk, so that a rename in it survives a crash."""
-    descriptor = os.open(folder, os.O_RDONLY)
+def read_whole(path: Path) -> bytes:
+    """The bytes of a plain file; a link is not followed."""
+    with open(os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "not a plain file", str(path))
+        return file.read()
+
+
+def sync(path: Path) -> None:
+    """Flush a file to disk, or a folder, so that a rename in it survives a crash."""
+    descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
     finally:
@@ -77,3 +89,95 @@ def explained(folder: Path) -> Iterator[None]:
             if usage.total > 0 and usage.free < 2**20:
                 reason = os.strerror(errno.ENOSPC)
         raise StoreTrouble(f"{folder}: {reason}") from trouble
+
+
+@contextlib.contextmanager
+def locked(path: Path, prepare: Callable[[], None]) -> Iterator[bool]:
+    """A context under a lock file; gives whether it was free.
+
+    ``prepare`` makes the folder of the file. A file that its holder removed at its end is no lock: who locks it then
+    begins again. Where the file system has no locks, a lease beside the file stands in.
+    """
+    lock = None
+    while lock is None:
+        prepare()
+        try:
+            lock = _lock(path)
+        except BlockingIOError:
+            yield False
+            return
+        except OSError as trouble:
+            if trouble.errno not in _NO_LOCKS:
+                raise StoreTrouble(f"{path}: {trouble.strerror}") from trouble
+            with leased(path.with_name("lease")) as free:
+                yield free
+            return
+    try:
+        yield True
+    finally:
+        os.close(lock)
+
+
+def _lock(path: Path) -> int | None:
+    """The descriptor of a file under a lock; None if it was removed before it was locked."""
+    with contextlib.suppress(FileNotFoundError):
+        lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o666)
+        with contextlib.ExitStack() as undone:
+            undone.callback(os.close, lock)
+            if not stat.S_ISREG(os.fstat(lock).st_mode):
+                raise OSError(errno.EINVAL, "not a plain file", str(path))
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.path.samestat(os.fstat(lock), os.stat(path, follow_symlinks=False)):
+                undone.pop_all()
+                return lock
+    return None
+
+
+@contextlib.contextmanager
+def leased(path: Path, beat: float = 10.0) -> Iterator[bool]:
+    """A context under a lease, a file whose time of change is renewed every ``beat`` [s]; gives whether it was free.
+
+    A lease that was not renewed for six beats is that of a run that was killed, and is taken over.
+    """
+    if not _took(path, 6.0 * beat):
+        yield False
+        return
+    ended = threading.Event()
+
+    def renew() -> None:
+        while not ended.wait(beat):
+            with contextlib.suppress(OSError):
+                os.utime(path)
+
+    threading.Thread(target=renew, daemon=True).start()
+    try:
+        yield True
+    finally:
+        ended.set()
+        path.unlink(missing_ok=True)
+
+
+def _took(path: Path, most: float) -> bool:
+    """Make a lease, where there is none or one older than ``most`` [s] by the clock of its file system."""
+    try:
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
+        return True
+    except FileExistsError:
+        pass
+    aside = path.with_name(f"{path.name}.{os.getpid()}")
+    try:
+        os.close(os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_NOFOLLOW, 0o666))
+        os.utime(aside)
+        now = os.stat(aside).st_mtime
+        if now - os.stat(path).st_mtime <= most:
+            return False
+        os.replace(path, aside)
+        if now - os.stat(aside).st_mtime <= most:  # another took it over meanwhile
+            os.link(aside, path)
+            return False
+        os.close(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o666))
+        return True
+    except (FileNotFoundError, FileExistsError):
+        return False
+    finally:
+        aside.unlink(missing_ok=True)

@@ -18,8 +18,8 @@ from numpy.testing import assert_allclose
 import sim
 from sim import cli
 from sim.engine import course_of, march
-from sim.ensemble import plan as plans, simulate as ensemble
-from sim.ensemble.netcdf import variable_name
+from sim.ensemble import netcdf, plan as plans, simulate as ensemble
+from sim.ensemble.outline import variable_name
 from sim.ensemble.plan import Plan
 from sim.ensemble.recorded import LARGEST, VARIABLES
 from sim.numerics.files import StoreTrouble
@@ -205,16 +205,11 @@ def test_a_run_that_fails_leaves_the_older_output(tmp_path, monkeypatch):
     def broken(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(ensemble, "write_dataset", broken)
+    monkeypatch.setattr(netcdf, "in_process", broken)
     with pytest.raises(StoreTrouble, match="No space left"):
         ensemble.run(sample(seed=6), path, replace=True)
     assert path.read_bytes() == before
     assert not list(tmp_path.glob(".out*"))
-
-
-def test_two_runs_do_not_share_an_output(tmp_path):
-    with ensemble._held(tmp_path / "out.nc"), pytest.raises(ensemble.OutputBusy):
-        ensemble.run(sample(), tmp_path / "out.nc")
 
 
 def test_a_full_disk_is_told_with_its_reason(tmp_path, room, monkeypatch, capsys):

@@ -1,0 +1,235 @@
+"""The folder of a run that is not done: its manifest, its lock and its parts, which are written once and never changed.
+
+``OUT.nc.parts`` holds ``manifest.json``, which says what is run, by which versions and in which blocks, and one part
+for each block that was computed. A part is built in memory, written beside its place, synced and renamed, and begins
+with the SHA-256 of the rest, so that it is either whole or not there. A folder without a manifest of ours is not
+touched, nor is any file in it that a run did not make; links are not followed.
+"""
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.numerics.files import StoreTrouble, explained, locked, read_whole, sync, write_whole
+from sim.units.refusals import BadInput
+
+Arrays = dict[str, np.ndarray]
+Manifest = dict[str, Any]
+
+DATASET = "dataset.nc"
+_MANIFEST, _LOCK, _STATE = "manifest.json", "lock", "state."
+_LOCKS = {_LOCK, "lease"}
+#: Names of the files that a run makes in its folder, whole or on the way.
+_OURS = re.compile(r"manifest\.json|lock|lease(\.\d+)?|dataset\.nc|point\d+-group\d+-block\d+\.part|\..*\.tmp")
+_DIGEST = hashlib.sha256().digest_size
+_FORMAT = "parts of a run of sim, 1"
+_MOST_NAMED, _LONGEST = 5, 40
+
+
+class OutputExists(FileExistsError):
+    """The output, or an unfinished run of it, is there already and was not to be replaced."""
+
+    exit_code = 73
+
+
+class OutputBusy(RuntimeError):
+    """Another run is writing this output."""
+
+    exit_code = 75
+
+
+class MemoryParts(dict[str, Arrays]):
+    """Parts kept in memory, without the states that only a run which goes on needs."""
+
+    def save(self, name: str, arrays: Arrays, state: Arrays) -> None:
+        self[name] = arrays
+
+    def load(self, name: str) -> Arrays:
+        return self[name]
+
+    def state(self, name: str) -> Arrays:
+        raise KeyError(f"{name} was kept without its state")
+
+
+@dataclass(frozen=True)
+class PartFiles:
+    """Parts kept as files of a folder."""
+
+    folder: Path
+
+    def path(self, name: str) -> Path:
+        return self.folder / f"{name}.part"
+
+    def __contains__(self, name: str) -> bool:
+        return self.path(name).exists()
+
+    def save(self, name: str, arrays: Arrays, state: Arrays) -> None:
+        """Keep what a block recorded, and the state at its end."""
+        buffer = io.BytesIO()
+        buffer.seek(_DIGEST)
+        kept = arrays | {f"{_STATE}{key}": values for key, values in state.items()}
+        np.savez(buffer, allow_pickle=False, **kept)
+        content = buffer.getbuffer()
+        content[:_DIGEST] = hashlib.sha256(content[_DIGEST:]).digest()
+        with explained(self.folder):
+            write_whole(self.path(name), content)
+
+    def load(self, name: str) -> Arrays:
+        """What a block recorded."""
+        return {key: values for key, values in self._read(name) if not key.startswith(_STATE)}
+
+    def state(self, name: str) -> Arrays:
+        """The state at the end of a block."""
+        return {key.removeprefix(_STATE): values for key, values in self._read(name) if key.startswith(_STATE)}
+
+    def _read(self, name: str) -> Iterator[tuple[str, np.ndarray]]:
+        with explained(self.folder):
+            content = memoryview(read_whole(self.path(name)))
+        if not _sound(content):
+            raise StoreTrouble(f"{self.path(name)} is damaged; go on with --resume, which computes it anew")
+        with np.load(io.BytesIO(content[_DIGEST:]), allow_pickle=False) as arrays:
+            yield from arrays.items()
+
+    def publish(self, target: Path, write: Callable[[Path], None]) -> None:
+        """Make the output beside the parts, sync it, and rename it into place."""
+        beside = self.folder / DATASET
+        with explained(self.folder):
+            write(beside)
+            sync(beside)
+            os.replace(beside, target)
+            sync(target.parent)
+
+    def begin(
+        self, target: Path, wanted: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest]
+    ) -> bool:
+        """Take up a run or begin one, where that is what was asked for; gives whether the output is there already."""
+        folder, older, there = self.folder, _manifest(self.folder), target.exists()
+        run = read(target) if resume and there else {}
+        if resume and run == wanted:
+            return True
+        if resume and (older or there):
+            _refuse_other(folder if older else target, older["run"] if older else run, wanted)
+        if older and not (resume or replace):
+            raise OutputExists(f"{folder} holds an unfinished run; go on with --resume, or begin anew with --force")
+        if there and not (replace or older.get("replace")):
+            raise OutputExists(f"{target} exists; replace it with --force or name another output")
+        self.clean(keep=resume)
+        with explained(folder):
+            manifest = {"format": _FORMAT, "replace": there, "run": wanted}
+            write_whole(folder / _MANIFEST, json.dumps(manifest, sort_keys=True).encode())
+        return False
+
+    def clean(self, keep: bool) -> None:
+        """Remove what a run made here but its lock; of a run that goes on only what is damaged or half made."""
+        with explained(self.folder):
+            for path in self.folder.iterdir():
+                sound = keep and (path.name == _MANIFEST or (path.suffix == ".part" and _sound(read_whole(path))))
+                if _OURS.fullmatch(path.name) and path.name not in _LOCKS and not sound:
+                    path.unlink()
+            sync(self.folder)
+
+
+Parts = MemoryParts | PartFiles
+
+
+def _sound(content: bytes | memoryview) -> bool:
+    return hashlib.sha256(content[_DIGEST:]).digest() == content[:_DIGEST]
+
+
+@contextlib.contextmanager
+def held(
+    target: Path, wanted: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest]
+) -> Iterator[PartFiles | None]:
+    """A context with the parts of an output, under a lock; they stay when the run ends early and go when it is done.
+
+    Parameters
+    ----------
+    target : Path
+        The netCDF file to be.
+    wanted : dict
+        What is to run, by which versions.
+    resume : bool
+        Whether to go on from the parts of an earlier run of the same, if there are any. Where the output is there
+        already, the context gives None.
+    replace : bool
+        Whether the output and the parts of an earlier run of it may be replaced.
+    read : callable
+        Gives what an output has run.
+
+    Raises
+    ------
+    OutputExists
+        If there is an output or an unfinished run that is not to be replaced, or the folder is not one of a run.
+    OutputBusy
+        If another run holds the output.
+    BadInput
+        If the output or the unfinished run is of something else.
+    """
+    folder = target.with_name(f"{target.name}.parts")
+    try:
+        with locked(folder / _LOCK, lambda: _make(folder)) as free:
+            if not free:
+                raise OutputBusy(f"another run is writing {target}; wait for it or name another output")
+            parts = PartFiles(folder)
+            try:
+                done = parts.begin(target, wanted, resume, replace, read)
+                yield None if done else parts
+                with contextlib.suppress(OSError):  # the output is there: whatever stays here does no harm
+                    parts.clean(keep=False)
+            finally:
+                if not (folder / _MANIFEST).exists():
+                    (folder / _LOCK).unlink(missing_ok=True)
+    finally:
+        with contextlib.suppress(OSError):  # of a run that goes on, or with files of others
+            folder.rmdir()
+
+
+def _make(folder: Path) -> None:
+    """Make the folder; refuse one that no run made."""
+    with explained(folder.parent):
+        folder.mkdir(exist_ok=True)
+        names = os.listdir(folder)
+    foreign = [name for name in names if not _OURS.fullmatch(name)] if _MANIFEST not in names else []
+    if folder.is_symlink() or foreign or (_MANIFEST in names and not _manifest(folder)):
+        raise OutputExists(f"{folder} is not the folder of a run; move it away or name another output")
+
+
+def _manifest(folder: Path) -> Manifest:
+    """The manifest of a folder; empty where there is none of ours."""
+    try:
+        found = json.loads(read_whole(folder / _MANIFEST))
+    except (FileNotFoundError, ValueError):
+        return {}
+    return found if isinstance(found, dict) and found.get("format") == _FORMAT else {}
+
+
+def _refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
+    """Refuse to go on with another scenario or other versions, naming what differs."""
+    was, now = _flat(older), _flat(wanted)
+    changed = [key for key in sorted({*was, *now}) if was.get(key) != now.get(key)]
+    if changed:
+        some = [f"{key} was {_short(was.get(key))}, is {_short(now.get(key))}" for key in changed[:_MOST_NAMED]]
+        more = f" and {len(changed) - len(some)} more" if len(changed) > len(some) else ""
+        cure = "run what was begun, or begin anew with --force"
+        raise BadInput([f"{path} is of another run: {'; '.join(some)}{more}; {cure}"])
+
+
+def _short(value: Any) -> str:
+    text = "left out" if value is None else str(value)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+
+
+def _flat(tree: Any, path: str = "") -> dict[str, Any]:
+    """The values of nested tables by dotted key."""
+    if not isinstance(tree, dict):
+        return {path: tree}
+    return {k: v for name, inner in tree.items() for k, v in _flat(inner, f"{path}.{name}".lstrip(".")).items()}
