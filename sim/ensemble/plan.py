@@ -170,10 +170,10 @@ def together(scenario: Scenario) -> int:
 def seconds_a_step(point: Scenario, members: int) -> float:
     """Rough time of one core for a step of a batch [s], which does not depend on the machine."""
     bonds, batch = point.population, _STEP + _ALONE * point.by_steps + point.population.step_seconds
-    member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds
+    member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds + point.contact.edge_seconds
     if bonds.per_member and not bonds.feeds_back:
         member += _COUNTED + _EVENT * bonds.followed(point.speeds(21), point.clock.step)
-    return batch + point.contact.step_seconds + members * member
+    return batch + members * member
 
 
 def map_bytes(point: Scenario, members: int) -> float:

@@ -27,11 +27,8 @@ slowly than Hertz's contact grows follows it.
 import math
 from typing import NamedTuple
 
-import numpy as np
-
-from sim.numerics.jit import device, kernel
+from sim.numerics.jit import device
 from sim.parts.contact.edge_law import ROUNDING, bare_force, edge_speed, excess, hertz_force, hertz_radius, pushed
-from sim.parts.exchange import Array
 
 _S6 = math.sqrt(6.0)
 _C1, _C2 = (4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0
@@ -50,39 +47,15 @@ _TOUCH = 1e-11
 _LEAST = 1e-9
 _LONGEST = 0.2
 
-#: The same for all members, or one for each.
-Number = float | Array
-
-
-class Hold(NamedTuple):
-    """Control of the sphere during a clock step: P = load + stiffness (displacement - delta), each linear in time.
-
-    ``stiffness`` 0 is a load and an infinite one an indentation, namely ``displacement``.
-    """
-
-    load_before: Number = 0.0
-    load_after: Number = 0.0
-    displacement_before: Number = 0.0
-    displacement_after: Number = 0.0
-    stiffness: Number = 0.0
-
 
 class Kinetics(NamedTuple):
     """The law of the edge: G - w = work (v/speed)^exponent where it opens, with numbers of its own where it heals."""
 
-    work: Number
-    speed: Number
-    exponent: Number
-    heal_speed: Number
-    heal_exponent: Number
-
-
-class Advance(NamedTuple):
-    """Result of a clock step for each member."""
-
-    radius: Array
-    detached_at: Array
-    dissipated: Array
+    work: float
+    speed: float
+    exponent: float
+    heal_speed: float
+    heal_exponent: float
 
 
 @device
@@ -352,88 +325,64 @@ def _zero(before, after, duration):
     return duration * min(max(before / (before - after), 0.0), 1.0)
 
 
-@kernel("void(float64[:,::1], float64[:,::1])")
-def _advance(rows, out):
-    """Fill (radius, time of detachment, energy) of each member from its seventeen numbers."""
-    for m in range(rows.shape[0]):
-        a, w0, w1, load0, load1, displacement0, displacement1, stiffness = rows[m, :8]
-        duration, scale, speed, exponent, heal_speed, heal_exponent, sphere_radius, modulus, least = rows[m, 8:]
-        out[m, 0], out[m, 1], out[m, 2] = math.nan, math.nan, (0.0 if math.isnan(a) or a <= 0.0 else math.nan)
-        if stiffness == math.inf:
-            load0 = load1 = 0.0
-        if stiffness == 0.0:
-            displacement0 = displacement1 = 0.0
-        ends = abs(w0) + abs(w1) + abs(load0) + abs(load1) + abs(displacement0) + abs(displacement1)
-        positive = min(scale, exponent, heal_exponent, sphere_radius, modulus)
-        wide = max(abs(a), scale, exponent, heal_exponent, sphere_radius, modulus, duration, least)
-        lowest = min(stiffness, duration, speed, heal_speed, least)
-        if not (ends + wide < math.inf and positive > 0.0 and lowest >= 0.0):
-            continue
+@device
+def scene_of(works, loads, bases, stiffness, duration, scale, bodies):
+    """The ``scene`` of ``edge_law`` from work, load and displacement at both ends of a time."""
+    per, (sphere_radius, modulus) = (1.0 / duration if duration > 0.0 else 0.0), bodies
+    load, base = (0.0 if stiffness == math.inf else loads[0]), (0.0 if stiffness == 0.0 else bases[0])
+    load_rate = 0.0 if stiffness == math.inf else (loads[1] - loads[0]) * per
+    base_rate = 0.0 if stiffness == 0.0 else (bases[1] - bases[0]) * per
+    held = modulus, 1.0 / sphere_radius, stiffness, load, load_rate, base, base_rate
+    return held + (works[0], (works[1] - works[0]) * per, scale)
+
+
+@device
+def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, least):
+    """Radius, time of detachment and dissipated energy of an edge after a time in which work and control are linear.
+
+    Parameters
+    ----------
+    a : float
+        Radius at the start [m]; nan or 0 for an open contact, which stays open. Below Hertz's it starts as that.
+    works, loads, bases : pair of floats
+        Work of adhesion w of any sign [J/m^2], load [N] and displacement of the base [m] at start and end.
+    stiffness, duration : float
+        Stiffness behind the base [N/m], 0 to inf; length of the time [s].
+    kinetics : Kinetics or tuple
+        Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
+        freezes the edge or leaves it in equilibrium.
+    bodies : pair of floats
+        R [m], E* [Pa].
+    least : float
+        Radius at which a shrinking contact counts as open [m], at least 1e-9 of the radius at the start. Under a dead
+        load the energy grows like 1/radius towards the end, because the load falls ever deeper; the time hardly
+        depends on it.
+
+    Returns
+    -------
+    tuple
+        The radius at the end [m], nan where open; the time since the start at which it opened [s], nan where it did
+        not; int \\|G - w\\| 2 pi a \\|da\\| [J] up to there. Where a number is nan or invalid all three are nan.
+
+    Notes
+    -----
+    Exponents above 1, whose edge is infinitely mobile at rest, cost much and lose digits in stiff
+    cases. Where pressing advances the edge faster than it heals, w dA is dissipated if w > 0, and nothing if w <= 0.
+    """
+    scale, speed, exponent, heal_speed, heal_exponent = kinetics
+    scene = scene_of(works, loads, bases, stiffness, duration, scale, bodies)
+    ends = abs(scene[3]) + abs(scene[5]) + abs(works[0]) + abs(works[1])
+    ends += (0.0 if stiffness == math.inf else abs(loads[1])) + (0.0 if stiffness == 0.0 else abs(bases[1]))
+    positive = min(scale, exponent, heal_exponent, bodies[0], bodies[1])
+    wide = max(abs(a), scale, exponent, heal_exponent, bodies[0], bodies[1], duration, least)
+    lowest = min(stiffness, duration, speed, heal_speed, least)
+    if ends + wide < math.inf and positive > 0.0 and lowest >= 0.0:
         per = 1.0 / duration if duration > 0.0 else 0.0
         power, heal_power = 1.0 / exponent, 1.0 / heal_exponent
         speed = min(speed, a * per * min(ROUNDING**-power, 1e250))
         heal_speed = min(heal_speed, a * per * min(ROUNDING**-heal_power, 1e250))
         front = speed, power, heal_speed, heal_power
-        held = modulus, 1.0 / sphere_radius, stiffness, load0, (load1 - load0) * per
-        scene = held + (displacement0, (displacement1 - displacement0) * per, w0, (w1 - w0) * per, scale)
         end, opened, energy = _member(a, duration, max(least, _LEAST * a), scene, front)
         if energy < math.inf and end != math.inf:
-            out[m, 0], out[m, 1], out[m, 2] = end, opened, energy
-
-
-def advance(radius, work, hold, kinetics, duration, sphere_radius, modulus, detached_below=0.0):
-    """Move the edge of each member's contact over one clock step.
-
-    Parameters
-    ----------
-    radius : array, shape (members,)
-        a at the start [m]; nan for an open contact, which stays open.
-    work : pair of arrays
-        Work of adhesion w at the start and at the end [J/m^2], of any sign.
-    hold : Hold
-        Load [N], displacement of the base [m] and stiffness [N/m].
-    kinetics : Kinetics
-        Reference work [J/m^2], speeds [m/s] and exponents [1] of opening and healing. A speed of 0 or infinity
-        freezes the edge or leaves it in equilibrium.
-    duration : float or array
-        Length of the clock step [s].
-    sphere_radius, modulus : float or array
-        R [m], E* [Pa].
-    detached_below : float or array
-        Radius at which a shrinking contact counts as open [m], at least 1e-9 of the radius at the start. Under a dead
-        load the energy grows like 1/radius towards the end, because the load falls ever deeper; the time hardly
-        depends on it.
-
-    All broadcast against the radius.
-
-    Returns
-    -------
-    Advance
-        ``radius`` [m], nan where open; ``detached_at``, the time since the start of the step at which
-        it opened [s], nan where it did not; ``dissipated``, int \\|G - w\\| 2 pi a \\|da\\| [J] up to there.
-        Where an input is nan or invalid all three are nan.
-
-    Notes
-    -----
-    Exponents above 1, whose edge is infinitely mobile at rest, cost much and lose digits in stiff
-    cases. A radius below Hertz's starts as Hertz's. Where pressing advances the edge faster than it heals,
-    w dA is dissipated if w > 0, and nothing if w <= 0.
-
-    Examples
-    --------
-    Pulled with twice its pull-off load, a sphere detaches the later the slower its edge:
-
-    >>> rest, pull = np.full(3, 7.2e-5), Hold(-8e-4, -8e-4)
-    >>> edge = Kinetics(0.042, np.array([1e-6, 1e-5, 1e-4]), 0.6, 1e-6, 0.6)
-    >>> gone = advance(rest, (0.042, 0.042), pull, edge, 1e3, 2e-3, 6.4e6, 1e-8)
-    >>> print("%.2f %.3f %.4f" % tuple(gone.detached_at))
-    28.87 2.887 0.2887
-    """
-    radius = np.asarray(radius, dtype=float)
-    columns = (radius, *work, *hold, duration, *kinetics, sphere_radius, modulus, detached_below)
-    rows = np.empty((radius.size, len(columns)))
-    for row, column in zip(rows.T, columns, strict=True):
-        row[:] = column
-    out = np.empty((radius.size, 3))
-    _advance(rows, out)
-    return Advance(*out.T.copy())
+            return end, opened, energy
+    return math.nan, math.nan, (0.0 if math.isnan(a) or a <= 0.0 else math.nan)

@@ -5,7 +5,6 @@ or a table; ``sim.parts.contact.control`` has the contact under each.
 """
 
 import math
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal
 
@@ -17,14 +16,13 @@ from pydantic_core import PydanticCustomError
 from sim.numerics.jit import kernel
 from sim.parts.contact.balance import AHEAD, CLOSED, OPEN, Balance
 from sim.parts.contact.control import Bodies, Control, DisplacementControl, LoadControl
-from sim.parts.contact.crack_front import Hold, Kinetics, advance as advance_front
+from sim.parts.contact.crack_front import Kinetics
 from sim.parts.contact.crossing import widest_crossings
+from sim.parts.contact.front_steps import follow as follow_front
 from sim.parts.exchange import Array, Flags, Motion, Motions, Setting, Touching, during
-from sim.units.course import Pieces, Prescribed, held, prescribed
+from sim.units.course import Prescribed, held, prescribed
 from sim.units.quantity import Quantity
 
-#: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
-_SPOT = 1e-3
 #: Radius of the contact over that of the sphere above which a parabola is a poor sphere.
 _LARGEST_SHARE = 0.3
 _KINDS = ("load", "indentation", "displacement")
@@ -52,8 +50,8 @@ class _Controlled:
     feeds_back: ClassVar[bool] = False
     #: Whether the edge takes time to reach equilibrium.
     lags: ClassVar[bool] = False
-    #: Rough time of a step of a batch where it is made alone, for estimates [s].
-    step_seconds: ClassVar[float] = 0.0
+    #: Rough time of a step of one member where its edge lags, for estimates [s].
+    edge_seconds: ClassVar[float] = 0.0
 
     load: _Load | None = None  # type: ignore[valid-type]
     indentation: _Indentation | None = None  # type: ignore[valid-type]
@@ -169,12 +167,6 @@ class _Controlled:
         _follow(phases, closes[:, 0], lost, self.after_pull_off == "reattach", after)
         return after
 
-    def _touching(self, state: Touching, control: Control) -> Flags:
-        """True where an open contact closes: at its first touch, or wherever it reattaches."""
-        return (
-            np.isnan(state.radius) & (np.isnan(state.detached) | (self.after_pull_off == "reattach")) & control.closes
-        )
-
     def equilibrium(self, control: Control, balance: Balance) -> Array:
         """Largest stable radius in equilibrium with the work left there [m], nan without one."""
         if balance.margin is None:
@@ -246,7 +238,7 @@ class RateDependent(_Controlled):
     """
 
     lags: ClassVar[bool] = True
-    step_seconds: ClassVar[float] = 120e-6
+    edge_seconds: ClassVar[float] = 1.5e-6
 
     front_speed: Annotated[float, Quantity("m/s", "speed of an opening edge at G - w = work at rest", "v_0", above=0)]
     front_exponent: Annotated[float, Quantity("1", "exponent of the edge's speed", "n", above=0, at_most=1)] = 0.6
@@ -255,77 +247,16 @@ class RateDependent(_Controlled):
     model: Literal["rate_dependent"] = "rate_dependent"
 
     def advance(self, state: Touching, motions: Motions, duration: float, balance: Balance) -> Touching:
-        phases, found = self._phases(state, self.control(motions.time, duration), balance), []
         ends = np.append(motions.time[0] - motions.duration[0], motions.time)
-        pieces = self.course.pieces(ends, duration)
-        for k, motion in enumerate(motions.each()):
-            within = Pieces(*(values[pieces.interval == k] for values in pieces))
-            state = self._step(state, motion, within, balance.at(k))
-            found.append(state)
-        return Touching(*map(np.array, zip(*found, strict=True)))._replace(phases=phases)
-
-    def _step(self, state: Touching, motion: Motion, pieces: Pieces, balance: Balance) -> Touching:
-        """The contact after one step, but for the phases of the reference contacts."""
-        last = self._left(state.radius, balance)
-        first = np.where(np.isnan(state.radius), last, state.work)
-        now = state._replace(radius=state.radius + np.zeros(last.shape))
-        begin, span, share = pieces.start[0], pieces.stop[-1] - pieces.start[0], 0.0
-        for row in zip(*pieces, strict=True):
-            piece = Pieces(*row)
-            before, share = share, (piece.stop - begin) / span
-            works = [(1.0 - part) * first + part * last for part in (before, share)]
-            now = self._moved(now, piece, motion.duration * (share - before), works, balance)
-        return now._replace(work=self._left(now.radius, balance))
-
-    def _moved(
-        self, state: Touching, piece: Pieces, duration: float, works: Sequence[Array], balance: Balance
-    ) -> Touching:
-        """The contact after a part of a clock step in which control and work change linearly.
-
-        Energy still stored where the edge opens counts as dissipated, and so does what a spot gains at a touch.
-        """
-        before, after, bodies = self._control(piece.first), self._control(piece.last), balance.bodies
-        spot, touching = _spot(balance), self._touching(state, before)
-        radius = np.where(touching, spot, state.radius)
-        moved = advance_front(
-            radius, works, self._hold(piece), self._kinetics(balance), duration, bodies.sphere_radius, bodies.modulus,
-            0.5 * spot,
-        )  # fmt: skip
-        opens, lost, counts = ~np.isnan(radius) & np.isnan(moved.radius), moved.dissipated, np.full(1, True)
-        if self.load is not None:
-            counts = ~opens & (after.closes or self._bears(state.radius, works[1], bodies))
-            lost = np.where(counts, lost, 0.0)
-        if touching.any():
-            wide = np.fmax(spot, before.radius(np.zeros(1), np.zeros(1), 0.0, bodies))
-            gained = -before.energy(wide, math.pi * wide**2 * works[0], bodies)
-            lost += np.where(touching, np.maximum(gained, 0.0), 0.0)
-        for m in np.flatnonzero(opens & counts):
-            part = moved.detached_at[m] / duration
-            control, narrow = self._control((1.0 - part) * piece.first + part * piece.last), np.full(1, 0.5 * spot)
-            work = (1.0 - part) * works[0][m] + part * works[1][m]
-            lost[m] += max(control.energy(narrow, math.pi * narrow**2 * work, bodies)[0], 0.0)
-        detached = np.where(opens, piece.stop - duration + moved.detached_at, state.detached)
-        return state._replace(radius=moved.radius, detached=detached, dissipated=state.dissipated + lost)
-
-    def _bears(self, radius: Array, work: Array, bodies: Bodies) -> Flags:
-        """True where a tensile load still has an equilibrium below: not at radii below that at pull-off.
-
-        The work of the falling load diverges there as the radius vanishes, and is not counted.
-        """
-        size, modulus, _ = bodies
-        fold = np.cbrt(9.0 * math.pi * np.maximum(work, 0.0) * size**2 / (8.0 * modulus))
-        return np.asarray(np.isnan(radius) | (radius >= fold))
-
-    def _hold(self, piece: Pieces) -> Hold:
-        """Control during a part of a clock step."""
-        if self.load is not None:
-            return Hold(load_before=piece.first, load_after=piece.last)
-        stiffness = self.stiffness or math.inf
-        return Hold(displacement_before=piece.first, displacement_after=piece.last, stiffness=stiffness)
-
-    def _kinetics(self, balance: Balance) -> Kinetics:
+        stiffness = 0.0 if self.load is not None else self.stiffness or math.inf
         speed, exponent = self.front_speed, self.front_exponent
-        return Kinetics(balance.reference, speed, exponent, self.heal_speed or speed, self.heal_exponent or exponent)
+        work, radius, detached, dissipated = follow_front(
+            state, motions.duration[:, 0], self.course.pieces(ends, duration), stiffness, balance, self.reversible,
+            Kinetics(balance.reference, speed, exponent, self.heal_speed or speed, self.heal_exponent or exponent),
+            self.after_pull_off == "reattach",
+        )  # fmt: skip
+        phases = self._phases(state, self.control(motions.time, duration), balance)
+        return Touching(work, radius, detached, dissipated, phases)
 
 
 @kernel("void(float64[:, :], boolean[:], boolean[:, :, :], boolean, float64[:, :, ::1])")
@@ -341,12 +272,6 @@ def _follow(phases, closes, lost, again, after):
                 if phase == CLOSED and lost[k, m, c]:
                     phase = OPEN
                 after[k, m, c] = phase
-
-
-def _spot(balance: Balance) -> float:
-    """Radius at which a touch begins [m]; a shrinking contact counts as open below half of it."""
-    size, modulus, _ = balance.bodies
-    return _SPOT * math.cbrt(balance.reference * size**2 / modulus)
 
 
 def _model(value: object) -> object:

@@ -14,7 +14,7 @@ from sim.engine import course_of, march, pack
 from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
 from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium, RateDependent
+from sim.parts.contact import Equilibrium, RateDependent, front_steps
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.control import elastic_energy
 from sim.parts.drive import prescribed as drive
@@ -430,6 +430,33 @@ def test_all_that_is_stored_is_dissipated_once_a_torn_contact_is_open(stiffness,
     assert_allclose(lost[-1], stored, rtol=1e-7)
 
 
+@pytest.mark.parametrize("stiffness", [0.5, math.inf])
+def test_all_that_a_touch_gains_is_dissipated_once_the_edge_is_at_rest(stiffness):
+    """The control jumps from far off to a light touch, then stays: nothing goes in or out any more."""
+    table = {"time": [0.0, 0.5, 0.5, 100.0], "value": [-9.0, -9.0, 0.02, 0.02]}
+    held = {"indentation": table} if math.isinf(stiffness) else {"displacement": table, "stiffness": stiffness}
+    scenario = maugis(RateDependent(**held, front_speed=5.0), 200, 100.0)
+    radius, lost, depth = course(scenario, "contact_radius", "dissipated_energy", "indentation")
+    spring = 0.0 if math.isinf(stiffness) else 0.5 * stiffness * (0.02 - depth[-1]) ** 2
+    kept = elastic_energy(radius[-1], depth[-1], scenario.bodies) + spring - math.pi * radius[-1] ** 2 * WORK
+    assert radius[0] == lost[0] == 0.0 and radius[-1] > 1.0
+    assert_allclose(lost[-1], -kept, rtol=1e-7)
+
+
+def test_an_edge_opens_at_a_time_of_its_own_within_a_clock_step():
+    contact = RateDependent(load={"from": 1.0, "to": -3.0}, front_speed=5.0)
+    few, many = (course(maugis(contact, steps), "detachment_time")[0][-1] for steps in (5, 500))
+    assert_allclose(few, many, rtol=1e-6)
+
+
+def test_a_fast_edge_stays_in_equilibrium_with_the_share_of_the_mean_stress():
+    parts = {"bonds": bonds.Unbroken(stress=2e5), "drive": drive.Steady(speed=1e-3)}
+    still, fast = Equilibrium(load=4e-3, reversible=0.02), RateDependent(load=4e-3, reversible=0.02, front_speed=1e3)
+    one, two = (course(scene(1, 20, contact=contact, **parts), "contact_radius")[0] for contact in (still, fast))
+    assert one[-1] < 0.95 * course(scene(1, 1), "contact_radius")[0][-1]
+    assert_allclose(two, one, rtol=1e-7)
+
+
 # --- masking ---
 
 
@@ -599,12 +626,10 @@ def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
 @pytest.mark.parametrize("steps", [400, pytest.param(2000, marks=pytest.mark.verify)])
 def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch, steps):
     # below the radius at pull-off the falling load gains energy like 1/radius; that is not the edge's
-    from sim.parts.contact import models as part
-
     pulled = RateDependent(load={"from": 1e-3, "to": -1e-3}, front_speed=1e-3)
     found = []
     for spot in (1e-3, 1e-2):
-        monkeypatch.setattr(part, "_SPOT", spot)
+        monkeypatch.setattr(front_steps, "_SPOT", spot)
         scenario = scene(1, steps, contact=pulled)
         *_, last = march(scenario, np.arange(1))
         assert np.isnan(last.contact.radius[0])

@@ -11,12 +11,13 @@ import math
 
 import numpy as np
 import pytest
+from helpers.edges import Hold, advance
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 
 from sim.laws import jkr
 from sim.parts.contact import crack_front as front
-from sim.parts.contact.crack_front import Hold, Kinetics, advance
+from sim.parts.contact.crack_front import Kinetics
 
 W = 1.0 / math.pi
 REST = 6.0 ** (1.0 / 3.0)
@@ -415,3 +416,10 @@ def test_an_open_contact_stays_open_and_others_do_not_mind():
     assert np.isnan(out.detached_at).all()
     assert_array_equal(out.dissipated[[0, 2]], 0.0)
     assert_array_equal(out.radius[1], advance(REST * ONE, (W, W), at_load(-1.0), EDGE, 1.0, **SPHERE).radius[0])
+
+
+def test_a_sphere_pulled_with_twice_its_pull_off_load_detaches_the_later_the_slower_its_edge():
+    rest, pull = np.full(3, 7.2e-5), Hold(-8e-4, -8e-4)
+    edge = Kinetics(0.042, np.array([1e-6, 1e-5, 1e-4]), 0.6, 1e-6, 0.6)
+    gone = advance(rest, (0.042, 0.042), pull, edge, 1e3, 2e-3, 6.4e6, 1e-8)
+    assert_allclose(gone.detached_at, [28.87, 2.887, 0.2887], rtol=2e-4)
