@@ -75,16 +75,16 @@ def run(
     BadInput
         If the scenario cannot be used, or the file is there and ``replace`` is False.
     """
-    from sim.cli import progress_bar
     from sim.ensemble import simulate
     from sim.ensemble.plan import Plan, work
+    from sim.ensemble.progress import Shown, progress_bar
     from sim.units.refusals import BadInput
 
     scene = _scene(scenario)
-    shown = progress_bar(work(Plan.of(scene))) if progress is True else contextlib.nullcontext(progress or None)
+    given = Shown(progress) if callable(progress) else Shown()
     try:
-        with shown as advance:
-            return simulate.run(scene, to, replace=replace, progress=advance)
+        with progress_bar(work(Plan.of(scene))) if progress is True else contextlib.nullcontext(given) as shown:
+            return simulate.run(scene, to, replace=replace, progress=shown.advance, stage=shown.begin)
     except simulate.OutputExists:
         raise BadInput([f"{to}: is there already; give replace=True or another path"]) from None
 

@@ -1,11 +1,12 @@
 """The commands. Each imports what it needs when it runs, so that ``sim --help`` is instant."""
 
 import contextlib
+import gc
 import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -25,6 +26,7 @@ _ROWS = 12
 
 def main() -> None:
     """Run the command line; every foreseen trouble ends in one message and its exit code."""
+    gc.set_threshold(50_000)  # imports make many objects that stay: looking through them is a tenth of a start
     for order in (signal.SIGTERM, signal.SIGHUP):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
     try:
@@ -79,8 +81,12 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
+    from sim.ensemble.progress import Stages, announce_compiling, progress_bar
+
+    began, stages = time.time(), Stages()
     from sim.scenario.reader import load
 
+    announce_compiling(quiet)
     scene = load(scenario, _overrides(changes, seed, members), option="--set")
     if target.is_dir() or (target.exists() and target.samefile(scenario)):
         _fail(f"{target} is {'a folder' if target.is_dir() else 'the scenario'}; name a file with -o", BAD_INPUT)
@@ -91,17 +97,21 @@ def run(
 
     from sim.ensemble import plan as plans, preview, simulate
 
-    began = time.time()
     plan = plans.Plan.of(scene)
     for remark in [] if quiet else preview.remarks(plan):
         click.echo(f"note: {remark}", err=True)
-    with contextlib.nullcontext() if quiet else progress_bar(plans.work(plan)) as advance:
-        simulate.run(scene, target, replace=force, resume=resume, progress=advance)
-    simulate.write_log(target, began, sys.argv[1:])
-    if not quiet:
-        if not bare:
+    with contextlib.ExitStack() as shown:
+        if not quiet:
+            stages.shown = shown.enter_context(progress_bar(plans.work(plan)))
+        simulate.run(scene, target, replace=force, resume=resume, progress=stages.shown.advance, stage=stages.begin)
+        shown.callback(lambda: simulate.write_log(target, began, sys.argv[1:], stages.ended()))
+        if tabulated := not (quiet or bare):
+            stages.begin("table")
             with _opened(target) as dataset:
-                _print_tables(dataset)
+                tables = _tables(dataset)
+    if tabulated:
+        _print_tables(*tables)
+    if not quiet:
         click.echo(str(target))
 
 
@@ -128,38 +138,19 @@ def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int |
     return _values(changes, "--set") | {key: value for key, value in given.items() if value is not None}
 
 
-@contextlib.contextmanager
-def progress_bar(total: int) -> Iterator[Callable[[int], None]]:
-    """A context that gives a callback taking member-steps: a bar on a terminal, else a line every half minute."""
-    if sys.stderr.isatty() and sys.stdout.isatty():
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-        shown = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f}%"))
-        with Progress(*shown, TimeRemainingColumn(), transient=True) as progress:
-            task = progress.add_task("member-steps", total=total)
-            yield lambda done: progress.advance(task, done)
-        return
-    so_far, said = 0, time.monotonic()
-
-    def advance(done: int) -> None:
-        nonlocal so_far, said
-        so_far += done
-        if time.monotonic() - said > 30.0:
-            said = time.monotonic()
-            click.echo(f"{100 * so_far / total:.0f} % of {total:,} member-steps", err=True)
-
-    yield advance
-
-
-def _print_tables(dataset: Any, most: int = _ROWS) -> None:
+def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]], list[str]]:
     """Statistics of a dataset over time and sweep, of each whole run, and what the numbers mean."""
     from sim import analysis
 
     rows, once = analysis.table(dataset, most), analysis.highlights(dataset, most)
-    for shown in filter(None, (rows, once)):
-        _print_rows(shown)
+    return [shown for shown in (rows, once) if shown], analysis.notes(dataset, rows, once)
+
+
+def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
+    for rows in tables:
+        _print_rows(rows)
         click.echo()
-    for note in analysis.notes(dataset, rows, once):
+    for note in notes:
         click.echo(note)
 
 
@@ -185,8 +176,10 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
 def check(scenario: Path, changes: tuple[str, ...]) -> None:
     """Print what a scenario would run: quantities in SI, models, errors known beforehand, time, memory, file size."""
     from sim.ensemble.preview import preview
+    from sim.ensemble.progress import announce_compiling
     from sim.scenario.reader import load
 
+    announce_compiling()
     click.echo(preview(load(scenario, _overrides(changes), option="--set")))
 
 
@@ -201,7 +194,7 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None) 
     from sim.numerics.files import explained
 
     with _opened(output, chosen) as dataset:
-        _print_tables(dataset, sys.maxsize if whole else _ROWS)
+        _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
         if csv is not None:
             with explained(csv.parent):
                 csv.parent.mkdir(parents=True, exist_ok=True)
@@ -342,3 +335,22 @@ def schema() -> None:
     from sim.scenario.schema import scenario_schema
 
     click.echo(json.dumps(scenario_schema(), indent=2))
+
+
+@cli.command()
+@click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core.")
+def warm(jobs: int | None) -> None:
+    """Compile all kernels at once in parallel; else each compiles when a run first calls it."""
+    from sim.ensemble.progress import progress_bar
+    from sim.ensemble.warm import compile_all, missing
+    from sim.numerics import jit
+
+    began, lacking = time.monotonic(), missing()
+    if lacking:
+        with progress_bar(len(lacking), "kernels") as shown:
+            for _ in compile_all(lacking, jobs):
+                shown.advance(1)
+    if left := [name for name in lacking if not jit.cached(name)]:
+        _fail(f"{len(left)} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written", TROUBLE)
+    took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
+    click.echo(f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled{took}; the others were there")

@@ -15,6 +15,8 @@ import xarray as xr
 from click.testing import CliRunner
 
 from sim import cli
+from sim.ensemble import progress
+from sim.numerics import jit
 from sim.scenario.reader import BadInput, load
 from sim.study import paper
 
@@ -111,7 +113,7 @@ def test_help_imports_nothing_heavy():
 def test_check_and_a_run_without_its_table_import_neither_xarray_nor_figures_nor_statistics(here):
     heavy = {"xarray", "pandas", "matplotlib", "scipy.stats", "rich", "dask"}
     assert not loaded("check", LENS) & heavy
-    assert not loaded("run", "scene.toml", "--no-table") & heavy
+    assert not loaded("run", "scene.toml", "--no-table", "--quiet") & heavy
     assert Path("outputs/scene.nc").exists()
 
 
@@ -177,6 +179,27 @@ def test_run_writes_the_dataset_into_a_new_folder_and_ends_with_its_path(here):
         assert dataset.sizes["member"] == 3
     entry = json.loads(Path("new/folder/x.nc.log").read_text())
     assert entry["arguments"] == ["run", "scene.toml", "-o", "new/folder/x.nc"]
+    assert list(entry["stages"]) == ["loading", "simulating", "writing", "table"]
+    assert 0.0 < sum(entry["stages"].values()) <= entry["seconds"] + 0.05
+    assert sim("run", "scene.toml", "-o", "new/folder/x.nc", "--force", "--no-table").exit_code == 0
+    last = json.loads(Path("new/folder/x.nc.log").read_text().splitlines()[-1])
+    assert list(last["stages"]) == ["loading", "simulating", "writing"]
+
+
+def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, monkeypatch):
+    progress.announce_compiling()
+    for _ in range(2):
+        for notice in list(jit.on_compiling):
+            notice("sim.laws.jkr.load.pull_off_load")
+    assert capsys.readouterr().err.count("compiling") == 1
+    progress.announce_compiling(quiet=True)
+    jit.on_compiling[0]("sim.laws.jkr.load.pull_off_load")
+    monkeypatch.setattr("time.monotonic", iter([0.0, 10.0, 40.0, 41.0, 50.0]).__next__)
+    with progress.progress_bar(100) as shown:
+        shown.begin("simulating")
+        shown.advance(30)
+        shown.begin("writing")
+    assert capsys.readouterr().err.splitlines() == ["30 % of 100 member-steps", "writing"]
 
 
 def test_run_writes_into_outputs_and_quietly_if_asked(here):
@@ -450,6 +473,8 @@ def test_converge_prints_a_table_a_recommendation_and_its_files(tmp_path, monkey
 def test_a_reduced_file_has_a_table_and_names_what_a_figure_misses(here):
     done = sim("run", "scene.toml", "-o", "out.nc", "--set", 'record.quantities=["speed"]')
     assert done.exit_code == 0 and "V" in done.output and "A/A_JKR" not in done.output
+    assert "record.quantities keeps speed" in done.output
+    assert "record.quantities" not in sim("run", "scene.toml", "-o", "whole.nc").stdout
     assert sim("stats", "out.nc", "--csv", "out.csv").exit_code == 0
     drawn = sim("plot", "out.nc", "stress")
     assert drawn.exit_code == cli.BAD_INPUT and "out.nc: shear_stress" in drawn.output

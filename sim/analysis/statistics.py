@@ -78,7 +78,7 @@ def averaging(dataset: xr.Dataset, late: bool) -> str:
     return f"mean over the {' and '.join(over)}" if over else ""
 
 
-def summary(trajectories: xr.Dataset) -> xr.Dataset:
+def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     """Mean, standard deviation, standard error and quantiles over the members.
 
     Parameters
@@ -86,6 +86,8 @@ def summary(trajectories: xr.Dataset) -> xr.Dataset:
     trajectories : xarray.Dataset
         Observables. One without the dimension ``member`` is the same for all members: its
         spread is 0. Variables that are statistics already (``…_mean``, ``…_std``, ``…_sem``) pass.
+    quantiles : bool
+        Whether quantiles are wanted, which take most of the time.
 
     Returns
     -------
@@ -100,29 +102,32 @@ def summary(trajectories: xr.Dataset) -> xr.Dataset:
         if name.rpartition("_")[2] in KEPT:
             found[name] = variable
             continue
-        for kind, values in _statistics_of(variable.astype(float)).items():
+        for kind, values in _statistics_of(variable.astype(float), quantiles).items():
             text = f"{_OF.get(kind, 'quantiles')} of {variable.attrs.get('long_name', name)}"
             found[f"{name}_{kind}"] = values.assign_attrs(variable.attrs, long_name=text)
     return xr.Dataset(found)
 
 
-def _statistics_of(variable: xr.DataArray) -> dict[str, xr.DataArray]:
+def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.DataArray]:
     if MEMBERS not in variable.dims:
         none = xr.zeros_like(variable).where(variable.notnull())
-        levels = variable.expand_dims(quantile=list(QUANTILES))
-        return {"mean": variable, "std": none, "sem": none, "quantile": levels}
+        levels = {"quantile": variable.expand_dims(quantile=list(QUANTILES))} if quantiles else {}
+        return {"mean": variable, "std": none, "sem": none} | levels
     values, axis = variable.to_numpy(), variable.get_axis_num(MEMBERS)
     count = np.sum(~np.isnan(values), axis, dtype=float)
     with warnings.catch_warnings():  # nan is the answer where no member has a value
         warnings.filterwarnings("ignore", "Mean of empty slice|All-NaN slice", RuntimeWarning)
         mean = np.nanmean(values, axis)
-        levels = (np.nanquantile if np.any(count < values.shape[axis]) else np.quantile)(values, QUANTILES, axis)
+        if quantiles:
+            levels = (np.nanquantile if np.any(count < values.shape[axis]) else np.quantile)(values, QUANTILES, axis)
     squares = np.nansum((values - np.expand_dims(mean, axis)) ** 2, axis)
     deviation = (squares / np.where(count > 1.0, count - 1.0, np.nan)) ** 0.5
     error = deviation / np.where(count > 0.0, count, np.nan) ** 0.5
     one = variable.isel({MEMBERS: 0}, drop=True)
     found = {name: one.copy(data=data) for name, data in (("mean", mean), ("std", deviation), ("sem", error))}
-    return found | {"quantile": one.expand_dims(quantile=list(QUANTILES)).copy(data=levels)}
+    if quantiles:
+        found["quantile"] = one.expand_dims(quantile=list(QUANTILES)).copy(data=levels)
+    return found
 
 
 def statistics(dataset: xr.Dataset) -> xr.Dataset:

@@ -15,7 +15,7 @@ import xarray as xr
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import all_observables, settled
-from sim.analysis.scene import answered, is_stationary, stays_held, sweep_dims, word
+from sim.analysis.scene import answered, is_stationary, resolved, stays_held, sweep_dims, word
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary
 from sim.numerics.files import write_whole
 from sim.units.notation import concise, scaled
@@ -125,6 +125,9 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
         if 0 < len(shown) < total:
             lines.append(f"{len(shown)} of {total} rows shown; all: --all, or --csv FILE; chosen: --where KEY=VALUE")
     headings = {re.sub(r"[ \n]\([^()]*\)$", "", heading) for row in (*rows[:1], *once[:1]) for heading in row}
+    if (names := resolved(dataset, "record.quantities")) is not None:
+        kept = ", ".join(names) or "contact_radius alone"
+        lines.append(f"columns of what was not recorded are left out; record.quantities keeps {kept}")
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
     words = "; ".join(f"{' '.join(column.heading.split())}: {column.meaning}" for column in known)
     return [*dict.fromkeys(lines), *filter(None, [words])]
@@ -211,15 +214,16 @@ def _rows(cells: Columns) -> list[dict[str, str]]:
 
 def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
     """Statistics to tabulate, and the index of each row in every dimension of sweep and time."""
+    memory, counts = correlation_time(dataset), _thinned(dataset, rows)
+    counts["t"] = max(1, rows // math.prod(counts.values()))
+    whole = is_stationary(dataset) and bool(sweep_dims(dataset))
+    if not whole:  # of the records only those that are shown
+        dataset = dataset.isel(t=_spread(dataset.sizes["t"], counts["t"]))
     trajectories = all_observables(dataset)
-    if is_stationary(dataset) and sweep_dims(dataset):
-        trajectories = settled(trajectories)
-    found = summary(trajectories).merge(correlation_time(dataset))
+    found = summary(settled(trajectories) if whole else trajectories, quantiles=False).merge(memory)
     if "applied_load" in dataset:  # it is known of open contacts too
         found["normal_load_mean"] = dataset["applied_load"].fillna(found["normal_load_mean"])
         found["normal_load_sem"] = found["normal_load_sem"].where(dataset["applied_load"].isnull(), 0.0)
-    counts = _thinned(dataset, rows)
-    counts["t"] = max(1, rows // math.prod(counts.values()))
     return found, _points(found.sizes, counts)
 
 

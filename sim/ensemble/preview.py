@@ -16,10 +16,14 @@ from sim.scenario.clock import Record
 from sim.scenario.declared import entries
 from sim.scenario.scenario import Scenario
 
-# Rough costs of one core, for the estimate only [s]: starting up; a point of a sweep; a part file; a record of a batch,
-# of a member; a byte.
-_START, _POINT, _PART, _RECORD, _RECORD_OF_MEMBER, _BYTE = 3.0, 15e-3, 5e-3, 5e-6, 2e-7, 50e-9
+# Rough costs of one core, for the estimate only [s]: starting up; the table, and a byte of it; a point of a sweep; a
+# part file; a record of a batch, of a member; a byte.
+_START, _TABLE, _TABULATED = 1.2, 0.9, 5e-9
+_POINT, _PART, _RECORD, _RECORD_OF_MEMBER, _BYTE = 15e-3, 5e-3, 5e-6, 2e-7, 50e-9
 _PROGRAM_BYTES = 200e6
+#: A file without its trajectories [byte], and what is left of those by ``record.compression``.
+_BARE = 1e5
+_LEFT = {"none": 1.0, "zlib": 0.4, "digits": 0.2}
 #: Points of a sweep whose cells are looked at.
 _MOST_POINTS = 8
 _MOST_WORDS = 6
@@ -213,9 +217,13 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
-    rows.append(("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core"))
+    rows.append(
+        ("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core, table included")
+    )
     rows.append(("memory", f"about {_size(held)}"))
-    return [*rows, ("file", f"{_size(plan.bytes)} at most, before compression")]
+    packed = f"about {_size(_BARE + _LEFT[scene.record.compression] * plan.bytes)}"
+    before = "" if scene.record.compression == "none" else f", {_size(_BARE + plan.bytes)} before compression"
+    return [*rows, ("file", packed + before)]
 
 
 def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:
@@ -224,7 +232,8 @@ def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:
     batches, points = max(1.0, plan.members / group), len(plan.points)
     records = clock.records * (_RECORD + group * _RECORD_OF_MEMBER)
     steps = clock.steps * sum(seconds_a_step(point, group) for point in some) / len(some)
-    return _START + points * (_POINT + batches * (records + steps + _PART)) + _BYTE * plan.bytes
+    kept = _TABLE + (_BYTE + _TABULATED) * plan.bytes
+    return _START + points * (_POINT + batches * (records + steps + _PART)) + kept
 
 
 def _size(count: float) -> str:

@@ -31,7 +31,7 @@ _STEPS = 1024
 
 def run(
     scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, resume: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | None = None, stage: Callable[[str], None] = lambda name: None,
 ) -> Any:  # fmt: skip
     """Run a scenario with its ensemble and its sweep.
 
@@ -47,6 +47,8 @@ def run(
         Whether to go on with an unfinished run of the same scenario; a finished one is left as it is.
     progress : callable, optional
         Called with the number of member-steps done since the last call.
+    stage : callable
+        Called with the name of each stage as it begins: "simulating", "writing".
 
     Returns
     -------
@@ -65,11 +67,13 @@ def run(
         If the disk or a file makes trouble; what the disk holds of an older output stays.
     """
     plan = Plan.of(scenario)
+    stage("simulating")
     if to is None:
         import xarray  # heavy
 
         memory = MemoryParts()
         simulate(plan, memory, progress)
+        stage("writing")
         made = outline(plan)
         return xarray.Dataset(in_memory(made, memory), attrs=made.attributes)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
@@ -82,6 +86,7 @@ def run(
     with held(target, identity(attributes(plan)), resume, replace, lambda path: identity(attributes_of(path))) as parts:
         if parts is not None:
             simulate(plan, parts, progress)
+            stage("writing")
             parts.publish(target, functools.partial(write, outline(plan), parts))
     return target
 
@@ -170,11 +175,11 @@ def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
     return {MAP[0]: maps, DISC_ENERGIES[0][0]: own, DISC_ENERGIES[1][0]: cross}
 
 
-def write_log(target: Path, began: float, arguments: list[str]) -> None:
-    """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments."""
+def write_log(target: Path, began: float, arguments: list[str], stages: dict[str, float]) -> None:
+    """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments, seconds of each stage."""
     when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
     machine = {"host": platform.node(), "platform": platform.platform(), "arguments": arguments}
-    entry = {"began": when, "seconds": round(time.time() - began, 2), **machine}
+    entry = {"began": when, "seconds": round(time.time() - began, 2), "stages": stages, **machine}
     with explained(target.parent), open(f"{target}.log", "a", encoding="utf-8") as log:
         log.write(json.dumps(entry) + "\n")
 

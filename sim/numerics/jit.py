@@ -20,10 +20,11 @@ from typing import Any
 
 import numba
 import numpy as np
+from llvmlite.binding import add_symbol
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
-from numba.core.runtime import rtsys
+from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 from numba.core.serialize import dumps
 from numba.np.ufunc import _internal  # type: ignore[attr-defined]
 from numba.np.ufunc.ufuncbuilder import UFuncDispatcher
@@ -41,15 +42,38 @@ _BLOCK = 4096
 
 
 @functools.cache
+def sources() -> dict[str, bytes]:
+    """Texts of the modules that import this one, by their names in the package."""
+    package = Path(__file__).parents[1]
+    texts = {path.relative_to(package).with_suffix(""): path.read_bytes() for path in sorted(package.rglob("*.py"))}
+    return {".".join((package.name, *path.parts)): t for path, t in texts.items() if b"sim.numerics.jit" in t}
+
+
+@functools.cache
 def _cache_folder() -> str:
     """Folder of compiled code, named by a hash of versions and of all sources that import this module."""
-    package = Path(__file__).parents[1]
     digest = hashlib.sha256(f"{sys.version} {numba.__version__} {np.__version__}".encode())
-    for source in sorted(package.rglob("*.py")):
-        text = source.read_bytes()
-        if b"sim.numerics.jit" in text or source.name == "jit.py":
-            digest.update(text)
+    for text in (Path(__file__).read_bytes(), *sources().values()):
+        digest.update(text)
     return str(kept.folder() / digest.hexdigest()[:16])
+
+
+def _path(name: str) -> Path:
+    """File of a kernel or law in the cache, which also names the machine that the code is for."""
+    machine = repr(cpu_target.target_context.codegen().magic_tuple()).encode()
+    return Path(_cache_folder(), f"{name}.{hashlib.sha256(machine).hexdigest()[:8]}")
+
+
+def cached(name: str) -> bool:
+    """Whether the cache holds the code of a kernel or law."""
+    return kept.read(_path(name)) is not None
+
+
+@functools.cache
+def _add_symbols() -> None:
+    """Give the linker what cached code calls of numba's memory: the part of its set-up that needs no compiler."""
+    for name, address in _nrt_python.c_helpers.items():
+        add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: Callable[..., Callable]) -> Callable:
@@ -59,13 +83,12 @@ def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: C
     exception leads to compilation, where a fault of the function itself shows again.
     """
     with global_compiler_lock:
-        rtsys.initialize(cpu_target.target_context)
-        machine = hashlib.sha256(repr(cpu_target.target_context.codegen().magic_tuple()).encode()).hexdigest()
-        path = Path(_cache_folder(), f"{_name(function)}.{machine[:8]}")
+        _add_symbols()
+        path = _path(_name(function))
         with contextlib.suppress(Exception):
             return load(*pickle.loads(kept.read(path) or b""))
-        for tell in on_compiling:
-            tell(_name(function))
+        for notice in on_compiling:
+            notice(_name(function))
         made, code = make()
         with contextlib.suppress(Exception):
             kept.store(path, dumps(code()))

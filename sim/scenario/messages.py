@@ -28,7 +28,7 @@ _BUILT_IN = frozenset(get_args(core_schema.ErrorType)) - {"value_error"}
 _FILES = ("bad_table", "no_table", "file_unreadable", "file_not_text")
 _EXCLUSIVE = ("control", "one_modulus")
 #: What a value must be, by the beginning of the kind of its error.
-_KINDS = {"bool": "true or false, without quotes", "string": "text in quotes", "tuple": 'a list such as ["1 s", "2 s"]'}
+_KINDS = {"bool": "true or false, without quotes", "string": "text in quotes", "tuple": "a list in brackets"}
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -186,6 +186,8 @@ def _value_fault(error: ErrorDetails) -> str:
     kind = error["type"]
     if kind == "string_too_long":
         return f"is longer than {error['ctx']['max_length']} characters; shorten it"
+    if kind == "tuple_type" and isinstance(error["input"], str):
+        return f"must be a list such as [{shown(error['input'])}], not text"
     if kind in _BUILT_IN and kind.partition("_")[0] in _KINDS:
         return f"must be {_KINDS[kind.partition('_')[0]]}, not {shown(error['input'])}"
     if kind in _BUILT_IN:

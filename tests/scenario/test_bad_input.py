@@ -316,13 +316,17 @@ def test_lists_and_choices_of_the_record_are_checked(refusal):
     for line, (key, words) in enumerate(
         (
             ("per_member", "true or false"),
-            ("maps", 'a list such as ["1 s", "2 s"]'),
+            ("maps", 'a list such as ["1 s"]'),
             ("precision", '"float64" or "float32"'),
             ("map_members", "at least 1"),
         ),
         start=END + 2,
     ):
         assert told(found[line - END - 2], line, f"record.{key}", words)
+    (problem,) = refusal(text=LENS + '[record]\nquantities = "speed"\n')
+    assert told(problem, END + 2, "record.quantities", 'a list such as ["speed"]')
+    (problem,) = refusal(text=LENS + "[record]\nmaps = 1.0\n")
+    assert told(problem, END + 2, "record.maps", "a list")
     (problem,) = refusal(text=LENS + '[record]\nmaps = ["1 s", "2 kg"]\n')
     assert told(problem, END + 2, "record.maps", 'value 2: ...unit "kg"')
     (problem,) = refusal(text=LENS + '[record]\nquantities = ["speed", "contact_aria"]\n')

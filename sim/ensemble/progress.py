@@ -1,0 +1,80 @@
+"""Progress of a run: its stages, what is done of it, and the first compilation of kernels."""
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import click
+
+#: Seconds between two lines of progress, where no bar is shown.
+_PAUSE = 30.0
+
+
+class Shown(NamedTuple):
+    """What shows progress: ``advance`` takes what was done since its last call, ``begin`` the name of a stage."""
+
+    advance: Callable[[int], None] = lambda done: None
+    begin: Callable[[str], None] = lambda stage: None
+
+
+class Stages:
+    """Stages of a run one after the other, and the ``seconds`` that each took."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.shown = Shown()
+        self._stage, self._since = "loading", time.monotonic()
+
+    def begin(self, stage: str) -> None:
+        """End the present stage and begin another."""
+        now = time.monotonic()
+        self.seconds[self._stage] = round(now - self._since, 2)
+        self._stage, self._since = stage, now
+        self.shown.begin(stage)
+
+    def ended(self) -> dict[str, float]:
+        """End the present stage; seconds of all."""
+        self.begin("")
+        return self.seconds
+
+
+@contextlib.contextmanager
+def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
+    """A context that shows progress: as a bar on a terminal, else by a line every half minute."""
+    if sys.stderr.isatty() and sys.stdout.isatty():
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        shown = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f}%"))
+        with Progress(*shown, TimeRemainingColumn(), transient=True) as progress:
+            task = progress.add_task(what, total=total)
+            yield Shown(lambda done: progress.advance(task, done), lambda name: progress.update(task, description=name))
+        return
+    so_far, began = 0, time.monotonic()
+    said = began
+
+    def advance(done: int) -> None:
+        nonlocal so_far, said
+        so_far += done
+        if time.monotonic() - said > _PAUSE:
+            said = time.monotonic()
+            click.echo(f"{100 * so_far / total:.0f} % of {total:,} {what}", err=True)
+
+    def begin(stage: str) -> None:
+        if stage and time.monotonic() - began > _PAUSE:  # shorter runs need no lines
+            click.echo(stage, err=True)
+
+    yield Shown(advance, begin)
+
+
+def announce_compiling(quiet: bool = False) -> None:
+    """Let the first kernel that is not in the cache be announced, since its compilation takes seconds."""
+    from sim.numerics import jit
+
+    def announce(name: str) -> None:
+        jit.on_compiling.clear()
+        if not quiet:
+            click.echo("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all", err=True)
+
+    jit.on_compiling[:] = [announce]
