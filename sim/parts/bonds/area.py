@@ -5,13 +5,13 @@ By default a population is that of the present area, whatever its history: a clo
 the area rises; where it shrinks, bonds leave with their area and the share stays.
 """
 
-from typing import Annotated, ClassVar, Literal, Protocol, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Field
 
 from sim.numerics.noise import Noise
-from sim.parts.exchange import Array, Bonding, Motion, Motions, Own, Setting
+from sim.parts.exchange import Array, Setting
 
 Area = Annotated[
     Literal["present", "carried"], Field(description='"carried": area that the contact gains comes without bonds')
@@ -32,25 +32,6 @@ def share_kept(seen: Array, radius: Array) -> Array:
     """
     grown = radius > seen
     return np.where(grown, np.square(np.divide(seen, radius, out=np.ones(grown.shape), where=grown)), 1.0)
-
-
-class _ByStep(Protocol[Own]):
-    """A model that advances one step after the other."""
-
-    def step(self, state: Own, motion: Motion, radius: Array, noise: Noise) -> Own:
-        """Population after a step over a contact that had this ``radius`` [m] at its start, nan where it was open."""
-
-    def bonding(self, state: Own) -> Bonding:
-        """Everything that others read of a population."""
-
-
-def by_step(model: _ByStep[Own], state: Own, motions: Motions, radius: Array, noise: Noise) -> tuple[Own, Bonding]:
-    """Population after a block of steps that are made one after the other, and what others read at the end of each."""
-    found = []
-    for motion in motions.each():
-        state = model.step(state, motion, radius, noise)
-        found.append(model.bonding(state))
-    return state, Bonding(*map(np.array, zip(*found, strict=True)))
 
 
 class Common:

@@ -7,7 +7,7 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohort_merging import settle
-from sim.parts.bonds.rupture import LAW, fresh_integral, growth, hazard_integral, hazard_time, law_of, rate_at
+from sim.parts.bonds.rupture import fresh_integral, growth, hazard_integral, hazard_time, law_of, rate_at
 
 
 class Rules(NamedTuple):
@@ -204,35 +204,57 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
     return count, travelled, settled
 
 
+@device
+def _read(pool, weight, stretch, width, share):
+    """Read a ``share`` of each cohort of a row into a pool, empty places left out; their number."""
+    count = 0
+    for i in range(weight.size):
+        if weight[i] * share > 0.0:
+            pool[0, count], pool[1, count] = weight[i] * share, stretch[i]
+            pool[2, count] = width[i] if width.size > 1 else 0.0
+            count += 1
+    return count
+
+
 @kernel(
-    "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:], float64, float64[::1],"
-    " float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])"
+    "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:], float64[:,:], float64[:],"
+    " float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1])"
 )
 def step_rows(
-    weight, stretch, width, lattice, slip, duration, numbers, new_weight, new_stretch, new_width, new_lattice
+    weight,
+    stretch,
+    width,
+    lattice,
+    share,
+    slip,
+    duration,
+    numbers,
+    new_weight,
+    new_stretch,
+    new_width,
+    new_lattice,
+    sums,
 ):
-    """Advance all rows, each by itself."""
+    """Advance all rows by all steps, each row by itself from a ``share`` of its bonds; its sums after each step."""
     rules = _rules(numbers)
     rows, capacity = new_weight.shape
-    wide = new_width.shape[1] == capacity
     pool = np.empty((8, capacity + 520))
     for m in range(rows):
-        old = m if weight.shape[0] > 1 else 0
-        count = 0
-        for i in range(capacity):
-            if weight[old, i] > 0.0:
-                pool[0, count], pool[1, count] = weight[old, i], stretch[old, i]
-                pool[2, count] = width[old, i] if wide else 0.0
-                count += 1
-        moved = slip[m] if slip.shape[0] > 1 else slip[0]
-        count, travelled, settled = _step_row(pool, count, lattice[old, 0], lattice[old, 1], moved, duration, rules)
-        if count > capacity:
-            direction = -1.0 if moved < 0.0 else 1.0
-            count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
-            settled = count
-        if rules.cell < math.inf:
-            travelled = travelled % (1048576.0 * rules.cell)
-        _write(pool, count, new_weight[m], new_stretch[m], new_width[m])
+        old = m % len(weight)
+        count = _read(pool, weight[old], stretch[old], width[old], share[m % share.size])
+        travelled, settled = lattice[old, 0], lattice[old, 1]
+        for k in range(duration.size):
+            moved = slip[k, m % slip.shape[1]]
+            count, travelled, settled = _step_row(pool, count, travelled, settled, moved, duration[k], rules)
+            if count > capacity:
+                direction = -1.0 if moved < 0.0 else 1.0
+                count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
+                settled = count
+            if rules.cell < math.inf:
+                travelled = travelled % (1048576.0 * rules.cell)
+            _write(pool, count, new_weight[m], new_stretch[m], new_width[m])
+            _sum(new_weight[m], new_stretch[m], new_width[m], rules, sums[:, k, m])
+            count = _read(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
         new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
 
 
@@ -245,19 +267,31 @@ def _write(pool, count, weight, stretch, width):
         width[:count], width[count:] = pool[2, :count], 0.0
 
 
-@kernel(f"void(float64[:,::1], float64[:,::1], float64[:,::1], {LAW}, float64[:,::1])")
-def sum_rows(weight, stretch, width, law, sums):
-    """∑ w, ∑ w x, ∑ w (x² + width²/12) and ∑ w x k(\\|x\\|) over the cohorts of each row, shape (4, rows)."""
+@device
+def _sum(weight, stretch, width, rules, sums):
+    """Sums over the cohorts of a row: as of ``cohorts.moments``."""
+    sums[:] = 0.0
+    limit, cell = rules.limit, rules.cell
+    for i in range(weight.size):
+        w, x, d = weight[i], stretch[i], (width[i] if width.size > 1 else 0.0)
+        if not w > 0.0:
+            continue
+        sums[0] += w
+        sums[1] += w * x
+        sums[2] += w * (x * x + d * d / 12.0)
+        if d > 0.0 and limit < math.inf:
+            size, half = math.fabs(x), 0.5 * d
+            outermost = min(size + half, limit) - max(size - half, limit - cell)
+            sums[3] += limit / cell * w * (max(outermost, 0.0) / d)
+        sums[4] += w * x * rate_at(x, rules.law)
+
+
+@kernel("void(float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])")
+def sum_rows(weight, stretch, width, numbers, sums):
+    """Sums over the cohorts of each row, shape (5, rows)."""
+    rules = _rules(numbers)
     for m in range(len(weight)):
-        bound, first, second, lost = 0.0, 0.0, 0.0, 0.0
-        for i in range(weight.shape[1]):
-            w, x, d = weight[m, i], stretch[m, i], (width[m, i] if width.shape[1] > 1 else 0.0)
-            if w > 0.0:
-                bound += w
-                first += w * x
-                second += w * (x * x + d * d / 12.0)
-                lost += w * x * rate_at(x, law)
-        sums[0, m], sums[1, m], sums[2, m], sums[3, m] = bound, first, second, lost
+        _sum(weight[m], stretch[m], width[m], rules, sums[:, m])
 
 
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")

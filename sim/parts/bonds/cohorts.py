@@ -16,6 +16,9 @@ from sim.parts.bonds.cohort_step import settle_steady, step_rows, sum_rows
 from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.exchange import Array
 
+#: Share of the bonds that stay where none are lost.
+_ALL = np.ones(1)
+
 
 class Cohorts(NamedTuple):
     """State of bond populations, one in each row.
@@ -90,22 +93,23 @@ def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance:
 def advance(
     cohorts: Cohorts,
     slip: Array,
-    duration: float,
+    duration: Array,
     rupture: RuptureRate,
     rebinding_rate: float,
     tolerance: float,
     largest: float = math.inf,
-) -> Cohorts:
-    """The populations after a step of constant speed.
+    share: Array = _ALL,
+) -> tuple[Cohorts, Array]:
+    """The populations after steps of constant speed each.
 
     Parameters
     ----------
     cohorts : Cohorts
         Of one row or of as many as slips; one row and many slips give many rows.
-    slip : array, shape (1,) or (rows,)
-        Slip of each row in this step [m], of any sign.
-    duration : float
-        Length of the step [s]; the speed in it is slip/duration.
+    slip : array, shape (steps, 1) or (steps, rows)
+        Slip of each row in each step [m], of any sign.
+    duration : array, shape (steps,)
+        Length of each step [s]; the speed in it is slip/duration.
     rupture : RuptureRate
         Rupture rate; the same one in all calls, as is the tolerance.
     rebinding_rate : float
@@ -113,12 +117,16 @@ def advance(
     tolerance : float
         Relative error allowed in the number of bonds.
     largest : float
-        Bound on the steps that a row makes by itself within the duration [s].
+        Bound on the steps that a row makes by itself within a duration [s].
+    share : array, shape (1,) or (rows,)
+        Share of each row's bonds that is left before the first step [1]; the other sites are free.
 
     Returns
     -------
-    Cohorts
-        A row depends, bit for bit, on its own state and slip alone.
+    cohorts : Cohorts
+        Those at the end. A row depends, bit for bit, on its own state and slips alone.
+    sums : array, shape (5, steps, rows)
+        Their ``moments`` after each step.
 
     Notes
     -----
@@ -128,22 +136,16 @@ def advance(
     What it gives as births are two new cohorts, so bonds and free sites add up to one. A step that nothing
     outlives ends in the steady state.
     """
-    slip = np.atleast_1d(np.asarray(slip, dtype=float))
-    rows = max(len(slip), len(cohorts.weight))
-    if {len(slip), len(cohorts.weight)} - {1, rows}:
+    lengths = {slip.shape[1], len(cohorts.weight), len(share)}
+    rows = max(lengths)
+    if lengths - {1, rows}:
         raise ValueError(
-            f"{len(slip)} slips do not fit {len(cohorts.weight)} populations: give one of either, or as many"
+            f"{slip.shape[1]} slips do not fit {len(cohorts.weight)} populations: give one of either, or as many"
         )
     before = cohorts.weight, cohorts.stretch, cohorts.width, cohorts.lattice
-    after = [np.empty((rows, array.shape[1])) for array in before]
-    after[2][:, :1] = 0.0
-    step_rows(*before, slip, float(duration), _numbers(rupture, rebinding_rate, tolerance, largest), *after)
-    return Cohorts(*after)
-
-
-def diluted(cohorts: Cohorts, share: Array) -> Cohorts:
-    """The populations with only a share of their bonds left, of shape (1,) or (rows,); the other sites are free."""
-    return cohorts._replace(weight=cohorts.weight * np.asarray(share)[:, np.newaxis])
+    after, sums = [np.zeros((rows, array.shape[1])) for array in before], np.empty((5, len(duration), rows))
+    step_rows(*before, share, slip, duration, _numbers(rupture, rebinding_rate, tolerance, largest), *after, sums)
+    return Cohorts(*after), sums
 
 
 def bound(cohorts: Cohorts) -> Array:
@@ -151,29 +153,17 @@ def bound(cohorts: Cohorts) -> Array:
     return np.sum(cohorts.weight, axis=1)
 
 
-def moments(cohorts: Cohorts, rupture: RuptureRate) -> Array:
-    """Sums over the cohorts per site, shape (4, rows).
+def moments(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
+    """Sums over the cohorts per site, shape (5, rows).
 
     Share of the sites bound [1]; stretch [m], the sum of w x; square stretch [m^2], that within the width of a cohort
-    included; stretch that thermal rupture takes in unit time [m/s], the sum of w x k(|x|).
+    included; density of the stretch at the rupture's limit times that limit [1], ℓ ρ(ℓ), 0 without a limit; stretch
+    that thermal rupture takes in unit time [m/s], the sum of w x k(|x|). The density is the mean over the outermost of
+    the cells that are merged, which is what the tolerance resolves.
     """
-    found = np.empty((4, len(cohorts.weight)))
-    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, tuple(rupture), found)
+    found = np.empty((5, len(cohorts.weight)))
+    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, _numbers(rupture, 0.0, tolerance, math.inf), found)
     return found
-
-
-def at_limit(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
-    """Density of the stretch at the rupture's limit times that limit, ℓ ρ(ℓ) [1], shape (rows,); 0 without a limit.
-
-    The mean over the outermost of the cells that are merged, which is what the tolerance resolves.
-    """
-    if rupture.limit == math.inf:
-        return np.zeros(1)
-    inner, half = rupture.limit - _cell(rupture, tolerance), 0.5 * cohorts.width
-    size = np.abs(cohorts.stretch)
-    inside = np.minimum(size + half, rupture.limit) - np.maximum(size - half, inner)
-    share = np.divide(np.maximum(inside, 0.0), cohorts.width, out=np.zeros(size.shape), where=cohorts.width > 0.0)
-    return rupture.limit / (rupture.limit - inner) * np.sum(cohorts.weight * share, axis=1)
 
 
 def _check(rupture: RuptureRate, tolerance: float) -> None:

@@ -87,14 +87,24 @@ def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding
     >>> print(f"{max(force):.2f} {force[-1]:.2f} {steady(100.0, bell, 10.0)[1][0]:.2f}")
     2.40 0.86 0.86
     """
+    bound, moment, slip, path = (np.array(value, dtype=float, ndmin=1) for value in (bound, moment, slip, path))
+    bound, moment = follow(bound, moment, slip[None], path[None], np.full(1, float(duration)), rupture, rebinding_rate)
+    return bound[0], moment[0]
+
+
+def follow(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
+    """Population after each of many steps, as of ``advance``: N and M, shape (steps, 1) or (steps, rows).
+
+    ``slip`` and ``path`` have that shape or (steps, 1), ``duration`` has the shape (steps,).
+    """
     _check(rupture)
-    given = [np.array(value, dtype=float, ndmin=1) for value in (bound, moment, slip, path)]
-    rows = max([array.size for array in given])
-    if any(array.size not in (1, rows) for array in given):
+    lengths = {bound.size, moment.size, slip.shape[1], path.shape[1]}
+    rows = max(lengths)
+    if lengths - {1, rows}:
         raise ValueError("bound, moment, slip and path need one entry, or one for every row")
-    bound, moment = np.empty(rows), np.empty(rows)
-    _advance(*given, duration, *rupture[:3], rebinding_rate, bound, moment)
-    return bound, moment
+    after = np.empty((2, len(duration), rows))
+    _advance(bound, moment, slip, path, duration, *rupture[:3], rebinding_rate, *after)
+    return after[0], after[1]
 
 
 def resting(rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
@@ -348,22 +358,24 @@ def _bell(bound, moment, speed, rate, binding, work):
 
 
 @device
-def _at(i, array):
+def _at(i, size):
     """Index of row i in an array of one entry or of all rows."""
-    return min(i, array.size - 1)
+    return min(i, size - 1)
 
 
-@kernel("void(f8[::1], f8[::1], f8[::1], f8[::1], f8, f8, f8, f8, f8, f8[::1], f8[::1])")
+@kernel("void(f8[::1], f8[::1], f8[:,:], f8[:,:], f8[:], f8, f8, f8, f8, f8[:,::1], f8[:,::1])")
 def _advance(bound, moment, slip, path, duration, rate, softness, limit, rebinding, bound_after, moment_after):
-    """A step of every row, each by itself."""
+    """All steps of every row, each by itself."""
     work = np.empty((8, 2))
-    breaking, binding = rate * duration, rebinding * duration
-    for i in range(bound_after.size):
-        share, stretch, way = bound[_at(i, bound)], moment[_at(i, moment)], slip[_at(i, slip)]
-        stiff = softness * math.fabs(stretch) <= _SMALL * share and softness * math.fabs(way) <= _SMALL * breaking
-        if stiff or softness == 0.0 or breaking == 0.0:
-            k, travel = _slow(softness * way, breaking), path[_at(i, path)] / limit
-            bound_after[i], moment_after[i] = _linear(share, stretch, way, binding, k, travel)
-        else:
-            after, rest = _bell(share, softness * stretch, softness * way, breaking, binding, work)
-            bound_after[i], moment_after[i] = after, rest / softness
+    for i in range(bound_after.shape[1]):
+        share, stretch = bound[_at(i, bound.size)], moment[_at(i, moment.size)]
+        for k in range(duration.size):
+            way, breaking, binding = slip[k, _at(i, slip.shape[1])], rate * duration[k], rebinding * duration[k]
+            stiff = softness * math.fabs(stretch) <= _SMALL * share and softness * math.fabs(way) <= _SMALL * breaking
+            if stiff or softness == 0.0 or breaking == 0.0:
+                gone, travel = _slow(softness * way, breaking), path[k, _at(i, path.shape[1])] / limit
+                share, stretch = _linear(share, stretch, way, binding, gone, travel)
+            else:
+                share, rest = _bell(share, softness * stretch, softness * way, breaking, binding, work)
+                stretch = rest / softness
+            bound_after[k, i], moment_after[k, i] = share, stretch

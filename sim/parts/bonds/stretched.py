@@ -17,7 +17,7 @@ import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.first_moment as first_moment
 import sim.parts.bonds.tracked as tracks
 from sim.numerics.noise import Noise
-from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea, by_step
+from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import Tracks
@@ -38,7 +38,6 @@ class _Stretched(Common):
 
     stretched: ClassVar[bool] = True
     knows_forces: ClassVar[bool] = True
-    step_seconds: ClassVar[float] = 80e-6
     carries_stress: ClassVar[bool] = True
 
     rupture: Rupture
@@ -118,12 +117,13 @@ class FirstMoment(OverArea, _Separable):
         return Stretches(rows * bound, rows * stretch)
 
     def advance(self, state: Stretches, motions: Motions, radius: Array, noise: Noise) -> tuple[Stretches, Bonding]:
-        return by_step(self, state, motions, radius, noise)
-
-    def step(self, state: Stretches, motion: Motion, radius: Array, noise: Noise) -> Stretches:
         share, seen = self.kept(state.seen, radius)
-        slid, rates = (motion.slip, motion.path, motion.duration), (self.law, self.rebinding_rate)
-        return Stretches(*first_moment.advance(state.bound * share, state.stretch * share, *slid, *rates), seen)
+        before, slid = (
+            (state.bound * share, state.stretch * share),
+            (motions.slip, motions.path, motions.duration[:, 0]),
+        )
+        bound, stretch = first_moment.follow(*before, *slid, self.law, self.rebinding_rate)
+        return Stretches(bound[-1], stretch[-1], seen), self.bonding(Stretches(bound, stretch))
 
     def remarks(self, setting: Setting) -> list[str]:
         excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)
@@ -163,6 +163,7 @@ class Cohort(OverArea, _Stretched):
     model: Literal["cohort"] = "cohort"
 
     state_class: ClassVar[type[Ages]] = Ages
+    step_seconds: ClassVar[float] = 10e-6
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
         recipe = self.law, self.rebinding_rate
@@ -176,18 +177,13 @@ class Cohort(OverArea, _Stretched):
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
     def advance(self, state: Ages, motions: Motions, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
-        return by_step(self, state, motions, radius, noise)
-
-    def step(self, state: Ages, motion: Motion, radius: Array, noise: Noise) -> Ages:
         share, seen = self.kept(state.seen, radius)
-        before = cohorts.diluted(state.cohorts, share) if self.area == "carried" else state.cohorts
-        recipe = self.law, self.rebinding_rate, self.tolerance
-        return Ages(cohorts.advance(before, motion.slip, motion.duration, *recipe), seen)
+        recipe, duration = (self.law, self.rebinding_rate, self.tolerance), motions.duration[:, 0]
+        after, sums = cohorts.advance(state.cohorts, motions.slip, duration, *recipe, share=share)
+        return Ages(after, seen), self._bonding(*sums)
 
     def bonding(self, state: Ages) -> Bonding:
-        breaking = cohorts.at_limit(state.cohorts, self.law, self.tolerance)
-        bound, stretch, square, lost = cohorts.moments(state.cohorts, self.law)
-        return self._bonding(bound, stretch, square, breaking, lost)
+        return self._bonding(*cohorts.moments(state.cohorts, self.law, self.tolerance))
 
     def steady(self, speed: Array) -> Bonding:
         rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.numerics.noise import Noise
+from sim.numerics.jit import kernel
+from sim.numerics.noise import Noise, normal, stream
 from sim.parts.exchange import Array, Bonding, Motion, Motions
 from sim.parts.shear.modal import ModalProcess, renew_modes
-from sim.parts.shear.process import Fluctuation, SmoothProcess, by_step
+from sim.parts.shear.process import Fluctuation, SmoothProcess
 
 
 @dataclass(frozen=True)
@@ -32,40 +33,58 @@ class SiteModes(ModalProcess):
     """
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        parts = np.zeros((len(noise.members), 4, self.pairs))
-        for row in (0, 2):
-            self._renew_rows(parts, row, np.zeros((1, 1)), np.ones((1, 1)), motion.step, noise)
-        return self._sized(parts, bonding)
+        parts, sizes = np.zeros((len(noise.members), 4, self.pairs)), _sizes(bonding)
+        whole, energy = (np.zeros((1, 1)), np.ones((1, 1))), np.empty((1, len(parts)))
+        renew_modes(parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), 0, energy)
+        _renew_sites(parts, *whole, sizes, self.weights, *noise.at(motion.step), energy)
+        return Fluctuation(energy[0], sizes[:, 0].T, parts)
 
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
-        return by_step(self, state, motions, bonding, noise)
-
-    def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        parts = state.values.copy()
-        keep, renew = self._shares(motion)
-        self._renew_rows(parts, 2, keep[np.newaxis], renew[np.newaxis], motion.step, noise)
-        return self._sized(parts, bonding)
-
-    def _renew_rows(self, parts: Array, row: int, keep: Array, renew: Array, step: int, noise: Noise) -> None:
-        """Renew a share of Z (``row`` 0) or Y (2) in place."""
-        energy = np.empty((1, len(parts)))
-        renew_modes(parts, keep, renew, np.ones((1, 1)), self.weights, *noise.at(step), row, energy)
-
-    def _sized(self, parts: Array, bonding: Bonding) -> Fluctuation:
-        """The state of these parts; ``amplitude`` holds the sizes of both, shape (2, 1) or (2, members)."""
-        sizes = np.sqrt(np.stack([bonding.frozen, bonding.varying]))
-        sizes[0] *= np.where(bonding.stress < 0.0, -1.0, 1.0)
-        field = _combined(parts, sizes)
-        energy = np.sum(self.weights * np.sum(np.square(field), axis=1), axis=1)
-        return Fluctuation(energy, sizes.T, parts)
+        parts, sizes = state.values.copy(), _sizes(bonding)
+        energy = np.empty((len(motions.time), len(parts)))
+        _renew_sites(parts, *self._shares(motions), sizes, self.weights, *noise.at(motions.step), energy)
+        return Fluctuation(energy[-1], sizes[:, -1].T, parts), energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
         return _combined(state.values, state.amplitude.T), np.array([0.5])
+
+
+def _sizes(bonding: Bonding) -> Array:
+    """Sizes of both parts, shape (2, steps, 1) or (2, steps, members), of one step where they stay."""
+    sizes = np.sqrt(np.stack([np.atleast_2d(bonding.frozen), np.atleast_2d(bonding.varying)]))
+    sizes[0] *= np.where(bonding.stress < 0.0, -1.0, 1.0)
+    return sizes
 
 
 def _combined(parts: Array, sizes: Array) -> Array:
     """The field of both parts at their sizes (2, members), shape (members, 2, pairs)."""
     frozen, varying = sizes[:, :, np.newaxis, np.newaxis]
     return frozen * parts[:, :2] + varying * parts[:, 2:]
+
+
+@kernel(
+    "void(float64[:,:,::1], float64[:,:], float64[:,:], float64[:,:,:], float64[::1],"
+    " uint64, uint64, uint64[::1], int64, float64[:,::1])"
+)
+def _renew_sites(parts, keep, renew, sizes, weights, seed, part, members, step, energy):
+    """Ornstein-Uhlenbeck steps of Y of all modes of all members in place, and the energy of the field after each.
+
+    Z stands in the first two rows of a member, Y in the others, whose first is the lane of its numbers.
+    """
+    many = keep.shape[1] > 1
+    for m in range(members.size):
+        for s in range(len(keep)):
+            numbers, total = stream(seed, part, members[m], step + s, 2), 0.0
+            frozen, varying = sizes[:, s % sizes.shape[1], m % sizes.shape[2]]
+            for k in range(weights.size):
+                one, numbers = normal(numbers)
+                other, numbers = normal(numbers)
+                i = k if many else 0
+                parts[m, 2, k] = keep[s, i] * parts[m, 2, k] + renew[s, i] * one
+                parts[m, 3, k] = keep[s, i] * parts[m, 3, k] + renew[s, i] * other
+                x = frozen * parts[m, 0, k] + varying * parts[m, 2, k]
+                y = frozen * parts[m, 1, k] + varying * parts[m, 3, k]
+                total += weights[k] * (x * x + y * y)
+            energy[s, m] = total

@@ -13,7 +13,7 @@ from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modes import Modes
-from sim.parts.shear.process import Fluctuation, Renewing, by_step
+from sim.parts.shear.process import Fluctuation, Renewing
 
 
 @dataclass(frozen=True)
@@ -129,13 +129,10 @@ class FixedProcess(ModalProcess):
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
-        return by_step(self, state, motions, bonding, noise)
-
-    def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
-        turn = np.sqrt(2.0 * self.correlation.exponents(self.wavenumber, motion))
-        phases = state.values + turn * noise.normals(motion.step, len(self.wavenumber))
-        return Fluctuation(self._energy(amplitude), amplitude, phases)
+        amplitude, phases = self.amplitude.factor(motions.speed, bonding.strength), state.values.copy()
+        turn_phases(phases, self.correlation.exponents(self.wavenumber, motions), *noise.at(motions.step))
+        energy = self._energy(amplitude)
+        return Fluctuation(energy[-1], amplitude[-1], phases), energy
 
     def _energy(self, amplitude: Array) -> Array:
         return amplitude**2 * (2.0 * np.sum(self.weights))
@@ -176,6 +173,18 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, r
                 values[m, row, k], values[m, row + 1, k] = x, y
                 total += weights[k] * (x * x + y * y)
             energy[s, m] = total
+
+
+@kernel("void(float64[:,::1], float64[:,:], uint64, uint64, uint64[::1], int64)")
+def turn_phases(phases, exponents, seed, part, members, step):
+    """Diffusion of all phases of all members in place, by √(2∫λdt) of a normal number in each step."""
+    many = exponents.shape[1] > 1
+    for m in range(members.size):
+        for s in range(len(exponents)):
+            numbers = stream(seed, part, members[m], step + s, 0)
+            for k in range(phases.shape[1]):
+                turn, numbers = normal(numbers)
+                phases[m, k] += math.sqrt(2.0 * exponents[s, k if many else 0]) * turn
 
 
 @kernel(

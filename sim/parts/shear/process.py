@@ -5,7 +5,7 @@ A process is a model of ``parts.shear`` on a given solid and cell.
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -104,7 +104,7 @@ class Renewing:
         energy = self._scaled(amplitude, energy)
         return Fluctuation(energy[-1], amplitude[-1], values), energy
 
-    def _shares(self, motions: Motion | Motions) -> tuple[Array, Array]:
+    def _shares(self, motions: Motions) -> tuple[Array, Array]:
         """Shares of a number that a step keeps and renews, whose squares add up to one."""
         exponents = self.correlation.exponents(self.wavenumber, motions)
         keep, renew = np.empty_like(exponents), np.empty_like(exponents)
@@ -114,24 +114,6 @@ class Renewing:
     def _scaled(self, amplitude: Array, energy: Array) -> Array:
         """The energy of numbers, scaled at once unless the amplitude relaxes."""
         return energy if self.amplitude.relaxing else amplitude**2 * energy
-
-
-class _ByStep(Protocol):
-    """A process that advances one step after the other."""
-
-    def step(self, state: Fluctuation, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        """Fluctuations after one step, at the end of which the bonds are ``bonding``."""
-
-
-def by_step(
-    process: _ByStep, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
-) -> tuple[Fluctuation, Array]:
-    """Fluctuations after a block of steps that are made one after the other, and their energy at the end of each."""
-    energies = []
-    for k, motion in enumerate(motions.each()):
-        state = process.step(state, motion, bonding.at(k), noise)
-        energies.append(state.energy)
-    return state, np.array(energies)
 
 
 def renewed_size(law: Amplitude, state: Fluctuation, motions: Motions, amplitude: Array) -> Array:

@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 from scipy.special import lambertw
 
-from sim.parts.bonds.cohorts import advance, bound, diluted, empty, moments as sums, resting, steady
+from sim.parts.bonds import cohorts as populations
+from sim.parts.bonds.cohorts import bound, empty, resting, steady
 from sim.parts.bonds.rupture import RuptureRate
 
 BELL = RuptureRate(rate=1.0, softness=1.0, limit=math.inf)
@@ -33,7 +34,11 @@ TABLE = [
 
 
 def moments(cohorts):
-    return sums(cohorts, RuptureRate(0.0, 0.0, math.inf))[:3, 0]
+    return populations.moments(cohorts, RuptureRate(0.0, 0.0, math.inf), 1e-4)[:3, 0]
+
+
+def advance(cohorts, slip, duration, *recipe, **more):
+    return populations.advance(cohorts, slip[np.newaxis], np.array([duration]), *recipe, **more)[0]
 
 
 def march(cohorts, speeds, duration, rupture, rebinding, tolerance, **more):
@@ -274,8 +279,7 @@ def test_a_step_without_duration_only_stretches():
 
 
 def test_dilution_frees_sites_that_bind_anew():
-    half = diluted(resting(BELL, 1.0, 1e-4), np.array([0.5]))
-    out, _ = march(half, [0.0], 1.0, BELL, 1.0, 1e-4)
+    out, _ = march(resting(BELL, 1.0, 1e-4), [0.0], 1.0, BELL, 1.0, 1e-4, share=np.array([0.5]))
     assert_allclose(out[0, 0], 0.5 - 0.25 * math.exp(-2.0), rtol=1e-4, atol=0)
 
 
