@@ -44,8 +44,9 @@ LOWEST = .venv-lowest
 .verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs: .verify-%: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
 
+# `make bench` measures all rows of docs/speed.md, `make bench ROWS="modal disc"` those of some groups.
 bench: $(STAMP)
-	$(BIN)/python benchmarks/run.py
+	$(BIN)/python -m benchmarks.run $(ROWS)
 
 lines:
 	$(PYTHON) benchmarks/lines.py

@@ -1,25 +1,42 @@
-"""The programs that a user of numpy would write for the same work, clear and without waste."""
+"""The programs that a user of numpy and scipy would write for fields of shear stress, clear and without waste."""
 
 import numpy as np
 from scipy import fft
 
 
+def half_spectrum(points, cell):
+    """Wavenumber along y and magnitude of the wavevector [rad/m] of ``rfft2``, inf at zero."""
+    qx = 2 * np.pi * np.fft.fftfreq(points, cell / points)[:, np.newaxis]
+    qy = 2 * np.pi * np.fft.rfftfreq(points, cell / points)[np.newaxis, :]
+    q = np.hypot(qx, qy)
+    q[0, 0] = np.inf
+    return qy, q
+
+
+def energy_weights(points, cell, shear_modulus):
+    """Energy per area of the squared moduli of ``rfft2``: the Green's function by Parseval."""
+    qy, q = half_spectrum(points, cell)
+    columns = np.where((qy > 0) & (qy < qy.max()), 2.0, 1.0)
+    return 0.5 * columns * (1 + (qy / q) ** 2) / (2 * shear_modulus * q) / points**4
+
+
+def surface_energy(field, weights):
+    """Elastic energy per area of a periodic shear-stress map [J/m²]."""
+    modes = fft.rfft2(field)
+    return np.sum(weights * (modes.real**2 + modes.imag**2))
+
+
 class TextbookModes:
-    """An Ornstein-Uhlenbeck stress field on an n × n grid, as the textbooks give it.
+    """An Ornstein-Uhlenbeck stress field on an n × n grid, as the textbooks give it, and its energy.
 
     Hermitian noise of unit variance is the transform of real white noise; each mode keeps e^(−λdt)
-    and gains the rest; the energy is the Green's function times the spectrum by Parseval.
+    and gains the rest.
     """
 
     def __init__(self, points, cell, density, shear_modulus, seed):
         self.points, self.random = points, np.random.default_rng(seed)
-        qx = 2 * np.pi * np.fft.fftfreq(points, cell / points)[:, np.newaxis]
-        qy = 2 * np.pi * np.fft.rfftfreq(points, cell / points)[np.newaxis, :]
-        q = np.hypot(qx, qy)
-        q[0, 0] = np.inf
-        self.size = np.sqrt(density(q)) / cell * points  # of the transform of a field of this spectrum
-        columns = np.where((qy > 0) & (qy < qy.max()), 2.0, 1.0)
-        self.weight = 0.5 * columns * (1 + (qy / q) ** 2) / (2 * shear_modulus * q) / points**4
+        self.size = np.sqrt(density(half_spectrum(points, cell)[1])) / cell * points  # of the transform of a field
+        self.weights = energy_weights(points, cell, shear_modulus)
         self.modes = self.noise()
 
     def noise(self):
@@ -27,30 +44,15 @@ class TextbookModes:
 
     def step(self, exponent):
         self.modes = np.exp(-exponent) * self.modes + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
-        return np.sum(self.weight * (self.modes.real**2 + self.modes.imag**2))
+        return np.sum(self.weights * (self.modes.real**2 + self.modes.imag**2))
 
-
-class RealSpaceMap(TextbookModes):
-    """The same, but with the energy of the map in real space: half the mean of stress times displacement."""
-
-    def __init__(self, points, cell, density, shear_modulus, seed):
-        super().__init__(points, cell, density, shear_modulus, seed)
-        qx = 2 * np.pi * np.fft.fftfreq(points, cell / points)[:, np.newaxis]
-        qy = 2 * np.pi * np.fft.rfftfreq(points, cell / points)[np.newaxis, :]
-        q = np.hypot(qx, qy)
-        q[0, 0] = np.inf
-        self.compliance = (1 + (qy / q) ** 2) / (2 * shear_modulus * q)
-
-    def step(self, exponent):
+    def map(self, exponent):
         self.modes = np.exp(-exponent) * self.modes + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
-        shape = (self.points, self.points)
-        stress = fft.irfft2(self.modes, s=shape)
-        displacement = fft.irfft2(self.compliance * self.modes, s=shape)
-        return 0.5 * np.mean(stress * displacement)
+        return fft.irfft2(self.modes)
 
 
 class HalfSpectrumModes:
-    """The same process, drawing one complex number for each of the pairs ±q: no transform at all."""
+    """The same process, drawing one complex number for each pair ±q that has power: no transform, arrays reused."""
 
     def __init__(self, points, cell, density, shear_modulus, seed):
         self.random = np.random.default_rng(seed)
@@ -58,12 +60,38 @@ class HalfSpectrumModes:
         qx, qy = (q.ravel() for q in np.meshgrid(numbers, numbers, indexing="ij"))
         half = ((qy > 0) | ((qy == 0) & (qx > 0))) & (density(np.hypot(qx, qy)) > 0)
         q = np.hypot(qx[half], qy[half])
-        self.weight = (1 + (qy[half] / q) ** 2) / (2 * shear_modulus * q) * density(q) / cell**2
-        self.modes = self.noise()
-
-    def noise(self):
-        return self.random.standard_normal((self.weight.size, 2)).view(complex)[:, 0] * np.sqrt(0.5)
+        weights = (1 + (qy[half] / q) ** 2) / (2 * shear_modulus * q) * density(q) / cell**2
+        self.weights = 0.5 * np.repeat(weights, 2)  # of real and imaginary parts of unit variance
+        self.parts, self.noise = self.random.standard_normal((2, self.weights.size))
 
     def step(self, exponent):
-        self.modes = np.exp(-exponent) * self.modes + np.sqrt(-np.expm1(-2 * exponent)) * self.noise()
-        return np.sum(self.weight * (self.modes.real**2 + self.modes.imag**2))
+        self.random.standard_normal(out=self.noise)
+        self.noise *= np.sqrt(-np.expm1(-2 * exponent))
+        self.parts *= np.exp(-exponent)
+        self.parts += self.noise
+        np.multiply(self.parts, self.parts, out=self.noise)
+        self.noise *= self.weights
+        return np.sum(self.noise)
+
+
+class HalfSpectrumMap:
+    """An Ornstein-Uhlenbeck stress field whose map is made at each step, drawing the half spectrum: one transform.
+
+    ``irfft2`` averages what stands for q and −q in the columns where both stand: hence their factor √2.
+    """
+
+    def __init__(self, points, cell, density, seed):
+        self.points, self.random = points, np.random.default_rng(seed)
+        self.size = np.sqrt(0.5 * density(half_spectrum(points, cell)[1])) / cell * points**2
+        self.size[:, [0, -1]] *= np.sqrt(2)
+        self.noise = np.empty((points, points // 2 + 1, 2))
+        self.random.standard_normal(out=self.noise)
+        self.modes = self.size * self.noise.view(complex)[..., 0]
+
+    def map(self, exponent):
+        self.random.standard_normal(out=self.noise)
+        renewed = self.noise.view(complex)[..., 0]
+        renewed *= self.size * np.sqrt(-np.expm1(-2 * exponent))
+        self.modes *= np.exp(-exponent)
+        self.modes += renewed
+        return fft.irfft2(self.modes, s=(self.points, self.points))

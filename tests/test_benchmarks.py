@@ -1,12 +1,70 @@
-"""What the benchmarks compute: intervals of ratios, and lines of code."""
+"""What the benchmarks compute: rows and their page, intervals of ratios, and lines of code."""
 
+import json
 import math
 import random
+import re
 
 import pytest
 
+from benchmarks import growth, page, run, timing
 from benchmarks.compare import interval, slower
 from benchmarks.lines import code_lines
+
+RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize("group", run.GROUPS)
+def test_every_row_runs_and_is_kept(group):
+    rows = run.GROUPS[group](timing.Bench(quick=True))
+    assert [row.ours for row in rows] == [row["ours"] for row in RESULTS[group]["rows"]]
+    for row in rows:
+        assert all(map(math.isfinite, row.result)), row.ours
+        times = sum((row.curves or {}).values(), row.seconds or row.result)
+        assert all(0.0 < time < math.inf for time in times if not row.curves or time not in row.result), row.ours
+
+
+def test_the_page_of_speed_is_that_of_the_results():
+    found = run.PAGE.read_text(encoding="utf-8")
+    assert found == page.text(RESULTS), "run make bench"
+    assert list(RESULTS) == list(run.GROUPS)
+    assert len(re.findall(r"\| (?:yes|\*\*no\*\*) \|", found)) == sum(
+        row.met is not None for row in page.rows_of(RESULTS)
+    )
+
+
+def test_the_figure_of_growth_lacks_no_letter(tmp_path):
+    page.draw(RESULTS, tmp_path / "speed.png")  # a letter that the font lacks is a warning, hence an error
+    assert (tmp_path / "speed.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_row_says_in_words_which_program_is_slower_and_whether_it_meets_its_goal():
+    def cells(kind, goal, *result):
+        return page.cells(timing.Row("a", "b", kind, goal, list(result), [2e-3, 5e-6]))[2:]
+
+    assert cells("faster", 2.0, 3.0, 4.0, 1234.0) == (
+        "≥ 2 times faster", "4 times faster (3 to 1,230)", "yes", "2 ms; 5 µs", "",
+    )  # fmt: skip
+    assert cells("faster", 2.0, 0.25, 0.5, 0.8)[:3] == ("≥ 2 times faster", "2 times slower (1.25 to 4)", "**no**")
+    assert cells("as long", 1.1, 1.0, 1.2, 1.3)[:3] == ("≤ 1.1 times as long", "1.2 times as long (1 to 1.3)", "**no**")
+    assert cells("s", 5.0, 4.0, 4.0, 4.0)[:3] == ("≤ 5 s", "4 s", "yes")
+    assert cells("MB", None, 4.0, 4.0, 4.0)[:3] == ("", "4 MB", "")
+
+
+def test_the_exponents_of_growth_are_the_least_that_of_the_last_decade_and_the_largest():
+    sizes = [1, 10, 100, 1000]
+    assert growth.exponents(sizes, [1.0, 1.0, 10.0, 10.0**2.5]) == pytest.approx([0.0, 1.5, 1.5])
+    assert growth.exponents(sizes, [1.0, 100.0, 1000.0, 1000.0]) == pytest.approx([0.0, 0.0, 2.0])
+
+
+def test_a_ratio_is_that_of_a_turn_per_share_of_the_work():
+    clock = lambda program, times=1: program() * times  # noqa: E731
+    other = timing.Beside("other", lambda: 8.0, share=2.0)
+    faster, longer = timing.Bench().compare(
+        "ours", lambda: 2.0, other, other._replace(goal=0.5, bound=True), clock=clock
+    )
+    assert (faster.kind, faster.result, faster.seconds, faster.met) == ("faster", [2.0] * 3, [2.0, 4.0], None)
+    assert (longer.kind, longer.result, longer.goal, longer.met) == ("as long", [0.5] * 3, 0.5, True)
 
 
 def test_the_interval_of_twenty_ratios_reaches_from_the_sixth_to_the_fifteenth():

@@ -12,7 +12,8 @@ from benchmarks.lines import MOST, code_lines
 
 ROOT = Path(sim.__file__).parent
 #: What is no part of the package but of the tree, by the name under which its modules import each other.
-BESIDE = {path.stem: path for folder in ("benchmarks", "docs") for path in sorted((ROOT.parent / folder).glob("*.py"))}
+BESIDE = {path.stem: path for path in sorted((ROOT.parent / "docs").glob("*.py"))}
+BESIDE |= {f"benchmarks.{path.stem}": path for path in sorted((ROOT.parent / "benchmarks").glob("*.py"))}
 BESIDE |= {f"helpers.{path.stem}": path for path in sorted((ROOT.parent / "tests" / "helpers").glob("*.py"))}
 
 #: The folders and the two modules beside them, lowest first.

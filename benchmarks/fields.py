@@ -1,0 +1,152 @@
+"""Rows of the fluctuating shear stress: banded, modal, mapped, and the energy of a given field."""
+
+import itertools
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from scipy import fft
+
+import sim
+from benchmarks import plain
+from benchmarks.compare import LOAD, RAMP, RATE
+from benchmarks.scenes import field, followed, loaded, scene, shortest, steady
+from benchmarks.timing import Bench, Beside, Row
+from sim.engine import Dice, follow, start
+from sim.laws.halfspace import surface_energy
+from sim.numerics.noise import Noise
+from sim.parts.drive.prescribed import Steady
+from sim.parts.exchange import Bonding
+from sim.spectrum.families import SelfAffine
+
+CELL, SHEAR_MODULUS, EXPONENT = 0.24e-3, 1.6e6, 0.1
+TEXTBOOK, HALF = "numpy, noise by rfft2", "numpy, only pairs with power drawn"
+
+
+def known(points: int) -> tuple[int, float, Callable]:
+    """What the programs of numpy need: the grid, its cell, and the spectrum's density."""
+    spectrum = SelfAffine(rms=100e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=shortest(points))
+    return points, CELL, spectrum.radial_density
+
+
+def by_numpy(points: int, goal: float, errors: str = "") -> tuple[Beside, Beside]:
+    """A step of all modes of a grid by numpy, for one member: as the textbooks have it, and as lean as can be."""
+    textbook, half = (of(*known(points), SHEAR_MODULUS, 1) for of in (plain.TextbookModes, plain.HalfSpectrumModes))
+    return (
+        Beside(TEXTBOOK, lambda: textbook.step(EXPONENT), goal=goal, errors=errors),
+        Beside(HALF, lambda: half.step(EXPONENT), errors=errors),
+    )
+
+
+def banded(bench: Bench) -> list[Row]:
+    """ΔΓ(t) of a 512² cell from bands, through whole runs into a file, per member-step."""
+    points, rows = bench.of(512, 64), []
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "x.nc"
+        parts = RAMP, RATE, field("banded", points, "tolerance = 0.01"), LOAD
+        for name, members, steps, every, more, goal in (
+            ("1024 members × 10⁴ steps, 1001 records", 1024, 10_000, 10, "", 8000),
+            ("1024 members × 2000 steps, all recorded, uncompressed", 1024, 2000, 1, 'compression = "none"', 2500),
+            ("one member × 10⁵ steps, 1001 records", 1, 100_000, 100, "", 230),
+        ):
+            members, steps = bench.of((members, steps), (2, 2 * every))
+            text = scene(members, steps, every, *parts, f"[record]\n{more}\n")
+            one = loaded(text)
+            third = abs(one.process.known_errors()["banded_error_third_cumulant"])
+            rows += bench.compare(
+                f"banded at 1 %, 512²: run to netCDF, {name}",
+                lambda one=one: sim.run(one, to=file, replace=True),
+                *by_numpy(points, goal, f"third cumulant of ΔΓ {third:.1%}; none")[: 2 if every == 10 else 1],
+                share=members * steps,
+                turns=7,
+            )
+    return [*rows, *bands(bench)]
+
+
+def bands(bench: Bench) -> list[Row]:
+    """The bands alone, beside the random numbers that they need."""
+    members, steps = bench.of((64, 1000), (2, 5))
+    parts = RAMP, RATE, field("banded", bench.of(512, 64), "tolerance = 0.01"), LOAD
+    process, noise = loaded(scene(members, steps, 1, *parts)).process, Noise(1, "shear", np.arange(members))
+    first, motions = steady(EXPONENT * 5e-6 / 1e-3, 1e-3, steps, Steady)
+    still = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
+    began = process.start(first, still, noise)
+    shapes = np.tile(process.shapes, (steps * members, 1))
+    generator = np.random.Generator(np.random.SFC64(1))
+
+    def numbers() -> None:
+        generator.standard_normal(shapes.shape)
+        generator.standard_gamma(shapes)
+
+    return bench.compare(
+        "banded at 1 %, 512²: the steps alone",
+        lambda: process.advance(began, motions, still, noise),
+        Beside("numpy's normals and gammas alone", numbers, steps * members, goal=1.0),
+        share=steps * members,
+    )
+
+
+def modal(bench: Bench) -> list[Row]:
+    """A step of all modes of a grid, and ΔΓ and the radius of it."""
+    rows, steps = [], bench.of(50, 2)
+    for points in (256, 512):
+        size = bench.of(points, 32)
+        program = followed(scene(1, steps, 1, RAMP, RATE, field("modal", size), LOAD))
+        rows += bench.compare(f"modal, {points}²: a step of a run", program, *by_numpy(size, 6), share=steps)
+    return rows
+
+
+def mapped(bench: Bench) -> list[Row]:
+    """A step of a stress field and its map."""
+    rows = []
+    for points, goal in ((512, 2.0), (1024, 1.5)):
+        size = bench.of(points, 32)
+        one = loaded(scene(1, 1000, 1, RAMP, RATE, field("mapped", size), LOAD))
+        dice = Dice.of(1, np.arange(1))
+        states = [start(one, dice)]
+
+        def step(one=one, dice=dice, states=states) -> None:
+            before = states[0] if states[0].step < 1000 else start(one, dice)
+            states[0], _ = follow(one, dice, before, range(before.step + 1, before.step + 2))
+            one.process.maps(states[0].shear, states[0].drive.position, 1)
+
+        textbook = plain.TextbookModes(*known(size), SHEAR_MODULUS, 1)
+        half = plain.HalfSpectrumMap(*known(size), 1)
+        still = half.modes.copy()
+        rows += bench.compare(
+            f"mapped, {points}²: a step and its map",
+            step,
+            Beside(f"{TEXTBOOK}, scipy's irfft2", lambda of=textbook: of.map(EXPONENT), goal=goal),
+            Beside("numpy, half spectrum drawn, scipy's irfft2", lambda of=half: of.map(EXPONENT)),
+            Beside("scipy's irfft2 alone", lambda still=still: fft.irfft2(still), bound=True),
+        )
+    return rows
+
+
+def energy(bench: Bench) -> list[Row]:
+    """ΔΓ of a given field."""
+    rows, random = [], np.random.default_rng(1)
+    for points in (512, 1024):
+        size = bench.of(points, 32)
+        fields, weights = random.standard_normal((8, size, size)), plain.energy_weights(size, CELL, SHEAR_MODULUS)
+        turn = itertools.cycle(fields)
+        rows += bench.compare(
+            f"`surface_energy` of a field, {points}²",
+            lambda turn=turn: surface_energy(next(turn), CELL, SHEAR_MODULUS),
+            Beside("scipy's rfft2 alone", lambda turn=turn: fft.rfft2(next(turn)), goal=1.25, bound=True),
+            Beside("scipy's rfft2 and numpy", lambda turn=turn, w=weights: plain.surface_energy(next(turn), w)),
+        )
+        if points > 512:
+            break
+        rows += bench.compare(
+            f"`surface_energy` of 8 fields at once, {points}²",
+            lambda fields=fields: surface_energy(fields, CELL, SHEAR_MODULUS),
+            Beside(
+                "the fields one by one",
+                lambda fields=fields: [surface_energy(one, CELL, SHEAR_MODULUS) for one in fields],
+                goal=1.05,
+                bound=True,
+            ),
+        )
+    return rows

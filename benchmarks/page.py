@@ -1,0 +1,121 @@
+"""The page of the benchmarks, ``docs/speed.md``, and its figure, from the rows that are stored."""
+
+from pathlib import Path
+from typing import Any
+
+from benchmarks.timing import Row
+
+TITLE = """# Speed
+
+`make bench` measures every row below and writes this page and its figure; `make bench ROWS="modal contact"` measures
+only some groups of rows. The programs are in [benchmarks/](../benchmarks): ours beside the best simple one that a
+user of numpy and scipy would write for the same work, or beside a step that no program can do without.
+
+- **Times** are CPU times on one core. In each turn of a row all its programs run one after the other, and a ratio is
+  that of one turn. The result is the median over the turns, in brackets the ends of their middle half. Absolute times
+  differ between machines, and with what else they do; compare ratios.
+- **"10 times faster"**: the other program takes 10 times our time. **"1.1 times as long"**: ours takes 1.1 times the
+  other's. Ours is the slower one where a row reads "times slower", or more than 1 "times as long".
+- **Goals** for fields are meant beside the textbook's program, which makes its noise by a transform; a leaner one,
+  which draws no number that it does not need, stands in the next row without a goal.
+- **Errors**, ours first: of the third cumulant of ΔΓ for bands, of the friction for bonds, of the radius for
+  contacts. Where none are given, both answers are exact to rounding or follow the same law without an error of the
+  step.
+- Memory that a program has freed stays with its process, for ours and the others alike: else the system's time for
+  new pages decides between them. `sim` as a command runs as it does for a user.
+
+"""
+GROWTH = """
+## Growth
+
+![CPU time over members, steps, records, points of a sweep and points of a grid](speed.png)
+
+*CPU time of loading a scene (hollow) and of running it into a file (filled); the grey line is linear growth. The rows
+above give the exponent over the last decade, in brackets the smallest and the largest between neighbouring points:
+for grids that of the run alone, as the modes of a cell are found once, at its start; else that of both together.*
+
+`sim converge SCENARIO.toml` shows what the models cost and err on a scene of your own.
+"""
+HEADINGS = ("work", "beside", "goal", "result", "met", "CPU time, ours; theirs", "errors, ours; theirs")
+
+
+def text(results: dict[str, Any]) -> str:
+    """The page."""
+    machines = sorted({f"{group['date']}, {group['machine']}" for group in results.values()})
+    lines = [TITLE, "Measured: ", "; ".join(machines), ".\n\n"]
+    lines += [f"| {' | '.join(cells)} |\n" for cells in (HEADINGS, ["---"] * len(HEADINGS))]
+    lines += [f"| {' | '.join(cells(row))} |\n" for row in rows_of(results)]
+    return "".join([*lines, GROWTH])
+
+
+def rows_of(results: dict[str, Any]) -> list[Row]:
+    """All rows that are stored."""
+    return [Row(**row) for group in results.values() for row in group["rows"]]
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """A line of the table."""
+    goal = "" if row.goal is None else f"{'≥' if row.kind == 'faster' else '≤'} {number(row.goal)} {unit(row)}".strip()
+    met = {None: "", True: "yes", False: "**no**"}[row.met]
+    return row.ours, row.beside, goal, result(row), met, "; ".join(map(seconds, row.seconds)), row.errors
+
+
+def unit(row: Row) -> str:
+    """The unit of a goal."""
+    return {"faster": "times faster", "as long": "times as long", "exponent": ""}.get(row.kind, row.kind)
+
+
+def result(row: Row) -> str:
+    """The result in words."""
+    low, middle, high = row.result
+    if row.kind == "faster" and middle < 1.0:
+        low, middle, high, said = 1.0 / high, 1.0 / middle, 1.0 / low, "times slower"
+    else:
+        said = {"faster": "times faster", "as long": "times as long", "exponent": ""}.get(row.kind, row.kind)
+    spread = "" if low == middle == high else f"({number(low)} to {number(high)})"
+    return " ".join(filter(None, (number(middle), said, spread)))
+
+
+def number(value: float) -> str:
+    """A number to three digits."""
+    return f"{float(f'{value:.3g}'):,.0f}" if abs(value) >= 100.0 else f"{value:.3g}"
+
+
+def seconds(value: float) -> str:
+    """A time with its unit."""
+    for scale, name in ((1.0, "s"), (1e-3, "ms"), (1e-6, "µs"), (1e-9, "ns")):
+        if value >= scale:
+            return f"{number(value / scale)} {name}"
+    return f"{value:.1e} s"
+
+
+def draw(results: dict[str, Any], path: Path) -> None:
+    """The figure of growth."""
+    import matplotlib as mpl
+    from matplotlib.ticker import LogLocator
+
+    from sim.plots.style import GUIDE, LINES, STYLE, WIDE, Picture
+
+    grown = [row for row in rows_of(results) if row.curves]
+    if not grown:
+        return
+    with mpl.rc_context(STYLE):
+        figure = Picture(figsize=(WIDE, 4.2), layout="constrained")
+        panels = figure.subplots(2, 4, sharey=True)
+        for panel, row in zip(panels.flat, grown, strict=False):
+            sizes, load, run = (row.curves[name] for name in ("sizes", "load", "run"))
+            panel.loglog(sizes, run, "o-", color=LINES[0], markersize=3.5, label="run into a file")
+            panel.loglog(sizes, load, "o:", color=LINES[1], markersize=3.5, mfc="white", label="loading the scene")
+            linear = [run[-1] * size / sizes[-1] for size in sizes]
+            panel.loglog(sizes, linear, **GUIDE, label="linear growth")
+            over, _, scene = row.ours.removeprefix("growth over ").partition(": ")
+            panel.set_title(scene.replace("10⁴", "$10^4$"))
+            panel.set_xlabel(over)
+            panel.xaxis.set_major_locator(LogLocator(numticks=4))
+            panel.set_ylim(5e-4, 500.0)
+        for first in panels[:, 0]:
+            first.set_ylabel("CPU time (s)")
+        for panel in panels.flat[len(grown) :]:
+            panel.axis("off")
+            panel.legend(*panels.flat[0].get_legend_handles_labels(), loc="center", fontsize=8.0)
+        figure.savefig(path, dpi=200)

@@ -1,0 +1,48 @@
+"""Scenes of the benchmarks: the lens of ``compare`` with other numbers, as text and as what is loaded of it."""
+
+import tomllib
+from collections.abc import Callable
+
+import numpy as np
+
+import sim
+from benchmarks.compare import FIELD, lens
+from sim.engine import Dice, follow
+from sim.parts.exchange import NO_RESISTANCE, Motion, Motions, Times
+from sim.scenario.scenario import Scenario
+
+
+def shortest(points: int) -> float:
+    """Shortest wavelength on a grid of the cell of 0.24 mm [m]: 1 µm at 512²."""
+    return 512e-6 / points
+
+
+def field(model: str, points: int = 512, more: str = "") -> str:
+    """The table of the fluctuations on a grid; their spectrum ends where the grid does."""
+    text = FIELD.format(model=model, more=f"points = {points}\n{more}")
+    return text.replace("2.5 um", f"{1e6 * shortest(points):.6f} um")
+
+
+def scene(members: int, steps: int, every: int, *parts: str) -> str:
+    """A scene of so many steps, each or each so-manieth of them recorded."""
+    text = lens(steps, members, *parts)
+    return text.replace('step = "1 ms"', f'step = "1 ms"\nrecord = "{every} ms"')
+
+
+def loaded(text: str) -> Scenario:
+    """The scene of a text."""
+    return sim.load(tomllib.loads(text))
+
+
+def followed(text: str) -> Callable[[], object]:
+    """A program that advances all members of a scene to its end, as a run does."""
+    of = loaded(text)
+    members, end = np.arange(of.ensemble.members), of.clock.steps
+    return lambda: follow(of, Dice.of(of.seed, members), None, range(0, end + 1, end))
+
+
+def steady(speed: float, step: float, steps: int, drive: Callable) -> tuple[Motion, Motions]:
+    """Start and motion of steady sliding, in steps of a length [s]."""
+    times = Times(step, steps, step * steps)
+    slider, first = drive(speed=speed).begin(times)
+    return first, drive(speed=speed).advance(slider, NO_RESISTANCE, times, range(1, steps + 1))[1]

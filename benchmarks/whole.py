@@ -1,0 +1,98 @@
+"""Rows of whole commands, as processes of their own: their start, a first run, the gallery, a large run; and files."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+import sim
+from benchmarks.compare import LOAD, RAMP, RATE
+from benchmarks.scenes import field, loaded, scene
+from benchmarks.timing import Bench, Beside, Row, absolute, spent, told
+
+#: What a command must import, by whoever writes it.
+CHECKED = "tomllib, click, numpy, numba, scipy.special, pydantic, pint"
+STARTER = str(Path(sim.__file__).parent / "starter.toml")
+GALLERY = Path(__file__).parent.parent / "scenarios"
+
+
+def commands(bench: Bench) -> list[Row]:
+    """The starter scene by three commands, kernels being in the cache, beside the import of what each must have."""
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        for words, modules, goal in (
+            (("run", "--force"), f"{CHECKED}, netCDF4, xarray", 1.6),
+            (("run", "--force", "--no-table"), f"{CHECKED}, netCDF4", 1.5),
+            (("check",), CHECKED, 1.5),
+        ):
+            output = ("-o", f"{folder}/x.nc") if words[0] == "run" else ()
+            rows += bench.compare(
+                f"`sim {' '.join(words)}` of the starter scene",
+                lambda words=words, output=output: bench.command(words[0], STARTER, *words[1:], *output)[0],
+                Beside(f"import {modules}", lambda modules=modules: bench.imports(modules), goal=goal, bound=True),
+                turns=9,
+                clock=told,
+            )
+    return rows
+
+
+def first(bench: Bench) -> list[Row]:
+    """The starter scene where nothing is compiled yet."""
+    times = []
+    for _ in range(bench.of(3, 1)):
+        with tempfile.TemporaryDirectory() as folder:
+            output = f"{folder}/x.nc"
+            times.append(bench.command("run", STARTER, "-o", output, SIM_CACHE_DIR=folder)[0])
+    return [absolute("`sim run` of the starter scene, the first ever: compiles", times, "s", 6.0)]
+
+
+def gallery(bench: Bench) -> list[Row]:
+    """All scenes of the gallery."""
+    scenes, times = sorted(GALLERY.glob("*.toml"))[bench.of(0, -1) :], {}
+    with tempfile.TemporaryDirectory() as folder:
+        for one in scenes:
+            turns = [bench.command("run", str(one), "-o", f"{folder}/x.nc", "--force") for _ in range(bench.of(3, 1))]
+            times[one.stem] = [seconds for seconds, _ in turns]
+    slowest = max(times, key=lambda name: np.median(times[name]))
+    others = ", ".join(f"{name} {np.median(one):.1f}" for name, one in times.items() if name != slowest)
+    beside = f"this is {slowest}; the others [s]: {others}"
+    return [absolute("`sim run` of the gallery's slowest scene", times[slowest], "s", 5.0, beside)]
+
+
+def large(bench: Bench) -> list[Row]:
+    """10⁷ member-steps of a banded 512² cell, with its start, into a file."""
+    members, steps = bench.of((1000, 10_000), (2, 20))
+    with tempfile.TemporaryDirectory() as folder:
+        path, banded = Path(folder) / "large.toml", field("banded", bench.of(512, 64), "tolerance = 0.01")
+        path.write_text(scene(members, steps, 10, RAMP, RATE, banded, LOAD))
+        arguments = "run", str(path), "-o", f"{folder}/x.nc", "--force"
+        seconds, megabytes = zip(*(bench.command(*arguments) for _ in range(bench.of(3, 1))), strict=True)
+    name = "`sim run`, banded at 1 %, 512²: 10⁷ member-steps, 1001 records"
+    return [
+        absolute(f"{name}: time", list(seconds), "s", 10.0),
+        absolute(f"{name}: peak memory", list(megabytes), "MB", 500.0),
+    ]
+
+
+def memory(bench: Bench) -> list[Row]:
+    """The fixed cost of a run in memory: one step of the simplest scene."""
+    one = loaded(scene(1, 1, 1, LOAD))
+    sim.run(one)
+    times = [1e3 * spent(lambda: sim.run(one)) for _ in range(bench.of(31, 1))]
+    return [absolute("`sim.run` in memory: one step of the simplest scene", times, "ms", 25.0)]
+
+
+def files(bench: Bench) -> list[Row]:
+    """Size of the dataset of a gallery scene, by its compression."""
+    sizes = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for packed in ("none", "zlib", "digits"):
+            changes = {"record.compression": packed, **bench.of({}, {"ensemble.members": 2})}
+            file = Path(folder) / f"{packed}.nc"
+            sim.run(sim.load(GALLERY / "pdms_lens.toml", changes), to=file)
+            sizes[packed] = file.stat().st_size / 1e6
+    plain = f"uncompressed: {sizes.pop('none'):.3g} MB"
+    return [
+        absolute(f'file of pdms_lens, `compression = "{packed}"`', [size], "MB", None, plain)
+        for packed, size in sizes.items()
+    ]
