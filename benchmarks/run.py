@@ -1,7 +1,8 @@
 """Speed beside plain numpy and scipy, goals and growth: ``make bench``.
 
 ``python -m benchmarks.run [GROUP ...]`` measures all groups of rows or some, keeps them in ``benchmarks/results.json``
-beside those of the other groups, and writes ``docs/speed.md`` and its figure of all that is kept.
+beside those of the other groups, and writes ``docs/speed.md`` and its figure of all that is kept. With ``--write``
+it measures nothing.
 """
 
 import datetime
@@ -35,10 +36,10 @@ GROUPS: dict[str, Callable[[Bench], list[Row]]] = {
 
 
 def main() -> None:
-    """Measure, keep, and write the page after each group."""
+    """Measure group by group, keep each, and write the page."""
     if any(os.environ.get(name) != value for name, value in ENVIRONMENT.items()):
         os.execve(sys.executable, [sys.executable, "-m", "benchmarks.run", *sys.argv[1:]], os.environ | ENVIRONMENT)
-    chosen = sys.argv[1:] or list(GROUPS)
+    chosen = [] if sys.argv[1:] == ["--write"] else sys.argv[1:] or list(GROUPS)
     if unknown := set(chosen) - set(GROUPS):
         sys.exit(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
     kept = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
@@ -49,7 +50,7 @@ def main() -> None:
         kept[name] = {"date": str(datetime.date.today()), "machine": machine(), "rows": rows}
         kept = {group: kept[group] for group in GROUPS if group in kept}
         RESULTS.write_text(json.dumps(kept, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
-        PAGE.write_text(page.text(kept), encoding="utf-8")
+    PAGE.write_text(page.text(kept), encoding="utf-8")
     page.draw(kept, FIGURE)
 
 
