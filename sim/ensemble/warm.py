@@ -14,7 +14,8 @@ def missing() -> list[str]:
     texts = jit.sources()
     for module in texts:
         importlib.import_module(module)
-    return [name for name in sorted(jit.compiled, key=lambda name: -len(texts[_module(name)])) if not jit.cached(name)]
+    names = [name for name in jit.compiled if _module(name) in texts]
+    return [name for name in sorted(names, key=lambda name: -len(texts[_module(name)])) if not jit.cached(name)]
 
 
 def compile_all(names: list[str], jobs: int | None = None) -> Iterator[str]:
