@@ -10,6 +10,7 @@ from scipy.special import exp1
 
 from sim.numerics.special import (
     erf_between,
+    exp,
     lambert_w,
     reduced_exponential_integral,
     scaled_exponential_integral,
@@ -108,3 +109,11 @@ def test_erf_between_keeps_its_digits_in_both_tails():
     with mp.workdps(450):
         exact = [float(mp.erf(h) - mp.erf(a)) for a, h in zip(low, high, strict=True)]
     assert_allclose(erf_between(low, high), exact, rtol=8 * np.finfo(float).eps, atol=0)
+
+
+def test_the_exponential_function_is_right_to_one_unit_in_the_last_place():
+    points = np.concatenate([np.linspace(-708.0, 709.0, 2001), np.linspace(-1.0, 1.0, 1001), [1e-300, -1e-17, 0.0]])
+    for x in points:
+        exact = mp.exp(mp.mpf(float(x)))
+        assert abs(mp.mpf(exp(x)) / exact - 1) <= 2.0**-52
+    assert [exp(x) for x in (0.0, -709.0, -math.inf, 710.0, math.inf)] == [1.0, 0.0, 0.0, math.inf, math.inf]

@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device, kernel
+from sim.numerics.special import exp
 from sim.parts.bonds.cohort_merging import settle
 from sim.parts.bonds.rupture import fresh_integral, growth, hazard_integral, hazard_time, law_of, rate_at
 
@@ -42,21 +43,21 @@ def _inside(stretch, width, limit):
 @device
 def _survive(pool, count, move, speed, step, rules):
     """Bonds that outlive a third of a step and all of it; pool[4] gets what outlives it, cohort by cohort."""
-    weight, stretch, width, steepness, kept = pool[0], pool[1], pool[2], pool[3], pool[4]
+    weight, stretch, width, steepness, kept, kept_early = pool[0], pool[1], pool[2], pool[3], pool[4], pool[8]
     early, short = step / 3.0, move / 3.0
     soon, late = fresh_integral(early, speed, rules.law), fresh_integral(step, speed, rules.law)
+    for i in range(count):
+        kept_early[i] = weight[i] * exp(-steepness[i] * soon)
+        kept[i] = weight[i] * exp(-steepness[i] * late)
     at_early, at_end = 0.0, 0.0
     for i in range(count):
-        if steepness[i] > 0.0:
-            one, two = math.exp(-steepness[i] * soon), math.exp(-steepness[i] * late)
-        else:
-            one = math.exp(-hazard_integral(stretch[i], short, early, rules.law))
-            two = math.exp(-hazard_integral(stretch[i], move, step, rules.law))
+        if steepness[i] == 0.0:
+            kept_early[i] = weight[i] * math.exp(-hazard_integral(stretch[i], short, early, rules.law))
+            kept[i] = weight[i] * math.exp(-hazard_integral(stretch[i], move, step, rules.law))
         if rules.limit < math.inf:
-            one *= _inside(stretch[i] + short, width[i], rules.limit)
-            two *= _inside(stretch[i] + move, width[i], rules.limit)
-        kept[i] = weight[i] * two
-        at_early += weight[i] * one
+            kept_early[i] *= _inside(stretch[i] + short, width[i], rules.limit)
+            kept[i] *= _inside(stretch[i] + move, width[i], rules.limit)
+        at_early += kept_early[i]
         at_end += kept[i]
     return at_early, at_end
 
@@ -238,7 +239,7 @@ def step_rows(
     """Advance all rows by all steps, each row by itself from a ``share`` of its bonds; its sums after each step."""
     rules = _rules(numbers)
     rows, capacity = new_weight.shape
-    pool = np.empty((8, capacity + 520))
+    pool = np.empty((9, capacity + 520))
     for m in range(rows):
         old = m % len(weight)
         count = _read(pool, weight[old], stretch[old], width[old], share[m % share.size])
@@ -253,7 +254,7 @@ def step_rows(
             if rules.cell < math.inf:
                 travelled = travelled % (1048576.0 * rules.cell)
             _write(pool, count, new_weight[m], new_stretch[m], new_width[m])
-            _sum(new_weight[m], new_stretch[m], new_width[m], rules, sums[:, k, m])
+            _sum(new_weight[m], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
             count = _read(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
         new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
 
@@ -268,9 +269,11 @@ def _write(pool, count, weight, stretch, width):
 
 
 @device
-def _sum(weight, stretch, width, rules, sums):
-    """Sums over the cohorts of a row: as of ``cohorts.moments``."""
+def _sum(weight, stretch, width, rules, lost, sums):
+    """Sums over the cohorts of a row: as of ``cohorts.moments``; ``lost`` is room for a number of each."""
     sums[:] = 0.0
+    for i in range(weight.size):
+        lost[i] = weight[i] * stretch[i] * rate_at(stretch[i], rules.law)
     limit, cell = rules.limit, rules.cell
     for i in range(weight.size):
         w, x, d = weight[i], stretch[i], (width[i] if width.size > 1 else 0.0)
@@ -283,15 +286,15 @@ def _sum(weight, stretch, width, rules, sums):
             size, half = math.fabs(x), 0.5 * d
             outermost = min(size + half, limit) - max(size - half, limit - cell)
             sums[3] += limit / cell * w * (max(outermost, 0.0) / d)
-        sums[4] += w * x * rate_at(x, rules.law)
+        sums[4] += lost[i]
 
 
 @kernel("void(float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])")
 def sum_rows(weight, stretch, width, numbers, sums):
     """Sums over the cohorts of each row, shape (5, rows)."""
-    rules = _rules(numbers)
+    rules, lost = _rules(numbers), np.empty(weight.shape[1])
     for m in range(len(weight)):
-        _sum(weight[m], stretch[m], width[m], rules, sums[:, m])
+        _sum(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
 
 
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")

@@ -21,6 +21,7 @@ from sim.laws.schallamach import (
     first_moment_peak,
 )
 from sim.numerics.jit import device
+from sim.numerics.special import exp
 from sim.parts.exchange import Array
 from sim.units.quantity import Quantity
 
@@ -183,7 +184,7 @@ def rate_at(stretch, law):
     """Rupture rate of a bond of a stretch below any limit under a ``RuptureRate``."""
     rate, softness, _, catch, relief = law
     size = math.fabs(stretch)
-    return rate * math.exp(size * softness) + catch * math.exp(-size * relief)
+    return rate * exp(size * softness) + catch * exp(-size * relief)
 
 
 @device
@@ -259,7 +260,7 @@ def fresh_integral(age, speed, law):
 def growth(stretch, slip, law):
     """Factor by which ∫k dt of a bond exceeds that of a fresh one over any motion along ``slip``; 0 where none does."""
     along = stretch * slip >= 0.0 and law[3] == 0.0
-    return math.exp(min(math.fabs(stretch) * law[1], 690.0)) if along else 0.0
+    return exp(min(math.fabs(stretch) * law[1], 690.0)) if along else 0.0
 
 
 @device
