@@ -50,6 +50,8 @@ def run(
     to: Path | None = None,
     *,
     replace: bool = False,
+    resume: bool = False,
+    jobs: int = 1,
     progress: bool | Callable[[int], None] = False,
 ) -> Any:
     """Run a scenario with its ensemble and its sweep.
@@ -61,7 +63,11 @@ def run(
     to : path, optional
         The netCDF file to make; without it everything stays in memory.
     replace : bool
-        Whether an existing file may be replaced.
+        Whether an existing file, and an unfinished run of it, may be replaced.
+    resume : bool
+        Whether to go on with an unfinished run of the same scenario; a finished one is left as it is.
+    jobs : int
+        Processes that share the work; the numbers are the same for any.
     progress : bool or callable
         True shows a bar; a function is called with the number of member-steps done since its last call.
 
@@ -73,7 +79,8 @@ def run(
     Raises
     ------
     BadInput
-        If the scenario cannot be used, or the file is there and ``replace`` is False.
+        If the scenario cannot be used, or the file or an unfinished run of it is there and is neither replaced nor gone
+        on with.
     """
     from sim.ensemble import simulate
     from sim.ensemble.plan import Plan, work
@@ -84,9 +91,11 @@ def run(
     given = Shown(progress) if callable(progress) else Shown()
     try:
         with progress_bar(work(Plan.of(scene))) if progress is True else contextlib.nullcontext(given) as shown:
-            return simulate.run(scene, to, replace=replace, progress=shown.advance, stage=shown.begin)
-    except simulate.OutputExists:
-        raise BadInput([f"{to}: is there already; give replace=True or another path"]) from None
+            how: dict[str, Any] = {"replace": replace, "resume": resume, "jobs": jobs}
+            return simulate.run(scene, to, **how, progress=shown.advance, stage=shown.begin)
+    except simulate.OutputExists as fault:
+        said = str(fault).replace("--resume", "resume=True").replace("--force", "replace=True")
+        raise BadInput([said.replace("-o", "to=")]) from None
 
 
 def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":

@@ -2,11 +2,12 @@
 
 import contextlib
 import gc
+import math
 import os
 import signal
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -19,6 +20,9 @@ _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE"
 _WHERE = click.option(
     "--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key, as load='4 mN'."
 )
+
+#: Orders to stop, of a terminal or a scheduler.
+_ORDERS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGXCPU
 
 #: Rows of a table on the terminal.
 _ROWS = 12
@@ -71,13 +75,15 @@ def cli() -> None:
 @_SET
 @click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
 @click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
+@click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
+@click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
 @click.option("--resume", is_flag=True, help="Go on with an unfinished run, bit for bit as if nothing had happened.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
 def run(
     scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
-    force: bool, resume: bool, quiet: bool, bare: bool,
+    jobs: int | None, max_time: str | None, force: bool, resume: bool, quiet: bool, bare: bool,
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
@@ -87,6 +93,7 @@ def run(
     from sim.scenario.reader import load
 
     announce_compiling(quiet)
+    until = time.monotonic() + (math.inf if max_time is None else _quantity(max_time, "--max-time", "s", above=0))
     scene = load(scenario, _overrides(changes, seed, members), option="--set")
     if target.is_dir() or (target.exists() and target.samefile(scenario)):
         _fail(f"{target} is {'a folder' if target.is_dir() else 'the scenario'}; name a file with -o", BAD_INPUT)
@@ -100,10 +107,14 @@ def run(
     plan = plans.Plan.of(scene)
     for remark in [] if quiet else preview.remarks(plan):
         click.echo(f"note: {remark}", err=True)
+    jobs = jobs or plan.worthwhile(len(os.sched_getaffinity(0)))
+    how: dict[str, Any] = {"replace": force, "resume": resume, "jobs": jobs, "stage": stages.begin}
     with contextlib.ExitStack() as shown:
         if not quiet:
             stages.shown = shown.enter_context(progress_bar(plans.work(plan)))
-        simulate.run(scene, target, replace=force, resume=resume, progress=stages.shown.advance, stage=stages.begin)
+        with _orders() as ordered:
+            how["stop"] = lambda: ordered() or time.monotonic() > until
+            simulate.run(scene, target, **how, progress=stages.shown.advance)
         shown.callback(lambda: simulate.write_log(target, began, sys.argv[1:], stages.ended()))
         if tabulated := not (quiet or bare):
             stages.begin("table")
@@ -113,6 +124,36 @@ def run(
         _print_tables(*tables)
     if not quiet:
         click.echo(str(target))
+
+
+def _quantity(text: str, option: str, unit: str, **bounds: Any) -> float:
+    """The value of an option with a unit, in SI."""
+    from sim.units.quantity import Quantity
+    from sim.units.refusals import BadInput
+
+    try:
+        return Quantity(unit, option, **bounds).read(text)
+    except ValueError as fault:
+        raise BadInput([f"{option} {text}: {fault}"]) from None
+
+
+@contextlib.contextmanager
+def _orders() -> Iterator[Callable[[], bool]]:
+    """A context that gives whether to stop was ordered: the first order lets running blocks end, the second not."""
+    came: list[int] = []
+
+    def order(number: int, frame: object) -> None:
+        if came:
+            raise KeyboardInterrupt
+        came.append(number)
+        os.write(2, b"stopping after the blocks that run; a second order stops now\n")
+
+    before = {one: signal.signal(one, order) for one in _ORDERS}
+    try:
+        yield lambda: bool(came)
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
 
 
 def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
@@ -263,14 +304,9 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
 def converge(scenario: Path, output: Path | None, budget: str, tolerance: str | None, changes: tuple[str, ...]) -> None:
     """Speed against error for this scene: models, tolerances and clock steps, and which to choose."""
     from sim.scenario.reader import load
-    from sim.units.quantity import Quantity
-    from sim.units.refusals import BadInput
 
-    try:
-        seconds = Quantity("s", "budget", above=0).read(budget)
-        accepted = None if tolerance is None else Quantity("1", "tolerance", above=0, below=1).read(tolerance)
-    except ValueError as fault:
-        raise BadInput([f"--budget {budget}, --tolerance {tolerance}: {fault}"]) from None
+    seconds = _quantity(budget, "--budget", "s", above=0)
+    accepted = None if tolerance is None else _quantity(tolerance, "--tolerance", "1", above=0, below=1)
     scene = load(scenario, _overrides(changes), option="--set")
     from sim.numerics.files import explained
     from sim.study import converge as convergence

@@ -117,7 +117,10 @@ def test_check_and_a_run_without_its_table_import_neither_xarray_nor_figures_nor
     assert Path("outputs/scene.nc").exists()
 
 
-def test_an_interrupt_ends_with_130_and_without_traceback(here):
+@pytest.mark.parametrize(
+    "orders", [[signal.SIGINT], [signal.SIGTERM], [signal.SIGUSR1], [signal.SIGINT, signal.SIGTERM]]
+)
+def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     points = 'sweep={"contact.load"={from=1e-3, to=4e-3, count=1000}}'
     long = ["run", "scene.toml", "--set", 'clock.duration="20 s"', "--set", points]
     run = subprocess.Popen(
@@ -130,11 +133,15 @@ def test_an_interrupt_ends_with_130_and_without_traceback(here):
     # once the first point is written, all is compiled and loaded and another point is marched
     while not list(parts.glob("*.part")) and run.poll() is None:
         time.sleep(0.02)
-    run.send_signal(signal.SIGINT)
+    for order in orders:
+        run.send_signal(order)
     _, errors = run.communicate(timeout=60)
-    assert run.returncode == 130
+    assert run.returncode == (130 if len(orders) > 1 else 75)
     lines = [line for line in errors.splitlines() if line.strip() and " % of " not in line and "compiling" not in line]
-    assert lines == ["stopped; what was computed is kept: go on with --resume"]
+    assert lines == [
+        "stopping after the blocks that run; a second order stops now",
+        "stopped; what was computed is kept: go on with --resume",
+    ]
     assert not (here / "outputs" / "scene.nc").exists()
     kept = {part: part.stat().st_mtime_ns for part in parts.glob("*.part")}
     assert kept

@@ -47,6 +47,12 @@ class OutputBusy(RuntimeError):
     exit_code = 75
 
 
+class Stopped(RuntimeError):
+    """The run was to stop; what is computed is kept."""
+
+    exit_code = 75
+
+
 class MemoryParts(dict[str, Arrays]):
     """Parts kept in memory, without the states that only a run which goes on needs."""
 

@@ -1,6 +1,7 @@
 """Division of a run into points, groups of members and blocks of steps, by the scenario alone."""
 
 import itertools
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,8 +19,10 @@ _STATE_NUMBERS = 2**23
 # an event of a bond that is followed.
 _STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
 _SCENARIO_BYTES, _STATISTICS, _MOST_STEPS = 2e4, 3, 10**9
-#: Time of one core that a block takes at most by its counted work [s].
-_BLOCK_SECONDS = 5.0
+#: Counted work [s of one core]: of a block at most, of a run that is cut into smaller groups for several cores, and of
+#: one for each process that is worth starting.
+_BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 5.0, 20.0, 4.0
+_SMALLEST_GROUP = 16
 
 
 class Block(NamedTuple):
@@ -45,6 +48,31 @@ class Block(NamedTuple):
             stop = min(first + most, records.stop, *drawn)
             yield range(first * stride, (stop - 1) * stride + 1, stride)
             first = stop
+
+
+class Task(NamedTuple):
+    """Blocks of one group of members, one after the other, at one point of a sweep or at several whose run is short.
+
+    ``names`` are those of its parts, ``quantities`` those that are recorded; members differ in some (``each``), of
+    which only moments are kept where members are ``pooled``.
+    """
+
+    points: list[Scenario]
+    members: np.ndarray
+    blocks: list[Block]
+    names: list[str]
+    quantities: list[str]
+    each: set[str]
+    pooled: bool
+
+    @property
+    def work(self) -> list[int]:
+        """Member-steps of each block."""
+        return [len(self.points) * len(self.members) * (block.end - block.start) for block in self.blocks]
+
+    def __str__(self) -> str:
+        first, last = self.members[0], self.members[-1]
+        return f"members {first} to {last} of {self.names[0].partition('-')[0]}"
 
 
 @dataclass(frozen=True)
@@ -85,12 +113,24 @@ class Plan:
     @cached_property
     def _pieces(self) -> tuple[int, int]:
         """Members of a group and most steps of a block, by the first and the last point of the sweep."""
-        group, steps = self.members, _MOST_STEPS
-        for point in {0: self.points[0], len(self.points): self.points[-1]}.values():
-            group = min(group, together(point))
-            steps = min(steps, int(_BLOCK_SECONDS / seconds_a_step(point, group)))
+        ends = {0: self.points[0], len(self.points): self.points[-1]}.values()
+        group = min(self.members, *(together(point) for point in ends))
+        if self._seconds(group) > _SHARED_SECONDS:  # smaller groups for more cores, where a batch costs little
+            batch, whole = (max(seconds_a_step(point, rows) for point in ends) for rows in (0, group))
+            group = min(group, max(_SMALLEST_GROUP, math.ceil(10.0 * batch * group / (whole - batch))))
+        steps = min(int(_BLOCK_SECONDS / seconds_a_step(point, group)) for point in ends)
+        for point in ends:
             point.release()
         return group, max(1, steps)
+
+    def _seconds(self, group: int) -> float:
+        """Counted work of the whole run in groups of so many members, as time of one core [s]."""
+        runs = len(self.points) * self.members / group
+        return runs * self.points[0].clock.steps * seconds_a_step(self.points[-1], group)
+
+    def worthwhile(self, cores: int) -> int:
+        """Processes that are worth starting."""
+        return min(cores, len(self.packs) * len(self.groups()), 1 + int(self._seconds(self.group) / _PROCESS_SECONDS))
 
     @property
     def group(self) -> int:
@@ -119,7 +159,7 @@ class Plan:
             ends = {clock.steps, *itertools.chain(*intervals)}
         if point.map_size is not None:
             numbers = min(self.group, point.record.map_members) * point.map_size[1] ** 2
-            ends |= {*self.snapshots(point)[:: max(1, _PART_NUMBERS // numbers)]}
+            ends |= {*snapshots(point)[:: max(1, _PART_NUMBERS // numbers)]}
         stops = sorted(ends)
         return [Block(start, end, clock.stride) for start, end in zip([-1, *stops], stops, strict=False)]
 
@@ -135,10 +175,16 @@ class Plan:
         rows = range(0, len(self.points), along)
         return [range(a, min(a + together, row + along)) for row in rows for a in range(row, row + along, together)]
 
-    def snapshots(self, point: Scenario) -> list[int]:
-        """Clock steps at which maps are drawn."""
-        clock = point.clock
-        return [round(time / clock.duration * (clock.records - 1)) * clock.stride for time in sorted(point.record.maps)]
+    def tasks(self) -> Iterator[Task]:
+        """All that is to be computed."""
+        recorded = self.variables + self.largest
+        quantities, each = [one.name for one in recorded], {one.name for one in recorded if self.varies(one)}
+        for pack in self.packs:
+            points = [self.points[number] for number in pack]
+            blocks = self.blocks(points[0])
+            for group, members in enumerate(self.groups()):
+                names = [part_name(pack.start, group, index) for index in range(len(blocks))]
+                yield Task(points, members, blocks, names, quantities, each, not self.scenario.record.per_member)
 
     def groups(self) -> list[np.ndarray]:
         """The members of each group."""
@@ -165,6 +211,12 @@ class Plan:
 def together(scenario: Scenario) -> int:
     """Members that are best advanced together: as many as keep their state below 64 MB, 256 at the most."""
     return min(_GROUP, max(1, _STATE_NUMBERS // (2 * scenario.process.pairs + scenario.population.numbers)))
+
+
+def snapshots(point: Scenario) -> list[int]:
+    """Clock steps at which maps are drawn."""
+    clock = point.clock
+    return [round(time / clock.duration * (clock.records - 1)) * clock.stride for time in sorted(point.record.maps)]
 
 
 def seconds_a_step(point: Scenario, members: int) -> float:

@@ -1,10 +1,12 @@
 """Running a scenario: its sweep, its members, in memory or onto the disk."""
 
+import contextlib
 import datetime
 import functools
 import json
 import os
 import platform
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -12,12 +14,13 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.engine import Dice, State, follow, pack as packed, unpack
+from sim.engine import Dice, State, follow, pack, unpack
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
-from sim.ensemble.part_files import MemoryParts, OutputBusy, OutputExists, Parts, held
-from sim.ensemble.plan import Block, Plan, part_name, work
-from sim.ensemble.recorded import DISC_ENERGIES, MAP
+from sim.ensemble.part_files import MemoryParts, OutputBusy, OutputExists, PartFiles, Parts, Stopped, held
+from sim.ensemble.plan import Block, Plan, Task, snapshots, work
+from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES
+from sim.ensemble.workers import share_out
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, explained
 from sim.parts.shear.modal import ModalProcess
@@ -25,13 +28,20 @@ from sim.parts.shear.process import Fluctuation
 from sim.scenario.scenario import Scenario
 
 Progress = Callable[[int], None]
+
+
+def ignore(done: int) -> None:
+    """No progress is shown."""
+
+
 #: Steps after which progress is reported, at the next record.
 _STEPS = 1024
 
 
 def run(
     scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, resume: bool = False,
-    progress: Progress | None = None, stage: Callable[[str], None] = lambda name: None,
+    jobs: int = 1, progress: Progress = ignore, stage: Callable[[str], None] = lambda name: None,
+    stop: Callable[[], bool] = lambda: False,
 ) -> Any:  # fmt: skip
     """Run a scenario with its ensemble and its sweep.
 
@@ -45,10 +55,14 @@ def run(
         Whether an existing file and an unfinished run of it may be replaced.
     resume : bool
         Whether to go on with an unfinished run of the same scenario; a finished one is left as it is.
-    progress : callable, optional
+    jobs : int
+        Processes that share the work; the numbers are the same for any.
+    progress : callable
         Called with the number of member-steps done since the last call.
     stage : callable
         Called with the name of each stage as it begins: "simulating", "writing".
+    stop : callable
+        Asked before every block of steps whether to end there.
 
     Returns
     -------
@@ -63,98 +77,117 @@ def run(
         If another run holds the output.
     BadInput
         If what is to be gone on with is of another scenario or of other versions.
+    Stopped
+        If it was to end early; what is computed is kept.
     StoreTrouble
         If the disk or a file makes trouble; what the disk holds of an older output stays.
+    WorkerDied
+        If processes died at the same work three times.
     """
     plan = Plan.of(scenario)
     stage("simulating")
     if to is None:
         import xarray  # heavy
 
-        memory = MemoryParts()
-        simulate(plan, memory, progress)
-        stage("writing")
-        made = outline(plan)
-        return xarray.Dataset(in_memory(made, memory), attrs=made.attributes)
+        with contextlib.nullcontext() if jobs == 1 else tempfile.TemporaryDirectory() as folder:
+            kept = MemoryParts() if folder is None else PartFiles(Path(folder))
+            simulate(plan, kept, progress, jobs, stop)
+            stage("writing")
+            made = outline(plan)
+            return xarray.Dataset(in_memory(made, kept), attrs=made.attributes)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
         raise OutputExists(f"{target} is no plain file; name another output")
     if target.exists() and not (replace or resume):
-        raise OutputExists(f"{target} exists; replace it or name another output")
+        raise OutputExists(f"{target} exists; replace it with --force or name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
     with held(target, identity(attributes(plan)), resume, replace, lambda path: identity(attributes_of(path))) as parts:
         if parts is not None:
-            simulate(plan, parts, progress)
+            simulate(plan, parts, progress, jobs, stop)
             stage("writing")
             parts.publish(target, functools.partial(write, outline(plan), parts))
     return target
 
 
-def simulate(plan: Plan, parts: Parts, progress: Progress | None = None) -> None:
-    """Advance every group of members at every point of the sweep, and save a part for each block of steps."""
-    for pack in plan.packs:
-        for group, members in enumerate(plan.groups()):
-            follow_group(plan, pack, group, members, parts, progress)
-        for number in pack:
-            plan.points[number].release()
-
-
-def follow_group(
-    plan: Plan, pack: range, group: int, members: np.ndarray, parts: Parts, progress: Progress | None
+def simulate(
+    plan: Plan, parts: Parts, progress: Progress = ignore, jobs: int = 1, stop: Callable[[], bool] = lambda: False
 ) -> None:
-    """Advance one group of members at some points from the last part that is there to the end of the run."""
-    points, state, before = [plan.points[number] for number in pack], None, ""
-    blocks = plan.blocks(points[0])
-    for index, block in enumerate(blocks):
-        name = part_name(pack.start, group, index)
-        if name not in parts:
-            if state is None and before:
-                state = unpack(points[0], parts.state(before))
-            found = []
-            for point in points:  # several only where the run is one block
-                state, arrays = _record(plan, point, Dice.of(point.seed, members), state, block, progress)
-                found.append(arrays)
-                if len(points) > 1:
-                    state = None
-            kept = {} if block is blocks[-1] else packed(cast(State, state))
-            parts.save(name, {key: np.stack([arrays[key] for arrays in found]) for key in found[0]}, kept)
+    """Advance every group of members at every point of the sweep, and save a part for each block of steps.
+
+    Raises
+    ------
+    Stopped
+        If parts are missing at the end, since it was to stop.
+    """
+    tasks = []
+    for task in plan.tasks():
+        if all(name in parts for name in task.names):
+            progress(sum(task.work))
         else:
+            tasks.append(task)
+    if jobs > 1 and len(tasks) > 1:
+        share_out(functools.partial(advance_group, parts), tasks, jobs, progress, stop)
+    else:
+        for task in tasks:
+            advance_group(parts, task, progress, stop)
+            for point in task.points:
+                point.release()
+    if any(name not in parts for task in tasks for name in task.names):
+        raise Stopped("stopped; what was computed is kept: go on with --resume")
+
+
+def advance_group(parts: Parts, task: Task, progress: Progress, stop: Callable[[], bool]) -> None:
+    """Advance one group of members from the last part that is there to the end of the run, or until it is to stop."""
+    state, before = None, ""
+    for block, name, steps in zip(task.blocks, task.names, task.work, strict=True):
+        if name in parts:
+            progress(steps)
             state = None
-            if progress is not None:
-                progress(len(points) * len(members) * (block.end - block.start))
+        else:
+            if stop():
+                return
+            if state is None and before:
+                state = unpack(task.points[0], parts.state(before))
+            found = []
+            for point in task.points:  # several only where the run is one block
+                end, arrays = _record(task, point, state, block, progress)
+                found.append(arrays)
+            state = end
+            kept = {} if name == task.names[-1] else pack(end)
+            parts.save(name, {key: np.stack([arrays[key] for arrays in found]) for key in found[0]}, kept)
         before = name
 
 
 def _record(
-    plan: Plan, point: Scenario, dice: Dice, state: State | None, block: Block, progress: Progress | None
+    task: Task, point: Scenario, state: State | None, block: Block, progress: Progress
 ) -> tuple[State, dict[str, np.ndarray]]:
     """One part: every variable over a block and the maps in it; and the state at its end."""
-    clock, members, records = point.clock, dice.shear.members, block.records
-    rows_of = 1, len(members)
-    rows = {one.name: np.empty((rows_of[plan.varies(one)], len(records))) for one in plan.variables}
+    clock, members, records, dice = point.clock, task.members, block.records, Dice.of(point.seed, task.members)
+    variables = [one for one in VARIABLES if one.name in task.quantities]
+    rows_of = {name: len(members) if name in task.each else 1 for name in task.quantities}
+    rows = {one.name: np.empty((rows_of[one.name], len(records))) for one in variables}
     maps: dict[str, np.ndarray] = {}
-    drawn, snapshots = int(np.sum(members < point.record.map_members)), plan.snapshots(point)
-    for steps in block.pieces(max(1, _STEPS // clock.stride), snapshots):
+    drawn, drawn_at = int(np.sum(members < point.record.map_members)), snapshots(point)
+    for steps in block.pieces(max(1, _STEPS // clock.stride), drawn_at):
         before = -1 if state is None else state.step
         state, course = follow(point, dice, state, steps)
         if steps[-1] % clock.stride == 0:
             first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]
-            for one in plan.variables:
+            for one in variables:
                 part = rows[one.name][:, first:last]
                 part[:] = np.broadcast_to(one.read(point, course), part.T.shape).T
-        if drawn and steps[-1] in snapshots:
+        if drawn and steps[-1] in drawn_at:
             for name, values in _maps(point, state, drawn).items():
-                maps[f"{name}@{snapshots.index(steps[-1])}"] = values
-        if progress is not None:
-            progress(len(members) * (state.step - before))
-    end, recorded = cast(State, state), plan.variables
+                maps[f"{name}@{drawn_at.index(steps[-1])}"] = values
+        progress(len(members) * (state.step - before))
+    end = cast(State, state)
     if block.end == clock.steps:
-        recorded += plan.largest
-        for largest in plan.largest:
-            rows[largest.name] = np.broadcast_to(largest.read(point, end), rows_of[plan.varies(largest)])
-    if not plan.scenario.record.per_member:
-        rows |= {one.name: moments(rows[one.name]) for one in recorded if plan.varies(one)}
+        for largest in LARGEST:
+            if largest.name in task.quantities:
+                rows[largest.name] = np.broadcast_to(largest.read(point, end), rows_of[largest.name])
+    if task.pooled:
+        rows |= {name: moments(values) for name, values in rows.items() if name in task.each}
     return end, rows | maps
 
 
