@@ -132,8 +132,11 @@ class Grid:
         Samples that a field lacks are 0. One field after the other, so that its spectrum stays in the cache.
         """
         shape = (self.points, self.points)
-        spectra = (scipy.fft.rfft2(field, s=shape) for field in fields.reshape(-1, *fields.shape[-2:]))
-        sums = [_weighted_power(spectrum, weight, self.multiplicity) for spectrum in spectra]
+        # no name holds a spectrum, so that the next one takes its memory
+        sums = [
+            _weighted_power(scipy.fft.rfft2(field, s=shape), weight, self.multiplicity)
+            for field in fields.reshape(-1, *fields.shape[-2:])
+        ]
         return np.reshape(sums, fields.shape[:-2]) * self.spacing**4
 
     def mean_square(self, spectrum: np.ndarray) -> np.ndarray:

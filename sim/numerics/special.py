@@ -131,6 +131,15 @@ def exp(x):
 
 
 @device
+def rough_cube_root(x):
+    """Cube root of a normal x > 0 to 2e-4: a third of the exponent, good to 6 %, and one of Halley's steps."""
+    exponent = np.uint64(np.float64(x).view(np.int64)) >> _HALF
+    root = np.uint64(((exponent * _THIRD) & _HIGH_HALF) + _OFFSET).view(np.float64)
+    cube = root * root * root
+    return root * ((cube + 2.0 * x) / (2.0 * cube + x))
+
+
+@device
 def cube_root(x):
     """Cube root of x >= 0, right to one unit in the last place; nan below zero.
 
@@ -141,11 +150,9 @@ def cube_root(x):
     large = x > 1e280
     scaled = x * 2.0**300 if small else x
     scaled = x * 2.0**-300 if large else scaled
-    exponent = np.uint64(np.float64(scaled).view(np.int64)) >> _HALF
-    root = np.uint64(((exponent * _THIRD) & _HIGH_HALF) + _OFFSET).view(np.float64)
-    for _ in range(2):
-        cube = root * root * root
-        root = root * ((cube + 2.0 * scaled) / (2.0 * cube + scaled))
+    root = rough_cube_root(scaled)
+    cube = root * root * root
+    root = root * ((cube + 2.0 * scaled) / (2.0 * cube + scaled))
     root -= (root * root * root - scaled) / (3.0 * root * root)
     root = root * 2.0**-100 if small else root
     root = root * 2.0**100 if large else root
