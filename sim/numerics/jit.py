@@ -43,10 +43,8 @@ _BLOCK = 4096
 
 @functools.cache
 def sources() -> dict[str, bytes]:
-    """Texts of the modules that import this one, by their names in the package."""
-    package = Path(__file__).parents[1]
-    texts = {path.relative_to(package).with_suffix(""): path.read_bytes() for path in sorted(package.rglob("*.py"))}
-    return {".".join((package.name, *path.parts)): t for path, t in texts.items() if b"sim.numerics.jit" in t}
+    """Texts of the modules that import this one, by name."""
+    return {name: text for name, text in kept.sources().items() if b"sim.numerics.jit" in text}
 
 
 @functools.cache
@@ -58,10 +56,15 @@ def _cache_folder() -> str:
     return str(kept.folder() / digest.hexdigest()[:16])
 
 
+def machine() -> str:
+    """The processor as compiled code and numpy use it."""
+    vectors = np._core._multiarray_umath.__cpu_features__  # type: ignore[attr-defined]
+    return repr((cpu_target.target_context.codegen().magic_tuple(), np.__version__, vectors))
+
+
 def _path(name: str) -> Path:
     """File of a kernel or law in the cache, which also names the machine that the code is for."""
-    machine = repr(cpu_target.target_context.codegen().magic_tuple()).encode()
-    return Path(_cache_folder(), f"{name}.{hashlib.sha256(machine).hexdigest()[:8]}")
+    return Path(_cache_folder(), f"{name}.{hashlib.sha256(machine().encode()).hexdigest()[:8]}")
 
 
 def cached(name: str) -> bool:

@@ -1,9 +1,19 @@
 """Results kept on disk between runs. A store that is broken, read-only or full costs time, never a run."""
 
 import contextlib
+import functools
 import hashlib
 import os
+import pickle
+import sys
+import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+#: What is found sooner is not kept [s].
+_WORTH = 0.1
 
 
 def folder() -> Path:
@@ -31,3 +41,35 @@ def store(path: Path, content: bytes) -> None:
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
+
+
+@functools.cache
+def sources() -> dict[str, bytes]:
+    """Texts of the package's modules by name."""
+    package = Path(__file__).parents[1]
+    texts = {path.relative_to(package).with_suffix(""): path.read_bytes() for path in sorted(package.rglob("*.py"))}
+    return {".".join((package.name, *path.parts)): text for path, text in texts.items()}
+
+
+@functools.cache
+def _digest() -> bytes:
+    """Hash of what any result may depend on: the sources, and the version of Python."""
+    digest = hashlib.sha256(sys.version.encode())
+    for text in sources().values():
+        digest.update(text)
+    return digest.digest()
+
+
+def found(key: Any, find: Callable[[], T]) -> T:
+    """What ``find`` gives: from the disk where an earlier run of the same sources has found it under the same key.
+
+    The key holds all that the result depends on, versions of libraries and features of the processor included.
+    """
+    path = folder() / "found" / hashlib.sha256(_digest() + pickle.dumps(key)).hexdigest()[:32]
+    with contextlib.suppress(Exception):
+        return pickle.loads(read(path) or b"")
+    began = time.process_time()
+    value = find()
+    if time.process_time() - began > _WORTH:
+        store(path, pickle.dumps(value))
+    return value

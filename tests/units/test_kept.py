@@ -64,3 +64,20 @@ def test_a_store_of_units_that_cannot_be_used_changes_no_number(anew, tmp_path, 
         anew(tmp_path / "full")
         assert length.read("3.3 nm") == exact
     assert not [path for path in (tmp_path / "full").rglob("*") if path.is_file()]
+
+
+def test_a_result_is_found_once_for_each_key_and_only_if_it_took_long(tmp_path, monkeypatch):
+    monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
+    found = []
+    for key in ("a", "a", "b"):
+        kept.found(key, lambda key=key: found.append(key))
+    assert found == ["a", "a", "b"]
+    monkeypatch.setattr(kept, "_WORTH", -1.0)
+    for key in ("a", "a", "b", "a"):
+        assert kept.found(key, lambda key=key: found.append(key) or f"of {key}") == f"of {key}"
+    assert found[3:] == ["a", "b"]
+    for path in tmp_path.rglob("found/*"):
+        path.write_bytes(path.read_bytes()[:-1])
+    assert kept.found("a", lambda: "anew") == "anew"
+    monkeypatch.setattr(kept, "_digest", lambda: b"of other sources")
+    assert kept.found("a", lambda: "of others") == "of others"

@@ -6,14 +6,16 @@ A model is a frozen recipe; with the solid and the cell it becomes a *process* w
 
 import functools
 import math
-from dataclasses import fields, replace
+from dataclasses import astuple, fields, replace
 from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
+import scipy
 from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from sim.numerics import jit
 from sim.parts.exchange import Setting
 from sim.parts.shear.amplitude import Amplitude, Constant
 from sim.parts.shear.banded import BandedProcess
@@ -27,8 +29,11 @@ from sim.parts.shear.process import SmoothProcess
 from sim.spectrum.families import Ripple, Spectrum
 from sim.spectrum.family import Family
 from sim.spectrum.finite_contact import marginal_energy
+from sim.units import kept
 from sim.units.quantity import Quantity
 
+#: Side and points of a cell, Poisson's ratio; power of the rates, tolerance, and whether the amplitude relaxes.
+_CellOf = tuple[float, int | None, float, int, float, bool]
 _Paid = Annotated[
     float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)
 ]
@@ -286,7 +291,8 @@ class Banded(_Fluctuating):
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
         spectrum, size = _of_unit_size(self.spectrum)
         power, relaxing = self.correlation.power, self.amplitude.relaxing
-        unit, errors = _grouped(spectrum, self.side(cell), self.points, poisson_ratio, power, self.tolerance, relaxing)
+        cell_of = self.side(cell), self.points, poisson_ratio, power, self.tolerance, relaxing
+        unit, errors = _grouped(spectrum, cell_of)
         bands = replace(unit, weight=unit.weight * (size / shear_modulus))
         if self.mode_amplitudes == "fixed":
             return SmoothProcess(bands.mean, self.amplitude)
@@ -300,11 +306,15 @@ def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
 
 
 @functools.lru_cache(maxsize=20_000)  # as many as a sweep has points, each a few kilobytes
-def _grouped(
-    spectrum: Family, cell: float, points: int | None, poisson_ratio: float,
-    power: int, tolerance: float, relaxing: bool,
-) -> tuple[Bands, dict[str, float]]:  # fmt: skip
+def _grouped(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
+    """``_grouped_anew``, from the disk where an earlier run has grouped the same modes."""
+    key = jit.machine(), scipy.__version__, astuple(spectrum), cell_of  # type: ignore[call-overload]
+    return kept.found(key, lambda: _grouped_anew(spectrum, cell_of))
+
+
+def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
     """The bands of a cell at a shear modulus of 1 Pa, and the cell's own errors against the infinite plane."""
+    cell, points, poisson_ratio, power, tolerance, relaxing = cell_of
     pairs = cell_pairs(spectrum, cell, points, 1.0, poisson_ratio)
     energy = float(np.sum(pairs.count * pairs.weight))
     infinite = float(spectrum.surface_energy(1.0, poisson_ratio))

@@ -30,6 +30,7 @@ from sim.spectrum.families import (
     Tabulated,
     VonKarman,
 )
+from sim.units import kept
 
 G, CELL, RMS = 1.6e6, 100e-6, 150e3
 FAMILIES = {
@@ -384,3 +385,20 @@ def test_a_longest_wave_beyond_the_cell_costs_what_the_cells_error_tells():
         )
     assert short.known_errors()["cell_error_energy"] < -0.01
     assert abs(long.known_errors()["cell_error_energy"]) < 1e-4
+
+
+def test_bands_from_the_disk_are_those_grouped_anew(tmp_path, monkeypatch):
+    monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(kept, "_WORTH", -1.0)
+    spectra = [SelfAffine(1.0, 0.8, 60e-6, 24e-6, 4e-6), SelfAffine(1.0, 0.7, 60e-6, 24e-6, 4e-6)]
+    cell = (240e-6, None, 0.5, 1, 0.01, False)
+    for spectrum in spectra:
+        bands, errors = shear._grouped_anew(spectrum, cell)
+        for _ in range(2):  # stored, then read
+            shear._grouped.cache_clear()
+            again, errors_again = shear._grouped(spectrum, cell)
+            assert errors_again == errors and again.errors == bands.errors
+            for name in ("weight", "freedom", "wavenumber"):
+                assert_allclose(getattr(again, name), getattr(bands, name), rtol=0)
+    assert len(list(tmp_path.rglob("found/*"))) == 2
+    shear._grouped.cache_clear()
