@@ -125,28 +125,26 @@ def mapped(bench: Bench) -> list[Row]:
 
 
 def energy(bench: Bench) -> list[Row]:
-    """ΔΓ of a given field."""
+    """ΔΓ of a given field, and of several at once."""
     rows, random = [], np.random.default_rng(1)
     for points in (512, 1024):
         size = bench.of(points, 32)
         fields, weights = random.standard_normal((8, size, size)), plain.energy_weights(size, CELL, SHEAR_MODULUS)
         turn = itertools.cycle(fields)
+
+        def ours(turn=turn) -> None:
+            surface_energy(next(turn), CELL, SHEAR_MODULUS)
+
         rows += bench.compare(
             f"`surface_energy` of a field, {points}²",
-            lambda turn=turn: surface_energy(next(turn), CELL, SHEAR_MODULUS),
+            ours,
             Beside("scipy's rfft2 alone", lambda turn=turn: fft.rfft2(next(turn)), goal=1.25, bound=True),
             Beside("scipy's rfft2 and numpy", lambda turn=turn, w=weights: plain.surface_energy(next(turn), w)),
         )
-        if points > 512:
-            break
         rows += bench.compare(
-            f"`surface_energy` of 8 fields at once, {points}²",
+            f"`surface_energy` of 8 fields at once, {points}², each",
             lambda fields=fields: surface_energy(fields, CELL, SHEAR_MODULUS),
-            Beside(
-                "the fields one by one",
-                lambda fields=fields: [surface_energy(one, CELL, SHEAR_MODULUS) for one in fields],
-                goal=1.05,
-                bound=True,
-            ),
+            Beside("a field alone", ours, goal=1.05, bound=True),
+            share=8,
         )
     return rows

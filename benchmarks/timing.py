@@ -7,13 +7,13 @@ import os
 import resource
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from benchmarks import compare
 from sim.cli import cli
 
 #: CPU seconds that one measurement takes at least.
@@ -88,11 +88,11 @@ def told(program: Callable[[], float], times: int = 1) -> float:
 
 
 def spent(program: Callable[[], object], times: int = 1) -> float:
-    """CPU seconds of some calls of a program."""
-    began = time.process_time()
+    """CPU seconds of some calls of a program, with those of the processes that it starts and ends."""
+    began = compare.spent()
     for _ in range(times):
         program()
-    return time.process_time() - began
+    return compare.spent() - began
 
 
 @dataclass(frozen=True)

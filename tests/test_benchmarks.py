@@ -1,5 +1,6 @@
 """What the benchmarks compute: rows and their page, intervals of ratios, and lines of code."""
 
+import itertools
 import json
 import math
 import random
@@ -20,8 +21,8 @@ def test_every_row_runs_and_is_kept(group):
     assert [row.ours for row in rows] == [row["ours"] for row in RESULTS[group]["rows"]]
     for row in rows:
         assert all(map(math.isfinite, row.result)), row.ours
-        times = sum((row.curves or {}).values(), row.seconds or row.result)
-        assert all(0.0 < time < math.inf for time in times if not row.curves or time not in row.result), row.ours
+        times = [*row.seconds, *itertools.chain(*(row.curves or {}).values())] or row.result
+        assert all(0.0 < time < math.inf for time in times), row.ours
 
 
 def test_the_page_of_speed_is_that_of_the_results():
@@ -57,14 +58,15 @@ def test_the_exponents_of_growth_are_the_least_that_of_the_last_decade_and_the_l
     assert growth.exponents(sizes, [1.0, 100.0, 1000.0, 1000.0]) == pytest.approx([0.0, 0.0, 2.0])
 
 
-def test_a_ratio_is_that_of_a_turn_per_share_of_the_work():
+def test_a_ratio_is_that_of_a_turn_per_call_and_share_of_the_work():
     clock = lambda program, times=1: program() * times  # noqa: E731
-    other = timing.Beside("other", lambda: 8.0, share=2.0)
-    faster, longer = timing.Bench().compare(
-        "ours", lambda: 2.0, other, other._replace(goal=0.5, bound=True), clock=clock
-    )
-    assert (faster.kind, faster.result, faster.seconds, faster.met) == ("faster", [2.0] * 3, [2.0, 4.0], None)
-    assert (longer.kind, longer.result, longer.goal, longer.met) == ("as long", [0.5] * 3, 0.5, True)
+    other = timing.Beside("other", lambda: 2.0**-9, share=2.0)
+    bound = other._replace(goal=0.5, bound=True)
+    faster, longer = timing.Bench().compare("ours", lambda: 2.0**-11, other, bound, clock=clock)
+    seconds = pytest.approx([2.0**-11, 2.0**-10], rel=1e-12)
+    assert (faster.kind, faster.result, faster.met) == ("faster", pytest.approx([2.0] * 3, rel=1e-12), None)
+    assert (longer.kind, longer.result, longer.goal) == ("as long", pytest.approx([0.5] * 3, rel=1e-12), 0.5)
+    assert faster.seconds == longer.seconds == seconds
 
 
 def test_the_interval_of_twenty_ratios_reaches_from_the_sixth_to_the_fifteenth():
