@@ -18,6 +18,8 @@ from sim.cli import cli
 
 #: CPU seconds that one measurement takes at least.
 _LEAST = 0.05
+#: Variables of the environment that a user has not set: of the allocator, and those that keep Python from its caches.
+_UNUSUAL = ("MALLOC_", "PYTHONDONTWRITE")
 #: Runs a command and prints the CPU time [s] and the peak memory [kB] of it alone: a process begins with the peak of
 #: the one that started it, so that a small one stands between.
 _LAUNCHER = """
@@ -151,7 +153,7 @@ def absolute(ours: str, values: list[float], unit: str, goal: float | None, besi
 def child(*arguments: str, **environment: str) -> tuple[float, float]:
     """CPU time [s] and peak memory [MB] of a Python process."""
     command = [sys.executable, "-S", "-c", _LAUNCHER, sys.executable, *arguments]
-    usual = {name: value for name, value in os.environ.items() if not name.startswith("MALLOC_")}
+    usual = {name: value for name, value in os.environ.items() if not name.startswith(_UNUSUAL)}
     printed = subprocess.run(command, env=usual | environment, check=True, capture_output=True, text=True).stdout
     seconds, kilobytes = map(float, printed.split())
     return seconds, kilobytes / 1024.0

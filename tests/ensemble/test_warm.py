@@ -51,4 +51,4 @@ def test_a_cache_that_cannot_be_written_is_no_success(cold, monkeypatch):
     monkeypatch.setattr(warm, "missing", lambda: SOME[:1])
     done = CliRunner().invoke(cli, ["warm"])
     assert done.exit_code == 74
-    assert "SIM_CACHE_DIR" in done.stderr
+    assert "SIM_CACHE_DIR" in done.output
