@@ -67,7 +67,7 @@ def run(
     resume : bool
         Whether to go on with an unfinished run of the same scenario; a finished one is left as it is.
     jobs : int
-        Processes that share the work; the numbers are the same for any.
+        Processes that share the work; the numbers are the same for any. The command takes one a core by itself.
     progress : bool or callable
         True shows a bar; a function is called with the number of member-steps done since its last call.
 

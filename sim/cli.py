@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -17,12 +17,17 @@ DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
 _PATH = click.Path(path_type=Path)
 _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of the file.")
+_SEED = click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
+_MEMBERS = click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
 _WHERE = click.option(
     "--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key, as load='4 mN'."
 )
 
-#: Orders to stop, of a terminal or a scheduler.
-_ORDERS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGXCPU
+_KEPT = "stopped; what was computed is kept: the same command with --resume goes on"
+_CODES = (
+    "Exit codes: 0 done; 1 failed; 2 bad input; 73 the output exists; 74 trouble with disk or files; 75 stopped, to go"
+    " on with --resume, or another run holds the output; 130 stopped at once."
+)
 
 #: Rows of a table on the terminal.
 _ROWS = 12
@@ -36,7 +41,7 @@ def main() -> None:
     try:
         cli.main(standalone_mode=False)
     except (click.Abort, KeyboardInterrupt):
-        _fail("stopped; what was computed is kept: go on with --resume", INTERRUPTED)
+        _fail("stopped", INTERRUPTED)
     except click.ClickException as fault:
         fault.show()
         sys.exit(fault.exit_code)
@@ -69,12 +74,12 @@ def cli() -> None:
     """
 
 
-@cli.command()
+@cli.command(epilog=_CODES)
 @click.argument("scenario", type=_PATH)
 @click.option("-o", "--output", type=_PATH, help="The netCDF file; default outputs/<name>.nc.")
 @_SET
-@click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
-@click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
+@_SEED
+@_MEMBERS
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
 @click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
@@ -87,7 +92,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
-    from sim.ensemble.progress import Stages, announce_compiling, progress_bar
+    from sim.ensemble.progress import Stages, announce_compiling, log, progress_bar
 
     began, stages = time.time(), Stages()
     from sim.scenario.reader import load
@@ -103,6 +108,7 @@ def run(
         _fail(f"{target} exists; replace it with --force or name another output with -o", EXISTS)
 
     from sim.ensemble import plan as plans, preview, simulate
+    from sim.ensemble.workers import orders
 
     plan = plans.Plan.of(scene)
     for remark in [] if quiet else preview.remarks(plan):
@@ -112,10 +118,14 @@ def run(
     with contextlib.ExitStack() as shown:
         if not quiet:
             stages.shown = shown.enter_context(progress_bar(plans.work(plan)))
-        with _orders() as ordered:
+        with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
-            simulate.run(scene, target, **how, progress=stages.shown.advance)
-        shown.callback(lambda: simulate.write_log(target, began, sys.argv[1:], stages.ended()))
+            try:
+                simulate.run(scene, target, **how, progress=stages.shown.advance)
+            except (simulate.Stopped, KeyboardInterrupt) as stopped:
+                log(target, began, stages.ended())
+                _fail(_KEPT, getattr(stopped, "exit_code", INTERRUPTED))
+        shown.callback(lambda: log(target, began, stages.ended()))
         if tabulated := not (quiet or bare):
             stages.begin("table")
             with _opened(target) as dataset:
@@ -131,29 +141,13 @@ def _quantity(text: str, option: str, unit: str, **bounds: Any) -> float:
     from sim.units.quantity import Quantity
     from sim.units.refusals import BadInput
 
+    value: str | float = text
+    with contextlib.suppress(ValueError):
+        value = float(text)
     try:
-        return Quantity(unit, option, **bounds).read(text)
+        return Quantity(unit, option, **bounds).read(value)
     except ValueError as fault:
         raise BadInput([f"{option} {text}: {fault}"]) from None
-
-
-@contextlib.contextmanager
-def _orders() -> Iterator[Callable[[], bool]]:
-    """A context that gives whether to stop was ordered: the first order lets running blocks end, the second not."""
-    came: list[int] = []
-
-    def order(number: int, frame: object) -> None:
-        if came:
-            raise KeyboardInterrupt
-        came.append(number)
-        os.write(2, b"stopping after the blocks that run; a second order stops now\n")
-
-    before = {one: signal.signal(one, order) for one in _ORDERS}
-    try:
-        yield lambda: bool(came)
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
 
 
 def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
@@ -214,14 +208,16 @@ def _print_rows(rows: list[dict[str, str]]) -> None:
 @cli.command()
 @click.argument("scenario", type=_PATH)
 @_SET
-def check(scenario: Path, changes: tuple[str, ...]) -> None:
+@_SEED
+@_MEMBERS
+def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: int | None) -> None:
     """Print what a scenario would run: quantities in SI, models, errors known beforehand, time, memory, file size."""
     from sim.ensemble.preview import preview
     from sim.ensemble.progress import announce_compiling
     from sim.scenario.reader import load
 
     announce_compiling()
-    click.echo(preview(load(scenario, _overrides(changes), option="--set")))
+    click.echo(preview(load(scenario, _overrides(changes, seed, members), option="--set")))
 
 
 @cli.command()

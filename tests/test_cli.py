@@ -139,10 +139,11 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     assert run.returncode == (130 if len(orders) > 1 else 75)
     lines = [line for line in errors.splitlines() if line.strip() and " % of " not in line and "compiling" not in line]
     assert lines == [
-        "stopping after the blocks that run; a second order stops now",
-        "stopped; what was computed is kept: go on with --resume",
+        "stopping when the running blocks end; once more stops at once",
+        "stopped; what was computed is kept: the same command with --resume goes on",
     ]
     assert not (here / "outputs" / "scene.nc").exists()
+    assert "simulating" in Path("outputs/scene.nc.log").read_text()
     kept = {part: part.stat().st_mtime_ns for part in parts.glob("*.part")}
     assert kept
     other = sim(*long[:-1], 'sweep={"contact.load"={from=1e-3, to=4e-3, count=100}}', "--resume")

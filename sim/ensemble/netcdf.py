@@ -22,12 +22,13 @@ from sim.numerics.files import HDF5
 
 #: What HDF5 keeps of a variable in memory [byte]; its own 64 MiB hold every variable of a usual run whole.
 _CHUNK_CACHE = 4 * 2**20
-#: How netCDF packs a variable, by ``record.compression``; six digits are within 5e-7 (20 bits and the leading one).
+#: How netCDF packs a variable, by ``record.compression``; six digits are within 5e-7, 20 bits and
+#: the leading one, rounded to nearest, so that flags stay flags and what was equal stays so.
 _ZLIB: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
 _PACKED: dict[str, dict[str, Any]] = {
     "none": {},
     "zlib": _ZLIB,
-    "digits": _ZLIB | {"significant_digits": 6, "quantize_mode": "BitGroom"},
+    "digits": _ZLIB | {"significant_digits": 20, "quantize_mode": "BitRound"},
 }
 
 

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from sim.numerics.files import StoreTrouble, explained, locked, read_whole, sync, write_whole
+from sim.units.kept import digest
 from sim.units.refusals import BadInput
 
 Arrays = dict[str, np.ndarray]
@@ -111,6 +112,9 @@ class PartFiles:
         with explained(self.folder):
             write(beside)
             sync(beside)
+        if not _manifest(self.folder)["replace"]:
+            _link(beside, target)
+        with explained(self.folder):
             os.replace(beside, target)
             sync(target.parent)
 
@@ -118,19 +122,20 @@ class PartFiles:
         self, target: Path, wanted: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest]
     ) -> bool:
         """Take up a run or begin one, where that is what was asked for; gives whether the output is there already."""
-        folder, older, there = self.folder, _manifest(self.folder), target.exists()
+        folder, older, there, code = self.folder, _manifest(self.folder), target.exists(), digest().hex()
         run = read(target) if resume and there else {}
         if resume and run == wanted:
             return True
         if resume and (older or there):
-            _refuse_other(folder if older else target, older["run"] if older else run, wanted)
+            was, now = (older, {"run": wanted, "code": code}) if older else ({"run": run}, {"run": wanted})
+            _refuse_other(folder if older else target, was, now)
         if older and not (resume or replace):
             raise OutputExists(f"{folder} holds an unfinished run; go on with --resume, or begin anew with --force")
         if there and not (replace or older.get("replace")):
             raise OutputExists(f"{target} exists; replace it with --force or name another output")
         self.clean(keep=resume)
         with explained(folder):
-            manifest = {"format": _FORMAT, "replace": there, "run": wanted}
+            manifest = {"format": _FORMAT, "replace": there, "run": wanted, "code": code}
             write_whole(folder / _MANIFEST, json.dumps(manifest, sort_keys=True).encode())
         return False
 
@@ -199,6 +204,18 @@ def held(
             folder.rmdir()
 
 
+def _link(beside: Path, target: Path) -> None:
+    """Give a file its place where nothing has come meanwhile; a file system without links is asked before."""
+    try:
+        os.link(beside, target)
+    except FileExistsError:
+        cure = "move it away, and the same command with --resume goes on"
+        raise OutputExists(f"{target} has come during the run, which does not replace it: {cure}") from None
+    except OSError:
+        if target.exists():
+            raise OutputExists(f"{target} has come during the run, which does not replace it") from None
+
+
 def _make(folder: Path) -> None:
     """Make the folder; refuse one that no run made."""
     with explained(folder.parent):
@@ -219,8 +236,8 @@ def _manifest(folder: Path) -> Manifest:
 
 
 def _refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
-    """Refuse to go on with another scenario or other versions, naming what differs."""
-    was, now = _flat(older), _flat(wanted)
+    """Refuse to go on with another scenario, other versions or other code, naming what differs."""
+    was, now = (_flat(of.get("run")) | _flat({"code": of["code"]} if "code" in of else {}) for of in (older, wanted))
     changed = [key for key in sorted({*was, *now}) if was.get(key) != now.get(key)]
     if changed:
         some = [f"{key} was {_short(was.get(key))}, is {_short(now.get(key))}" for key in changed[:_MOST_NAMED]]

@@ -4,6 +4,7 @@ import contextlib
 import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import NamedTuple
 
 import click
@@ -78,3 +79,13 @@ def announce_compiling(quiet: bool = False) -> None:
             click.echo("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all", err=True)
 
     jit.on_compiling[:] = [announce]
+
+
+def log(target: Path, began: float, seconds: dict[str, float]) -> None:
+    """Write the log; trouble with it is a note, as it does not harm the output."""
+    from sim.ensemble import simulate
+
+    try:
+        simulate.write_log(target, began, sys.argv[1:], seconds)
+    except OSError as trouble:
+        click.echo(f"note: {target}.log was not written: {trouble}", err=True)

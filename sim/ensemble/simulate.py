@@ -134,7 +134,7 @@ def simulate(
             for point in task.points:
                 point.release()
     if any(name not in parts for task in tasks for name in task.names):
-        raise Stopped("stopped; what was computed is kept: go on with --resume")
+        raise Stopped("stopped; what was computed is kept")
 
 
 def advance_group(parts: Parts, task: Task, progress: Progress, stop: Callable[[], bool]) -> None:

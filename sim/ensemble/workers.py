@@ -12,8 +12,8 @@ import subprocess
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Sequence
-from multiprocessing import Pipe, get_context
+from collections.abc import Callable, Iterator, Sequence
+from multiprocessing import Pipe, current_process, get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import ForkProcess
 from typing import Any, cast
@@ -24,6 +24,7 @@ _TRIES = 3
 _LOOK = 0.2
 #: Each process has one core: libraries of linear algebra are not to start threads of their own.
 _ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR", "NUMBA")}
+#: Orders to stop, of a terminal or a scheduler.
 _ORDERS = signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1, signal.SIGXCPU
 
 #: Takes a task, a callback for what was done of it since the last call, and one that says whether to stop.
@@ -33,6 +34,8 @@ Work = Callable[[Any, Callable[[int], None], Callable[[], bool]], None]
 class WorkerDied(RuntimeError):
     """A process ended without a word, killed or after a crash inside a library."""
 
+    exit_code = 1
+
 
 class _Worker:
     """A process that does one task after the other; ``done`` is what it reported of the present one."""
@@ -40,14 +43,22 @@ class _Worker:
     def __init__(self, work: Work, copied: bool = False) -> None:
         self.connection, theirs = Pipe()
         self.process: subprocess.Popen[bytes] | ForkProcess
+        self.told = False
         if copied:
             self.process = get_context("fork").Process(target=_serve, args=(theirs, self.connection))
             with warnings.catch_warnings():  # the threads of numpy's BLAS, which Python warns of, survive a copy
                 warnings.simplefilter("ignore", DeprecationWarning)
                 self.process.start()
         else:
-            arguments = [sys.executable, "-c", f"from sim.ensemble.workers import serve; serve({theirs.fileno()})"]
-            self.process = subprocess.Popen(arguments, pass_fds=[theirs.fileno()], env=os.environ | _ONE_THREAD)
+            command = f"from sim.ensemble.workers import serve; serve({theirs.fileno()})"
+            # what this process would import, and nothing of the present folder beside
+            path = {"PYTHONPATH": os.pathsep.join(folder or os.getcwd() for folder in sys.path)}
+            arguments, environment = [sys.executable, "-P", "-c", command], os.environ | _ONE_THREAD | path
+            before = signal.pthread_sigmask(signal.SIG_BLOCK, _ORDERS)  # until the new process ignores them
+            try:
+                self.process = subprocess.Popen(arguments, pass_fds=[theirs.fileno()], env=environment)
+            finally:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
         theirs.close()
         self.number, self.done = -1, 0
         self.say(work)
@@ -59,6 +70,12 @@ class _Worker:
     def begin(self, number: int, task: Any) -> None:
         self.number, self.done = number, 0
         self.say(task)
+
+    def stop(self) -> None:
+        """Let the task end that runs: said once, as nobody reads it before that."""
+        if not self.told:
+            self.told = True
+            self.say(None)
 
     def end(self) -> str:
         """End the process; how it ended, if it was dead already."""
@@ -89,6 +106,7 @@ def _serve(connection: Connection, of_parent: Connection | None = None) -> None:
         of_parent.close()
     for order in _ORDERS:  # of a terminal or a scheduler: whoever gave the tasks decides
         signal.signal(order, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, _ORDERS)
     with contextlib.suppress(EOFError, ConnectionError):
         work: Work = connection.recv()
         while (task := connection.recv()) is not None:
@@ -104,8 +122,8 @@ def _serve(connection: Connection, of_parent: Connection | None = None) -> None:
 def in_process(work: Callable[..., None], *arguments: Any) -> None:
     """Do some work in a process of its own, so that a crash ends that process alone.
 
-    It is a copy of this process where that is safe: on Linux, without other threads that may hold a lock. A new one
-    first loads what the work needs, a quarter of a second.
+    It is a copy of this process where that is safe and allowed: on Linux, without other threads that may hold a lock,
+    and not of a daemon. A new one first loads what the work needs, a quarter of a second.
 
     Raises
     ------
@@ -114,7 +132,8 @@ def in_process(work: Callable[..., None], *arguments: Any) -> None:
     Exception
         Whatever the work raised.
     """
-    worker = _Worker(_call, copied=sys.platform == "linux" and threading.active_count() == 1)
+    alone = threading.active_count() == 1 and not current_process().daemon
+    worker = _Worker(_call, copied=sys.platform == "linux" and alone)
     try:
         worker.begin(0, (work, arguments))
         trouble = worker.connection.recv()
@@ -163,7 +182,7 @@ def share_out(
             stopped = stop()
             for worker in team:
                 if stopped:
-                    worker.say(None)
+                    worker.stop()
                 elif worker.number < 0 and left:
                     worker.begin(left[-1], tasks[left.pop()])
             busy: dict[Any, _Worker] = {worker.connection: worker for worker in team if worker.number >= 0}
@@ -195,3 +214,23 @@ def share_out(
             worker.end()
     if lost:
         raise WorkerDied(f"given up after {_TRIES} times each: {'; '.join(lost)}; the rest is done and kept")
+
+
+@contextlib.contextmanager
+def orders() -> Iterator[Callable[[], bool]]:
+    """A context that gives whether to stop was ordered: the first order lets running blocks end, the second not."""
+    came: list[int] = []
+
+    def order(number: int, frame: object) -> None:
+        if came:
+            raise KeyboardInterrupt
+        came.append(number)
+        with contextlib.suppress(OSError):  # of a terminal that is gone
+            os.write(2, b"stopping when the running blocks end; once more stops at once\n")
+
+    before = {one: signal.signal(one, order) for one in _ORDERS}
+    try:
+        yield lambda: bool(came)
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)

@@ -13,11 +13,13 @@ import functools
 import hashlib
 import inspect
 import pickle
+import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import llvmlite
 import numba
 import numpy as np
 from llvmlite.binding import add_symbol
@@ -43,14 +45,17 @@ _BLOCK = 4096
 
 @functools.cache
 def sources() -> dict[str, bytes]:
-    """Texts of the modules that import this one, by name."""
-    return {name: text for name, text in kept.sources().items() if b"sim.numerics.jit" in text}
+    """Texts of the modules that import this one and of those that they import, whose constants are compiled in."""
+    texts = kept.sources()
+    own = [name for name, text in texts.items() if b"sim.numerics.jit" in text]
+    imported = {word.decode() for name in own for word in re.findall(rb"^from (sim[\w.]*) import", texts[name], re.M)}
+    return {name: texts[name] for name in sorted({*own, *imported} & texts.keys())}
 
 
 @functools.cache
 def _cache_folder() -> str:
     """Folder of compiled code, named by a hash of versions and of all sources that import this module."""
-    digest = hashlib.sha256(f"{sys.version} {numba.__version__} {np.__version__}".encode())
+    digest = hashlib.sha256(f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
     for text in (Path(__file__).read_bytes(), *sources().values()):
         digest.update(text)
     return str(kept.folder() / digest.hexdigest()[:16])

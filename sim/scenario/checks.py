@@ -102,6 +102,8 @@ def _unrecorded_maps(record: Record, clock: Clock) -> Faults:
             said = f"{time:g} s is none of the recorded times; choose whole multiples of {between:g} s"
             yield ("record", "maps"), f"{said} up to {clock.duration:g} s"
             return
+    if len({round(time / between) for time in record.maps}) < len(record.maps):
+        yield ("record", "maps"), "names a time twice; give each once"
 
 
 def _too_many_map_members(record: Record, ensemble: Ensemble) -> Faults:

@@ -6,6 +6,7 @@ import hashlib
 import os
 import pickle
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +20,10 @@ _WORTH = 0.1
 def folder() -> Path:
     """Folder of what is kept: ``SIM_CACHE_DIR``, else the user's cache."""
     base = os.environ.get("SIM_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
-    return Path(base).expanduser() / "sliding-sim"
+    try:
+        return Path(base).expanduser() / "sliding-sim"
+    except RuntimeError:  # there is no home
+        return Path(tempfile.gettempdir()) / f"sliding-sim-{os.getuid()}"
 
 
 def read(path: Path) -> bytes | None:
@@ -52,12 +56,12 @@ def sources() -> dict[str, bytes]:
 
 
 @functools.cache
-def _digest() -> bytes:
+def digest() -> bytes:
     """Hash of what any result may depend on: the sources, and the version of Python."""
-    digest = hashlib.sha256(sys.version.encode())
+    found = hashlib.sha256(sys.version.encode())
     for text in sources().values():
-        digest.update(text)
-    return digest.digest()
+        found.update(text)
+    return found.digest()
 
 
 def found(key: Any, find: Callable[[], T]) -> T:
@@ -65,7 +69,7 @@ def found(key: Any, find: Callable[[], T]) -> T:
 
     The key holds all that the result depends on, versions of libraries and features of the processor included.
     """
-    path = folder() / "found" / hashlib.sha256(_digest() + pickle.dumps(key)).hexdigest()[:32]
+    path = folder() / "found" / hashlib.sha256(digest() + pickle.dumps(key)).hexdigest()[:32]
     with contextlib.suppress(Exception):
         return pickle.loads(read(path) or b"")
     began = time.process_time()

@@ -66,7 +66,17 @@ def killed(operation, scenario, path, **how):
     count, sync = itertools.count(1), os.fsync
 
     def step(event, *rest):
-        if event in {"open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.scandir", "os.listdir", "sync"}:
+        if event in {
+            "open",
+            "os.rename",
+            "os.remove",
+            "os.link",
+            "os.mkdir",
+            "os.rmdir",
+            "os.scandir",
+            "os.listdir",
+            "sync",
+        }:
             os.kill(os.getpid(), signal.SIGKILL if next(count) == operation else 0)
 
     status = 1
@@ -144,6 +154,25 @@ def test_parts_that_are_there_are_not_computed_again(tmp_path, monkeypatch):
     done_before = len(done)
     ensemble.run(sample(), tmp_path / "other.nc")
     assert len(done) - done_before == done_before + 3
+
+
+def test_a_file_that_comes_during_a_run_is_not_replaced(tmp_path):
+    path = tmp_path / "out.nc"
+    with pytest.raises(OutputExists, match="has come during the run, which does not replace it: move it away"):
+        ensemble.run(sample(), path, progress=lambda done: path.write_text("precious"))
+    assert path.read_text() == "precious"
+    path.rename(tmp_path / "kept")
+    whole = ensemble.run(sample(), tmp_path / "whole.nc").read_bytes()
+    assert ensemble.run(sample(), path, resume=True).read_bytes() == whole
+
+
+def test_parts_of_other_code_are_refused(tmp_path, monkeypatch):
+    stopped(sample(), tmp_path / "out.nc")
+    monkeypatch.setattr("sim.ensemble.part_files.digest", lambda: b"other")
+    with pytest.raises(
+        BadInput, match=r"out.nc.parts is of another run: code was .*, is 6f74686572; run what was begun"
+    ):
+        ensemble.run(sample(), tmp_path / "out.nc", resume=True)
 
 
 def test_a_finished_run_is_left_as_it_is(tmp_path):

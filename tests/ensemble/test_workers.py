@@ -10,6 +10,7 @@ import time
 from dataclasses import replace
 
 import pytest
+from helpers.chatty import chatty
 from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
 
 from sim.ensemble import plan as plans, simulate as ensemble
@@ -68,6 +69,28 @@ def test_no_task_is_begun_after_a_stop(tmp_path):
     asked = itertools.count()
     share_out(_call, tasks, 2, print, lambda: next(asked) > 1)
     assert len(list(tmp_path.iterdir())) == 2
+
+
+def test_a_stop_is_heard_however_much_is_reported(tmp_path):
+    heard = []
+    share_out(chatty, [2000, 2000], 2, heard.append, lambda: len(heard) > 5)
+    assert sum(heard) == 4000
+
+
+def test_processes_import_what_this_one_would_and_nothing_of_the_present_folder(tmp_path, monkeypatch):
+    for name in ("sim", "queue", "numpy"):
+        (tmp_path / f"{name}.py").write_text("raise SystemExit('wrong')")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", [path for path in sys.path if path])
+    share_out(_call, [code(f"open({str(tmp_path / 'done')!r}, 'x')")], 1, print, never)
+    assert (tmp_path / "done").exists()
+
+
+def test_a_daemon_may_run_scenes(tmp_path):
+    script = "import multiprocessing as m; from sim.ensemble.workers import in_process\n"
+    script += f"m.get_context('fork').Pool(1).apply(in_process, (open, {str(tmp_path / 'made')!r}, 'x'))"
+    subprocess.run([sys.executable, "-c", script], check=True)
+    assert (tmp_path / "made").exists()
 
 
 def sample(**parts):

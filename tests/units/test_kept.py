@@ -79,5 +79,5 @@ def test_a_result_is_found_once_for_each_key_and_only_if_it_took_long(tmp_path, 
     for path in tmp_path.rglob("found/*"):
         path.write_bytes(path.read_bytes()[:-1])
     assert kept.found("a", lambda: "anew") == "anew"
-    monkeypatch.setattr(kept, "_digest", lambda: b"of other sources")
+    monkeypatch.setattr(kept, "digest", lambda: b"of other sources")
     assert kept.found("a", lambda: "of others") == "of others"
