@@ -99,11 +99,11 @@ def test_a_run_that_was_killed_at_a_file_operation_goes_on_to_the_same_bytes(tmp
     path.parent.mkdir()
     while ended:
         ended = killed(operation, scenario, path)
-        assert ended in (0, -signal.SIGKILL)
+        assert ended in (0, -signal.SIGKILL) or (some == 1 and ended == 1)  # 1: the process that writes alone
         assert not path.exists() or path.read_bytes() == whole
         kept = {part.name: part.read_bytes() for part in path.parent.glob("*/*.part")}
         again = killed(operation // 2, scenario, path, resume=True)  # and a second time
-        assert again in (0, -signal.SIGKILL)
+        assert again in (0, -signal.SIGKILL) or (some == 1 and again == 1)
         for part in path.parent.glob("*/*.part"):
             assert part.read_bytes() == kept.get(part.name, part.read_bytes())
         assert ensemble.run(scenario, path, resume=True).read_bytes() == whole
