@@ -146,7 +146,7 @@ def leased(path: Path, beat: float = 10.0) -> Iterator[bool]:
 
     def renew() -> None:
         while not ended.wait(beat):
-            with contextlib.suppress(OSError):
+            with contextlib.suppress(OSError):  # five beats more come before the lease is taken for a dead one
                 os.utime(path)
 
     threading.Thread(target=renew, daemon=True).start()

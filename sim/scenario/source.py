@@ -30,7 +30,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Files:
-    """The files that a scenario names, relative to its own folder; remembers the text of each."""
+    """Files that a scenario names, relative to its own folder, and the text of each that was read."""
 
     folder: Path
     texts: dict[str, str] = field(default_factory=dict)

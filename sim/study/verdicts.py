@@ -50,7 +50,7 @@ def largest(errors: Array) -> Largest:
 
 
 def percent(error: float) -> str:
-    """A relative error in percent, two digits.
+    """Percentage of a relative error, two digits.
 
     >>> print(percent(0.0123), percent(2e-6), percent(0.0), percent(1.0))
     1.2 % 0.0002 % 0 % 100 %
