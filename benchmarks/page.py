@@ -13,7 +13,8 @@ user of numpy and scipy would write for the same work, or beside a step that no 
 
 - **Times** are CPU times on one core. In each turn of a row all its programs run one after the other, and a ratio is
   that of one turn. The result is the median over the turns, in brackets the ends of their middle half. Absolute times
-  differ between machines, and with what else they do; compare ratios.
+  differ between machines, and with what else they do; compare ratios. A time is that of one step of one member, of
+  one field, of one set of radii or of one whole command, as the first column says; commands use one process.
 - **"10 times faster"**: the other program takes 10 times our time. **"1.1 times as long"**: ours takes 1.1 times the
   other's. Ours is the slower one where a row reads "times slower", or more than 1 "times as long".
 - **Goals** for fields are meant beside the textbook's program, which makes its noise by a transform; a leaner one,
@@ -32,7 +33,8 @@ GROWTH = """
 
 *CPU time of loading a scene (hollow) and of running it into a file (filled); the grey line is linear growth. The rows
 above give the exponent over the last decade, in brackets the smallest and the largest between neighbouring points:
-for grids that of the run alone, as the modes of a cell are found once, at its start; else that of both together.*
+for grids that of the run alone, as the modes of a cell are found once, at its start; else that of both together.
+Where nothing else is named the scene is banded; its first loading groups the bands, which are kept.*
 
 `sim converge SCENARIO.toml` shows what the models cost and err on a scene of your own.
 """

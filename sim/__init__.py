@@ -93,9 +93,8 @@ def run(
         with progress_bar(work(Plan.of(scene))) if progress is True else contextlib.nullcontext(given) as shown:
             how: dict[str, Any] = {"replace": replace, "resume": resume, "jobs": jobs}
             return simulate.run(scene, to, **how, progress=shown.advance, stage=shown.begin)
-    except simulate.OutputExists as fault:
-        said = str(fault).replace("--resume", "resume=True").replace("--force", "replace=True")
-        raise BadInput([said.replace("-o", "to=")]) from None
+    except (simulate.OutputExists, BadInput) as fault:
+        raise BadInput([str(fault).replace("--resume", "resume=True").replace("--force", "replace=True")]) from None
 
 
 def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":

@@ -92,7 +92,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
-    from sim.ensemble.progress import Stages, announce_compiling, log, progress_bar
+    from sim.ensemble.progress import Stages, announce_compiling, log, note, progress_bar
 
     began, stages = time.time(), Stages()
     from sim.scenario.reader import load
@@ -112,7 +112,7 @@ def run(
 
     plan = plans.Plan.of(scene)
     for remark in [] if quiet else preview.remarks(plan):
-        click.echo(f"note: {remark}", err=True)
+        note(f"note: {remark}")
     jobs = jobs or plan.worthwhile(len(os.sched_getaffinity(0)))
     how: dict[str, Any] = {"replace": force, "resume": resume, "jobs": jobs, "stage": stages.begin}
     with contextlib.ExitStack() as shown:

@@ -115,7 +115,7 @@ class PartFiles:
         if not _manifest(self.folder)["replace"]:
             _link(beside, target)
         with explained(self.folder):
-            os.replace(beside, target)
+            os.replace(beside, target)  # which leaves two names of one file as they are
             sync(target.parent)
 
     def begin(

@@ -113,7 +113,7 @@ class Plan:
     @cached_property
     def _pieces(self) -> tuple[int, int]:
         """Members of a group and most steps of a block, by the first and the last point of the sweep."""
-        ends = {0: self.points[0], len(self.points): self.points[-1]}.values()
+        ends = self.points[0], self.points[-1]
         group = min(self.members, *(together(point) for point in ends))
         if self._seconds(group) > _SHARED_SECONDS:  # smaller groups for more cores, where a batch costs little
             batch, whole = (max(seconds_a_step(point, rows) for point in ends) for rows in (0, group))

@@ -13,6 +13,12 @@ import click
 _PAUSE = 30.0
 
 
+def note(text: str) -> None:
+    """Print a line to standard error; that nobody reads it ends no run."""
+    with contextlib.suppress(OSError):
+        click.echo(text, err=True)
+
+
 class Shown(NamedTuple):
     """What shows progress: ``advance`` takes what was done since its last call, ``begin`` the name of a stage."""
 
@@ -60,11 +66,11 @@ def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
         so_far += done
         if time.monotonic() - said > _PAUSE:
             said = time.monotonic()
-            click.echo(f"{100 * so_far / total:.0f} % of {total:,} {what}", err=True)
+            note(f"{100 * so_far / total:.0f} % of {total:,} {what}")
 
     def begin(stage: str) -> None:
         if stage and time.monotonic() - began > _PAUSE:  # shorter runs need no lines
-            click.echo(stage, err=True)
+            note(stage)
 
     yield Shown(advance, begin)
 
@@ -76,7 +82,7 @@ def announce_compiling(quiet: bool = False) -> None:
     def announce(name: str) -> None:
         jit.on_compiling.clear()
         if not quiet:
-            click.echo("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all", err=True)
+            note("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all")
 
     jit.on_compiling[:] = [announce]
 
@@ -88,4 +94,4 @@ def log(target: Path, began: float, seconds: dict[str, float]) -> None:
     try:
         simulate.write_log(target, began, sys.argv[1:], seconds)
     except OSError as trouble:
-        click.echo(f"note: {target}.log was not written: {trouble}", err=True)
+        note(f"note: {target}.log was not written: {trouble}")

@@ -77,10 +77,10 @@ class _Worker:
             self.told = True
             self.say(None)
 
-    def end(self) -> str:
-        """End the process; how it ended, if it was dead already."""
+    def end(self, patience: float = _LOOK) -> str:
+        """End the process, by force if it takes longer; how it ended."""
         self.connection.close()
-        if self._status(_LOOK) is None:
+        if self._status(patience) is None:
             self.process.kill()
         status = cast(int, self._status(None))
         return signal.Signals(-status).name if status < 0 else f"exit status {status}"
@@ -211,7 +211,9 @@ def share_out(
                     progress(said)
     finally:
         for worker in team:
-            worker.end()
+            worker.connection.close()
+        for worker in team:
+            worker.end(patience=_LOOK if worker.number < 0 else 0.0)
     if lost:
         raise WorkerDied(f"given up after {_TRIES} times each: {'; '.join(lost)}; the rest is done and kept")
 

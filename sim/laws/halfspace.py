@@ -454,14 +454,11 @@ def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
     """
     field = np.asarray(field, dtype=float)
     grid, unit = _unit_compliance(float(cell), field.shape[-1], float(poisson_ratio))
-    moduli = np.broadcast_to(shear_modulus, np.broadcast_shapes(field.shape[:-2], np.shape(shear_modulus)))
-    fields, displaced = (
-        np.broadcast_to(field, moduli.shape + field.shape[-2:]),
-        np.empty(moduli.shape + field.shape[-2:]),
-    )
-    for index, modulus in np.ndenumerate(moduli):
+    fields, moduli = np.broadcast_arrays(field, np.asarray(shear_modulus, dtype=float)[..., None, None])
+    displaced = np.empty(fields.shape)
+    for index in np.ndindex(fields.shape[:-2]):
         spectrum = scipy.fft.rfft2(fields[index])
-        spectrum *= unit / (modulus * grid.points**2)
+        spectrum *= unit / (moduli[*index, 0, 0] * grid.points**2)
         grid.superpose(spectrum, spectrum, displaced[index])
     return displaced
 

@@ -99,15 +99,6 @@ class Grid:
         """Half spectrum [unit of the field x m^2] of a field, over the last two axes."""
         return scipy.fft.rfft2(field) * self.spacing**2
 
-    def inverse(self, spectrum: np.ndarray) -> np.ndarray:
-        """Field of a half spectrum: undoes ``forward``."""
-        shape, fields = spectrum.shape[-2:], np.empty((*spectrum.shape[:-2], self.points, self.points))
-        between = np.empty(shape, dtype=complex)
-        for one, field in zip(spectrum.reshape(-1, *shape), fields.reshape(-1, *fields.shape[-2:]), strict=True):
-            self.superpose(one, between, field)
-            field /= self.cell**2
-        return fields
-
     def superpose(self, amplitudes: np.ndarray, between: np.ndarray, field: np.ndarray) -> None:
         """Write the sum over all wavevectors of amplitude × exp(i q.x), of a half spectrum, to ``field``.
 

@@ -98,14 +98,6 @@ def words_at(seed, part, c0, c1, c2, c3):
 
 
 @device
-def fill_words(seed, part, first, second, member, lane, count, words):
-    """Two words of each of ``count`` counters (first[i], second[i], member, lane), shape (2, at least count)."""
-    one, two = words[0], words[1]
-    for i in range(count):
-        one[i], two[i], _, _ = words_at(seed, part, first[i], second[i], member, lane)
-
-
-@device
 def stream(seed, part, member, step, lane):
     """The numbers of one member and step at their beginning; a ``lane`` of its own for each law of a part.
 

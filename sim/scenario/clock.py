@@ -55,10 +55,6 @@ class Clock:
         """Number of records, the one at t = 0 included."""
         return self.steps // self.stride + 1
 
-    def steps_of(self, records: range) -> range:
-        """Clock steps of some records, one after the other."""
-        return range(records.start * self.stride, (records.stop - 1) * self.stride + 1, self.stride)
-
     def time(self, step: int) -> float:
         """Time at the end of a step [s]; never accumulated."""
         return self.duration * (step / self.steps)

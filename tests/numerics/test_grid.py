@@ -14,10 +14,12 @@ def fields(points, members=(3,), seed=1):
 
 
 @pytest.mark.parametrize("points", SIZES)
-def test_inverse_undoes_forward(points):
+def test_a_half_spectrum_superposed_is_its_field(points):
     grid = Grid(cell=2.4e-4, points=points)
-    field = fields(points)
-    assert np.max(np.abs(grid.inverse(grid.forward(field)) - field)) < 1e-13
+    field, back = fields(points, members=()), np.empty((points, points))
+    spectrum = grid.forward(field) / grid.cell**2
+    grid.superpose(spectrum, np.empty_like(spectrum), back)
+    assert np.max(np.abs(back - field)) < 1e-13
 
 
 @pytest.mark.parametrize("points", SIZES)
@@ -73,12 +75,10 @@ def test_a_member_has_the_same_bits_alone_and_in_any_batch(points):
     batch = fields(points, members=(13,), seed=3)
     spectra = grid.forward(batch)
     squares = grid.mean_square(spectra)
-    back = grid.inverse(spectra)
     for member in (0, 6, 12):
         alone = grid.forward(batch[member])
         assert_array_equal(alone, spectra[member])
         assert grid.mean_square(alone) == squares[member]
-        assert_array_equal(grid.inverse(alone), back[member])
     assert_array_equal(grid.mean_square(grid.forward(batch[3:6])), squares[3:6])
 
 

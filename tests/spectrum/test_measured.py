@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.fields import field_of
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
@@ -47,7 +48,7 @@ def white_map(points, level, cell, seed=1):
     half = grid.forward(generator.normal(size=(points, points)))
     half *= math.sqrt(level) * cell / np.abs(half)
     half[0, 0] = 0.0
-    return grid.inverse(half)
+    return field_of(grid, half)
 
 
 def test_a_table_in_persson_s_convention_is_four_pi_squared_larger():
@@ -294,7 +295,7 @@ def test_a_hann_window_keeps_the_border_of_a_steep_map_from_leaking():
     grid = Grid(1.0, points)
     density = law.density(*grid.wavevectors)
     white = grid.forward(generator.normal(size=(count, points, points))) / grid.spacing
-    fields = grid.inverse(white * np.sqrt(density))[:, : points // 2, : points // 2]
+    fields = field_of(grid, white * np.sqrt(density))[:, : points // 2, : points // 2]
     part = Grid(0.5, points // 2)
     asked = law.density(*part.wavevectors)
     asked[asked == 0.0] = np.inf
@@ -315,7 +316,7 @@ def test_the_estimate_of_a_realisation_has_its_variance_and_energy():
     band = Band(1.0, longest=1 / 5, shortest=1 / 20)
     white = grid.forward(np.random.default_rng(9).normal(size=(64, 64))) / grid.spacing
     half = white * np.sqrt(band.density(*grid.wavevectors))
-    ring = radial_average(periodogram(grid.inverse(half), 1.0), grid)
+    ring = radial_average(periodogram(field_of(grid, half), 1.0), grid)
     found = Tabulated(ring.q, ring.density)
     modes = math.pi * (20**2 - 5**2) / 2
     # one realisation scatters by 1/sqrt(modes); a row at the cut-off smears it by half a ring, 5 %

@@ -60,10 +60,6 @@ class RuptureRate(NamedTuple):
         return self.softness > 0.0 and self.catch == 0.0 and self.limit == math.inf
 
 
-#: Type of a law in signatures of kernels.
-LAW = f"UniTuple(float64, {len(RuptureRate._fields)})"
-
-
 class _Law:
     """Attributes of all rupture laws.
 

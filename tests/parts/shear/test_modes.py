@@ -6,6 +6,7 @@ import math
 import mpmath
 import numpy as np
 import pytest
+from helpers.fields import field_of
 from numpy.testing import assert_allclose
 from scipy import integrate, special
 
@@ -314,7 +315,7 @@ def realisations(found: Modes, grid: Grid, count: int, seed: int):
     half[:, found.ix % grid.points, found.iy] = amplitude
     first = found.iy == 0  # its column holds q and -q
     half[:, -found.ix[first] % grid.points, 0] = amplitude[:, first].conj()
-    return grid.inverse(half * grid.cell**2)
+    return field_of(grid, half * grid.cell**2)
 
 
 @pytest.mark.parametrize("points", [21, 24])
