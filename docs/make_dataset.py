@@ -26,7 +26,7 @@ standard error of the mean over the members.
 MAPS = "record.maps"
 COORDINATES = (
     ("t", "s", "t", "time since the start", ""),
-    ("member", "1", "member", "number of the ensemble member", "members differ and record.per_member"),
+    ("member", "1", "member", "number of the ensemble member", "members differ and each is kept"),
     ("map_member", "1", "map_member", "member of a map", MAPS),
     ("map_time", "s", "map_time", "time of a map", MAPS),
     ("x", "m", "x", "position along the sliding direction", MAPS),

@@ -77,7 +77,7 @@ def _dimensions(made: Outline, plan: Plan) -> None:
     for axis in plan.scenario.sweep:
         made.sizes[variable_name(axis.keys[0])] = len(axis.values)
         _sweep_coordinates(made, plan, axis)
-    if plan.scenario.record.per_member and any(plan.varies(variable) for variable in plan.variables):
+    if plan.per_member and any(plan.varies(variable) for variable in plan.variables):
         made.sizes["member"] = plan.members
         described = "1", "number of the ensemble member", "", np.arange(plan.members)
         _add(made, "member", "i4", ("member",), *described, standard_name="realization")
@@ -107,9 +107,14 @@ def _label(value: Any) -> str:
     return str(value)
 
 
-def scenario_json(scenario: Scenario) -> str:
-    """The resolved scenario as canonical JSON: SI numbers throughout, and the sweep as it was given."""
+def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
+    """The resolved scenario as canonical JSON: SI numbers throughout, and the sweep as it was given.
+
+    ``per_member`` says whether every member is kept, where the scenario leaves that to the size of the run.
+    """
     dumped = TypeAdapter(Scenario).dump_python(scenario, by_alias=True, exclude={"source", "sweep"}, mode="json")
+    if per_member is not None:
+        dumped["record"]["per_member"] = per_member
     sweep = {"sweep": written(scenario.sweep)} if scenario.sweep else {}
     return json.dumps(dumped | sweep, sort_keys=True, default=str)
 
@@ -117,7 +122,7 @@ def scenario_json(scenario: Scenario) -> str:
 def attributes(plan: Plan) -> dict[str, Any]:
     """Global attributes: what ran, by which versions."""
     scene, source = plan.scenario, plan.scenario.origin
-    resolved = scenario_json(scene)
+    resolved = scenario_json(scene, plan.per_member)
     digest = hashlib.sha256(resolved.encode()).hexdigest()[:16]
     versions = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
     sim_version = importlib.metadata.version("sliding-sim")
@@ -179,7 +184,7 @@ def _derived_variables(made: Outline, plan: Plan) -> None:
 def _recorded(made: Outline, plan: Plan, recorded: Variable) -> Place:
     """Make the variables of a quantity at each record, or of each whole run."""
     shape, varies, whole = _sweep_shape(plan), plan.varies(recorded), recorded in plan.largest
-    each = varies and plan.scenario.record.per_member
+    each = varies and plan.per_member
     dimensions = (*_sweep_names(plan), *(("member",) if each else ()), *(() if whole else ("t",)))
     chunks = (
         *((1,) * (len(shape) - 1) + (len(plan.packs[0]),) if shape else ()),

@@ -23,6 +23,9 @@ _SCENARIO_BYTES, _STATISTICS, _MOST_STEPS = 2e4, 3, 10**9
 #: one for each process that is worth starting.
 _BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 5.0, 20.0, 4.0
 _SMALLEST_GROUP = 16
+#: What is left of trajectories by ``record.compression``, roughly; and the largest file of them that nobody asked for.
+LEFT = {"none": 1.0, "zlib": 0.4, "digits": 0.2}
+_MOST_BYTES = 20e9
 
 
 class Block(NamedTuple):
@@ -184,7 +187,7 @@ class Plan:
             blocks = self.blocks(points[0])
             for group, members in enumerate(self.groups()):
                 names = [part_name(pack.start, group, index) for index in range(len(blocks))]
-                yield Task(points, members, blocks, names, quantities, each, not self.scenario.record.per_member)
+                yield Task(points, members, blocks, names, quantities, each, not self.per_member)
 
     def groups(self) -> list[np.ndarray]:
         """The members of each group."""
@@ -193,14 +196,25 @@ class Plan:
     @cached_property
     def bytes(self) -> float:
         """Size of all that is recorded, before compression [byte]."""
-        record, points = self.scenario.record, len(self.points)
-        each = 4.0 if record.precision == "float32" else 8.0
-        total = _SCENARIO_BYTES + points * map_bytes(self.points[0], self.members)
+        maps = len(self.points) * map_bytes(self.points[0], self.members)
+        return _SCENARIO_BYTES + maps + self._trajectories(self.per_member)
+
+    @cached_property
+    def per_member(self) -> bool:
+        """Whether every member is kept; where the scenario leaves it open, unless they would make too large a file."""
+        record = self.scenario.record
+        if record.per_member is not None:
+            return record.per_member
+        return LEFT[record.compression] * self._trajectories(True) <= _MOST_BYTES
+
+    def _trajectories(self, per_member: bool) -> float:
+        """Size of the trajectories before compression [byte]."""
+        each, total = 4.0 if self.scenario.record.precision == "float32" else 8.0, 0.0
         for variable in self.variables:
             rows, size = 1, each
             if self.varies(variable):
-                rows, size = (self.members, each) if record.per_member else (_STATISTICS, 8.0)
-            total += rows * size * self.points[0].clock.records * points
+                rows, size = (self.members, each) if per_member else (_STATISTICS, 8.0)
+            total += rows * size * self.points[0].clock.records * len(self.points)
         return total
 
     def varies(self, variable: Variable) -> bool:

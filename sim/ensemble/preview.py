@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.ensemble.plan import Plan, map_bytes, seconds_a_step, work
+from sim.ensemble.plan import LEFT, Plan, map_bytes, seconds_a_step, work
 from sim.laws import jkr
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
@@ -21,9 +21,8 @@ from sim.scenario.scenario import Scenario
 _START, _TABLE, _TABULATED = 1.2, 0.9, 5e-9
 _POINT, _PART, _RECORD, _RECORD_OF_MEMBER, _BYTE = 15e-3, 5e-3, 5e-6, 2e-7, 50e-9
 _PROGRAM_BYTES = 200e6
-#: A file without its trajectories [byte], and what is left of those by ``record.compression``.
+#: A file without its trajectories [byte].
 _BARE = 1e5
-_LEFT = {"none": 1.0, "zlib": 0.4, "digits": 0.2}
 #: Points of a sweep whose cells are looked at.
 _MOST_POINTS = 8
 _MOST_WORDS = 6
@@ -62,7 +61,13 @@ def preview(scenario: Scenario) -> str:
 
 def remarks(plan: Plan) -> list[str]:
     """What is to be known before a run, one sentence each."""
-    return list(dict.fromkeys(text for point in _spread(plan.points) for text in point.remarks()))
+    found = [text for point in _spread(plan.points) for text in point.remarks()]
+    if plan.scenario.record.per_member is None and not plan.per_member:
+        found.append(
+            "every member would make a file of more than 20 GB: mean, spread and standard error are kept alone"
+            " (record.per_member = true keeps every member)"
+        )
+    return list(dict.fromkeys(found))
 
 
 def _spread(points: Sequence[Scenario]) -> list[Scenario]:
@@ -221,7 +226,7 @@ def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
         ("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core, table included")
     )
     rows.append(("memory", f"about {_size(held)}"))
-    packed = f"about {_size(_BARE + _LEFT[scene.record.compression] * plan.bytes)}"
+    packed = f"about {_size(_BARE + LEFT[scene.record.compression] * plan.bytes)}"
     before = "" if scene.record.compression == "none" else f", {_size(_BARE + plan.bytes)} before compression"
     return [*rows, ("file", packed + before)]
 

@@ -88,8 +88,12 @@ class Record:
     """What is kept: each member or the ensemble's mean, spread and standard error; maps at given times."""
 
     per_member: Annotated[
-        bool, Field(description="keep every member; false: mean, standard deviation and standard error alone")
-    ] = True
+        bool | None,
+        Field(
+            description="keep every member; false: mean, standard deviation and standard error alone; not given: every"
+            " member, unless their trajectories would make a file of more than 20 GB"
+        ),
+    ] = None
     maps: tuple[Annotated[float, Quantity("s", "time of a stress map", "t", at_least=0)], ...] = ()
     map_members: Annotated[int, Quantity("1", "members whose maps are kept", at_least=1, at_most=10**4, whole=True)] = 1
     quantities: Annotated[
