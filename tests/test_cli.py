@@ -182,7 +182,7 @@ def test_run_writes_the_dataset_into_a_new_folder_and_ends_with_its_path(here):
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1] == "new/folder/x.nc"
     assert len(done.stdout.splitlines()) > 3
-    assert sorted(path.name for path in (here / "new/folder").iterdir()) == ["x.nc", "x.nc.log"]
+    assert sorted(path.name for path in (here / "new/folder").iterdir()) == ["x.nc", "x.nc.log", "x.nc.sha256"]
     with xr.open_dataset("new/folder/x.nc") as dataset:
         assert dataset.sizes["member"] == 3
     entry = json.loads(Path("new/folder/x.nc.log").read_text())
@@ -353,8 +353,8 @@ def test_schema_is_json(here):
 
 
 def test_paper_ends_with_1_if_anything_fails(monkeypatch):
-    line = SimpleNamespace(name="a", equation="1", computed=1.0, expected=1.0, error=0.0, tolerance=1e-12, passed=True)
-    wrong = SimpleNamespace(**{**vars(line), "computed": 1.1, "error": 0.1, "passed": False})
+    line = paper.Check("a", "1", computed=1.0, expected=1.0, error=0.0, tolerance=1e-12)
+    wrong = line._replace(computed=1.1, error=0.1)
     monkeypatch.setattr(paper, "checks", lambda: [line])
     done = sim("paper")
     assert done.exit_code == 0

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.ensemble import checksums
 from sim.numerics.files import StoreTrouble, explained, locked, read_whole, sync, write_whole
 from sim.units.kept import digest
 from sim.units.refusals import BadInput
@@ -27,10 +28,13 @@ Arrays = dict[str, np.ndarray]
 Manifest = dict[str, Any]
 
 DATASET = "dataset.nc"
-_MANIFEST, _LOCK, _STATE = "manifest.json", "lock", "state."
+_SUMS = "dataset.nc.sha256"
+_MANIFEST, _LOCK, _STATE = checksums.MANIFEST, "lock", "state."
 _LOCKS = {_LOCK, "lease"}
 #: Names of the files that a run makes in its folder, whole or on the way.
-_OURS = re.compile(r"manifest\.json|lock|lease(\.\d+)?|dataset\.nc|point\d+-group\d+-block\d+\.part|\..*\.tmp")
+_OURS = re.compile(
+    r"manifest\.json|lock|lease(\.\d+)?|dataset\.nc(\.sha256)?|point\d+-group\d+-block\d+\.part|\..*\.tmp"
+)
 _DIGEST = hashlib.sha256().digest_size
 _FORMAT = "parts of a run of sim, 1"
 _MOST_NAMED, _LONGEST = 5, 40
@@ -107,42 +111,53 @@ class PartFiles:
             yield from arrays.items()
 
     def publish(self, target: Path, write: Callable[[Path], None]) -> None:
-        """Make the output beside the parts, sync it, and rename it into place."""
-        beside = self.folder / DATASET
+        """Make the output and its checksums beside the parts, sync them, and rename them into place.
+
+        The run is done when its manifest is removed: one that was killed between the two renames goes on.
+        """
+        beside, sums, manifest = self.folder / DATASET, self.folder / _SUMS, _manifest(self.folder)
         with explained(self.folder):
             write(beside)
             sync(beside)
-        if not _manifest(self.folder)["replace"]:
+            write_whole(sums, checksums.content(beside, manifest["source"], manifest["run"]))
+        _refuse_foreign(target)
+        if not manifest["replace"]:
             _link(beside, target)
         with explained(self.folder):
             os.replace(beside, target)  # which leaves two names of one file as they are
+            os.replace(sums, checksums.path_of(target))
             sync(target.parent)
 
     def begin(
-        self, target: Path, wanted: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest]
-    ) -> bool:
+        self, target: Path, wanted: Manifest, source: Manifest, resume: bool, replace: bool,
+        read: Callable[[Path], Manifest],
+    ) -> bool:  # fmt: skip
         """Take up a run or begin one, where that is what was asked for; gives whether the output is there already."""
+        _refuse_foreign(target)
         folder, older, there, code = self.folder, _manifest(self.folder), target.exists(), digest().hex()
         run = read(target) if resume and there else {}
-        if resume and run == wanted:
+        if resume and run == wanted and not older:
             return True
         if resume and (older or there):
             was, now = (older, {"run": wanted, "code": code}) if older else ({"run": run}, {"run": wanted})
             _refuse_other(folder if older else target, was, now)
         if older and not (resume or replace):
             raise OutputExists(f"{folder} holds an unfinished run; go on with --resume, or begin anew with --force")
-        if there and not (replace or older.get("replace")):
+        if there and run != wanted and not (replace or older.get("replace")):
             raise OutputExists(f"{target} exists; replace it with --force or name another output")
-        self.clean(keep=resume)
+        self.clean(keep=resume and bool(older))
         with explained(folder):
-            manifest = {"format": _FORMAT, "replace": there, "run": wanted, "code": code}
-            write_whole(folder / _MANIFEST, json.dumps(manifest, sort_keys=True).encode())
+            manifest = {"format": _FORMAT, "replace": there, "run": wanted, "source": source, "code": code}
+            write_whole(folder / _MANIFEST, json.dumps(manifest, sort_keys=True, default=str).encode())
         return False
 
     def clean(self, keep: bool) -> None:
-        """Remove what a run made here but its lock; of a run that goes on only what is damaged or half made."""
+        """Remove what a run made here but its lock; of a run that goes on only what is damaged or half made.
+
+        The manifest goes first: parts without one are none.
+        """
         with explained(self.folder):
-            for path in self.folder.iterdir():
+            for path in sorted(self.folder.iterdir(), key=lambda path: path.name != _MANIFEST):
                 sound = keep and (path.name == _MANIFEST or (path.suffix == ".part" and _sound(read_whole(path))))
                 if _OURS.fullmatch(path.name) and path.name not in _LOCKS and not sound:
                     path.unlink()
@@ -158,7 +173,7 @@ def _sound(content: bytes | memoryview) -> bool:
 
 @contextlib.contextmanager
 def held(
-    target: Path, wanted: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest]
+    target: Path, wanted: Manifest, source: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest]
 ) -> Iterator[PartFiles | None]:
     """A context with the parts of an output, under a lock; they stay when the run ends early and go when it is done.
 
@@ -168,6 +183,8 @@ def held(
         The netCDF file to be.
     wanted : dict
         What is to run, by which versions.
+    source : dict
+        Path, text, overrides and files of the scenario.
     resume : bool
         Whether to go on from the parts of an earlier run of the same, if there are any. Where the output is there
         already, the context gives None.
@@ -192,7 +209,7 @@ def held(
                 raise OutputBusy(f"another run is writing {target}; wait for it or name another output")
             parts = PartFiles(folder)
             try:
-                done = parts.begin(target, wanted, resume, replace, read)
+                done = parts.begin(target, wanted, source, resume, replace, read)
                 yield None if done else parts
                 with contextlib.suppress(OSError):  # the output is there: whatever stays here does no harm
                     parts.clean(keep=False)
@@ -202,6 +219,13 @@ def held(
     finally:
         with contextlib.suppress(OSError):  # of a run that goes on, or with files of others
             folder.rmdir()
+
+
+def _refuse_foreign(target: Path) -> None:
+    """Refuse to replace a file in the place of the checksums that no run made."""
+    place = checksums.path_of(target)
+    if not checksums.known(place):
+        raise OutputExists(f"{place} holds no checksums of a run; move it away or name another output")
 
 
 def _link(beside: Path, target: Path) -> None:

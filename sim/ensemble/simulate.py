@@ -102,7 +102,8 @@ def run(
         raise OutputExists(f"{target} exists; replace it with --force or name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
-    with held(target, identity(attributes(plan)), resume, replace, lambda path: identity(attributes_of(path))) as parts:
+    wanted, source = identity(attributes(plan)), scenario.origin.written
+    with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path))) as parts:
         if parts is not None:
             simulate(plan, parts, progress, jobs, stop)
             stage("writing")

@@ -27,6 +27,11 @@ class Source:
         kept = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
         return Source(self.path, self.text, kept | values, self.files)
 
+    @property
+    def written(self) -> dict[str, Any]:
+        """Path, text, overrides and files, of which another process makes the same source."""
+        return {"path": self.path, "text": self.text, "overrides": self.overrides, "files": self.files}
+
 
 @dataclass(frozen=True)
 class Files:

@@ -73,6 +73,19 @@ class Check(NamedTuple):
         """True if the error is within the tolerance; False for nan."""
         return self.error <= self.tolerance
 
+    @property
+    def row(self) -> dict[str, str]:
+        """The line as a row of a table, by its headings."""
+        return {
+            "": "ok" if self.passed else "FAILS",
+            "equation": self.equation,
+            "what": self.name,
+            "computed": f"{self.computed:.9g}",
+            "expected": f"{self.expected:.9g}",
+            "error": f"{self.error:.1e}",
+            "allowed": f"{self.tolerance:.0e}",
+        }
+
 
 #: What ``_check`` takes: name, equation, computed and expected value or values, largest error unless 1e-12.
 Row = tuple[Any, ...]

@@ -68,7 +68,7 @@ def test_the_file_opens_lazily_and_equals_the_run_in_memory(tmp_path):
         assert from_disk["contact_radius"].dims == ("contact_load", "adhesion_bond_share", "member", "t")
         assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
         xr.testing.assert_identical(from_disk.load(), ensemble.run(scenario))
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["out.nc"]
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["out.nc", "out.nc.sha256"]
 
 
 def test_equal_runs_are_equal_bytes(tmp_path):

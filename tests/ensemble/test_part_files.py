@@ -14,6 +14,7 @@ import xarray as xr
 from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
 
 from sim.ensemble import plan as plans, simulate as ensemble
+from sim.ensemble.checksums import verify
 from sim.ensemble.part_files import OutputBusy, OutputExists, PartFiles, held
 from sim.ensemble.plan import Plan
 from sim.numerics.files import StoreTrouble, leased, locked
@@ -33,6 +34,10 @@ def sample(**parts):
     defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
     sweep = read_sweep({"contact.load": [1e-3, 4e-3]})
     return replace(scene(parts.pop("members", 3), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
 
 
 def test_blocks_hold_every_step_once_and_end_at_records_or_between_them(monkeypatch):
@@ -107,7 +112,8 @@ def test_a_run_that_was_killed_at_a_file_operation_goes_on_to_the_same_bytes(tmp
         for part in path.parent.glob("*/*.part"):
             assert part.read_bytes() == kept.get(part.name, part.read_bytes())
         assert ensemble.run(scenario, path, resume=True).read_bytes() == whole
-        assert [left.name for left in path.parent.iterdir()] == ["out.nc"]
+        assert names(path.parent) == ["out.nc", "out.nc.sha256"]
+        verify(path)
         path.unlink()
         operation += some
     assert operation > 100
@@ -182,7 +188,7 @@ def test_a_finished_run_is_left_as_it_is(tmp_path):
     assert path.stat().st_mtime_ns == before.st_mtime_ns
     with pytest.raises(BadInput, match=r"out.nc is of another run: scenario.seed was 5, is 6"):
         ensemble.run(sample(seed=6), path, resume=True)
-    assert [left.name for left in tmp_path.iterdir()] == ["out.nc"]
+    assert names(tmp_path) == ["out.nc", "out.nc.sha256"]
 
 
 def test_a_run_that_replaces_an_output_and_is_stopped_goes_on_to_replace_it(tmp_path):
@@ -246,7 +252,7 @@ def test_a_lock_that_is_no_plain_file_is_neither_followed_nor_waited_for(tmp_pat
 
 def test_two_runs_do_not_share_an_output(tmp_path):
     path = tmp_path / "out.nc"
-    with held(path, {}, resume=False, replace=False, read=dict), pytest.raises(OutputBusy, match="another run"):
+    with held(path, {}, {}, resume=False, replace=False, read=dict), pytest.raises(OutputBusy, match="another run"):
         ensemble.run(sample(), path)
 
 
@@ -281,10 +287,10 @@ def test_where_the_file_system_has_no_locks_a_lease_stands_in(tmp_path, monkeypa
     path = tmp_path / "out.nc"
     with monkeypatch.context() as patched:
         patched.setattr("fcntl.flock", none)
-        with held(path, {}, resume=False, replace=False, read=dict), pytest.raises(OutputBusy, match="another run"):
+        with held(path, {}, {}, resume=False, replace=False, read=dict), pytest.raises(OutputBusy, match="another run"):
             ensemble.run(sample(), path)
         whole = ensemble.run(sample(), path).read_bytes()
-    assert [left.name for left in tmp_path.iterdir()] == ["out.nc"]
+    assert names(tmp_path) == ["out.nc", "out.nc.sha256"]
     assert ensemble.run(sample(), path, replace=True).read_bytes() == whole
 
 
@@ -311,8 +317,8 @@ def test_trouble_after_the_output_is_there_does_not_undo_it(tmp_path, monkeypatc
             raise OSError(errno.EIO, "I/O error")
         clean(parts, keep)
 
-    monkeypatch.setattr(PartFiles, "clean", broken)
-    assert ensemble.run(sample(), tmp_path / "out.nc").exists()
-    monkeypatch.undo()
+    with monkeypatch.context() as patched:
+        patched.setattr(PartFiles, "clean", broken)
+        assert ensemble.run(sample(), tmp_path / "out.nc").exists()
     ensemble.run(sample(), tmp_path / "out.nc", resume=True)
-    assert [left.name for left in tmp_path.iterdir()] == ["out.nc"]
+    assert names(tmp_path) == ["out.nc", "out.nc.sha256"]

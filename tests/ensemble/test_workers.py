@@ -105,7 +105,12 @@ def test_any_number_of_processes_gives_the_same_bytes(tmp_path, monkeypatch, job
     alone, counted = ensemble.run(sample(), tmp_path / "alone.nc").read_bytes(), []
     assert ensemble.run(sample(), tmp_path / "out.nc", jobs=jobs, progress=counted.append).read_bytes() == alone
     assert sum(counted) == plans.work(Plan.of(sample()))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["alone.nc", "out.nc"]
+    assert sorted(path.name for path in tmp_path.glob("*.nc*")) == [
+        "alone.nc",
+        "alone.nc.sha256",
+        "out.nc",
+        "out.nc.sha256",
+    ]
 
 
 def test_a_run_whose_processes_are_killed_gives_the_same_bytes(tmp_path, monkeypatch):
