@@ -7,11 +7,11 @@ import sys
 import time
 from pathlib import Path
 
-import click
 import netCDF4
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from helpers.commands import sim
 
 from sim import cli
 from sim.ensemble import progress
@@ -54,26 +54,6 @@ def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("scene.toml").write_text(SCENE)
     return tmp_path
-
-
-def sim(*arguments):
-    """A command as ``main`` runs it, in this process: exit code, output, errors."""
-    return CliRunner().invoke(_main(), list(map(str, arguments)))
-
-
-def _main():
-    """``cli.main`` as a click command, so that the runner can catch what it prints."""
-
-    @click.command(context_settings={"ignore_unknown_options": True, "help_option_names": []})
-    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
-    def run(arguments):
-        before, sys.argv = sys.argv, ["sim", *arguments]
-        try:
-            cli.main()
-        finally:
-            sys.argv = before
-
-    return run
 
 
 # --- processes of their own: exit codes and imports ---
@@ -442,9 +422,9 @@ def test_what_is_no_dataset_is_told_in_one_line(dataset, here, name):
         ("nope.nc", "nope.nc: there is no such file; name a dataset"),
         (".", ".: is a folder; name a dataset"),
         ("scene.toml", "scene.toml: is a scenario; name the dataset that `sim run` makes of it"),
-        ("cut.nc", "cut.nc: is not a netCDF file, or is cut short; run the scenario again"),
-        ("stub.nc", "stub.nc: is not a netCDF file, or is cut short; run the scenario again"),
-        ("empty.nc", "empty.nc: is not a netCDF file, or is cut short; run the scenario again"),
+        ("cut.nc", "cut.nc: is not a netCDF file, or is cut short or damaged; run the scenario again"),
+        ("stub.nc", "stub.nc: is not a netCDF file, or is cut short or damaged; run the scenario again"),
+        ("empty.nc", "empty.nc: is not a netCDF file, or is cut short or damaged; run the scenario again"),
         ("foreign.nc", "foreign.nc: was not written by `sim run`; name one of its outputs"),
     ):
         done = sim(name, file)

@@ -19,6 +19,7 @@ import numpy as np
 from sim.ensemble.part_files import Parts
 from sim.ensemble.workers import in_process
 from sim.numerics.files import HDF5
+from sim.numerics.hdf5 import Refused, opened
 
 #: What HDF5 keeps of a variable in memory [byte]; its own 64 MiB hold every variable of a usual run whole.
 _CHUNK_CACHE = 4 * 2**20
@@ -153,11 +154,11 @@ def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def attributes_of(path: Path) -> dict[str, Any]:
-    """Global attributes of a netCDF file; none of what is no such file."""
+    """Global attributes of a netCDF file; none of what is no such file, or is not read."""
     # of who reads a dataset lazily in another thread; where xarray is not imported nobody does
     reading = getattr(sys.modules.get("xarray.backends.netCDF4_"), "NETCDF4_PYTHON_LOCK", contextlib.nullcontext())
     try:
-        with HDF5, reading, netCDF4.Dataset(path) as file:
+        with HDF5, reading, opened(path) as file:
             return {name: file.getncattr(name) for name in file.ncattrs()}
-    except (OSError, RuntimeError):
+    except (OSError, RuntimeError, Refused):
         return {}

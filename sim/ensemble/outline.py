@@ -12,6 +12,7 @@ from pydantic import TypeAdapter
 from sim.ensemble.netcdf import Described, Outline, Piece, Place
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
+from sim.numerics import hdf5
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
@@ -147,11 +148,12 @@ def attributes(plan: Plan) -> dict[str, Any]:
 
 def identity(found: Mapping[str, Any]) -> dict[str, Any]:
     """What decides the numbers of a dataset, of its attributes: the scenario, its files, and the versions."""
-    if "scenario_resolved" not in found:
+    if not (scenario := hdf5.tables(found.get("scenario_resolved"))):
         return {}
-    files = {name: entry["sha256"] for name, entry in json.loads(found["scenario_files"]).items()}
+    files = hdf5.tables(found.get("scenario_files"))
+    digests = {name: entry.get("sha256") for name, entry in files.items() if isinstance(entry, dict)}
     versions = {key.removesuffix("_version"): found[key] for key in found if key.endswith("_version")}
-    return {"scenario": json.loads(found["scenario_resolved"]), "files": files, "version": versions}
+    return {"scenario": scenario, "files": digests, "version": versions}
 
 
 def _scenario_variables(made: Outline, plan: Plan) -> None:

@@ -96,7 +96,7 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
         for key in shear[table]:
             with contextlib.suppress(KeyError):
                 shear[table][key] = style.number_at(setting(dataset, f"shear.{table}.{key}"), at)
-    spectrum = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
+    spectrum = _spectrum(shear["spectrum"])
     if spectrum.wavevector is not None:
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
     if shear["amplitude"].get("relaxing"):  # the field lags behind its amplitude: only the shape can be compared
@@ -106,6 +106,13 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
     factor = amplitude.factor(*(_then(dataset, name, at, stress) for name in ("speed", "shear_stress")))
     return spectrum, float(np.mean(factor**2)), "target"
+
+
+def _spectrum(table: dict[str, Any]) -> Any:
+    """The spectrum of a dataset's scenario; the rows of one from a file stand in the dataset."""
+    if table.get("file") and not table.get("wavenumbers"):
+        raise ValueError("the spectrum names a file, whose rows the dataset lacks; run the scenario again")
+    return TypeAdapter(Spectrum).validate_python(table)
 
 
 def _grid_of(stress: xr.DataArray) -> Grid:

@@ -20,10 +20,12 @@ from sim.spectrum.periodogram import periodogram, radial_average
 from sim.spectrum.radial import PowerLaws
 from sim.spectrum.tabulated import Densities, FromFile, Wavenumbers, by_name
 from sim.units.quantity import Quantity
-from sim.units.table import file_fault, file_path, file_text, matrix
+from sim.units.table import TableError, file_fault, file_path, file_text, matrix
 
 _STRESS = Quantity("Pa", "shear stress", "τ1")
 _SPACING = Quantity("m", "distance between neighbouring points of the map", "h", above=0)
+#: Most numbers of a map.
+_MOST = 10**8
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -84,8 +86,8 @@ class Measured(FromFile):
             else:
                 maps = matrix(source, _STRESS)
             q, density = _estimate(maps, spacing, window)
-        except (OSError, ValueError, RuntimeError) as fault:
-            raise file_fault(name, fault) from None
+        except (OSError, ValueError, RuntimeError, MemoryError) as fault:
+            raise file_fault(name, fault, info.context) from None
         return {**values, "spacing": spacing, "wavenumbers": q.tolist(), "densities": density.tolist()}
 
     @functools.cached_property
@@ -96,15 +98,22 @@ class Measured(FromFile):
 
 def _read_netcdf(path: Path, variable: str, spacing: float | None) -> tuple[Array, float | None]:
     """Maps (..., x, y) [Pa] and their spacing [m]."""
-    import xarray as xr  # heavy: only where a map is read
+    from sim.numerics import hdf5  # heavy: only where a map is read
 
-    with HDF5, xr.open_dataset(path, decode_times=False) as dataset:
+    try:
+        dataset = hdf5.lazily(path)
+    except hdf5.Refused as fault:
+        raise ValueError(f"{fault}; write the map anew, as a plain variable") from None
+    with HDF5, dataset:
         if variable not in dataset:
-            found = ", ".join(map(str, dataset.data_vars))[:80]
-            raise ValueError(f'there is no variable "{variable}" (found: {found}); name it by variable = "..."')
-        data = dataset[variable].load()
-    if data.ndim < 2:
-        raise ValueError(f'"{variable}" has no two dimensions; name a map by variable = "..."')
+            said = f'there is no variable "{variable}"; name it by variable = "..."'
+            raise TableError(said, map(str, dataset.data_vars))
+        data = dataset[variable]
+        if data.ndim < 2 or data.dtype.kind not in "fiu":
+            raise ValueError(f'"{variable}" has no two dimensions, or no numbers; name a map by variable = "..."')
+        if data.size > _MOST:
+            raise ValueError(f'"{variable}" has more than {_MOST:.0e} numbers; crop the map')
+        data = data.load()
     if {"x", "y"} <= set(data.dims):
         data = data.transpose(..., "x", "y")
         spacing = _coordinate_spacing(data, spacing)
@@ -113,7 +122,7 @@ def _read_netcdf(path: Path, variable: str, spacing: float | None) -> tuple[Arra
 
 def _factor(data: Any, quantity: Quantity) -> float:
     """Factor to SI from a netCDF variable's ``units``; without the attribute it is SI."""
-    unit = data.attrs.get("units", quantity.unit)
+    unit = str(data.attrs.get("units", quantity.unit))
     return Quantity(quantity.unit, quantity.meaning).read(f"1 {unit}")
 
 

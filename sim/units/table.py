@@ -2,8 +2,9 @@
 
 import contextlib
 import csv
+import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,8 +17,19 @@ from sim.units.quantity import Quantity
 _HEADER = re.compile(r"\s*(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?\s*")
 
 
+#: What a header's names look like; whatever else stands in a file is shown by no message.
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_ .-]{0,19}")
+
+
 class TableError(ValueError):
-    """A table that cannot be read; the message names the line and the cure, not the file."""
+    """A table that cannot be read; the message names the line and the cure, not the file nor what stands in it.
+
+    ``names`` are those that its header has in place of one that is wanted.
+    """
+
+    def __init__(self, said: str, names: Iterable[str] = ()):
+        super().__init__(said)
+        self.names = tuple(names)
 
 
 def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.float64]]:
@@ -111,8 +123,8 @@ def _header(at: int, header: list[str], wanted: dict[str, Quantity], example: st
     found = {}
     for name, quantity in wanted.items():
         if names.count(name) != 1:
-            what = "is there twice" if name in names else f"is missing (found: {', '.join(names)[:80]})"
-            raise TableError(f'line {at}: column "{name}" {what}; write the header as "{example}"')
+            what = "is there twice" if name in names else "is missing"
+            raise TableError(f'line {at}: column "{name}" {what}; write the header as "{example}"', names)
         place = names.index(name)
         found[name] = (place, _unit(at, name, split[place]["unit"], quantity))
     return found
@@ -125,11 +137,11 @@ def _unit(at: int, name: str, unit: str | None, quantity: Quantity) -> str:
     free = Quantity(quantity.unit, quantity.meaning)  # one unit need not lie within the bounds
     try:
         if not re.match(r"[A-Za-zµμΩ°%]|1/", unit):
-            raise ValueError(f'has the unit "{unit}", which is no unit')
+            raise ValueError(unit)
         free.read(f"1 {unit}")
-    except ValueError as fault:
-        cure = _column(name, quantity)
-        raise TableError(f'line {at}: column "{name}" {_words(fault)}; write the column as "{cure}"') from None
+    except ValueError:
+        said = f'has a unit that is not a unit of {quantity.unit}; write the column as "{_column(name, quantity)}"'
+        raise TableError(f'line {at}: column "{name}" {said}') from None
     return unit
 
 
@@ -137,18 +149,18 @@ def _number(at: int, name: str, cell: str, unit: str, quantity: Quantity) -> flo
     try:
         number = float(cell)
     except ValueError:
-        said = f'"{cell[:40]}"' if cell else "an empty cell"
-        raise TableError(f"line {at}: {name} is {said}, not a number; write a plain number") from None
+        said = "" if cell else " an empty cell,"
+        raise TableError(f"line {at}: {name} is{said} not a number; write a plain number") from None
     try:
         return quantity.read(f"{number!r} {unit}" if unit else number)
     except ValueError as fault:
-        raise TableError(f"line {at}: {name} {_words(fault)} (the cell holds {cell})") from None
+        raise TableError(f"line {at}: {name} {_words(fault)}") from None
 
 
 def _words(fault: ValueError) -> str:
-    """The first sentence of a fault, without the example that does not fit a table."""
+    """What a number must be, without the number, and without the example that does not fit a table."""
     text = fault.message() if isinstance(fault, PydanticCustomError) else str(fault)
-    return text.split("; write for example")[0]
+    return re.split("; write for example|, not |: ", text)[0]
 
 
 def file_text(name: str, context: Any) -> str:
@@ -176,12 +188,19 @@ def file_columns(name: str, context: Any, wanted: dict[str, Quantity]) -> dict[s
     try:
         return columns(file_text(name, context), wanted)
     except TableError as fault:
-        raise file_fault(name, fault) from None
+        raise file_fault(name, fault, context) from None
 
 
-def file_fault(name: str, fault: Exception) -> PydanticCustomError:
-    """A fault of what a file holds; of libraries' messages the first line."""
+def file_fault(name: str, fault: Exception, context: Any) -> PydanticCustomError:
+    """A fault of what a file holds; of libraries' messages the first line.
+
+    Names that it has are shown only of a file in the scenario's folder: one elsewhere may be no table of who reads it.
+    """
     reason = str(fault).partition("\n")[0]
+    names = [one for one in getattr(fault, "names", ()) if _NAME.fullmatch(one)]
+    folder = context["files"].folder if context and "files" in context else Path()
+    if names and (folder / name).resolve().is_relative_to(folder.resolve()):
+        reason += f" (found: {', '.join(names[:8])})"
     return PydanticCustomError("bad_table", "{file}: {reason}", {"file": name, "reason": reason})
 
 
@@ -189,7 +208,7 @@ def file_path(name: str, context: Any) -> Path:
     """Where a file that a scenario names lies; arguments and errors as ``file_text``."""
     with _readable(name):
         path = context["files"].path(name) if context and "files" in context else Path(name)
-        path.open("rb").close()
+        open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb").close()  # a pipe is not waited for
         return path
 
 

@@ -579,7 +579,7 @@ TABLE = ('model = "ramp"\nfrom = "10 um/s"\nto = "100 mm/s"\nscale = "log"', 'mo
         ("", "the table is empty...header"),
         ("time [s]\n0\n", 'line 1: column "speed" is missing...header'),
         ("time [s], speed [kg]\n0, 1\n", 'line 1: column "speed"...not a unit of m/s'),
-        ("time [s], speed [m/s]\n0, 1\n2, fast\n", 'line 3: speed is "fast"...plain number'),
+        ("time [s], speed [m/s]\n0, 1\n2, fast\n", "line 3: speed is not a number...plain number"),
         ("time [s], speed [m/s]\n0, 1\n2\n", "line 3: 1 cells...2"),
         (b"time [s], speed [m/s]\n0, \xff\n", "UTF-8"),
     ],

@@ -102,7 +102,7 @@ def test_a_table_is_read_from_csv_with_its_units(files):
         ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 0\n", "every density is zero"),
         ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
         ("q [rad/m], C [Pa^2 m^2]\n1, -1\n2, 0\n", "line 2: C must be at least 0"),
-        ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", r'line 1: column "C" has the unit "Pa\^2", which is not a unit of'),
+        ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", 'line 1: column "C" has a unit that is not a unit of'),
         ("k, S\n1, 1\n2, 0\n", 'psd.csv: line 1: column "q" is missing'),
         ("", "psd.csv: the table is empty"),
     ],
@@ -239,7 +239,7 @@ def test_netcdf_without_coordinates_takes_the_spacing_of_the_key(files):
     assert_allclose(found.densities, 1.0, rtol=1e-10, atol=0)
     for given, words in [
         ({"variable": "tau"}, "no coordinates; give spacing"),
-        ({"variable": "tua", "spacing": 0.1}, r'no variable "tua" \(found: tau\)'),
+        ({"variable": "tua", "spacing": 0.1}, r'no variable "tua"; .* \(found: tau\)'),
     ]:
         with pytest.raises(ValidationError, match=words):
             read(files, model="measured", file="maps.nc", **given)
@@ -272,7 +272,7 @@ def test_a_wrong_map_is_refused_with_the_cure(files, change, words):
         ({"file": "missing.csv", "spacing": 1}, "missing.csv cannot be read"),
         ({"file": "missing.nc", "spacing": 1}, "missing.nc cannot be read"),
         ({"file": "a.nc", "spacing": 1}, "a.nc: "),
-        ({"file": "bad.csv", "spacing": 1}, 'bad.csv: line 1: value is "x"'),
+        ({"file": "bad.csv", "spacing": 1}, "bad.csv: line 1: value is not a number"),
         ({"file": "a.csv", "spacing": "-1 m"}, "above 0"),
         ({"file": "a.csv", "spacing": 1, "window": "box"}, "'none' or 'hann'"),
         ({"spacing": 1}, "file"),

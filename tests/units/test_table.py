@@ -56,25 +56,25 @@ def test_units_of_more_than_one_word_are_read():
         ("", r'the table is empty; begin with a header such as "time \[s\], speed \[m/s\]"'),
         ("# only this\n\n", "the table is empty"),
         ("time [s], speed [m/s]\n", "line 1: no rows follow the header"),
-        ("time [s], sped [m/s]\n1,2", r'line 1: column "speed" is missing \(found: time, sped\); write the header'),
+        ("time [s], sped [m/s]\n1,2", r'line 1: column "speed" is missing; write the header'),
         ("time [s]; speed [m/s]\n1;2", 'line 1: a header cell cannot be read; write the header as "time'),
         ("time [s]\tspeed [m/s]\n1\t2", "line 1: a header cell cannot be read"),
         ("1, 2\n3, 4", 'line 1: column "time" is missing'),
         ("time [s], time [ms], speed [m/s]\n1,2,3", 'column "time" is there twice'),
-        ("#\ntime [s], speed [m]\n1,2", r'line 2: column "speed" has the unit "m", which is not a unit of m/s; .*\['),
-        ("time [s], speed [furlongs/blink]\n1,2", "unknown unit"),
-        ("time [s], speed [1]\n1,2", 'the unit "1"'),
-        ("time [s], speed []\n1,2", 'the unit ""'),
+        ("#\ntime [s], speed [m]\n1,2", r'line 2: column "speed" has a unit that is not a unit of m/s; .*\['),
+        ("time [s], speed [furlongs/blink]\n1,2", "not a unit of m/s"),
+        ("time [s], speed [1]\n1,2", "not a unit of m/s"),
+        ("time [s], speed []\n1,2", "not a unit of m/s"),
         ("time [s], speed [m/s\n1,2", "header cell cannot be read"),
         ("time [s], speed [m/s]\n1,2\n3", "line 3: 1 cells where the header has 2"),
         ("time [s], speed [m/s]\n1,2,3", "line 2: 3 cells where the header has 2; .* decimals with a point"),
-        ("time [s], speed [m/s]\n1,2\n\n3,fast", 'line 4: speed is "fast", not a number; write a plain number'),
+        ("time [s], speed [m/s]\n1,2\n\n3,fast", "line 4: speed is not a number; write a plain number"),
         ("time [s], speed [m/s]\n1,", "line 2: speed is an empty cell"),
         ("time [s], speed [m/s]\n1,nan", "line 2: speed must be finite"),
         ("time [s], speed [m/s]\n1,-inf", "line 2: speed must be finite"),
         ("time [s], speed [m/s]\n1,1e999", "line 2: speed must be finite"),
-        ("time [s], speed [m/s]\n-1,1", r"line 2: time must be at least 0 s, not -1 s \(the cell holds -1\)"),
-        ("time [s], speed [m/s]\n1,2 m/s", 'speed is "2 m/s", not a number'),
+        ("time [s], speed [m/s]\n-1,1", "line 2: time must be at least 0 s$"),
+        ("time [s], speed [m/s]\n1,2 m/s", "speed is not a number"),
         ('time [s], speed [m/s]\n1,"2', "line 2"),
     ],
 )
@@ -89,7 +89,12 @@ def test_a_matrix_is_read_row_by_row():
 
 @pytest.mark.parametrize(
     ("text", "words"),
-    [("", "empty"), ("1,2\n3", "line 2: 1 cells where the first row has 2"), ("1,nan", "finite"), ("1,x", '"x"')],
+    [
+        ("", "empty"),
+        ("1,2\n3", "line 2: 1 cells where the first row has 2"),
+        ("1,nan", "finite"),
+        ("1,x", "line 1: value is not a number"),
+    ],
 )
 def test_a_wrong_matrix_is_refused_with_line_and_cure(text, words):
     with pytest.raises(TableError, match=words):
