@@ -82,19 +82,21 @@ def cli() -> None:
 @_MEMBERS
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
 @click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
+@click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; `sim merge` makes the file of all.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
 @click.option("--resume", is_flag=True, help="Go on with an unfinished run, bit for bit as if nothing had happened.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
 def run(
     scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
-    jobs: int | None, max_time: str | None, force: bool, resume: bool, quiet: bool, bare: bool,
+    jobs: int | None, max_time: str | None, shard: str | None, force: bool, resume: bool, quiet: bool, bare: bool,
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
+    from sim.ensemble.part_files import shard_of
     from sim.ensemble.progress import Stages, announce_compiling, log, note, progress_bar
 
-    began, stages = time.time(), Stages()
+    began, stages, share = time.time(), Stages(), shard_of(shard or "1/1")
     from sim.scenario.reader import load
 
     announce_compiling(quiet)
@@ -114,10 +116,10 @@ def run(
     for remark in [] if quiet else preview.remarks(plan):
         note(f"note: {remark}")
     jobs = jobs or plan.worthwhile(len(os.sched_getaffinity(0)))
-    how: dict[str, Any] = {"replace": force, "resume": resume, "jobs": jobs, "stage": stages.begin}
+    how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "stage": stages.begin}
     with contextlib.ExitStack() as shown:
         if not quiet:
-            stages.shown = shown.enter_context(progress_bar(plans.work(plan)))
+            stages.shown = shown.enter_context(progress_bar(plans.work(plan, *share)))
         with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
             try:
@@ -126,14 +128,14 @@ def run(
                 log(target, began, stages.ended())
                 _fail(_KEPT, getattr(stopped, "exit_code", INTERRUPTED))
         shown.callback(lambda: log(target, began, stages.ended()))
-        if tabulated := not (quiet or bare):
+        if tabulated := not (quiet or bare or shard):
             stages.begin("table")
             with _opened(target) as dataset:
                 tables = _tables(dataset)
     if tabulated:
         _print_tables(*tables)
     if not quiet:
-        click.echo(str(target))
+        click.echo(f"shard {shard} is done; when all are: sim merge {target}" if shard else str(target))
 
 
 def _quantity(text: str, option: str, unit: str, **bounds: Any) -> float:
@@ -246,6 +248,16 @@ def verify(output: Path) -> None:
     from sim.ensemble import checksums
 
     click.echo(checksums.verify(output))
+
+
+@cli.command()
+@click.argument("output", type=_PATH)
+@click.option("--force", is_flag=True, help="Replace an existing output.")
+def merge(output: Path, force: bool) -> None:
+    """Make the dataset of a run whose shards are all done, of `sim run --shard`."""
+    from sim.ensemble import unfinished
+
+    click.echo(str(unfinished.merge(output, force)))
 
 
 class _Plot(click.Command):

@@ -12,7 +12,7 @@ import io
 import json
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,10 +27,16 @@ from sim.units.refusals import BadInput
 Arrays = dict[str, np.ndarray]
 Manifest = dict[str, Any]
 
+#: Number of a shard, from 1, and how many there are.
+Shard = tuple[int, int]
+WHOLE: Shard = (1, 1)
+
 DATASET = "dataset.nc"
 _SUMS = "dataset.nc.sha256"
 _MANIFEST, _LOCK, _STATE = checksums.MANIFEST, "lock", "state."
 _LOCKS = {_LOCK, "lease"}
+#: Name of the folder of a shard, inside that of its run.
+_SHARD, _NUMBERS = (re.compile(rf"([1-9][0-9]{{0,5}}){sign}([1-9][0-9]{{0,5}})") for sign in ("-of-", "/"))
 #: Names of the files that a run makes in its folder, whole or on the way.
 _OURS = re.compile(
     r"manifest\.json|lock|lease(\.\d+)?|dataset\.nc(\.sha256)?|point\d+-group\d+-block\d+\.part|\..*\.tmp"
@@ -38,6 +44,14 @@ _OURS = re.compile(
 _DIGEST = hashlib.sha256().digest_size
 _FORMAT = "parts of a run of sim, 1"
 _MOST_NAMED, _LONGEST = 5, 40
+
+
+def shard_of(text: str) -> Shard:
+    """Number of a shard and how many there are, of "I/N"."""
+    found = _NUMBERS.fullmatch(text)
+    if not found or int(found[1]) > int(found[2]):
+        raise BadInput([f"--shard takes I/N with I from 1 to N, such as 3/64, not {text[:_LONGEST]}"])
+    return int(found[1]), int(found[2])
 
 
 class OutputExists(FileExistsError):
@@ -94,6 +108,11 @@ class PartFiles:
         with explained(self.folder):
             write_whole(self.path(name), content)
 
+    def sound(self, name: str) -> bool:
+        """Whether a part is there and undamaged."""
+        with explained(self.folder):
+            return name in self and _sound(read_whole(self.path(name)))
+
     def load(self, name: str) -> Arrays:
         """What a block recorded."""
         return {key: values for key, values in self._read(name) if not key.startswith(_STATE)}
@@ -115,7 +134,7 @@ class PartFiles:
 
         The run is done when its manifest is removed: one that was killed between the two renames goes on.
         """
-        beside, sums, manifest = self.folder / DATASET, self.folder / _SUMS, _manifest(self.folder)
+        beside, sums, manifest = self.folder / DATASET, self.folder / _SUMS, manifest_of(self.folder)
         with explained(self.folder):
             write(beside)
             sync(beside)
@@ -134,13 +153,13 @@ class PartFiles:
     ) -> bool:  # fmt: skip
         """Take up a run or begin one, where that is what was asked for; gives whether the output is there already."""
         _refuse_foreign(target)
-        folder, older, there, code = self.folder, _manifest(self.folder), target.exists(), digest().hex()
+        folder, older, there, code = self.folder, manifest_of(self.folder), target.exists(), digest().hex()
         run = read(target) if resume and there else {}
         if resume and run == wanted and not older:
             return True
         if resume and (older or there):
             was, now = (older, {"run": wanted, "code": code}) if older else ({"run": run}, {"run": wanted})
-            _refuse_other(folder if older else target, was, now)
+            refuse_other(folder if older else target, was, now)
         if older and not (resume or replace):
             raise OutputExists(f"{folder} holds an unfinished run; go on with --resume, or begin anew with --force")
         if there and run != wanted and not (replace or older.get("replace")):
@@ -150,6 +169,21 @@ class PartFiles:
             manifest = {"format": _FORMAT, "replace": there, "run": wanted, "source": source, "code": code}
             write_whole(folder / _MANIFEST, json.dumps(manifest, sort_keys=True, default=str).encode())
         return False
+
+    def adopt(self, shards: Iterable["PartFiles"], replace: bool) -> None:
+        """Take over the parts of all shards of a run, which is then like one that was stopped."""
+        with explained(self.folder):
+            for shard in shards:
+                manifest = manifest_of(shard.folder) | {"replace": replace}
+                write_whole(self.folder / _MANIFEST, json.dumps(manifest, sort_keys=True).encode())
+                for path in shard.folder.iterdir():
+                    if _OURS.fullmatch(path.name) and path.suffix == ".part":
+                        os.replace(path, self.folder / path.name)
+                sync(self.folder)
+                shard.clean(keep=False)
+                _unlock(shard.folder)
+                with contextlib.suppress(OSError):  # with files of others
+                    shard.folder.rmdir()
 
     def clean(self, keep: bool) -> None:
         """Remove what a run made here but its lock; of a run that goes on only what is damaged or half made.
@@ -173,9 +207,12 @@ def _sound(content: bytes | memoryview) -> bool:
 
 @contextlib.contextmanager
 def held(
-    target: Path, wanted: Manifest, source: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest]
-) -> Iterator[PartFiles | None]:
+    target: Path, wanted: Manifest, source: Manifest, resume: bool, replace: bool, read: Callable[[Path], Manifest],
+    shard: Shard = WHOLE,
+) -> Iterator[PartFiles | None]:  # fmt: skip
     """A context with the parts of an output, under a lock; they stay when the run ends early and go when it is done.
+
+    Those of a shard stay until they are merged.
 
     Parameters
     ----------
@@ -192,6 +229,8 @@ def held(
         Whether the output and the parts of an earlier run of it may be replaced.
     read : callable
         Gives what an output has run.
+    shard : (int, int)
+        Share of the run, which has a folder and a lock of its own.
 
     Raises
     ------
@@ -202,23 +241,69 @@ def held(
     BadInput
         If the output or the unfinished run is of something else.
     """
-    folder = target.with_name(f"{target.name}.parts")
+    whole = _folder(target)
+    folder = whole if shard == WHOLE else whole / "{}-of-{}".format(*shard)
     try:
-        with locked(folder / _LOCK, lambda: _make(folder)) as free:
+        with locked(folder / _LOCK, lambda: _make(whole, folder)) as free:
             if not free:
                 raise OutputBusy(f"another run is writing {target}; wait for it or name another output")
             parts = PartFiles(folder)
             try:
                 done = parts.begin(target, wanted, source, resume, replace, read)
                 yield None if done else parts
-                with contextlib.suppress(OSError):  # the output is there: whatever stays here does no harm
-                    parts.clean(keep=False)
+                if done or folder == whole:
+                    with contextlib.suppress(OSError):  # the output is there: whatever stays here does no harm
+                        parts.clean(keep=False)
             finally:
-                if not (folder / _MANIFEST).exists():
-                    (folder / _LOCK).unlink(missing_ok=True)
+                _unlock(folder)
     finally:
         with contextlib.suppress(OSError):  # of a run that goes on, or with files of others
             folder.rmdir()
+            whole.rmdir()
+
+
+@contextlib.contextmanager
+def gathered(target: Path) -> Iterator[tuple[PartFiles, dict[Shard, PartFiles]]]:
+    """A context with the parts of a run and of its shards by their numbers, under all their locks.
+
+    Raises
+    ------
+    BadInput
+        If there are none, or shards of different divisions.
+    OutputBusy
+        If one of them is being run.
+    """
+    folder = _folder(target)
+    shards = dict(sorted((shard, PartFiles(folder / "{}-of-{}".format(*shard))) for shard in _shards(folder)))
+    if not shards and not manifest_of(folder):
+        raise BadInput([f"{folder}: there are no shards of a run; name the output that `sim run --shard` was given"])
+    if len(divisions := {of for _, of in shards}) > 1:
+        several = " and of ".join(map(str, sorted(divisions)))
+        raise BadInput([f"{folder} holds shards of {several}; move away those that are of another division"])
+    with contextlib.ExitStack() as locks:
+        for parts in (PartFiles(folder), *shards.values()):
+            if not locks.enter_context(locked(parts.folder / _LOCK, lambda: None)):
+                raise OutputBusy(f"{parts.folder} is being written; wait for it")
+            locks.callback(_unlock, parts.folder)
+        yield PartFiles(folder), shards
+
+
+def _folder(target: Path) -> Path:
+    return target.with_name(f"{target.name}.parts")
+
+
+def _shards(folder: Path) -> list[Shard]:
+    """Numbers of the shards in the folder of a run."""
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        names = (found for path in folder.iterdir() if (found := _SHARD.fullmatch(path.name)))
+        return [(int(name[1]), int(name[2])) for name in names if manifest_of(folder / name[0])]
+    return []
+
+
+def _unlock(folder: Path) -> None:
+    """Remove the lock of a folder in which no run is to go on."""
+    if not (folder / _MANIFEST).exists():
+        (folder / _LOCK).unlink(missing_ok=True)
 
 
 def _refuse_foreign(target: Path) -> None:
@@ -240,17 +325,23 @@ def _link(beside: Path, target: Path) -> None:
             raise OutputExists(f"{target} has come during the run, which does not replace it") from None
 
 
-def _make(folder: Path) -> None:
-    """Make the folder; refuse one that no run made."""
-    with explained(folder.parent):
-        folder.mkdir(exist_ok=True)
-        names = os.listdir(folder)
-    foreign = [name for name in names if not _OURS.fullmatch(name)] if _MANIFEST not in names else []
-    if folder.is_symlink() or foreign or (_MANIFEST in names and not _manifest(folder)):
-        raise OutputExists(f"{folder} is not the folder of a run; move it away or name another output")
+def _make(whole: Path, folder: Path) -> None:
+    """Make the folder, a shard's in that of the run; refuse one that no run made, and a run beside its shards."""
+    with explained(whole.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+        names = {path: os.listdir(path) for path in (whole, folder)}
+    for path, inside in names.items():
+        foreign = [name for name in inside if not (_OURS.fullmatch(name) or _SHARD.fullmatch(name))]
+        unknown = not manifest_of(path) if _MANIFEST in inside else foreign
+        if path.is_symlink() or unknown:
+            raise OutputExists(f"{path} is not the folder of a run; move it away or name another output")
+    if folder != whole and _MANIFEST in names[whole]:
+        raise OutputExists(f"{whole} holds an unfinished run; go on with it by --resume without --shard")
+    if folder == whole and _shards(whole):
+        raise OutputExists(f"{whole} holds shards of a run; put them together with `sim merge`, or move them away")
 
 
-def _manifest(folder: Path) -> Manifest:
+def manifest_of(folder: Path) -> Manifest:
     """The manifest of a folder; empty where there is none of ours."""
     try:
         found = json.loads(read_whole(folder / _MANIFEST))
@@ -259,7 +350,7 @@ def _manifest(folder: Path) -> Manifest:
     return found if isinstance(found, dict) and found.get("format") == _FORMAT else {}
 
 
-def _refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
+def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
     """Refuse to go on with another scenario, other versions or other code, naming what differs."""
     was, now = (_flat(of.get("run")) | _flat({"code": of["code"]} if "code" in of else {}) for of in (older, wanted))
     changed = [key for key in sorted({*was, *now}) if was.get(key) != now.get(key)]

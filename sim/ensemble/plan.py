@@ -189,6 +189,10 @@ class Plan:
                 names = [part_name(pack.start, group, index) for index in range(len(blocks))]
                 yield Task(points, members, blocks, names, quantities, each, not self.per_member)
 
+    def share(self, number: int, of: int) -> Iterator[Task]:
+        """What one of several shards computes, each in turn."""
+        return itertools.islice(self.tasks(), number - 1, None, of)
+
     def groups(self) -> list[np.ndarray]:
         """The members of each group."""
         return [np.arange(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
@@ -249,9 +253,9 @@ def map_bytes(point: Scenario, members: int) -> float:
     return 8.0 * min(point.record.map_members, members) * len(point.record.maps) * point.map_size[1] ** 2
 
 
-def work(plan: Plan) -> int:
-    """Member-steps that a plan takes."""
-    return sum(plan.members * (point.clock.steps + 1) for point in plan.points)
+def work(plan: Plan, number: int = 1, of: int = 1) -> int:
+    """Member-steps that a plan takes, or one of several shards."""
+    return sum(sum(task.work) for task in plan.share(number, of))
 
 
 def part_name(point: int, group: int, block: int) -> str:

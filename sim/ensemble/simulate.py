@@ -17,7 +17,17 @@ import numpy as np
 from sim.engine import Dice, State, follow, pack, unpack
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
-from sim.ensemble.part_files import MemoryParts, OutputBusy, OutputExists, PartFiles, Parts, Stopped, held
+from sim.ensemble.part_files import (
+    WHOLE,
+    MemoryParts,
+    OutputBusy,
+    OutputExists,
+    PartFiles,
+    Parts,
+    Shard,
+    Stopped,
+    held,
+)  # fmt: skip
 from sim.ensemble.plan import Block, Plan, Task, snapshots, work
 from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES
 from sim.ensemble.workers import share_out
@@ -41,7 +51,7 @@ _STEPS = 1024
 def run(
     scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, resume: bool = False,
     jobs: int = 1, progress: Progress = ignore, stage: Callable[[str], None] = lambda name: None,
-    stop: Callable[[], bool] = lambda: False,
+    stop: Callable[[], bool] = lambda: False, shard: Shard = WHOLE,
 ) -> Any:  # fmt: skip
     """Run a scenario with its ensemble and its sweep.
 
@@ -63,6 +73,8 @@ def run(
         Called with the name of each stage as it begins: "simulating", "writing".
     stop : callable
         Asked before every block of steps whether to end there.
+    shard : (int, int)
+        Number of a share of the run, from 1, and how many there are; ``merge`` makes the file of all.
 
     Returns
     -------
@@ -103,17 +115,19 @@ def run(
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
     wanted, source = identity(attributes(plan)), scenario.origin.written
-    with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path))) as parts:
+    with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts:
         if parts is not None:
-            simulate(plan, parts, progress, jobs, stop)
+            simulate(plan, parts, progress, jobs, stop, shard)
+        if parts is not None and shard == WHOLE:
             stage("writing")
             parts.publish(target, functools.partial(write, outline(plan), parts))
     return target
 
 
 def simulate(
-    plan: Plan, parts: Parts, progress: Progress = ignore, jobs: int = 1, stop: Callable[[], bool] = lambda: False
-) -> None:
+    plan: Plan, parts: Parts, progress: Progress = ignore, jobs: int = 1, stop: Callable[[], bool] = lambda: False,
+    shard: Shard = WHOLE,
+) -> None:  # fmt: skip
     """Advance every group of members at every point of the sweep, and save a part for each block of steps.
 
     Raises
@@ -122,7 +136,7 @@ def simulate(
         If parts are missing at the end, since it was to stop.
     """
     tasks = []
-    for task in plan.tasks():
+    for task in plan.share(*shard):
         if all(name in parts for name in task.names):
             progress(sum(task.work))
         else:
