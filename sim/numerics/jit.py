@@ -1,11 +1,11 @@
 """Compilation by numba, the only place that decorates with it.
 
-Four decorators: ``device`` for a scalar helper that compiles into its callers, ``inlined`` for one whose body must
-stand in the calling loop for vector instructions, ``kernel`` for a loop over arrays, ``law`` for a formula that
-broadcasts as a numpy ufunc but keeps its Python signature, defaults and docstring. Kernels and laws compile at their
-first call. Their machine code is kept on disk, one file each, in a folder named by a hash of all compiled sources; it
-is loaded without numba's tables of what it can compile, which take half a second to set up. A cache that is broken,
-read-only or full costs time, never a run.
+Four decorators: ``device`` for a helper that compiles into its callers, ``inlined`` for one whose body must stand in
+the calling loop (Philox words in the lives of single bonds: a tenth of their time), ``kernel`` for a loop over arrays,
+``law`` for a formula that broadcasts as a numpy ufunc but keeps its Python signature, defaults and docstring. Kernels
+and laws compile at their first call. Their machine code is kept on disk, one file each, in a folder named by a hash of
+all compiled sources; it is loaded without numba's tables of what it can compile, which take half a second to set up. A
+cache that is broken, read-only or full costs time, never a run.
 """
 
 import contextlib
@@ -25,7 +25,7 @@ import numpy as np
 from llvmlite.binding import add_symbol
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
-from numba.core.registry import cpu_target
+from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 from numba.core.serialize import dumps
 from numba.np.ufunc import _internal  # type: ignore[attr-defined]
@@ -34,8 +34,28 @@ from numba.np.ufunc.wrappers import build_ufunc_wrapper
 
 from sim.units import kept
 
-device = numba.njit(error_model="numpy")
-inlined = numba.njit(error_model="numpy", inline="always")
+#: Floats divide as numpy divides them; no wrapper is made for calls from C, which nobody makes.
+_OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+class _Device(CPUDispatcher):
+    """A compiled function without the wrappers that Python calls, which are a tenth of what a first run compiles."""
+
+    @functools.cached_property
+    def _from_python(self) -> Callable:
+        return numba.njit(error_model="numpy")(self.py_func)
+
+    def __call__(self, *arguments: Any) -> Any:
+        return self._from_python(*arguments)
+
+
+def device(function: Callable, inline: str = "never") -> Callable:
+    """Compile a helper into its callers."""
+    options = {"nopython": True, "no_cpython_wrapper": True, "inline": inline}
+    return _Device(function, targetoptions=_OPTIONS | options)
+
+
+inlined = functools.partial(device, inline="always")
 #: Every kernel and law that was imported, by its name in the cache; calling one compiles or loads it.
 compiled: dict[str, Callable[[], Callable]] = {}
 #: Called with the name of each kernel or law that is about to be compiled, as it is not in the cache.
@@ -112,11 +132,11 @@ def kernel(signature: str) -> Callable[[Callable], Callable]:
 
     def decorate(function: Callable) -> Callable:
         def make() -> tuple[Callable, Callable]:
-            dispatcher = numba.njit(signature, error_model="numpy")(function)
+            dispatcher = numba.njit(signature, **_OPTIONS)(function)
             return dispatcher, next(iter(dispatcher.overloads.values()))._reduce
 
         def load(*code: Any) -> Callable:
-            dispatcher = device(function)
+            dispatcher = numba.njit(**_OPTIONS)(function)
             dispatcher.add_overload(CompileResult._rebuild(cpu_target.target_context, *code))
             dispatcher.disable_compile()
             return dispatcher

@@ -86,3 +86,10 @@ def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path, compile
         no_room = compiled_in(tmp_path / "full")
     assert not [path for path in (tmp_path / "full").rglob("*") if path.is_file()]
     assert fresh == again == no_folder == unmakeable == no_room
+
+
+def test_a_compiled_helper_is_called_from_python_like_any_function():
+    # without the wrappers that Python calls, which it is compiled without, this would end the process
+    helper = jit.device(lambda x, y: x / y)
+    assert helper(1.0, 4.0) == 0.25
+    assert helper(1.0, 0.0) == np.inf
