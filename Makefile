@@ -10,7 +10,7 @@ comma := ,
 
 run: $(STAMP)
 	$(BIN)/sim run scenarios/pdms_lens.toml --force
-	$(BIN)/sim plot outputs/pdms_lens.nc
+	$(BIN)/sim plot outputs/pdms_lens.nc --force
 
 test: $(STAMP)
 	$(BIN)/python -m pytest $(PARALLEL) --doctest-modules --ignore=sim/__main__.py sim tests

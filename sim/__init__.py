@@ -124,11 +124,13 @@ def plot(
 
     ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
     """
-    from sim.plots import draw
+    from pathlib import Path
+
+    from sim.plots.kinds import draw, save
 
     figure = _plainly(lambda found: draw(found, kind), dataset, where)
     if to is not None:
-        figure.savefig(to)
+        save(figure, Path(to))
     return figure
 
 

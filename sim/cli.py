@@ -13,12 +13,15 @@ from typing import Any, NoReturn
 
 import click
 
+from sim.ensemble.progress import while_read
+
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
 _PATH = click.Path(path_type=Path)
 _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE", help="Replace a value of the file.")
 _SEED = click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
 _MEMBERS = click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
+_FORCE = click.option("--force", is_flag=True, help="Replace files that exist.")
 _WHERE = click.option(
     "--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key, as load='4 mN'."
 )
@@ -45,9 +48,6 @@ def main() -> None:
     except click.ClickException as fault:
         fault.show()
         sys.exit(fault.exit_code)
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(DONE)
     except MemoryError:
         _fail("there is not enough memory; fewer points, members or records take less (see `sim check`)", FAILED)
     except (OSError, RuntimeError, ValueError) as trouble:
@@ -59,11 +59,24 @@ def main() -> None:
 
 
 def _fail(text: str, code: int) -> NoReturn:
-    click.echo(text, err=True)
+    with contextlib.suppress(OSError):  # of a reader that is gone
+        click.echo(text, err=True)
     sys.exit(code)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+class _Commands(click.Group):
+    """Commands that end in silence where whoever reads what they print has read enough."""
+
+    def make_context(self, *arguments: Any, **options: Any) -> click.Context:
+        with while_read():
+            return super().make_context(*arguments, **options)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        with while_read():
+            return super().invoke(ctx)
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(package_name="sliding-sim", prog_name="sim")
 def cli() -> None:
     """Adhesive sliding interfaces: a smooth sphere slides on a soft half-space.
@@ -102,14 +115,12 @@ def run(
     announce_compiling(quiet)
     until = time.monotonic() + (math.inf if max_time is None else _quantity(max_time, "--max-time", "s", above=0))
     scene = load(scenario, _overrides(changes, seed, members), option="--set")
-    if target.is_dir() or (target.exists() and target.samefile(scenario)):
-        _fail(f"{target} is {'a folder' if target.is_dir() else 'the scenario'}; name a file with -o", BAD_INPUT)
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
-    if target.exists() and not (force or resume):
-        _fail(f"{target} exists; replace it with --force or name another output with -o", EXISTS)
 
     from sim.ensemble import plan as plans, preview, simulate
+
+    simulate.claim(target, force or resume, simulate.files_read(scene), simulate.BESIDE)
     from sim.ensemble.workers import orders
 
     plan = plans.Plan.of(scene)
@@ -130,8 +141,7 @@ def run(
         shown.callback(lambda: log(target, began, stages.ended()))
         if tabulated := not (quiet or bare or shard):
             stages.begin("table")
-            with _opened(target) as dataset:
-                tables = _tables(dataset)
+            tables = _tables_of(target)
     if tabulated:
         _print_tables(*tables)
     if not quiet:
@@ -183,6 +193,15 @@ def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]]
     return [shown for shown in (rows, once) if shown], analysis.notes(dataset, rows, once)
 
 
+def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
+    """The tables of a run that is done, which trouble with them does not change."""
+    try:
+        with _opened(target) as dataset:
+            return _tables(dataset)
+    except (MemoryError, OSError) as trouble:
+        return [], [f"the output is complete; its table could not be made: {trouble or 'not enough memory'}"]
+
+
 def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
     for rows in tables:
         _print_rows(rows)
@@ -227,17 +246,17 @@ def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: i
 @_WHERE
 @click.option("--all", "whole", is_flag=True, help="Every row: all times and sweep values.")
 @click.option("--csv", type=_PATH, help="Also write every time and sweep value to this CSV file.")
-def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None) -> None:
+@_FORCE
+def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, force: bool) -> None:
     """Ensemble statistics over time and sweep."""
     from sim import analysis
-    from sim.numerics.files import explained
 
     with _opened(output, chosen) as dataset:
+        if csv is not None:
+            analysis.scene.claim(dataset, output, csv, force)
         _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
         if csv is not None:
-            with explained(csv.parent):
-                csv.parent.mkdir(parents=True, exist_ok=True)
-                analysis.to_csv(dataset, csv)
+            analysis.to_csv(dataset, csv)
             click.echo(str(csv))
 
 
@@ -275,21 +294,13 @@ class _Plot(click.Command):
 @click.argument("kind", required=False)
 @click.option("-o", "--picture", type=_PATH, help="The picture; default beside the dataset.")
 @_WHERE
-def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str, ...]) -> None:
+@_FORCE
+def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str, ...], force: bool) -> None:
     """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset."""
-    from sim.numerics.files import explained
     from sim.plots import kinds as plots
 
     with _opened(output, chosen) as dataset:
-        target = picture or output.with_name(f"{output.stem}{'-' + kind if kind else ''}.png")
-        try:
-            figure = plots.draw(dataset, kind)
-            with explained(target.parent):
-                target.parent.mkdir(parents=True, exist_ok=True)
-                figure.savefig(target)
-        except ValueError as fault:  # an unknown kind or format of picture
-            _fail(f"{output}: {fault}", BAD_INPUT)
-    click.echo(str(target))
+        click.echo(str(plots.drawn(dataset, kind, output, picture, force)))
 
 
 @contextlib.contextmanager
@@ -318,25 +329,25 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
 @click.option("--budget", default="60 s", show_default=True, help="Computing time to share over the settings.")
 @click.option("--tolerance", help="Error that is accepted, such as 1 %; default that of the scene.")
 @_SET
-def converge(scenario: Path, output: Path | None, budget: str, tolerance: str | None, changes: tuple[str, ...]) -> None:
+@_FORCE
+def converge(
+    scenario: Path, output: Path | None, budget: str, tolerance: str | None, changes: tuple[str, ...], force: bool
+) -> None:
     """Speed against error for this scene: models, tolerances and clock steps, and which to choose."""
     from sim.scenario.reader import load
 
     seconds = _quantity(budget, "--budget", "s", above=0)
     accepted = None if tolerance is None else _quantity(tolerance, "--tolerance", "1", above=0, below=1)
     scene = load(scenario, _overrides(changes), option="--set")
-    from sim.numerics.files import explained
     from sim.study import converge as convergence
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
+    picture = convergence.claim(scene, target, force)
     found = convergence.converge(scene, seconds, accepted)
     _print_rows(convergence.table(found))
     click.echo(f"{convergence.explanation(found)}\n\n{convergence.recommendation(found)}\n")
-    with explained(target.parent):
-        target.parent.mkdir(parents=True, exist_ok=True)
-        found.to_netcdf(target)
-        convergence.figure(found).savefig(target.with_suffix(".png"))
-    click.echo(f"{target}\n{target.with_suffix('.png')}")
+    convergence.save(found, target, picture)
+    click.echo(f"{target}\n{picture}")
 
 
 @cli.command()

@@ -1,10 +1,12 @@
 """The commands: what they print, write and refuse, and with which exit code."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
 import time
+import tomllib
 from pathlib import Path
 
 import netCDF4
@@ -14,7 +16,7 @@ from click.testing import CliRunner
 from helpers.commands import sim
 
 from sim import cli
-from sim.ensemble import progress
+from sim.ensemble import progress, simulate
 from sim.numerics import jit
 from sim.scenario.reader import BadInput, load
 from sim.study import paper
@@ -131,6 +133,19 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     assert {part: part.stat().st_mtime_ns for part in parts.glob("*.part")} == kept
 
 
+@pytest.mark.parametrize("arguments", [["--help"], ["check", LENS], ["stats", "x.nc"]])
+def test_a_reader_that_leaves_at_once_is_no_error(here, arguments):
+    if arguments[0] == "stats":
+        assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run(
+        [sys.executable, "-m", "sim", *arguments], stdout=writing, stderr=subprocess.PIPE, timeout=120
+    )
+    os.close(writing)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
 def test_a_reader_that_leaves_early_is_no_error():
     run = subprocess.Popen([sys.executable, "-m", "sim", "schema"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     run.stdout.read(1)
@@ -203,7 +218,7 @@ def test_an_output_that_exists_is_refused_before_anything_is_computed(here, monk
         patched.setattr("sim.ensemble.simulate.run", None)  # computing would fail
         done = sim(*other)
     assert done.exit_code == 73
-    assert done.stderr.splitlines() == ["x.nc exists; replace it with --force or name another output with -o"]
+    assert done.stderr.splitlines() == ["x.nc exists; replace it with --force or name another file"]
     assert Path("x.nc").read_bytes() == content
     assert sim(*other, "--force", "--quiet").exit_code == 0
     assert Path("x.nc").read_bytes() != content
@@ -222,11 +237,14 @@ def test_seed_members_and_set_reach_the_run(here):
 @pytest.mark.parametrize(
     ("arguments", "code", "said"),
     [
-        (["-o", "."], 2, ". is a folder; name a file with -o"),
-        (["-o", "scene.toml", "--force"], 2, "scene.toml is the scenario; name a file with -o"),
+        (["-o", "."], 2, ". is a folder; name a file"),
+        (["-o", "scene.toml", "--force"], 2, "scene.toml: the command reads what it would write; name another file"),
         (["-o", "scene.toml/x.nc"], 74, "scene.toml"),
         (["-o", "/proc/x.nc"], 74, "/proc"),
         (["-o", "x" * 300], 74, "File name too long"),
+        (["-o", "x" * 250], 74, "File name too long"),
+        (["-o", "new/" + "x" * 250], 74, "File name too long"),
+        (["-o", "\udcff.nc"], 2, "?.nc: the name is not UTF-8 text; name another file"),
         (["--set", "contact"], 2, "--set takes TABLE.KEY=VALUE, such as contact.load=\"2 mN\", not 'contact'"),
         (["--set", "=3"], 2, "--set takes TABLE.KEY=VALUE"),
         (["--set", "contact.lod=3"], 2, '--set contact.lod: is not a key; did you mean "load"?'),
@@ -241,6 +259,84 @@ def test_what_cannot_be_run_is_told_with_its_code(here, arguments, code, said):
     assert said in done.stderr
     assert "Traceback" not in done.output
     assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
+
+
+def test_an_output_that_can_only_fail_is_refused_before_the_first_step(here, monkeypatch):
+    monkeypatch.setattr("sim.ensemble.simulate.simulate", None)  # computing would fail
+    Path("loop.nc").symlink_to("loop.nc")
+    with monkeypatch.context() as patched:
+        patched.setattr("os.access", lambda path, how: Path(path) != here)
+        assert sim("run", "scene.toml", "-o", "x.nc").stderr == "x.nc: Permission denied\n"
+    done = sim("run", "scene.toml", "-o", "loop.nc")
+    assert (done.exit_code, done.stderr) == (74, "loop.nc: Too many levels of symbolic links\n")
+    assert sorted(path.name for path in here.iterdir()) == ["loop.nc", "scene.toml"]
+
+
+@pytest.mark.parametrize(
+    "where",
+    [
+        'drive={ model="table", file="v.csv" }',
+        'sweep={ drive=[{ model="table", file="v.csv" }, { model="steady", speed=1 }] }',
+    ],
+)
+@pytest.mark.parametrize("name", ["v.csv", "link.nc", "v"])
+def test_a_table_that_a_scenario_reads_is_never_its_output(here, where, name):
+    text = "time [s], speed [m/s]\n0, 1e-3\n1, 2e-3\n"
+    Path("v.csv").write_text(text)
+    Path("link.nc").symlink_to("v.csv")
+    Path("v.log").write_text(text)
+    where = where.replace("v.csv", "v.log" if name == "v" else "v.csv")
+    done = sim("run", "scene.toml", "--set", where, "-o", name, "--force")
+    assert (done.exit_code, done.stderr) == (2, f"{name}: the command reads what it would write; name another file\n")
+    assert Path("v.csv").read_text() == Path("v.log").read_text() == text
+    with pytest.raises(BadInput, match="reads what it would write"):
+        simulate.run(
+            load("scene.toml", {where.partition("=")[0]: tomllib.loads(where)[where.partition("=")[0]]}),
+            name,
+            replace=True,
+        )
+
+
+def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
+    Path("x.nc.log").mkdir()
+    with monkeypatch.context() as patched:
+        done, replace = [], os.replace
+
+        def replaced(path, target):
+            replace(path, target)
+            if Path(target).name == "x.nc.sha256":
+                done.append(target)
+
+        def broken(real):
+            def call(*arguments, **options):
+                if done:
+                    raise OSError(5, "Input/output error")
+                return real(*arguments, **options)
+
+            return call
+
+        patched.setattr("os.replace", replaced)
+        for name in ("os.unlink", "os.rmdir", "os.fsync"):
+            patched.setattr(name, broken(getattr(os, name.partition(".")[2])))
+        patched.setattr("sim.analysis.table", broken(lambda *_: done.append("read")))
+        found = sim("run", "scene.toml", "-o", "x.nc")
+    assert found.exit_code == 0
+    assert "note: x.nc.log was not written: " in found.stderr
+    assert "the output is complete; its table could not be made: [Errno 5]" in found.stdout
+    assert sim("stats", "x.nc").exit_code == 0
+
+
+def test_a_log_is_no_link_to_a_file_of_others(here):
+    Path("mine").write_text("mine")
+    Path("x.nc.log").symlink_to("mine")
+    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
+    assert Path("mine").read_text() == "mine"
+
+
+def test_a_clock_that_is_far_off_ends_no_run(here, monkeypatch):
+    monkeypatch.setattr("time.time", lambda: -1e14)
+    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
+    assert json.loads(Path("x.nc.log").read_text())["began"] == "-100000000000000 s after 1970"
 
 
 def test_a_folder_that_cannot_be_written_ends_with_74(here, monkeypatch):
@@ -384,6 +480,96 @@ def test_no_number_of_a_table_is_cut_short(capsys):
     assert "[mm/s]" in printed
     assert "[bold]2[/bold]" in printed
     cli._print_rows([])
+
+
+@pytest.fixture
+def made(dataset, here):
+    """A folder with a run, its scenario and an unlike file of each name that a command would make."""
+    Path("x.nc").write_bytes(dataset.read_bytes())
+    Path("other.nc").write_bytes(dataset.read_bytes())
+    for name in ("x.png", "x-time.png", "x.csv", "notes", "new.png", "new.nc", "new.toml"):
+        Path(name).write_text("mine")
+    return here
+
+
+def content(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+CONVERGE = ["converge", "scene.toml", "-o", "new.nc"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "file"),
+    [
+        (["stats", "x.nc", "--csv", "x.csv"], "x.csv"),
+        (["plot", "x.nc"], "x.png"),
+        (["plot", "x.nc", "time"], "x-time.png"),
+        (["plot", "x.nc", "-o", "notes"], "notes"),
+        (CONVERGE, "new.nc"),
+        (["converge", "scene.toml", "-o", "new"], "new.png"),
+    ],
+)
+def test_what_exists_is_replaced_only_if_asked(made, monkeypatch, arguments, file):
+    before = content(made)
+    with monkeypatch.context() as patched:
+        patched.setattr("sim.study.converge.converge", None)  # computing would fail
+        patched.setattr("sim.analysis.tables.frame", None)
+        done = sim(*arguments)
+    assert (done.exit_code, done.stderr) == (73, f"{file} exists; replace it with --force or name another file\n")
+    assert content(made) == before
+    if arguments[0] != "converge":
+        assert sim(*arguments, "--force").exit_code == 0
+        assert {name for name, now in content(made).items() if now != before.get(name)} == {file}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["stats", "x.nc", "--csv", "x.nc"], "x.nc: the command reads what it would write"),
+        (["stats", "x.nc", "--csv", "other.nc"], "other.nc is a dataset, which is not replaced"),
+        (["stats", "x.nc", "--csv", "new.toml"], "new.toml is a scenario by its name, which is never replaced"),
+        (["stats", "x.nc", "--csv", "copy"], "copy is the scenario of this dataset, or a table of it"),
+        (["plot", "x.nc", "-o", "link.png"], "link.png: the command reads what it would write"),
+        (["plot", "x.nc", "-o", "copy"], "copy is the scenario of this dataset, or a table of it"),
+        (["plot", "t.nc", "-o", "v.csv"], "v.csv is the scenario of this dataset, or a table of it"),
+        (["converge", "scene.toml", "-o", "scene.toml"], "scene.toml: the command reads what it would write"),
+        (["converge", "scene.toml", "-o", "new.png"], "new.png: the dataset cannot have the name of its picture"),
+    ],
+)
+def test_a_scenario_its_tables_and_datasets_are_never_replaced(made, arguments, said):
+    Path("copy").write_bytes(Path("scene.toml").read_bytes())
+    Path("link.png").symlink_to("x.nc")
+    if arguments[1] == "t.nc":
+        Path("v.csv").write_bytes(b"time [s], speed [m/s]\r\n0, 1e-3\r\n1, 2e-3\r\n")
+        table = 'drive={ model="table", file="v.csv" }'
+        assert sim("run", "scene.toml", "--set", table, "-o", "t.nc", "--quiet").exit_code == 0
+    before = content(made)
+    done = sim(*arguments, "--force")
+    assert (done.exit_code, done.stderr) == (2, f"{said}; {done.stderr.partition('; ')[2]}")
+    assert content(made) == before
+
+
+@pytest.mark.parametrize("trouble", ["savefig", "fsync"])
+def test_an_older_picture_stays_whole_where_the_new_one_fails(made, monkeypatch, trouble):
+    def full(*arguments, **options):
+        if trouble == "savefig":
+            Path(arguments[1]).write_bytes(b"torn")
+        raise OSError(28, "No space left on device")
+
+    before = content(made)
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig" if trouble == "savefig" else "os.fsync", full)
+    done = sim("plot", "x.nc", "--force")
+    assert (done.exit_code, done.stderr) == (74, ".: No space left on device\n")
+    assert content(made) == before
+
+
+def test_a_table_goes_into_a_pipe_that_is_there(made):
+    os.mkfifo("pipe")
+    reading = os.open("pipe", os.O_RDONLY | os.O_NONBLOCK)
+    assert sim("stats", "x.nc", "--csv", "pipe").exit_code == 0
+    assert os.read(reading, 4) == b"t [s"
+    os.close(reading)
 
 
 def test_plot_writes_a_picture_beside_the_dataset_or_where_asked(dataset, here):

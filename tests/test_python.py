@@ -58,7 +58,7 @@ def test_a_scene_is_a_path_a_dictionary_or_keywords(dataset, tmp_path):
 def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset):
     with sim.open(file) as found:
         np.testing.assert_array_equal(found.contact_radius, dataset.contact_radius)
-    with pytest.raises(sim.BadInput, match=r"out\.nc exists; replace it with replace=True or name another output"):
+    with pytest.raises(sim.BadInput, match=r"out\.nc exists; replace it with replace=True or name another file"):
         sim.run(SCENE, to="out.nc")
     assert sim.run(SCENE, to="out.nc", replace=True) == file
 

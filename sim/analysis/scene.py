@@ -4,16 +4,19 @@ A number of the scenario is a variable, a swept one a coordinate; the resolved s
 """
 
 import contextlib
+import functools
+import hashlib
 import json
 import os
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import xarray as xr
 
-from sim.numerics import hdf5
+from sim.numerics import files, hdf5
 from sim.units.recorded import Recorded
 from sim.units.refusals import BadInput, refuse_old
 
@@ -31,6 +34,7 @@ _STATISTIC = re.compile("_(mean|std|sem)$")
 #: Tables of a scenario that are read here.
 _TABLES = ("contact", "drive", "record", "shear")
 _CONTROLS = ("load", "indentation", "displacement")
+_MOST_BYTES = 2**28
 
 
 def open(path: str | os.PathLike[str]) -> xr.Dataset:
@@ -122,6 +126,23 @@ def _there(dataset: xr.Dataset, key: str) -> bool:
     with contextlib.suppress(KeyError):
         return bool(setting(dataset, key).notnull().all())
     return False
+
+
+def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool) -> None:
+    """Refuse a file to be made of the dataset at ``path``; errors as of ``files.claim``."""
+    files.claim(target, replace, [path], guard=functools.partial(_guard, dataset))
+
+
+def _guard(dataset: xr.Dataset, path: Path) -> None:
+    """Refuse to replace a dataset, or a file that this dataset was made from."""
+    with path.open("rb") as file:
+        content = file.read(_MOST_BYTES)
+    text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n")
+    if content.startswith((b"\x89HDF", b"CDF")):
+        raise BadInput([f"{path} is a dataset, which is not replaced; name another file"])
+    told = str(dataset.attrs.get("scenario_files")), dataset.attrs.get("scenario_toml")
+    if content and (hashlib.sha256(text.encode()).hexdigest() in told[0] or text == told[1]):
+        raise BadInput([f"{path} is the scenario of this dataset, or a table of it; name another file"])
 
 
 @contextlib.contextmanager

@@ -17,7 +17,7 @@ from sim.analysis.events import events
 from sim.analysis.observables import all_observables, settled
 from sim.analysis.scene import answered, is_stationary, resolved, stays_held, sweep_dims, word
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary
-from sim.numerics.files import write_whole
+from sim.numerics.files import output
 from sim.units.notation import concise, scaled
 
 #: Cells of columns by heading.
@@ -274,11 +274,8 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     units = long.attrs["units"]
     header = [name if units[name] == "1" else f"{name} [{units[name]}]" for name in long]
     text = long.to_csv(header=header, index=False, na_rep="nan", lineterminator="\n").encode()
-    path = Path(path)
-    if path.is_symlink() or (path.exists() and not path.is_file()):  # such as /dev/stdout or a pipe
-        path.write_bytes(text)
-    else:
-        write_whole(path, text)
+    with output(Path(path)) as beside:
+        beside.write_bytes(text)
 
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from sim.ensemble import checksums
-from sim.numerics.files import StoreTrouble, explained, locked, read_whole, sync, write_whole
+from sim.numerics.files import OutputExists, StoreTrouble, explained, locked, read_whole, sync, write_whole
 from sim.units.kept import digest
 from sim.units.refusals import BadInput
 
@@ -52,12 +52,6 @@ def shard_of(text: str) -> Shard:
     if not found or int(found[1]) > int(found[2]):
         raise BadInput([f"--shard takes I/N with I from 1 to N, such as 3/64, not {text[:_LONGEST]}"])
     return int(found[1]), int(found[2])
-
-
-class OutputExists(FileExistsError):
-    """The output, or an unfinished run of it, is there already and was not to be replaced."""
-
-    exit_code = 73
 
 
 class OutputBusy(RuntimeError):
@@ -145,6 +139,7 @@ class PartFiles:
         with explained(self.folder):
             os.replace(beside, target)  # which leaves two names of one file as they are
             os.replace(sums, checksums.path_of(target))
+        with contextlib.suppress(OSError):  # the output is there
             sync(target.parent)
 
     def begin(

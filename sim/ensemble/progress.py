@@ -1,6 +1,7 @@
 """Progress of a run: its stages, what is done of it, and the first compilation of kernels."""
 
 import contextlib
+import os
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -17,6 +18,18 @@ def note(text: str) -> None:
     """Print a line to standard error; that nobody reads it ends no run."""
     with contextlib.suppress(OSError):
         click.echo(text, err=True)
+
+
+@contextlib.contextmanager
+def while_read() -> Iterator[None]:
+    """A context that ends the program in silence, as done, when whoever reads what it prints has read enough."""
+    try:
+        yield
+    except (BrokenPipeError, SystemExit) as end:
+        if not isinstance(end, BrokenPipeError) and not isinstance(end.__context__, BrokenPipeError):  # rich exits
+            raise
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        sys.exit(0)
 
 
 class Shown(NamedTuple):

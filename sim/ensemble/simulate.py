@@ -32,9 +32,10 @@ from sim.ensemble.plan import Block, Plan, Task, snapshots, work
 from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES
 from sim.ensemble.workers import share_out
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
-from sim.numerics.files import StoreTrouble, explained
+from sim.numerics.files import StoreTrouble, claim, explained
 from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import Fluctuation
+from sim.scenario.declared import files_read
 from sim.scenario.scenario import Scenario
 
 Progress = Callable[[int], None]
@@ -44,6 +45,8 @@ def ignore(done: int) -> None:
     """No progress is shown."""
 
 
+#: Ends of the names of what a run makes beside its output.
+BESIDE = (".parts", ".log", ".sha256")
 #: Steps after which progress is reported, at the next record.
 _STEPS = 1024
 
@@ -107,11 +110,10 @@ def run(
             stage("writing")
             made = outline(plan)
             return xarray.Dataset(in_memory(made, kept), attrs=made.attributes)
+    claim(Path(to), replace or resume, files_read(scenario), BESIDE)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
         raise OutputExists(f"{target} is no plain file; name another output")
-    if target.exists() and not (replace or resume):
-        raise OutputExists(f"{target} exists; replace it with --force or name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
     wanted, source = identity(attributes(plan)), scenario.origin.written
@@ -225,10 +227,13 @@ def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
 
 def write_log(target: Path, began: float, arguments: list[str], stages: dict[str, float]) -> None:
     """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments, seconds of each stage."""
-    when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
+    when = f"{began:.0f} s after 1970"
+    with contextlib.suppress(ValueError, OverflowError, OSError):  # of a clock that is far off
+        when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
     machine = {"host": platform.node(), "platform": platform.platform(), "arguments": arguments}
     entry = {"began": when, "seconds": round(time.time() - began, 2), "stages": stages, **machine}
-    with explained(target.parent), open(f"{target}.log", "a", encoding="utf-8") as log:
+    how = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+    with explained(target.parent), open(os.open(f"{target}.log", how, 0o666), "a", encoding="utf-8") as log:
         log.write(json.dumps(entry) + "\n")
 
 

@@ -1,4 +1,4 @@
-"""Atomic writing of files, and file errors with their reason."""
+"""Outputs that are whole and replace nothing unasked, and file errors with their reason."""
 
 import contextlib
 import errno
@@ -7,8 +7,10 @@ import os
 import shutil
 import stat
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+
+from sim.units.refusals import BadInput
 
 #: What a file system without locks answers.
 _NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
@@ -43,19 +45,108 @@ class StoreTrouble(OSError):
     exit_code = 74
 
 
-def write_whole(path: Path, content: memoryview | bytes) -> None:
-    """Write a file whole or not at all: beside its place, to disk, then renamed."""
-    beside = path.with_name(f".{path.name}.tmp")
+class OutputExists(FileExistsError):
+    """The output, or an unfinished run of it, is there already and was not to be replaced."""
+
+    exit_code = 73
+
+
+def claim(
+    path: Path, replace: bool, inputs: Iterable[Path] = (), beside: tuple[str, ...] = (),
+    guard: Callable[[Path], None] = lambda path: None,
+) -> None:  # fmt: skip
+    """Refuse an output that would destroy what is there or cannot be written, before anything is computed.
+
+    Parameters
+    ----------
+    path : Path
+        The file to be. What is no plain file, such as /dev/stdout or a pipe, is written to and not replaced.
+    replace : bool
+        Whether an older file may be replaced; a scenario and ``inputs`` never are.
+    inputs : iterable of Path
+        Files that the command reads.
+    beside : tuple of str
+        What else is written, as ends of its name.
+    guard : callable
+        Other arguments: refuses older files that are never to be replaced.
+
+    Raises
+    ------
+    BadInput
+        If the name or what has it is not to be written to.
+    OutputExists
+        If there is a file that is not to be replaced.
+    StoreTrouble
+        If the folder or the file system refuses such a file.
+    """
     try:
-        with open(beside, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(beside, path)
+        str(path).encode()
+        if path.is_dir():
+            raise BadInput([f"{path} is a folder; name a file"])
+        names = [path, *(path.with_name(path.name + end) for end in beside)]
+        there = _is_there(path)
+        for folder in (folder for folder in path.absolute().parents if folder.exists()):
+            for name in {*path.parts, *(one.name for one in names)}:
+                _is_there(folder / name)  # which refuses names that are too long
+            if not os.access(folder, os.W_OK | os.X_OK) and not path.is_relative_to("/dev"):
+                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            break
+    except UnicodeEncodeError:
+        shown = str(path).encode(errors="replace").decode()
+        raise BadInput([f"{shown}: the name is not UTF-8 text; name another file"]) from None
+    except OSError as trouble:
+        raise StoreTrouble(f"{path}: {trouble.strerror}") from trouble
+    if any(one.exists() and each.exists() and one.samefile(each) for one in names for each in inputs):
+        raise BadInput([f"{path}: the command reads what it would write; name another file"])
+    if there and path.is_file() and not path.is_relative_to("/dev"):
+        if not replace:
+            raise OutputExists(f"{path} exists; replace it with --force or name another file")
+        if path.suffix == ".toml":
+            raise BadInput([f"{path} is a scenario by its name, which is never replaced; name another file"])
+        guard(path)
+
+
+def _is_there(path: Path) -> bool:
+    """Whether a path leads to something."""
+    try:
+        os.stat(path)
+    except FileNotFoundError:
+        return False
+    return True
+
+
+@contextlib.contextmanager
+def output(path: Path) -> Iterator[Path]:
+    """A context with the name under which to write a file for its user, which is whole when it takes its place."""
+    with explained(path.parent):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and (not path.is_file() or path.is_relative_to("/dev")):  # such as a pipe, or /dev/stdout
+            yield path
+        else:
+            with whole(path.resolve()) as aside:
+                yield aside
+
+
+@contextlib.contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A context with a name beside a file for its new content, which at the end is synced and takes its place."""
+    aside = path.with_name(f".{os.urandom(8).hex()}.tmp")
+    try:
+        yield aside
+        sync(aside)
+        os.replace(aside, path)
     except BaseException:
-        beside.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            aside.unlink(missing_ok=True)
         raise
-    sync(path.parent)
+    with contextlib.suppress(OSError):  # the file is there, and not every file system syncs folders
+        sync(path.parent)
+
+
+def write_whole(path: Path, content: memoryview | bytes) -> None:
+    """Write a file whole or not at all."""
+    with whole(path) as aside:
+        aside.write_bytes(content)
 
 
 def read_whole(path: Path) -> bytes:

@@ -4,6 +4,7 @@
 """
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib as mpl
@@ -11,7 +12,8 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
-from sim.analysis.scene import answered
+from sim.analysis.scene import answered, claim
+from sim.numerics.files import output
 from sim.plots import panels
 from sim.plots.bond_laws import rest_of
 from sim.plots.field import map_figure, needs_maps, spectrum_figure
@@ -20,7 +22,7 @@ from sim.plots.profile import profile_figure, shapes_of
 from sim.plots.stress import needs_stress, stress_figure
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.plots.theories import case_of, sweeps_theories, theories_figure
-from sim.units.refusals import renamed
+from sim.units.refusals import BadInput, renamed
 
 
 class Kind(NamedTuple):
@@ -110,3 +112,28 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
         if fixed:
             figure.suptitle(", ".join(fixed), fontsize=mpl.rcParams["axes.titlesize"])
         return figure
+
+
+def drawn(dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None, replace: bool) -> Path:
+    """Draw the dataset of a file into a picture, by default beside it; the picture's path.
+
+    Raises
+    ------
+    BadInput
+        For an unknown kind or format of picture, or a picture that is not to be made.
+    """
+    try:
+        target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}.png")
+        claim(dataset, source, target, replace)
+        save(draw(dataset, kind), target)
+    except BadInput:
+        raise
+    except ValueError as fault:
+        raise BadInput([f"{source}: {fault}"]) from None
+    return target
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure in the format that the ending of its name says, PNG without one, whole or not at all."""
+    with output(path) as beside:
+        figure.savefig(beside, format=path.suffix.removeprefix(".").lower() or "png")

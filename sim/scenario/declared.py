@@ -4,6 +4,7 @@ import functools
 import html
 from collections.abc import Hashable, Iterable, Iterator
 from dataclasses import fields, is_dataclass
+from pathlib import Path
 from typing import Any, NamedTuple, cast, get_args
 
 from pydantic import Tag
@@ -99,6 +100,24 @@ def _listed(table: type) -> list[tuple[str, str, Quantity | None]]:
         quantity = None if field is None else declaration(field) or Quantity("1", meaning)
         listed.append((item.name, (field and field.alias) or item.name, quantity))
     return listed
+
+
+def files_read(scenario: Any) -> list[Path]:
+    """The file of a scenario and all that it and its sweep name."""
+    source, named = scenario.source, [(key, value) for key, value, _ in entries(scenario)]
+    for axis in scenario.sweep:
+        named += [pair for row in axis.values for pair in zip(axis.keys, row, strict=True)]
+    names = {*source.files, *(name for key, value in named for name in _files_named(key, value))}
+    return [*([Path(source.path)] if source.path else ()), *(Path(source.path).parent / name for name in sorted(names))]
+
+
+def _files_named(key: str, value: Any) -> Iterator[str]:
+    """Names of files in a value of a dotted key."""
+    if isinstance(value, dict):
+        for inner, held in value.items():
+            yield from _files_named(inner, held)
+    elif isinstance(value, str) and value and key.rpartition(".")[2] == "file":
+        yield value
 
 
 def as_html(title: str, listed: Iterable[Entry]) -> str:

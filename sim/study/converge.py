@@ -9,6 +9,7 @@ import importlib.metadata
 import math
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,15 +17,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from sim.analysis import engineering
-from sim.scenario.declared import quantities
+from sim.numerics import files
+from sim.numerics.files import output
+from sim.scenario.declared import files_read, quantities
 from sim.scenario.scenario import Scenario
 from sim.study.exact_law import QUANTITIES, STATISTICS, Walk, cell_gammas, memory
 from sim.study.figure import figure
 from sim.study.samples import Array, Estimates, affordable, coupled, estimates, fluctuates, sampled, timed
 from sim.study.settings import Row, at_step, number_of_sites, plain, settings, tolerance_of
 from sim.study.verdicts import explanation, recommendation, table
+from sim.units.refusals import BadInput
 
-__all__ = ["converge", "explanation", "figure", "recommendation", "table"]
+__all__ = ["claim", "converge", "explanation", "figure", "recommendation", "save", "table"]
 
 #: Shares of the budget: runs without noise, times, samples.
 _WALKS, _TIMES, _SAMPLES = 0.4, 0.2, 0.4
@@ -80,6 +84,24 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
         row.time, row.time_low, row.time_high = as_written if row.own else timed(row.scenario, share)
     study.sample(_SAMPLES * budget_seconds)
     return _assembled(scenario, study, accepted, left_out)
+
+
+def claim(scenario: Scenario, target: Path, replace: bool) -> Path:
+    """Refuse files that cannot be written or are not to be replaced; the name of the picture beside the dataset."""
+    picture = target.with_suffix(".png")
+    if picture == target:
+        raise BadInput([f"{target}: the dataset cannot have the name of its picture; end it in .nc"])
+    for path in (target, picture):
+        files.claim(path, replace, files_read(scenario))
+    return picture
+
+
+def save(found: xr.Dataset, target: Path, picture: Path) -> None:
+    """Write the dataset and its figure, each whole or not at all."""
+    with output(target) as beside:
+        found.to_netcdf(beside)
+    with output(picture) as beside:
+        figure(found).savefig(beside, format="png")
 
 
 class _Study:
