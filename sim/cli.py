@@ -94,6 +94,7 @@ def cli() -> None:
 @_SEED
 @_MEMBERS
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
+@click.option("--scheduler", default="", metavar="ADDRESS", help="Work on the cluster of this scheduler of dask.")
 @click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
 @click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; `sim merge` makes the file of all.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
@@ -102,7 +103,8 @@ def cli() -> None:
 @click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
 def run(
     scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
-    jobs: int | None, max_time: str | None, shard: str | None, force: bool, resume: bool, quiet: bool, bare: bool,
+    jobs: int | None, scheduler: str, max_time: str | None, shard: str | None, force: bool, resume: bool, quiet: bool,
+    bare: bool,
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
@@ -127,14 +129,21 @@ def run(
     for remark in [] if quiet else preview.remarks(plan):
         note(f"note: {remark}")
     jobs = jobs or plan.worthwhile(len(os.sched_getaffinity(0)))
-    how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "stage": stages.begin}
+    how: dict[str, Any] = {
+        "shard": share,
+        "scheduler": scheduler,
+        "replace": force,
+        "resume": resume,
+        "jobs": jobs,
+        "stage": stages.begin,
+    }
     with contextlib.ExitStack() as shown:
         if not quiet:
             stages.shown = shown.enter_context(progress_bar(plans.work(plan, *share)))
         with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
             try:
-                simulate.run(scene, target, **how, progress=stages.shown.advance)
+                simulate.run(scene, target, **how, stage=stages.begin, progress=stages.shown.advance)
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
                 log(target, began, stages.ended())
                 _fail(_KEPT, getattr(stopped, "exit_code", INTERRUPTED))

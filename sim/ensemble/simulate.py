@@ -15,6 +15,7 @@ from typing import Any, cast
 import numpy as np
 
 from sim.engine import Dice, State, follow, pack, unpack
+from sim.ensemble import cluster
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
 from sim.ensemble.part_files import (
@@ -54,7 +55,7 @@ _STEPS = 1024
 def run(
     scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, resume: bool = False,
     jobs: int = 1, progress: Progress = ignore, stage: Callable[[str], None] = lambda name: None,
-    stop: Callable[[], bool] = lambda: False, shard: Shard = WHOLE,
+    stop: Callable[[], bool] = lambda: False, shard: Shard = WHOLE, scheduler: str = "",
 ) -> Any:  # fmt: skip
     """Run a scenario with its ensemble and its sweep.
 
@@ -78,6 +79,8 @@ def run(
         Asked before every block of steps whether to end there.
     shard : (int, int)
         Number of a share of the run, from 1, and how many there are; ``merge`` makes the file of all.
+    scheduler : str
+        Address of a scheduler of dask, whose workers take the place of processes.
 
     Returns
     -------
@@ -104,9 +107,9 @@ def run(
     if to is None:
         import xarray  # heavy
 
-        with contextlib.nullcontext() if jobs == 1 else tempfile.TemporaryDirectory() as folder:
+        with contextlib.nullcontext() if jobs == 1 and not scheduler else tempfile.TemporaryDirectory() as folder:
             kept = MemoryParts() if folder is None else PartFiles(Path(folder))
-            simulate(plan, kept, progress, jobs, stop)
+            simulate(plan, kept, progress, jobs, stop, scheduler=scheduler)
             stage("writing")
             made = outline(plan)
             return xarray.Dataset(in_memory(made, kept), attrs=made.attributes)
@@ -119,7 +122,7 @@ def run(
     wanted, source = identity(attributes(plan)), scenario.origin.written
     with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts:
         if parts is not None:
-            simulate(plan, parts, progress, jobs, stop, shard)
+            simulate(plan, parts, progress, jobs, stop, shard, scheduler)
         if parts is not None and shard == WHOLE:
             stage("writing")
             parts.publish(target, functools.partial(write, outline(plan), parts))
@@ -128,7 +131,7 @@ def run(
 
 def simulate(
     plan: Plan, parts: Parts, progress: Progress = ignore, jobs: int = 1, stop: Callable[[], bool] = lambda: False,
-    shard: Shard = WHOLE,
+    shard: Shard = WHOLE, scheduler: str = "",
 ) -> None:  # fmt: skip
     """Advance every group of members at every point of the sweep, and save a part for each block of steps.
 
@@ -143,7 +146,9 @@ def simulate(
             progress(sum(task.work))
         else:
             tasks.append(task)
-    if jobs > 1 and len(tasks) > 1:
+    if scheduler:
+        cluster.share_out(advance_group, parts, tasks, scheduler, progress, stop)
+    elif jobs > 1 and len(tasks) > 1:
         share_out(functools.partial(advance_group, parts), tasks, jobs, progress, stop)
     else:
         for task in tasks:
