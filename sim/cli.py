@@ -129,14 +129,7 @@ def run(
     for remark in [] if quiet else preview.remarks(plan):
         note(f"note: {remark}")
     jobs = jobs or plan.worthwhile(len(os.sched_getaffinity(0)))
-    how: dict[str, Any] = {
-        "shard": share,
-        "scheduler": scheduler,
-        "replace": force,
-        "resume": resume,
-        "jobs": jobs,
-        "stage": stages.begin,
-    }
+    how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
     with contextlib.ExitStack() as shown:
         if not quiet:
             stages.shown = shown.enter_context(progress_bar(plans.work(plan, *share)))
@@ -401,16 +394,11 @@ def schema() -> None:
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core.")
 def warm(jobs: int | None) -> None:
     """Compile all kernels at once in parallel; else each compiles when a run first calls it."""
-    from sim.ensemble.progress import progress_bar
-    from sim.ensemble.warm import compile_all, missing
-    from sim.numerics import jit
+    from sim.ensemble.warm import compile_missing
 
-    began, lacking = time.monotonic(), missing()
-    if lacking:
-        with progress_bar(len(lacking), "kernels") as shown:
-            for _ in compile_all(lacking, jobs):
-                shown.advance(1)
-    if left := [name for name in lacking if not jit.cached(name)]:
-        _fail(f"{len(left)} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written", TROUBLE)
+    began = time.monotonic()
+    lacking, left, kernels = compile_missing(jobs)
+    if left:
+        _fail(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written", TROUBLE)
     took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
-    click.echo(f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled{took}; the others were there")
+    click.echo(f"{lacking} of {kernels} kernels and laws compiled{took}; the others were there")

@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 
+from sim.ensemble.progress import progress_bar
 from sim.numerics import jit
 
 
@@ -16,6 +17,16 @@ def missing() -> list[str]:
         importlib.import_module(module)
     names = [name for name in jit.compiled if _module(name) in texts]
     return [name for name in sorted(names, key=lambda name: -len(texts[_module(name)])) if not jit.cached(name)]
+
+
+def compile_missing(jobs: int | None) -> tuple[int, int, int]:
+    """Compile what is not in the cache; how many that were, how many of them could not be stored, and how many are."""
+    lacking = missing()
+    if lacking:
+        with progress_bar(len(lacking), "kernels") as shown:
+            for _ in compile_all(lacking, jobs):
+                shown.advance(1)
+    return len(lacking), sum(not jit.cached(name) for name in lacking), len(jit.compiled)
 
 
 def compile_all(names: list[str], jobs: int | None = None) -> Iterator[str]:
