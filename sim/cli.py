@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 import click
 
 from sim.ensemble.progress import while_read
+from sim.units.terminal import print_rows, replace_unknown, say, usage
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
@@ -41,13 +42,13 @@ def main() -> None:
     gc.set_threshold(50_000)  # imports make many objects that stay: looking through them is a tenth of a start
     for order in (signal.SIGTERM, signal.SIGHUP):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
+    replace_unknown()
     try:
         cli.main(standalone_mode=False)
     except (click.Abort, KeyboardInterrupt):
         _fail("stopped", INTERRUPTED)
     except click.ClickException as fault:
-        fault.show()
-        sys.exit(fault.exit_code)
+        _fail(usage(fault), fault.exit_code)
     except MemoryError:
         _fail("there is not enough memory; fewer points, members or records take less (see `sim check`)", FAILED)
     except (OSError, RuntimeError, ValueError) as trouble:
@@ -60,7 +61,7 @@ def main() -> None:
 
 def _fail(text: str, code: int) -> NoReturn:
     with contextlib.suppress(OSError):  # of a reader that is gone
-        click.echo(text, err=True)
+        say(text, err=True)
     sys.exit(code)
 
 
@@ -147,7 +148,7 @@ def run(
     if tabulated:
         _print_tables(*tables)
     if not quiet:
-        click.echo(f"shard {shard} is done; when all are: sim merge {target}" if shard else str(target))
+        say(f"shard {shard} is done; when all are: sim merge {target}" if shard else str(target))
 
 
 def _quantity(text: str, option: str, unit: str, **bounds: Any) -> float:
@@ -206,26 +207,10 @@ def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
 
 def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
     for rows in tables:
-        _print_rows(rows)
-        click.echo()
+        print_rows(rows)
+        say()
     for note in notes:
-        click.echo(note)
-
-
-def _print_rows(rows: list[dict[str, str]]) -> None:
-    """A table on the terminal, its headings the keys of the rows."""
-    from rich.console import Console
-    from rich.table import Table
-
-    shown = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in rows[0] if rows else ():
-        shown.add_column(heading, justify="right", no_wrap=True)
-    for row in rows:
-        shown.add_row(*row.values())
-    console = Console(highlight=False, markup=False, emoji=False)
-    wide = console.options.update(max_width=10_000)
-    console.width = max(console.width, console.measure(shown, options=wide).maximum)  # no number is cut short
-    console.print(shown)
+        say(note)
 
 
 @cli.command()
@@ -240,7 +225,7 @@ def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: i
     from sim.scenario.reader import load
 
     announce_compiling()
-    click.echo(preview(load(scenario, _overrides(changes, seed, members), option="--set")))
+    say(preview(load(scenario, _overrides(changes, seed, members), option="--set")))
 
 
 @cli.command()
@@ -259,7 +244,7 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, 
         _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
         if csv is not None:
             analysis.to_csv(dataset, csv)
-            click.echo(str(csv))
+            say(str(csv))
 
 
 @cli.command()
@@ -268,7 +253,7 @@ def verify(output: Path) -> None:
     """Compare a dataset byte by byte with the checksums of its run; exit 1 where it has changed."""
     from sim.ensemble import checksums
 
-    click.echo(checksums.verify(output))
+    say(checksums.verify(output))
 
 
 @cli.command()
@@ -278,7 +263,7 @@ def merge(output: Path, force: bool) -> None:
     """Make the dataset of a run whose shards are all done, of `sim run --shard`."""
     from sim.ensemble import unfinished
 
-    click.echo(str(unfinished.merge(output, force)))
+    say(str(unfinished.merge(output, force)))
 
 
 class _Plot(click.Command):
@@ -302,7 +287,7 @@ def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str
     from sim.plots import kinds as plots
 
     with _opened(output, chosen) as dataset:
-        click.echo(str(plots.drawn(dataset, kind, output, picture, force)))
+        say(str(plots.drawn(dataset, kind, output, picture, force)))
 
 
 @contextlib.contextmanager
@@ -346,10 +331,10 @@ def converge(
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
     picture = convergence.claim(scene, target, force)
     found = convergence.converge(scene, seconds, accepted)
-    _print_rows(convergence.table(found))
-    click.echo(f"{convergence.explanation(found)}\n\n{convergence.recommendation(found)}\n")
+    print_rows(convergence.table(found))
+    say(f"{convergence.explanation(found)}\n\n{convergence.recommendation(found)}\n")
     convergence.save(found, target, picture)
-    click.echo(f"{target}\n{picture}")
+    say(f"{target}\n{picture}")
 
 
 @cli.command()
@@ -358,9 +343,9 @@ def paper() -> None:
     from sim.study.paper import checks
 
     results = checks()
-    _print_rows([line.row for line in results])
+    print_rows([line.row for line in results])
     failed = sum(not line.passed for line in results)
-    click.echo(f"{len(results) - failed} of {len(results)} hold")
+    say(f"{len(results) - failed} of {len(results)} hold")
     sys.exit(FAILED if failed else DONE)
 
 
@@ -377,7 +362,7 @@ def new(name: Path) -> None:
             file.write(text)
     except FileExistsError:
         _fail(f"{target} exists; name another file", EXISTS)
-    click.echo(f"{target}: run it with `sim run {target}`")
+    say(f"{target}: run it with `sim run {target}`")
 
 
 @cli.command()
@@ -387,7 +372,7 @@ def schema() -> None:
 
     from sim.scenario.schema import scenario_schema
 
-    click.echo(json.dumps(scenario_schema(), indent=2))
+    say(json.dumps(scenario_schema(), indent=2))
 
 
 @cli.command()
@@ -401,4 +386,4 @@ def warm(jobs: int | None) -> None:
     if left:
         _fail(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written", TROUBLE)
     took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
-    click.echo(f"{lacking} of {kernels} kernels and laws compiled{took}; the others were there")
+    say(f"{lacking} of {kernels} kernels and laws compiled{took}; the others were there")

@@ -1,5 +1,6 @@
 """The commands: what they print, write and refuse, and with which exit code."""
 
+import io
 import json
 import os
 import signal
@@ -474,12 +475,12 @@ def test_stats_prints_a_table_and_writes_csv(dataset, here):
 
 def test_no_number_of_a_table_is_cut_short(capsys):
     rows = [{"a long heading": "1.23456789(12)" * 9, "[mm/s]": "[bold]2[/bold]"}] * 2
-    cli._print_rows(rows)
+    cli.print_rows(rows)
     printed = capsys.readouterr().out
     assert printed.count("1.23456789(12)" * 9) == 2
     assert "[mm/s]" in printed
     assert "[bold]2[/bold]" in printed
-    cli._print_rows([])
+    cli.print_rows([])
 
 
 @pytest.fixture
@@ -652,3 +653,55 @@ def test_a_reduced_file_has_a_table_and_names_what_a_figure_misses(here):
     drawn = sim("plot", "out.nc", "stress")
     assert drawn.exit_code == cli.BAD_INPUT and "out.nc: shear_stress" in drawn.output
     assert 'add "shear_stress" to record.quantities' in drawn.output
+
+
+# --- terminals ---
+
+MARKS = "\x1b]0;x\x07\x9b31m\u202e\u2066"
+#: Commands on terminals that do not write UTF-8.
+BARE = [
+    ("stats x.nc", {"PYTHONIOENCODING": "ascii"}),
+    ("check scene.toml", {"PYTHONIOENCODING": "latin-1"}),
+    ("run scene.toml", {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}),
+]
+
+
+@pytest.mark.parametrize(("command", "environment"), BARE, ids=["ascii", "latin-1", "C"])
+def test_a_terminal_without_utf_8_gets_replacements(dataset, here, command, environment):
+    Path("scene.toml").write_text(SCENE.replace("a scene", "τ1 → ∮"))
+    Path("x.nc").symlink_to(dataset)
+    run = [sys.executable, "-m", "sim", *command.split()]
+    done = subprocess.run(run, env=os.environ | environment, capture_output=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"?" in done.stdout
+
+
+def test_a_table_on_a_terminal_without_utf_8_has_replacements(monkeypatch):
+    """What ``sim converge`` and ``sim paper`` print goes the same way."""
+    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    monkeypatch.setattr(sys, "stdout", terminal)
+    monkeypatch.setattr(cli.cli, "main", lambda **how: cli.print_rows([{"τ": "→"}]))
+    cli.main()
+    terminal.flush()
+    assert terminal.buffer.getvalue() == b"?\n?\n"
+
+
+def test_no_control_character_of_a_scenario_or_a_dataset_reaches_the_terminal(dataset, here):
+    name = json.dumps(MARKS)
+    Path("scene.toml").write_text(SCENE.replace('"a scene"', name) + f'[sweep]\n"contact.load" = [1, {name}]\n')
+    odd = f"{MARKS}.toml"
+    Path(odd).write_text(SCENE.replace('"a scene"', name))
+    shown = [sim("check", "scene.toml"), sim("check", odd), sim("run", odd), sim("new", odd), sim("check", "a", MARKS)]
+    shown += [sim("check", odd, "--set", f"{MARKS}=1"), sim("stats", MARKS), sim("plot", dataset, MARKS)]
+    shown += [sim("stats", dataset, "--where", f"{MARKS}=1"), sim("stats", f"outputs/{MARKS}.nc")]
+    with netCDF4.Dataset(dataset, "a") as file:
+        file["t"].units = MARKS
+    shown += [sim("stats", dataset), sim("plot", dataset)]
+    for done in shown:
+        assert done.output
+        assert done.output.replace("\n", "").isprintable(), done.output
+
+
+def test_everything_is_printed_by_one_function():
+    folder = Path(cli.__file__).parent
+    assert [path.name for path in folder.rglob("*.py") if "click.echo(" in path.read_text()] == ["terminal.py"]

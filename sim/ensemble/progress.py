@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-import click
+from sim.units.terminal import say
 
 #: Seconds between two lines of progress, where no bar is shown.
 _PAUSE = 30.0
@@ -17,7 +17,7 @@ _PAUSE = 30.0
 def note(text: str) -> None:
     """Print a line to standard error; that nobody reads it ends no run."""
     with contextlib.suppress(OSError):
-        click.echo(text, err=True)
+        say(text, err=True)
 
 
 @contextlib.contextmanager

@@ -16,6 +16,7 @@ from sim.scenario.declared import all_tables, declaration, keys, model, tables, 
 from sim.scenario.toml_lines import key_lines
 from sim.units.quantity import in_words
 from sim.units.refusals import BadInput, renamed
+from sim.units.terminal import one_line
 
 Path = tuple[str | int, ...]
 Tables = dict[str, type]
@@ -301,8 +302,3 @@ class Place:
                 if wanted[:length] in lines:
                     return lines[wanted[:length]]
         return lines.get(path[:1])
-
-
-def one_line(problem: str) -> str:
-    """A problem on one line that no terminal takes for a command."""
-    return "".join(c if c.isprintable() else "?" if c.isspace() else repr(c)[1:-1] for c in problem)

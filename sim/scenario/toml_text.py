@@ -5,8 +5,9 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from sim.scenario.messages import Fault, one_line, shown
+from sim.scenario.messages import Fault, shown
 from sim.units.refusals import BadInput
+from sim.units.terminal import one_line
 
 _MOST_BYTES = 2**20
 
