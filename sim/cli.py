@@ -3,7 +3,6 @@
 import contextlib
 import gc
 import math
-import os
 import signal
 import sys
 import time
@@ -96,6 +95,7 @@ def cli() -> None:
 @_MEMBERS
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
 @click.option("--scheduler", default="", metavar="ADDRESS", help="Work on the cluster of this scheduler of dask.")
+@click.option("--max-memory", metavar="SIZE", help="Memory for all processes, such as 4 GB; less of it means fewer.")
 @click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
 @click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; `sim merge` makes the file of all.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
@@ -104,8 +104,8 @@ def cli() -> None:
 @click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
 def run(
     scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
-    jobs: int | None, scheduler: str, max_time: str | None, shard: str | None, force: bool, resume: bool, quiet: bool,
-    bare: bool,
+    jobs: int | None, scheduler: str, max_memory: str | None, max_time: str | None, shard: str | None, force: bool,
+    resume: bool, quiet: bool, bare: bool,
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
@@ -117,19 +117,20 @@ def run(
 
     announce_compiling(quiet)
     until = time.monotonic() + (math.inf if max_time is None else _quantity(max_time, "--max-time", "s", above=0))
+    memory = math.inf if max_memory is None else _quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
     scene = load(scenario, _overrides(changes, seed, members), option="--set")
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
 
-    from sim.ensemble import plan as plans, preview, simulate
+    from sim.ensemble import bounds, plan as plans, preview, simulate
 
     simulate.claim(target, force or resume, simulate.files_read(scene), simulate.BESIDE)
     from sim.ensemble.workers import orders
 
     plan = plans.Plan.of(scene)
-    for remark in [] if quiet else preview.remarks(plan):
-        note(f"note: {remark}")
-    jobs = jobs or plan.worthwhile(len(os.sched_getaffinity(0)))
+    jobs, said = preview.announced(plan, jobs, memory, share[1])
+    for line in [] if quiet else said:
+        note(line)
     how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
     with contextlib.ExitStack() as shown:
         if not quiet:
@@ -137,12 +138,12 @@ def run(
         with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
             try:
-                simulate.run(scene, target, **how, stage=stages.begin, progress=stages.shown.advance)
+                simulate.run(scene, target, **how, memory=memory, stage=stages.begin, progress=stages.shown.advance)
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
                 log(target, began, stages.ended())
                 _fail(_KEPT, getattr(stopped, "exit_code", INTERRUPTED))
         shown.callback(lambda: log(target, began, stages.ended()))
-        if tabulated := not (quiet or bare or shard):
+        if tabulated := not (quiet or bare or shard) and bounds.tabulated(plan):
             stages.begin("table")
             tables = _tables_of(target)
     if tabulated:

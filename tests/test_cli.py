@@ -3,6 +3,7 @@
 import io
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from click.testing import CliRunner
 from helpers.commands import sim
 
 from sim import cli
-from sim.ensemble import progress, simulate
+from sim.ensemble import bounds, progress, simulate
 from sim.numerics import jit
 from sim.scenario.reader import BadInput, load
 from sim.study import paper
@@ -705,3 +706,19 @@ def test_no_control_character_of_a_scenario_or_a_dataset_reaches_the_terminal(da
 def test_everything_is_printed_by_one_function():
     folder = Path(cli.__file__).parent
     assert [path.name for path in folder.rglob("*.py") if "click.echo(" in path.read_text()] == ["terminal.py"]
+
+
+def test_max_memory_is_honoured_and_refused_with_the_least_where_it_is_too_little(here, monkeypatch):
+    for given, said in (("5 m", "--max-memory 5 m"), ("-1 GB", "above"), ("much", "4 GB")):
+        refused = sim("run", "scene.toml", "--max-memory", given)
+        assert (refused.exit_code, said in refused.stderr) == (2, True)
+    refused = sim("run", "scene.toml", "--max-memory", "9 MB")
+    assert refused.exit_code == 1
+    assert re.search(r"takes \d+ MB of memory at least, of which 9 MB are allowed \(--max-memory\)", refused.stderr)
+    assert not Path("outputs").exists()
+    assert sim("run", "scene.toml", "--max-memory", "4 GB", "--no-table").exit_code == 0
+    monkeypatch.setattr(bounds, "_MOST_TABULATED", 0.0)
+    large = sim("run", "scene.toml", "--force")
+    assert large.exit_code == 0
+    assert "`sim stats` prints the table" in large.stderr
+    assert large.stdout == "outputs/scene.nc\n"

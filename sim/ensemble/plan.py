@@ -18,13 +18,15 @@ _STATE_NUMBERS = 2**23
 # Rough costs of one core [s]: a step of a batch, of one where a part feeds back; of a member, of a counted population,
 # an event of a bond that is followed.
 _STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
-_SCENARIO_BYTES, _STATISTICS, _MOST_STEPS = 2e4, 3, 10**9
+#: A dataset without its trajectories [byte]; statistics of each.
+_SCENARIO_BYTES, _STATISTICS = 1.2e5, 3
 #: Counted work [s of one core]: of a block at most, of a run that is cut into smaller groups for several cores, and of
 #: one for each process that is worth starting.
 _BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 5.0, 20.0, 4.0
 _SMALLEST_GROUP = 16
-#: What is left of trajectories by ``record.compression``, roughly; and the largest file of them that nobody asked for.
-LEFT = {"none": 1.0, "zlib": 0.4, "digits": 0.2}
+#: What is left of trajectories by ``record.compression``, roughly, and of maps; and the largest file of trajectories
+#: that nobody asked for [byte].
+_LEFT, _LEFT_OF_MAPS = {"none": 1.0, "zlib": 0.4, "digits": 0.2}, 0.85
 _MOST_BYTES = 20e9
 
 
@@ -149,6 +151,10 @@ class Plan:
         """Records of a block that bounds its numbers."""
         return max(1, _PART_NUMBERS // (self.group * len(VARIABLES)))
 
+    def snapshots_of_block(self, point: Scenario) -> int:
+        """Times at most of one block at which maps are drawn."""
+        return max(1, int(8 * _PART_NUMBERS * len(point.record.maps) / map_bytes(point, self.group)))
+
     def blocks(self, point: Scenario) -> list[Block]:
         """Blocks of a group: of whole records, or where one takes too long, of some steps between two records.
 
@@ -161,8 +167,7 @@ class Plan:
             intervals = (range(first, first + clock.stride, longest) for first in range(0, clock.steps, clock.stride))
             ends = {clock.steps, *itertools.chain(*intervals)}
         if point.map_size is not None:
-            numbers = min(self.group, point.record.map_members) * point.map_size[1] ** 2
-            ends |= {*snapshots(point)[:: max(1, _PART_NUMBERS // numbers)]}
+            ends |= {*snapshots(point)[:: self.snapshots_of_block(point)]}
         stops = sorted(ends)
         return [Block(start, end, clock.stride) for start, end in zip([-1, *stops], stops, strict=False)]
 
@@ -200,8 +205,26 @@ class Plan:
     @cached_property
     def bytes(self) -> float:
         """Size of all that is recorded, before compression [byte]."""
-        maps = len(self.points) * map_bytes(self.points[0], self.members)
-        return _SCENARIO_BYTES + maps + self._trajectories(self.per_member)
+        return _SCENARIO_BYTES + self.maps + self.trajectories
+
+    @property
+    def file_bytes(self) -> float:
+        """Size of the dataset, roughly [byte]."""
+        return _SCENARIO_BYTES + _LEFT_OF_MAPS * self.maps + self._left * self.trajectories
+
+    @property
+    def maps(self) -> float:
+        """Size of all maps, before compression [byte]."""
+        return len(self.points) * map_bytes(self.points[0], self.members)
+
+    @property
+    def trajectories(self) -> float:
+        """Size of all trajectories, before compression [byte]."""
+        return self._trajectories(self.per_member)
+
+    @property
+    def _left(self) -> float:
+        return _LEFT[self.scenario.record.compression]
 
     @cached_property
     def per_member(self) -> bool:
@@ -209,7 +232,7 @@ class Plan:
         record = self.scenario.record
         if record.per_member is not None:
             return record.per_member
-        return LEFT[record.compression] * self._trajectories(True) <= _MOST_BYTES
+        return self._left * self._trajectories(True) <= _MOST_BYTES
 
     def _trajectories(self, per_member: bool) -> float:
         """Size of the trajectories before compression [byte]."""
@@ -228,7 +251,7 @@ class Plan:
 
 def together(scenario: Scenario) -> int:
     """Members that are best advanced together: as many as keep their state below 64 MB, 256 at the most."""
-    return min(_GROUP, max(1, _STATE_NUMBERS // (2 * scenario.process.pairs + scenario.population.numbers)))
+    return min(_GROUP, max(1, _STATE_NUMBERS // state_numbers(scenario)))
 
 
 def snapshots(point: Scenario) -> list[int]:
@@ -237,12 +260,20 @@ def snapshots(point: Scenario) -> list[int]:
     return [round(time / clock.duration * (clock.records - 1)) * clock.stride for time in sorted(point.record.maps)]
 
 
-def seconds_a_step(point: Scenario, members: int) -> float:
-    """Rough time of one core for a step of a batch [s], which does not depend on the machine."""
+def state_numbers(point: Scenario) -> int:
+    """Numbers that the state of a member holds."""
+    return 2 * point.process.pairs + point.population.numbers
+
+
+def seconds_a_step(point: Scenario, members: int, speeds: np.ndarray | None = None) -> float:
+    """Rough time of one core for a step of a batch [s], which does not depend on the machine; on average over the run.
+
+    Given ``speeds`` [m/s] it is that of steps at these.
+    """
     bonds, batch = point.population, _STEP + _ALONE * point.by_steps + point.population.step_seconds
     member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds + point.contact.edge_seconds
     if bonds.per_member and not bonds.feeds_back:
-        member += _COUNTED + _EVENT * bonds.followed(point.speeds(21), point.clock.step)
+        member += _COUNTED + _EVENT * bonds.followed(point.speeds(21) if speeds is None else speeds, point.clock.step)
     return batch + members * member
 
 

@@ -1,36 +1,41 @@
 """What a scenario would run, in words: for ``sim check``."""
 
+import itertools
 import math
+import os
 import re
+import time
 import tomllib
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from sim.ensemble.plan import LEFT, Plan, map_bytes, seconds_a_step, work
+from sim.ensemble import bounds
+from sim.ensemble.bounds import size, spread
+from sim.ensemble.plan import Block, Plan, seconds_a_step, work
 from sim.laws import jkr
+from sim.numerics import jit
+from sim.numerics.files import StoreTrouble
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.clock import Record
 from sim.scenario.declared import entries
 from sim.scenario.scenario import Scenario
 
-# Rough costs of one core, for the estimate only [s]: starting up; the table, and a byte of it; a point of a sweep; a
-# part file; a record of a batch, of a member; a byte.
-_START, _TABLE, _TABULATED = 1.2, 0.9, 5e-9
-_POINT, _PART, _RECORD, _RECORD_OF_MEMBER, _BYTE = 15e-3, 5e-3, 5e-6, 2e-7, 50e-9
-_PROGRAM_BYTES = 200e6
-#: A file without its trajectories [byte].
-_BARE = 1e5
-#: Points of a sweep whose cells are looked at.
-_MOST_POINTS = 8
 _MOST_WORDS = 6
+#: Time for which steps are tried [s]; a run that is counted shorter [s] is not tried, or not announced.
+_TRIED, _WORTH_TRYING, _LONG = 0.25, 1.0, 10.0
 #: Keys that stand elsewhere than among the quantities.
 _ELSEWHERE = ("name", "sweep", *(f"{part}.model" for part in Parts._fields))
 _ROWS = {"cell_error": "error of the cell", "banded_error": "error of the bands", "member_spread": "spread of a member"}
 
 Rows = list[tuple[str, ...]]
+
+
+class _NotCompiledError(Exception):
+    """A kernel is not in the cache."""
 
 
 def preview(scenario: Scenario) -> str:
@@ -47,33 +52,27 @@ def preview(scenario: Scenario) -> str:
         Several lines for a terminal.
     """
     plan = Plan.of(scenario)
-    some = _spread(plan.points)
+    some = spread(plan.points)
     blocks: dict[str, Rows] = {
         "models": _models(plan),
         "quantities in SI": _quantities(plan.points),
         "contact at rest": _contact(plan.points),
         "fluctuations": _fluctuations(some),
-        "notes": [(text,) for text in remarks(plan)],
-        "the run": _run(plan, some),
+        "notes": [(text,) for text in [*remarks(plan), *_lacking(plan)]],
+        "the run": _run(plan),
     }
     return "\n\n".join([scenario.name, *(f"{title}\n{_aligned(rows)}" for title, rows in blocks.items() if rows)])
 
 
 def remarks(plan: Plan) -> list[str]:
     """What is to be known before a run, one sentence each."""
-    found = [text for point in _spread(plan.points) for text in point.remarks()]
+    found = [text for point in spread(plan.points) for text in point.remarks()]
     if plan.scenario.record.per_member is None and not plan.per_member:
         found.append(
             "every member would make a file of more than 20 GB: mean, spread and standard error are kept alone"
             " (record.per_member = true keeps every member)"
         )
     return list(dict.fromkeys(found))
-
-
-def _spread(points: Sequence[Scenario]) -> list[Scenario]:
-    """Some of the points, first and last included."""
-    places = np.unique(np.linspace(0, len(points) - 1, min(_MOST_POINTS, len(points))).round().astype(int))
-    return [points[place] for place in places]
 
 
 def _aligned(rows: Rows) -> str:
@@ -209,42 +208,121 @@ def _percent(values: list[float]) -> str:
     return f"{100.0 * value:+.2g} %" if abs(value) > 1e-9 else "none"
 
 
-def _run(plan: Plan, some: Sequence[Scenario]) -> Rows:
+def usual_jobs(plan: Plan) -> int:
+    """Processes that a run has by itself: one a core where the work is worth it."""
+    return plan.worthwhile(len(os.sched_getaffinity(0)))
+
+
+def _lacking(plan: Plan) -> list[str]:
+    """Memory or disk that there is not enough of for a run here."""
+    said = []
+    try:
+        bounds.fitting(plan, 1)
+    except bounds.NoRoom as trouble:
+        said.append(str(trouble))
+    try:
+        bounds.refuse_full_disk(plan, Path("outputs") / "dataset.nc")
+    except StoreTrouble as trouble:
+        said.append(str(trouble))
+    return said
+
+
+def _run(plan: Plan) -> Rows:
     """How much there is to compute and to keep."""
-    scene, clock = plan.scenario, plan.points[0].clock
-    sample = Plan(scene, tuple(some))
-    numbers = max(8 * point.process.pairs + point.population.numbers for point in some)
-    held = _PROGRAM_BYTES + 8.0 * sample.group * (numbers + 2.0 * len(plan.variables) * sample.most_records)
-    held += 2.0 * map_bytes(some[0], sample.group)  # a part, and what is written of it
+    scene, clock, jobs = plan.scenario, plan.points[0].clock, usual_jobs(plan)
     alike = ", all alike, so one is computed" if scene.ensemble.members > plan.members else ""
     rows: Rows = [("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records")]
     rows.append(("members", f"{scene.ensemble.members:,}{alike}"))
     if scene.sweep:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
-    rows.append(
-        ("work", f"{work(plan):,} member-steps, about {_duration(_seconds(plan, some))} on one core, table included")
+    pace = tried(plan)
+    found = bounds.takes(plan, jobs, pace or 1.0)
+    rows.append(("work", f"{work(plan):,} member-steps, {_times(found, jobs, pace is not None)}"))
+    rows.append(("memory", f"about {size(found.memory)}{', all processes together' if jobs > 1 else ''}"))
+    before = "" if scene.record.compression == "none" else f", {size(plan.bytes)} before compression"
+    return [
+        *rows,
+        ("file", f"about {size(found.file)}{before}"),
+        ("disk", f"about {size(found.disk)} while it is made"),
+    ]
+
+
+def announced(plan: Plan, jobs: int | None, memory: float, shares: int = 1) -> tuple[int, list[str]]:
+    """Processes of a run, of those wanted as many as ``memory`` [byte] holds, and what is said before it.
+
+    Of a long run, or one of several processes, that is how much it takes; kernels that are missing are compiled for it,
+    before these processes need them.
+    """
+    wanted, said = jobs or usual_jobs(plan), [f"note: {text}" for text in remarks(plan)]
+    if (jobs := bounds.fitting(plan, wanted, memory)) < wanted:
+        said.append(f"note: there is memory for {jobs} of {wanted} processes")
+    if not bounds.tabulated(plan):
+        said.append("note: of so large a dataset `sim stats` prints the table")
+    if jobs > 1 or bounds.counted(plan) > _LONG:
+        found = bounds.takes(plan, jobs, tried(plan, compiling=True) or 1.0, shares)
+        room = f"{size(found.memory)} of memory, {size(found.disk)} of disk for a file of {size(found.file)}"
+        said.append(f"{_times(found, jobs)}, {room}")
+    return jobs, said
+
+
+def tried(plan: Plan, compiling: bool = False) -> float | None:
+    """Pace of a machine: CPU time of some steps, computed as a run does, over what is counted for them.
+
+    1 for a run that is counted short; None where kernels are not in the cache, unless ``compiling`` them is wanted.
+    """
+
+    def refuse(name: str) -> None:
+        raise _NotCompiledError(name)
+
+    if bounds.counted(plan) < _WORTH_TRYING:
+        return 1.0
+    before, ends = list(jit.on_compiling), spread(plan.points, 3)
+    jit.on_compiling[:] = before if compiling else [refuse]
+    try:
+        found = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
+    except _NotCompiledError:
+        return None
+    finally:
+        jit.on_compiling[:] = before
+    return sum(took for took, _ in found) / sum(expected for _, expected in found)
+
+
+def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
+    """CPU time of some steps at one point, for ``most`` [s] altogether, and what is counted for them [s]."""
+    from sim.ensemble.part_files import MemoryParts
+    from sim.ensemble.simulate import advance_group, ignore
+
+    marks: list[float] = []
+
+    class Timed(MemoryParts):
+        """Parts of which nothing is kept but when each was made."""
+
+        def save(self, *of_part: object) -> None:
+            marks.append(time.process_time())
+
+    def late() -> bool:  # each block is twice as long as the one before
+        return len(marks) > 2 and marks[-1] - marks[0] + 2.0 * (marks[-1] - marks[-2]) > most
+
+    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
+    steps, stride = point.clock.steps, point.clock.stride
+    within = {2**k for k in range(stride.bit_length()) if 2**k < stride}  # beyond that, a block ends at a record
+    ends = sorted({-1, 0, *within, *(2**k * stride for k in range((steps // stride).bit_length())), steps})
+    blocks = [Block(start, end, stride) for start, end in itertools.pairwise(ends)]
+    task = next(plan.tasks())._replace(points=[point], members=members, blocks=blocks, names=["tried"] * len(blocks))
+    advance_group(Timed(), task, ignore, late)
+    point.release()
+    last = blocks[len(marks) - 1]
+    return marks[-1] - marks[-2], bounds.counted_block(
+        point, members, last, point.speeds(5, last.end / point.clock.steps)[2:]
     )
-    rows.append(("memory", f"about {_size(held)}"))
-    packed = f"about {_size(_BARE + LEFT[scene.record.compression] * plan.bytes)}"
-    before = "" if scene.record.compression == "none" else f", {_size(_BARE + plan.bytes)} before compression"
-    return [*rows, ("file", packed + before)]
 
 
-def _seconds(plan: Plan, some: Sequence[Scenario]) -> float:
-    """Time of the whole run on one core, linear in the members."""
-    clock, group = plan.points[0].clock, min(plan.members, Plan(plan.scenario, tuple(some)).group)
-    batches, points = max(1.0, plan.members / group), len(plan.points)
-    records = clock.records * (_RECORD + group * _RECORD_OF_MEMBER)
-    steps = clock.steps * sum(seconds_a_step(point, group) for point in some) / len(some)
-    kept = _TABLE + (_BYTE + _TABULATED) * plan.bytes
-    return _START + points * (_POINT + batches * (records + steps + _PART)) + kept
-
-
-def _size(count: float) -> str:
-    """A number of bytes to two digits, as the estimate it is."""
-    unit, factor = next((row for row in (("GB", 1e9), ("MB", 1e6)) if count >= row[1]), ("kB", 1e3))
-    return f"{float(f'{count / factor:.2g}'):g} {unit}"
+def _times(found: bounds.Takes, jobs: int, compiled: bool = True) -> str:
+    """CPU time and time by the clock in words."""
+    clock = f", {_duration(found.clock)} by the clock in {jobs} processes" if jobs > 1 else ""
+    compiling = "" if compiled else " by rough costs, and up to half a minute to compile, once"
+    return f"about {_duration(found.cpu)} of CPU time{clock}{compiling}"
 
 
 def _duration(seconds: float) -> str:

@@ -4,6 +4,7 @@ import contextlib
 import datetime
 import functools
 import json
+import math
 import os
 import platform
 import tempfile
@@ -16,6 +17,7 @@ import numpy as np
 
 from sim.engine import Dice, State, follow, pack, unpack
 from sim.ensemble import cluster
+from sim.ensemble.bounds import fitting, refuse_full_disk
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
 from sim.ensemble.part_files import (
@@ -55,7 +57,7 @@ _STEPS = 1024
 def run(
     scenario: Scenario, to: str | os.PathLike | None = None, *, replace: bool = False, resume: bool = False,
     jobs: int = 1, progress: Progress = ignore, stage: Callable[[str], None] = lambda name: None,
-    stop: Callable[[], bool] = lambda: False, shard: Shard = WHOLE, scheduler: str = "",
+    stop: Callable[[], bool] = lambda: False, shard: Shard = WHOLE, scheduler: str = "", memory: float = math.inf,
 ) -> Any:  # fmt: skip
     """Run a scenario with its ensemble and its sweep.
 
@@ -81,6 +83,8 @@ def run(
         Number of a share of the run, from 1, and how many there are; ``merge`` makes the file of all.
     scheduler : str
         Address of a scheduler of dask, whose workers take the place of processes.
+    memory : float
+        Memory that all processes together may take [byte]: fewer of them share the work where it is little.
 
     Returns
     -------
@@ -98,11 +102,14 @@ def run(
     Stopped
         If it was to end early; what is computed is kept.
     StoreTrouble
-        If the disk or a file makes trouble; what the disk holds of an older output stays.
+        If the disk has too little room or a file makes trouble; what the disk holds of an older output stays.
+    NoRoom
+        If there is too little memory, before anything is computed.
     WorkerDied
         If processes died at the same work three times.
     """
     plan = Plan.of(scenario)
+    jobs = fitting(plan, jobs, memory, kept=to is None)
     stage("simulating")
     if to is None:
         import xarray  # heavy
@@ -120,6 +127,8 @@ def run(
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
     wanted, source = identity(attributes(plan)), scenario.origin.written
+    if replace or not target.exists():
+        refuse_full_disk(plan, target, shard[1])
     with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts:
         if parts is not None:
             simulate(plan, parts, progress, jobs, stop, shard, scheduler)

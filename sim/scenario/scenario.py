@@ -192,10 +192,10 @@ class Scenario:
         """The four parts with the models chosen that the scenario leaves open."""
         return self.drive, self.population, self.fluctuations, self.contact
 
-    def speeds(self, count: int) -> np.ndarray:
-        """Speeds at times spread evenly over the run, its ends included [m/s]."""
+    def speeds(self, count: int, share: float = 1.0) -> np.ndarray:
+        """Speeds at times spread evenly over the run or a first share of it, its ends included [m/s]."""
         duration = self.times.duration
-        instants = np.repeat(np.linspace(0.0, duration, count), 2)
+        instants = np.repeat(np.linspace(0.0, share * duration, count), 2)
         return self.drive.pieces(instants, duration).joined.last[::2]
 
     @cached_property

@@ -1,16 +1,26 @@
 """What a run takes: known before it starts, refused where there is no room, and bounded."""
 
 import json
+import math
+import resource
+import shutil
+import time
+from pathlib import Path
+from types import SimpleNamespace
 
+import pytest
 from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
+from numpy.testing import assert_allclose
 
 from sim import analysis
-from sim.ensemble import plan as plans
+from sim.ensemble import bounds, plan as plans, preview, simulate
 from sim.ensemble.outline import identity
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import remarks
 from sim.ensemble.simulate import run
-from sim.scenario.clock import Record
+from sim.numerics import jit
+from sim.numerics.files import StoreTrouble
+from sim.scenario.clock import Clock, Record
 
 
 def sample(members=3, steps=9, **parts):
@@ -32,3 +42,127 @@ def test_members_whose_file_would_be_too_large_are_pooled_where_the_scenario_lea
         assert identity(dataset.attrs) == identity(alike.attrs)  # so that either goes on with the other
         assert analysis.table(dataset) == analysis.table(alike)
         assert "member" in run(kept).dims
+
+
+def never_begun(done):
+    raise AssertionError("the run has begun")
+
+
+def test_a_run_has_as_many_processes_as_memory_holds_and_is_refused_where_it_holds_none(monkeypatch, tmp_path):
+    plan = Plan.of(sample(8, 500))
+    needed = [bounds.memory(plan, jobs) for jobs in (1, 2, 3, 4)]
+    assert needed == sorted(needed)
+    for free, most in ((math.inf, needed[2]), (needed[2], math.inf), (needed[2], needed[3])):
+        monkeypatch.setattr(bounds, "_free_memory", lambda free=free: free)
+        assert bounds.fitting(plan, 4, most) == 3
+        assert bounds.fitting(plan, 2, most) == 2
+    assert "note: there is memory for 3 of 4 processes" in preview.announced(plan, 4, needed[2])[1]
+    monkeypatch.setattr(bounds, "_free_memory", lambda: 0.5 * needed[0])
+    for to in (None, tmp_path / "x.nc"):
+        with pytest.raises(bounds.NoRoom, match=f"{bounds.size(0.5 * needed[0])} are free") as refused:
+            run(plan.scenario, to, jobs=2, progress=never_begun)
+    assert bounds.size(needed[0]) in str(refused.value)
+    assert refused.value.exit_code == 1
+    assert not list(tmp_path.iterdir())
+    assert any(bounds.size(needed[0]) in line for line in preview.preview(plan.scenario).splitlines())
+    with pytest.raises(bounds.NoRoom, match="are allowed"):
+        bounds.fitting(plan, 1, 0.4 * needed[0])
+
+
+def test_a_dataset_in_memory_counts(monkeypatch):
+    plan = Plan.of(sample(100, 2000))
+    monkeypatch.setattr(bounds, "_free_memory", lambda: bounds.memory(plan, 1) + plan.bytes)
+    assert bounds.fitting(plan, 1) == 1
+    with pytest.raises(bounds.NoRoom):
+        bounds.fitting(plan, 1, kept=True)
+
+
+@pytest.mark.parametrize(
+    ("own", "top", "limit", "used"),
+    [
+        ("0::/jobs/mine", ".", "memory.max", "memory.current"),
+        ("4:memory:/jobs/mine\n2:cpu:/", "memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
+    ],
+)
+def test_the_least_limit_of_the_control_groups_holds_with_what_can_be_reclaimed(own, top, limit, used, tmp_path):
+    (tmp_path / "own").write_text(own)
+    (tmp_path / top / "jobs" / "mine").mkdir(parents=True)
+    for place, most in (("jobs/mine", 900), ("jobs", 700), (".", 10**6)):
+        folder = tmp_path / top / place
+        (folder / limit).write_text(f"{most}\n")
+        (folder / used).write_text("300\n")
+        (folder / "memory.stat").write_text("cache 9\ninactive_file 50\n")
+    assert sorted(bounds._free_in_groups(tmp_path, tmp_path / "own")) == [450, 650, 10**6 - 250]
+    (tmp_path / top / "jobs" / limit).write_text("max\n")
+    assert min(bounds._free_in_groups(tmp_path, tmp_path / "own")) == 650
+    assert not list(bounds._free_in_groups(tmp_path, tmp_path / "none"))
+
+
+def test_the_limit_of_addresses_holds(monkeypatch):
+    status = bounds._table(Path("/proc/self/status"))
+    monkeypatch.setattr(resource, "getrlimit", lambda what: (int(status["VmSize"] + 1e6), resource.RLIM_INFINITY))
+    assert 0.5 * status["VmRSS"] < bounds._free_memory() < status["VmRSS"] + 1e7
+
+
+def test_a_run_whose_parts_and_dataset_the_disk_does_not_hold_is_refused_and_leaves_nothing(monkeypatch, tmp_path):
+    scenario, folder = sample(50, 500), tmp_path / "outputs"
+    needed = bounds.takes(Plan.of(scenario), 1).disk
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(total=10**12, free=0.9 * needed))
+    with pytest.raises(StoreTrouble, match=bounds.size(0.9 * needed)) as refused:
+        run(scenario, folder / "x.nc", progress=never_begun)
+    assert refused.value.exit_code == 74
+    assert bounds.size(needed) in str(refused.value)
+    assert not list(folder.iterdir())
+    monkeypatch.chdir(tmp_path)
+    assert any(bounds.size(0.9 * needed) in line for line in preview.preview(scenario).splitlines())
+    parts = folder / "x.nc.parts"
+    parts.mkdir()
+    (parts / "manifest.json").write_bytes(bytes(int(0.2 * needed)))  # what a run that goes on has there already
+    bounds.refuse_full_disk(Plan.of(scenario), folder / "x.nc")
+
+
+def test_the_room_on_disk_is_that_of_parts_and_dataset(tmp_path, monkeypatch):
+    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)
+    mapped = sample(5, 60, shear=SHEARS["mapped, diffusion, constant"], record=Record(maps=(1e-3, 5e-2)))
+    for scenario in (sample(50, 200), sample(50, 200, record=Record(per_member=False)), mapped):
+        held = {}
+
+        def watch(stage, held=held):
+            if stage == "writing":
+                held["parts"] = sum(path.stat().st_size for path in (tmp_path / "x.nc.parts").iterdir())
+
+        size = run(scenario, tmp_path / "x.nc", replace=True, stage=watch).stat().st_size
+        found = bounds.takes(Plan.of(scenario), 1)
+        assert found.disk / 1.5 < held["parts"] + size < 1.5 * found.disk
+
+
+def test_the_pace_is_that_of_the_steps_and_nothing_is_compiled_for_it(monkeypatch):
+    monkeypatch.setattr(preview, "_WORTH_TRYING", 0.0)
+    plan, clock = Plan.of(sample(20, 3000, clock=Clock(duration=3.0, step=1e-3, record=0.1))), [0.0]
+    follow = simulate.follow
+
+    def slow(point, dice, state, steps):
+        before = -1 if state is None else state.step
+        clock[0] += 3.0 * bounds.counted_block(point, dice.shear.members, plans.Block(before, steps[-1], 100))
+        return follow(point, dice, state, steps)
+
+    monkeypatch.setattr(simulate, "follow", slow)
+    monkeypatch.setattr(time, "process_time", lambda: clock[0])
+    assert_allclose(preview.tried(plan), 3.0, rtol=1e-9)
+    assert 0.0 < clock[0] < 0.5
+    asked, own = [], [lambda name: None]
+    monkeypatch.setattr(jit, "on_compiling", own[:])
+    monkeypatch.setattr(simulate, "follow", lambda *of_block: asked.append(1) or jit.on_compiling[0]("a kernel"))
+    assert preview.tried(plan) is None
+    assert jit.on_compiling == own
+    assert asked == [1]
+    said = preview._times(bounds.takes(plan, 2), 2, compiled=False)
+    assert "to compile" in said
+    assert "in 2 processes" in said
+
+
+def test_a_run_of_ten_times_the_members_takes_no_more_memory():
+    few, many = (Plan.of(sample(members, 2000)) for members in (1000, 10_000))
+    assert not bounds.tabulated(many)
+    for jobs in (1, 4):
+        assert bounds.memory(many, jobs) < 1.1 * bounds.memory(few, jobs)
