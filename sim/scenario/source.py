@@ -1,11 +1,10 @@
 """Origin of a scenario: its text and the files it names."""
 
-import errno
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-_MOST_BYTES = 2**28
+from sim.units.table import plain_text
 
 
 @dataclass(frozen=True)
@@ -47,10 +46,5 @@ class Files:
     def text(self, name: str) -> str:
         """The file's text, kept for the dataset's provenance."""
         if name not in self.texts:
-            path = self.path(name)
-            if path.exists() and not path.is_file():
-                raise OSError(errno.EINVAL, "it is no plain file")
-            if path.stat().st_size > _MOST_BYTES:
-                raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
-            self.texts[name] = path.read_text(encoding="utf-8")
+            self.texts[name] = plain_text(self.path(name))
         return self.texts[name]

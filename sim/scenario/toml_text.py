@@ -1,6 +1,9 @@
 """From a TOML file to its document, and overrides on top of it."""
 
+import errno
+import os
 import re
+import stat
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -33,7 +36,11 @@ def read_text(path: Path) -> str:
     """The text of a scenario file, which is UTF-8 and of at most 1 MiB."""
     try:
         with path.open("rb") as file:
-            content = file.read(_MOST_BYTES + 1)
+            found = os.fstat(file.fileno())
+            if stat.S_ISCHR(found.st_mode) or stat.S_ISBLK(found.st_mode):
+                raise OSError(errno.EINVAL, "it is a device")
+            plain = stat.S_ISREG(found.st_mode)  # and not a pipe: one without a size, as in /proc, may wait for ever
+            content = file.read(min(found.st_size, _MOST_BYTES + 1) if plain else _MOST_BYTES + 1)
     except FileNotFoundError:
         raise _refusal(f"{path}: there is no such file; `sim new` writes a starter") from None
     except (OSError, ValueError) as trouble:

@@ -11,12 +11,12 @@ from pydantic_core import ArgsKwargs, PydanticCustomError
 
 from sim.spectrum.radial import PowerLaws, Rowed
 from sim.units.quantity import Quantity
-from sim.units.table import file_columns
+from sim.units.table import at_once, file_columns
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
 _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0)
-Wavenumbers = tuple[Annotated[float, _WAVENUMBER], ...]
-Densities = tuple[Annotated[float, _DENSITY], ...]
+Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], at_once(_WAVENUMBER)]
+Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], at_once(_DENSITY)]
 _WHERE = "4π² in the integral, <τ1²> = ∫ d²q C / 4π², or in the density, <τ1²> = ∫ d²q C (Persson)"
 _Normalization = Annotated[Literal["in_integral", "in_density"], Field(description=_WHERE)]
 #: Factor from a density to C: the 4π² stands in the integral ⟨τ1²⟩ = ∫ d²q C / 4π², or already in the density.
@@ -97,7 +97,7 @@ class Tabulated(FromFile):
         if not name or not isinstance(name, str):
             raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
         table = file_columns(name, info.context, {"q": _WAVENUMBER, "C": _DENSITY})
-        return {**values, "wavenumbers": table["q"].tolist(), "densities": table["C"].tolist()}
+        return {**values, "wavenumbers": table["q"], "densities": table["C"]}
 
     @functools.cached_property
     def rows(self) -> PowerLaws:

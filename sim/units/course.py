@@ -14,7 +14,7 @@ from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import Quantity
-from sim.units.table import file_columns
+from sim.units.table import at_once, file_columns
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -208,7 +208,7 @@ class Table:
     changes: ClassVar[bool] = True
     cycles: ClassVar[int] = 0
 
-    time: tuple[Annotated[float, _TIME], ...]
+    time: Annotated[tuple[Annotated[float, _TIME], ...], at_once(_TIME)]
     file: Annotated[str, Field(description="CSV with these columns, beside the scenario, in place of them")] = ""
 
     @model_validator(mode="before")
@@ -274,7 +274,7 @@ def held(unit: Quantity, name: str) -> Any:
 
         quantity: ClassVar[Quantity] = unit
         column: ClassVar[str] = name
-        value: tuple[Annotated[float, unit], ...]
+        value: Annotated[tuple[Annotated[float, unit], ...], at_once(unit)]
         file: Annotated[str, Field(description=f"CSV with the columns `time` and `{name}`, in place of these")] = ""
 
     number, course = Annotated[float, unit, Tag("[value]")], Annotated[_Course, Tag("[course]")]

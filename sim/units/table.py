@@ -2,14 +2,18 @@
 
 import contextlib
 import csv
+import errno
+import itertools
 import os
 import re
-from collections.abc import Iterable, Iterator
+import stat
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import WrapValidator
 from pydantic_core import PydanticCustomError
 
 from sim.units.quantity import Quantity
@@ -19,6 +23,9 @@ _HEADER = re.compile(r"\s*(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\]
 
 #: What a header's names look like; whatever else stands in a file is shown by no message.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_ .-]{0,19}")
+_MOST_BYTES = 2**28
+#: Characters of a table that are read together, and of a line at most.
+_AT_ONCE, _LONGEST_LINE = 2**18, 2**23
 
 
 class TableError(ValueError):
@@ -61,22 +68,25 @@ def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.floa
     >>> table["speed"].tolist()
     [0.001, 0.005]
     """
-    lines = _lines(text)
     example = ", ".join(_column(name, quantity) for name, quantity in wanted.items())
-    if not lines:
+    found: dict[str, tuple[int, str]] = {}
+    parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in wanted}
+    number, header = 0, list[str]()
+    for lines, rows in _rows(text):
+        if not header:
+            number, header = lines.pop(0), [cell.strip() for cell in rows.pop(0)]
+            found = _header(number, header, wanted, example)
+        if at := _ragged(lines, rows, len(header)):
+            said = f"line {at[0]}: {at[1]} cells where the header has {len(header)}"
+            raise TableError(f"{said}; separate cells by commas, write decimals with a point")
+        for name, (place, unit) in found.items():
+            parts[name].append(_numbers(name, lines, [row[place] for row in rows], unit, wanted[name]))
+    if not header:
         raise TableError(f'the table is empty; begin with a header such as "{example}", then rows of numbers')
-    (number, header), rows = lines[0], lines[1:]
-    found = _header(number, header, wanted, example)
-    if not rows:
+    columns = {name: np.concatenate(several) for name, several in parts.items()}
+    if not all(map(len, columns.values())):
         raise TableError(f"line {number}: no rows follow the header; add rows of numbers below it")
-    for at, cells in rows:
-        if len(cells) != len(header):
-            said = f"{len(cells)} cells where the header has {len(header)}"
-            raise TableError(f"line {at}: {said}; separate cells by commas, write decimals with a point")
-    return {
-        name: np.array([_number(at, name, cells[place], unit, wanted[name]) for at, cells in rows])
-        for name, (place, unit) in found.items()
-    }
+    return columns
 
 
 def matrix(text: str, quantity: Quantity) -> NDArray[np.float64]:
@@ -87,27 +97,45 @@ def matrix(text: str, quantity: Quantity) -> NDArray[np.float64]:
     TableError
         If it is empty or ragged, or a cell is no finite number within the bounds.
     """
-    lines = _lines(text)
-    if not lines:
+    width, parts = 0, []
+    for lines, rows in _rows(text):
+        width = width or len(rows[0])
+        if at := _ragged(lines, rows, width):
+            raise TableError(f"line {at[0]}: {at[1]} cells where the first row has {width}; complete the row")
+        cells = list(itertools.chain.from_iterable(rows))
+        parts.append(_numbers("value", np.repeat(lines, width), cells, "", quantity))
+    if not parts:
         raise TableError("the table is empty; write one row of comma-separated numbers per line")
-    width = len(lines[0][1])
-    for at, cells in lines:
-        if len(cells) != width:
-            raise TableError(f"line {at}: {len(cells)} cells where the first row has {width}; complete the row")
-    return np.array([[_number(at, "value", cell, "", quantity) for cell in cells] for at, cells in lines])
+    return np.concatenate(parts).reshape(-1, width)
 
 
-def _lines(text: str) -> list[tuple[int, list[str]]]:
-    """Line numbers and cells of all lines that are neither empty nor comments."""
-    lines = []
-    for at, line in enumerate(text.removeprefix("\ufeff").splitlines(), start=1):
-        if line.strip() and not line.lstrip().startswith("#"):
-            try:
-                cells = next(csv.reader([line], skipinitialspace=True, strict=True))
-            except csv.Error as fault:
-                raise TableError(f"line {at}: cannot be read as comma-separated cells ({fault})") from None
-            lines.append((at, [cell.strip() for cell in cells]))
-    return lines
+def _rows(text: str) -> Iterator[tuple[list[int], list[list[str]]]]:
+    """Line numbers and cells of all lines that are neither empty nor comments, some thousands at a time."""
+    start, number = len(text) - len(text.removeprefix("\ufeff")), 1
+    while start < len(text):
+        end = text.find("\n", start + _AT_ONCE) + 1 or len(text)
+        if end - start > _LONGEST_LINE:
+            raise TableError(f"a line after line {number} is longer than {_LONGEST_LINE:,} characters; break it")
+        lines = text[start:end].splitlines()
+        found = [at for at, line in enumerate(lines, number) if (bare := line.lstrip()) and bare[0] != "#"]
+        if found:
+            yield found, [_cells(at, line) if '"' in (line := lines[at - number]) else line.split(",") for at in found]
+        start, number = end, number + len(lines)
+
+
+def _cells(at: int, line: str) -> list[str]:
+    """The cells of a line in which some are quoted."""
+    try:
+        return next(csv.reader([line], skipinitialspace=True, strict=True))
+    except csv.Error as fault:
+        raise TableError(f"line {at}: cannot be read as comma-separated cells ({fault})") from None
+
+
+def _ragged(lines: list[int], rows: list[list[str]], width: int) -> tuple[int, int] | None:
+    """Line and number of cells of the first row that has not as many as are due."""
+    if set(map(len, rows)) <= {width}:
+        return None
+    return next((at, len(row)) for at, row in zip(lines, rows, strict=True) if len(row) != width)
 
 
 def _column(name: str, quantity: Quantity) -> str:
@@ -145,6 +173,36 @@ def _unit(at: int, name: str, unit: str | None, quantity: Quantity) -> str:
     return unit
 
 
+def _numbers(name: str, lines: Iterable[int], cells: list[str], unit: str, quantity: Quantity) -> NDArray[np.float64]:
+    """The numbers in cells of some lines, in SI: all at once, or where that fails one by one to say what is wrong."""
+    try:
+        with np.errstate(over="ignore"):
+            return _sound(quantity.scaled(np.array(list(map(float, cells))), unit), quantity)
+    except ValueError:
+        return np.array(
+            [_number(at, name, cell.strip(), unit, quantity) for at, cell in zip(lines, cells, strict=True)]
+        )
+
+
+def _sound(numbers: NDArray[np.float64], quantity: Quantity) -> NDArray[np.float64]:
+    """The numbers, where the least and the largest of them, which are nan if any is, can be read."""
+    for end in (numbers.min(), numbers.max()) if numbers.size else ():
+        quantity.read(float(end))
+    return numbers
+
+
+def at_once(quantity: Quantity) -> WrapValidator:
+    """Checks an array of numbers as a whole, and what is none, or not sound, number by number."""
+
+    def check(values: Any, each: Callable[[Any], tuple[float, ...]]) -> tuple[float, ...]:
+        if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1:
+            with contextlib.suppress(ValueError):
+                return tuple(_sound(values, quantity).tolist())
+        return each(values)
+
+    return WrapValidator(check)
+
+
 def _number(at: int, name: str, cell: str, unit: str, quantity: Quantity) -> float:
     try:
         number = float(cell)
@@ -161,6 +219,17 @@ def _words(fault: ValueError) -> str:
     """What a number must be, without the number, and without the example that does not fit a table."""
     text = fault.message() if isinstance(fault, PydanticCustomError) else str(fault)
     return re.split("; write for example|, not |: ", text)[0]
+
+
+def plain_text(path: Path) -> str:
+    """Text of a plain file of at most 256 MiB; nothing of the system's without a size, such as /proc/kmsg."""
+    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), encoding="utf-8") as file:  # a pipe is not waited for
+        found = os.fstat(file.fileno())
+        if not stat.S_ISREG(found.st_mode):
+            raise OSError(errno.EINVAL, "it is no plain file")
+        if found.st_size > _MOST_BYTES:
+            raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
+        return file.read(found.st_size)
 
 
 def file_text(name: str, context: Any) -> str:
@@ -180,7 +249,7 @@ def file_text(name: str, context: Any) -> str:
         If the file cannot be read, with the reason and a cure.
     """
     with _readable(name):
-        return context["files"].text(name) if context and "files" in context else Path(name).read_text("utf-8")
+        return context["files"].text(name) if context and "files" in context else plain_text(Path(name))
 
 
 def file_columns(name: str, context: Any, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.float64]]:

@@ -1,9 +1,15 @@
 """CSV tables: units in the header, and one clear error for each way to get them wrong."""
 
-import pytest
+import os
+from typing import Annotated
 
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from sim.units import table
 from sim.units.quantity import Quantity
-from sim.units.table import TableError, columns, file_path, file_text, matrix
+from sim.units.table import TableError, at_once, columns, file_path, file_text, matrix
 
 TIME = Quantity("s", "time", at_least=0)
 SPEED = Quantity("m/s", "speed")
@@ -101,6 +107,62 @@ def test_a_wrong_matrix_is_refused_with_line_and_cure(text, words):
         matrix(text, Quantity("Pa", "stress"))
 
 
+def test_a_long_table_is_read_in_blocks_and_not_cell_by_cell(monkeypatch):
+    monkeypatch.setattr(table, "_AT_ONCE", 3000)
+    times = [f"{0.1 * number!r}" for number in range(999)]
+    rows = [f"{time}, 'remark', {7.0 * n:.4e}" for n, time in enumerate(times)]
+    rows[500:500] = ["", "# a note", f'"{times[500]}","quoted, or not", " 1.5 "', "\t"]
+    text = "\r\n".join(["\ufefftime [ms], remark, speed [in/min]", *rows])
+    read, reads = Quantity.read, []
+    monkeypatch.setattr(Quantity, "read", lambda self, value: reads.append(value) or read(self, value))
+    found = columns(text, WANTED)
+    assert len(reads) < 0.1 * len(rows)
+    times.insert(500, times[500])
+    assert found["time"].tolist() == [read(TIME, f"{time} ms") for time in times]
+    speeds = [7.0 * n for n in range(999)]
+    speeds.insert(500, 1.5)
+    expected = [read(SPEED, f"{float(f'{speed:.4e}')!r} in/min") for speed in speeds]
+    assert found["speed"].tolist() == expected
+    stresses = matrix("\n".join(",".join([time] * 3) for time in times), Quantity("Pa", "stress"))
+    assert stresses.tolist() == [[float(time)] * 3 for time in times]
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        ("1", "line 901: 1 cells where the header has 2"),
+        ("1, x", "line 901: speed is not a number"),
+        ("-1, 1", "line 901: time must be at least 0 s"),
+        ("1, 1e308", "line 901: speed must be finite"),
+        ('1, "2', "line 901: cannot be read"),
+        ("1, nan", "line 901: speed must be finite"),
+    ],
+)
+def test_a_fault_far_down_is_named_with_its_line(monkeypatch, row, said):
+    monkeypatch.setattr(table, "_AT_ONCE", 300)
+    rows = ["# a comment", "", "time [s], speed [km/s]", *(f"{n}, 2" for n in range(3, 900)), row, "5, 5"]
+    with pytest.raises(TableError, match=said):
+        columns("\n".join(rows), WANTED)
+
+
+def test_a_line_without_an_end_is_refused(monkeypatch):
+    monkeypatch.setattr(table, "_LONGEST_LINE", 1000)
+    with pytest.raises(TableError, match="line after line 1 is longer than 1,000 characters"):
+        matrix("1," * 600, Quantity("Pa", "stress"))
+
+
+def test_an_array_is_checked_as_its_numbers_are():
+    part = TypeAdapter(Annotated[tuple[Annotated[float, TIME], ...], at_once(TIME)])
+    assert part.validate_python(np.array([1.0, 2.0])) == part.validate_python([1.0, "2 s"]) == (1.0, 2.0)
+    assert part.validate_python(np.array([1, 2])) == (1.0, 2.0)
+    for wrong in (np.array([1.0, -1.0]), np.array([1.0, np.nan]), np.array([[1.0]])):
+        with pytest.raises(ValidationError) as fault:
+            part.validate_python(wrong)
+        with pytest.raises(ValidationError) as other:
+            part.validate_python(wrong.tolist())
+        assert [error["loc"] for error in fault.value.errors()] == [error["loc"] for error in other.value.errors()]
+
+
 class Files:
     """Reads beside a scenario, as the reader's object does."""
 
@@ -130,6 +192,18 @@ def test_a_file_that_is_not_there_is_named_with_a_cure(tmp_path, read, name):
     for context in ({"files": Files(tmp_path)}, None):
         with pytest.raises(ValueError, match=r"cannot be read .*; give a path relative to the scenario"):
             read(name, context)
+
+
+def test_what_never_ends_is_no_table(tmp_path, monkeypatch):
+    os.mkfifo(tmp_path / "pipe.csv")
+    for name in ("/dev/zero", str(tmp_path / "pipe.csv")):
+        with pytest.raises(ValueError, match="it is no plain file"):
+            file_text(name, None)
+    assert file_text("/proc/self/status", None) == ""  # as /proc/kmsg, which waits for the kernel's next word
+    monkeypatch.setattr(table, "_MOST_BYTES", 3)
+    (tmp_path / "long.csv").write_text("1234")
+    with pytest.raises(ValueError, match="it is larger than 0 MiB"):
+        file_text(str(tmp_path / "long.csv"), None)
 
 
 def test_a_file_that_is_not_text_is_refused(tmp_path):

@@ -15,6 +15,7 @@ from pydantic.dataclasses import dataclass
 from sim.parts.exchange import Array, Motion, Motions, Resistance, Setting, Times
 from sim.units.course import Course, Number, Pieces, Table as Rows, table_pieces
 from sim.units.quantity import Quantity
+from sim.units.table import at_once
 
 _SPEED = Quantity("m/s", "sliding speed", "V")
 
@@ -149,7 +150,7 @@ class Table(Rows, _Sliding):
     column: ClassVar[str] = "speed"
     values_in: ClassVar[str] = "speed"
 
-    speed: tuple[Annotated[float, _SPEED], ...]
+    speed: Annotated[tuple[Annotated[float, _SPEED], ...], at_once(_SPEED)]
     model: Literal["table"] = "table"
 
 
