@@ -110,7 +110,7 @@ def run(
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
     from sim.ensemble.part_files import shard_of
-    from sim.ensemble.progress import Stages, announce_compiling, log, note, progress_bar
+    from sim.ensemble.progress import Stages, announce_compiling, log, named, note, progress_bar
 
     began, stages, share = time.time(), Stages(), shard_of(shard or "1/1")
     from sim.scenario.reader import load
@@ -118,7 +118,8 @@ def run(
     announce_compiling(quiet)
     until = time.monotonic() + (math.inf if max_time is None else _quantity(max_time, "--max-time", "s", above=0))
     memory = math.inf if max_memory is None else _quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
-    scene = load(scenario, _overrides(changes, seed, members), option="--set")
+    with named("making modes and bands of the fluctuations", quiet):
+        scene = load(scenario, _overrides(changes, seed, members), option="--set")
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
 
@@ -134,7 +135,8 @@ def run(
     how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
     with contextlib.ExitStack() as shown:
         if not quiet:
-            stages.shown = shown.enter_context(progress_bar(plans.work(plan, *share)))
+            bar = progress_bar(plans.work(plan, *share), each=plan.points[0].clock.steps + 1)
+            stages.shown = shown.enter_context(bar)
         with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
             try:

@@ -198,12 +198,37 @@ def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, 
     assert capsys.readouterr().err.count("compiling") == 1
     progress.announce_compiling(quiet=True)
     jit.on_compiling[0]("sim.laws.jkr.load.pull_off_load")
-    monkeypatch.setattr("time.monotonic", iter([0.0, 10.0, 40.0, 41.0, 50.0]).__next__)
-    with progress.progress_bar(100) as shown:
+    monkeypatch.setattr("time.monotonic", iter([0.0, 10.0, 40.0, 50.0]).__next__)
+    with progress.progress_bar(100, each=10) as shown:
         shown.begin("simulating")
         shown.advance(30)
         shown.begin("writing")
-    assert capsys.readouterr().err.splitlines() == ["30 % of 100 member-steps", "writing"]
+    done = "30 % of 100 member-steps, 3 of 10 members, 1 a second, 2 min left"
+    assert capsys.readouterr().err.splitlines() == [done, "writing"]
+
+
+def test_a_terminal_has_a_bar_with_what_is_done(capsys, monkeypatch):
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("COLUMNS", "120")
+    with progress.progress_bar(100, each=10) as shown:
+        shown.begin("simulating")
+        shown.advance(30)
+    printed = capsys.readouterr()
+    assert "simulating" in printed.out + printed.err
+    assert "30 %, 3 of 10 members" in printed.out + printed.err
+
+
+def test_a_stage_without_a_bar_is_named_when_it_takes_long(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "_SLOW", 0.0)
+    for quiet in (False, True):
+        with progress.named("making modes", quiet):
+            time.sleep(0.1)
+        assert capsys.readouterr().err == ("" if quiet else "making modes\n")
+    monkeypatch.setattr(progress, "_SLOW", 99.0)
+    with progress.named("making modes", False):
+        pass
+    assert capsys.readouterr().err == ""
 
 
 def test_run_writes_into_outputs_and_quietly_if_asked(here):

@@ -15,6 +15,7 @@ import numpy as np
 from sim.ensemble import bounds
 from sim.ensemble.bounds import size, spread
 from sim.ensemble.plan import Block, Plan, seconds_a_step, work
+from sim.ensemble.progress import duration
 from sim.laws import jkr
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
@@ -261,6 +262,7 @@ def announced(plan: Plan, jobs: int | None, memory: float, shares: int = 1) -> t
         said.append("note: of so large a dataset `sim stats` prints the table")
     if jobs > 1 or bounds.counted(plan) > _LONG:
         found = bounds.takes(plan, jobs, tried(plan, compiling=True) or 1.0, shares)
+    if jobs > 1 or (bounds.counted(plan) > _LONG and found.clock > _LONG):
         room = f"{size(found.memory)} of memory, {size(found.disk)} of disk for a file of {size(found.file)}"
         said.append(f"{_times(found, jobs)}, {room}")
     return jobs, said
@@ -320,12 +322,6 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
 
 def _times(found: bounds.Takes, jobs: int, compiled: bool = True) -> str:
     """CPU time and time by the clock in words."""
-    clock = f", {_duration(found.clock)} by the clock in {jobs} processes" if jobs > 1 else ""
+    clock = f", {duration(found.clock)} by the clock in {jobs} processes" if jobs > 1 else ""
     compiling = "" if compiled else " by rough costs, and up to half a minute to compile, once"
-    return f"about {_duration(found.cpu)} of CPU time{clock}{compiling}"
-
-
-def _duration(seconds: float) -> str:
-    if seconds < 90.0:
-        return f"{max(seconds, 1.0):.0f} s"
-    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+    return f"about {duration(found.cpu)} of CPU time{clock}{compiling}"

@@ -3,6 +3,7 @@
 import contextlib
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -12,6 +13,8 @@ from sim.units.terminal import say
 
 #: Seconds between two lines of progress, where no bar is shown.
 _PAUSE = 30.0
+#: Seconds after which a stage without a bar is named.
+_SLOW = 3.0
 
 
 def note(text: str) -> None:
@@ -61,31 +64,66 @@ class Stages:
 
 
 @contextlib.contextmanager
-def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
-    """A context that shows progress: as a bar on a terminal, else by a line every half minute."""
+def progress_bar(total: int, what: str = "member-steps", each: int = 0) -> Iterator[Shown]:
+    """A context that shows what is done of a total, ``each`` of a member: as a bar on a terminal, else by lines."""
     if sys.stderr.isatty() and sys.stdout.isatty():
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+        from rich.progress import BarColumn, Progress, TextColumn
 
-        shown = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.percentage:3.0f}%"))
-        with Progress(*shown, TimeRemainingColumn(), transient=True) as progress:
-            task = progress.add_task(what, total=total)
-            yield Shown(lambda done: progress.advance(task, done), lambda name: progress.update(task, description=name))
+        columns = TextColumn("{task.description}"), BarColumn(10), TextColumn("{task.fields[said]}")
+        with Progress(*columns, transient=True) as progress:
+            progress.add_task(what, total=total, said="")
+            (task,) = progress.tasks
+
+            def draw(done: int) -> None:
+                progress.advance(task.id, done)
+                progress.update(task.id, said=_said(int(task.completed), total, "", each, task.speed or 0.0))
+
+            yield Shown(draw, lambda name: progress.update(task.id, description=name))
         return
     so_far, began = 0, time.monotonic()
-    said = began
+    before, said = 0, began
 
     def advance(done: int) -> None:
-        nonlocal so_far, said
-        so_far += done
-        if time.monotonic() - said > _PAUSE:
-            said = time.monotonic()
-            note(f"{100 * so_far / total:.0f} % of {total:,} {what}")
+        nonlocal so_far, before, said
+        so_far, now = so_far + done, time.monotonic()
+        if now - said > _PAUSE:
+            note(_said(so_far, total, what, each, (so_far - before) / (now - said)))
+            before, said = so_far, now
 
     def begin(stage: str) -> None:
         if stage and time.monotonic() - began > _PAUSE:  # shorter runs need no lines
             note(stage)
 
     yield Shown(advance, begin)
+
+
+def _said(done: int, total: int, what: str, each: int, rate: float) -> str:
+    """What is done, at which ``rate`` [1/s], and how long the rest takes."""
+    said = [f"{100 * done / total:.0f} %{f' of {total:,} {what}' if what else ''}"]
+    if each:
+        said.append(f"{done // each:,} of {total // each:,} members")
+    if rate > 0.0:
+        said += [f"{rate:,.0f} a second", f"{duration((total - done) / rate)} left"]
+    return ", ".join(said)
+
+
+def duration(seconds: float) -> str:
+    """A time in words."""
+    if seconds < 90.0:
+        return f"{max(seconds, 1.0):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+@contextlib.contextmanager
+def named(stage: str, quiet: bool) -> Iterator[None]:
+    """A context that names a stage once it has taken some seconds."""
+    timer = threading.Timer(_SLOW, (lambda text: None) if quiet else note, [stage])
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()
 
 
 def announce_compiling(quiet: bool = False) -> None:

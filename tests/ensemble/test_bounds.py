@@ -4,6 +4,9 @@ import json
 import math
 import resource
 import shutil
+import signal
+import subprocess
+import sys
 import time
 from pathlib import Path
 from types import SimpleNamespace
@@ -12,6 +15,7 @@ import pytest
 from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
 from numpy.testing import assert_allclose
 
+from benchmarks.timing import child
 from sim import analysis
 from sim.ensemble import bounds, plan as plans, preview, simulate
 from sim.ensemble.outline import identity
@@ -21,6 +25,7 @@ from sim.ensemble.simulate import run
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
 from sim.scenario.clock import Clock, Record
+from sim.scenario.reader import load
 
 
 def sample(members=3, steps=9, **parts):
@@ -166,3 +171,71 @@ def test_a_run_of_ten_times_the_members_takes_no_more_memory():
     assert not bounds.tabulated(many)
     for jobs in (1, 4):
         assert bounds.memory(many, jobs) < 1.1 * bounds.memory(few, jobs)
+
+
+# --- processes of their own ---
+
+LONG = """
+name = "one long member"
+[clock]
+duration = "{steps} ms"
+step = "1 ms"
+record = "{record} ms"
+[solid]
+shear_modulus = "1.6 MPa"
+[sphere]
+radius = "2 mm"
+[adhesion]
+work = "42 mJ/m^2"
+[drive]
+speed = "1 mm/s"
+[bonds]
+model = "counted"
+critical_speed = "10 mm/s"
+rebinding_rate = "500 1/s"
+sites = 50
+stress = "0.3 MPa"
+[contact]
+load = "4 mN"
+"""
+
+
+def started(folder, *arguments):
+    """A run of ``scene.toml`` as a process of its own, in a folder."""
+    return subprocess.Popen([sys.executable, "-m", "sim", "run", "../scene.toml", "-o", "x.nc", *arguments], cwd=folder)
+
+
+@pytest.mark.verify
+def test_a_member_of_a_hundred_million_steps_is_kept_in_stretches_and_goes_on_from_the_last(tmp_path):
+    (tmp_path / "scene.toml").write_text(LONG.format(steps=10**8, record=10**7))
+    straight, killed = tmp_path / "straight", tmp_path / "killed"
+    for folder in (straight, killed):
+        folder.mkdir()
+    whole, early = started(straight, "--quiet"), started(killed, "--quiet")
+    parts = killed / "x.nc.parts"
+    while early.poll() is None and len(list(parts.glob("*.part"))) < 40:
+        time.sleep(0.01)
+    early.kill()
+    assert early.wait() == -signal.SIGKILL
+    there = {path: path.stat().st_mtime_ns for path in parts.glob("*.part")}
+    assert len(there) < 100  # of 107
+    resumed = started(killed, "--quiet", "--resume")
+    while resumed.poll() is None and len(list(parts.glob("*.part"))) < len(there) + 3:
+        time.sleep(0.01)
+    assert {path: path.stat().st_mtime_ns for path in there} == there
+    assert (resumed.wait(), whole.wait()) == (0, 0)
+    assert (killed / "x.nc").read_bytes() == (straight / "x.nc").read_bytes()
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_path, jobs):
+    """The number of processes is the same, so that the memory of all is."""
+    largest = []
+    for members in (500, 5000):
+        (tmp_path / "scene.toml").write_text(LONG.format(steps=2000, record=2) + f"[ensemble]\nmembers = {members}\n")
+        run = ["run", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "x.nc"), "--force", "--no-table", "-j", jobs]
+        largest.append(child("-m", "sim", *run)[1])
+        plan = Plan.of(load(tmp_path / "scene.toml"))
+        assert 1e6 * largest[-1] < 1.5 * bounds.memory(plan, 1)
+    assert largest[1] < 1.1 * largest[0]
