@@ -38,8 +38,8 @@ _MOST = 1000
 _LONGEST, _ALL = 2**16, 2**24
 _SCENARIO = dict.fromkeys(("scenario_toml", "scenario_overrides", "scenario_resolved"), 2**28)
 _SCENARIO |= {"scenario_files": 2**30}
-#: Most bytes of all texts of a variable, and least that a chunk of numbers may take.
-_WORDS, _CHUNK = 2**26, 2**26
+#: Most texts of a variable, most bytes of them all, and least that a chunk of numbers may take.
+_LABELS, _WORDS, _CHUNK = 10**5, 2**26, 2**26
 #: How many times smaller zlib packs numbers at best, and bytes that need not be there, as of a number never written.
 _PACKED, _SMALL = 1032, 2**16
 #: Attributes of HDF5 that say which dimensions a variable has; netCDF does not give them.
@@ -284,14 +284,17 @@ def _stored(hdf5: _Calls, one: int, name: str) -> tuple[int, bool]:
         raise Refused(f'holds "{name}", which is neither numbers nor texts')
     if chunk * width > max(_CHUNK, count * width):
         raise Refused(f'declares chunks of "{name}" larger than it is')
+    taken = hdf5("Dget_storage_size", one)
+    whole = count * width <= max(_SMALL, taken * (_PACKED if _ZLIB in filters else 1))
+    if varies and (count > _LABELS or not whole):
+        raise Refused(f'holds too many texts in "{name}"')
     if varies:
         with hdf5.held("Tclose", "Dget_type", one) as made, hdf5.held("Sclose", "Dget_space", one) as space:
             length = ctypes.c_uint64()
             hdf5("Dvlen_get_buf_size", one, made, space, ctypes.byref(length))
         if length.value > _WORDS:
             raise Refused(f'holds too long texts in "{name}"')
-    taken = hdf5("Dget_storage_size", one)
-    return taken, count * width <= max(_SMALL, taken * (_PACKED if _ZLIB in filters else 1))
+    return taken, whole
 
 
 def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> None:
