@@ -186,8 +186,13 @@ def advance_group(parts: Parts, task: Task, progress: Progress, stop: Callable[[
                 found.append(arrays)
             state = end
             kept = {} if name == task.names[-1] else pack(end)
-            parts.save(name, {key: np.stack([arrays[key] for arrays in found]) for key in found[0]}, kept)
+            parts.save(name, {key: _stacked([arrays[key] for arrays in found]) for key in found[0]}, kept)
         before = name
+
+
+def _stacked(arrays: list[np.ndarray]) -> np.ndarray:
+    """Arrays along a new first axis; one alone is not copied."""
+    return np.stack(arrays) if len(arrays) > 1 else arrays[0][np.newaxis]
 
 
 def _record(

@@ -143,10 +143,10 @@ def whole(path: Path) -> Iterator[Path]:
         sync(path.parent)
 
 
-def write_whole(path: Path, content: memoryview | bytes) -> None:
+def write_whole(path: Path, *pieces: bytes | memoryview) -> None:
     """Write a file whole or not at all."""
-    with whole(path) as aside:
-        aside.write_bytes(content)
+    with whole(path) as aside, aside.open("wb") as file:
+        file.writelines(pieces)
 
 
 def read_whole(path: Path) -> bytes:
