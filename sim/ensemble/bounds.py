@@ -23,7 +23,7 @@ _POINT, _PART, _MODE, _RECORD, _RECORD_OF_MEMBER = 4e-3, 2e-3, 5e-6, 5e-6, 2e-7
 # Rough memory [byte]: libraries, which all processes share, and more of the table; a process beside its work, one that
 # writes the dataset, one that reads the table; what is kept of a variable that is written; a byte that is read; a mode
 # pair while it is made and while it is used.
-_SHARED, _SHARED_BY_TABLE, _PROCESS, _WRITER, _READER = 88e6, 10e6, 66e6, 30e6, 115e6
+_SHARED, _SHARED_BY_TABLE, _PROCESS, _WRITER, _READER = 88e6, 10e6, 70e6, 30e6, 128e6
 _CACHE, _OF_BYTE, _OF_MODE_MADE, _OF_MODE = 4 * 2**20, 1.5, 520.0, 160.0
 #: Copies of a part while it is made or written; bytes of a quantity's name in it.
 _COPIES, _HEADER = 3.0, 300.0

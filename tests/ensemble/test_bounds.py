@@ -237,5 +237,5 @@ def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_p
         run = ["run", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "x.nc"), "--force", "--no-table", "-j", jobs]
         largest.append(child("-m", "sim", *run)[1])
         plan = Plan.of(load(tmp_path / "scene.toml"))
-        assert 1e6 * largest[-1] < 1.5 * bounds.memory(plan, 1)
+        assert 2**20 * largest[-1] < 1.5 * bounds.memory(plan, 1)
     assert largest[1] < 1.1 * largest[0]
