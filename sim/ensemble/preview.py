@@ -22,7 +22,7 @@ from sim.numerics.files import StoreTrouble
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.clock import Record
-from sim.scenario.declared import entries
+from sim.scenario.declared import distinct, entries
 from sim.scenario.scenario import Scenario
 
 _MOST_WORDS = 6
@@ -101,9 +101,10 @@ def _models(plan: Plan) -> Rows:
         why = "swept" if name in swept else "changed by --set" if name in changed else why
         found: dict[str, tuple[str, ...]] = {}
         for point in plan.points:
-            part = point.given[place]
-            found[part.model] = (name, part.model, why, _meaning(part))
-            if name in point.why:
+            part = getattr(point, name)
+            if part.model not in found:
+                found[part.model] = (name, part.model, why, _meaning(part))
+            if name in ("bonds", "shear") and name in point.why:
                 chosen = point.chosen[place].model
                 found[f"→ {chosen}"] = ("", f"→ {chosen}", "chosen", point.why[name])
         rows += found.values()
@@ -121,19 +122,20 @@ def _meaning(part: Any) -> str:
 def _quantities(points: Sequence[Scenario]) -> Rows:
     """Every number and choice of a scenario; where a sweep changes one, its range."""
     found: dict[str, tuple[str, str, list[Any]]] = {}
-    for point in points:
-        for key, value, quantity in entries(point):
-            unrecorded = key.startswith("record.") and point.record == Record()
-            if value in (None, "", ()) or key in _ELSEWHERE or unrecorded:
-                continue
-            unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
-            meaning = "" if quantity is None or key.endswith(quantity.meaning) else quantity.meaning
-            if isinstance(value, tuple | bool):
-                value = f"{len(value)} values" if isinstance(value, tuple) else str(value).lower()
-            found.setdefault(key, (unit, meaning, []))[2].append(value)
-    tables = list(dict.fromkeys(key.partition(".")[0] for key in found))
+    tables = (entries(part, f"{name}.") for name, part in distinct(points))
+    plain = (entry for entry in entries(points[0]) if "." not in entry.key)
+    for key, value, quantity in itertools.chain(*tables, plain):
+        unrecorded = key.startswith("record.") and points[0].record == Record()
+        if value in (None, "", ()) or key in _ELSEWHERE or unrecorded:
+            continue
+        unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
+        meaning = "" if quantity is None or key.endswith(quantity.meaning) else quantity.meaning
+        if isinstance(value, tuple | bool):
+            value = f"{len(value)} values" if isinstance(value, tuple) else str(value).lower()
+        found.setdefault(key, (unit, meaning, []))[2].append(value)
+    order = list(dict.fromkeys(key.partition(".")[0] for key in found))
     rows: Rows = []
-    for key in sorted(found, key=lambda key: tables.index(key.partition(".")[0])):
+    for key in sorted(found, key=lambda key: order.index(key.partition(".")[0])):
         unit, meaning, values = found[key]
         different = list(dict.fromkeys(values))
         if all(isinstance(value, int | float) for value in different):

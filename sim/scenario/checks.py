@@ -2,7 +2,7 @@
 
 import inspect
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, cast
 
 import numpy as np
@@ -31,8 +31,15 @@ def rest_radius(solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Conta
 Faults = Iterator[tuple[tuple[str, ...], str]]
 
 
-def faults_across(parts: dict[str, Any]) -> Faults:
-    """What does not go together between those parts that are there, each as (place, what is wrong and the cure)."""
+def faults_across(parts: dict[str, Any], built: bool = True) -> Faults:
+    """What does not go together between those parts that are there, each as (place, what is wrong and the cure).
+
+    Without ``built`` the process of the shear part is not tried.
+    """
+    if "radius" not in parts:
+        held = [parts[name] for name in ("solid", "sphere", "adhesion", "contact") if name in parts]
+        parts = parts | {"radius": rest_radius(*held) if len(held) == 4 else math.nan}
+    parts = parts | {"built": built}
     if "shear" in parts:
         record = parts.get("record")
         try:
@@ -42,12 +49,10 @@ def faults_across(parts: dict[str, Any]) -> Faults:
             return
         parts = parts | {"shear": chosen}
     if "bonds" in parts:
-        held = [parts[name] for name in ("solid", "sphere", "adhesion", "contact") if name in parts]
-        radius = rest_radius(*held) if len(held) == 4 else math.nan
         forces = "shear" in parts and parts["shear"].spectrum.bond_made
-        parts = parts | {"bonds": parts["bonds"].chosen(math.pi * radius**2, forces)}
+        parts = parts | {"bonds": parts["bonds"].chosen(math.pi * parts["radius"] ** 2, forces)}
     for check, reads in _CHECKS.items():
-        if all(name in parts for name in reads):
+        if parts.keys() >= reads.keys():
             yield from check(*(parts[name] for name in reads))
 
 
@@ -112,25 +117,26 @@ def _too_many_map_members(record: Record, ensemble: Ensemble) -> Faults:
         yield ("record", "map_members"), said
 
 
-def _shear_faults(shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact) -> Faults:
-    radius = rest_radius(solid, sphere, adhesion, contact)
+def _shear_faults(
+    shear: Model, solid: Solid, sphere: Sphere, adhesion: Adhesion, contact: Contact, radius: float, built: bool
+) -> Faults:
     if not shear.side(math.sqrt(math.pi) * radius) > 0.0:
         limit = f" of {jkr.pull_off_load(adhesion.work, sphere.radius):.3g} N" if contact.kind == "load" else ""
         said = f"is beyond pull-off{limit} at the start, so that there is no contact at rest to size the cell of shear"
         yield ("contact", contact.kind), f'{said} by; hold the sphere closer, or give shear.cell such as "0.2 mm"'
-    else:
+    elif built:
         found = shear.faults(*solid.effective, radius)
         yield from ((("shear", key) if key else ("shear",), said) for key, said in found)
 
 
 #: Each check with the names of the parts that it reads.
-_CHECKS: dict[Callable[..., Faults], tuple[str, ...]] = {
-    check: tuple(inspect.signature(check).parameters)
+_CHECKS: dict[Callable[..., Faults], Mapping[str, Any]] = {
+    check: inspect.signature(check).parameters
     for check in (_table_too_short, _control_too_short, _no_stress, _no_forces, _no_adhesion, _no_maps)
     + (_unrecorded_maps, _too_many_map_members, _shear_faults)
 }
 #: The parts that the checks read.
-CHECKED = sorted({name for reads in _CHECKS.values() for name in reads})
+CHECKED = sorted({name for reads in _CHECKS.values() for name in reads} - {"radius", "built"})
 
 #: Rms of the fluctuations over the mean stress that is remarked on: some 2 % of the area is reversed.
 _MOST_REVERSED = 0.5

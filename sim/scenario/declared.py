@@ -90,6 +90,22 @@ def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
             yield Entry(prefix + key, value, quantity if number else None)
 
 
+def distinct(points: Iterable[Any]) -> Iterator[tuple[str, Any]]:
+    """Name and table of each scenario among points of a sweep, those that several share once."""
+    kept: dict[int, Any] = {}  # so that no other gets the number of one that is gone
+    for point in points:
+        for name in _tables_of(cast(Hashable, type(point))):
+            part = getattr(point, name)
+            if id(part) not in kept:
+                kept[id(part)] = part
+                yield name, part
+
+
+@functools.cache
+def _tables_of(root: type) -> list[str]:
+    return [key for key, admitted in options(root).items() if admitted]
+
+
 @functools.cache
 def _listed(table: type) -> list[tuple[str, str, Quantity | None]]:
     """Name, key and declaration as a number of each field of a table, None for one that no file gives."""

@@ -30,6 +30,8 @@ _FILES = ("bad_table", "no_table", "file_unreadable", "file_not_text")
 _EXCLUSIVE = ("control", "one_modulus")
 #: What a value must be, by the beginning of the kind of its error.
 _KINDS = {"bool": "true or false, without quotes", "string": "text in quotes", "tuple": "a list in brackets"}
+#: Faults that are put in words; what is so wrong is put right some at a time.
+_MOST = 100
 _PLAIN_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -71,10 +73,12 @@ def faults(root: type, invalid: ValidationError, document: dict[str, Any]) -> li
     A key that is missing because it was misspelt, or has another name now, is not a fault of its own.
     """
     errors = invalid.errors(include_url=False)
+    more = len(errors) - _MOST
+    errors = errors[:_MOST]
     found = [_unknown(root, error, document) if error["type"] in _UNKNOWN else _worded(root, error) for error in errors]
     meant = {fault.near for fault in found} | {fault.path for fault in found if fault.kind != "missing"}
     found = [fault for fault in found if fault.kind != "missing" or fault.path not in meant]
-    return first_at_each(found)
+    return first_at_each(found) + ([Fault((), f"and {more:,} faults more", "more")] if more > 0 else [])
 
 
 def first_at_each(found: list[Fault]) -> list[Fault]:
@@ -262,7 +266,7 @@ class Place:
     def problems(self, faults: list[Fault]) -> list[str]:
         """One line for each fault, in the order of the file."""
         lines = key_lines(self.text.replace("\r\n", "\n"))
-        ordered = sorted(faults, key=lambda fault: self._number(fault.path, lines) or 0)
+        ordered = sorted(faults, key=lambda fault: (fault.kind == "more", self._number(fault.path, lines) or 0))
         return list(dict.fromkeys(one_line(self._line(fault, lines)) for fault in ordered))
 
     def _line(self, fault: Fault, lines: dict[Path, int]) -> str:

@@ -2,18 +2,17 @@
 
 import contextlib
 import copy
-import functools
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import Field, TypeAdapter, ValidationError
+from pydantic import TypeAdapter, ValidationError
 
 from sim.scenario.checks import CHECKED, faults_across
 from sim.scenario.declared import with_models
 from sim.scenario.messages import Fault, Place, dotted, faults, first_at_each, shown
-from sim.scenario.scenario import Scenario
+from sim.scenario.scenario import Scenario, table_adapter
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import Axis, set_key, sweep_axes
 from sim.scenario.toml_lines import words_of
@@ -25,6 +24,8 @@ __all__ = ["BadInput", "load"]
 
 _DECLARED: dict[str, Any] = getattr(Scenario, "__pydantic_fields__", {})
 _SCENARIO = TypeAdapter(Scenario)
+#: Rows of a sweep whose faults are put in words.
+_MOST_TRIED = 100
 Words = tuple[str | int, ...]
 
 
@@ -110,7 +111,7 @@ def _faults_between_sound_parts(document: dict[str, Any], files: Files) -> list[
     for name in CHECKED:
         with contextlib.suppress(ValidationError):
             if name in document:
-                parts[name] = _part(name).validate_python(document[name], **how)
+                parts[name] = table_adapter(name).validate_python(document[name], **how)
             elif not _DECLARED[name].is_required():
                 parts[name] = _DECLARED[name].get_default(call_default_factory=True)
     return [Fault(path, said) for path, said in faults_across(parts)]
@@ -124,16 +125,41 @@ def _row_faults(
     found: list[Fault] = []
     for axis in axes:
         places: dict[Fault, list[int]] = {}
-        for place, row in enumerate(axis.values):
-            changed = dict(document)
-            for key, value in zip(axis.keys, row, strict=True):
-                set_key(changed, key, value)
+        suspects = _suspects(document, files, axis)
+        for place in (suspects or range(len(axis.values)))[:_MOST_TRIED]:
+            changed = _with_row(document, axis, place)
             for fault in _validated(changed, files)[1]:
                 # a table whose name is misspelt lacks its keys: that is one fault
                 lacking = any(fault.path[:length] in meant for length in range(1, len(fault.path) + 1))
                 if fault not in known and not lacking:
                     places.setdefault(fault, []).append(place)
         found += [_swept(fault, axis, several, zipped) for fault, several in places.items()]
+        if len(suspects) > _MOST_TRIED:
+            said = f"{len(suspects) - _MOST_TRIED:,} more values cannot be used"
+            found.append(Fault(("sweep", axis.keys[0]), said, "more"))
+    return found
+
+
+def _with_row(document: dict[str, Any], axis: Axis, place: int) -> dict[str, Any]:
+    """The document at one row of an axis."""
+    changed = dict(document)
+    for key, value in zip(axis.keys, axis.values[place], strict=True):
+        set_key(changed, key, value)
+    return changed
+
+
+def _suspects(document: dict[str, Any], files: Files, axis: Axis) -> list[int]:
+    """Rows of an axis at which one of its tables cannot be read by itself."""
+    names, found = {key.partition(".")[0] for key in axis.keys}, []
+    for place in range(len(axis.values)):
+        row = _with_row(document, axis, place)
+        tables = with_models(Scenario, {name: row[name] for name in names})
+        try:
+            for name in names:
+                how: dict[str, Any] = {"context": {"files": files}, "by_alias": True, "by_name": False}
+                table_adapter(name).validate_python(tables[name], **how)
+        except (ValidationError, KeyError):
+            found.append(place)
     return found
 
 
@@ -162,10 +188,3 @@ def _point_faults(scenario: Scenario) -> list[Fault]:
     except BadInput as fault:
         return [Fault(("sweep",), said) for said in fault.problems]
     return []
-
-
-@functools.cache
-def _part(name: str) -> TypeAdapter:
-    declared = _DECLARED[name]
-    kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator)]
-    return TypeAdapter(kind)

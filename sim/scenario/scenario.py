@@ -1,5 +1,6 @@
 """A scenario: one of each part, a clock, and what must hold between them."""
 
+import copy
 import math
 from collections.abc import Hashable
 from dataclasses import fields
@@ -33,6 +34,8 @@ from sim.units.refusals import BadInput
 #: Relative error of a cell against the infinite plane that is remarked on.
 _CELL_ERROR = 0.05
 _Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
+#: Points of a sweep whose shear processes are all tried.
+_MOST_BUILT = 64
 #: Points of a sweep that differ elsewhere share it with its spline.
 _margin = lru_cache(maxsize=32)(Margin)
 
@@ -94,13 +97,18 @@ class Scenario:
 
     @model_validator(mode="after")
     def _across_parts(self) -> "Scenario":
-        across = faults_across({name: getattr(self, name) for name in CHECKED})
+        self._check_across()
+        return self
+
+    def _check_across(self, built: bool = True) -> None:
+        """Refuse parts that do not go together; without ``built`` the shear part's process is not tried."""
+        parts = {name: getattr(self, name) for name in CHECKED}
+        across = faults_across(parts | {"radius": self.rest_radius}, built)
         faults = [InitErrorDetails(type=PydanticCustomError("across", text), loc=at, input=None) for at, text in across]
         if faults:
             raise ValidationError.from_exception_data("Scenario", faults)
         if self.source.text and not self.source.parts:
             self.source.parts.update(self._parts)
-        return self
 
     @property
     def _parts(self) -> dict[str, Any]:
@@ -255,18 +263,24 @@ class Scenario:
     def points(self) -> list["Scenario"]:
         """The scenario at each point of its sweep, the last axis fastest; one point where there is none.
 
+        Of a long sweep the processes of the shear part are tried at both ends only, as each may take long to build.
+
         Raises
         ------
         BadInput
             If values do not go together, or points would not fit into one dataset.
         """
+        return list(self._swept)
+
+    @cached_property
+    def _swept(self) -> list["Scenario"]:
         if not self.sweep:
             return [self]
         values: list[dict[str, Any]] = [{}]
         for axis in self.sweep:
             values = [{**point, **dict(zip(axis.keys, row, strict=True))} for point in values for row in axis.values]
         try:
-            points = [self.with_values(point) for point in values]
+            points = self._points(values)
         except BadInput as fault:
             raise BadInput([f"some values do not go together: {said}" for said in fault.problems]) from None
         for what, found in (
@@ -276,6 +290,59 @@ class Scenario:
             if len(found) > 1:
                 raise BadInput([f"the points of the sweep would have different {what}"])
         return points
+
+    def _points(self, values: list[dict[str, Any]]) -> list["Scenario"]:
+        """The scenario with some values each, made of tables that are read once for each of their own values."""
+        read: dict[tuple[Any, ...], Any] = {}
+        points, ends, origin = [], (0, len(values) - 1), self.origin
+        files = Files(Path(self.source.path).parent, self.source.files)
+        for place, point in enumerate(values):
+            tables: dict[str, dict[str, Any]] = {}
+            for key, value in point.items():
+                tables.setdefault(key.partition(".")[0], {})[key] = value
+            parts = {}
+            for name, changed in tables.items():
+                which = (name, *map(id, changed.values()))  # the values live as long as the sweep
+                if which not in read:
+                    read[which] = self._table(name, changed, files)
+                parts[name] = read[which]
+            if any(part is None for part in parts.values()):  # which says what is wrong
+                points.append(self.with_values(point))
+                continue
+            made = copy.copy(self)
+            made.__dict__.clear()
+            made.__dict__.update({name: self.__dict__[name] for name in _FIELDS} | parts | {"sweep": ()})
+            made.__dict__["source"] = origin.changed(point | {"sweep": {}})
+            with in_plain_words(Scenario, {}):
+                made._check_across(len(values) <= _MOST_BUILT or place in ends)
+            points.append(made)
+        return points
+
+    def _table(self, name: str, values: dict[str, Any], files: Files) -> Any:
+        """One table with some keys changed, checked anew; None where it cannot be read by itself."""
+        part = getattr(self, name, None)
+        document = {}
+        if values.keys() != {name}:
+            document = {name: _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)}
+        for key, value in values.items():
+            set_key(document, key, value)
+            _forget_file(document, key)
+        try:
+            return table_adapter(name).validate_python(with_models(Scenario, document)[name], context={"files": files})
+        except (ValidationError, KeyError):
+            return None
+
+
+#: The tables and values of a scenario.
+_FIELDS = tuple(item.name for item in fields(Scenario))
+
+
+@cache
+def table_adapter(name: str) -> TypeAdapter[Any]:
+    """What checks a table of a scenario by itself."""
+    declared = getattr(Scenario, "__pydantic_fields__", {})[name]
+    kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator)]
+    return TypeAdapter(kind)
 
 
 def _forget_file(document: dict[str, Any], key: str) -> None:

@@ -664,6 +664,18 @@ def test_a_fault_shared_by_many_values_is_told_once(refusal):
     assert told(problem, END + 2, LOAD, 'value 1 (1 kg) and 49 more: ...unit "kg"')
 
 
+def test_of_many_faults_the_first_are_put_in_words(refusal):
+    numbers = ", ".join(f"{-number}.5" for number in range(1, 301))
+    values = refusal(text=LENS + f'[sweep]\n"solid.shear_modulus" = [1e6, {numbers}]')
+    assert len(values) == 101
+    assert told(values[0], END + 2, 'sweep."solid.shear_modulus"', "value 2 (-1.5): ...above 0 Pa")
+    assert told(values[-1], END + 2, 'sweep."solid.shear_modulus"', "200 more values cannot be used")
+    keys = refusal(text="".join(f"a{number} = 1\n" for number in range(900)) + LENS)
+    assert len(keys) == 101
+    assert told(keys[0], 1, "a0", "is not a key")
+    assert keys[-1] == "x: and 800 faults more"
+
+
 def test_a_sweep_of_tables_is_told_what_each_lacks(refusal):
     one, two = refusal(
         text=LENS + '[sweep]\nbonds = [{ model = "none" }, { model = "steady" }, { modle = "rate" }, { stress = 1 }]'

@@ -15,7 +15,7 @@ from hypothesis import example, given, strategies as st
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.scenario.declared import all_tables, declaration, keys, quantities, tables
+from sim.scenario.declared import all_tables, declaration, distinct, keys, quantities, tables
 from sim.scenario.reader import BadInput, load
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import scenario_schema
@@ -457,3 +457,29 @@ def test_bad_input_is_a_value_error_with_one_line_for_each_problem(scene):
 def test_a_scenario_cannot_be_changed(scene):
     with pytest.raises(dataclasses.FrozenInstanceError):
         scene().seed = 3
+
+
+def test_points_of_a_sweep_share_the_tables_of_the_same_values_and_are_those_made_one_by_one(scene):
+    loads, models = ["1 mN", "2 mN", "4 mN"], [{"model": "none"}, {"model": "steady", "critical_speed": 1, "stress": 1}]
+    sweep = {"contact.load": loads, "bonds": models, "contact.after_pull_off": ["stop", "stay_open"]}
+    found = scene(overrides={"sweep": sweep})
+    points = found.points()
+    values = [dict(zip(sweep, row, strict=True)) for row in itertools.product(*sweep.values())]
+    expected = [found.with_values(value) for value in values]
+    assert points == expected
+    assert [point.origin for point in points] == [point.origin for point in expected]
+    assert points[0].contact is points[2].contact is not points[1].contact
+    assert points[0].solid is points[-1].solid
+    assert all(one is other for one, other in zip(points, found.points(), strict=True))
+    assert len(list(distinct(points))) == len(list(distinct(points[:1]))) + 5 + 1
+
+
+def test_of_a_long_sweep_the_fluctuations_are_built_at_both_ends_only(scene, monkeypatch):
+    built, process = [], shear.Banded.process
+    monkeypatch.setattr(shear.Banded, "process", lambda self, *solid: built.append(self) or process(self, *solid))
+    many = {"from": "100 kPa", "to": "200 kPa", "count": 65}
+    band = {"model": "band", "rms": "1 kPa", "longest": "120 um", "shortest": "60 um"}
+    banded = {"model": "banded", "cell": "0.24 mm", "correlation": {"model": "time", "time": 1}, "spectrum": band}
+    points = scene(overrides={"shear": banded, "sweep": {"shear.spectrum.rms": many}}).points()
+    assert [one.spectrum.rms for one in built[-2:]] == [points[0].shear.spectrum.rms, points[-1].shear.spectrum.rms]
+    assert len(built) <= 4
