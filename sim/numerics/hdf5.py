@@ -78,6 +78,7 @@ _CALLS: dict[str, tuple[Any, ...]] = {
     "H5Dget_storage_size": (_SIZE, _ID),
     "H5Dvlen_get_buf_size": (_INT, _ID, _ID, _ID, _AT),
     "H5Sget_simple_extent_npoints": (_ID, _ID),
+    "H5Sget_simple_extent_ndims": (_INT, _ID),
     "H5Tget_class": (_INT, _ID),
     "H5Tget_size": (_SIZE, _ID),
     "H5Tis_variable_str": (_INT, _ID),
@@ -236,6 +237,7 @@ _calls: Callable[[], _Calls] = functools.cache(_Calls)
 def _look_through(path: str, size: int) -> set[str]:
     """Names of the variables that are in a file of HDF5 as declared; whatever else there is in it is refused."""
     hdf5, stored, found = _calls(), 0, set()
+    placed: list[bool] = []  # which variables have dimensions with names
     with hdf5.held("Fclose", "Fopen", os.fsencode(path), 0, 0) as file:
         _refuse_attributes(hdf5, file, _SCENARIO)
         links = (ctypes.c_uint64 * 8)()
@@ -254,10 +256,14 @@ def _look_through(path: str, size: int) -> set[str]:
                 hdf5("Lget_name_by_idx", file, b".", 0, 0, place, called, len(called), 0)
                 name = called.value.decode("utf-8", "replace")
                 taken, whole = _stored(hdf5, one, name[:40])
-                _refuse_attributes(hdf5, one, {})
+                names = _refuse_attributes(hdf5, one, {})
+                if _axes(hdf5, one):
+                    placed.append(bool(names & {"CLASS", "DIMENSION_LIST"}))
             stored += taken
             if whole:
                 found.add(name.removeprefix("_nc4_non_coord_"))
+    if any(placed) and not all(placed):  # netCDF may look for the others' dimensions for ever
+        raise Refused("holds variables that lack their dimensions")
     if stored > size:
         raise Refused("declares more numbers than it holds")
     return found
@@ -297,8 +303,15 @@ def _stored(hdf5: _Calls, one: int, name: str) -> tuple[int, bool]:
     return taken, whole
 
 
-def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> None:
-    """Refuse attributes of a variable or of the file that are too long, or neither numbers nor one text."""
+def _axes(hdf5: _Calls, one: int) -> int:
+    """Number of dimensions of a variable."""
+    with hdf5.held("Sclose", "Dget_space", one) as space:
+        return hdf5("Sget_simple_extent_ndims", space)
+
+
+def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> set[str]:
+    """Names of the attributes of a variable or the file; those too long, or neither numbers nor a text, are refused."""
+    names = set()
     if hdf5("Aget_num_attrs", holder) > _MOST:
         raise Refused(f"holds more than {_MOST} attributes")
     for place in range(hdf5("Aget_num_attrs", holder)):
@@ -306,6 +319,7 @@ def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> Non
             called = ctypes.create_string_buffer(1024)
             hdf5("Aget_name", one, len(called), called)
             name = called.value.decode("utf-8", "replace")
+            names.add(name)
             if name in _INNER:
                 continue
             kind, width, count, varies = hdf5.type_of(one, "A")
@@ -313,3 +327,4 @@ def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> Non
             raise Refused(f'holds an attribute that is neither numbers nor a text: "{name[:40]}"')
         if count * width > limits.get(name, _LONGEST):
             raise Refused(f'holds too long an attribute: "{name[:40]}"')
+    return names
