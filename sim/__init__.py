@@ -24,6 +24,7 @@ sim.units.refusals.BadInput: contact.lod: is not a key; did you mean "load"?
 import contextlib
 import importlib
 import os
+import pathlib
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
@@ -35,14 +36,9 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
     from sim.scenario.scenario import Scenario
 
 Path = str | os.PathLike[str]
-_FROM = {
-    "BadInput": "sim.units.refusals",
-    "Scenario": "sim.scenario.scenario",
-    "load": "sim.scenario.reader",
-    "open": "sim.analysis.scene",
-}
+_FROM = {"BadInput": "sim.units.refusals", "Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
 _FOLDERS = ("analysis", "laws", "plots", "spectrum")
-__all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "plot", "run", "stats"])
+__all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "open", "plot", "run", "stats"])
 
 
 def run(
@@ -102,6 +98,25 @@ def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
     from sim.ensemble.preview import preview
 
     return Text(preview(_scene(scenario)))
+
+
+def open(path: Path) -> "xarray.Dataset":
+    """Open the dataset of a run lazily, with named dimensions and units.
+
+    Of a run that is not done it holds what is computed so far, nan elsewhere, and ``attrs["share_done"]``.
+
+    Raises
+    ------
+    BadInput
+        If there is no such file, or it is none of our datasets.
+    """
+    from sim.analysis import scene
+
+    if os.path.isdir(f"{os.fspath(path)}.parts") and not os.path.exists(path):
+        from sim.ensemble import unfinished
+
+        return unfinished.dataset(pathlib.Path(path))
+    return scene.open(path)
 
 
 def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None) -> "pandas.DataFrame":
@@ -165,13 +180,12 @@ def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
 
 def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", where: dict[str, Any] | None) -> Any:
     """What a function makes of a dataset, or of the file that holds it; ``BadInput`` for what it cannot use."""
-    from sim.analysis.scene import open as opened
     from sim.analysis.statistics import where as chosen
     from sim.units.refusals import BadInput, refuse_old
 
     try:
         if isinstance(dataset, str | os.PathLike):
-            with opened(dataset) as found:
+            with open(dataset) as found:
                 return function(chosen(found, where or {}))
         refuse_old("the dataset", [*dataset.variables, *dataset.dims])
         return function(chosen(dataset, where or {}))

@@ -300,7 +300,13 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     from sim.analysis import scene
     from sim.units.refusals import BadInput
 
-    with scene.open(path) as dataset:
+    opened: Any = scene.open
+    if not path.exists() and path.with_name(f"{path.name}.parts").is_dir():
+        from sim.ensemble.unfinished import dataset as opened
+    with opened(path) as dataset:
+        if "share_done" in dataset.attrs:
+            done = f"{100 * dataset.attrs['share_done']:.0f} % is computed, the rest is nan"
+            click.echo(f"note: {path} is of a run that is not done: {done}", err=True)
         try:
             found = analysis.where(dataset, _values(chosen, "--where"))
         except ValueError as fault:

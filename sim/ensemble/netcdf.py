@@ -88,7 +88,7 @@ def in_memory(outline: Outline, parts: Parts) -> dict[str, tuple[tuple[str, ...]
         arrays[name] = np.empty(shape, object if one.kind is str else one.kind)
         if one.values is not None:
             arrays[name][...] = one.values
-    _fill(outline, parts, arrays)
+    fill(outline, parts, arrays)
     return {name: (one.dimensions, arrays[name], one.attributes) for name, one in outline.variables.items()}
 
 
@@ -103,7 +103,7 @@ def _write(outline: Outline, parts: Parts, path: Path) -> None:
             file.createDimension(name, size)
         file.setncatts(outline.attributes)
         made = {name: _variable(file, name, one) for name, one in outline.variables.items()}
-        _fill(outline, parts, made)
+        fill(outline, parts, made)
 
 
 def _variable(file: netCDF4.Dataset, name: str, one: Described) -> netCDF4.Variable:
@@ -117,7 +117,7 @@ def _variable(file: netCDF4.Dataset, name: str, one: Described) -> netCDF4.Varia
     return variable
 
 
-def _fill(outline: Outline, parts: Parts, variables: Mapping[str, Any]) -> None:
+def fill(outline: Outline, parts: Any, variables: Mapping[str, Any]) -> None:
     """Put what the parts hold into variables, or into arrays."""
     for piece in outline.pieces:
         pools: dict[str, list[np.ndarray]] = {}

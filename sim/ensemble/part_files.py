@@ -158,7 +158,9 @@ class PartFiles:
         if resume and run == wanted and not older:
             return True
         if resume and (older or there):
-            was, now = (older, {"run": wanted, "code": code}) if older else ({"run": run}, {"run": wanted})
+            was, now = (
+                (older, {"run": wanted, "code": code, "source": source}) if older else ({"run": run}, {"run": wanted})
+            )
             refuse_other(folder if older else target, was, now)
         if older and not (resume or replace):
             raise OutputExists(f"{folder} holds an unfinished run; go on with --resume, or begin anew with --force")
@@ -221,7 +223,7 @@ def held(
     wanted : dict
         What is to run, by which versions.
     source : dict
-        Path, text, overrides and files of the scenario.
+        Path, text, overrides and files of the scenario, and its swept keys in their order.
     resume : bool
         Whether to go on from the parts of an earlier run of the same, if there are any. Where the output is there
         already, the context gives None.
@@ -288,6 +290,13 @@ def gathered(target: Path) -> Iterator[tuple[PartFiles, dict[Shard, PartFiles]]]
         yield PartFiles(folder), shards
 
 
+def folders(target: Path) -> list[Path]:
+    """Folders in which an unfinished run of an output, or its shards, have their parts."""
+    whole = _folder(target)
+    shards = [whole / "{}-of-{}".format(*shard) for shard in sorted(_shards(whole))]
+    return [whole, *shards] if manifest_of(whole) else shards
+
+
 def _folder(target: Path) -> Path:
     return target.with_name(f"{target.name}.parts")
 
@@ -352,7 +361,11 @@ def manifest_of(folder: Path) -> Manifest:
 
 def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
     """Refuse to go on with another scenario, other versions or other code, naming what differs."""
-    was, now = (_flat(of.get("run")) | _flat({"code": of["code"]} if "code" in of else {}) for of in (older, wanted))
+    begun = (
+        {"code": of["code"], "order of the sweep": of["source"].get("sweep")} if "code" in of else {}
+        for of in (older, wanted)
+    )
+    was, now = (_flat(of.get("run")) | more for of, more in zip((older, wanted), begun, strict=True))
     changed = [key for key in sorted({*was, *now}) if was.get(key) != now.get(key)]
     if changed:
         some = [f"{key} was {_short(was.get(key))}, is {_short(now.get(key))}" for key in changed[:_MOST_NAMED]]

@@ -126,7 +126,8 @@ def run(
         raise OutputExists(f"{target} is no plain file; name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
-    wanted, source = identity(attributes(plan)), scenario.origin.written
+    order = [axis.keys[0] for axis in scenario.sweep]
+    wanted, source = identity(attributes(plan)), scenario.origin.written | {"sweep": order}
     if replace or not target.exists():
         refuse_full_disk(plan, target, shard[1])
     with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts:

@@ -1,27 +1,34 @@
-"""Runs that are not done, by the folder of their parts: what they run, what they lack, and shards put together."""
+"""Runs that are not done, by the folder of their parts: their dataset so far, what they lack, shards put together."""
 
+from collections.abc import Iterator
 from dataclasses import replace as changed
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 from pydantic import TypeAdapter
 
-from sim.ensemble.outline import attributes, identity
+from sim.ensemble.netcdf import Outline, Piece, Place, fill
+from sim.ensemble.outline import attributes, identity, outline
 from sim.ensemble.part_files import (
     WHOLE,
+    Arrays,
     Manifest,
     OutputExists,
     PartFiles,
     Shard,
     Stopped,
+    folders,
     gathered,
     manifest_of,
     refuse_other,
 )  # fmt: skip
-from sim.ensemble.plan import Plan
+from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
 from sim.scenario.scenario import Scenario
 from sim.scenario.source import Source
 from sim.units.kept import digest
+from sim.units.refusals import BadInput
 
 #: Shards that a message names.
 _MOST_NAMED = 20
@@ -47,7 +54,11 @@ def merge(target: Path, replace: bool = False) -> Path:
         manifests = {folder: manifest for folder, manifest in found.items() if manifest}
         scenario = scenario_of(next(iter(manifests.values())))
         plan = Plan.of(scenario)
-        now = {"run": identity(attributes(plan)), "code": digest().hex()}
+        now = {
+            "run": identity(attributes(plan)),
+            "code": digest().hex(),
+            "source": next(iter(manifests.values()))["source"],
+        }
         for folder, manifest in manifests.items():
             refuse_other(folder, manifest, now)
         if lacking := _lacking(plan, whole, shards):
@@ -60,10 +71,105 @@ def merge(target: Path, replace: bool = False) -> Path:
     return run(scenario, target, replace=replace, resume=True)
 
 
+def dataset(target: Path) -> Any:
+    """The dataset of a run that is not done, lazily, nan where parts are missing, with the attribute ``share_done``."""
+    import xarray  # heavy
+    from xarray.core.indexing import LazilyIndexedArray
+
+    if not (kept := folders(target)):
+        raise BadInput([f"{target}: there is no such file, nor an unfinished run of it"])
+    parts = _Found({path.stem: PartFiles(folder) for folder in kept for path in folder.glob("*.part")})
+    plan = Plan.of(scenario_of(manifest_of(kept[0])))
+    made = outline(plan)
+    quantities = {name: key for key, place in made.places.items() for name in place.names.values()}
+    variables = {}
+    for name, one in made.variables.items():
+        values = one.values
+        if name in quantities:
+            values = LazilyIndexedArray(_lazy(made, parts, quantities[name], name))
+        variables[name] = one.dimensions, values, one.attributes
+    done = sum(
+        steps for task in plan.tasks() for part, steps in zip(task.names, task.work, strict=True) if part in parts
+    )
+    return xarray.Dataset(variables, attrs=made.attributes | {"share_done": done / work(plan)})
+
+
+class _Found(dict[str, PartFiles]):
+    """Parts that are there, each with where it is kept."""
+
+    def load(self, name: str) -> Arrays:
+        return self[name].load(name)
+
+
+class _Window:
+    """What is wanted of a variable, nan until something is put there."""
+
+    def __init__(self, shape: tuple[int, ...], key: tuple[int | slice, ...]) -> None:
+        self.shape = shape
+        self.wanted = [np.atleast_1d(np.arange(size)[at]) for size, at in zip(shape, key, strict=True)]
+        self.values = np.full([len(wanted) for wanted in self.wanted], np.nan)
+
+    def _places(self, axes: tuple[int | slice, ...]) -> Iterator[tuple[np.ndarray, np.ndarray, int]]:
+        """Along each axis, which wanted places are in a part of the variable, where in that, and how long it is."""
+        axes = (*axes, *(slice(None) for _ in self.shape[len(axes) :]))
+        for size, wanted, at in zip(self.shape, self.wanted, axes, strict=True):
+            span = range(size)[at] if isinstance(at, slice) else range(at, at + 1)
+            inside = np.flatnonzero((wanted >= span.start) & (wanted < span.stop))
+            yield inside, wanted[inside] - span.start, len(span)
+
+    def touches(self, axes: tuple[int | slice, ...]) -> bool:
+        """Whether something of a part of the variable is wanted."""
+        return all(len(inside) for inside, _, _ in self._places(axes))
+
+    def __setitem__(self, axes: tuple[int | slice, ...], values: np.ndarray) -> None:
+        inside, taken, lengths = zip(*self._places(axes), strict=True)
+        self.values[np.ix_(*inside)] = values.reshape(lengths)[np.ix_(*taken)]
+
+
+def _lazy(made: Outline, parts: _Found, quantity: str, name: str) -> Any:
+    """A variable whose numbers are read from the parts when they are called for."""
+    from xarray.backends import BackendArray
+    from xarray.core.indexing import IndexingSupport, explicit_indexing_adapter
+
+    one, place = made.variables[name], made.places[quantity]
+
+    class Lazy(BackendArray):
+        """What xarray reads lazily; flags are numbers here, as nan is none."""
+
+        dtype = np.dtype("f8" if one.kind == "i1" else one.kind)
+        shape = tuple(made.sizes[size] for size in one.dimensions)
+
+        def __getitem__(self, key: Any) -> Any:
+            return explicit_indexing_adapter(key, self.shape, IndexingSupport.BASIC, self.read)
+
+        def read(self, key: tuple[int | slice, ...]) -> np.ndarray:
+            windows = {each: _Window(self.shape, key) for each in place.names.values()}
+            found = windows[name]
+            fill(Outline(places={quantity: place}, pieces=list(_pieces(made, parts, place, found))), parts, windows)
+            return found.values.astype(self.dtype)[tuple(slice(None) if isinstance(at, slice) else 0 for at in key)]
+
+    return Lazy()
+
+
+def _pieces(made: Outline, parts: _Found, place: Place, wanted: _Window) -> Iterator[Piece]:
+    """Those pieces of which something is there and wanted; of pooled members none that lacks a part."""
+    drawn = any("map_time" in made.variables[name].dimensions for name in place.names.values())
+    for piece in made.pieces:
+        kept = [(rows, name) for rows, name in zip(piece.members, piece.names, strict=True) if name in parts]
+        if "" not in place.names and len(kept) < len(piece.names):
+            continue
+        if place.timed or piece.times.stop == made.sizes["t"]:
+            kept = [one for one in kept if drawn or wanted.touches(place.axes(piece, one[0]))]
+            yield piece._replace(members=[rows for rows, _ in kept], names=[name for _, name in kept])
+
+
 def scenario_of(manifest: Manifest) -> Scenario:
     """The scenario of a run by its manifest."""
     scenario = TypeAdapter(Scenario).validate_python(manifest["run"]["scenario"])
-    return changed(scenario, source=Source(**manifest["source"]))
+    source = dict(manifest["source"])
+    order = source.pop("sweep")  # which the resolved scenario, sorted by its keys, does not hold
+    axes = sorted(scenario.sweep, key=lambda axis: order.index(axis.keys[0]))
+    return changed(scenario, sweep=tuple(axes), source=Source(**source))
 
 
 def _lacking(plan: Plan, whole: PartFiles, shards: dict[Shard, PartFiles]) -> list[str]:

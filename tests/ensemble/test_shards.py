@@ -28,7 +28,7 @@ def many_parts(monkeypatch):
 
 def sample(**parts):
     defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
-    sweep = read_sweep({"contact.load": [1e-3, 4e-3]})
+    sweep = read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.5, 1.0]})
     return replace(scene(parts.pop("members", 7), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
 
 
@@ -48,7 +48,7 @@ def test_every_task_is_in_one_shard(of):
     shares = [[task.names[0] for task in plan.share(number, of)] for number in range(1, of + 1)]
     assert sorted(itertools.chain(*shares)) == sorted(task.names[0] for task in plan.tasks())
     assert sum(plans.work(plan, number, of) for number in range(1, of + 1)) == plans.work(plan)
-    assert plans.work(plan) == 7 * 10 * 2
+    assert plans.work(plan) == 7 * 10 * 4
 
 
 def test_merged_shards_are_the_bytes_of_an_undivided_run(tmp_path, whole):
@@ -97,7 +97,7 @@ def test_a_shard_that_was_stopped_goes_on_and_a_lost_or_damaged_part_is_named(tm
         ensemble.run(sample(), path, shard=(1, 2))
     with pytest.raises(BadInput, match=r"1-of-2 is of another run: scenario.ensemble.members was 7, is 8"):
         ensemble.run(sample(members=8), path, shard=(1, 2), resume=True)
-    with pytest.raises(Stopped, match=r"^shard 1/2 lacks \d+ of 8 parts\nrun it with --resume, then merge again$"):
+    with pytest.raises(Stopped, match=r"^shard 1/2 lacks \d+ of 16 parts\nrun it with --resume, then merge again$"):
         merge(path)
     ensemble.run(sample(), path, shard=(1, 2), resume=True)
     part = min((tmp_path / "out.nc.parts" / "2-of-2").glob("*.part"))
@@ -117,6 +117,13 @@ def test_shards_of_different_runs_are_not_put_together(tmp_path):
     ensemble.run(sample(), path, shard=(2, 3))
     with pytest.raises(BadInput, match="holds shards of 2 and of 3; move away"):
         merge(path)
+
+
+def test_a_sweep_in_another_order_is_another_run(tmp_path):
+    path, turned = tmp_path / "out.nc", replace(sample(), sweep=sample().sweep[::-1])
+    ensemble.run(sample(), path, shard=(1, 2))
+    with pytest.raises(BadInput, match=r"1-of-2 is of another run: order of the sweep was \['contact.load"):
+        ensemble.run(turned, path, shard=(1, 2), resume=True)
 
 
 def test_an_output_that_is_there_is_replaced_only_if_asked(tmp_path, whole):

@@ -1,0 +1,114 @@
+"""The dataset of a run that is not done: what is computed has the numbers of the finished one, the rest is nan."""
+
+import itertools
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from helpers.scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
+
+import sim
+from sim.cli import cli
+from sim.ensemble import plan as plans, simulate as ensemble
+from sim.ensemble.part_files import PartFiles, Stopped
+from sim.ensemble.plan import Plan
+from sim.parts.shear import models as shear
+from sim.parts.shear.correlation import Slip
+from sim.scenario.clock import Clock, Record
+from sim.scenario.scenario import read_sweep
+
+MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
+
+
+@pytest.fixture(autouse=True)
+def many_parts(monkeypatch):
+    """Several groups and blocks even of a small run."""
+    monkeypatch.setattr(plans, "_GROUP", 2)
+    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 4.5e-5)
+
+
+def sample(**parts):
+    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
+    sweep = read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.5, 1.0]})
+    return replace(scene(parts.pop("members", 5), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
+
+
+def stopped(scenario, path, after, **how):
+    """A run that ended after some parts."""
+    count = itertools.count()
+    with pytest.raises(Stopped):
+        ensemble.run(scenario, path, stop=lambda: next(count) == after or next(count) > 2 * after, **how)
+    return path
+
+
+SCENES = {
+    "members": sample(),
+    "pooled": sample(record=Record(per_member=False)),
+    "short runs together": sample(steps=1),
+    "maps": sample(shear=MAPPED, record=Record(maps=(8e-3, 1e-3), map_members=3)),
+    "single precision": sample(record=Record(precision="float32")),
+    "no sweep": replace(sample(), sweep=()),
+    "blocks in a record": sample(clock=Clock(duration=9e-3, step=1e-3, record=9e-3)),
+}
+
+
+@pytest.mark.parametrize("scenario", SCENES.values(), ids=SCENES)
+def test_what_is_computed_has_the_numbers_of_the_finished_run(tmp_path, scenario):
+    whole = ensemble.run(scenario)
+    path, some = tmp_path / "out.nc", 0
+    ensemble.run(scenario, path, shard=(2, 3))
+    with sim.open(path) as found:
+        assert 0 < found.attrs["share_done"] < 1
+        assert found.attrs["share_done"] == plans.work(Plan.of(scenario), 2, 3) / plans.work(Plan.of(scenario))
+        assert set(found.variables) == set(whole.variables)
+        for name, values in found.variables.items():
+            wanted = whole[name].values
+            if values.dtype.kind in "OUT" or name in found.coords:
+                assert np.array_equal(values.values, wanted)
+                continue
+            there = ~np.isnan(values.values)
+            assert np.array_equal(values.values[there], wanted[there].astype(values.dtype))
+            some += not there.all() and there.any()
+    assert some > 3 or scenario is SCENES["pooled"]
+    for number in (1, 3):
+        ensemble.run(scenario, path, shard=(number, 3))
+    complete = sim.open(path)
+    assert complete.attrs.pop("share_done") == 1
+    xr.testing.assert_equal(complete, whole)
+    assert complete.attrs == whole.attrs
+
+
+def test_any_part_of_a_variable_is_read_alone(tmp_path, monkeypatch):
+    whole, path = ensemble.run(sample()), tmp_path / "out.nc"
+    for number in (1, 2):
+        ensemble.run(sample(), path, shard=(number, 2))
+    read, load = [], PartFiles.load
+    monkeypatch.setattr(PartFiles, "load", lambda parts, name: read.append(name) or load(parts, name))
+    found = sim.open(path)["contact_radius"]
+    assert not read
+    chosen = {"contact_load": 1, "member": slice(4, 1, -2), "t": [7, 2]}
+    xr.testing.assert_equal(found.isel(chosen), whole["contact_radius"].isel(chosen))
+    at_once = {"contact_load": 0, "adhesion_bond_share": 1, "member": 4, "t": -1}
+    read.clear()
+    xr.testing.assert_equal(found.isel(at_once), whole["contact_radius"].isel(at_once))
+    assert len(read) == 1
+
+
+def test_tables_and_figures_of_an_unfinished_run_say_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ensemble.run(sample(), "out.nc", shard=(1, 2))
+    for words in (["stats", "out.nc"], ["plot", "out.nc"]):
+        done = CliRunner().invoke(cli, words, catch_exceptions=False)
+        assert done.exit_code == 0
+        assert "note: out.nc is of a run that is not done: 50 % is computed" in done.stderr
+    assert sim.stats("out.nc")["contact_radius_mean"].notna().any()
+
+
+def test_what_is_not_there_is_told(tmp_path):
+    with pytest.raises(sim.BadInput, match="there is no such file"):
+        sim.open(tmp_path / "out.nc")
+    (tmp_path / "out.nc.parts").mkdir()
+    with pytest.raises(sim.BadInput, match="there is no such file, nor an unfinished run of it"):
+        sim.open(tmp_path / "out.nc")
