@@ -8,7 +8,7 @@ import numpy as np
 import sim
 from benchmarks.compare import FIELD, lens
 from sim.engine import Dice, follow
-from sim.parts.exchange import NO_RESISTANCE, Motion, Motions, Times
+from sim.parts.exchange import Motion, Motions, Times
 from sim.scenario.scenario import Scenario
 
 
@@ -44,5 +44,5 @@ def followed(text: str) -> Callable[[], object]:
 def steady(speed: float, step: float, steps: int, drive: Callable) -> tuple[Motion, Motions]:
     """Start and motion of steady sliding, in steps of a length [s]."""
     times = Times(step, steps, step * steps)
-    slider, first = drive(speed=speed).begin(times)
-    return first, drive(speed=speed).advance(slider, NO_RESISTANCE, times, range(1, steps + 1))[1]
+    slider, first = drive(speed=speed).begin(times, 1)
+    return first, drive(speed=speed).advance(slider, times, range(1, steps + 1))[1]

@@ -10,9 +10,10 @@ from typing import NamedTuple, cast, get_type_hints
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts import extremes
+from sim.parts import coupling, extremes
 from sim.parts.contact.balance import Balance
-from sim.parts.exchange import NO_RESISTANCE, Array, Bonding, Indices, Sliding, Storing, Touching
+from sim.parts.coupling import Around, Held
+from sim.parts.exchange import Array, Bonding, Indices, Sliding, Storing, Touching, during
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, Array]
@@ -42,7 +43,8 @@ class Course(NamedTuple):
     """What a batch of members goes through, with the time as first axis and the member as second.
 
     ``time`` [s], ``position`` [m] and ``speed`` [m/s] of the slider; ``fraction``, ``stress`` and ``strength`` of the
-    bonds as of ``Bonding``; ``energy`` ΔΓ [J/m²]; ``work`` and the rest as of ``Touching``.
+    bonds as of ``Bonding``; ``energy`` ΔΓ [J/m²]; ``driven`` the readings of a drive that feels the friction, in
+    columns; ``work`` and the rest as of ``Touching``.
     """
 
     time: Array
@@ -52,6 +54,7 @@ class Course(NamedTuple):
     stress: Array
     strength: Array
     energy: Array
+    driven: Array
     work: Array
     radius: Array
     detached: Array
@@ -73,12 +76,16 @@ class Dice(NamedTuple):
 def start(scenario: Scenario, dice: Dice) -> State:
     """The state at t = 0."""
     drive, population, process, contact = scenario.parts
-    slider, motion = drive.begin(scenario.times)
+    slider, motion = drive.begin(scenario.times, len(dice.bonds.members))
     bonds = population.start(motion, dice.bonds)
     bonding = population.bonding(bonds)
     shear = process.start(motion, bonding, dice.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy)
     touch = contact.start(motion, scenario.times.duration, terms)
+    if drive.feeds_back:
+        bonding = coupling.viscous(scenario.parts, bonding, motion.speed)
+        around = _around(scenario, touch, shear.energy, 1)
+        slider = coupling.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
 
@@ -86,16 +93,22 @@ def start(scenario: Scenario, dice: Dice) -> State:
 def advance(scenario: Scenario, state: State, dice: Dice, steps: range) -> tuple[State, Course]:
     """The state after a block of clock steps, of a single one where a part feeds back, and what it went through."""
     drive, population, process, contact = scenario.parts
-    slider, motions = drive.advance(state.drive, NO_RESISTANCE, scenario.times, steps)
-    bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, dice.bonds)
+    if drive.feeds_back:
+        around = _around(scenario, state.contact, state.shear.energy, steps.start)
+        before = state.drive, state.bonds
+        slider, motions, bonds, bonding = coupling.advance(scenario.parts, before, around, scenario.times, steps.start)
+    else:
+        slider, motions = drive.advance(state.drive, scenario.times, steps)
+        bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, dice.bonds)
     shear, energy = process.advance(state.shear, motions, bonding, dice.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, energy)
     touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
-    before, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
-    largest = extremes.after(state.extremes, before, bonding, touch.radius, pull, motions)
+    at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
+    largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions)
     end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
     of_bonds = bonding.fraction, bonding.stress, bonding.strength
-    return end, Course(motions.time, motions.position, motions.speed, *of_bonds, energy, *touch)
+    driven = during(drive.readings(slider), len(energy))
+    return end, Course(motions.time, motions.position, motions.speed, *of_bonds, energy, driven, *touch)
 
 
 def march(scenario: Scenario, members: Indices, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -157,13 +170,27 @@ def course_of(scenario: Scenario, state: State) -> Course:
     """What a march passes at one state, with a time axis of length 1."""
     time, drive, bonds = np.full(1, scenario.times.at(state.step)), state.drive, state.bonding
     moving = time, drive.position, drive.speed, bonds.fraction, bonds.stress, bonds.strength
-    return Course(*(values[np.newaxis] for values in (*moving, state.shear.energy, *state.contact)))
+    driven = scenario.parts.drive.readings(drive)
+    return Course(*(values[np.newaxis] for values in (*moving, state.shear.energy, driven, *state.contact)))
 
 
 def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array) -> Balance:
     """The terms of the effective work of adhesion w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*)."""
     bonded, fluctuating = scenario.adhesion.work_of_bonds(fraction), scenario.fluctuations.paid_by_adhesion * energy
     return Balance(bonded, fluctuating, strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
+
+
+def _around(scenario: Scenario, touch: Touching, energy: Array, step: int) -> Around:
+    """Contact and half-space at the start of a clock step, for a drive that feels the friction."""
+    contact, bodies, times, adhesion = scenario.contact, scenario.bodies, scenario.times, scenario.adhesion
+    first, last = contact.held_between(times.at(step - 1.0), times.at(float(step)), times.duration)
+    share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(touch.radius, nan=0.0))
+    bare = adhesion.work_of_bonds(0.0) - scenario.fluctuations.paid_by_adhesion * share * energy
+    bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
+    area = scenario.contact_area
+    held = cast(tuple[Held, Held], (first.held, last.held))
+    solid = *bodies, scenario.solid.effective[0]
+    return Around(touch.radius, bare, bonded, contact.reversible, held, contact.lags, *solid, area)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

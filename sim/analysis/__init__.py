@@ -9,7 +9,7 @@ peak); ``summary`` turns both into statistics over the members.
 from sim.analysis.correlation import IntegralTime, correlation_time, integral_time
 from sim.analysis.events import events, loop_energy, peaks
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
-from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, sweep_dims
+from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary, where
 from sim.analysis.tables import highlights, notes, table, to_csv
 from sim.units.notation import concise, engineering, scaled

@@ -175,11 +175,23 @@ def sweep_dims(dataset: xr.Dataset) -> tuple[str, ...]:
     return tuple(str(name) for name in dataset["contact_modulus"].dims)
 
 
+def speed_name(dataset: xr.Dataset) -> str:
+    """Name of the speed that is prescribed: that of the stage where it pulls through a spring."""
+    return "stage_speed" if "stage_speed" in dataset else "speed"
+
+
+def speed_of(dataset: xr.Dataset) -> xr.DataArray:
+    """The speed that is prescribed, of the slider or of the stage, which is the same for all members [m/s]."""
+    speed = dataset[speed_name(dataset)]
+    return speed.isel({MEMBERS: 0}, drop=True) if MEMBERS in speed.dims else speed
+
+
 def steady_points(dataset: xr.Dataset) -> xr.DataArray:
     """True at the points of the sweep where the speed is constant in time; unrecorded, where the drive is steady."""
-    if "speed" not in dataset:
+    if speed_name(dataset) not in dataset:
         return word(dataset, "drive.model", "") == "steady"
-    return (dataset["speed"] == dataset["speed"].isel(t=0)).all("t")
+    speed = speed_of(dataset)
+    return (speed == speed.isel(t=0)).all("t")
 
 
 def is_steady(dataset: xr.Dataset) -> bool:

@@ -118,6 +118,10 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     whole = is_stationary(dataset) and bool(sweep_dims(dataset))
     points = math.prod(dataset.sizes[name] for name in sweep_dims(dataset))
     said = [words] if (words := averaging(dataset, whole)) else []
+    if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
+        said.append(
+            f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: nothing held the body"
+        )
     if any("(" in cell for row in rows for cell in row.values()):
         said.append("in brackets the standard error in the last digits")
     lines = ["; ".join(said)] if said else []

@@ -19,6 +19,8 @@ from sim.ensemble.progress import duration
 from sim.laws import jkr
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
+from sim.parts.bonds import FirstMoment
+from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.clock import Record
@@ -59,6 +61,7 @@ def preview(scenario: Scenario) -> str:
         "quantities in SI": _quantities(plan.points),
         "contact at rest": _contact(plan.points),
         "fluctuations": _fluctuations(some),
+        "slider": _slider([point for point in some if point.drive.feeds_back]),
         "notes": [(text,) for text in [*remarks(plan), *_lacking(plan)]],
         "the run": _run(plan),
     }
@@ -196,6 +199,39 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
         pairs, grid = _span([each.qx.size for each in modes], "", ","), _span([each.points for each in modes], "", ",")
         rows.append(("modes", f"{pairs} pairs on a grid of {grid} points a side"))
     return rows
+
+
+def _slider(points: Sequence[Scenario]) -> Rows:
+    """Stiffness of the contact, and of the spring below which friction that falls with speed makes oscillations."""
+    rows: dict[tuple[str, str], list[float]] = {}
+    for point in points:
+        drive, (yields, slope) = cast(Spring, point.drive), cast(Spring, point.drive).yields(*point.solid.effective)
+        radius, speeds = math.sqrt(point.contact_area / math.pi), np.abs(point.speeds(41))
+        firm = 1.0 / (yields + slope / radius) if yields + slope > 0.0 else math.inf
+        rows.setdefault(("contact k_t", "N/m"), []).append(firm)
+        if not drive.spring:
+            continue
+        if drive.mass > 0.0:
+            own = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
+            rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(own)
+        bonds, bodies = cast(FirstMoment, point.population), (point.sphere.radius, point.solid.contact_modulus)
+        works = (point.adhesion.work_of_bonds(bonds.steady(speeds).fraction * share) for share in (0.9999, 1.0, 1.0001))
+        less, area, more = (np.pi * point.contact.equilibrium_radius(work, *bodies) ** 2 for work in works)
+        contact = area, (more - less) / 2e-4 / area
+        alone, behind = (bonds.onset(speeds, *contact, *rest) for rest in ((), (drive.mass, firm)))
+        if np.isnan(alone.stiffness).all():
+            continue
+        worst = int(np.nanargmax(alone.stiffness))
+        at = f", at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
+        rows.setdefault(("oscillates below", f"N/m of the spring{at}"), []).append(float(alone.stiffness[worst]))
+        if drive.mass > 0.0 or firm < math.inf:
+            stiffest = float(np.nanmax(behind.stiffness))
+            rows.setdefault(("with mass and k_t", "N/m of the spring, without damping"), []).append(stiffest)
+        soft = 4.0 * math.pi * point.solid.effective[0] * float(area[worst] / alone.stiffness[worst])
+        if 0.5 * soft < 2.0 * radius:
+            said = "m and longer: such waves along the sliding oscillate by themselves, across half as long ones"
+            rows.setdefault(("half-space", said), []).append(soft)
+    return [(name, f"{_span(values)} {said}") for (name, said), values in rows.items()]
 
 
 def _power(point: Scenario) -> float:

@@ -10,15 +10,17 @@ from sim.laws import jkr
 from sim.parts import extremes
 from sim.parts.contact.balance import BONDED, CLOSED, SETTLED, STRESSLESS, WHOLE, Balance
 from sim.parts.contact.control import Control, LoadControl
+from sim.parts.drive import READINGS
 from sim.scenario.scenario import Scenario
 
 
 class Variable(NamedTuple):
     """One recorded quantity, or one number of a scene.
 
-    ``part`` names the part whose class decides whether members differ, "" for a number of the scene. ``read`` takes
-    the scenario and what a batch went through, a ``Course``, and gives an array that broadcasts to shape (times,
-    members); that of a quantity of the whole run takes the state at its end, that of a number the scenario alone.
+    ``part`` names the part whose class decides whether members differ, or their control; "" for a number of the scene.
+    ``read`` takes the scenario and what a batch went through, a ``Course``, and gives an array that broadcasts to
+    shape (times, members); that of a quantity of the whole run takes the state at its end, that of a number the
+    scenario alone.
     ``there`` says for which scenes it is recorded, with ``condition`` in words.
     """
 
@@ -121,7 +123,7 @@ LARGEST = (
           lambda scene: scene.contact.makes_load, "a load that changes"),
 )  # fmt: skip
 
-VARIABLES = (
+VARIABLES: tuple[Variable, ...] = (
     Variable("speed", "m/s", "sliding speed", "V", "drive", lambda scene, course: course.speed),
     Variable("slider_position", "m", "displacement of the slider", "X", "drive",
           lambda scene, course: course.position),
@@ -152,9 +154,9 @@ VARIABLES = (
     Variable("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
           lambda scene, course: course.dissipated),
     Variable("jkr_radius", "m", "radius in equilibrium with the full work of adhesion, under the same control and rule"
-          " after pull-off; 0 while that contact is open", "a_JKR", "drive", _jkr_radius),
+          " after pull-off; 0 while that contact is open", "a_JKR", "control", _jkr_radius),
     Variable("hertz_radius", "m", "radius without adhesion, under the same control; 0 where nothing presses", "a_H",
-          "drive", _hertz_radius),
+          "control", _hertz_radius),
     Variable("bonds_radius", "m", "radius in equilibrium with the work of adhesion of the bonds alone, under the same"
           " control and rule after pull-off; 0 while that contact is open", "a_b", "bonds", _bonds_radius),
     Variable("fluctuations_radius", "m", "radius in equilibrium with the work of adhesion that fluctuations leave"
@@ -164,10 +166,35 @@ VARIABLES = (
     Variable("equilibrium_radius", "m", "radius in equilibrium with the work of adhesion left, under the same control"
           " and rule after pull-off; 0 while that contact is open", "a_e", "contact", _equilibrium_radius,
           lambda scene: scene.contact.lags, 'contact.model = "rate_dependent"'),
-    Variable("applied_load", "N", "load applied to the sphere, in contact or not", "P_a", "drive", _applied_load,
+    Variable("applied_load", "N", "load applied to the sphere, in contact or not", "P_a", "control", _applied_load,
           lambda scene: scene.contact.load is not None and scene.contact.changes, "a contact.load that changes"),
 )  # fmt: skip
 
+
+def _driven(name: str, unit: str, long_name: str, symbol: str) -> Variable:
+    """A quantity of a drive that feels the friction, the stage's of one with a spring."""
+    column, sprung = READINGS.index(name), name.startswith("stage_")
+    found = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., column]
+    if sprung:
+        return Variable(*found, lambda scene: scene.drive.model == "spring", 'drive.model = "spring"')
+    return Variable(*found, lambda scene: scene.drive.feeds_back, 'drive.model = "spring" or "force"')
+
+
+VARIABLES += (
+    _driven("stage_position", "m", "displacement of the stage", "X_s"),
+    _driven("stage_speed", "m/s", "speed of the stage", "V_s"),
+    _driven("spring_force", "N", "force of the spring on the body, or that prescribed", "Q"),
+    _driven("drive_work", "J", "work of the stage, or of the force", "W_d"),
+    _driven("stored_energy", "J", "energy of spring, mass, yielding contact and bonds", "U"),
+    _driven("dissipated_by_damping", "J", "energy dissipated by the damping of the body", "W_c"),
+    _driven("dissipated_by_viscosity", "J", "energy dissipated by the viscosity of the interface", "W_v"),
+    _driven("dissipated_by_rupture", "J", "energy that bonds lose as they break and are made", "W_b"),
+    _driven("dissipated_by_area", "J", "energy stored in what the area loses less that in what it gains", "W_A"),
+    _driven("energy_residual", "J", "work of the drive less the rise of the energy stored and all that is dissipated",
+            "W_0"),
+    _driven("substeps", "1", "number of sub-steps since the start", ""),
+    _driven("runaway_time", "s", "time at which nothing held the body any longer", "t_r"),
+)  # fmt: skip
 
 #: Numbers of a scene, written for each point of the sweep.
 NUMBERS = (

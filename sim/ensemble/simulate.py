@@ -15,7 +15,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.engine import Dice, State, follow, pack, unpack
+from sim.engine import Course, Dice, State, follow, pack, unpack
 from sim.ensemble import cluster
 from sim.ensemble.bounds import fitting, refuse_full_disk
 from sim.ensemble.netcdf import attributes_of, in_memory, write
@@ -32,10 +32,11 @@ from sim.ensemble.part_files import (
     held,
 )  # fmt: skip
 from sim.ensemble.plan import Block, Plan, Task, snapshots, work
-from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES
+from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.ensemble.workers import share_out
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, claim, explained
+from sim.parts.drive import READINGS
 from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import Fluctuation
 from sim.scenario.declared import files_read
@@ -213,7 +214,7 @@ def _record(
             first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]
             for one in variables:
                 part = rows[one.name][:, first:last]
-                part[:] = np.broadcast_to(one.read(point, course), part.T.shape).T
+                part[:] = np.broadcast_to(_read(one, point, course), part.T.shape).T
         if drawn and steps[-1] in drawn_at:
             for name, values in _maps(point, state, drawn).items():
                 maps[f"{name}@{drawn_at.index(steps[-1])}"] = values
@@ -226,6 +227,17 @@ def _record(
     if task.pooled:
         rows |= {name: moments(values) for name, values in rows.items() if name in task.each}
     return end, rows | maps
+
+
+def _read(variable: Variable, point: Scenario, course: Course) -> np.ndarray:
+    """A recorded quantity, nan once nothing has held the body any longer; a flag or a count, without symbol, stays."""
+    values = variable.read(point, course)
+    if (
+        not (point.varies["drive"] and point.varies[variable.part] and variable.symbol)
+        or variable.name == "runaway_time"
+    ):
+        return cast(np.ndarray, values)
+    return np.where(np.isnan(course.driven[..., READINGS.index("runaway_time")]), values, np.nan)
 
 
 def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:

@@ -164,9 +164,8 @@ class Bonding(NamedTuple):
         nan where bonds carry no stretch.
     varying : array
         n Var f [N²/m²]: the power that forces add which differ from bond to bond. nan where it is not known.
-    stored, dissipated : array
-        Elastic energy of the bonds, and the running sum of what their rupture took [J/m²]: kept for drives that
-        balance energies; 0 under a prescribed drive.
+    stored : array
+        Elastic energy of the bonds [J/m²], for drives that balance energies; 0 where none can be solved with them.
     """
 
     fraction: Array
@@ -177,7 +176,6 @@ class Bonding(NamedTuple):
     frozen: Array = _UNKNOWN
     varying: Array = _UNKNOWN
     stored: Array = _NONE
-    dissipated: Array = _NONE
 
     def at(self, k: int) -> "Bonding":
         """The bonds at the end of step k of a block."""
@@ -203,18 +201,6 @@ class Gammas(NamedTuple):
     shape: Array = np.empty(0)
     wavenumber: Array = np.empty(0)
     constant: float = 0.0
-
-
-class Resistance(NamedTuple):
-    """Resistance of the contact to a drive that feeds back: friction force [N], its tangent and k_t [N/m]."""
-
-    force: Array
-    tangent: Array
-    contact_stiffness: Array
-
-
-#: For drives that prescribe the motion.
-NO_RESISTANCE = Resistance(_NONE, _NONE, _NONE)
 
 
 class Sliding(Protocol):
@@ -298,11 +284,14 @@ class Drive(Part, Protocol[Own]):
     def state_class(self) -> type[Own]:
         """Class of the state, a ``NamedTuple`` with ``position`` and ``speed``."""
 
-    def begin(self, times: Times) -> tuple[Own, Motion]:
-        """State and motion at t = 0: no slip, and the speed with which the run begins."""
+    def begin(self, times: Times, members: int) -> tuple[Own, Motion]:
+        """State and motion of some members at t = 0: no slip, and the speed with which the run begins."""
 
-    def advance(self, state: Own, resistance: Resistance, times: Times, steps: range) -> tuple[Own, Motions]:
-        """State at the end of a block of steps and the exact motion in it; ``resistance`` is that at its start."""
+    def advance(self, state: Own, times: Times, steps: range) -> tuple[Own, Motions]:
+        """State at the end of a block of steps and the exact motion in it, of a drive that prescribes it."""
+
+    def readings(self, state: Own) -> Array:
+        """Recorded quantities of a drive that feels the friction, shape (members, quantities), else (1, 0)."""
 
 
 class Bonds(Part, Protocol[Own]):

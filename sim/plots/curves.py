@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from sim.analysis import averaging, bond_work, is_stationary, is_steady, settled, summary, sweep_dims
+from sim.analysis import averaging, bond_work, is_stationary, is_steady, settled, speed_of, summary, sweep_dims
 from sim.analysis.observables import all_observables
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
 
@@ -143,8 +143,12 @@ class Scene(NamedTuple):
 
     def parted(self, line: Line, *several: np.ndarray) -> list[np.ndarray]:
         """The x values of a curve and values over them, with a nan in each where lines break."""
-        at = jumps(self.values("speed_mean", line)) if self.broken else ()
+        at = jumps(self.speeds(line)) if self.broken else ()
         return [np.insert(values, at, np.nan) for values in (self.x[line.number], *several)]
+
+    def speeds(self, line: Line) -> np.ndarray:
+        """The speed that is prescribed along a curve [m/s], that of the stage where it pulls through a spring."""
+        return self.values("stage_speed_mean" if "stage_speed_mean" in self.found else "speed_mean", line)
 
     def covered(self, name: str, lines: list[Line]) -> list[bool]:
         """Curves that a later one hides, nowhere farther from it than a hundredth of what all span."""
@@ -291,7 +295,7 @@ def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, 
 
 def speed_dim(dataset: xr.Dataset) -> str | None:
     """The sweep's dimension along which the speed changes."""
-    speed = dataset["speed"].isel(t=0)
+    speed = speed_of(dataset).isel(t=0)
     varying = (n for n in sweep_dims(dataset) if n in speed.dims and bool((speed != speed.isel({n: 0})).any()))
     return next(varying, None)
 
@@ -299,5 +303,6 @@ def speed_dim(dataset: xr.Dataset) -> str | None:
 def over_speed(dataset: xr.Dataset) -> Scene:
     """Statistics over the sliding speed, of a ramp or of steady speeds."""
     scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
-    speeds = scene.all("speed_mean")
-    return scene.placed(speeds, "sliding speed $V$", "m/s", axis_scale(speeds), broken=scene.along == "t")
+    speeds = np.stack([scene.speeds(line) for line in scene.lines])
+    words = "speed of the stage $V$" if "stage_speed" in dataset else "sliding speed $V$"
+    return scene.placed(speeds, words, "m/s", axis_scale(speeds), broken=scene.along == "t")

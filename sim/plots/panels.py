@@ -8,7 +8,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import is_stationary, is_steady
+from sim.analysis import is_stationary, is_steady, speed_of
 from sim.analysis.scene import stays_held
 from sim.plots import style
 from sim.plots.bond_laws import rest_of
@@ -195,7 +195,7 @@ def time_figure(dataset: xr.Dataset) -> Figure:
 
 def turns(dataset: xr.Dataset) -> bool:
     """Whether the speed does not only rise, or only fall, in time: a curve over it would lie on itself."""
-    change = dataset["speed"].diff("t")
+    change = speed_of(dataset).diff("t")
     return rest_of(dataset) is None and bool(((change > 0.0).any("t") & (change < 0.0).any("t")).any())
 
 

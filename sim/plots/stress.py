@@ -72,7 +72,7 @@ def stress_figure(dataset: xr.Dataset) -> Figure:
 
 def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.ndarray, Steady]]:
     """Closed forms over the speeds of a curve, each with the speeds [m/s]."""
-    speeds = scene.values("speed_mean", line)
+    speeds = scene.speeds(line)
     low, high = float(np.min(speeds)), float(np.max(speeds))
     fine = np.linspace(low, high, _FINE)
     if scene.scale == "log":
@@ -103,7 +103,7 @@ def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
     """The curves, each with its maximum in its name; a ring marks it."""
     named = []
     for line in scene.lines:
-        speed, stress = scene.values("speed_mean", line), scene.values("shear_stress_mean", line)
+        speed, stress = scene.speeds(line), scene.values("shear_stress_mean", line)
         at = maximum_of(speed, stress)
         words = line.label
         if at is not None:

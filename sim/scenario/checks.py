@@ -61,6 +61,17 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
         yield ("drive",), _TOO_SHORT.format(drive.end, clock.duration)
 
 
+def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
+    if not drive.feeds_back:
+        return
+    if not bonds.driven:
+        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use bonds.model = "rate" with a rupture'
+        yield ("bonds", "model"), said
+    elif drive.at_once and bonds.snaps:
+        said = "bonds with a cut-off stretch break in an avalanche, which nothing holds back: give drive.damping,"
+        yield ("drive",), f'{said} mass or viscosity, such as viscosity = "10 Pa s/m", or another rupture'
+
+
 def _no_adhesion(contact: Contact, adhesion: Adhesion) -> Faults:
     if contact.lags and not adhesion.work > 0.0:
         said = "a rate-dependent edge measures its drive by the work of adhesion at rest; give a work above zero"
@@ -132,8 +143,8 @@ def _shear_faults(
 #: Each check with the names of the parts that it reads.
 _CHECKS: dict[Callable[..., Faults], Mapping[str, Any]] = {
     check: inspect.signature(check).parameters
-    for check in (_table_too_short, _control_too_short, _no_stress, _no_forces, _no_adhesion, _no_maps)
-    + (_unrecorded_maps, _too_many_map_members, _shear_faults)
+    for check in (_table_too_short, _control_too_short, _cannot_be_driven, _no_stress, _no_forces, _no_adhesion)
+    + (_no_maps, _unrecorded_maps, _too_many_map_members, _shear_faults)
 }
 #: The parts that the checks read.
 CHECKED = sorted({name for reads in _CHECKS.values() for name in reads} - {"radius", "built"})

@@ -154,6 +154,12 @@ class Scenario:
         return self.fluctuations.process(*self.solid.effective, self._square)
 
     @property
+    def contact_area(self) -> float:
+        """Area of the contact at rest [m²], of one without equilibrium that of a hundredth of the sphere's radius."""
+        radius = self.rest_radius if self.rest_radius > 0.0 else 0.01 * self.sphere.radius
+        return math.pi * radius**2
+
+    @property
     def _square(self) -> float:
         """Side of the square that is as large as the contact at rest [m]."""
         return math.sqrt(math.pi) * self.rest_radius
@@ -218,10 +224,11 @@ class Scenario:
 
     @cached_property
     def varies(self) -> dict[str, bool]:
-        """For each part whether its values differ between members: by its class, never by looking."""
-        bonded = self.population.per_member
-        sheared = self.fluctuations.per_member or (self.fluctuations.reads_stress and bonded)
-        return {"drive": self.drive.per_member, "bonds": bonded, "shear": sheared, "contact": bonded or sheared}
+        """For each part, and the control of the contact, whether its values differ between members: by its class."""
+        driven = self.drive.per_member
+        bonded = driven or self.population.per_member
+        sheared = driven or self.fluctuations.per_member or (self.fluctuations.reads_stress and bonded)
+        return {"drive": driven, "bonds": bonded, "shear": sheared, "contact": bonded or sheared, "control": False}
 
     @property
     def by_steps(self) -> bool:

@@ -61,6 +61,11 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
         ``statistic`` in units of the ``yardstick``, and at the stated times ``t`` the ``value`` in a sample, its
         ``deviation`` from what is expected and the ``standard_error`` of that.
 
+    Raises
+    ------
+    BadInput
+        If the drive feels the friction.
+
     Notes
     -----
     Truth: all modes of the cell (of a grid eight times as fine as the finest that is tried, where the spectrum has no
@@ -70,6 +75,11 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     first order or better leave. Yardsticks are largest values over the run: of the mean for means and for the spread
     of bonds, of the spread for spreads, of the skewness for that of ΔΓ; that of the rest is not judged.
     """
+    if scenario.drive.feeds_back:
+        said = (
+            f'drive.model is "{scenario.drive.model}", whose slider feels the noise: no law gives its truth; study the'
+        )
+        raise BadInput([f'{said} scene at a speed that is prescribed, such as [drive] model = "ramp"'])
     left_out: list[str] = []
     base = plain(scenario)
     accepted = tolerance_of(scenario) if tolerance is None else tolerance

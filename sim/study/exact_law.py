@@ -97,7 +97,7 @@ class Expected(Renewing):
         amplitude, energies = self.amplitude.factor(motions.speed, bonding.strength), []
         sizes = renewed_size(self.amplitude, state, motions, amplitude)
         for now, size, keep, renew in zip(amplitude, sizes, *self._shares(motions), strict=True):
-            state = self._with_energy(now, keep**2 * state.values + (renew * size) ** 2)
+            state = self._with_energy(now, keep[0] ** 2 * state.values + (renew[0] * size) ** 2)
             energies.append(state.energy)
         return state, np.array(energies)
 

@@ -12,7 +12,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
+from helpers.scenes import BONDS, CELL, CONTACTS, DRIVES, SHEARS, SPECTRUM, scene
 from numpy.testing import assert_allclose
 
 import sim
@@ -23,6 +23,7 @@ from sim.ensemble.outline import variable_name
 from sim.ensemble.plan import Plan
 from sim.ensemble.recorded import LARGEST, VARIABLES
 from sim.numerics.files import StoreTrouble
+from sim.parts.drive import READINGS
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Record
@@ -305,15 +306,19 @@ def test_reading_one_map_reads_one_map(tmp_path):
 
 
 def test_a_variable_is_there_where_its_condition_holds():
-    scenes = {
-        "": sample(),
-        "fluctuations_radius": sample(contact=CONTACTS["partly reversible"]),
-        "equilibrium_radius": sample(contact=CONTACTS["rate_dependent"]),
-        "applied_load": sample(contact=CONTACTS["load there and back"]),
-    }
-    some = {name for name in scenes if name}
+    felt = {"bonds": BONDS["rate, bell"]}
+    driven, stage = set(READINGS), {"stage_position", "stage_speed"}
+    scenes = [
+        (set(), sample()),
+        ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
+        ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
+        ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
+        (driven, sample(drive=DRIVES["spring"], **felt)),
+        (driven - stage, sample(drive=DRIVES["force"], **felt)),
+    ]
+    some = set.union(*(names for names, _ in scenes))
     assert some == {variable.name for variable in VARIABLES if variable.condition}
-    for name, scenario in scenes.items():
+    for names, scenario in scenes:
         found = set(ensemble.run(scenario).variables)
-        assert found & some == {name} - {""}
+        assert found & some == names
         assert {variable.name for variable in VARIABLES if not variable.condition} <= found

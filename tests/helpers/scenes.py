@@ -6,7 +6,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.drive import prescribed as drive
+from sim.parts.drive import Force, Spring, prescribed as drive
 from sim.parts.exchange import Motions
 from sim.parts.shear import models as shear
 from sim.parts.shear.amplitude import Constant as ConstantAmplitude, Onset, Stress
@@ -25,6 +25,17 @@ DRIVES = {
     "linear ramp": drive.Ramp(start=-1e-3, stop=5e-3),
     "log ramp": drive.Ramp(start=1e-5, stop=1e-1, scale="log"),
     "table": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
+    "spring": Spring(stage=2e-2, stiffness=100.0, start="steady"),
+    "spring with mass": Spring(
+        stage={"from": 1e-2, "to": -1e-2, "cycles": 1},
+        stiffness=200.0,
+        start_after=1e-3,
+        mass=1e-4,
+        damping=0.1,
+        viscosity=1e5,
+        contact_stiffness=500.0,
+    ),
+    "force": Force(force={"from": 0.0, "to": 3e-3}, damping=0.1, contact_stiffness="rigid"),
 }
 #: Bonds whose life at rest is 5 ms and that feel their force from a stretch of 10 µm on, 0.2 MPa at the most.
 BELL = Bell(zero_force_rate=200.0, bell_force=4e-12)
@@ -113,6 +124,13 @@ CONTACTS = {
     ),
     "partly reversible": Equilibrium(load=4e-3, reversible=0.02),
 }
+
+
+def go_together(case):
+    """Whether the bonds of a case, by the names of its depths, can feel its drive."""
+    part, population = DRIVES[case.get("drive", "steady")], BONDS[case.get("bonds", "rate, bell")]
+    felt = getattr(population, "driven", False) and not (part.at_once and population.snaps)
+    return felt or not part.feeds_back
 
 
 def scene(members=3, steps=8, **parts):

@@ -25,6 +25,7 @@ from sim.laws.schallamach import (
     cut_off_moments,
     cut_off_stress,
     first_moment_fraction,
+    first_moment_onset,
     first_moment_peak,
     first_moment_stress,
     first_moment_stretch,
@@ -624,3 +625,24 @@ def test_arguments_broadcast():
     assert cluster_lifetime(5.0 * speed, rate, 1.0, 1.0, 1.0).shape == (3, 4)
     whole = bell_moments([1.0, 10.0], 1.0, 1.0, 1.0, 1.0).force
     assert_array_equal(whole, [bell_moments(v, 1.0, 1.0, 1.0, 1.0).force for v in (1.0, 10.0)])
+
+
+@pytest.mark.parametrize(
+    ("speed", "beta", "stiffness", "frequency"),
+    [(10.0, 1.0, 0.0390213, 4.691569), (20.0, 1.0, 0.0515158, 9.999753), (50.0, 10.0, 0.1823410, 24.876979),
+     (100.0, 1.0, 0.0378665, 46.056227)],
+)  # fmt: skip
+def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues(speed, beta, stiffness, frequency):
+    found = first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, 1.0)
+    assert_allclose(found, (stiffness, frequency), rtol=2e-6)
+    assert np.isnan(first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, 1.0)).all()
+
+
+def test_area_mass_and_a_contact_that_yields_raise_the_stiffness_at_the_onset():
+    unit = (10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
+    assert_allclose(first_moment_onset(*unit, 0.5), (0.0986672601, 6.4985274731), rtol=1e-9)
+    assert_allclose(first_moment_onset(*unit, 0.0, [1e-3, 1e-2]).stiffness, (0.0610321013, 0.2591294488), rtol=1e-8)
+    assert_allclose(
+        first_moment_onset(*unit, 0.0, [0.0, 1e-3], 0.05).stiffness, (0.1777133504, 0.1997241668), rtol=1e-8
+    )
+    assert first_moment_onset(*unit, 0.0, 0.0, 0.03).stiffness == math.inf

@@ -341,6 +341,9 @@ COHORT = next(
     if table == "bonds" and '"cohort"' in text
 )
 
+#: Bonds that a drive can feel.
+FELT = {"model": "rate"} | {key: value for key, value in COHORT.items() if key not in ("model", "tolerance")}
+
 
 @pytest.mark.parametrize(("table", "text"), list(alternatives()))
 def test_every_alternative_of_the_starter_is_a_scene(table, text, tmp_path):
@@ -352,6 +355,7 @@ def test_every_alternative_of_the_starter_is_a_scene(table, text, tmp_path):
     (tmp_path / "map.csv").write_text("\n".join(",".join(f"{v:.3e}" for v in row) for row in 1e5 * waves))
     changed = tomllib.loads(f"value = {text}")["value"]
     beside = {"bonds": COHORT, "shear.amplitude": {"model": "constant"}} if changed["model"] == "bonds" else {}
+    beside |= {"bonds": FELT} if changed["model"] in ("spring", "force") else {}
     scenario = load(tmp_path / "x.toml", {table: changed} | beside)
     for word in table.split("."):
         scenario = getattr(scenario, word)

@@ -10,8 +10,10 @@ states of that closure, not of bonds; for those see ``bell_moments``.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim.laws.schallamach.renewal import Peak
 from sim.numerics.jit import device, law
@@ -153,3 +155,65 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
     """
     given = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
     return Peak(_peak_speed(*given), np.multiply(site_density, _peak_force(*given)))
+
+
+class Onset(NamedTuple):
+    """Onset of oscillations behind a spring: its stiffness [N/m] and their frequency [rad/s], nan where none is."""
+
+    stiffness: NDArray[np.float64]
+    frequency: NDArray[np.float64]
+
+
+def first_moment_onset(
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, area, area_growth=0.0, mass=0.0,
+    contact_stiffness=math.inf,
+):  # fmt: skip
+    """Stiffness of a spring below which a mean-field Bell population oscillates at a speed.
+
+    Parameters
+    ----------
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density : float or array
+        As in ``first_moment_stress``.
+    area : float or array
+        A [m^2], at this speed.
+    area_growth : float or array
+        d ln A/d ln phi of a contact whose area follows the bonds [1].
+    mass : float or array
+        m of the body behind the spring [kg], without damping.
+    contact_stiffness : float or array
+        k_t between body and interface [N/m].
+
+    Returns
+    -------
+    Onset
+        Stiffness [N/m], infinite where no spring is stiff enough, and frequency [rad/s]; nan where friction does not
+        fall with speed.
+
+    Notes
+    -----
+    With the share N bound, x the stretch over f_b/kappa, s the growth of the area and d = (1 + s) x k - k_on - k,
+
+        ``K_0 = n kappa A N d/(k_on + 2k)``,  ``omega^2 = (k_on + k)(1 + x) d/(1 + (1 + s) x)``,
+
+    from the eigenvalues of the closure; a mass and k_t make it ``K = m omega^2 + K_0 k_t/(k_t - K_0)``. Mass raises
+    the stiffness that is needed, and so does a contact that yields; where k_t <= K_0 the contact itself oscillates.
+
+    Examples
+    --------
+    In units of all sites, at ten times the speed at which bonds begin to yield:
+
+    >>> print("%.7f %.6f" % first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
+    0.0390213 4.691569
+    """
+    tilt = bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / bell_force
+    tilt = np.abs(tilt)
+    rate = zero_force_rate * np.exp(tilt)
+    surplus = (1.0 + area_growth) * tilt * rate - rebinding_rate - rate
+    surplus = np.where(surplus > 0.0, surplus, np.nan)
+    bound = rebinding_rate / (rebinding_rate + rate)
+    square = (rebinding_rate + rate) * (1.0 + tilt) * surplus / (1.0 + (1.0 + area_growth) * tilt)
+    alone = site_density * bond_stiffness * area * bound * surplus / (rebinding_rate + 2.0 * rate)
+    yields = alone / np.asarray(contact_stiffness, dtype=float)
+    behind = np.divide(alone, 1.0 - yields, out=np.full(np.shape(yields), np.inf), where=yields < 1.0)
+    stiffness = np.where(np.isnan(alone), np.nan, np.multiply(mass, square) + behind)
+    return Onset(stiffness[()], np.sqrt(square)[()])

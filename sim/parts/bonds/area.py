@@ -38,6 +38,10 @@ class Common:
     """Attributes of all models, as they are where all members share one population."""
 
     in_place: ClassVar[bool] = False
+    #: Whether a drive that feels the friction can be solved together with this model.
+    driven: ClassVar[bool] = False
+    #: Whether slip may break more than it stretches, so that nothing but the body's delay holds it.
+    snaps: ClassVar[bool] = False
     #: Rough time of a step of a batch where it is made alone, for estimates [s].
     step_seconds: ClassVar[float] = 0.0
 

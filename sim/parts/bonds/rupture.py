@@ -5,19 +5,21 @@ integral of the rate along a motion, the same of a fresh bond, the time to ruptu
 """
 
 import math
-from typing import Annotated, ClassVar, Literal, NamedTuple
+from typing import Annotated, ClassVar, Literal, NamedTuple, cast
 
 import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.laws.schallamach import (
+    Onset,
     SiteMoments,
     bell_moments,
     bell_peak,
     catch_moments,
     constant_moments,
     cut_off_moments,
+    first_moment_onset,
     first_moment_peak,
 )
 from sim.numerics.jit import device
@@ -82,6 +84,12 @@ class _Law:
         """Relative error of the friction maximum if every bond is taken at the mean stretch [1]."""
         return 0.0
 
+    def first_moment_onset(
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, *contact: Array | float
+    ) -> Onset:
+        """Onset of oscillations behind a spring at speeds [m/s]; the rest as of the law ``first_moment_onset``."""
+        return Onset(*np.full((2, *speed.shape), np.nan))
+
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Constant(_Law):
@@ -120,6 +128,12 @@ class Bell(_Law):
     def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
         recipe = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
         return float(first_moment_peak(*recipe, 1.0).stress / bell_peak(*recipe, 1.0).stress - 1.0)
+
+    def first_moment_onset(
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, *contact: Array | float
+    ) -> Onset:
+        law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate, site_density
+        return cast(Onset, first_moment_onset(speed, *law, *contact))
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

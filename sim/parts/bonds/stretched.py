@@ -5,6 +5,7 @@ breaks at a rate that depends on its stretch. Their mean force makes the shear s
 has a maximum, ages and starts with a peak; nothing of that is put in by hand.
 """
 
+import math
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
@@ -16,6 +17,7 @@ from pydantic_core import PydanticCustomError
 import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.first_moment as first_moment
 import sim.parts.bonds.tracked as tracks
+from sim.laws.schallamach import Onset
 from sim.numerics.noise import Noise
 from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
 from sim.parts.bonds.cohorts import Cohorts
@@ -106,6 +108,11 @@ class FirstMoment(OverArea, _Separable):
 
     state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
+    driven: ClassVar[bool] = True
+
+    @property
+    def snaps(self) -> bool:  # type: ignore[override]
+        return self.law.limit < math.inf
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
         if self.start_from == "steady":
@@ -113,7 +120,7 @@ class FirstMoment(OverArea, _Separable):
         else:
             bound = np.full(1, self.bound_at_rest if self.start_from == "bonded" else 0.0)
             stretch = np.zeros(1)
-        rows = self.rows(noise)
+        rows = self.rows(noise) + 0.0 * motion.first  # a drive that feels the friction has its members
         return Stretches(rows * bound, rows * stretch)
 
     def advance(self, state: Stretches, motions: Motions, radius: Array, noise: Noise) -> tuple[Stretches, Bonding]:
@@ -125,6 +132,11 @@ class FirstMoment(OverArea, _Separable):
         bound, stretch = first_moment.follow(*before, *slid, self.law, self.rebinding_rate)
         return Stretches(bound[-1], stretch[-1], seen), self.bonding(Stretches(bound, stretch))
 
+    def onset(self, speed: Array, *contact: Array | float) -> Onset:
+        """Onset of oscillations behind a spring at speeds [m/s]; the rest as of the law ``first_moment_onset``."""
+        recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
+        return self.rupture.first_moment_onset(speed, *recipe, *contact)
+
     def remarks(self, setting: Setting) -> list[str]:
         excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)
         said = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
@@ -133,7 +145,8 @@ class FirstMoment(OverArea, _Separable):
     def bonding(self, state: Stretches) -> Bonding:
         mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
         breaking, lost = 2.0 * np.abs(state.stretch) / self.law.limit, state.stretch * self.law.at(mean)
-        return self._bonding(state.bound, state.stretch, _UNKNOWN, breaking, lost)
+        stored = 0.5 * self.site_density * self.bond_stiffness * mean * state.stretch
+        return self._bonding(state.bound, state.stretch, _UNKNOWN, breaking, lost)._replace(stored=stored)
 
     def steady(self, speed: Array) -> Bonding:
         return self.bonding(Stretches(*first_moment.steady(speed, self.law, self.rebinding_rate)))

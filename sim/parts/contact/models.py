@@ -116,6 +116,11 @@ class _Controlled:
     def _control(self, value: float | Array) -> Control:
         return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
 
+    def held_between(self, begin: float, end: float, duration: float) -> tuple[Control, Control]:
+        """The control at the two ends of an interval of a run [s], before any jump at its end."""
+        pieces = self.course.pieces(np.array([begin, end]), duration)
+        return self._control(float(pieces.first[0])), self._control(float(pieces.last[-1]))
+
     @property
     def makes_load(self) -> bool:
         """True if the load follows from the contact or changes in time, rather than staying as given."""

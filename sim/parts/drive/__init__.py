@@ -1,5 +1,6 @@
-"""Drives: how fast the slider moves."""
+"""Drives: how fast the slider moves, or what moves it."""
 
-from sim.parts.drive.prescribed import Drive, Ramp, Start, Steady, Table
+from sim.parts.drive.driven import READINGS, Drive, Force, Spring
+from sim.parts.drive.prescribed import Ramp, Start, Steady, Table
 
-__all__ = ["Drive", "Ramp", "Start", "Steady", "Table"]
+__all__ = ["READINGS", "Drive", "Force", "Ramp", "Spring", "Start", "Steady", "Table"]

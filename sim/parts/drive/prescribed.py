@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.parts.exchange import Array, Motion, Motions, Resistance, Setting, Times
+from sim.parts.exchange import Array, Motion, Motions, Setting, Times
 from sim.units.course import Course, Number, Pieces, Table as Rows, table_pieces
 from sim.units.quantity import Quantity
 from sim.units.table import at_once
@@ -37,12 +37,13 @@ class _Sliding:
     state_class: ClassVar[type[Slider]] = Slider
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
+    at_once: ClassVar[bool] = False
 
-    def begin(self, times: Times) -> tuple[Slider, Motion]:
+    def begin(self, times: Times, members: int) -> tuple[Slider, Motion]:
         motion = self.motion(0, 0.0, 0.0, times.duration)
         return Slider(np.zeros(1), motion.speed), motion
 
-    def advance(self, state: Slider, resistance: Resistance, times: Times, steps: range) -> tuple[Slider, Motions]:
+    def advance(self, state: Slider, times: Times, steps: range) -> tuple[Slider, Motions]:
         found = self._of_steps(times, steps) if len(steps) > 1 else self._of_one(times, steps.start)
         time, duration, slip, path, first, speed = found
         position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
@@ -66,6 +67,9 @@ class _Sliding:
     @cached_property
     def _kept(self) -> dict[tuple[Times, int], Array]:
         return {}
+
+    def readings(self, state: Slider) -> Array:
+        return np.empty((1, 0))
 
     def remarks(self, setting: Setting) -> list[str]:
         return []
@@ -152,6 +156,3 @@ class Table(Rows, _Sliding):
 
     speed: Annotated[tuple[Annotated[float, _SPEED], ...], at_once(_SPEED)]
     model: Literal["table"] = "table"
-
-
-Drive = Annotated[Steady | Start | Ramp | Table, Field(discriminator="model")]

@@ -70,24 +70,25 @@ class BandedProcess(Renewing):
 
 
 @kernel(
-    "void(float64[:,::1], float64[:,:], float64[:,:], float64[:,:], float64[::1], float64[::1],"
+    "void(float64[:,::1], float64[:,:,:], float64[:,:,:], float64[:,:], float64[::1], float64[::1],"
     " uint64, uint64, uint64[::1], int64, float64[:,::1])"
 )
 def _renew_bands(values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy):
     """Exact steps of all bands of all members in place, and their energy at the end of each."""
-    many = keep.shape[1] > 1
+    many = keep.shape[2] > 1
     for m in range(members.size):
+        own = m % keep.shape[1]
         for s in range(len(keep)):
             numbers = stream(seed, part, members[m], step + s, 0)
             total, unit = 0.0, size[s, m % size.shape[1]]
             for k in range(shapes.size):
                 i = k if many else 0
-                x, share = values[m, k], renew[s, i]
+                x, share = values[m, k], renew[s, own, i]
                 if share != 0.0:  # else nothing has passed: not even a rounding
                     one, numbers = normal(numbers)
                     rest, numbers = gamma(shapes[k], numbers)
                     kick = share * unit
-                    moved = kick * one + keep[s, i] * math.sqrt(x)
+                    moved = kick * one + keep[s, own, i] * math.sqrt(x)
                     x = moved * moved + 2.0 * kick * kick * rest
                 values[m, k] = x
                 total += half_weight[k] * x

@@ -34,7 +34,7 @@ class SiteModes(ModalProcess):
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         parts, sizes = np.zeros((len(noise.members), 4, self.pairs)), _sizes(bonding)
-        whole, energy = (np.zeros((1, 1)), np.ones((1, 1))), np.empty((1, len(parts)))
+        whole, energy = (np.zeros((1, 1, 1)), np.ones((1, 1, 1))), np.empty((1, len(parts)))
         renew_modes(parts, *whole, np.ones((1, 1)), self.weights, *noise.at(motion.step), 0, energy)
         _renew_sites(parts, *whole, sizes, self.weights, *noise.at(motion.step), energy)
         return Fluctuation(energy[0], sizes[:, 0].T, parts)
@@ -65,7 +65,7 @@ def _combined(parts: Array, sizes: Array) -> Array:
 
 
 @kernel(
-    "void(float64[:,:,::1], float64[:,:], float64[:,:], float64[:,:,:], float64[::1],"
+    "void(float64[:,:,::1], float64[:,:,:], float64[:,:,:], float64[:,:,:], float64[::1],"
     " uint64, uint64, uint64[::1], int64, float64[:,::1])"
 )
 def _renew_sites(parts, keep, renew, sizes, weights, seed, part, members, step, energy):
@@ -73,8 +73,9 @@ def _renew_sites(parts, keep, renew, sizes, weights, seed, part, members, step, 
 
     Z stands in the first two rows of a member, Y in the others, whose first is the lane of its numbers.
     """
-    many = keep.shape[1] > 1
+    many = keep.shape[2] > 1
     for m in range(members.size):
+        own = m % keep.shape[1]
         for s in range(len(keep)):
             numbers, total = stream(seed, part, members[m], step + s, 2), 0.0
             frozen, varying = sizes[:, s % sizes.shape[1], m % sizes.shape[2]]
@@ -82,8 +83,8 @@ def _renew_sites(parts, keep, renew, sizes, weights, seed, part, members, step, 
                 one, numbers = normal(numbers)
                 other, numbers = normal(numbers)
                 i = k if many else 0
-                parts[m, 2, k] = keep[s, i] * parts[m, 2, k] + renew[s, i] * one
-                parts[m, 3, k] = keep[s, i] * parts[m, 3, k] + renew[s, i] * other
+                parts[m, 2, k] = keep[s, own, i] * parts[m, 2, k] + renew[s, own, i] * one
+                parts[m, 3, k] = keep[s, own, i] * parts[m, 3, k] + renew[s, own, i] * other
                 x = frozen * parts[m, 0, k] + varying * parts[m, 2, k]
                 y = frozen * parts[m, 1, k] + varying * parts[m, 3, k]
                 total += weights[k] * (x * x + y * y)

@@ -25,8 +25,11 @@ class Time:
     model: Literal["time"] = "time"
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
-        """∫λdt over a step, shape (1,) or that of ``wavenumber`` [rad/m]; of a block with the step as first axis."""
-        return np.atleast_1d(motion.duration / self.time)
+        """∫λdt over a step, shape (1, 1) or (members, 1), or with that of ``wavenumber`` [rad/m] as last axis.
+
+        Of a block with the step as first axis.
+        """
+        return np.asarray(motion.duration)[..., np.newaxis] / self.time
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -40,7 +43,7 @@ class Slip:
     model: Literal["slip"] = "slip"
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
-        return motion.path / self.length
+        return motion.path[..., np.newaxis] / self.length
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -54,7 +57,7 @@ class Wave:
     model: Literal["wave"] = "wave"
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
-        return wavenumber * (motion.path / (2.0 * np.pi * self.waves))
+        return wavenumber * (motion.path / (2.0 * np.pi * self.waves))[..., np.newaxis]
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -68,7 +71,7 @@ class Diffusion:
     model: Literal["diffusion"] = "diffusion"
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
-        return wavenumber**2 * (self.diffusivity * motion.duration)
+        return wavenumber**2 * (self.diffusivity * np.asarray(motion.duration)[..., np.newaxis])
 
 
 Correlation = Annotated[Time | Slip | Wave | Diffusion, Field(discriminator="model")]

@@ -150,7 +150,7 @@ class FixedProcess(ModalProcess):
 
 
 @kernel(
-    "void(float64[:,:,::1], float64[:,:], float64[:,:], float64[:,:], float64[::1],"
+    "void(float64[:,:,::1], float64[:,:,:], float64[:,:,:], float64[:,:], float64[::1],"
     " uint64, uint64, uint64[::1], int64, int64, float64[:,::1])"
 )
 def renew_modes(values, keep, renew, size, weights, seed, part, members, step, row, energy):
@@ -158,8 +158,9 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, r
 
     The amplitudes of a member stand in two rows from ``row`` on, which is also the lane of their numbers.
     """
-    many = keep.shape[1] > 1
+    many = keep.shape[2] > 1
     for m in range(members.size):
+        own = m % keep.shape[1]
         for s in range(len(keep)):
             numbers = stream(seed, part, members[m], step + s, row)
             total, unit = 0.0, size[s, m % size.shape[1]]
@@ -167,7 +168,7 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, r
                 one, numbers = normal(numbers)
                 other, numbers = normal(numbers)
                 i = k if many else 0
-                kept, kick = keep[s, i], renew[s, i] * unit
+                kept, kick = keep[s, own, i], renew[s, own, i] * unit
                 x = kept * values[m, row, k] + kick * one
                 y = kept * values[m, row + 1, k] + kick * other
                 values[m, row, k], values[m, row + 1, k] = x, y
@@ -175,16 +176,17 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, r
             energy[s, m] = total
 
 
-@kernel("void(float64[:,::1], float64[:,:], uint64, uint64, uint64[::1], int64)")
+@kernel("void(float64[:,::1], float64[:,:,:], uint64, uint64, uint64[::1], int64)")
 def turn_phases(phases, exponents, seed, part, members, step):
     """Diffusion of all phases of all members in place, by √(2∫λdt) of a normal number in each step."""
-    many = exponents.shape[1] > 1
+    many = exponents.shape[2] > 1
     for m in range(members.size):
+        own = m % exponents.shape[1]
         for s in range(len(exponents)):
             numbers = stream(seed, part, members[m], step + s, 0)
             for k in range(phases.shape[1]):
                 turn, numbers = normal(numbers)
-                phases[m, k] += math.sqrt(2.0 * exponents[s, k if many else 0]) * turn
+                phases[m, k] += math.sqrt(2.0 * exponents[s, own, k if many else 0]) * turn
 
 
 @kernel(

@@ -83,8 +83,8 @@ class Renewing:
     def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
         """Keep a share of the numbers, in place, and renew the rest at a size, in one step after the other.
 
-        Shares have the shape (steps, 1) or (steps, numbers of a member), sizes (steps, 1) or (steps, members). Returns
-        the energy of the numbers at the end of each step, shape (steps, members).
+        Shares have the shape (steps, 1 or members, 1 or numbers of a member), sizes (steps, 1 or members). Returns the
+        energy of the numbers at the end of each step, shape (steps, members).
         """
         raise NotImplementedError
 
@@ -92,7 +92,7 @@ class Renewing:
         amplitude = self.amplitude.factor(motion.speed, bonding.strength)
         size = amplitude if self.amplitude.relaxing else np.ones(1)
         values = self._empty(len(noise.members))
-        energy = self._renew(values, np.zeros((1, 1)), np.ones((1, 1)), size[np.newaxis], motion.step, noise)
+        energy = self._renew(values, np.zeros((1, 1, 1)), np.ones((1, 1, 1)), size[np.newaxis], motion.step, noise)
         return Fluctuation(self._scaled(amplitude, energy[0]), amplitude, values)
 
     def advance(

@@ -1,0 +1,321 @@
+"""Slider and bonds together through one clock step, in sub-steps that each row chooses for itself.
+
+The equations stand in ``coupling_equations``. A sub-step's error is what they lack between their nodes.
+"""
+
+import math
+
+import numpy as np
+
+from sim.numerics.jit import device, kernel
+from sim.parts.coupling_equations import (
+    BODY,
+    BOUND,
+    COUNT,
+    ENDED,
+    FORCE,
+    MOMENT,
+    NEXT,
+    NODES,
+    PATH,
+    POSITION,
+    RADIUS,
+    RATES,
+    SHARES,
+    SHEARED,
+    SLIP,
+    SPEED,
+    compliance,
+    contact_area,
+    driven,
+    equations,
+    kinetics,
+    pull_on,
+    solve,
+)
+from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, STORED, VISCOSITY, WORK
+from sim.parts.exchange import Array
+
+#: Share of a sub-step after which the defect of the equations is measured, between the first two nodes.
+_BETWEEN = 0.4
+
+
+def _between() -> tuple[Array, Array]:
+    """Values and slopes of the polynomials through start and nodes at ``_BETWEEN``, that of the start last."""
+    places = np.append(NODES, 0.0)
+    values, slopes = np.empty(4), np.empty(4)
+    for j in range(4):
+        others = np.delete(places, j)
+        lagrange = np.poly1d(others, r=True) / np.prod(places[j] - others)
+        values[j], slopes[j] = lagrange(_BETWEEN), lagrange.deriv()(_BETWEEN)
+    return values, slopes
+
+
+_VALUES, _SLOPES = _between()
+#: Share of a clock step below which a sub-step means that there is no solution to go on with.
+_LEAST = 1e-13
+#: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
+_FEW, _SOME = 1e-12, 0.1
+_MOST_STEPS = 2_000_000
+
+
+@device
+def _newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
+    """Solve for slip, u, N, M at the nodes; whether that worked."""
+    of_bound, of_moment, _, _, _, _ = kinetics(row[BOUND], row[MOMENT], row[SPEED], law)
+    for i in range(3):
+        time = NODES[i] * step
+        z[0, i], z[1, i] = row[SPEED] * time, 0.0
+        z[2, i], z[3, i] = max(of_bound[0] * time, -0.5 * row[BOUND]), of_moment[0] * time
+    before, close = math.inf, min(1e-7, 0.01 * slider[7])
+    for turn in range(14):
+        if not equations(row, z, start, step, bare, slider, law, held, piece, right, matrix):
+            return False
+        if not solve(matrix, right):
+            return False
+        part, change = 1.0, 0.0
+        for i in range(3):
+            bound = row[BOUND] + z[2, i]
+            if bound - right[4 * i + 2] < 0.1 * bound:  # N stays above zero
+                part = min(part, 0.9 * bound / right[4 * i + 2])
+        for i in range(3):
+            bound, moment = row[BOUND] + z[2, i] + _FEW, row[MOMENT] + z[3, i]
+            for j in range(4):
+                z[j, i] -= part * right[4 * i + j]
+            change = max(change, math.fabs(right[4 * i]) / (law[4] + math.fabs(z[0, i])))
+            change = max(change, math.fabs(right[4 * i + 2]) / bound)
+            change = max(change, math.fabs(right[4 * i + 3]) / (law[4] * bound + math.fabs(moment)))
+        if change <= close:
+            return True
+        if not (part > 0.0 and change < 1e12) or (turn > 4 and change > 2.0 * before):
+            return False
+        before = change
+    return False
+
+
+@device
+def _error(row, z, start, step, bare, slider, law, held, piece):
+    """Defect of the equations between nodes, as an error of a stretch: of order 4 in the sub-step, over its scale.
+
+    The polynomials through start and nodes solve the equations at the nodes alone. What is missing between them of the
+    balance of forces, of N, of M and, with a mass, of the speed is taken over what resists it.
+    """
+    stiffness, mass, damping, viscosity, _, _, _, _ = slider
+    slip, body, bound, moment = 0.0, 0.0, row[BOUND], row[MOMENT]
+    speed, to_bound, to_moment, going = 0.0, 0.0, 0.0, 0.0
+    pace, bend = _VALUES[3] * row[BODY], _SLOPES[3] * row[BODY] / step
+    for j in range(3):
+        at_node = 0.0
+        for k in range(3):
+            at_node += RATES[j, k] * (z[0, k] + z[1, k]) / step
+        pace += _VALUES[j] * at_node
+        bend += _SLOPES[j] * at_node / step
+        slip += _VALUES[j] * z[0, j]
+        body += _VALUES[j] * (z[0, j] + z[1, j])
+        going += _SLOPES[j] * (z[0, j] + z[1, j]) / step
+        speed += _SLOPES[j] * z[0, j] / step
+        bound += _VALUES[j] * z[2, j]
+        moment += _VALUES[j] * z[3, j]
+        to_bound += _SLOPES[j] * z[2, j]
+        to_moment += _SLOPES[j] * z[3, j]
+    time = start + _BETWEEN * step
+    radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
+    if not (area >= 0.0 and bound >= 0.0):
+        return math.inf
+    of_bound, of_moment, on, _, _, _ = kinetics(bound, moment, speed, law)
+    pace = pace if mass > 0.0 else going
+    balance = area * (moment + viscosity * speed) + damping * pace + mass * bend
+    balance -= pull_on(time, start, body, row, slider, piece)
+    bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
+    scale = law[4] * (bound + _FEW) + math.fabs(moment)
+    found = max(
+        math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + _FEW),
+        math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,
+    )
+    # a mass between stiff springs rings within a small part of a stretch: as a force that is no small part
+    yields, _ = compliance(radius, slider)
+    stiffest = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0)
+    firm = max(1.0, stiffest / (area * (bound + _SOME))) if mass > 0.0 and area > 0.0 else 1.0
+    # an open contact bears nothing: then what is missing from the spring counts
+    found = max(found, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law[4])
+    return max(found, firm * step * math.fabs(going - pace) / law[4]) if mass > 0.0 else found
+
+
+@device
+def _elastic(row, time, bare, slider, held, piece, energy):
+    """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
+
+    Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
+    back to the drive is booked to the area that has changed.
+    """
+    stiffness, mass, damping, viscosity, forced, _, _, _ = slider
+    held_back = mass + damping > 0.0
+    yields, _ = compliance(row[RADIUS], slider)
+    row[FORCE] = driven(time, piece)[1] if forced > 0.0 else row[FORCE]
+    if viscosity > 0.0 or (held_back and yields == 0.0):
+        return True
+    slip, bound, moment, way, radius, area = 0.0, row[BOUND], row[MOMENT], 0.0, row[RADIUS], 0.0
+    for _ in range(40):
+        radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, bare, held)
+        if not area >= 0.0:
+            return False
+        yields, _ = compliance(radius, slider)
+        force = area * (moment + bound * slip)
+        slope = (area + by_moment * (moment + bound * slip)) * bound
+        way = 0.0 if held_back else slip + yields * force - row[SHEARED]
+        over = slip + yields * force - row[SHEARED] if held_back else stiffness * way + force - row[FORCE]
+        slope = 1.0 + yields * slope if held_back else stiffness * (1.0 + yields * slope) + slope
+        if not slope > 0.0:
+            return over == 0.0
+        slip -= over / slope
+        if math.fabs(over / slope) <= 1e-14 * (math.fabs(slip) + math.fabs(moment)):
+            break
+    moment += bound * slip
+    row[MOMENT], row[SHEARED], row[RADIUS] = moment, yields * area * moment, radius
+    row[POSITION] += way
+    row[SLIP] += slip
+    row[PATH] += math.fabs(slip)
+    energy[WORK] += row[FORCE] * way if forced > 0.0 else 0.0
+    row[FORCE] -= 0.0 if forced > 0.0 else stiffness * way
+    return True
+
+
+@device
+def _stored(row, bare, time, slider, held):
+    """Elastic and kinetic energy of spring, body, contact and bonds."""
+    _, area, _, _ = contact_area(row[BOUND], row[MOMENT], time, row[RADIUS], bare, held)
+    if not area >= 0.0:  # equilibrium was lost on the way
+        area = math.pi * row[RADIUS] * row[RADIUS] / held[10]
+    stiffness, mass, _, viscosity, _, _, _, _ = slider
+    energy = 0.5 * mass * row[BODY] * row[BODY]
+    energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])
+    if stiffness > 0.0:
+        energy += 0.5 * row[FORCE] * row[FORCE] / stiffness
+    if row[BOUND] > 0.0:
+        energy += 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
+    return energy
+
+
+@device
+def _book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy):
+    """Take an accepted sub-step: integrals of the powers by the method's own shares, and the row at its end."""
+    _, _, damping, viscosity, forced, _, _, _ = slider
+    way, speed, body = 0.0, 0.0, 0.0
+    for i in range(3):
+        bound, moment = row[BOUND] + z[2, i], row[MOMENT] + z[3, i]
+        radius, area, _, _ = contact_area(bound, moment, start + NODES[i] * step, row[RADIUS], bare, held)
+        yields, _ = compliance(radius, slider)
+        at_nodes[0, i], at_nodes[1, i], at_nodes[2, i] = area, 1.0 / yields if yields > 0.0 else 0.0, radius
+    _, first, _, _ = contact_area(row[BOUND], row[MOMENT], start, row[RADIUS], bare, held)
+    yields, _ = compliance(row[RADIUS], slider)
+    firm = 1.0 / yields if yields > 0.0 else 0.0
+    for i in range(3):
+        bound, moment, area = row[BOUND] + z[2, i], row[MOMENT] + z[3, i], at_nodes[0, i]
+        speed, body, spreads, firms = 0.0, 0.0, 0.0, 0.0
+        for j in range(3):
+            speed += RATES[i, j] * z[0, j] / step
+            body += RATES[i, j] * (z[0, j] + z[1, j]) / step
+            spreads += RATES[i, j] * (at_nodes[0, j] - first)
+            firms += RATES[i, j] * (at_nodes[1, j] - firm)
+        time, sheared = start + NODES[i] * step, row[SHEARED] + z[1, i]
+        pull = pull_on(time, start, z[0, i] + z[1, i], row, slider, piece)
+        _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
+        square = moment * moment / bound if bound > 0.0 else 0.0
+        fresh = law[3] * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
+        share = SHARES[i] * step
+        energy[WORK] += share * pull * (body if forced > 0.0 else driven(time, piece)[1])
+        energy[DAMPING] += share * damping * body * body
+        energy[VISCOSITY] += share * area * viscosity * speed * speed
+        energy[RUPTURE] += share * 0.5 * area * (square * (k + 3.0 * travel) + fresh)
+        energy[AREA] -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
+        row[PATH] += math.fabs(z[0, i] - way)
+        way = z[0, i]
+    pull = pull_on(start + step, start, z[0, 2] + z[1, 2], row, slider, piece)
+    row[FORCE], row[BODY], row[SPEED], row[RADIUS] = pull, body, speed, at_nodes[2, 2]
+    row[SHEARED] += z[1, 2]
+    row[BOUND] = min(row[BOUND] + z[2, 2], 1.0)
+    row[MOMENT] += z[3, 2]
+    row[POSITION] += z[0, 2] + z[1, 2]
+    row[SLIP] += z[0, 2]
+    row[COUNT] += 1.0
+
+
+@device
+def _later(held, time, stays):
+    """The contact's numbers some time later, its radius as it is from there on if it ``stays``."""
+    _, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area = held
+    load, base = load + load_rate * time, base + base_rate * time
+    return stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area
+
+
+@device
+def _piece(row, bare, slider, law, held, piece, room, energy):
+    """Go through one piece of a clock step; the time after which it ends or there is no way on.
+
+    The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
+    tolerance. A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    """
+    z, right, matrix, at_nodes = room
+    start, length = 0.0, piece[0]
+    for _ in range(_MOST_STEPS):
+        left = length - start
+        step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
+        step = left if step > 0.999 * left else min(step, 0.5 * left)
+        if not step > _LEAST * length:
+            if held[0] > 0.0:
+                return start
+            held = _later(held, 0.0, 1.0)
+            row[NEXT] = 0.0
+            continue
+        if not _newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
+            row[NEXT] = 0.25 * step
+            continue
+        error = _error(row, z, start, step, bare, slider, law, held, piece)
+        error *= math.sqrt(error) / slider[7]
+        grows = min(6.0, max(0.1, 0.9 * error ** (-1.0 / 6.0))) if error > 0.0 else 6.0
+        if not error <= 1.0:
+            row[NEXT] = step * (grows if error < math.inf else 0.25)
+            continue
+        _book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy)
+        row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
+        if step == left:
+            return length
+        start += step
+    return start
+
+
+@kernel(
+    "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64, UniTuple(float64, 8),"
+    " UniTuple(float64, 5), UniTuple(float64, 11))"
+)
+def advance_rows(rows, energies, bare, pieces, begin, slider, law, held):
+    """Advance all rows through a clock step that begins at a time, each row by itself.
+
+    ``bare``: work of adhesion of each row without bonds. ``pieces``: length of each, value of the drive at its ends and
+    its integral. A row that nothing holds any longer ends there; its bonds and contact stay as they were.
+    """
+    room = np.empty((4, 3)), np.empty(12), np.empty((12, 12)), np.empty((3, 3))
+    for m in range(len(rows)):
+        row, energy = rows[m], energies[m]
+        row[SLIP], row[PATH] = 0.0, 0.0
+        if not math.isnan(row[ENDED]):
+            continue
+        is_open = not row[RADIUS] > 0.0
+        row[RADIUS] = 0.0 if is_open else row[RADIUS]
+        now, time, worked, going = _later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
+        for p in range(len(pieces)):
+            piece = pieces[p, 0], pieces[p, 1], pieces[p, 2], pieces[p, 3]
+            if p == 0:
+                going = _elastic(row, 0.0, bare[m], slider, now, piece, energy)
+                energy[AREA] += energy[WORK] - worked - _stored(row, bare[m], 0.0, slider, now) + energy[STORED]
+            reached = (
+                _piece(row, bare[m], slider, law, _later(now, time, now[0]), piece, room, energy) if going else 0.0
+            )
+            time += reached
+            going = going and reached == piece[0]
+            if not going:
+                row[ENDED], row[POSITION], row[SPEED], row[BODY] = begin + time, math.nan, math.nan, math.nan
+                energy[:] = math.nan
+                break
+        if going:
+            energy[STORED] = _stored(row, bare[m], time, slider, now)

@@ -1,0 +1,227 @@
+"""Drives that feel the friction: a prescribed force, or a stage that pulls through a spring.
+
+The body has a mass and a damping to the counter-surface; between it and the interface the contact itself yields with
+k_t, and the interface may have a viscosity. Slider and bonds are solved together by ``sim.parts.coupling``.
+"""
+
+import math
+from typing import Annotated, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from pydantic import Field
+from pydantic.dataclasses import dataclass
+
+from sim.parts.drive.prescribed import Ramp, Start, Steady, Table
+from sim.parts.exchange import Array, Motion, Setting, Times
+from sim.units.course import Pieces, Prescribed, held, linear_pieces, prescribed
+from sim.units.quantity import Quantity
+
+_SPEED = Quantity("m/s", "speed of the stage", "V")
+_Stage = held(_SPEED, "speed")
+_Force = held(Quantity("N", "tangential force on the body", "Q"), "force")
+_Stiffness = Annotated[float, Quantity("N/m", "stiffness of the spring", "K", above=0)]
+_Mass = Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)]
+_Damping = Annotated[float, Quantity("N s/m", "damping of the body", "c", at_least=0)]
+_Viscosity = Annotated[float, Quantity("Pa s/m", "viscosity of the interface", "eta", at_least=0)]
+_Tolerance = Annotated[float, Quantity("1", "tolerance of the slider's motion", "", at_least=1e-12, at_most=1e-2)]
+_After = Annotated[float, Quantity("s", "time at rest before the stage moves", "t_w", at_least=0)]
+_ContactStiffness = Annotated[
+    Annotated[float, Quantity("N/m", "tangential stiffness of the contact", "k_t", above=0)]
+    | Literal["half_space", "rigid"],
+    Field(description='"half_space": that of the half-space under a uniform stress'),
+]
+
+#: Columns of ``Driven.energies``: work of the drive; lost to damping, viscosity, rupture and to the area as it changes;
+#: stored now, and at the start.
+WORK, DAMPING, VISCOSITY, RUPTURE, AREA, STORED, FIRST = range(7)
+#: Columns of the readings of a drive that feels the friction.
+READINGS = (
+    "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
+    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_area", "energy_residual", "substeps",
+    "runaway_time",
+)  # fmt: skip
+
+
+class Driven(NamedTuple):
+    """State of a driven slider; arrays of shape (members,).
+
+    Attributes
+    ----------
+    position, body_speed : array
+        Displacement of the body since the start [m], and its speed [m/s].
+    speed : array
+        Sliding speed, that of the interface [m/s].
+    spring_force : array
+        Force of the spring, or that prescribed [N].
+    sheared : array
+        Shear displacement of the contact between body and interface [m].
+    stage_position, stage_speed : array
+        Displacement [m] and speed [m/s] of the stage; 0 without one.
+    next_step : array
+        Length of the next sub-step [s].
+    substeps : array
+        Sub-steps since the start.
+    runaway_time : array
+        Time at which nothing held the body any longer [s], nan if never.
+    energies : array, shape (members, 7)
+        Energies since the start [J], columns ``WORK`` to ``FIRST``.
+    """
+
+    position: Array
+    body_speed: Array
+    speed: Array
+    spring_force: Array
+    sheared: Array
+    stage_position: Array
+    stage_speed: Array
+    next_step: Array
+    substeps: Array
+    runaway_time: Array
+    energies: Array
+
+
+@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+class _Driven:
+    """Keys and attributes of a drive that feels the friction."""
+
+    state_class: ClassVar[type[Driven]] = Driven
+    per_member: ClassVar[bool] = True
+    feeds_back: ClassVar[bool] = True
+
+    mass: _Mass = 0.0
+    damping: _Damping = 0.0
+    viscosity: _Viscosity = 0.0
+    contact_stiffness: _ContactStiffness = "half_space"
+    tolerance: _Tolerance = 1e-6
+
+    #: Stiffness of the spring [N/m]; 0 where the force is prescribed.
+    spring: ClassVar[float] = 0.0
+
+    @property
+    def at_once(self) -> bool:
+        """True if nothing delays the slider: neither mass, damping nor viscosity."""
+        return self.mass + self.damping + self.viscosity == 0.0
+
+    @property
+    def course(self) -> Prescribed:
+        """What is prescribed over time."""
+        raise NotImplementedError
+
+    @property
+    def end(self) -> float:
+        return self.course.end
+
+    def begin(self, times: Times, members: int) -> tuple[Driven, Motion]:
+        speed = np.full(members, self._first_speed(times.duration))
+        zero = np.zeros(members)
+        state = Driven(*(zero for _ in Driven._fields))._replace(
+            body_speed=speed, speed=speed, runaway_time=np.full(members, np.nan), energies=np.zeros((members, 7))
+        )
+        return state, Motion(0, 0.0, 0.0, zero, zero, speed, speed)
+
+    def first(self, duration: float) -> float:
+        """What is prescribed at the start, speed of the stage [m/s] or force [N]."""
+        return float(self.course.at(np.zeros(1), duration)[0])
+
+    def _first_speed(self, duration: float) -> float:
+        """Speed of the slider at the start [m/s]."""
+        return 0.0
+
+    def yields(self, shear_modulus: float, poisson_ratio: float) -> tuple[float, float]:
+        """1/k_t of a contact of radius a as (constant [m/N], slope over 1/a [m²/N]).
+
+        ``k_t = 3 π² G a/(4 (2 − ν))``: a disc of uniform stress on the half-space, and its mean displacement.
+        """
+        if self.contact_stiffness == "half_space":
+            return 0.0, 4.0 * (2.0 - poisson_ratio) / (3.0 * math.pi**2 * shear_modulus)
+        return (0.0, 0.0) if self.contact_stiffness == "rigid" else (1.0 / float(self.contact_stiffness), 0.0)
+
+    def driven(self, ends: Array, duration: float) -> Pieces:
+        """What is prescribed, speed of the stage or force, in the intervals between some times [s]."""
+        return self.course.pieces(ends, duration)
+
+    def readings(self, state: Driven) -> Array:
+        """Recorded quantities of the drive, columns ``READINGS``, shape (members, columns)."""
+        made, *spent, stored, first = state.energies.T
+        residual = made - (stored - first) - sum(spent)
+        stage = state.stage_position, state.stage_speed, state.spring_force
+        return np.stack([*stage, made, stored, *spent, residual, state.substeps, state.runaway_time], axis=1)
+
+    def remarks(self, setting: Setting) -> list[str]:
+        return []
+
+
+@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+class Force(_Driven):
+    """A prescribed tangential force: creep, ageing under load, the static threshold. Limit: ``Spring`` as K -> 0.
+
+    Where nothing can bear the force any longer, the member ends there with the time of its runaway.
+    """
+
+    force: _Force  # type: ignore[valid-type]
+    model: Literal["force"] = "force"
+
+    @property
+    def course(self) -> Prescribed:
+        return prescribed(self.force)
+
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        return _zeros(ends)
+
+
+@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+class Spring(_Driven):
+    """A stage that pulls the body through a spring: stick-slip. Limit: the stage's own motion as K -> infinity."""
+
+    stage: _Stage  # type: ignore[valid-type]
+    stiffness: _Stiffness
+    start_after: _After = 0.0
+    start: Annotated[
+        Literal["rest", "steady"], Field(description='"steady": moving with the stage, the spring preloaded')
+    ] = "rest"
+    model: Literal["spring"] = "spring"
+
+    @property
+    def spring(self) -> float:  # type: ignore[override]
+        return self.stiffness
+
+    @property
+    def course(self) -> Prescribed:
+        return prescribed(self.stage)
+
+    @property
+    def end(self) -> float:
+        return self.start_after + self.course.end
+
+    def first(self, duration: float) -> float:
+        return 0.0 if self.start_after > 0.0 else super().first(duration)
+
+    def _first_speed(self, duration: float) -> float:
+        return self.first(duration) if self.start == "steady" else 0.0
+
+    def driven(self, ends: Array, duration: float) -> Pieces:
+        return self.pieces(ends, duration)
+
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        """The speed of the stage in the intervals between some times [s], in pieces."""
+        after = self.start_after
+        if after <= ends[0]:
+            found = self.course.pieces(ends - after, duration - after)
+            return found._replace(start=found.start + after, stop=found.stop + after)
+        rests, cut = ends[ends < after], ends[ends > after]
+        still = _zeros(np.append(rests, min(after, ends[-1])))
+        if not len(cut):
+            return still
+        found = self.course.pieces(np.append(0.0, cut - after), duration - after)
+        moving = found._replace(start=found.start + after, stop=found.stop + after)
+        pieces = Pieces(*(np.concatenate(pair) for pair in zip(still, moving, strict=True)))
+        return pieces._replace(interval=np.searchsorted(ends, 0.5 * (pieces.start + pieces.stop)) - 1)
+
+
+def _zeros(ends: Array) -> Pieces:
+    """Nothing in the intervals between some times [s]."""
+    none = np.zeros(len(ends) - 1)
+    return linear_pieces(np.arange(len(none)), ends[:-1], ends[1:], none, none)
+
+
+Drive = Annotated[Steady | Start | Ramp | Table | Force | Spring, Field(discriminator="model")]

@@ -1,0 +1,380 @@
+"""Slider and bonds solved together, against closed forms, linear stability and trajectories of other integrators."""
+
+import math
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import sim
+from sim.analysis.tables import notes
+from sim.engine import Dice, follow, march, pack, unpack
+from sim.laws import jkr
+from sim.parts.bonds import Cohort, FirstMoment, Unbroken
+from sim.parts.bonds.rupture import Bell, Constant, CutOff
+from sim.parts.contact import Equilibrium
+from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.drive import READINGS, Force, Spring, Steady
+from sim.scenario.clock import Clock, Ensemble
+from sim.scenario.scenario import Scenario
+from sim.units.refusals import BadInput
+
+#: Bonds whose unit of stretch is 10 nm and of time 1 s.
+STRETCH, DENSITY, KAPPA = 1e-8, 1e15, 4e-4
+BELL = Bell(zero_force_rate=1.0, bell_force=STRETCH * KAPPA)
+R, MODULUS = 2e-3, 6.4e6
+#: Work of adhesion at which the load is π w R, which the trajectory with a changing area takes.
+LOAD = 4e-3
+WORK = LOAD / (math.pi * R)
+
+
+def scenario(duration, steps, drive, share=0.0, rupture=BELL, rebinding=1.0, start="bonded", members=1, **contact):
+    """A lens whose bonds carry ``share`` of the work of adhesion."""
+    return Scenario(
+        clock=Clock(duration=duration, step=duration / steps),
+        solid=Solid(shear_modulus=MODULUS / 4.0),
+        sphere=Sphere(radius=R),
+        adhesion=Adhesion(work=WORK, bond_share=share),
+        contact=Equilibrium(**({"load": LOAD} | contact)),
+        bonds=FirstMoment(
+            rupture=rupture, bond_stiffness=KAPPA, rebinding_rate=rebinding, site_density=DENSITY, start_from=start
+        ),
+        drive=drive,
+        ensemble=Ensemble(members=members),
+    )
+
+
+AREA = math.pi * jkr.radius_at_load(LOAD, WORK, R, MODULUS) ** 2
+#: Force over displacement of all sites of the contact at rest; force at the unit of stretch; energy.
+STIFF = DENSITY * KAPPA * AREA
+UNIT, ENERGY = STIFF * STRETCH, STIFF * STRETCH**2
+
+
+def spring(stiffness, speed=10.0, mass=0.0, damping=0.0, contact=math.inf, viscosity=0.0, **keys):
+    """A spring drive in units of all sites bound: stiffness and k_t over n κ A, speed in stretches a second."""
+    return Spring(
+        stage=speed * STRETCH if isinstance(speed, float) else speed, stiffness=stiffness * STIFF, mass=mass * STIFF,
+        damping=damping * STIFF, viscosity=viscosity * DENSITY * KAPPA,
+        contact_stiffness="rigid" if contact == math.inf else contact * STIFF, **keys,
+    )  # fmt: skip
+
+
+def force(load, **keys):
+    return Force(force=load * UNIT, **({"contact_stiffness": "rigid"} | keys))
+
+
+def marched(scene):
+    """States of a single member, and the readings of the drive in each, by name."""
+    states = list(march(scene, np.arange(1)))
+    readings = np.array([scene.parts.drive.readings(state.drive)[0] for state in states])
+    return states, dict(zip(READINGS, readings.T, strict=True))
+
+
+def residual(read):
+    """Largest energy that is missing, over all the work of the drive."""
+    return np.max(np.abs(read["energy_residual"])) / read["drive_work"][-1]
+
+
+def reached(states, *names):
+    """Some quantities of bonds and drive in the units of the bonds, one row a state."""
+    units = {"position": STRETCH, "body_speed": STRETCH, "bound": 1.0, "stretch": STRETCH}
+    parts = {"position": "drive", "body_speed": "drive", "bound": "bonds", "stretch": "bonds"}
+    return np.array([[getattr(getattr(state, parts[n]), n)[0] / units[n] for n in names] for state in states])
+
+
+#: X, N, F at 1, 1.5, 2, 2.5 and 4 of a massless slider, by two integrators that agree to 2e-12.
+MASSLESS = {
+    2: (0.66078417052, 0.43706238159, 0.18678431659),
+    3: (1.38296108241, 0.37378147709, 0.27234077835),
+    4: (2.84992794049, 0.28217034178, 0.34300144119),
+    5: (24.65242920427, 0.06015825135, 0.00695141591),
+    8: (26.61555546465, 0.35027850732, 0.26768889071),
+}
+
+
+@pytest.mark.parametrize("steps", [8, 80])
+def test_a_massless_slider_follows_its_reference_through_a_slip(steps):
+    states, read = marched(scenario(4.0, steps, spring(0.02, tolerance=1e-8)))
+    for place, exact in MASSLESS.items():
+        state = states[place * steps // 8]
+        assert_allclose(reached([state], "position", "bound", "stretch")[0], exact, rtol=1e-6)
+    assert_allclose(read["stage_position"][-1], 40.0 * STRETCH, rtol=1e-14)
+    assert_allclose(read["spring_force"], [state.bonding.stress[0] * AREA for state in states], rtol=1e-9, atol=1e-9)
+    assert residual(read) < 1e-7
+
+
+def test_errors_fall_with_the_tolerance_and_steps_grow_as_the_sixth_root_of_it():
+    errors, counts = [], []
+    for tolerance in (1e-4, 1e-7, 1e-10):
+        states, read = marched(scenario(4.0, 8, spring(0.02, tolerance=tolerance)))
+        exact = np.array([MASSLESS[place] for place in MASSLESS])
+        found = reached([states[place] for place in MASSLESS], "position", "bound", "stretch")
+        errors.append(np.max(np.abs(found - exact)))
+        counts.append(read["substeps"][-1])
+        assert residual(read) < 10.0 * tolerance
+    assert errors[2] < errors[1] < errors[0]
+    # of order 5: the error falls with the fifth power of the number of sub-steps, or faster
+    assert math.log(errors[0] / errors[2]) / math.log(counts[2] / counts[0]) > 4.5
+
+
+#: X, v, N, M, A/A_rest and work, damping, rupture, area of a body with mass and damping whose area follows its bonds.
+WITH_MASS = {
+    2: (0.6701109338, 1.2259073835, 0.4366280821, 0.1907491406, 0.9669729159)
+    + (0.9452661342, 0.0005249635, 0.0326176631, 0.0006137312),
+    4: (3.2414235908, 5.9325747346, 0.2575936680, 0.3601989198, 0.8700236014)
+    + (3.6234681296, 0.0087401333, 0.5553065048, 0.0142207552),
+    5: (11.0888440083, 33.3879670336, 0.0765254672, 0.2044020447, 0.7651500809)
+    + (5.2703910602, 0.1646970381, 2.3568774747, 0.0473633380),
+    8: (30.4992884103, -0.1735524184, 0.3522898786, 0.1875462974, 0.9220199073)
+    + (6.9555296727, 0.8491728180, 5.1176020214, 0.0400760338),
+}
+
+
+def test_a_body_with_mass_and_damping_follows_its_reference_while_the_area_follows_the_bonds():
+    drive = spring(0.02, mass=1e-3, damping=1e-3, tolerance=1e-8)
+    states, read = marched(scenario(4.0, 8, drive, share=0.5))
+    parts = ("drive_work", "dissipated_by_damping", "dissipated_by_rupture", "dissipated_by_area")
+    found = []
+    for place in WITH_MASS:
+        bonds = reached([states[place]], "position", "body_speed", "bound", "stretch")[0]
+        area = np.pi * states[place].contact.radius[0] ** 2 / AREA
+        found.append([*bonds, area, *(read[part][place] / ENERGY for part in parts)])
+    exact = np.array(list(WITH_MASS.values()))
+    assert np.all(np.abs(np.array(found) - exact) < 1e-6 * np.max(np.abs(exact), axis=0))
+    assert residual(read) < 1e-7
+
+
+#: Stiffness of the spring at the onset of oscillations at V = 10 and k_on = k0, and their frequency.
+ONSETS = {
+    "massless": ({}, 0.0390213, 4.691569),
+    "mass": ({"mass": 1e-3}, 0.0610321013, 4.691569),
+    "damping": ({"damping": 1e-3}, 0.0319311178, 4.1845576357),
+    "mass and damping": ({"mass": 1e-3, "damping": 1e-3}, 0.0494416404, 4.1845576357),
+    "contact": ({"contact": 0.05}, 0.1777133504, 4.691569),
+    "contact and mass": ({"contact": 0.05, "mass": 1e-3}, 0.1997241668, 4.6915686491),
+    "contact, mass, damping": ({"contact": 0.05, "mass": 1e-3, "damping": 1e-3}, 0.1924327975, 4.6670599625),
+}
+
+
+def growth(stiffness, keys, steps=300, step=0.02, share=0.0):
+    """Growth rate and frequency of the slowest mode of the bonds after a small jump of the speed."""
+    stage = {"time": (0.0, step, step, 1e3), "value": tuple(v * STRETCH for v in (10.0, 10.0, 10.0001, 10.0001))}
+    drive = spring(stiffness, stage, start="steady", tolerance=1e-11, **keys)
+    states, _ = marched(scenario(steps * step, steps, drive, share=share, start="steady"))
+    changes = np.diff(reached(states, "bound")[steps // 2 :, 0])
+    modes = 4 if {"contact", "mass"} <= keys.keys() else 2  # there the body rings for long
+    shifted = np.stack([changes[modes - 1 - k : -1 - k] for k in range(modes)], axis=1)
+    found = np.roots([1.0, *-np.linalg.lstsq(shifted, changes[modes:])[0]])
+    slowest = min(np.log(found[found.imag > 0.0]) / step, key=lambda root: root.imag)
+    return slowest.real, slowest.imag
+
+
+def check_onset(onset, frequency, keys, share=0.0):
+    rate, turns = growth(onset, keys, share=share)
+    assert abs(rate) < 1e-4 * frequency
+    assert_allclose(turns, frequency, rtol=1e-4)
+    assert growth(0.98 * onset, keys, share=share)[0] > 1e-3
+    assert growth(1.02 * onset, keys, share=share)[0] < -1e-3
+
+
+@pytest.mark.parametrize("name", ONSETS)
+def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_on_its_sides(name):
+    keys, onset, frequency = ONSETS[name]
+    check_onset(onset, frequency, keys)
+
+
+def test_an_area_that_follows_the_bonds_raises_the_onset_as_linear_stability_has_it():
+    # K_c = A N d/(β + 2k), ω² = (β + k)(1 + x) d/(1 + (1 + s) x), d = (1 + s) x k − β − k, s = d ln A/d ln N
+    stretch = 1.7455280027406994  # x e^x = 10
+    rate = 10.0 / stretch
+    bound = 1.0 / (1.0 + rate)
+    areas = [math.pi * jkr.radius_at_load(LOAD, WORK * (0.5 + share * bound), R, MODULUS) ** 2 / AREA
+             for share in (0.999, 1.0, 1.001)]  # fmt: skip
+    slope = (areas[2] - areas[0]) / 0.002 / areas[1]
+    surplus = (1.0 + slope) * stretch * rate - 1.0 - rate
+    onset = areas[1] * bound * surplus / (1.0 + 2.0 * rate)
+    square = (1.0 + rate) * (1.0 + stretch) * surplus / (1.0 + (1.0 + slope) * stretch)
+    check_onset(onset, math.sqrt(square), {}, share=0.5)
+
+
+def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_speed():
+    for keys in ({}, {"mass": 1e-3, "damping": 2e-3, "contact": 0.5}):
+        driven = scenario(3.0, 30, spring(1.0, start="steady", **keys), share=0.3, start="steady")
+        given = scenario(3.0, 30, Steady(speed=10.0 * STRETCH), share=0.3, start="steady")
+        one, other = (list(march(scene, np.arange(1)))[-1] for scene in (driven, given))
+        assert_allclose(one.bonding.stress, other.bonding.stress, rtol=1e-8)
+        assert_allclose(one.drive.speed, other.drive.speed, rtol=1e-8)
+
+
+def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness():
+    given = [state.bonding.stress[0] for state in march(scenario(1.0, 20, Steady(speed=10.0 * STRETCH)), np.arange(1))]
+    errors = []
+    for stiffness in (40.0, 4e2, 4e3, 4e4):
+        states, _ = marched(scenario(1.0, 20, spring(stiffness, tolerance=1e-9)))
+        off = [state.bonding.stress[0] for state in states] - np.array(given)
+        errors.append(np.max(np.abs(off)) / max(given))
+        assert errors[-1] < 10.0 / (stiffness / 0.0390213)
+    assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.05)
+
+
+@pytest.mark.parametrize(("load", "share", "speed"), [(0.2, 0.367052999629, 0.939593030185),
+                                                      (0.27, 0.265980949699, 2.80136714552)])  # fmt: skip
+def test_a_force_below_the_threshold_makes_creep(load, share, speed):
+    states, read = marched(scenario(200.0, 4, force(load)))
+    assert_allclose(reached(states[-1:], "bound")[0], share, rtol=1e-10)
+    assert_allclose(states[-1].drive.speed / STRETCH, speed, rtol=1e-8)
+    assert np.isnan(read["runaway_time"]).all()
+    assert_allclose(read["energy_residual"], 0.0, atol=1e-6 * read["drive_work"][-1])
+
+
+@pytest.mark.parametrize(("load", "time"), [(0.28, 11.0634348789), (0.3, 2.52331513753), (0.4, 0.687585303603)])
+def test_a_force_above_the_threshold_runs_away_in_time(load, time):
+    states, read = marched(scenario(12.0, 12, force(load, tolerance=1e-8)))
+    assert_allclose(read["runaway_time"][-1], time, rtol=1e-7)
+    ended = states[-1]
+    assert np.isnan([ended.drive.position, ended.drive.speed]).all()
+    assert np.isfinite([ended.bonds.bound, ended.contact.radius]).all()
+
+
+@pytest.mark.parametrize(("x0", "time", "halfway"), [(0.5, 0.559773594776, 0.858292500361),
+                                                     (2.0, 0.0489005107, None)])  # fmt: skip
+def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(x0, time, halfway):
+    # E1(x(t)) = E1(x0) − k0 t; they are remade so rarely that it does not show
+    scene = scenario(2.0 * time, 4, force(0.5 * x0, tolerance=1e-9), rebinding=1e-13)
+    first = next(march(scene, np.arange(1)))
+    first = first._replace(bonds=first.bonds._replace(bound=np.full(1, 0.5)))
+    states = list(march(scene, np.arange(1), first))
+    assert_allclose(states[-1].drive.runaway_time, time, rtol=1e-7)
+    if halfway:
+        assert_allclose(states[0].bonds.stretch / states[0].bonds.bound / STRETCH, halfway, rtol=1e-8)
+
+
+def test_a_viscous_interface_delays_what_bonds_of_a_constant_rate_take_over():
+    # N stays; M' = N v − k M with η v + M = Q
+    eta, load = 0.3, 0.2
+    drive = force(load, viscosity=eta * DENSITY * KAPPA, tolerance=1e-10)
+    scene = scenario(2.0, 10, drive, rupture=Constant(rate=1.0))
+    states, read = marched(scene)
+    time, rate = 0.2 * np.arange(11), 0.5 / eta + 1.0
+    moment = 0.5 * load / eta / rate * -np.expm1(-rate * time)
+    assert_allclose(reached(states, "stretch")[1:, 0], moment[1:], rtol=1e-8)
+    assert_allclose([state.drive.speed[0] / STRETCH for state in states[1:]], (load - moment[1:]) / eta, rtol=1e-8)
+    assert_allclose([state.bonding.stress[0] * AREA / UNIT for state in states[1:]], load, rtol=1e-9)
+    assert residual(read) < 1e-9
+
+
+def test_the_half_space_yields_with_its_stiffness_in_series_with_the_bonds():
+    # bonds that slip alone would break, far from it
+    held = CutOff(stretch=1e6 * STRETCH)
+    drive = force(0.01, contact_stiffness="half_space", viscosity=1e-6 * DENSITY * KAPPA)
+    states, read = marched(scenario(1.0, 4, drive, rupture=held))
+    firm = math.pi**2 * MODULUS / 4.0 * math.sqrt(AREA / math.pi) / 2.0
+    assert_allclose(states[-1].drive.position, 0.01 * UNIT * (1.0 / firm + 1.0 / STIFF), rtol=1e-7)
+    assert_allclose(states[-1].drive.sheared, 0.01 * UNIT / firm, rtol=1e-12)
+    assert_allclose(1.6e6 * math.pi**2 * 0.12e-3 / 2.0, 1.0 / drive.yields(1.6e6, 0.5)[1] * 0.12e-3, rtol=1e-14)
+    assert_allclose(read["stored_energy"][-1], 0.5 * 0.01 * UNIT * states[-1].drive.position[0], rtol=1e-6)
+
+
+@pytest.mark.parametrize("keys", [{}, {"mass": 1e-3, "damping": 1e-3}, {"contact": 0.2},
+                                  {"contact": 0.2, "mass": 1e-4, "viscosity": 1e-3}])  # fmt: skip
+def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys):
+    scene = scenario(4.0, 160, spring(0.02, **keys), share=0.5)
+    straight = list(march(scene, np.arange(3)))
+    slip = max(range(160), key=lambda k: straight[k].drive.speed[0])
+    assert straight[slip].drive.speed[0] > 3.0 * 10.0 * STRETCH
+    again = list(march(scene, np.arange(3), unpack(scene, pack(straight[slip]))))
+    alone = list(march(scene, np.array([1])))
+    one, other, single = (pack(states[-1]) for states in (straight, again, alone))
+    assert all(np.array_equal(one[key], other[key], equal_nan=True) for key in one)
+    for key, values in single.items():
+        whole = one[key][1:2] if one[key].ndim and len(one[key]) == 3 else one[key]
+        assert np.array_equal(whole, values, equal_nan=True), key
+    end, passed = follow(scene, Dice.of(scene.seed, np.arange(3)), None, range(0, 161, 4))
+    assert np.array_equal(passed.driven[:, 0, 2], [state.drive.spring_force[0] for state in straight[::4]])
+    assert np.array_equal(end.drive.position, straight[-1].drive.position)
+
+
+@pytest.mark.parametrize("stiffness", [4e-8, 1.0, 4e4])
+@pytest.mark.parametrize("keys", [{}, {"damping": 1e-3}, {"mass": 1e-9}, {"contact": 1.0}])
+def test_springs_from_soft_to_stiff_keep_the_energies_balanced(stiffness, keys):
+    _, read = marched(scenario(20.0, 5, spring(stiffness, **keys), share=0.3))
+    assert residual(read) < 1e-5
+
+
+def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_signs():
+    turns = {
+        "time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0),
+        "value": tuple(v * STRETCH for v in (10.0, 10.0, -10.0, -10.0, 0, 0)),
+    }
+    states, read = marched(scenario(8.0, 16, spring(0.2, turns, start_after=1.0, damping=1e-2), share=0.5))
+    assert_allclose(read["stage_position"][[2, 6, 10, 16]] / STRETCH, [0.0, 20.0, 0.0, 0.0], atol=1e-12)
+    assert states[6].bonding.stress[0] > 0.0 > states[10].bonding.stress[0]
+    assert abs(states[16].bonding.stress[0]) < 0.2 * abs(states[10].bonding.stress[0])
+    assert residual(read) < 1e-5
+
+
+def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again():
+    base = {"time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0), "value": (LOAD, LOAD, -LOAD, -LOAD, LOAD, LOAD)}
+    scene = scenario(3.0, 30, spring(1.0), share=0.5, load=base, after_pull_off="reattach")
+    states, read = marched(scene)
+    open_ = np.isnan([state.contact.radius[0] for state in states])
+    assert open_[11:20].all()
+    assert not open_[21:].any()
+    assert_allclose(read["spring_force"][12:20], 0.0, atol=1e-12 * UNIT)
+    assert read["spring_force"][-1] > 0.05 * UNIT
+    assert np.isfinite(read["energy_residual"]).all()
+
+
+def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
+    lens = {name: getattr(scenario(1.0, 4, spring(1.0)), name) for name in ("clock", "solid", "sphere", "contact")}
+    recipe = {"bond_stiffness": KAPPA, "rebinding_rate": 1.0, "site_density": DENSITY}
+    for bonds, keys, place, cure in (
+        (Cohort(rupture=BELL, **recipe), {}, "bonds.model", '"rate"'),
+        (Unbroken(stress=1e5), {"mass": 1e-3}, "bonds.model", "rupture"),
+        (FirstMoment(rupture=CutOff(stretch=STRETCH), **recipe), {}, "drive", "viscosity"),
+    ):
+        with pytest.raises(BadInput) as refused:
+            Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=bonds, drive=spring(1.0, **keys))
+        assert any(place in said and cure in said for said in refused.value.problems)
+    damped = FirstMoment(rupture=CutOff(stretch=STRETCH), **recipe)
+    scene = Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=damped, drive=spring(1.0, damping=1e-3))
+    _, read = marched(scene)
+    assert residual(read) < 1e-5
+
+
+def test_a_run_records_the_drive_of_each_member_and_ends_those_that_run_away():
+    scene = scenario(12.0, 12, force(0.28), members=2)
+    dataset = sim.run(scene)
+    assert dataset["friction_force"].dims == ("member", "t")
+    assert_allclose(dataset["runaway_time"].isel(t=-1), 11.0634348789, rtol=1e-5)
+    for name in ("slider_position", "speed", "spring_force", "stored_energy", "contact_radius", "bond_fraction"):
+        assert np.isfinite(dataset[name].isel(t=11)).all(), name
+        assert np.isnan(dataset[name].isel(t=12)).all(), name
+    assert "stage_speed" not in dataset
+    assert any("2 of 2 trajectories end in a runaway" in line for line in notes(dataset, [], []))
+
+
+def test_what_would_run_shows_where_the_slider_oscillates():
+    text = sim.check(scenario(1.0, 4, spring(1.0, mass=1e-3, contact=0.05, damping=1e-3)))
+    rows = {line.split("  ")[1]: line for line in text.partition("\nslider\n")[2].splitlines() if line.startswith("  ")}
+    assert f"{0.0390213 * STIFF:.4g} N/m" in rows["oscillates below"]
+    assert f"{0.1997241668 * STIFF:.4g} N/m" in rows["with mass and k_t"]
+    assert f"{0.05 * STIFF:.4g} N/m" in rows["contact k_t"]
+    assert f"{math.sqrt(1.0 / 1e-3) / (2.0 * math.pi):.4g} Hz" in rows["natural frequency"]
+
+
+def test_a_study_of_a_drive_that_feels_its_noise_is_refused():
+    with pytest.raises(BadInput, match=r"drive\.model"):
+        sim.converge(scenario(1.0, 4, spring(1.0)))
+
+
+def test_a_force_is_a_soft_spring_that_is_pulled_from_afar():
+    # K V stays as K falls: the force of the spring is that ramp but for what the body gives way
+    ramp = {"from": 0.0, "to": 0.2 * UNIT}
+    given = list(march(scenario(1.0, 10, Force(force=ramp, contact_stiffness="rigid")), np.arange(1)))[-1]
+    errors = []
+    for stiffness in (1e-3, 1e-4, 1e-5):
+        drive = spring(stiffness, 0.2 / stiffness)
+        last = list(march(scenario(1.0, 10, drive), np.arange(1)))[-1]
+        errors.append(abs(last.drive.position[0] / given.drive.position[0] - 1.0))
+    assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.02)
