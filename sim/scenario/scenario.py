@@ -150,8 +150,11 @@ class Scenario:
 
     @cached_property
     def process(self) -> Process:
-        """The shear part on this solid and cell."""
-        return self.fluctuations.process(*self.solid.effective, self._square)
+        """The shear part on this solid and cell; ``BadInput`` where it cannot be built."""
+        try:
+            return self.fluctuations.process(*self.solid.effective, self._square)
+        except PydanticCustomError as fault:  # of a point inside a long sweep, which was not tried before
+            raise BadInput([f"shear: {fault.message()}"]) from None
 
     @property
     def contact_area(self) -> float:

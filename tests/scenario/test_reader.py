@@ -487,3 +487,13 @@ def test_of_a_long_sweep_the_fluctuations_are_built_at_both_ends_only(scene, mon
     points = scene(overrides={"shear": banded, "sweep": {"shear.spectrum.rms": many}}).points()
     assert [one.spectrum.rms for one in built[-2:]] == [points[0].shear.spectrum.rms, points[-1].shear.spectrum.rms]
     assert len(built) <= 4
+
+
+def test_a_point_inside_a_long_sweep_that_cannot_be_built_is_bad_input(scene):
+    band = {"model": "band", "rms": "1 kPa", "longest": "120 um", "shortest": "60 um"}
+    mapped = {"model": "mapped", "points": 64, "correlation": {"model": "time", "time": 1}, "spectrum": band}
+    cells = [0.24e-3] * 33 + [1e-2] + [0.24e-3] * 33
+    points = scene(overrides={"shear": mapped, "sweep": {"shear.cell": cells}}).points()
+    assert points[0].process
+    with pytest.raises(BadInput, match="shear: "):
+        _ = points[33].process
