@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers
-from sim.numerics.files import StoreTrouble
+from sim.numerics.files import DiskFull, StoreTrouble
 from sim.scenario.scenario import Scenario
 
 # Rough costs of one core [s]: a start, the table, a process that shares the work; a byte of the table, of a part, of
@@ -170,6 +170,17 @@ def refuse_full_disk(plan: Plan, target: Path, shares: int = 1) -> None:
     if needed > free:
         said = f"parts and dataset take {size(needed)} until they are one file, of which {size(free)} are free"
         raise StoreTrouble(f"{folder}: {said}; fewer members, records or maps take less, as do pooled statistics")
+
+
+@contextlib.contextmanager
+def room_named(plan: Plan) -> Iterator[None]:
+    """A context in which the message of a full disk says how much a run takes, and how it goes on."""
+    try:
+        yield
+    except DiskFull as trouble:
+        needed = size(takes(plan, 1).disk)
+        cure = "make room, and the same command with --resume goes on"
+        raise DiskFull(f"{trouble}; parts and dataset take {needed} until they are one file; {cure}") from trouble
 
 
 def _free_memory() -> float:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from sim.ensemble import checksums
-from sim.numerics.files import OutputExists, StoreTrouble, explained, locked, read_whole, sync, write_whole
+from sim.numerics.files import OutputExists, StoreTrouble, by_hdf5, explained, locked, read_whole, sync, write_whole
 from sim.units.kept import digest
 from sim.units.refusals import BadInput
 
@@ -135,7 +135,8 @@ class PartFiles:
         """
         beside, sums, manifest = self.folder / DATASET, self.folder / _SUMS, manifest_of(self.folder)
         with explained(self.folder):
-            write(beside)
+            with by_hdf5(beside):
+                write(beside)
             sync(beside)
             write_whole(sums, checksums.content(beside, manifest["source"], manifest["run"]))
         _refuse_foreign(target)

@@ -17,7 +17,7 @@ import numpy as np
 
 from sim.engine import Course, Dice, State, follow, pack, unpack
 from sim.ensemble import cluster
-from sim.ensemble.bounds import fitting, refuse_full_disk
+from sim.ensemble.bounds import fitting, refuse_full_disk, room_named
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
 from sim.ensemble.part_files import (
@@ -131,7 +131,10 @@ def run(
     wanted, source = identity(attributes(plan)), scenario.origin.written | {"sweep": order}
     if replace or not target.exists():
         refuse_full_disk(plan, target, shard[1])
-    with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts:
+    with (
+        room_named(plan),
+        held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts,
+    ):
         if parts is not None:
             simulate(plan, parts, progress, jobs, stop, shard, scheduler)
         if parts is not None and shard == WHOLE:

@@ -14,6 +14,7 @@ from sim.units.refusals import BadInput
 
 #: What a file system without locks answers.
 _NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 # HDF5 reports trouble with its file as a RuntimeError
 _WRITE_TROUBLE = (OSError, RuntimeError)
 
@@ -43,6 +44,10 @@ class StoreTrouble(OSError):
     """Disk or file error; the message names the folder and the reason."""
 
     exit_code = 74
+
+
+class DiskFull(StoreTrouble):
+    """No room: of the disk, of a quota, or below a limit of the size of files."""
 
 
 class OutputExists(FileExistsError):
@@ -174,12 +179,24 @@ def explained(folder: Path) -> Iterator[None]:
     except StoreTrouble:
         raise
     except _WRITE_TROUBLE as trouble:
-        reason = trouble.strerror if isinstance(trouble, OSError) and trouble.errno else str(trouble)
+        number = trouble.errno if isinstance(trouble, OSError) else None
+        reason = trouble.strerror if isinstance(trouble, OSError) and number else str(trouble)
         with contextlib.suppress(OSError):
             usage = shutil.disk_usage(folder)
             if usage.total > 0 and usage.free < 2**20:
-                reason = os.strerror(errno.ENOSPC)
-        raise StoreTrouble(f"{folder}: {reason}") from trouble
+                number, reason = errno.ENOSPC, os.strerror(errno.ENOSPC)
+        raise (DiskFull if number in _FULL else StoreTrouble)(f"{folder}: {reason}") from trouble
+
+
+@contextlib.contextmanager
+def by_hdf5(path: Path) -> Iterator[None]:
+    """A context in which HDF5 writes a file: of its trouble it gives no reason, as one more write does."""
+    try:
+        yield
+    except _WRITE_TROUBLE:
+        with contextlib.suppress(FileNotFoundError), path.open("ab") as file:
+            file.write(bytes(2**20))
+        raise
 
 
 @contextlib.contextmanager

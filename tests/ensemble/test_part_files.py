@@ -17,7 +17,7 @@ from sim.ensemble import plan as plans, simulate as ensemble
 from sim.ensemble.checksums import verify
 from sim.ensemble.part_files import OutputBusy, OutputExists, PartFiles, held
 from sim.ensemble.plan import Plan
-from sim.numerics.files import StoreTrouble, leased, locked
+from sim.numerics.files import DiskFull, StoreTrouble, leased, locked
 from sim.scenario.clock import Clock
 from sim.scenario.scenario import read_sweep
 from sim.units.refusals import BadInput
@@ -160,6 +160,15 @@ def test_parts_that_are_there_are_not_computed_again(tmp_path, monkeypatch):
     done_before = len(done)
     ensemble.run(sample(), tmp_path / "other.nc")
     assert len(done) - done_before == done_before + 3
+
+
+def test_a_dataset_for_which_there_is_no_room_is_told_with_what_it_takes_and_its_run_goes_on(tmp_path, room):
+    whole, path = ensemble.run(sample(), tmp_path / "whole.nc").read_bytes(), tmp_path / "out.nc"
+    said = r"out.nc.parts: File too large; parts and dataset take \d+ kB until they are one file; make room, .*--resume"
+    with room(len(whole) // 2), pytest.raises(DiskFull, match=said):  # the parts have room
+        ensemble.run(sample(), path)
+    assert not path.exists()
+    assert ensemble.run(sample(), path, resume=True).read_bytes() == whole
 
 
 def test_a_file_that_comes_during_a_run_is_not_replaced(tmp_path):
