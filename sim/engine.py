@@ -79,11 +79,12 @@ def start(scenario: Scenario, dice: Dice) -> State:
     slider, motion = drive.begin(scenario.times, len(dice.bonds.members))
     bonds = population.start(motion, dice.bonds)
     bonding = population.bonding(bonds)
+    if drive.feeds_back:
+        bonding = coupling.felt(scenario.parts, bonding, motion.speed)
     shear = process.start(motion, bonding, dice.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy)
     touch = contact.start(motion, scenario.times.duration, terms)
     if drive.feeds_back:
-        bonding = coupling.viscous(scenario.parts, bonding, motion.speed)
         around = _around(scenario, touch, shear.energy, 1)
         slider = coupling.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))

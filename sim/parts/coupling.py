@@ -13,8 +13,9 @@ import numpy as np
 from sim.laws.reversible import mean_stress_energy
 from sim.parts import coupling_equations as columns
 from sim.parts.bonds.stretched import FirstMoment, Stretches
+from sim.parts.bonds.two_state import Population, Steady, Unbroken
 from sim.parts.coupling_equations import Law, Resting, Slider
-from sim.parts.coupling_step import advance_rows
+from sim.parts.coupling_rows import advance_rows
 from sim.parts.drive.driven import FIRST, STORED, Driven, Force, Spring
 from sim.parts.exchange import Array, Bonding, Motions, Parts, Sliding, Times
 
@@ -69,20 +70,29 @@ class Around(NamedTuple):
 
 
 class _Units(NamedTuple):
-    """Units in which a step is made: a stretch b [m], and the force n κ b A0 that all sites bear at it [N]."""
+    """Units in which a step is made: a stretch b [m], and a force over the area at rest [N].
+
+    That of all sites at the stretch b, n κ b A0; of bonds without a stretch their strength, τ A0.
+    """
 
     stretch: float
     force: float
 
 
-def _units(drive: Force | Spring, bonds: FirstMoment, around: Around) -> _Units:
+def _units(drive: Force | Spring, bonds: FirstMoment | Unbroken | Steady, around: Around, step: float) -> _Units:
+    most = max(map(abs, drive.course.extremes))
+    if not isinstance(bonds, FirstMoment):
+        force = bonds.stress * around.area
+        if drive.spring:
+            return _Units(force / drive.spring, force)
+        slow = drive.mass / step + drive.damping + drive.viscosity * around.area
+        return _Units(max(most, force) * step / slow, force)
     law, bears = bonds.law, bonds.site_density * bonds.bond_stiffness * around.area
     if law.softness > 0.0:
         stretch = 1.0 / law.softness
     elif law.limit < math.inf:
         stretch = law.limit
     else:
-        most = max(map(abs, drive.course.extremes))
         stretch = most / (law.rate if drive.spring else bears * bonds.bound_at_rest) or _STRETCH
     return _Units(stretch, bears * stretch)
 
@@ -104,27 +114,27 @@ def load(parts: Parts, slider: Sliding, bonding: Bonding, around: Around, durati
     return slider._replace(**loaded, energies=energies)
 
 
-def viscous(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
-    """The readings of bonds with the stress of a viscous interface at sliding speeds [m/s]."""
+def felt(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
+    """The readings of bonds whose strength is their actual stress, with that of a viscous interface at speeds [m/s]."""
     viscosity = cast(Force | Spring, parts.drive).viscosity
-    return bonding._replace(stress=bonding.stress + viscosity * speed) if viscosity else bonding
+    return bonding._replace(stress=bonding.stress + viscosity * speed, strength=np.abs(bonding.stress))
 
 
 def advance(
     parts: Parts, state: tuple[Sliding, tuple[object, ...]], around: Around, times: Times, step: int
 ) -> tuple[Sliding, Motions, tuple[object, ...], Bonding]:
     """Slider, its motion, bonds and their readings after a clock step, from the slider and the bonds before it."""
-    drive, bonds = cast(Force | Spring, parts.drive), cast(FirstMoment, parts.bonds)
-    slider, population = cast(Driven, state[0]), cast(Stretches, state[1])
-    units = _units(drive, bonds, around)
-    stretch, force = units
+    drive, bonds = cast(Force | Spring, parts.drive), cast(FirstMoment | Unbroken | Steady, parts.bonds)
+    slider, population = cast(Driven, state[0]), state[1]
     begin, end = times.at(step - 1.0), times.at(float(step))
-    share, seen = bonds.kept(population.seen, around.radius)
+    units = _units(drive, bonds, around, end - begin)
+    stretch, force = units
+    bound, moment, seen = _population(bonds, population, slider, around, stretch)
     rows = np.zeros((len(slider.speed), columns.COLUMNS))
     of_rows = {
         columns.FORCE: slider.spring_force / force, columns.BODY: slider.body_speed / stretch,
-        columns.SHEARED: slider.sheared / stretch, columns.BOUND: population.bound * share,
-        columns.MOMENT: population.stretch * share / stretch, columns.SPEED: slider.speed / stretch,
+        columns.SHEARED: slider.sheared / stretch, columns.BOUND: bound, columns.MOMENT: moment / stretch,
+        columns.SPEED: slider.speed / stretch,
         columns.RADIUS: around.radius, columns.NEXT: slider.next_step, columns.ENDED: slider.runaway_time,
     }  # fmt: skip
     for column, values in of_rows.items():
@@ -151,21 +161,44 @@ def advance(
     time, duration = np.full((1, 1), end), np.full((1, 1), end - begin)
     slid = rows[:, columns.SLIP] * stretch, rows[:, columns.PATH] * stretch, slider.speed, speed, after.position
     motions = Motions(step, time, duration, *(values[np.newaxis] for values in slid))
-    bonding = bonds.bonding(Stretches(bound[np.newaxis], moment[np.newaxis]))
-    return after, motions, Stretches(bound, moment, seen), viscous(parts, bonding, speed)
+    if isinstance(bonds, FirstMoment):
+        bonding = bonds.bonding(Stretches(bound[np.newaxis], moment[np.newaxis]))
+        return after, motions, Stretches(bound, moment, seen), felt(parts, bonding, speed)
+    stress = bonds.stress / stretch * moment
+    bonding = Bonding(bound[np.newaxis], stress[np.newaxis], stress[np.newaxis])
+    return after, motions, Population(bound, np.sign(stress), seen), felt(parts, bonding, speed)
+
+
+def _population(
+    bonds: FirstMoment | Unbroken | Steady, population: tuple[object, ...], slider: Driven, around: Around, unit: float
+) -> tuple[Array, Array, Array]:
+    """Share of the sites that is bound, times the mean stretch [m], and the contact radius that they have seen.
+
+    Of bonds without a stretch the share of those of rest, with the sense of the sliding in place of a stretch.
+    """
+    if isinstance(bonds, FirstMoment):
+        stretches = cast(Stretches, population)
+        share, seen = bonds.kept(stretches.seen, around.radius)
+        return stretches.bound * share, stretches.stretch * share, seen
+    left = cast(Population, population)
+    return left.bound, left.bound * np.sign(slider.speed) * unit, left.seen
 
 
 def _numbers(
-    drive: Force | Spring, bonds: FirstMoment, around: Around, units: _Units, duration: float
+    drive: Force | Spring, bonds: FirstMoment | Unbroken | Steady, around: Around, units: _Units, duration: float
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
     """The numbers of slider, bonds and contact for one step, in its units."""
     stretch, force = units
-    stiff, law = force / stretch, bonds.law
-    density = bonds.site_density * bonds.bond_stiffness
+    stiff, density = force / stretch, force / (stretch * around.area)
     yields, slope = (stiff * value for value in drive.yields(around.shear_modulus, around.poisson_ratio))
     body = drive.spring / stiff, drive.mass / stiff, drive.damping / stiff, drive.viscosity / density
     slider = Slider(*body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
-    breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, law.limit / stretch, bonds.rebinding_rate, 1.0)
+    if isinstance(bonds, FirstMoment):
+        law, of_rest = bonds.law, bonds.bound_at_rest
+        breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, law.limit / stretch, bonds.rebinding_rate, 1.0)
+    else:
+        slows = stretch / bonds.critical_speed if isinstance(bonds, Steady) else 0.0
+        breaking, of_rest = Law(0.0, 0.0, math.inf, 0.0, 1.0, 1.0, slows), 1.0
     taken = 0.0
     if around.reversible:
         stress = density * stretch
@@ -173,7 +206,7 @@ def _numbers(
     (load, base, behind), (later, beyond, _) = around.held
     rates = (later - load) / duration, (beyond - base) / duration
     held = Resting(
-        float(around.stays), around.bonded / bonds.bound_at_rest, taken, load, rates[0], base, rates[1], behind,
+        float(around.stays), around.bonded / of_rest, taken, load, rates[0], base, rates[1], behind,
         1.0 / around.sphere_radius, around.modulus, around.area,
     )  # fmt: skip
     return tuple(slider), tuple(breaking), tuple(held)

@@ -52,13 +52,18 @@ class Slider(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Numbers of the bonds: k0, its growth with the stretch (1 or 0), cut-off stretch, k_on, scale of a stretch."""
+    """Numbers of the bonds: k0, its growth with the stretch (1 or 0), cut-off stretch, k_on, scale of a stretch.
+
+    Bonds without a stretch have the ``sense`` of the sliding, 1 or -1, else 0, and a share 1/(1 + ``slows`` speed).
+    """
 
     rate: float
     softness: float
     limit: float
     binding: float
     scale: float
+    sense: float = 0.0
+    slows: float = 0.0
 
 
 class Resting(NamedTuple):
@@ -132,7 +137,7 @@ def compliance(radius, slider):
 @device
 def kinetics(bound, moment, speed, law):
     """Ṅ and its slopes over N and M; Ṁ and its slope over N; that over M, and over the speed; Ṅ's; k, \\|speed\\|/l."""
-    rate, softness, limit, binding, _ = law
+    rate, softness, limit, binding, _, _, _ = law
     stretch = moment / bound if bound > 0.0 else 0.0
     k = rate * math.exp(min(softness * math.fabs(stretch), 690.0))
     steeper = math.copysign(k * softness, stretch)
@@ -141,6 +146,12 @@ def kinetics(bound, moment, speed, law):
     to_moment = bound * speed - (k + 2.0 * travel) * moment, speed + steeper * stretch * stretch
     moment_turn = -(k + 2.0 * travel) - steeper * stretch, bound - 2.0 * turn * moment
     return to_bound, to_moment, moment_turn, -turn * bound, k, travel
+
+
+@device
+def share_left(speed, law):
+    """Bonds over those of rest of bonds without a stretch, continued smoothly through a speed of zero."""
+    return 1.0 / (1.0 + law[6] * law[5] * speed)
 
 
 @device
@@ -246,4 +257,11 @@ def equations(row, z, start, step, bare, slider, law, held, piece, right, matrix
             matrix[b + 3, d + 3] += rate
             matrix[b + 2, d] -= turn * rate
             matrix[b + 3, d] -= on[1] * rate
+        if law[5] != 0.0:  # bonds without a stretch follow the speed at once
+            share = share_left(slip, law)
+            right[b + 2], right[b + 3] = bound - share, moment - law[5] * bound
+            matrix[b + 2 : b + 4, :] = 0.0
+            matrix[b + 2, b + 2], matrix[b + 3, b + 2], matrix[b + 3, b + 3] = 1.0, -law[5], 1.0
+            for j in range(3):
+                matrix[b + 2, 4 * j] = law[6] * law[5] * share * share * RATES[i, j] / step
     return True

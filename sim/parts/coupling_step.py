@@ -1,21 +1,20 @@
 """Slider and bonds together through one clock step, in sub-steps that each row chooses for itself.
 
-The equations stand in ``coupling_equations``. A sub-step's error is what they lack between their nodes.
+The equations stand in ``coupling_equations``, rows of sub-steps in ``coupling_rows``. A sub-step's error is what the
+equations lack between their nodes.
 """
 
 import math
 
 import numpy as np
 
-from sim.numerics.jit import device, kernel
+from sim.numerics.jit import device
 from sim.parts.coupling_equations import (
     BODY,
     BOUND,
     COUNT,
-    ENDED,
     FORCE,
     MOMENT,
-    NEXT,
     NODES,
     PATH,
     POSITION,
@@ -31,9 +30,10 @@ from sim.parts.coupling_equations import (
     equations,
     kinetics,
     pull_on,
+    share_left,
     solve,
 )
-from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, STORED, VISCOSITY, WORK
+from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, VISCOSITY, WORK
 from sim.parts.exchange import Array
 
 #: Share of a sub-step after which the defect of the equations is measured, between the first two nodes.
@@ -52,21 +52,20 @@ def _between() -> tuple[Array, Array]:
 
 
 _VALUES, _SLOPES = _between()
-#: Share of a clock step below which a sub-step means that there is no solution to go on with.
-_LEAST = 1e-13
 #: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
 _FEW, _SOME = 1e-12, 0.1
-_MOST_STEPS = 2_000_000
 
 
 @device
-def _newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
+def newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
     """Solve for slip, u, N, M at the nodes; whether that worked."""
     of_bound, of_moment, _, _, _, _ = kinetics(row[BOUND], row[MOMENT], row[SPEED], law)
     for i in range(3):
         time = NODES[i] * step
         z[0, i], z[1, i] = row[SPEED] * time, 0.0
         z[2, i], z[3, i] = max(of_bound[0] * time, -0.5 * row[BOUND]), of_moment[0] * time
+        if law[5] != 0.0:
+            z[2, i], z[3, i] = 0.0, 0.0
     before, close = math.inf, min(1e-7, 0.01 * slider[7])
     for turn in range(14):
         if not equations(row, z, start, step, bare, slider, law, held, piece, right, matrix):
@@ -94,7 +93,7 @@ def _newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
 
 
 @device
-def _error(row, z, start, step, bare, slider, law, held, piece):
+def error_of(row, z, start, step, bare, slider, law, held, piece):
     """Defect of the equations between nodes, as an error of a stretch: of order 4 in the sub-step, over its scale.
 
     The polynomials through start and nodes solve the equations at the nodes alone. What is missing between them of the
@@ -128,6 +127,8 @@ def _error(row, z, start, step, bare, slider, law, held, piece):
     balance -= pull_on(time, start, body, row, slider, piece)
     bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
     scale = law[4] * (bound + _FEW) + math.fabs(moment)
+    if law[5] != 0.0:
+        to_bound, to_moment = step * of_bound[0] + bound - share_left(speed, law), step * of_moment[0]
     found = max(
         math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + _FEW),
         math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,
@@ -142,62 +143,7 @@ def _error(row, z, start, step, bare, slider, law, held, piece):
 
 
 @device
-def _elastic(row, time, bare, slider, held, piece, energy):
-    """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
-
-    Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
-    back to the drive is booked to the area that has changed.
-    """
-    stiffness, mass, damping, viscosity, forced, _, _, _ = slider
-    held_back = mass + damping > 0.0
-    yields, _ = compliance(row[RADIUS], slider)
-    row[FORCE] = driven(time, piece)[1] if forced > 0.0 else row[FORCE]
-    if viscosity > 0.0 or (held_back and yields == 0.0):
-        return True
-    slip, bound, moment, way, radius, area = 0.0, row[BOUND], row[MOMENT], 0.0, row[RADIUS], 0.0
-    for _ in range(40):
-        radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, bare, held)
-        if not area >= 0.0:
-            return False
-        yields, _ = compliance(radius, slider)
-        force = area * (moment + bound * slip)
-        slope = (area + by_moment * (moment + bound * slip)) * bound
-        way = 0.0 if held_back else slip + yields * force - row[SHEARED]
-        over = slip + yields * force - row[SHEARED] if held_back else stiffness * way + force - row[FORCE]
-        slope = 1.0 + yields * slope if held_back else stiffness * (1.0 + yields * slope) + slope
-        if not slope > 0.0:
-            return over == 0.0
-        slip -= over / slope
-        if math.fabs(over / slope) <= 1e-14 * (math.fabs(slip) + math.fabs(moment)):
-            break
-    moment += bound * slip
-    row[MOMENT], row[SHEARED], row[RADIUS] = moment, yields * area * moment, radius
-    row[POSITION] += way
-    row[SLIP] += slip
-    row[PATH] += math.fabs(slip)
-    energy[WORK] += row[FORCE] * way if forced > 0.0 else 0.0
-    row[FORCE] -= 0.0 if forced > 0.0 else stiffness * way
-    return True
-
-
-@device
-def _stored(row, bare, time, slider, held):
-    """Elastic and kinetic energy of spring, body, contact and bonds."""
-    _, area, _, _ = contact_area(row[BOUND], row[MOMENT], time, row[RADIUS], bare, held)
-    if not area >= 0.0:  # equilibrium was lost on the way
-        area = math.pi * row[RADIUS] * row[RADIUS] / held[10]
-    stiffness, mass, _, viscosity, _, _, _, _ = slider
-    energy = 0.5 * mass * row[BODY] * row[BODY]
-    energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])
-    if stiffness > 0.0:
-        energy += 0.5 * row[FORCE] * row[FORCE] / stiffness
-    if row[BOUND] > 0.0:
-        energy += 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
-    return energy
-
-
-@device
-def _book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy):
+def book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy):
     """Take an accepted sub-step: integrals of the powers by the method's own shares, and the row at its end."""
     _, _, damping, viscosity, forced, _, _, _ = slider
     way, speed, body = 0.0, 0.0, 0.0
@@ -220,13 +166,15 @@ def _book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy)
         time, sheared = start + NODES[i] * step, row[SHEARED] + z[1, i]
         pull = pull_on(time, start, z[0, i] + z[1, i], row, slider, piece)
         _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
-        square = moment * moment / bound if bound > 0.0 else 0.0
+        square = moment * moment / bound if bound > 0.0 and law[5] == 0.0 else 0.0
         fresh = law[3] * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
         share = SHARES[i] * step
         energy[WORK] += share * pull * (body if forced > 0.0 else driven(time, piece)[1])
         energy[DAMPING] += share * damping * body * body
         energy[VISCOSITY] += share * area * viscosity * speed * speed
         energy[RUPTURE] += share * 0.5 * area * (square * (k + 3.0 * travel) + fresh)
+        if law[5] != 0.0:
+            energy[RUPTURE] += share * area * moment * speed
         energy[AREA] -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
         row[PATH] += math.fabs(z[0, i] - way)
         way = z[0, i]
@@ -238,84 +186,3 @@ def _book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy)
     row[POSITION] += z[0, 2] + z[1, 2]
     row[SLIP] += z[0, 2]
     row[COUNT] += 1.0
-
-
-@device
-def _later(held, time, stays):
-    """The contact's numbers some time later, its radius as it is from there on if it ``stays``."""
-    _, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area = held
-    load, base = load + load_rate * time, base + base_rate * time
-    return stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area
-
-
-@device
-def _piece(row, bare, slider, law, held, piece, room, energy):
-    """Go through one piece of a clock step; the time after which it ends or there is no way on.
-
-    The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
-    tolerance. A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
-    """
-    z, right, matrix, at_nodes = room
-    start, length = 0.0, piece[0]
-    for _ in range(_MOST_STEPS):
-        left = length - start
-        step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
-        step = left if step > 0.999 * left else min(step, 0.5 * left)
-        if not step > _LEAST * length:
-            if held[0] > 0.0:
-                return start
-            held = _later(held, 0.0, 1.0)
-            row[NEXT] = 0.0
-            continue
-        if not _newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
-            row[NEXT] = 0.25 * step
-            continue
-        error = _error(row, z, start, step, bare, slider, law, held, piece)
-        error *= math.sqrt(error) / slider[7]
-        grows = min(6.0, max(0.1, 0.9 * error ** (-1.0 / 6.0))) if error > 0.0 else 6.0
-        if not error <= 1.0:
-            row[NEXT] = step * (grows if error < math.inf else 0.25)
-            continue
-        _book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy)
-        row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
-        if step == left:
-            return length
-        start += step
-    return start
-
-
-@kernel(
-    "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64, UniTuple(float64, 8),"
-    " UniTuple(float64, 5), UniTuple(float64, 11))"
-)
-def advance_rows(rows, energies, bare, pieces, begin, slider, law, held):
-    """Advance all rows through a clock step that begins at a time, each row by itself.
-
-    ``bare``: work of adhesion of each row without bonds. ``pieces``: length of each, value of the drive at its ends and
-    its integral. A row that nothing holds any longer ends there; its bonds and contact stay as they were.
-    """
-    room = np.empty((4, 3)), np.empty(12), np.empty((12, 12)), np.empty((3, 3))
-    for m in range(len(rows)):
-        row, energy = rows[m], energies[m]
-        row[SLIP], row[PATH] = 0.0, 0.0
-        if not math.isnan(row[ENDED]):
-            continue
-        is_open = not row[RADIUS] > 0.0
-        row[RADIUS] = 0.0 if is_open else row[RADIUS]
-        now, time, worked, going = _later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
-        for p in range(len(pieces)):
-            piece = pieces[p, 0], pieces[p, 1], pieces[p, 2], pieces[p, 3]
-            if p == 0:
-                going = _elastic(row, 0.0, bare[m], slider, now, piece, energy)
-                energy[AREA] += energy[WORK] - worked - _stored(row, bare[m], 0.0, slider, now) + energy[STORED]
-            reached = (
-                _piece(row, bare[m], slider, law, _later(now, time, now[0]), piece, room, energy) if going else 0.0
-            )
-            time += reached
-            going = going and reached == piece[0]
-            if not going:
-                row[ENDED], row[POSITION], row[SPEED], row[BODY] = begin + time, math.nan, math.nan, math.nan
-                energy[:] = math.nan
-                break
-        if going:
-            energy[STORED] = _stored(row, bare[m], time, slider, now)

@@ -65,8 +65,18 @@ def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
     if not drive.feeds_back:
         return
     if not bonds.driven:
-        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use bonds.model = "rate" with a rupture'
+        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use "none", "steady", or "rate" with a'
+        said += " rupture"
         yield ("bonds", "model"), said
+    elif not bonds.stretched:
+        if drive.contact_stiffness != "rigid":
+            said = "bonds without a stretch hold interface and body together as one"
+            yield ("drive", "contact_stiffness"), f'{said}: take "rigid", or bonds with a rupture'
+        if drive.at_once:
+            said = "nothing sets the speed at which bonds without a stretch slip"
+            yield ("drive",), f"{said}: give drive.damping, mass or viscosity, or bonds with a rupture"
+        if not bonds.carries_stress:
+            yield ("bonds", "stress"), "is 0 Pa, so that a drive would feel nothing; give the stress of the bonds"
     elif drive.at_once and bonds.snaps:
         said = "bonds with a cut-off stretch break in an avalanche, which nothing holds back: give drive.damping,"
         yield ("drive",), f'{said} mass or viscosity, such as viscosity = "10 Pa s/m", or another rupture'

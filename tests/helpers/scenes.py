@@ -33,7 +33,7 @@ DRIVES = {
         mass=1e-4,
         damping=0.1,
         viscosity=1e5,
-        contact_stiffness=500.0,
+        contact_stiffness="rigid",
     ),
     "force": Force(force={"from": 0.0, "to": 3e-3}, damping=0.1, contact_stiffness="rigid"),
 }
@@ -129,8 +129,12 @@ CONTACTS = {
 def go_together(case):
     """Whether the bonds of a case, by the names of its depths, can feel its drive."""
     part, population = DRIVES[case.get("drive", "steady")], BONDS[case.get("bonds", "rate, bell")]
-    felt = getattr(population, "driven", False) and not (part.at_once and population.snaps)
-    return felt or not part.feeds_back
+    if not part.feeds_back:
+        return True
+    if not getattr(population, "driven", False):
+        return False
+    bears = population.stretched or part.contact_stiffness == "rigid"
+    return bears and not (part.at_once and (population.snaps or not population.stretched))
 
 
 def scene(members=3, steps=8, **parts):

@@ -10,11 +10,11 @@ import sim
 from sim.analysis.tables import notes
 from sim.engine import Dice, follow, march, pack, unpack
 from sim.laws import jkr
-from sim.parts.bonds import Cohort, FirstMoment, Unbroken
+from sim.parts.bonds import Cohort, FirstMoment, Steady, Unbroken
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.drive import READINGS, Force, Spring, Steady
+from sim.parts.drive import READINGS, Force, Spring, Steady as AtSpeed
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario
 from sim.units.refusals import BadInput
@@ -200,14 +200,14 @@ def test_an_area_that_follows_the_bonds_raises_the_onset_as_linear_stability_has
 def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_speed():
     for keys in ({}, {"mass": 1e-3, "damping": 2e-3, "contact": 0.5}):
         driven = scenario(3.0, 30, spring(1.0, start="steady", **keys), share=0.3, start="steady")
-        given = scenario(3.0, 30, Steady(speed=10.0 * STRETCH), share=0.3, start="steady")
+        given = scenario(3.0, 30, AtSpeed(speed=10.0 * STRETCH), share=0.3, start="steady")
         one, other = (list(march(scene, np.arange(1)))[-1] for scene in (driven, given))
         assert_allclose(one.bonding.stress, other.bonding.stress, rtol=1e-8)
         assert_allclose(one.drive.speed, other.drive.speed, rtol=1e-8)
 
 
 def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness():
-    given = [state.bonding.stress[0] for state in march(scenario(1.0, 20, Steady(speed=10.0 * STRETCH)), np.arange(1))]
+    given = [state.bonding.stress[0] for state in march(scenario(1.0, 20, AtSpeed(speed=10.0 * STRETCH)), np.arange(1))]
     errors = []
     for stiffness in (40.0, 4e2, 4e3, 4e4):
         states, _ = marched(scenario(1.0, 20, spring(stiffness, tolerance=1e-9)))
@@ -330,7 +330,9 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
     recipe = {"bond_stiffness": KAPPA, "rebinding_rate": 1.0, "site_density": DENSITY}
     for bonds, keys, place, cure in (
         (Cohort(rupture=BELL, **recipe), {}, "bonds.model", '"rate"'),
-        (Unbroken(stress=1e5), {"mass": 1e-3}, "bonds.model", "rupture"),
+        (Unbroken(stress=1e5), {}, "drive", "mass"),
+        (Unbroken(stress=1e5), {"mass": 1e-3, "contact": 1.0}, "drive.contact_stiffness", "rigid"),
+        (Unbroken(), {"mass": 1e-3}, "bonds.stress", "stress"),
         (FirstMoment(rupture=CutOff(stretch=STRETCH), **recipe), {}, "drive", "viscosity"),
     ):
         with pytest.raises(BadInput) as refused:
@@ -378,3 +380,88 @@ def test_a_force_is_a_soft_spring_that_is_pulled_from_afar():
         last = list(march(scenario(1.0, 10, drive), np.arange(1)))[-1]
         errors.append(abs(last.drive.position[0] / given.drive.position[0] - 1.0))
     assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.02)
+
+
+#: Strength of the contact at rest [N], and speeds in stretches a second, of bonds without a stretch.
+COULOMB = 1e5
+HELD = COULOMB * AREA
+
+
+def stuck(duration, steps, bonds, drive, members=1):
+    """A lens whose bonds have no stretch; their strength and the unit of length make the unit of stiffness."""
+    scene = scenario(duration, steps, spring(1.0), members=members)
+    return Scenario(**{**_fields(scene), "bonds": bonds, "drive": drive})
+
+
+def _fields(scene):
+    return {name: getattr(scene, name) for name in ("clock", "solid", "sphere", "adhesion", "contact", "ensemble")}
+
+
+def pulled(stiffness=1.0, speed=1.0, mass=0.0, damping=0.0, **keys):
+    stiff = HELD / STRETCH
+    given = {"stage": speed * STRETCH, "stiffness": stiffness * stiff, "mass": mass * stiff, "damping": damping * stiff}
+    return Spring(**given, contact_stiffness="rigid", **keys)
+
+
+@pytest.mark.parametrize(
+    ("damping", "speed", "sticks", "slips", "least"),
+    [(0.01, 0.5, 1.62, 0.0189864408745, 0.19), (0.04, 1.0, 0.64, 0.0546142733837, 0.36)],
+)
+def test_bonds_that_follow_the_speed_at_once_make_the_relaxation_cycles_of_their_closed_form(
+    damping, speed, sticks, slips, least
+):
+    bonds = Steady(critical_speed=STRETCH, stress=COULOMB)
+    drive = pulled(speed=speed, damping=damping, tolerance=1e-8)
+    # the first slip begins where the spring has come to the strength, each further one a cycle later
+    for cycles, after, left in ((0, 0.0, 1.0), (0, slips, least), (4, sticks, 1.0), (4, sticks + slips, least)):
+        duration = 1.0 / speed + (slips if cycles else 0.0) + max(0, cycles - 1) * (sticks + slips) + after
+        states, read = marched(stuck(duration, 5, bonds, drive))
+        assert_allclose(read["spring_force"][-1] / HELD, left, rtol=1e-6)
+        assert residual(read) < 1e-7
+    most = max(state.bonding.stress[0] for state in states)
+    assert most <= COULOMB * (1.0 + 1e-12)
+
+
+def test_coulomb_friction_with_a_mass_touches_rest_once_a_period_and_never_sticks():
+    mass, speed, time = 0.01, 0.3, 10.3
+    drive = pulled(speed=speed, mass=mass, tolerance=1e-10)
+    states, read = marched(stuck(1.0 / speed + time, 7, Unbroken(stress=COULOMB), drive))
+    turn = time / math.sqrt(mass)
+    assert_allclose(states[-1].drive.speed[0] / STRETCH, speed * (1.0 - math.cos(turn)), rtol=1e-5)
+    force = 1.0 + speed * math.sqrt(mass) * math.sin(turn)
+    assert_allclose(read["spring_force"][-1] / HELD, force, rtol=1e-6)
+    assert residual(read) < 1e-8
+    assert_allclose(read["dissipated_by_rupture"][-1], HELD * states[-1].drive.position[0], rtol=1e-10)
+
+
+@pytest.mark.parametrize("mass", [0.0, 0.05])
+def test_a_force_holds_below_the_strength_and_above_it_makes_the_speed_that_friction_and_damping_bear(mass):
+    stiff, bonds = HELD / STRETCH, Steady(critical_speed=STRETCH, stress=COULOMB)
+    for load in (0.9, -0.9, 1.3, -1.3):
+        keys = {"mass": mass * stiff, "damping": 0.5 * stiff, "contact_stiffness": "rigid"}
+        states, read = marched(stuck(40.0, 8, bonds, Force(force=load * HELD, **keys)))
+        speed = abs(states[-1].drive.speed[0]) / STRETCH
+        if abs(load) < 1.0:
+            assert speed == states[-1].drive.position[0] == 0.0
+            assert_allclose(states[-1].bonding.stress[0], load * COULOMB, rtol=1e-14)
+            assert states[-1].bonds.bound[0] == 1.0
+        else:
+            assert_allclose(0.5 * speed + 1.0 / (1.0 + speed), 1.3, rtol=1e-9)
+            assert states[-1].drive.speed[0] * load > 0.0
+            assert residual(read) < 1e-6
+
+
+@pytest.mark.parametrize("stiffness", [0.1, 10.0])
+def test_steady_sliding_on_falling_friction_is_stable_where_damping_outweighs_the_fall(stiffness):
+    # m v'' + (c + F') v' + K v = 0 with F' = -V_c/(V_c + V)^2
+    fall, mass, step = 1.0 / 4.0, 1.0, 0.05
+    bonds = Steady(critical_speed=STRETCH, stress=COULOMB)
+    for damping in (0.9 * fall, 1.1 * fall):
+        stage = {"time": (0.0, step, step, 1e3), "value": (STRETCH, STRETCH, 1.00001 * STRETCH, 1.00001 * STRETCH)}
+        keys = {"stage": stage, "stiffness": stiffness * HELD / STRETCH, "start": "steady", "tolerance": 1e-11}
+        heavy = {"mass": mass * HELD / STRETCH, "damping": damping * HELD / STRETCH}
+        states, _ = marched(stuck(400 * step, 400, bonds, Spring(**keys, **heavy, contact_stiffness="rigid")))
+        changes = np.diff([state.drive.speed[0] / STRETCH for state in states[2:]])
+        found = np.roots([1.0, *-np.linalg.lstsq(np.stack([changes[1:-1], changes[:-2]], axis=1), changes[2:])[0]])
+        rate = np.log(found[0]).real / step
+        assert_allclose(rate, 0.5 * (fall - damping) / mass, rtol=1e-3)

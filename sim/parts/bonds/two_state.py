@@ -107,6 +107,8 @@ def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound)
 class _AtOnce(_WithoutStretch):
     """Bonds that are steady at every speed."""
 
+    driven: ClassVar[bool] = True
+
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
 

@@ -38,6 +38,7 @@ class _Sliding:
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
     at_once: ClassVar[bool] = False
+    contact_stiffness: ClassVar[str] = "rigid"
 
     def begin(self, times: Times, members: int) -> tuple[Slider, Motion]:
         motion = self.motion(0, 0.0, 0.0, times.duration)

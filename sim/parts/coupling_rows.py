@@ -1,0 +1,328 @@
+"""Rows of sliders and bonds through a clock step: what happens at once at its start, sub-steps, stick and slip."""
+
+import math
+
+import numpy as np
+
+from sim.numerics.jit import device, kernel
+from sim.parts.coupling_equations import (
+    BODY,
+    BOUND,
+    ENDED,
+    FORCE,
+    MOMENT,
+    NEXT,
+    PATH,
+    POSITION,
+    RADIUS,
+    RATES,
+    SHEARED,
+    SLIP,
+    SPEED,
+    compliance,
+    contact_area,
+    driven,
+    pull_on,
+    share_left,
+)  # fmt: skip
+from sim.parts.coupling_step import book, error_of, newton
+from sim.parts.drive.driven import AREA, STORED, WORK
+
+#: Share of a clock step below which a sub-step means that there is no solution to go on with.
+_LEAST = 1e-13
+_MOST_STEPS = 2_000_000
+#: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
+_PLACES, _HALVINGS = 32, 60
+#: Turns in which area and stress of a slider at rest settle.
+_FEW_TURNS = 20
+
+
+@device
+def _elastic(row, time, bare, slider, held, piece, energy):
+    """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
+
+    Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
+    back to the drive is booked to the area that has changed.
+    """
+    stiffness, mass, damping, viscosity, forced, _, _, _ = slider
+    held_back = mass + damping > 0.0
+    yields, _ = compliance(row[RADIUS], slider)
+    row[FORCE] = driven(time, piece)[1] if forced > 0.0 else row[FORCE]
+    if viscosity > 0.0 or (held_back and yields == 0.0):
+        return True
+    slip, bound, moment, way, radius, area = 0.0, row[BOUND], row[MOMENT], 0.0, row[RADIUS], 0.0
+    for _ in range(40):
+        radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, bare, held)
+        if not area >= 0.0:
+            return False
+        yields, _ = compliance(radius, slider)
+        force = area * (moment + bound * slip)
+        slope = (area + by_moment * (moment + bound * slip)) * bound
+        way = 0.0 if held_back else slip + yields * force - row[SHEARED]
+        over = slip + yields * force - row[SHEARED] if held_back else stiffness * way + force - row[FORCE]
+        slope = 1.0 + yields * slope if held_back else stiffness * (1.0 + yields * slope) + slope
+        if not slope > 0.0:
+            return over == 0.0
+        slip -= over / slope
+        if math.fabs(over / slope) <= 1e-14 * (math.fabs(slip) + math.fabs(moment)):
+            break
+    moment += bound * slip
+    row[MOMENT], row[SHEARED], row[RADIUS] = moment, yields * area * moment, radius
+    row[POSITION] += way
+    row[SLIP] += slip
+    row[PATH] += math.fabs(slip)
+    energy[WORK] += row[FORCE] * way if forced > 0.0 else 0.0
+    row[FORCE] -= 0.0 if forced > 0.0 else stiffness * way
+    return True
+
+
+@device
+def _stored(row, bare, time, slider, law, held):
+    """Elastic and kinetic energy of spring, body, contact and bonds."""
+    _, area, _, _ = contact_area(row[BOUND], row[MOMENT], time, row[RADIUS], bare, held)
+    if not area >= 0.0:  # equilibrium was lost on the way
+        area = math.pi * row[RADIUS] * row[RADIUS] / held[10]
+    stiffness, mass, _, viscosity, _, _, _, _ = slider
+    energy = 0.5 * mass * row[BODY] * row[BODY]
+    energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])
+    if stiffness > 0.0:
+        energy += 0.5 * row[FORCE] * row[FORCE] / stiffness
+    if row[BOUND] > 0.0 and law[5] == 0.0:
+        energy += 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
+    return energy
+
+
+@device
+def _later(held, time, stays):
+    """The contact's numbers some time later, its radius as it is from there on if it ``stays``."""
+    _, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area = held
+    load, base = load + load_rate * time, base + base_rate * time
+    return stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area
+
+
+@device
+def _piece(row, bare, slider, law, held, piece, room, energy):
+    """Go through one piece of a clock step; the time after which it ends or there is no way on.
+
+    The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
+    tolerance. A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    """
+    z, right, matrix, at_nodes = room
+    start, length = 0.0, piece[0]
+    for _ in range(_MOST_STEPS):
+        left = length - start
+        step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
+        step = left if step > 0.999 * left else min(step, 0.5 * left)
+        if not step > _LEAST * length:
+            if held[0] > 0.0:
+                return start
+            held = _later(held, 0.0, 1.0)
+            row[NEXT] = 0.0
+            continue
+        if not newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
+            row[NEXT] = 0.25 * step
+            continue
+        error = error_of(row, z, start, step, bare, slider, law, held, piece)
+        error *= math.sqrt(error) / slider[7]
+        grows = min(6.0, max(0.1, 0.9 * error ** (-1.0 / 6.0))) if error > 0.0 else 6.0
+        if not error <= 1.0:
+            row[NEXT] = step * (grows if error < math.inf else 0.25)
+            continue
+        book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy)
+        row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
+        if step == left:
+            return length
+        start += step
+    return start
+
+
+@device
+def _slips(time, start, row, bare, slider, held, piece):
+    """Pull beyond what the bonds of rest bear at a time while nothing moves, over the unit of force."""
+    _, area, _, _ = contact_area(1.0, 1.0, time, row[RADIUS], bare, held)
+    return math.fabs(pull_on(time, start, 0.0, row, slider, piece)) - area
+
+
+@device
+def _rest(row, start, bare, slider, held, piece, energy):
+    """Stay at rest until the pull is more than bonds bear; the time at which it is, or the end of the piece."""
+    length = piece[0]
+    end, before = length, start
+    for k in range(_PLACES + 1):
+        time = start + (length - start) * (k / _PLACES)
+        if _slips(time, start, row, bare, slider, held, piece) > 0.0:
+            low, end = before, time
+            for _ in range(_HALVINGS):
+                middle = 0.5 * (low + end)
+                if _slips(middle, start, row, bare, slider, held, piece) > 0.0:
+                    end = middle
+                else:
+                    low = middle
+            break
+        before = time
+    first, last = row[FORCE], pull_on(end, start, 0.0, row, slider, piece)
+    if slider[4] == 0.0:
+        energy[WORK] += 0.5 * (last - first) * (last + first) / slider[0]
+    moment = 0.0
+    for _ in range(_FEW_TURNS):  # the stress takes a little of the area, if adhesion pays for it
+        radius, area, _, _ = contact_area(1.0, moment, end, row[RADIUS], bare, held)
+        moment = last / area if area > 0.0 else 0.0
+    row[FORCE], row[BOUND], row[RADIUS], row[MOMENT] = last, 1.0, radius, moment
+    row[SPEED], row[BODY] = 0.0, 0.0
+    return end
+
+
+@device
+def _jump(row, time, bare, slider, law, held):
+    """Speed at which a body without mass begins to slip: the highest at which friction and damping bear the pull.
+
+    Newton's method from above: friction is convex in the speed.
+    """
+    _, _, damping, viscosity, _, _, _, _ = slider
+    pull, speed = math.fabs(row[FORCE]), 0.0
+    _, area, _, _ = contact_area(0.0, 0.0, time, row[RADIUS], bare, held)
+    if not damping + area * viscosity > 0.0:  # an open contact
+        return 0.0
+    speed = pull / (damping + area * viscosity)
+    for _ in range(100):
+        share = share_left(law[5] * speed, law)
+        _, area, by_bound, by_moment = contact_area(share, share, time, row[RADIUS], bare, held)
+        bears = damping + area * viscosity
+        slope = bears - law[6] * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
+        change = (bears * speed + area * share - pull) / slope
+        if not (slope > 0.0 and change > 1e-15 * speed):
+            break
+        speed = max(speed - change, 0.0)
+    return speed
+
+
+@device
+def _slide(row, start, sense, bare, slider, law, held, piece, room, energy):
+    """Slip until the speed comes to zero or the piece ends; the time reached, negative where there is no way on."""
+    z, right, matrix, at_nodes = room
+    length = piece[0]
+    along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
+    for _ in range(_MOST_STEPS):
+        left = length - start
+        step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
+        step = left if step > 0.999 * left else min(step, 0.5 * left)
+        if not step > _LEAST * length:
+            row[NEXT] = 0.0
+            return start if slider[1] == 0.0 or row[SPEED] == 0.0 else -1.0
+        if not newton(row, z, start, step, bare, slider, along, held, piece, right, matrix):
+            row[NEXT] = 0.25 * step
+            continue
+        error = error_of(row, z, start, step, bare, slider, along, held, piece)
+        error *= math.sqrt(error) / slider[7]
+        grows = min(6.0, max(0.1, 0.9 * error ** (-1.0 / 6.0))) if error > 0.0 else 6.0
+        if not error <= 1.0:
+            row[NEXT] = step * (grows if error < math.inf else 0.25)
+            continue
+        speed = _last_speed(z, step) * sense
+        stops = speed <= 0.0
+        if stops and row[SPEED] == 0.0:
+            row[NEXT] = 0.25 * step
+            continue
+        if stops:
+            near, above, far, below, side = 0.0, row[SPEED] * sense, step, speed, 0
+            for _ in range(100):
+                step = near + (far - near) * (above / (above - below))
+                if not newton(row, z, start, step, bare, slider, along, held, piece, right, matrix):
+                    break
+                speed = _last_speed(z, step) * sense
+                if math.fabs(speed) <= 1e-13 * math.fabs(row[SPEED]) or far - near <= 1e-15 * far:
+                    break
+                if speed > 0.0:
+                    near, above = step, speed
+                    below *= 0.5 if side > 0 else 1.0
+                    side = 1
+                else:
+                    far, below = step, speed
+                    above *= 0.5 if side < 0 else 1.0
+                    side = -1
+        book(row, z, start, step, bare, slider, along, held, piece, at_nodes, energy)
+        row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
+        start = length if step == left else start + step
+        if stops:
+            row[SPEED], row[BODY] = 0.0, 0.0
+        if stops or start >= length:
+            return start
+    return -1.0
+
+
+@device
+def _last_speed(z, step):
+    """Speed of the interface at the end of a sub-step."""
+    return (RATES[2, 0] * z[0, 0] + RATES[2, 1] * z[0, 1] + RATES[2, 2] * z[0, 2]) / step
+
+
+@device
+def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
+    """Go through one piece with bonds that bear any pull up to their strength at rest; the time reached."""
+    start, length = 0.0, piece[0]
+    stuck = 0
+    while start < length:
+        if row[SPEED] == 0.0:
+            before = start
+            start = _rest(row, start, bare, slider, held, piece, energy)
+            if start >= length:
+                return length
+            stuck = stuck + 1 if start == before else 0
+            if stuck > 100:
+                return start
+            sense = math.copysign(1.0, row[FORCE])
+            along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
+            speed = sense * _jump(row, start, bare, slider, along, held) if slider[1] == 0.0 else 0.0
+            row[SPEED] = row[BODY] = speed
+            row[BOUND] = share_left(speed, along)
+            row[MOMENT] = sense * row[BOUND]
+        else:
+            sense = math.copysign(1.0, row[SPEED])
+        start = _slide(row, start, sense, bare, slider, law, held, piece, room, energy)
+        if start < 0.0:
+            return 0.0
+        if start < length:
+            row[SPEED] = row[BODY] = 0.0
+    return length
+
+
+@kernel(
+    "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64, UniTuple(float64, 8),"
+    " UniTuple(float64, 7), UniTuple(float64, 11))"
+)
+def advance_rows(rows, energies, bare, pieces, begin, slider, law, held):
+    """Advance all rows through a clock step that begins at a time, each row by itself.
+
+    ``bare``: work of adhesion of each row without bonds. ``pieces``: length of each, value of the drive at its ends and
+    its integral. A row that nothing holds any longer ends there; its bonds and contact stay as they were.
+    """
+    room = np.empty((4, 3)), np.empty(12), np.empty((12, 12)), np.empty((3, 3))
+    for m in range(len(rows)):
+        row, energy = rows[m], energies[m]
+        row[SLIP], row[PATH] = 0.0, 0.0
+        if not math.isnan(row[ENDED]):
+            continue
+        is_open = not row[RADIUS] > 0.0
+        row[RADIUS] = 0.0 if is_open else row[RADIUS]
+        now, time, worked, going = _later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
+        for p in range(len(pieces)):
+            piece = pieces[p, 0], pieces[p, 1], pieces[p, 2], pieces[p, 3]
+            if p == 0:
+                if law[5] == 0.0:
+                    going = _elastic(row, 0.0, bare[m], slider, now, piece, energy)
+                elif slider[4] > 0.0:
+                    row[FORCE] = driven(0.0, piece)[1]
+                energy[AREA] += energy[WORK] - worked - _stored(row, bare[m], 0.0, slider, law, now) + energy[STORED]
+            later, reached = _later(now, time, now[0]), 0.0
+            if going and law[5] == 0.0:
+                reached = _piece(row, bare[m], slider, law, later, piece, room, energy)
+            elif going:
+                reached = _sticking_piece(row, bare[m], slider, law, later, piece, room, energy)
+            time += reached
+            going = going and reached == piece[0]
+            if not going:
+                row[ENDED], row[POSITION], row[SPEED], row[BODY] = begin + time, math.nan, math.nan, math.nan
+                energy[:] = math.nan
+                break
+        if going:
+            energy[STORED] = _stored(row, bare[m], time, slider, law, now)
