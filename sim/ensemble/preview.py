@@ -214,6 +214,8 @@ def _slider(points: Sequence[Scenario]) -> Rows:
         if drive.mass > 0.0:
             own = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
             rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(own)
+        if not point.population.stretched:
+            continue
         bonds, bodies = cast(FirstMoment, point.population), (point.sphere.radius, point.solid.contact_modulus)
         works = (point.adhesion.work_of_bonds(bonds.steady(speeds).fraction * share) for share in (0.9999, 1.0, 1.0001))
         less, area, more = (np.pi * point.contact.equilibrium_radius(work, *bodies) ** 2 for work in works)

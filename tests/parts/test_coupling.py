@@ -365,6 +365,12 @@ def test_what_would_run_shows_where_the_slider_oscillates():
     assert f"{math.sqrt(1.0 / 1e-3) / (2.0 * math.pi):.4g} Hz" in rows["natural frequency"]
 
 
+def test_what_would_run_shows_the_slider_of_bonds_without_a_stretch():
+    text = sim.check(stuck(1.0, 4, Steady(critical_speed=STRETCH, stress=COULOMB), pulled(mass=0.01)))
+    assert "natural frequency" in text.partition("\nslider\n")[2]
+    assert "oscillates below" not in text
+
+
 def test_a_study_of_a_drive_that_feels_its_noise_is_refused():
     with pytest.raises(BadInput, match=r"drive\.model"):
         sim.converge(scenario(1.0, 4, spring(1.0)))
