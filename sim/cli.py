@@ -306,7 +306,7 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     with opened(path) as dataset:
         if "share_done" in dataset.attrs:
             done = f"{100 * dataset.attrs['share_done']:.0f} % is computed, the rest is nan"
-            click.echo(f"note: {path} is of a run that is not done: {done}", err=True)
+            say(f"note: {path} is of a run that is not done: {done}", err=True)
         try:
             found = analysis.where(dataset, _values(chosen, "--where"))
         except ValueError as fault:
