@@ -61,6 +61,12 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
         yield ("drive",), _TOO_SHORT.format(drive.end, clock.duration)
 
 
+def _reversible_under_a_drive(drive: Drive, contact: Contact) -> Faults:
+    if drive.feeds_back and contact.reversible > 0.0:
+        said = f'cannot be solved with a "{drive.model}" drive yet: leave it out, or prescribe the speed'
+        yield ("contact", "reversible"), said
+
+
 def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
     if not drive.feeds_back:
         return
@@ -154,7 +160,7 @@ def _shear_faults(
 _CHECKS: dict[Callable[..., Faults], Mapping[str, Any]] = {
     check: inspect.signature(check).parameters
     for check in (_table_too_short, _control_too_short, _cannot_be_driven, _no_stress, _no_forces, _no_adhesion)
-    + (_no_maps, _unrecorded_maps, _too_many_map_members, _shear_faults)
+    + (_reversible_under_a_drive, _no_maps, _unrecorded_maps, _too_many_map_members, _shear_faults)
 }
 #: The parts that the checks read.
 CHECKED = sorted({name for reads in _CHECKS.values() for name in reads} - {"radius", "built"})

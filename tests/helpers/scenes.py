@@ -131,6 +131,8 @@ def go_together(case):
     part, population = DRIVES[case.get("drive", "steady")], BONDS[case.get("bonds", "rate, bell")]
     if not part.feeds_back:
         return True
+    if CONTACTS[case.get("contact", "load")].reversible:
+        return False
     if not getattr(population, "driven", False):
         return False
     bears = population.stretched or part.contact_stiffness == "rigid"

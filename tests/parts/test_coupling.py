@@ -338,6 +338,8 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
         with pytest.raises(BadInput) as refused:
             Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=bonds, drive=spring(1.0, **keys))
         assert any(place in said and cure in said for said in refused.value.problems)
+    with pytest.raises(BadInput, match=r"contact\.reversible"):
+        scenario(1.0, 4, spring(1.0), reversible=0.01)
     damped = FirstMoment(rupture=CutOff(stretch=STRETCH), **recipe)
     scene = Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=damped, drive=spring(1.0, damping=1e-3))
     _, read = marched(scene)
