@@ -154,22 +154,21 @@ class PartFiles:
     ) -> bool:  # fmt: skip
         """Take up a run or begin one, where that is what was asked for; gives whether the output is there already."""
         _refuse_foreign(target)
-        folder, older, there, code = self.folder, manifest_of(self.folder), target.exists(), digest().hex()
+        folder, older, there = self.folder, manifest_of(self.folder), target.exists()
         run = read(target) if resume and there else {}
+        manifest = {"format": _FORMAT, "replace": there, "run": wanted, "source": source, "code": digest().hex()}
         if resume and run == wanted and not older:
             return True
-        if resume and (older or there):
-            was, now = (
-                (older, {"run": wanted, "code": code, "source": source}) if older else ({"run": run}, {"run": wanted})
-            )
-            refuse_other(folder if older else target, was, now)
+        if resume and older:
+            refuse_other(folder, older, manifest)
+        elif resume and there:
+            refuse_other(target, {"run": run}, {"run": wanted})
         if older and not (resume or replace):
             raise OutputExists(f"{folder} holds an unfinished run; go on with --resume, or begin anew with --force")
         if there and run != wanted and not (replace or older.get("replace")):
             raise OutputExists(f"{target} exists; replace it with --force or name another output")
         self.clean(keep=resume and bool(older))
         with explained(folder):
-            manifest = {"format": _FORMAT, "replace": there, "run": wanted, "source": source, "code": code}
             write_whole(folder / _MANIFEST, json.dumps(manifest, sort_keys=True, default=str).encode())
         return False
 
@@ -277,7 +276,7 @@ def gathered(target: Path) -> Iterator[tuple[PartFiles, dict[Shard, PartFiles]]]
         If one of them is being run.
     """
     folder = _folder(target)
-    shards = dict(sorted((shard, PartFiles(folder / "{}-of-{}".format(*shard))) for shard in _shards(folder)))
+    shards = {shard: PartFiles(path) for shard, path in _shards(folder).items()}
     if not shards and not manifest_of(folder):
         raise BadInput([f"{folder}: there are no shards of a run; name the output that `sim run --shard` was given"])
     if len(divisions := {of for _, of in shards}) > 1:
@@ -294,20 +293,20 @@ def gathered(target: Path) -> Iterator[tuple[PartFiles, dict[Shard, PartFiles]]]
 def folders(target: Path) -> list[Path]:
     """Folders in which an unfinished run of an output, or its shards, have their parts."""
     whole = _folder(target)
-    shards = [whole / "{}-of-{}".format(*shard) for shard in sorted(_shards(whole))]
-    return [whole, *shards] if manifest_of(whole) else shards
+    return [*([whole] if manifest_of(whole) else []), *_shards(whole).values()]
 
 
 def _folder(target: Path) -> Path:
     return target.with_name(f"{target.name}.parts")
 
 
-def _shards(folder: Path) -> list[Shard]:
-    """Numbers of the shards in the folder of a run."""
+def _shards(folder: Path) -> dict[Shard, Path]:
+    """Folders of the shards in that of a run, in order."""
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-        names = (found for path in folder.iterdir() if (found := _SHARD.fullmatch(path.name)))
-        return [(int(name[1]), int(name[2])) for name in names if manifest_of(folder / name[0])]
-    return []
+        names = [name for path in folder.iterdir() if (name := _SHARD.fullmatch(path.name))]
+        found = {(int(name[1]), int(name[2])): folder / name[0] for name in names if manifest_of(folder / name[0])}
+        return dict(sorted(found.items()))
+    return {}
 
 
 def _unlock(folder: Path) -> None:
@@ -362,17 +361,21 @@ def manifest_of(folder: Path) -> Manifest:
 
 def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
     """Refuse to go on with another scenario, other versions or other code, naming what differs."""
-    begun = (
-        {"code": of["code"], "order of the sweep": of["source"].get("sweep")} if "code" in of else {}
-        for of in (older, wanted)
-    )
-    was, now = (_flat(of.get("run")) | more for of, more in zip((older, wanted), begun, strict=True))
+    was, now = _decisive(older), _decisive(wanted)
     changed = [key for key in sorted({*was, *now}) if was.get(key) != now.get(key)]
     if changed:
         some = [f"{key} was {_short(was.get(key))}, is {_short(now.get(key))}" for key in changed[:_MOST_NAMED]]
         more = f" and {len(changed) - len(some)} more" if len(changed) > len(some) else ""
         cure = "run what was begun, or begin anew with --force"
         raise BadInput([f"{path} is of another run: {'; '.join(some)}{more}; {cure}"])
+
+
+def _decisive(manifest: Manifest) -> dict[str, Any]:
+    """What decides the bytes of an output, by dotted key; a finished one gives no code and no order of its sweep."""
+    found = _flat(manifest.get("run"))
+    if "code" in manifest:
+        found |= {"code": manifest["code"], "order of the sweep": manifest["source"].get("sweep")}
+    return found
 
 
 def _short(value: Any) -> str:
