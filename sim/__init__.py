@@ -139,13 +139,11 @@ def plot(
 
     ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
     """
-    from pathlib import Path
-
     from sim.plots.kinds import draw, save
 
     figure = _plainly(lambda found: draw(found, kind), dataset, where)
     if to is not None:
-        save(figure, Path(to))
+        save(figure, pathlib.Path(to))
     return figure
 
 

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
-from sim.ensemble.progress import while_read
+from sim.ensemble.progress import Stages, announce_compiling, named, note, progress_bar, while_read
 from sim.units.terminal import print_rows, replace_unknown, say, usage
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
@@ -110,7 +110,6 @@ def run(
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
     from sim.ensemble.part_files import shard_of
-    from sim.ensemble.progress import Stages, announce_compiling, log, named, note, progress_bar
 
     began, stages, share = time.time(), Stages(), shard_of(shard or "1/1")
     from sim.scenario.reader import load
@@ -142,9 +141,9 @@ def run(
             try:
                 simulate.run(scene, target, **how, memory=memory, stage=stages.begin, progress=stages.shown.advance)
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
-                log(target, began, stages.ended())
+                simulate.log(target, began, stages.ended())
                 _fail(_KEPT, getattr(stopped, "exit_code", INTERRUPTED))
-        shown.callback(lambda: log(target, began, stages.ended()))
+        shown.callback(lambda: simulate.log(target, began, stages.ended()))
         if tabulated := not (quiet or bare or shard) and bounds.tabulated(plan):
             stages.begin("table")
             tables = _tables_of(target)
@@ -212,8 +211,8 @@ def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
     for rows in tables:
         print_rows(rows)
         say()
-    for note in notes:
-        say(note)
+    for line in notes:
+        say(line)
 
 
 @cli.command()
@@ -224,7 +223,6 @@ def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
 def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: int | None) -> None:
     """Print what a scenario would run: quantities in SI, models, errors known beforehand, time, memory, file size."""
     from sim.ensemble.preview import preview
-    from sim.ensemble.progress import announce_compiling
     from sim.scenario.reader import load
 
     announce_compiling()

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.ensemble.checksums import parts_of
 from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers
 from sim.numerics.files import DiskFull, StoreTrouble
 from sim.scenario.scenario import Scenario
@@ -27,6 +28,11 @@ _SHARED, _SHARED_BY_TABLE, _PROCESS, _WRITER, _READER = 88e6, 10e6, 70e6, 30e6, 
 _CACHE, _OF_BYTE, _OF_MODE_MADE, _OF_MODE = 4 * 2**20, 1.5, 520.0, 160.0
 #: Copies of a part while it is made or written; bytes of a quantity's name in it.
 _COPIES, _HEADER = 3.0, 300.0
+#: Folder, limit and use of the memory of control groups, by their controllers in /proc: of version 2, of version 1.
+_GROUPS = {
+    "": ("", "memory.max", "memory.current"),
+    "memory": ("memory", "memory.limit_in_bytes", "memory.usage_in_bytes"),
+}
 #: A dataset of more trajectories [byte] is not read back for a table.
 _MOST_TABULATED = 1e8
 
@@ -55,10 +61,9 @@ def takes(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1) -> Takes:
     disk = _parts(plan)
     steps = (pace * counted(plan) + parts * _PART + disk * _PART_BYTE) / shares
     alone = _START + modes + len(points) * _POINT
-    if shares == 1:
+    if shares == 1:  # a share makes no dataset
         alone += plan.bytes * _BYTE + packed * _PACKED_BYTE
-    if shares == 1 and tabulated(plan):
-        alone += _TABLE + _READ_BYTE * plan.trajectories
+        alone += _TABLE + _READ_BYTE * plan.trajectories if tabulated(plan) else 0.0
     started = _WORKER + modes if jobs > 1 else 0.0
     cpu, clock = alone + jobs * started + steps, alone + started + steps / jobs
     disk = disk + plan.file_bytes if shares == 1 else disk / shares
@@ -164,9 +169,8 @@ def refuse_full_disk(plan: Plan, target: Path, shares: int = 1) -> None:
     """
     folder = next(one for one in target.absolute().parents if one.is_dir())
     needed, free = takes(plan, 1, shares=shares).disk, float(shutil.disk_usage(folder).free)
-    parts = target.with_name(f"{target.name}.parts")
     with contextlib.suppress(OSError):  # what an unfinished run has already
-        free += sum(path.stat().st_size for path in parts.iterdir())
+        free += sum(path.stat().st_size for path in parts_of(target).iterdir())
     if needed > free:
         said = f"parts and dataset take {size(needed)} until they are one file, of which {size(free)} are free"
         raise StoreTrouble(f"{folder}: {said}; fewer members, records or maps take less, as do pooled statistics")
@@ -215,18 +219,16 @@ def _free_in_groups(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc
     lines = own.read_text().splitlines() if own.exists() else []
     for line in lines:
         _, controllers, path = line.split(":", 2)
-        if controllers not in ("", "memory"):
+        if controllers not in _GROUPS:
             continue
-        top, names = (root, ("memory.max", "memory.current")) if not controllers else (root / "memory", _OLDER)
+        folder, *names = _GROUPS[controllers]
+        top = root / folder
         group = top / path.strip("/")
         for folder in (group, *group.parents)[: len(group.relative_to(top).parts) + 1]:
             with contextlib.suppress(OSError, ValueError):  # no such file, or "max"
                 limit, used = (float((folder / name).read_text()) for name in names)
                 stat = dict(row.split() for row in (folder / "memory.stat").read_text().splitlines())
                 yield limit - used + float(stat.get("inactive_file", 0.0))
-
-
-_OLDER = ("memory.limit_in_bytes", "memory.usage_in_bytes")
 
 
 def size(count: float) -> str:

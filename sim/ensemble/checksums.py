@@ -49,6 +49,11 @@ def path_of(dataset: Path) -> Path:
     return dataset.with_name(f"{dataset.name}.sha256")
 
 
+def parts_of(dataset: Path) -> Path:
+    """Folder of the parts of a run that is not done."""
+    return dataset.with_name(f"{dataset.name}.parts")
+
+
 def _command(source: dict[str, Any]) -> str:
     """The command that runs a scenario of this source, without its output; "" if no file and overrides describe it."""
     if not source.get("text"):
@@ -129,7 +134,7 @@ def verify(dataset: Path) -> str:
     Damaged
         If it differs, or its checksums are lost: with the damaged stretches and what makes it again.
     """
-    beside, unfinished = path_of(dataset), dataset.with_name(f"{dataset.name}.parts") / MANIFEST
+    beside, unfinished = path_of(dataset), parts_of(dataset) / MANIFEST
     cure = "the same command with --resume makes it whole" if unfinished.exists() else ""
     if not dataset.is_file():
         raise BadInput([f"{dataset}: {f'is of an unfinished run; {cure}' if cure else 'there is no such file'}"])

@@ -84,7 +84,7 @@ def share_out(
     except (OSError, ValueError) as trouble:
         raise WorkerDied(f"no scheduler of dask answers at {address}: {trouble}") from None
     left, running, lost = list(tasks)[::-1], dict[Any, Task](), list[str]()
-    progress(sum(steps for task in tasks for name, steps in zip(task.names, task.work, strict=True) if name in parts))
+    progress(sum(task.done(parts) for task in tasks))
     with client, client.as_current():
         try:
             while True:

@@ -243,7 +243,7 @@ def held(
     BadInput
         If the output or the unfinished run is of something else.
     """
-    whole = _folder(target)
+    whole = checksums.parts_of(target)
     folder = whole if shard == WHOLE else whole / "{}-of-{}".format(*shard)
     try:
         with locked(folder / _LOCK, lambda: _make(whole, folder)) as free:
@@ -275,7 +275,7 @@ def gathered(target: Path) -> Iterator[tuple[PartFiles, dict[Shard, PartFiles]]]
     OutputBusy
         If one of them is being run.
     """
-    folder = _folder(target)
+    folder = checksums.parts_of(target)
     shards = {shard: PartFiles(path) for shard, path in _shards(folder).items()}
     if not shards and not manifest_of(folder):
         raise BadInput([f"{folder}: there are no shards of a run; name the output that `sim run --shard` was given"])
@@ -292,21 +292,18 @@ def gathered(target: Path) -> Iterator[tuple[PartFiles, dict[Shard, PartFiles]]]
 
 def folders(target: Path) -> list[Path]:
     """Folders in which an unfinished run of an output, or its shards, have their parts."""
-    whole = _folder(target)
+    whole = checksums.parts_of(target)
     return [*([whole] if manifest_of(whole) else []), *_shards(whole).values()]
-
-
-def _folder(target: Path) -> Path:
-    return target.with_name(f"{target.name}.parts")
 
 
 def _shards(folder: Path) -> dict[Shard, Path]:
     """Folders of the shards in that of a run, in order."""
+    found = {}
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
-        names = [name for path in folder.iterdir() if (name := _SHARD.fullmatch(path.name))]
-        found = {(int(name[1]), int(name[2])): folder / name[0] for name in names if manifest_of(folder / name[0])}
-        return dict(sorted(found.items()))
-    return {}
+        for path in folder.iterdir():
+            if (numbers := _SHARD.fullmatch(path.name)) and manifest_of(path):
+                found[int(numbers[1]), int(numbers[2])] = path
+    return dict(sorted(found.items()))
 
 
 def _unlock(folder: Path) -> None:

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -74,6 +74,10 @@ class Task(NamedTuple):
     def work(self) -> list[int]:
         """Member-steps of each block."""
         return [len(self.points) * len(self.members) * (block.end - block.start) for block in self.blocks]
+
+    def done(self, parts: Container[str]) -> int:
+        """Member-steps of the blocks whose parts are there."""
+        return sum(steps for name, steps in zip(self.names, self.work, strict=True) if name in parts)
 
     def __str__(self) -> str:
         first, last = self.members[0], self.members[-1]

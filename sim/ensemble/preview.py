@@ -282,11 +282,9 @@ def _run(plan: Plan) -> Rows:
     rows.append(("work", f"{work(plan):,} member-steps, {_times(found, jobs, pace is not None)}"))
     rows.append(("memory", f"about {size(found.memory)}{', all processes together' if jobs > 1 else ''}"))
     before = "" if scene.record.compression == "none" else f", {size(plan.bytes)} before compression"
-    return [
-        *rows,
-        ("file", f"about {size(found.file)}{before}"),
-        ("disk", f"about {size(found.disk)} while it is made"),
-    ]
+    rows.append(("file", f"about {size(found.file)}{before}"))
+    rows.append(("disk", f"about {size(found.disk)} while it is made"))
+    return rows
 
 
 def announced(plan: Plan, jobs: int | None, memory: float, shares: int = 1) -> tuple[int, list[str]]:
@@ -302,9 +300,9 @@ def announced(plan: Plan, jobs: int | None, memory: float, shares: int = 1) -> t
         said.append("note: of so large a dataset `sim stats` prints the table")
     if jobs > 1 or bounds.counted(plan) > _LONG:
         found = bounds.takes(plan, jobs, tried(plan, compiling=True) or 1.0, shares)
-    if jobs > 1 or (bounds.counted(plan) > _LONG and found.clock > _LONG):
-        room = f"{size(found.memory)} of memory, {size(found.disk)} of disk for a file of {size(found.file)}"
-        said.append(f"{_times(found, jobs)}, {room}")
+        if jobs > 1 or found.clock > _LONG:
+            room = f"{size(found.memory)} of memory, {size(found.disk)} of disk for a file of {size(found.file)}"
+            said.append(f"{_times(found, jobs)}, {room}")
     return jobs, said
 
 

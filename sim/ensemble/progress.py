@@ -6,7 +6,6 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import NamedTuple
 
 from sim.units.terminal import say
@@ -136,13 +135,3 @@ def announce_compiling(quiet: bool = False) -> None:
             note("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all")
 
     jit.on_compiling[:] = [announce]
-
-
-def log(target: Path, began: float, seconds: dict[str, float]) -> None:
-    """Write the log; trouble with it is a note, as it does not harm the output."""
-    from sim.ensemble import simulate
-
-    try:
-        simulate.write_log(target, began, sys.argv[1:], seconds)
-    except OSError as trouble:
-        note(f"note: {target}.log was not written: {trouble}")

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import platform
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -20,18 +21,9 @@ from sim.ensemble import cluster
 from sim.ensemble.bounds import fitting, refuse_full_disk, room_named
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
-from sim.ensemble.part_files import (
-    WHOLE,
-    MemoryParts,
-    OutputBusy,
-    OutputExists,
-    PartFiles,
-    Parts,
-    Shard,
-    Stopped,
-    held,
-)  # fmt: skip
-from sim.ensemble.plan import Block, Plan, Task, snapshots, work
+from sim.ensemble.part_files import WHOLE, MemoryParts, OutputExists, PartFiles, Parts, Shard, Stopped, held
+from sim.ensemble.plan import Block, Plan, Task, snapshots
+from sim.ensemble.progress import note
 from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.ensemble.workers import share_out
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
@@ -260,16 +252,19 @@ def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
     return {MAP[0]: maps, DISC_ENERGIES[0][0]: own, DISC_ENERGIES[1][0]: cross}
 
 
-def write_log(target: Path, began: float, arguments: list[str], stages: dict[str, float]) -> None:
-    """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments, seconds of each stage."""
+def log(target: Path, began: float, stages: dict[str, float]) -> None:
+    """Append to ``OUT.nc.log`` what may differ between equal runs: time, host, arguments, seconds of each stage.
+
+    Trouble with it is a note, as it does not harm the output.
+    """
     when = f"{began:.0f} s after 1970"
     with contextlib.suppress(ValueError, OverflowError, OSError):  # of a clock that is far off
         when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
-    machine = {"host": platform.node(), "platform": platform.platform(), "arguments": arguments}
+    machine = {"host": platform.node(), "platform": platform.platform(), "arguments": sys.argv[1:]}
     entry = {"began": when, "seconds": round(time.time() - began, 2), "stages": stages, **machine}
     how = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
-    with explained(target.parent), open(os.open(f"{target}.log", how, 0o666), "a", encoding="utf-8") as log:
-        log.write(json.dumps(entry) + "\n")
-
-
-__all__ = ["OutputBusy", "OutputExists", "StoreTrouble", "run", "simulate", "work", "write_log"]
+    try:
+        with explained(target.parent), open(os.open(f"{target}.log", how, 0o666), "a", encoding="utf-8") as file:
+            file.write(json.dumps(entry) + "\n")
+    except StoreTrouble as trouble:
+        note(f"note: {target}.log was not written: {trouble}")

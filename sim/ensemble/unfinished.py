@@ -50,20 +50,17 @@ def merge(target: Path, replace: bool = False) -> Path:
     """
     target = target.resolve() if target.is_symlink() else target
     with gathered(target) as (whole, shards):
-        found = {parts.folder: manifest_of(parts.folder) for parts in (whole, *shards.values())}
-        manifests = {folder: manifest for folder, manifest in found.items() if manifest}
-        scenario = scenario_of(next(iter(manifests.values())))
+        manifests = {folder: manifest_of(folder) for folder in folders(target)}
+        first = next(iter(manifests.values()))
+        scenario = scenario_of(first)
         plan = Plan.of(scenario)
-        now = {
-            "run": identity(attributes(plan)),
-            "code": digest().hex(),
-            "source": next(iter(manifests.values()))["source"],
-        }
+        now = first | {"run": identity(attributes(plan)), "code": digest().hex()}
         for folder, manifest in manifests.items():
             refuse_other(folder, manifest, now)
         if lacking := _lacking(plan, whole, shards):
             cure = "run it with --resume, then merge again"
-            raise Stopped("\n".join([*lacking[:_MOST_NAMED], *(["..."] if lacking[_MOST_NAMED:] else []), cure]))
+            more = ["..."] if lacking[_MOST_NAMED:] else []
+            raise Stopped("\n".join([*lacking[:_MOST_NAMED], *more, cure]))
         replace = replace or any(manifest["replace"] for manifest in manifests.values())
         if target.exists() and not replace:
             raise OutputExists(f"{target} exists; replace it with --force")
@@ -88,9 +85,7 @@ def dataset(target: Path) -> Any:
         if name in quantities:
             values = LazilyIndexedArray(_lazy(made, parts, quantities[name], name))
         variables[name] = one.dimensions, values, one.attributes
-    done = sum(
-        steps for task in plan.tasks() for part, steps in zip(task.names, task.work, strict=True) if part in parts
-    )
+    done = sum(task.done(parts) for task in plan.tasks())
     return xarray.Dataset(variables, attrs=made.attributes | {"share_done": done / work(plan)})
 
 

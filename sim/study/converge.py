@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from sim.analysis import engineering
 from sim.numerics import files
-from sim.numerics.files import output
 from sim.scenario.declared import files_read, quantities
 from sim.scenario.scenario import Scenario
 from sim.study.exact_law import QUANTITIES, STATISTICS, Walk, cell_gammas, memory
@@ -108,9 +107,9 @@ def claim(scenario: Scenario, target: Path, replace: bool) -> Path:
 
 def save(found: xr.Dataset, target: Path, picture: Path) -> None:
     """Write the dataset and its figure, each whole or not at all."""
-    with output(target) as beside:
+    with files.output(target) as beside:
         found.to_netcdf(beside)
-    with output(picture) as beside:
+    with files.output(picture) as beside:
         figure(found).savefig(beside, format="png")
 
 
