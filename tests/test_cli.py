@@ -120,7 +120,8 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
         run.send_signal(order)
     _, errors = run.communicate(timeout=60)
     assert run.returncode == (130 if len(orders) > 1 else 75)
-    lines = [line for line in errors.splitlines() if line.strip() and " % of " not in line and "compiling" not in line]
+    lines = [line for line in errors.splitlines() if line.strip() and " % of " not in line]
+    lines = [line for line in lines if not line.startswith(("compiling", "making"))]  # of a slow machine
     assert lines == [
         "stopping when the running blocks end; once more stops at once",
         "stopped; what was computed is kept: the same command with --resume goes on",

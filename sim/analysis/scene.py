@@ -53,9 +53,10 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     try:
         dataset = hdf5.lazily(path)
     except hdf5.Refused as fault:
-        cure = "run the scenario again"
-        said = "is a scenario; name the dataset that `sim run` makes of it" if str(path).endswith(".toml") else ""
-        raise BadInput([f"{path}: {said or f'{fault}; {cure}'}"]) from None
+        said = f"{fault}; run the scenario again"
+        if str(path).endswith(".toml"):
+            said = "is a scenario; name the dataset that `sim run` makes of it"
+        raise BadInput([f"{path}: {said}"]) from None
     with contextlib.ExitStack() as refused:
         refused.callback(dataset.close)
         if "sim_version" not in dataset.attrs:

@@ -221,8 +221,8 @@ def _free_in_groups(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc
         _, controllers, path = line.split(":", 2)
         if controllers not in _GROUPS:
             continue
-        folder, *names = _GROUPS[controllers]
-        top = root / folder
+        within, *names = _GROUPS[controllers]
+        top = root / within
         group = top / path.strip("/")
         for folder in (group, *group.parents)[: len(group.relative_to(top).parts) + 1]:
             with contextlib.suppress(OSError, ValueError):  # no such file, or "max"

@@ -127,8 +127,7 @@ def _row_faults(
         places: dict[Fault, list[int]] = {}
         suspects = _suspects(document, files, axis)
         for place in (suspects or range(len(axis.values)))[:_MOST_TRIED]:
-            changed = _with_row(document, axis, place)
-            for fault in _validated(changed, files)[1]:
+            for fault in _validated(_with_row(document, axis, place), files)[1]:
                 # a table whose name is misspelt lacks its keys: that is one fault
                 lacking = any(fault.path[:length] in meant for length in range(1, len(fault.path) + 1))
                 if fault not in known and not lacking:
@@ -151,12 +150,12 @@ def _with_row(document: dict[str, Any], axis: Axis, place: int) -> dict[str, Any
 def _suspects(document: dict[str, Any], files: Files, axis: Axis) -> list[int]:
     """Rows of an axis at which one of its tables cannot be read by itself."""
     names, found = {key.partition(".")[0] for key in axis.keys}, []
+    how: dict[str, Any] = {"context": {"files": files}, "by_alias": True, "by_name": False}
     for place in range(len(axis.values)):
         row = _with_row(document, axis, place)
         tables = with_models(Scenario, {name: row[name] for name in names})
         try:
             for name in names:
-                how: dict[str, Any] = {"context": {"files": files}, "by_alias": True, "by_name": False}
                 table_adapter(name).validate_python(tables[name], **how)
         except (ValidationError, KeyError):
             found.append(place)

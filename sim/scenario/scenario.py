@@ -1,6 +1,5 @@
 """A scenario: one of each part, a clock, and what must hold between them."""
 
-import copy
 import math
 from collections.abc import Hashable
 from dataclasses import fields
@@ -113,7 +112,7 @@ class Scenario:
     @property
     def _parts(self) -> dict[str, Any]:
         """Everything that decides about the run, the sweep included."""
-        return {item.name: getattr(self, item.name) for item in fields(self) if item.name != "source"}
+        return {name: getattr(self, name) for name in _FIELDS if name != "source"}
 
     @property
     def origin(self) -> Source:
@@ -257,14 +256,10 @@ class Scenario:
         BadInput
             If a key is unknown or a value is not admissible.
         """
-        document = {
-            item.name: getattr(self, item.name) for item in fields(self) if item.name not in ("source", "sweep")
-        }
+        document = {name: getattr(self, name) for name in _FIELDS if name not in ("source", "sweep")}
         for name in {key.partition(".")[0] for key in values if "." in key} & document.keys():  # the rest stays checked
             document[name] = _adapter(cast(Hashable, type(document[name]))).dump_python(document[name], by_alias=True)
-        for key, value in values.items():
-            set_key(document, key, value)
-            _forget_file(document, key)
+        _change(document, values)
         document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
         files = Files(Path(self.source.path).parent, self.source.files)
         with in_plain_words(Scenario, document):
@@ -304,7 +299,7 @@ class Scenario:
     def _points(self, values: list[dict[str, Any]]) -> list["Scenario"]:
         """The scenario with some values each, made of tables that are read once for each of their own values."""
         read: dict[tuple[Any, ...], Any] = {}
-        points, ends, origin = [], (0, len(values) - 1), self.origin
+        points, ends = [], (0, len(values) - 1)
         files = Files(Path(self.source.path).parent, self.source.files)
         for place, point in enumerate(values):
             tables: dict[str, dict[str, Any]] = {}
@@ -319,10 +314,9 @@ class Scenario:
             if any(part is None for part in parts.values()):  # which says what is wrong
                 points.append(self.with_values(point))
                 continue
-            made = copy.copy(self)
-            made.__dict__.clear()
-            made.__dict__.update({name: self.__dict__[name] for name in _FIELDS} | parts | {"sweep": ()})
-            made.__dict__["source"] = origin.changed(point | {"sweep": {}})
+            own = {"sweep": (), "source": self.origin.changed(point | {"sweep": {}})}
+            made = object.__new__(Scenario)
+            made.__dict__.update({name: self.__dict__[name] for name in _FIELDS} | parts | own)
             with in_plain_words(Scenario, {}):
                 made._check_across(len(values) <= _MOST_BUILT or place in ends)
             points.append(made)
@@ -334,9 +328,7 @@ class Scenario:
         document = {}
         if values.keys() != {name}:
             document = {name: _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)}
-        for key, value in values.items():
-            set_key(document, key, value)
-            _forget_file(document, key)
+        _change(document, values)
         try:
             return table_adapter(name).validate_python(with_models(Scenario, document)[name], context={"files": files})
         except (ValidationError, KeyError):
@@ -353,6 +345,13 @@ def table_adapter(name: str) -> TypeAdapter[Any]:
     declared = getattr(Scenario, "__pydantic_fields__", {})[name]
     kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator)]
     return TypeAdapter(kind)
+
+
+def _change(document: dict[str, Any], values: dict[str, Any]) -> None:
+    """Change some keys of a document."""
+    for key, value in values.items():
+        set_key(document, key, value)
+        _forget_file(document, key)
 
 
 def _forget_file(document: dict[str, Any], key: str) -> None:

@@ -19,8 +19,6 @@ from pydantic_core import PydanticCustomError
 from sim.units.quantity import Quantity
 
 _HEADER = re.compile(r"\s*(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?\s*")
-
-
 #: What a header's names look like; whatever else stands in a file is shown by no message.
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_ .-]{0,19}")
 _MOST_BYTES = 2**28
