@@ -384,7 +384,7 @@ def test_a_full_disk_ends_with_74_and_its_reason(here, monkeypatch):
     monkeypatch.setattr("sim.ensemble.part_files.write_whole", full)
     done = sim("run", "scene.toml")
     assert done.exit_code == 74
-    assert done.stderr.strip().endswith("No space left on device")
+    assert done.stderr.startswith("outputs/scene.nc.parts: No space left on device; ")
     assert not Path("outputs/scene.nc").exists()
 
 
