@@ -10,8 +10,10 @@ import ctypes
 import functools
 import json
 import math
+import mmap
 import os
 import stat
+import struct
 from collections.abc import Callable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -38,6 +40,8 @@ _MOST = 1000
 _LONGEST, _ALL = 2**16, 2**24
 _SCENARIO = dict.fromkeys(("scenario_toml", "scenario_overrides", "scenario_resolved"), 2**28)
 _SCENARIO |= {"scenario_files": 2**30}
+#: How a collection of texts and lists begins, and bytes of a file in which they are looked for.
+_HEAP, _SEEN = b"GCOL\x01\0\0\0", 2**30
 #: Most texts of a variable, most bytes of them all, and least that a chunk of numbers may take.
 _LABELS, _WORDS, _CHUNK = 10**5, 2**26, 2**26
 #: How many times smaller zlib packs numbers at best, and bytes that need not be there, as of a number never written.
@@ -78,7 +82,6 @@ _CALLS: dict[str, tuple[Any, ...]] = {
     "H5Dget_storage_size": (_SIZE, _ID),
     "H5Dvlen_get_buf_size": (_INT, _ID, _ID, _ID, _AT),
     "H5Sget_simple_extent_npoints": (_ID, _ID),
-    "H5Sget_simple_extent_ndims": (_INT, _ID),
     "H5Tget_class": (_INT, _ID),
     "H5Tget_size": (_SIZE, _ID),
     "H5Tis_variable_str": (_INT, _ID),
@@ -111,6 +114,8 @@ def opened(path: str | os.PathLike[str]) -> netCDF4.Dataset:
     with HDF5, _damaged():
         if begins != _SIGNATURE and not begins.startswith(_CLASSIC):
             raise Refused(BROKEN)
+        if begins == _SIGNATURE:
+            _refuse_endless(path)
         found = _look_through(path, size) if begins == _SIGNATURE else set()
         file = netCDF4.Dataset(path)
         try:
@@ -234,10 +239,25 @@ def _succeeded(result: int, call: Any, arguments: Any) -> int:
 _calls: Callable[[], _Calls] = functools.cache(_Calls)
 
 
+def _refuse_endless(path: str) -> None:
+    """Refuse a file whose collections of texts and lists hold one without an end, which HDF5 reads for ever."""
+    size = min(os.path.getsize(path), _SEEN)
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), size, prot=mmap.PROT_READ) as content:
+        at = content.find(_HEAP, 0, size - 16)
+        while at >= 0:
+            place = at + 16
+            end = min(at + struct.unpack_from("<Q", content, at + 8)[0], len(content))
+            while place + 16 <= end:
+                number, size = struct.unpack_from("<H6xQ", content, place)
+                place += 16 + size + -size % 8 if number else size
+                if place > end or (size < 16 and not number):
+                    raise Refused(BROKEN)
+            at = content.find(_HEAP, at + 8, len(content) - 16)
+
+
 def _look_through(path: str, size: int) -> set[str]:
     """Names of the variables that are in a file of HDF5 as declared; whatever else there is in it is refused."""
     hdf5, stored, found = _calls(), 0, set()
-    placed: list[bool] = []  # which variables have dimensions with names
     with hdf5.held("Fclose", "Fopen", os.fsencode(path), 0, 0) as file:
         _refuse_attributes(hdf5, file, _SCENARIO)
         links = (ctypes.c_uint64 * 8)()
@@ -256,14 +276,10 @@ def _look_through(path: str, size: int) -> set[str]:
                 hdf5("Lget_name_by_idx", file, b".", 0, 0, place, called, len(called), 0)
                 name = called.value.decode("utf-8", "replace")
                 taken, whole = _stored(hdf5, one, name[:40])
-                names = _refuse_attributes(hdf5, one, {})
-                if _axes(hdf5, one):
-                    placed.append(bool(names & {"CLASS", "DIMENSION_LIST"}))
+                _refuse_attributes(hdf5, one, {})
             stored += taken
             if whole:
                 found.add(name.removeprefix("_nc4_non_coord_"))
-    if any(placed) and not all(placed):  # netCDF may look for the others' dimensions for ever
-        raise Refused("holds variables that lack their dimensions")
     if stored > size:
         raise Refused("declares more numbers than it holds")
     return found
@@ -303,15 +319,8 @@ def _stored(hdf5: _Calls, one: int, name: str) -> tuple[int, bool]:
     return taken, whole
 
 
-def _axes(hdf5: _Calls, one: int) -> int:
-    """Number of dimensions of a variable."""
-    with hdf5.held("Sclose", "Dget_space", one) as space:
-        return hdf5("Sget_simple_extent_ndims", space)
-
-
-def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> set[str]:
-    """Names of the attributes of a variable or the file; those too long, or neither numbers nor a text, are refused."""
-    names = set()
+def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> None:
+    """Refuse attributes of a variable or of the file that are too long, or neither numbers nor one text."""
     if hdf5("Aget_num_attrs", holder) > _MOST:
         raise Refused(f"holds more than {_MOST} attributes")
     for place in range(hdf5("Aget_num_attrs", holder)):
@@ -319,7 +328,6 @@ def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> set
             called = ctypes.create_string_buffer(1024)
             hdf5("Aget_name", one, len(called), called)
             name = called.value.decode("utf-8", "replace")
-            names.add(name)
             if name in _INNER:
                 continue
             kind, width, count, varies = hdf5.type_of(one, "A")
@@ -327,4 +335,3 @@ def _refuse_attributes(hdf5: _Calls, holder: int, limits: dict[str, int]) -> set
             raise Refused(f'holds an attribute that is neither numbers nor a text: "{name[:40]}"')
         if count * width > limits.get(name, _LONGEST):
             raise Refused(f'holds too long an attribute: "{name[:40]}"')
-    return names

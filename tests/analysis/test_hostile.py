@@ -314,12 +314,14 @@ def test_a_map_of_many_numbers_is_refused_before_it_is_read(here, monkeypatch):
     assert '"shear_map" has more than' in mapped(lambda file: None).stderr
 
 
-def test_a_variable_without_the_dimensions_that_others_have_is_refused(here):
-    """netCDF looks for them for ever."""
+def test_a_list_without_an_end_is_refused(here):
+    """HDF5 reads it for ever."""
     mapped(lambda file: None)
-    with h5py.File("map.nc", "a") as file:
-        del file["shear_map"].attrs["DIMENSION_LIST"]
-    assert "map.nc: holds variables that lack their dimensions" in sim("check", "mapped.toml").stderr
+    content = bytearray(Path("map.nc").read_bytes())
+    at = content.index(b"GCOL") + 16
+    content[at : at + 16] = b"\xff" * 16
+    Path("map.nc").write_bytes(content)
+    assert "map.nc: is not a netCDF file" in sim("check", "mapped.toml").stderr
 
 
 def test_classic_netcdf_that_declares_more_than_its_file_is_refused(here):
