@@ -41,7 +41,7 @@ _LONGEST, _ALL = 2**16, 2**24
 _SCENARIO = dict.fromkeys(("scenario_toml", "scenario_overrides", "scenario_resolved"), 2**28)
 _SCENARIO |= {"scenario_files": 2**30}
 #: How a collection of texts and lists begins, and bytes of a file in which they are looked for.
-_HEAP, _SEEN = b"GCOL\x01\0\0\0", 2**30
+_HEAP, _SEEN = b"GCOL\x01\0\0\0", 2**27
 #: Most texts of a variable, most bytes of them all, and least that a chunk of numbers may take.
 _LABELS, _WORDS, _CHUNK = 10**5, 2**26, 2**26
 #: How many times smaller zlib packs numbers at best, and bytes that need not be there, as of a number never written.
@@ -241,18 +241,18 @@ _calls: Callable[[], _Calls] = functools.cache(_Calls)
 
 def _refuse_endless(path: str) -> None:
     """Refuse a file whose collections of texts and lists hold one without an end, which HDF5 reads for ever."""
-    size = min(os.path.getsize(path), _SEEN)
-    with open(path, "rb") as file, mmap.mmap(file.fileno(), size, prot=mmap.PROT_READ) as content:
-        at = content.find(_HEAP, 0, size - 16)
+    seen = min(os.path.getsize(path), _SEEN)
+    with open(path, "rb") as file, mmap.mmap(file.fileno(), seen, prot=mmap.PROT_READ) as content:
+        at = content.find(_HEAP, 0, seen - 16)
         while at >= 0:
             place = at + 16
-            end = min(at + struct.unpack_from("<Q", content, at + 8)[0], len(content))
+            end = min(at + struct.unpack_from("<Q", content, at + 8)[0], seen)
             while place + 16 <= end:
                 number, size = struct.unpack_from("<H6xQ", content, place)
                 place += 16 + size + -size % 8 if number else size
                 if place > end or (size < 16 and not number):
                     raise Refused(BROKEN)
-            at = content.find(_HEAP, at + 8, len(content) - 16)
+            at = content.find(_HEAP, at + 8, seen - 16)
 
 
 def _look_through(path: str, size: int) -> set[str]:
