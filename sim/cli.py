@@ -111,11 +111,13 @@ def run(
     target = output or Path("outputs") / f"{scenario.stem}.nc"
     from sim.ensemble.part_files import shard_of
 
-    began, stages, share = time.time(), Stages(), shard_of(shard or "1/1")
+    began, stages, share = time.time(), Stages(), shard_of("1/1" if shard is None else shard)
     from sim.scenario.reader import load
 
     announce_compiling(quiet)
-    until = time.monotonic() + (math.inf if max_time is None else _quantity(max_time, "--max-time", "s", above=0))
+    until = time.monotonic() + (
+        math.inf if max_time is None else _quantity(max_time, "--max-time", "s", above=0, typical="8 h")
+    )
     memory = math.inf if max_memory is None else _quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
     with named("making modes and bands of the fluctuations", quiet):
         scene = load(scenario, _overrides(changes, seed, members), option="--set")

@@ -233,5 +233,6 @@ def _free_in_groups(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc
 
 def size(count: float) -> str:
     """A number of bytes to two digits, as the estimate it is."""
-    unit, factor = next((row for row in (("GB", 1e9), ("MB", 1e6)) if count >= row[1]), ("kB", 1e3))
+    units = ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)
+    unit, factor = next((row for row in units if count >= row[1]), ("byte", 1.0))
     return f"{float(f'{count / factor:.2g}'):g} {unit}"

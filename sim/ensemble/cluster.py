@@ -76,10 +76,11 @@ def share_out(
     """
     try:
         from distributed import CancelledError, Client, KilledWorker, wait  # heavy
-        from distributed.comm import CommClosedError
+        from distributed.comm import CommClosedError, resolve_address
     except ImportError:
         raise BadInput(["--scheduler needs dask.distributed; install sliding-sim[cluster]"]) from None
     try:
+        resolve_address(address)  # a client that fails at it is not closed within its patience
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as trouble:
         raise WorkerDied(f"no scheduler of dask answers at {address}: {trouble}") from None

@@ -44,6 +44,8 @@ _OURS = re.compile(
 _DIGEST = hashlib.sha256().digest_size
 _FORMAT = "parts of a run of sim, 2"
 _MOST_NAMED, _LONGEST = 5, 40
+#: Tables and lists inside each other in a manifest.
+_DEEPEST = 40
 
 
 def shard_of(text: str) -> Shard:
@@ -348,12 +350,22 @@ def _make(whole: Path, folder: Path) -> None:
 
 
 def manifest_of(folder: Path) -> Manifest:
-    """The manifest of a folder; empty where there is none of ours."""
+    """The manifest of a folder; empty where there is none of ours, or a damaged one."""
     try:
         found = json.loads(read_whole(folder / _MANIFEST))
-    except (FileNotFoundError, ValueError):
+    except (FileNotFoundError, RecursionError, ValueError):
         return {}
-    return found if isinstance(found, dict) and found.get("format") == _FORMAT else {}
+    whole = isinstance(found, dict) and found.get("format") == _FORMAT and _shallow(found)
+    return found if whole and isinstance(found.get("run"), dict) and isinstance(found.get("source"), dict) else {}
+
+
+def _shallow(tree: Any) -> bool:
+    """Whether tables and lists nest no deeper than in a scenario."""
+    inner = [tree]
+    for _ in range(_DEEPEST):
+        found = (one for outer in inner for one in (outer.values() if isinstance(outer, dict) else outer))
+        inner = [one for one in found if isinstance(one, dict | list)]
+    return not inner
 
 
 def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:

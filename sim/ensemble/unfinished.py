@@ -1,13 +1,14 @@
 """Runs that are not done, by the folder of their parts: their dataset so far, what they lack, shards put together."""
 
 from collections.abc import Iterator
-from dataclasses import replace as changed
+from dataclasses import dataclass, replace as changed
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter
 
+from sim.ensemble.checksums import MANIFEST
 from sim.ensemble.netcdf import Outline, Piece, Place, fill
 from sim.ensemble.outline import attributes, identity, outline
 from sim.ensemble.part_files import (
@@ -26,10 +27,24 @@ from sim.ensemble.part_files import (
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
 from sim.scenario.scenario import Scenario
-from sim.scenario.source import Source
+from sim.scenario.source import Files, Source
 from sim.units.kept import digest
 from sim.units.refusals import BadInput
 
+
+@dataclass(frozen=True)
+class _Written:
+    """Source of a scenario as a manifest holds it."""
+
+    path: str
+    text: str
+    overrides: dict[str, Any]
+    files: dict[str, str]
+    sweep: list[str]
+
+
+_SCENARIO = TypeAdapter(Scenario)
+_SOURCE = TypeAdapter(_Written)
 #: Shards that a message names.
 _MOST_NAMED = 20
 
@@ -52,7 +67,7 @@ def merge(target: Path, replace: bool = False) -> Path:
     with gathered(target) as (whole, shards):
         manifests = {folder: manifest_of(folder) for folder in folders(target)}
         first = next(iter(manifests.values()))
-        scenario = scenario_of(first)
+        scenario = scenario_of(next(iter(manifests)), first)
         plan = Plan.of(scenario)
         now = first | {"run": identity(attributes(plan)), "code": digest().hex()}
         for folder, manifest in manifests.items():
@@ -61,7 +76,7 @@ def merge(target: Path, replace: bool = False) -> Path:
             cure = "run it with --resume, then merge again"
             more = ["..."] if lacking[_MOST_NAMED:] else []
             raise Stopped("\n".join([*lacking[:_MOST_NAMED], *more, cure]))
-        replace = replace or any(manifest["replace"] for manifest in manifests.values())
+        replace = replace or any(manifest.get("replace") for manifest in manifests.values())
         if target.exists() and not replace:
             raise OutputExists(f"{target} exists; replace it with --force")
         whole.adopt(shards.values(), replace and target.exists())
@@ -74,9 +89,11 @@ def dataset(target: Path) -> Any:
     from xarray.core.indexing import LazilyIndexedArray
 
     if not (kept := folders(target)):
-        raise BadInput([f"{target}: there is no such file, nor an unfinished run of it"])
+        beside = target.with_name(f"{target.name}.parts")
+        damaged = f", as {beside} is empty or its manifest damaged: run the scenario again" if beside.exists() else ""
+        raise BadInput([f"{target}: there is no such file, nor an unfinished run of it{damaged}"])
     parts = _Found({path.stem: PartFiles(folder) for folder in kept for path in folder.glob("*.part")})
-    plan = Plan.of(scenario_of(manifest_of(kept[0])))
+    plan = Plan.of(scenario_of(kept[0], manifest_of(kept[0])))
     made = outline(plan)
     quantities = {name: key for key, place in made.places.items() for name in place.names.values()}
     variables = {}
@@ -158,13 +175,31 @@ def _pieces(made: Outline, parts: _Found, place: Place, wanted: _Window) -> Iter
             yield piece._replace(members=[rows for rows, _ in kept], names=[name for _, name in kept])
 
 
-def scenario_of(manifest: Manifest) -> Scenario:
-    """The scenario of a run by its manifest."""
-    scenario = TypeAdapter(Scenario).validate_python(manifest["run"]["scenario"])
-    source = dict(manifest["source"])
-    order = source.pop("sweep")  # which the resolved scenario, sorted by its keys, does not hold
-    axes = sorted(scenario.sweep, key=lambda axis: order.index(axis.keys[0]))
-    return changed(scenario, sweep=tuple(axes), source=Source(**source))
+def scenario_of(folder: Path, manifest: Manifest) -> Scenario:
+    """The scenario of a run by its manifest, which names no file that is opened but tables of a sweep.
+
+    Raises
+    ------
+    BadInput
+        If the manifest is damaged.
+    """
+    try:
+        scenario = _SCENARIO.validate_python(manifest["run"]["scenario"], context={"files": _NoFiles(Path())})
+        source = _SOURCE.validate_python(manifest["source"])
+        # which the resolved scenario, sorted by its keys, does not hold
+        axes = sorted(scenario.sweep, key=lambda axis: source.sweep.index(axis.keys[0]))
+        origin = Source(source.path, source.text, source.overrides, source.files)
+        return changed(scenario, sweep=tuple(axes), source=origin)
+    except (KeyError, ValueError):
+        cure = "move the folder away and run the scenario again"
+        raise BadInput([f"{folder / MANIFEST} is damaged: what it holds is no scenario; {cure}"]) from None
+
+
+class _NoFiles(Files):
+    """Files that are not opened: a manifest holds what stood in them."""
+
+    def path(self, name: str) -> Path:
+        raise ValueError("a manifest names no file")
 
 
 def _lacking(plan: Plan, whole: PartFiles, shards: dict[Shard, PartFiles]) -> list[str]:

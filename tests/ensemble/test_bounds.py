@@ -239,3 +239,13 @@ def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_p
         plan = Plan.of(load(tmp_path / "scene.toml"))
         assert 2**20 * largest[-1] < 1.5 * bounds.memory(plan, 1)
     assert largest[1] < 1.1 * largest[0]
+
+
+def test_sizes_are_said_in_units_that_fit():
+    assert [bounds.size(count) for count in (4, 999, 4e3, 2.34e6, 5e9)] == [
+        "4 byte",
+        "1000 byte",
+        "4 kB",
+        "2.3 MB",
+        "5 GB",
+    ]

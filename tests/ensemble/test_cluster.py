@@ -10,7 +10,7 @@ from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
 
 import sim
 from sim.ensemble import cluster, plan as plans, simulate as ensemble
-from sim.ensemble.part_files import Stopped
+from sim.ensemble.part_files import MemoryParts, Stopped
 from sim.ensemble.plan import Plan
 from sim.ensemble.workers import WorkerDied
 from sim.scenario.scenario import read_sweep
@@ -77,9 +77,16 @@ def test_workers_of_another_version_and_schedulers_that_do_not_answer_are_told(t
     with pytest.raises(BadInput, match="another version of sim"):
         ensemble.run(sample(), tmp_path / "out.nc", scheduler=threads.scheduler_address)
     monkeypatch.setattr(cluster, "_PATIENCE", "0.1 s")
-    for address in ("tcp://127.0.0.1:1", "nonsense://x"):
+    for address in ("tcp://127.0.0.1:1", "nonsense://x", "nowhere", "tcp://127.0.0.1:x"):
         with pytest.raises(WorkerDied, match="no scheduler of dask answers at"):
             ensemble.run(sample(), tmp_path / "other.nc", replace=True, scheduler=address)
+
+
+def test_no_client_is_made_for_what_is_no_address(monkeypatch):
+    monkeypatch.setattr(distributed, "Client", lambda *_, **__: pytest.fail("a client that hangs at its end"))
+    for address in ("nonsense://x", "nowhere", "tcp://127.0.0.1:x"):
+        with pytest.raises(WorkerDied, match=f"no scheduler of dask answers at {address}: ."):
+            cluster.share_out(ensemble.advance_group, MemoryParts(), [], address, ensemble.ignore, lambda: False)
 
 
 def test_scenes_are_mapped_over_a_cluster(threads):

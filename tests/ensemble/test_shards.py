@@ -212,9 +212,15 @@ def test_commands_in_a_job_array_with_tables(tmp_path, monkeypatch):
     assert Path("out.nc").read_bytes() == Path("whole.nc").read_bytes()
 
 
-@pytest.mark.parametrize("shard", ["0/3", "4/3", "3", "a/b", "1/3/4", "-1/3", f"1/{'9' * 5000}", "1/0"])
+@pytest.mark.parametrize("shard", ["0/3", "4/3", "3", "a/b", "1/3/4", "-1/3", "", f"1/{'9' * 5000}", "1/0"])
 def test_a_wrong_shard_is_told(tmp_path, shard):
     (tmp_path / "scene.toml").write_text(TABLES)
     with pytest.raises(BadInput, match="--shard takes I/N with I from 1 to N, such as 3/64"):
         CliRunner().invoke(cli, ["run", str(tmp_path / "scene.toml"), "--shard", shard], catch_exceptions=False)
     assert names(tmp_path) == ["scene.toml"]
+
+
+def test_a_wrong_time_is_told_with_an_example_of_its_size(tmp_path):
+    (tmp_path / "scene.toml").write_text(TABLES)
+    with pytest.raises(BadInput, match='; write for example "8 h"'):
+        CliRunner().invoke(cli, ["run", str(tmp_path / "scene.toml"), "--max-time", "1 parsec"], catch_exceptions=False)

@@ -1,6 +1,7 @@
 """The dataset of a run that is not done: what is computed has the numbers of the finished one, the rest is nan."""
 
 import itertools
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -112,3 +113,38 @@ def test_what_is_not_there_is_told(tmp_path):
     (tmp_path / "out.nc.parts").mkdir()
     with pytest.raises(sim.BadInput, match="there is no such file, nor an unfinished run of it"):
         sim.open(tmp_path / "out.nc")
+
+
+DAMAGED = {
+    "none": lambda text: "",
+    "cut": lambda text: text[:-9],
+    "list": lambda text: "[1]",
+    "nested": lambda text: "[" * 100_000,
+    "nested inside": lambda text: text.replace('"source": {', '"source": {"x": ' + "[" * 400 + "]" * 400 + ", "),
+    "without run": lambda text: text.replace('"run":', '"ran":'),
+    "another run": lambda text: text.replace('"run": {', '"run": [], "ran": {'),
+    "without a scenario": lambda text: text.replace('"scenario":', '"scene":'),
+    "an unknown key": lambda text: text.replace('"scenario": {', '"scenario": {"\\u001b[2J": 1, '),
+    "a wrong value": lambda text: text.replace('"radius": 0.002', '"radius": -1'),
+    "another source": lambda text: text.replace('"source": {', '"source": 3, "sources": {'),
+    "a source of numbers": lambda text: text.replace('"files": {}, "overrides"', '"files": 3, "overrides"'),
+    "another order": lambda text: text.replace('"sweep": ["contact.load", "adhesion.bond_share"]', '"sweep": []'),
+    "a file": lambda text: re.sub(r'"load": [0-9.e-]+', '"load": {"file": "loads.csv"}', text),
+}
+
+
+@pytest.mark.parametrize("harm", DAMAGED.values(), ids=DAMAGED)
+@pytest.mark.parametrize("words", [["stats", "out.nc"], ["merge", "out.nc"]], ids=["stats", "merge"])
+def test_a_damaged_manifest_is_told_in_one_line(tmp_path, monkeypatch, harm, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loads.csv").write_text("time [s], load [mN]\n0, 1\n1, 2\n")
+    ensemble.run(sample(steps=1), "out.nc", shard=(1, 2))
+    manifest = tmp_path / "out.nc.parts" / "1-of-2" / "manifest.json"
+    before = manifest.read_text()
+    manifest.write_text(harm(before))
+    assert manifest.read_text() != before
+    with pytest.raises(sim.BadInput) as told:
+        CliRunner().invoke(cli, words, catch_exceptions=False)
+    assert len(told.value.problems) == 1
+    assert "out.nc" in str(told.value)
+    assert str(told.value).isprintable()
