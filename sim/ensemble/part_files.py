@@ -122,13 +122,18 @@ class PartFiles:
     def _read(self, name: str) -> Iterator[tuple[str, np.ndarray]]:
         with explained(self.folder):
             content = read_whole(self.path(name))
-        if not _sound(content):
+        try:
+            found = _arrays(content) if _sound(content) else None
+        except (
+            ValueError,
+            TypeError,
+            AttributeError,
+            RecursionError,
+        ):  # of others: a sum that fits, of what no run has written
+            found = None
+        if found is None:
             raise StoreTrouble(f"{self.path(name)} is damaged; go on with --resume, which computes it anew")
-        at = content.index(b"\n", _DIGEST) + 1
-        for key, (kind, shape) in json.loads(content[_DIGEST:at]).items():
-            values = np.frombuffer(content, kind, math.prod(shape), at).reshape(shape)
-            at += values.nbytes
-            yield key, values
+        yield from found.items()
 
     def publish(self, target: Path, write: Callable[[Path], None]) -> None:
         """Make the output and its checksums beside the parts, sync them, and rename them into place.
@@ -203,6 +208,15 @@ class PartFiles:
 
 
 Parts = MemoryParts | PartFiles
+
+
+def _arrays(content: bytes) -> Arrays:
+    """The numbers of a part, each where it stands in it."""
+    found, at = {}, content.index(b"\n", _DIGEST) + 1
+    for key, (kind, shape) in json.loads(content[_DIGEST:at]).items():
+        found[key] = np.frombuffer(content, kind, math.prod(shape), at).reshape(shape)
+        at += found[key].nbytes
+    return found
 
 
 def _sound(content: bytes) -> bool:
@@ -303,7 +317,7 @@ def _shards(folder: Path) -> dict[Shard, Path]:
     found = {}
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         for path in folder.iterdir():
-            if (numbers := _SHARD.fullmatch(path.name)) and manifest_of(path):
+            if (numbers := _SHARD.fullmatch(path.name)) and not path.is_symlink() and manifest_of(path):
                 found[int(numbers[1]), int(numbers[2])] = path
     return dict(sorted(found.items()))
 

@@ -1,6 +1,7 @@
 """Parts of a run: killed at every file operation it goes on as if nothing had happened; files of others stay."""
 
 import errno
+import hashlib
 import itertools
 import os
 import signal
@@ -223,6 +224,16 @@ def test_a_damaged_part_is_computed_anew(tmp_path, harm):
         PartFiles(folder).load(first.stem)
     whole = ensemble.run(sample(), tmp_path / "whole.nc").read_bytes()
     assert ensemble.run(sample(), path, resume=True).read_bytes() == whole
+
+
+_ODD = [b'{"a": ["|O", [1]]}\n12345678', b'{"a": ["<f8", [9]]}\n', b"[1]\n", b'{"a": 1}\n', b""]
+
+
+@pytest.mark.parametrize("line", _ODD)
+def test_a_part_that_no_run_has_written_is_damaged_whatever_its_sum(tmp_path, line):
+    (tmp_path / "x.part").write_bytes(hashlib.sha256(line).digest() + line)
+    with pytest.raises(StoreTrouble, match=r"x\.part is damaged"):
+        PartFiles(tmp_path).load("x")
 
 
 def test_a_folder_that_no_run_made_is_not_touched(tmp_path):

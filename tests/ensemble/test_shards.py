@@ -177,6 +177,18 @@ def test_files_of_others_in_a_shard_stay(tmp_path, whole):
     assert note.read_text() == "mine"
 
 
+def test_a_shard_that_is_a_link_is_not_followed(tmp_path):
+    path, elsewhere = tmp_path / "out.nc", tmp_path / "elsewhere"
+    for number in (1, 2):
+        ensemble.run(sample(), path, shard=(number, 2))
+    (tmp_path / "out.nc.parts" / "2-of-2").rename(elsewhere)
+    (tmp_path / "out.nc.parts" / "2-of-2").symlink_to(elsewhere)
+    before = sorted(elsewhere.iterdir())
+    with pytest.raises(Stopped, match="shard 2/2 lacks 16 of 16 parts"):
+        merge(path)
+    assert sorted(elsewhere.iterdir()) == before
+
+
 TABLES = """
 clock = {duration = "4 ms", step = "1 ms"}
 solid = {shear_modulus = "1 MPa"}
