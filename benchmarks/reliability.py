@@ -238,9 +238,9 @@ class Campaign:
         """Check the code, the words, and that all that is there is whole and as it should be."""
         killed = ended.code == -signal.SIGKILL
         self.codes["killed" if killed else str(ended.code)] += 1
-        if not killed and (
-            ended.code not in CODES or "Traceback" in ended.said or bool(ended.said) != bool(ended.code)
-        ):
+        message = ended.said and not ended.said.startswith("note:")  # such as of a log that was not written
+        explained = ended.code in CODES and "Traceback" not in ended.said and bool(message) == bool(ended.code)
+        if not (killed or explained):
             self.problems.append(f"{what}{ended.code} {ended.said[-2000:]}")
         for path in (self.output, *self.parts.glob("*.part")):
             wanted = self.files[path.name] if path == self.output else self.whole_parts.get(path.name)
