@@ -22,9 +22,10 @@ from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.correlation import Slip, Time, Wave
 from sim.scenario.clock import Clock, Record
 from sim.spectrum.families import Gaussian, Ripple, SelfAffine
+from sim.study import samples
 from sim.study.converge import converge, explanation, figure, recommendation, table
 from sim.study.exact_law import QUANTITIES, READ, STATISTICS, Walk, cell_gammas, gamma_nodes, memory
-from sim.study.samples import coupled, estimates, sampled, timed
+from sim.study.samples import coupled, estimates, sampled
 from sim.study.settings import REFERENCE, at_step, number_of_sites, plain, settings, table as keys
 from sim.study.verdicts import choices, chosen, differing
 
@@ -217,12 +218,22 @@ def test_steps_that_are_run_together_have_the_same_fluctuations():
     assert_allclose(values[0, 3], values[1, 3], rtol=0.1)
 
 
-def test_a_time_is_that_of_the_whole_run():
-    scenario = scene(shear=SHEARS["modal, slip, onset"], members=200, steps=20)
-    few, many = timed(replace(scenario, ensemble=replace(scenario.ensemble, members=64)), 0.05), timed(scenario, 0.05)
-    median, low, high = few
-    assert 0.0 < low <= median <= high
-    assert 1.5 < many[0] / median < 10.0  # four batches for one
+def test_a_time_is_that_of_the_whole_run(monkeypatch):
+    # by a clock that a step of a member moves on by 1 ms
+    clock, follow = [0.0], samples.follow
+
+    def counted(scenario, dice, state, steps):
+        clock[0] += 1e-3 * len(dice.shear.members) * len(steps)
+        return follow(scenario, dice, state, steps)
+
+    monkeypatch.setattr(samples, "follow", counted)
+    monkeypatch.setattr(samples.time, "process_time", lambda: clock[0])
+    scenario = scene(shear=SHEARS["modal, slip, onset"], steps=20)
+    batch = samples.together(scenario)
+    for members in (7, batch, 2 * batch + 1):
+        found = samples.timed(replace(scenario, ensemble=replace(scenario.ensemble, members=members)), 0.05)
+        of_batches = members if members <= batch else 3 * batch
+        assert_allclose(found, 1e-3 * 20 * of_batches, rtol=1e-12)
 
 
 # settings
