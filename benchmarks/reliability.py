@@ -292,9 +292,9 @@ def digest(path: Path) -> bytes:
 
 #: Every campaign, how many times it goes by itself, and in words.
 CAMPAIGNS: dict[str, tuple[int, str]] = {
-    "faults": (1, "faults below Python, two at each of {operations} file operations"),
-    "kills": (300, "`kill -9` of all processes, before an operation or in a write, of 1, 2, 3 and 5 workers in turn"),
-    "limits": (40, "limits of the size of files, from nothing to that of the dataset"),
+    "faults": (1, "faults below Python, two at each of {operations} file operations where they apply"),
+    "kills": (210, "`kill -9` of all processes, before an operation or in a write, of 1, 2, 3 and 5 workers in turn"),
+    "limits": (25, "limits of the size of files, from nothing to that of the dataset"),
     "starts": (20, "starts at once on one output"),
 }
 
