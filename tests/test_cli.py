@@ -15,7 +15,7 @@ import netCDF4
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from helpers.commands import sim
+from helpers.commands import SCENE, sim
 
 from sim import cli
 from sim.ensemble import bounds, progress, simulate
@@ -24,32 +24,6 @@ from sim.scenario.reader import BadInput, load
 from sim.study import paper
 
 LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
-SCENE = """\
-name = "a scene"
-[clock]
-duration = "1 s"
-step = "0.1 s"
-[solid]
-shear_modulus = "1.6 MPa"
-[sphere]
-radius = "2 mm"
-[adhesion]
-work = "42 mJ/m^2"
-[drive]
-model = "ramp"
-from = "1 mm/s"
-to = "20 mm/s"
-[bonds]
-model = "counted"
-critical_speed = "10 mm/s"
-rebinding_rate = "500 1/s"
-sites = 50
-stress = "0.3 MPa"
-[contact]
-load = "4 mN"
-[ensemble]
-members = 3
-"""
 
 
 @pytest.fixture

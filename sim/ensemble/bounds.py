@@ -1,4 +1,4 @@
-"""What a run takes of time, memory and disk, known before it starts, and whether there is room for it."""
+"""Time, memory and disk of a run, known before it starts, and whether there is room for it."""
 
 import contextlib
 import math
@@ -44,7 +44,7 @@ class NoRoom(RuntimeError):
 
 
 class Takes(NamedTuple):
-    """What a run takes with some ``jobs``: time of all cores and by the clock [s], the dataset, room on disk [byte]."""
+    """Needs of a run with some ``jobs``: time of all cores and by the clock [s], the dataset, room on disk [byte]."""
 
     cpu: float
     clock: float
@@ -54,7 +54,7 @@ class Takes(NamedTuple):
 
 
 def takes(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1) -> Takes:
-    """What a run takes, or one of some shares of it, at a ``pace`` of the machine: its time over what is counted."""
+    """Needs of a run, or of one of some shares of it, at a ``pace`` of the machine: its time over what is counted."""
     points, parts = plan.points, len(plan.packs) * len(plan.groups()) * len(plan.blocks(plan.points[0]))
     packed = plan.maps if plan.scenario.record.compression == "none" else plan.bytes
     modes = _MODE * max(_mode_pairs(point) for point in spread(points, 2))
@@ -122,7 +122,7 @@ def _block(plan: Plan, point: Scenario) -> float:
 
 
 def _part(plan: Plan, point: Scenario) -> float:
-    """What the largest part records [byte]."""
+    """Size of the largest part [byte]."""
     numbers = plan.group * max(1, plan.records_of_block(point)) * len(plan.variables) * len(plan.packs[0])
     drawn = min(1.0, plan.snapshots_of_block(point) / len(point.record.maps)) if point.record.maps else 0.0
     return 8.0 * numbers + drawn * map_bytes(point, plan.group)
@@ -215,7 +215,7 @@ def _table(path: Path) -> dict[str, float]:
 
 
 def _free_in_groups(root: Path = Path("/sys/fs/cgroup"), own: Path = Path("/proc/self/cgroup")) -> Iterator[float]:
-    """What the control groups of this process, and those that hold them, still have of their memory [byte]."""
+    """Memory that is left to the control groups of this process, and to those that hold them [byte]."""
     lines = own.read_text().splitlines() if own.exists() else []
     for line in lines:
         _, controllers, path = line.split(":", 2)

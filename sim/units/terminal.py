@@ -1,4 +1,4 @@
-"""What is printed on a terminal: texts from wherever, of which it takes nothing for a command, and tables."""
+"""Output on a terminal: texts from wherever, of which it takes nothing for a command, and tables."""
 
 import io
 import sys
@@ -26,7 +26,7 @@ def say(text: str = "", err: bool = False) -> None:
 
 
 def usage(fault: click.ClickException) -> str:
-    """What click says of a command that cannot be understood."""
+    """Words on a command that cannot be understood."""
     shown = io.StringIO()
     fault.show(shown)
     return shown.getvalue().rstrip("\n")

@@ -10,37 +10,12 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
-from helpers.commands import sim
+from helpers.commands import SCENE as SCENE_OF_A_SECOND, sim
 
 import sim as package
 from sim.plots import field
 
-SCENE = """\
-name = "a scene"
-[clock]
-duration = "0.4 s"
-step = "0.1 s"
-[solid]
-shear_modulus = "1.6 MPa"
-[sphere]
-radius = "2 mm"
-[adhesion]
-work = "42 mJ/m^2"
-[drive]
-model = "ramp"
-from = "1 mm/s"
-to = "20 mm/s"
-[bonds]
-model = "counted"
-critical_speed = "10 mm/s"
-rebinding_rate = "500 1/s"
-sites = 50
-stress = "0.3 MPa"
-[contact]
-load = "4 mN"
-[ensemble]
-members = 3
-"""
+SCENE = SCENE_OF_A_SECOND.replace('"1 s"', '"0.4 s"')
 MAP = """
 [shear]
 model = "mean"

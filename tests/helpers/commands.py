@@ -7,6 +7,34 @@ from click.testing import CliRunner
 
 from sim import cli
 
+#: A small scene, some of whose parts are random.
+SCENE = """\
+name = "a scene"
+[clock]
+duration = "1 s"
+step = "0.1 s"
+[solid]
+shear_modulus = "1.6 MPa"
+[sphere]
+radius = "2 mm"
+[adhesion]
+work = "42 mJ/m^2"
+[drive]
+model = "ramp"
+from = "1 mm/s"
+to = "20 mm/s"
+[bonds]
+model = "counted"
+critical_speed = "10 mm/s"
+rebinding_rate = "500 1/s"
+sites = 50
+stress = "0.3 MPa"
+[contact]
+load = "4 mN"
+[ensemble]
+members = 3
+"""
+
 
 def sim(*arguments):
     """A command as ``main`` runs it, in this process: exit code, output, errors."""
