@@ -1,18 +1,27 @@
 """Rows of whole commands, as processes of their own: their start, a first run, the gallery, a large run; and files."""
 
+import subprocess
+import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
 
 import sim
-from benchmarks.compare import LOAD, RAMP, RATE
+from benchmarks.compare import BANDED, LOAD, RAMP, RATE
 from benchmarks.scenes import field, loaded, scene
-from benchmarks.timing import Bench, Beside, Row, absolute, spent, told
+from benchmarks.timing import Bench, Beside, Row, absolute, middle, spent, told
+from sim.ensemble import bounds, simulate
+from sim.ensemble.part_files import MemoryParts, PartFiles
+from sim.ensemble.plan import Plan
+from sim.ensemble.preview import tried
 
 #: What a command cannot do without now, and what else none could in 0.1.0, when the goals were set.
 CHECKED, OLDER = "tomllib, click, numpy, numba, pydantic", ", scipy.special, pint"
 STARTER = str(Path(sim.__file__).parent / "starter.toml")
+DRAWN = '[record]\nmaps = ["5 ms", "10 ms", "15 ms", "20 ms"]\nmap_members = 2\n'
+SWEPT = '[sweep]\n"contact.load" = { from = "1 mN", to = "40 mN", count = 2000, scale = "linear" }\n'
 GALLERY = Path(__file__).parent.parent / "scenarios"
 
 
@@ -83,6 +92,49 @@ def large(bench: Bench) -> list[Row]:
     ]
 
 
+def workers(bench: Bench) -> list[Row]:
+    """Two processes that share a run, beside two runs of half of it side by side, by the clock."""
+    half, steps = bench.of((4096, 40_000), (2, 20))
+    together, apart = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        for members in (half, 2 * half):
+            (Path(folder) / f"{members}.toml").write_text(scene(members, steps, steps // 20, RAMP, RATE, BANDED, LOAD))
+        arguments = sys.executable, "-m", "sim", "run", "--force", "--quiet"
+        whole = [[*arguments, f"{folder}/{2 * half}.toml", "-o", f"{folder}/x.nc", "-j", "2"]]
+        halves = [[*arguments, f"{folder}/{half}.toml", "-o", f"{folder}/{i}.nc", "-j", "1"] for i in range(2)]
+        for _ in range(bench.of(3, 1)):
+            for commands, times in ((whole, together), (halves, apart)):
+                began = time.monotonic()
+                for one in [subprocess.Popen(command) for command in commands]:
+                    one.wait()
+                times.append(time.monotonic() - began)
+    medians = [float(np.median(times)) for times in (together, apart)]
+    ratios = middle(np.array(together) / apart)
+    ours = "`sim run -j 2` of 8,192 banded members, 40,000 steps, by the clock"
+    return [Row(ours, "two runs with `-j 1` of 4,096 members each, at once", "as long", 1.11, ratios, medians)]
+
+
+def parts(bench: Bench) -> list[Row]:
+    """What it costs to keep on the disk what is computed, block by block."""
+    rows = []
+    for every in (20, 1):
+        plan = Plan.of(loaded(scene(*bench.of((256, 20_000), (2, 20)), every, RAMP, RATE, BANDED, LOAD)))
+
+        def kept(plan: Plan = plan) -> None:
+            with tempfile.TemporaryDirectory() as folder:
+                simulate.simulate(plan, PartFiles(Path(folder)))
+
+        often = "every step" if every == 1 else f"each {every}th step"
+        beside = Beside(
+            "the same without the disk",
+            lambda plan=plan: simulate.simulate(plan, MemoryParts()),
+            goal=1.02 if every > 1 else None,
+            bound=True,
+        )
+        rows += bench.compare(f"blocks of 256 banded members kept as parts, {often} recorded", kept, beside, turns=7)
+    return rows
+
+
 def memory(bench: Bench) -> list[Row]:
     """The fixed cost of a run in memory: one step of the simplest scene."""
     one = loaded(scene(1, 1, 1, LOAD))
@@ -102,3 +154,40 @@ def files(bench: Bench) -> list[Row]:
             sizes[packed] = file.stat().st_size / 1e6
     beside = f"uncompressed {sizes['none']:.3g} MB, to six digits {sizes['digits']:.3g} MB"
     return [absolute("file of pdms_lens, compressed as by default", [sizes["zlib"]], "MB", None, beside)]
+
+
+def estimates(bench: Bench) -> list[Row]:
+    """What is known of runs before they start, beside what they then take: the gallery, and large runs of each kind."""
+    large = {
+        "modal, 512²": scene(8, 500, 10, RAMP, RATE, field("modal", 512), LOAD),
+        "maps of 1024²": scene(2, 20, 1, RAMP, RATE, field("mapped", 1024), LOAD, DRAWN),
+        "2000 points": scene(4, 10, 1, RAMP, RATE, BANDED, LOAD, SWEPT),
+        "10⁶ records": scene(1, 1_000_000, 1, RAMP, RATE, BANDED, LOAD),
+        "256 members × 1001 records": scene(256, 10_000, 10, RAMP, RATE, BANDED, LOAD),
+        "2560 members × 1001 records": scene(2560, 10_000, 10, RAMP, RATE, BANDED, LOAD),
+    }
+    ratios: dict[str, dict[str, float]] = {"CPU time": {}, "memory of the largest process": {}, "size of the file": {}}
+    if not bench.quick:
+        bench.command("warm")
+    with tempfile.TemporaryDirectory() as folder:
+        for name, text in bench.of(large, {}).items():
+            (Path(folder) / f"{name}.toml").write_text(text, encoding="utf-8")
+        for path in [*sorted(GALLERY.glob("*.toml")), *Path(folder).glob("*.toml")][bench.of(0, -1) :]:
+            output = Path(folder) / "x.nc"
+            arguments = "run", str(path), "-o", str(output), "--force", "-j", "1"
+            plan = Plan.of(sim.load(path))
+            known = bounds.takes(plan, 1, tried(plan) or 1.0)
+            seconds, megabytes = bench.command(*arguments)
+            found = seconds / known.cpu, 2**20 * megabytes / known.memory, output.stat().st_size / known.file
+            for kind, ratio in zip(ratios.values(), found, strict=True):
+                kind[path.stem] = ratio
+    return [_beside_estimate(kind, each) for kind, each in ratios.items()]
+
+
+def _beside_estimate(kind: str, each: dict[str, float]) -> Row:
+    """Factors by which runs differ from what was known of them, up or down, with the largest three."""
+    off = {name: max(ratio, 1.0 / ratio) for name, ratio in each.items()}
+    worst = sorted(off, key=lambda name: -off[name])[:3]
+    beside = f"{len(off)} scenes; farthest off: {', '.join(f'{name} {each[name]:.2f}' for name in worst)}"
+    name = f"`sim run` beside what `sim check` says: {kind}"
+    return Row(name, beside, "times off", 1.5, middle(list(off.values())), [])
