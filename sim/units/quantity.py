@@ -70,9 +70,12 @@ def _written(unit: str) -> str:
 
 @functools.lru_cache(maxsize=1)
 def _known_scales() -> tuple[Path, dict[str, float]]:
-    """Factors between units that pint has found before, by both texts, and their file."""
-    path = kept.folder() / f"units-{version('pint')}"
-    return path, json.loads(kept.read(path) or b"{}")
+    """Factors between units that pint has found before, by both texts, and their file.
+
+    Those of common units come with the package, so that a first run need not wait for pint.
+    """
+    path, common = kept.folder() / f"units-{version('pint')}", Path(__file__).with_name("scales.json")
+    return path, json.loads(common.read_text(encoding="utf-8")) | json.loads(kept.read(path) or b"{}")
 
 
 @functools.lru_cache(maxsize=1024)

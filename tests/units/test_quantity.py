@@ -197,23 +197,23 @@ def _forget():
 def test_units_are_read_where_the_cache_folder_is_a_file(fresh_registry, monkeypatch):
     (fresh_registry / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(fresh_registry / "file"))
-    assert LENGTH.read("2 mm") == 2e-3
+    assert LENGTH.read("2 dm") == 0.2
 
 
 def test_units_are_read_where_the_cache_is_read_only(fresh_registry):
     os.chmod(fresh_registry, 0o500)
-    assert LENGTH.read("2 mm") == 2e-3
+    assert LENGTH.read("2 dm") == 0.2
     os.chmod(fresh_registry, 0o700)
 
 
 def test_units_are_read_where_the_cache_is_broken(fresh_registry):
-    assert LENGTH.read("2 mm") == 2e-3
+    assert LENGTH.read("2 dm") == 0.2
     kept = [path for path in fresh_registry.rglob("*") if path.is_file()]
     assert kept
     for path in kept:
         path.write_bytes(path.read_bytes()[:7])
     _forget()
-    assert LENGTH.read("3 mm") == 3e-3
+    assert LENGTH.read("3 dm") == 0.3
 
 
 def test_units_are_read_where_the_disk_is_full(fresh_registry, monkeypatch):
@@ -221,4 +221,4 @@ def test_units_are_read_where_the_disk_is_full(fresh_registry, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(pickle, "dump", full)
-    assert LENGTH.read("2 mm") == 2e-3
+    assert LENGTH.read("2 dm") == 0.2
