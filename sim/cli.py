@@ -300,6 +300,7 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     from sim.analysis import scene
     from sim.units.refusals import BadInput
 
+    _without_other_arrays()
     opened: Any = scene.open
     if not path.exists() and path.with_name(f"{path.name}.parts").is_dir():
         from sim.ensemble.unfinished import dataset as opened
@@ -317,6 +318,17 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
             if "NetCDF" not in str(trouble):
                 raise
             raise BadInput([f"{path}: {scene.BROKEN}"]) from None
+
+
+def _without_other_arrays() -> None:
+    """Let xarray find no arrays of pint and dask, whose import takes a second and which no command makes of a file."""
+    import xarray as xr
+
+    absent = {name for name in ("pint", "dask.array") if name not in sys.modules}
+    sys.modules |= dict.fromkeys(absent)  # type: ignore[arg-type]
+    xr.Dataset(coords={"t": [0.0]}).t.notnull()
+    for name in absent:
+        del sys.modules[name]
 
 
 @cli.command()
