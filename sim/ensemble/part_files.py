@@ -293,6 +293,9 @@ def gathered(target: Path) -> Iterator[tuple[PartFiles, dict[Shard, PartFiles]]]
     """
     folder = checksums.parts_of(target)
     shards = {shard: PartFiles(path) for shard, path in _shards(folder).items()}
+    for shard, path in _named_shards(folder).items():
+        if shard not in shards and (manifest := path / _MANIFEST).exists():
+            raise BadInput([f"{manifest} is damaged; move {path} away and run that shard again"])
     if not shards and not manifest_of(folder):
         raise BadInput([f"{folder}: there are no shards of a run; name the output that `sim run --shard` was given"])
     if len(divisions := {of for _, of in shards}) > 1:
@@ -314,10 +317,15 @@ def folders(target: Path) -> list[Path]:
 
 def _shards(folder: Path) -> dict[Shard, Path]:
     """Folders of the shards in that of a run, in order."""
+    return {shard: path for shard, path in _named_shards(folder).items() if manifest_of(path)}
+
+
+def _named_shards(folder: Path) -> dict[Shard, Path]:
+    """Folders with names of shards, in order, whether or not they hold a manifest."""
     found = {}
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         for path in folder.iterdir():
-            if (numbers := _SHARD.fullmatch(path.name)) and not path.is_symlink() and manifest_of(path):
+            if (numbers := _SHARD.fullmatch(path.name)) and not path.is_symlink():
                 found[int(numbers[1]), int(numbers[2])] = path
     return dict(sorted(found.items()))
 
@@ -358,7 +366,7 @@ def _make(whole: Path, folder: Path) -> None:
         if path.is_symlink() or unknown:
             raise OutputExists(f"{path} is not the folder of a run; move it away or name another output")
     if folder != whole and _MANIFEST in names[whole]:
-        raise OutputExists(f"{whole} holds an unfinished run; go on with it by --resume without --shard")
+        raise OutputExists(f"{whole} holds an unfinished run; go on by --resume without --shard, or move it away")
     if folder == whole and _shards(whole):
         raise OutputExists(f"{whole} holds shards of a run; put them together with `sim merge`, or move them away")
 
@@ -382,14 +390,15 @@ def _shallow(tree: Any) -> bool:
     return not inner
 
 
-def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
+def refuse_other(
+    path: Path, older: Manifest, wanted: Manifest, cure: str = "run what was begun, or begin anew with --force"
+) -> None:
     """Refuse to go on with another scenario, other versions or other code, naming what differs."""
     was, now = _decisive(older), _decisive(wanted)
     changed = [key for key in sorted({*was, *now}) if was.get(key) != now.get(key)]
     if changed:
         some = [f"{key} was {_short(was.get(key))}, is {_short(now.get(key))}" for key in changed[:_MOST_NAMED]]
         more = f" and {len(changed) - len(some)} more" if len(changed) > len(some) else ""
-        cure = "run what was begun, or begin anew with --force"
         raise BadInput([f"{path} is of another run: {'; '.join(some)}{more}; {cure}"])
 
 

@@ -71,7 +71,7 @@ def merge(target: Path, replace: bool = False) -> Path:
         plan = Plan.of(scenario)
         now = first | {"run": identity(attributes(plan)), "code": digest().hex()}
         for folder, manifest in manifests.items():
-            refuse_other(folder, manifest, now)
+            refuse_other(folder, manifest, now, "move it away, and run that shard again as the others")
         if lacking := _lacking(plan, whole, shards):
             cure = "run it with --resume, then merge again"
             more = ["..."] if lacking[_MOST_NAMED:] else []

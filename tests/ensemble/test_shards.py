@@ -82,7 +82,7 @@ def test_a_shard_does_not_begin_where_a_whole_run_is_unfinished(tmp_path, whole)
     with pytest.raises(ZeroDivisionError):
         ensemble.run(sample(), path, progress=lambda done: 1 / 0)
     for how in ({"resume": True}, {"replace": True}, {}):
-        with pytest.raises(OutputExists, match="holds an unfinished run; go on with it by --resume without --shard"):
+        with pytest.raises(OutputExists, match="holds an unfinished run; go on by --resume without --shard"):
             ensemble.run(sample(), path, **how, shard=(1, 2))
     assert names(path.with_name("out.nc.parts")) == ["lock", "manifest.json"]
     assert ensemble.run(sample(), path, resume=True).read_bytes() == whole
@@ -112,8 +112,13 @@ def test_shards_of_different_runs_are_not_put_together(tmp_path):
     path = tmp_path / "out.nc"
     ensemble.run(sample(), path, shard=(1, 2))
     ensemble.run(sample(seed=6), path, shard=(2, 2))
-    with pytest.raises(BadInput, match=r"2-of-2 is of another run: scenario.seed was 6, is 5"):
+    with pytest.raises(BadInput, match=r"2-of-2 is of another run: scenario.seed was 6, is 5; move it away, and run"):
         merge(path)
+    damaged = tmp_path / "out.nc.parts" / "2-of-2" / "manifest.json"
+    damaged.write_bytes((content := damaged.read_bytes())[:-1])
+    with pytest.raises(BadInput, match=r"2-of-2/manifest.json is damaged; move .*2-of-2 away and run that shard again"):
+        merge(path)
+    damaged.write_bytes(content)
     ensemble.run(sample(), path, shard=(2, 3))
     with pytest.raises(BadInput, match="holds shards of 2 and of 3; move away"):
         merge(path)
