@@ -2,7 +2,7 @@
 
 import inspect
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from typing import Any, cast
 
 import numpy as np
@@ -52,8 +52,9 @@ def faults_across(parts: dict[str, Any], built: bool = True) -> Faults:
         forces = "shear" in parts and parts["shear"].spectrum.bond_made
         parts = parts | {"bonds": parts["bonds"].chosen(math.pi * parts["radius"] ** 2, forces)}
     for check, reads in _CHECKS.items():
-        if parts.keys() >= reads.keys():
-            yield from check(*(parts[name] for name in reads))
+        found = [parts[name] for name in reads if name in parts]
+        if len(found) == len(reads):
+            yield from check(*found)
 
 
 def _table_too_short(drive: Drive, clock: Clock) -> Faults:
@@ -157,8 +158,8 @@ def _shear_faults(
 
 
 #: Each check with the names of the parts that it reads.
-_CHECKS: dict[Callable[..., Faults], Mapping[str, Any]] = {
-    check: inspect.signature(check).parameters
+_CHECKS: dict[Callable[..., Faults], list[str]] = {
+    check: list(inspect.signature(check).parameters)
     for check in (_table_too_short, _control_too_short, _cannot_be_driven, _no_stress, _no_forces, _no_adhesion)
     + (_reversible_under_a_drive, _no_maps, _unrecorded_maps, _too_many_map_members, _shear_faults)
 }

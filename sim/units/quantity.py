@@ -61,6 +61,7 @@ def _units() -> Any:
         return pint.UnitRegistry()
 
 
+@functools.lru_cache(maxsize=1024)
 def _written(unit: str) -> str:
     """A unit's text as pint reads it; ValueError for what is no product of names with small powers."""
     if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
@@ -311,7 +312,7 @@ class Quantity:
         inside = next((number for number in (*usual, *bounds) if self._holds(number)), 1.0)
         return f"{inside:g}" if self.unit == "1" else f'"{inside:g} {self.unit}"'
 
-    @property
+    @functools.cached_property
     def _bounds(self) -> dict[str, float]:
         return {name: getattr(self, name) for name in _BOUNDS}
 
