@@ -341,7 +341,10 @@ def _without_other_arrays() -> None:
 def converge(
     scenario: Path, output: Path | None, budget: str, tolerance: str | None, changes: tuple[str, ...], force: bool
 ) -> None:
-    """Speed against error for this scene: models, tolerances and clock steps, and which to choose."""
+    """Speed against error for this scene: models, tolerances and clock steps, and which to choose.
+
+    One core is used: settings that run side by side would disturb each other's times.
+    """
     from sim.scenario.reader import load
 
     seconds = _quantity(budget, "--budget", "s", above=0)

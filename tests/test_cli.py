@@ -77,7 +77,12 @@ def test_check_and_a_run_without_its_table_import_neither_xarray_nor_figures_nor
 
 
 @pytest.mark.parametrize(
-    "orders", [[signal.SIGINT], [signal.SIGTERM], [signal.SIGUSR1], [signal.SIGINT, signal.SIGTERM]]
+    "orders",
+    [
+        [signal.SIGTERM],
+        [signal.SIGINT, signal.SIGTERM],
+        *(pytest.param([order], marks=pytest.mark.verify) for order in (signal.SIGINT, signal.SIGUSR1)),
+    ],
 )
 def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     points = 'sweep={"contact.load"={from=1e-3, to=4e-3, count=1000}}'
