@@ -11,6 +11,7 @@ tangential force, tau = T/(pi a^2) the mean shear stress and E* the contact modu
     ``G + 6 tau^2 a/(pi E*) = w``       uniform stress, reversible, constant stress
     ``G + alpha 6 tau^2 a/(pi E*) = w`` a reversible share alpha (``sim.laws.reversible``)
     ``A = A0 - alpha_S T^2``            Sahli et al. 2018, measured
+    ``G + G_s = w f(psi)``              mixed-mode fracture (``sim.laws.mixed_mode``), G_s as Savkoor & Briggs'
 
 MCD is Menga, Carbone & Dini. The two laws at a constant force differ by 32/(3 pi^2) = 1.08 in energy;
 both have the radius of the last but one at alpha = pi^2/32 and 1/3, but are less stable, for T stays
@@ -27,6 +28,12 @@ import numpy as np
 
 from sim.laws.jkr import hertz_radius_at_indentation, hertz_radius_at_load, radius_at_indentation, radius_at_load
 from sim.laws.jkr.scales import twice_pull_off
+from sim.laws.mixed_mode import (
+    scaled_angle_at_indentation,
+    scaled_angle_at_load,
+    scaled_tangent_at_indentation,
+    scaled_tangent_at_load,
+)
 from sim.laws.reversible import (
     compressible,
     crossing_at_displacement,
@@ -41,6 +48,7 @@ _STICK = 1.5  # of T^2 in the energy balance at a load: full stick,
 _UNIFORM = 16.0 / math.pi**2  # and uniform stress
 _AS_STICK = math.pi**2 / 32.0  # alpha at a constant stress that gives the same radii
 _AS_UNIFORM = 1.0 / 3.0
+_HALVINGS = 40  # at most, of a force, until it is that of a stress
 
 
 @device
@@ -325,6 +333,43 @@ def sahli_at_load(load, work, tangential_force, shrinkage, sphere_radius, modulu
     return _measured_at_force(jkr, hertz, shrinkage, tangential_force)
 
 
+def mixities(shrinkage, load, work, sphere_radius, modulus, poisson_ratio=0.5):
+    """Mixity lambda of each mixed-mode theory that shrinks as the law of Sahli et al. at small forces.
+
+    Parameters
+    ----------
+    shrinkage : float or array
+        alpha_S of ``A = A0 - alpha_S T^2`` [m^2/N^2], measured at this load.
+    load, work, sphere_radius, modulus, poisson_ratio : float or array
+        P [N], w [J/m^2], R [m], E* [Pa], nu [1].
+
+    Returns
+    -------
+    dict of array
+        lambda [1] by theory: ``"scaled_angle"``, ``"shear_share"`` and ``"scaled_tangent"``; nan where the contact
+        shrinks more than by Savkoor & Briggs, or grows.
+
+    Notes
+    -----
+    ``alpha_S/alpha_SB`` is ``lambda (2 - lambda)`` of the first theory and lambda of the others. Contacts of other
+    loads on the same rig have given other lambdas: it is no constant of the interface.
+
+    Examples
+    --------
+    >>> half = 0.5 * savkoor_briggs_shrinkage(4e-3, 0.042, 2e-3, 6.4e6)
+    >>> for name, mixity in mixities(half, 4e-3, 0.042, 2e-3, 6.4e6).items():
+    ...     print(f"{name:14s} {mixity:.3f}")
+    scaled_angle   0.293
+    shear_share    0.500
+    scaled_tangent 0.500
+    """
+    full = savkoor_briggs_shrinkage(load, work, sphere_radius, modulus, poisson_ratio)
+    with np.errstate(all="ignore"):
+        share = np.asarray(shrinkage, dtype=float) / full
+    share = np.where((share >= 0.0) & (share <= 1.0), share, math.nan)
+    return {"scaled_angle": share / (1.0 + np.sqrt(1.0 - share)), "shear_share": share, "scaled_tangent": share}
+
+
 def _at_load(load, work, sphere_radius, modulus):
     """Radii of JKR and Hertz at a load, the load and the work."""
     jkr = radius_at_load(load, work, sphere_radius, modulus)
@@ -337,7 +382,9 @@ def _at_indentation(indentation, work, sphere_radius, modulus):
     return jkr, hertz_radius_at_indentation(indentation, sphere_radius), indentation, work
 
 
-def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, shrinkage=math.nan):
+def compare_at_load(
+    stress, load, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, shrinkage=math.nan, mixity=0.5
+):
     """Contact radius at a load and a mean shear stress by every theory.
 
     Parameters
@@ -348,13 +395,16 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
         alpha of ``"fraction"`` [1].
     shrinkage : float or array
         alpha_S of ``"sahli"`` [m^2/N^2]; nan, unknown, leaves its radius nan.
+    mixity : float or array
+        lambda [1] of the mixed-mode theories.
 
     Returns
     -------
     dict of array
         a [m] by theory: ``"jkr"``, ``"hertz"``, ``"uncorrected"`` (MCD 2018), ``"savkoor_briggs"``,
-        ``"reversible_force"``, ``"reversible_stress"``, ``"fraction"`` and ``"sahli"``. Each theory's
-        tangential force is ``pi a^2 tau`` with its own radius.
+        ``"reversible_force"``, ``"reversible_stress"``, ``"fraction"``, ``"sahli"`` and the mixed-mode
+        ``"scaled_angle"``, ``"shear_share"`` and ``"scaled_tangent"``. Each theory's tangential force is
+        ``pi a^2 tau`` with its own radius.
 
     Notes
     -----
@@ -373,26 +423,51 @@ def compare_at_load(stress, load, work, sphere_radius, modulus, poisson_ratio=0.
     reversible_force  1.7371 1.6249
     reversible_stress 1.7371 1.3975
     fraction          1.7371 1.7036
+    shear_share       1.7371 1.6854
+    scaled_angle      1.7371 1.6611
+    scaled_tangent    1.7371 1.6917
     """
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
     jkr, hertz, *held = _at_load(load, work, sphere_radius, modulus)
     radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_load(load, work, stress, *rest)}
     radii["sahli"] = _measured_at_stress(jkr, hertz, shrinkage, stress)
-    return _with_shares(radii, shrunk_at_load, (*held, stress), reversible, rest)
+    _add_shares(radii, shrunk_at_load, (*held, stress), reversible, mixity, rest)
+    laws = {"scaled_angle": scaled_angle_at_load, "scaled_tangent": scaled_tangent_at_load}
+    return _with_own_forces(radii, laws, held, stress, mixity, rest)
 
 
-def compare_at_indentation(stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1):
+def compare_at_indentation(
+    stress, indentation, work, sphere_radius, modulus, poisson_ratio=0.5, reversible=0.1, mixity=0.5
+):
     """Contact radius [m] at an indentation by theory, as ``compare_at_load`` but for ``"sahli"``, measured at loads."""
     rest, stress = (sphere_radius, modulus, poisson_ratio), np.asarray(stress, dtype=float)
-    jkr, hertz, *_ = _at_indentation(indentation, work, sphere_radius, modulus)
+    jkr, hertz, *held = _at_indentation(indentation, work, sphere_radius, modulus)
     radii = {"jkr": jkr, "hertz": hertz, "uncorrected": uncorrected_at_indentation(indentation, work, stress, *rest)}
-    return _with_shares(radii, shrunk_at_displacement, (indentation, math.inf, work, stress), reversible, rest)
+    _add_shares(radii, shrunk_at_displacement, (indentation, math.inf, work, stress), reversible, mixity, rest)
+    laws = {"scaled_angle": scaled_angle_at_indentation, "scaled_tangent": scaled_tangent_at_indentation}
+    return _with_own_forces(radii, laws, held, stress, mixity, rest)
 
 
-def _with_shares(radii, shrunk, held, reversible, rest):
-    """Radii by theory with those that differ in the reversible share and in what is held, all of one shape."""
+def _add_shares(radii, shrunk, held, reversible, mixity, rest):
+    """Radii by theory with those that differ in the reversible share and in what is held."""
     shares = {"savkoor_briggs": (_AS_STICK, 4.0), "reversible_force": (_AS_UNIFORM, 4.0)}
     shares |= {"reversible_stress": (1.0, 0.0), "fraction": (reversible, 0.0)}
+    shares["shear_share"] = (_AS_STICK * np.asarray(mixity), 4.0)
     for name, share in shares.items():
         radii[name] = shrunk(radii["jkr"], radii["hertz"], *held, *share, *rest)
+
+
+def _with_own_forces(radii, laws, held, stress, mixity, rest):
+    """Radii by theory, all of one shape, with those by laws at a force, each with the force of its own radius."""
+    stress = np.abs(stress)
+    for name, radius_at in laws.items():
+        with np.errstate(all="ignore"):
+            high = np.pi * radii["jkr"] ** 2 * stress
+            low = np.zeros_like(high)
+            for _ in range(_HALVINGS):
+                force = 0.5 * (low + high)
+                own = np.pi * radius_at(*held, force, mixity, *rest) ** 2 * stress  # falls as the force grows
+                low = np.fmax(low, np.fmin(own, force))
+                high = np.where(own > force, np.fmin(high, own), force)
+        radii[name] = radius_at(*held, high, mixity, *rest)
     return dict(zip(radii, (np.array(a) for a in np.broadcast_arrays(*radii.values())), strict=True))

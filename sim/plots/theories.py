@@ -22,10 +22,16 @@ _THEORIES: dict[str, tuple[str, str, Any]] = {
     "reversible_force": ("reversible, force held", style.LINES[5], "--"),
     "reversible_stress": ("reversible, stress held", style.LINES[2], "-"),
     "fraction": ("a fraction {share:.3g} reversible", style.LINES[3], "-."),
+    "scaled_angle": (r"mixed mode $1+\tan^2((1-\lambda)\psi)$", style.LINES[6], "-"),
+    "shear_share": (r"mixed mode $1/(1-(1-\lambda)\sin^2\psi)$", style.LINES[6], "--"),
+    "scaled_tangent": (r"mixed mode $1+(1-\lambda)\tan^2\psi$, $\lambda=$ {mixity:.3g}", style.LINES[6], "-."),
 }
 
 #: Reversible fraction that is drawn where the dataset has none of its own.
 _FRACTION = 0.1
+
+#: Mixity lambda of the mixed-mode theories, halfway between JKR and Savkoor & Briggs.
+_MIXITY = 0.5
 
 #: Stresses at which theories are evaluated, and the widest area drawn, in JKR's.
 _FINE, _WIDEST = 1500, 1.6
@@ -53,7 +59,7 @@ class Case(NamedTuple):
 
     def radii(self, stress: np.ndarray) -> dict[str, np.ndarray]:
         """Contact radius at shear stresses [Pa] by theory [m]."""
-        found = _CONTROLS[self.held][0](stress, *self[1:])
+        found = _CONTROLS[self.held][0](stress, *self[1:], mixity=_MIXITY)
         return {name: radius for name, radius in found.items() if name in _THEORIES}
 
     @property
@@ -153,7 +159,7 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
 def _panel(panel: Axes, case: Case, along: dict[str, np.ndarray], areas: dict[str, np.ndarray], factor: float) -> None:
     """Every theory along its own x, as far as its adhesive branch goes."""
     for name, (words, colour, line) in _THEORIES.items():
-        values, label = factor * areas[name], words.format(share=case.reversible)
+        values, label = factor * areas[name], words.format(share=case.reversible, mixity=_MIXITY)
         if name in ("jkr", "hertz"):  # whatever the shear
             panel.axhline(values[0], linestyle=line, label=label, **style.GREY)
             continue

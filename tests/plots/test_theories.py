@@ -50,7 +50,8 @@ def curve_of(panel, name):
 )
 def test_every_theory_is_drawn_as_far_as_adhesion_holds(contact, law, value):
     stresses, forces = plots.draw(plain(contact=contact), "theories").axes
-    for name in ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction"):
+    names = ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction")
+    for name in (*names, "scaled_angle", "shear_share", "scaled_tangent"):
         stress, area = curve_of(stresses, name)
         factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
         radii = law(factor * stress, value, *NUMBERS)
@@ -117,7 +118,7 @@ def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
 def test_theories_are_named():
     (legend,) = rendered(plots.draw(plain(), "theories")).legends
     names = [text.get_text() for text in legend.get_texts()]
-    assert len(names) == len(set(names)) == 8
+    assert len(names) == len(set(names)) == 11
     assert names[-1] == "simulated" and "a fraction 0.1 reversible" in names
 
 
