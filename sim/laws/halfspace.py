@@ -18,7 +18,7 @@ import math
 import numpy as np
 import scipy
 
-from sim.numerics.grid import Grid
+from sim.numerics.grid import lattice_of
 from sim.numerics.jit import device, law
 
 # Above this parameter m the hypergeometric series lose digits near m = 1, below it the elliptic
@@ -417,13 +417,48 @@ def masking_amplitude(work, wavelength, shear_modulus, angle=0.0, poisson_ratio=
     return math.sqrt(8.0 * math.pi * shear_modulus * work / (wavelength * slope))
 
 
+@law
+def noise_energy(rms, pixel, shear_modulus, poisson_ratio=0.5):
+    """Energy per area that white noise of a map's pixels seems to store.
+
+    Parameters
+    ----------
+    rms : float or array
+        s, root mean square of the noise [Pa], independent from pixel to pixel.
+    pixel : float or array
+        p, side of a square pixel [m].
+    shear_modulus, poisson_ratio : float or array
+        G [Pa], nu [1].
+
+    Returns
+    -------
+    float or array
+        Delta Gamma [J/m^2], which a measurement adds to that of the stress.
+
+    Notes
+    -----
+    The density ``s^2 p^2`` over the square of wavevectors below Nyquist: ``(2 - nu) asinh(1) s^2 p/(2 pi G)``.
+
+    Examples
+    --------
+    >>> print(f"{noise_energy(1.0, 1.0, 1.0):.6f}")
+    0.210412
+    """
+    return (2.0 - poisson_ratio) * math.asinh(1.0) / (2.0 * math.pi) * rms * rms * pixel / shear_modulus
+
+
 @functools.lru_cache(maxsize=4)
-def _unit_compliance(cell, points, poisson_ratio):
-    """Grid of a cell and its compliance at unit shear modulus on the half spectrum."""
-    grid = Grid(cell=cell, points=points)
-    table = compliance(*grid.wavevectors, 1.0, poisson_ratio)
+def _unit_compliance(cell, shape, poisson_ratio):
+    """Lattice of a cell and its compliance at unit shear modulus on the half spectrum."""
+    lattice = lattice_of(cell, shape)
+    table = compliance(*lattice.wavevectors, 1.0, poisson_ratio)
     table.flags.writeable = False
-    return grid, table
+    return lattice, table
+
+
+def _sides(cell):
+    """One or both sides of a cell, hashable."""
+    return float(cell) if np.ndim(cell) == 0 else (float(cell[0]), float(cell[1]))
 
 
 def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
@@ -431,10 +466,10 @@ def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
 
     Parameters
     ----------
-    field : array, shape (..., points, points)
-        Shear stress along x [Pa]; axis -2 is x, axis -1 is y; an odd or even number of points.
-    cell : float
-        Side of the periodic cell [m].
+    field : array, shape (..., nx, ny)
+        Shear stress along x [Pa]; axis -2 is x, axis -1 is y; odd or even numbers of points.
+    cell : float or (float, float)
+        Sides of the periodic cell along x and y [m], one for both if they are equal.
     shear_modulus : float or array, shape (...)
         G [Pa]; an array goes with the leading axes of the field.
     poisson_ratio : float
@@ -453,13 +488,13 @@ def displacement(field, cell, shear_modulus, poisson_ratio=0.5):
     1.000
     """
     field = np.asarray(field, dtype=float)
-    grid, unit = _unit_compliance(float(cell), field.shape[-1], float(poisson_ratio))
+    lattice, unit = _unit_compliance(_sides(cell), field.shape[-2:], float(poisson_ratio))
     fields, moduli = np.broadcast_arrays(field, np.asarray(shear_modulus, dtype=float)[..., None, None])
     displaced = np.empty(fields.shape)
     for index in np.ndindex(fields.shape[:-2]):
         spectrum = scipy.fft.rfft2(fields[index])
-        spectrum *= unit / (moduli[*index, 0, 0] * grid.points**2)
-        grid.superpose(spectrum, spectrum, displaced[index])
+        spectrum *= unit / (moduli[*index, 0, 0] * (lattice.shape[0] * lattice.shape[1]))
+        lattice.superpose(spectrum, spectrum, displaced[index])
     return displaced
 
 
@@ -478,8 +513,8 @@ def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
 
     Notes
     -----
-    By Parseval ``(1/2L^4) sum over q of G_x(q) |tau(q)|^2``, q = 0 left out: only the fluctuation
-    counts, never the mean. For a stress whose spectrum is smooth through q = 0 the periodic cell holds
+    By Parseval ``(1/2A^2) sum over q of G_x(q) |tau(q)|^2``, A the area of the cell, q = 0 left out: only the
+    fluctuation counts, never the mean. For a stress whose spectrum is smooth through q = 0 the periodic cell holds
     less than the infinite plane by ``(2 - nu)/(8 pi) 3.900265 C(0) /
     (G L)`` (0.23278 C(0)/(G L) at nu = 1/2).
 
@@ -493,5 +528,5 @@ def surface_energy(field, cell, shear_modulus, poisson_ratio=0.5):
     1.000
     """
     field = np.asarray(field, dtype=float)
-    grid, unit = _unit_compliance(float(cell), field.shape[-1], float(poisson_ratio))
-    return 0.5 * grid.weighted_power(field, unit) / (grid.cell**4 * np.asarray(shear_modulus))
+    lattice, unit = _unit_compliance(_sides(cell), field.shape[-2:], float(poisson_ratio))
+    return 0.5 * lattice.weighted_power(field, unit) / (lattice.area**2 * np.asarray(shear_modulus))

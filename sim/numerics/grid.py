@@ -1,4 +1,4 @@
-"""Periodic square cell: coordinates, wavevectors, the Fourier pair and Parseval's sum.
+"""Periodic cell, square or rectangular: coordinates, wavevectors, the Fourier pair and Parseval's sum.
 
 Conventions, once for the whole project. A field f(x, y) is an array (..., points, points): axis -2
 is x (the sliding direction), axis -1 is y, axes before them are members or times. Its spectrum is
@@ -24,8 +24,98 @@ def _read_only(array: np.ndarray) -> np.ndarray:
     return array
 
 
+class Lattice:
+    """Attributes of periodic cells: of ``sides`` [m] and ``shape`` along x and y."""
+
+    sides: tuple[float, float]
+    shape: tuple[int, int]
+
+    @property
+    def area(self) -> float:
+        """Area of the cell [m²]."""
+        return self.sides[0] * self.sides[1]
+
+    @property
+    def pixel(self) -> float:
+        """Area of a pixel [m²]."""
+        return self.area / (self.shape[0] * self.shape[1])
+
+    @cached_property
+    def wavevectors(self) -> tuple[np.ndarray, np.ndarray]:
+        """Components qx (points, 1) and qy (1, points//2 + 1) of the half spectrum [rad/m].
+
+        For an even number of points the Nyquist row carries qx = -pi/spacing and the Nyquist
+        column qy = +pi/spacing: only its modulus has a meaning there.
+        """
+        along, across = np.arange(self.shape[0]), np.arange(self.shape[1] // 2 + 1)
+        along[along > (self.shape[0] - 1) // 2] -= self.shape[0]
+        first, second = (2.0 * math.pi / side for side in self.sides)
+        return _read_only(first * along[:, None]), _read_only(second * across[None, :])
+
+    @cached_property
+    def multiplicity(self) -> np.ndarray:
+        """Wavevectors that a column of the half spectrum stands for, shape (points//2 + 1,).
+
+        2 (q and -q), but 1 for the first column and, for an even number of points, the last:
+        these hold both signs already.
+        """
+        count = np.full(self.shape[1] // 2 + 1, 2.0)
+        count[0] = 1.0
+        if self.shape[1] % 2 == 0:
+            count[-1] = 1.0
+        return _read_only(count)
+
+    def forward(self, field: np.ndarray) -> np.ndarray:
+        """Half spectrum [unit of the field x m^2] of a field, over the last two axes."""
+        return scipy.fft.rfft2(field) * self.pixel
+
+    def superpose(self, amplitudes: np.ndarray, between: np.ndarray, field: np.ndarray) -> None:
+        """Write the sum over all wavevectors of amplitude × exp(i q.x), of a half spectrum, to ``field``.
+
+        ``between`` has the shape of the amplitudes and is overwritten. Arrays used again save the system's time
+        for new ones, as long as the transforms themselves.
+        """
+        np.fft.ifft(amplitudes, axis=0, norm="forward", out=between)
+        np.fft.irfft(between, self.shape[1], axis=1, norm="forward", out=field)
+
+    def mode_sum(self, values: np.ndarray) -> np.ndarray:
+        """Sum over all wavevectors of a real, even function given on the half spectrum.
+
+        Every leading index is summed alone along one contiguous axis, so that a member's result
+        keeps its bits whatever the batch it stands in.
+        """
+        counted = np.ascontiguousarray(values * self.multiplicity)
+        return counted.reshape(*counted.shape[:-2], -1).sum(axis=-1)
+
+    def weighted_power(self, fields: np.ndarray, weight: np.ndarray) -> np.ndarray:
+        """Sum over all wavevectors of ``weight`` \\|f(q)\\|², for each field (..., m, n) of no more samples.
+
+        A smaller field stands at the corner of the cell, with zeros beyond. The weight, on the half
+        spectrum, is real and even. Every field is summed alone, and its spectrum is gone before the next.
+        """
+        # no name holds a spectrum, so that the next one takes its memory
+        sums = [
+            _weighted_power(scipy.fft.rfft2(field, s=self.shape), weight, self.multiplicity)
+            for field in fields.reshape(-1, *fields.shape[-2:])
+        ]
+        return np.reshape(sums, fields.shape[:-2]) * self.pixel**2
+
+    def mean_square(self, spectrum: np.ndarray) -> np.ndarray:
+        """Mean over the cell of the squared field, from its half spectrum (Parseval)."""
+        power = np.square(spectrum.real) + np.square(spectrum.imag)
+        return self.mode_sum(power) / self.area**2
+
+
 @dataclass(frozen=True)
-class Grid:
+class Rectangle(Lattice):
+    """Periodic cell of ``sides`` [m] along x and y with ``shape`` samples."""
+
+    sides: tuple[float, float]
+    shape: tuple[int, int]
+
+
+@dataclass(frozen=True)
+class Grid(Lattice):
     """Square periodic cell with points x points samples, an odd or an even number of them.
 
     Parameters
@@ -69,71 +159,33 @@ class Grid:
         """Coordinate of the samples along one side [m], shape (points,), from 0."""
         return _read_only(np.arange(self.points) * self.spacing)
 
-    @cached_property
-    def wavevectors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Components qx (points, 1) and qy (1, points//2 + 1) of the half spectrum [rad/m].
+    @property
+    def sides(self) -> tuple[float, float]:  # type: ignore[override]
+        """Sides of the cell along x and y [m]."""
+        return self.cell, self.cell
 
-        For an even number of points the Nyquist row carries qx = -pi/spacing and the Nyquist
-        column qy = +pi/spacing: only its modulus has a meaning there.
-        """
-        step = 2.0 * math.pi / self.cell
-        along = np.arange(self.points)
-        along[along > (self.points - 1) // 2] -= self.points
-        across = np.arange(self.points // 2 + 1)
-        return _read_only(step * along[:, None]), _read_only(step * across[None, :])
+    @property
+    def shape(self) -> tuple[int, int]:  # type: ignore[override]
+        """Samples along x and y."""
+        return self.points, self.points
 
-    @cached_property
-    def multiplicity(self) -> np.ndarray:
-        """Wavevectors that a column of the half spectrum stands for, shape (points//2 + 1,).
+    @property
+    def area(self) -> float:
+        """Area of the cell [m²]."""
+        return self.cell**2
 
-        2 (q and -q), but 1 for the first column and, for an even number of points, the last:
-        these hold both signs already.
-        """
-        count = np.full(self.points // 2 + 1, 2.0)
-        count[0] = 1.0
-        if self.points % 2 == 0:
-            count[-1] = 1.0
-        return _read_only(count)
+    @property
+    def pixel(self) -> float:
+        """Area of a pixel [m²]."""
+        return self.spacing**2
 
-    def forward(self, field: np.ndarray) -> np.ndarray:
-        """Half spectrum [unit of the field x m^2] of a field, over the last two axes."""
-        return scipy.fft.rfft2(field) * self.spacing**2
 
-    def superpose(self, amplitudes: np.ndarray, between: np.ndarray, field: np.ndarray) -> None:
-        """Write the sum over all wavevectors of amplitude × exp(i q.x), of a half spectrum, to ``field``.
-
-        ``between`` has the shape of the amplitudes and is overwritten. Arrays used again save the system's time
-        for new ones, as long as the transforms themselves.
-        """
-        np.fft.ifft(amplitudes, axis=0, norm="forward", out=between)
-        np.fft.irfft(between, self.points, axis=1, norm="forward", out=field)
-
-    def mode_sum(self, values: np.ndarray) -> np.ndarray:
-        """Sum over all wavevectors of a real, even function given on the half spectrum.
-
-        Every leading index is summed alone along one contiguous axis, so that a member's result
-        keeps its bits whatever the batch it stands in.
-        """
-        counted = np.ascontiguousarray(values * self.multiplicity)
-        return counted.reshape(*counted.shape[:-2], -1).sum(axis=-1)
-
-    def weighted_power(self, fields: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """Sum over all wavevectors of ``weight`` \\|f(q)\\|², for each field (..., m, m) of m <= points samples.
-
-        Samples that a field lacks are 0. One field after the other, so that its spectrum stays in the cache.
-        """
-        shape = (self.points, self.points)
-        # no name holds a spectrum, so that the next one takes its memory
-        sums = [
-            _weighted_power(scipy.fft.rfft2(field, s=shape), weight, self.multiplicity)
-            for field in fields.reshape(-1, *fields.shape[-2:])
-        ]
-        return np.reshape(sums, fields.shape[:-2]) * self.spacing**4
-
-    def mean_square(self, spectrum: np.ndarray) -> np.ndarray:
-        """Mean over the cell of the squared field, from its half spectrum (Parseval)."""
-        power = np.square(spectrum.real) + np.square(spectrum.imag)
-        return self.mode_sum(power) / self.cell**4
+def lattice_of(cell: float | tuple[float, float], shape: tuple[int, int]) -> Grid | Rectangle:
+    """The periodic cell of one or both sides [m] and a shape, a ``Grid`` where it is square."""
+    first, second = (cell, cell) if isinstance(cell, int | float) else cell
+    if first == second and shape[0] == shape[1]:
+        return Grid(float(first), shape[0])
+    return Rectangle((float(first), float(second)), (shape[0], shape[1]))
 
 
 @kernel("float64(complex128[:, ::1], Array(float64, 2, 'C', readonly=True), Array(float64, 1, 'C', readonly=True))")

@@ -45,8 +45,9 @@ def _adapter(table: Any) -> TypeAdapter[Any]:
     return TypeAdapter(table)
 
 
-#: Columns that a part has read from its file, read anew where its table changes.
-_FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities")
+#: Columns that a part has read from its file, read anew where its table changes but for keys of their use.
+_FILE_COLUMNS = ("time", "speed", "wavenumbers", "densities", "values", "shape")
+_OF_USE = ("rms", "normalization")
 
 
 @plain_spoken
@@ -361,6 +362,6 @@ def _forget_file(document: dict[str, Any], key: str) -> None:
         return
     for name in tables:
         document = document[name]
-    if document.get("file") and last not in _FILE_COLUMNS:
+    if document.get("file") and last not in _FILE_COLUMNS + _OF_USE:
         for column in _FILE_COLUMNS:
             document.pop(column, None)

@@ -66,6 +66,7 @@ class Ripple:
     model: Literal["ripple"] = "ripple"
 
     bond_made: ClassVar[bool] = False
+    remarks: ClassVar[tuple[str, ...]] = ()
 
     @property
     def wavevector(self) -> tuple[float, float]:

@@ -21,6 +21,10 @@ class Family(Protocol):
         """Mean square of the stress [Pa²]."""
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on what is assumed of the spectrum, for ``sim check``."""
+
+    @property
     def support(self) -> tuple[float, float]:
         """Wavenumbers between which the density may differ from zero [rad/m]."""
 

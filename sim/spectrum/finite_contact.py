@@ -44,6 +44,11 @@ class Waves(Protocol):
     bond_made: ClassVar[bool] = False
 
     @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on what is assumed of the spectrum."""
+        return ()
+
+    @property
     def support(self) -> tuple[float, float]:
         """Wavenumbers [rad/m] between which the density may differ from zero."""
         return 0.0, math.inf

@@ -14,13 +14,23 @@ from sim.units.quantity import Quantity
 from sim.units.table import at_once, file_columns
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
-_DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0)
+_HEIGHTS = 'it is a spectrum of heights; a stress is needed, whose density over the plane is in "Pa^2 m^2"'
+_LINE = 'it is the spectrum of a line; give that of the plane, whose density is in "Pa^2 m^2"'
+_MISTAKEN = (("m^4", _HEIGHTS), ("m^3", _HEIGHTS), ("m^2", _HEIGHTS), ("Pa^2 m", _LINE))
+_DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0, mistaken=_MISTAKEN)
+_RMS = Quantity("Pa", "root mean square of the stress, to which the density is scaled", "σ", above=0)
 Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], at_once(_WAVENUMBER)]
 Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], at_once(_DENSITY)]
+Rescaled = Annotated[float, _RMS]
 _WHERE = "4π² in the integral, <τ1²> = ∫ d²q C / 4π², or in the density, <τ1²> = ∫ d²q C (Persson)"
 _Normalization = Annotated[Literal["in_integral", "in_density"], Field(description=_WHERE)]
 #: Factor from a density to C: the 4π² stands in the integral ⟨τ1²⟩ = ∫ d²q C / 4π², or already in the density.
 NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
+#: How near 2π the ratio of two rms is taken for that of the normalizations.
+_NEAR = 0.05
+
+
+_COLUMNS = {"q": _WAVENUMBER, "C": _DENSITY}
 
 
 class FromFile(Rowed, Protocol):
@@ -28,20 +38,37 @@ class FromFile(Rowed, Protocol):
 
     wavenumbers: Wavenumbers
     densities: Densities
+    rms: Rescaled | None
 
     @model_validator(mode="after")
     def _check(self) -> Self:
         """Refuse rows that are no spectrum."""
-        rows, falls = (len(self.wavenumbers), len(self.densities)), np.flatnonzero(np.diff(self.wavenumbers) <= 0.0)
+        rows, steps = (len(self.wavenumbers), len(self.densities)), np.diff(self.wavenumbers)
+        falls = np.flatnonzero((-steps if self._falling else steps) <= 0.0)
         if rows[0] != rows[1] or rows[0] < 2:
             said = "a spectrum needs at least two rows and as many densities as wavenumbers"
             raise PydanticCustomError("table_too_short", f"{said}, not {rows[0]} and {rows[1]}")
         if len(falls):
-            said = f"the wavenumbers must increase from row to row, but row {falls[0] + 2} does not exceed the one"
+            said = f"the wavenumbers must all rise or all fall, but row {falls[0] + 2} does not go on from the one"
             raise PydanticCustomError("table_not_increasing", f"{said} before; sort the rows and merge equal ones")
         if not any(self.densities):
             raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
         return self
+
+    @property
+    def _falling(self) -> bool:
+        return len(self.wavenumbers) > 1 and self.wavenumbers[0] > self.wavenumbers[-1]
+
+    def _chain(self, factor: float = 1.0) -> PowerLaws:
+        """The rows with a factor of the density as a chain of power laws."""
+        order = slice(None, None, -1 if self._falling else 1)
+        return PowerLaws(np.array(self.wavenumbers[order]), factor * np.array(self.densities[order]))
+
+    def _scaled(self, found: PowerLaws) -> PowerLaws:
+        """A chain at the rms that is given."""
+        if self.rms is None:
+            return found
+        return PowerLaws(found.q, found.density * (self.rms**2 / float(found.cumulative(found.q[-1]))))
 
 
 def by_name(values: Any, names: tuple[str, ...]) -> Any:
@@ -62,15 +89,19 @@ class Tabulated(FromFile):
     Parameters
     ----------
     wavenumbers : tuple of float
-        q [rad/m], increasing.
+        q [rad/m], all rising or all falling.
     densities : tuple of float
-        Density at each q [Pa² m²]; next to a zero the interpolation is linear.
+        Density at each q [Pa² m²]; next to a zero, which may stand at either end, the interpolation is linear.
     normalization : {"in_integral", "in_density"}
         Where the 4π² stands. "in_integral": the densities are C, and ``<τ1²> = ∫ d²q C / 4π²``. "in_density":
         they are C / 4π², as in Persson's papers, and ``<τ1²> = ∫ d²q`` of them.
     file : str
         In a scenario instead of the rows: a CSV with the columns ``q [rad/m], C [Pa^2 m^2]``. It is
         not read if the rows are given too.
+    header : str
+        Names of the columns of a file without a header.
+    rms : float, optional
+        Root mean square [Pa] to which the densities are scaled.
 
     Examples
     --------
@@ -85,22 +116,53 @@ class Tabulated(FromFile):
     densities: Densities
     normalization: _Normalization = "in_integral"
     file: Annotated[str, Field(description="CSV with the columns q [rad/m], C [Pa^2 m^2], in place of the rows")] = ""
+    header: Annotated[str, Field(description="header of a file without one, as q [cycles/um], C [Pa^2 m^2]")] = ""
+    rms: Rescaled | None = None
     model: Literal["tabulated"] = "tabulated"
 
     @model_validator(mode="before")
     @classmethod
     def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
-        values = by_name(values, ("wavenumbers", "densities", "normalization", "file"))
+        values = by_name(values, ("wavenumbers", "densities", "normalization", "file", "header", "rms"))
         if not isinstance(values, dict) or "wavenumbers" in values or "densities" in values:
             return values
         name = values.get("file")
         if not name or not isinstance(name, str):
             raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
-        table = file_columns(name, info.context, {"q": _WAVENUMBER, "C": _DENSITY})
+        header = values.get("header", "")
+        table = file_columns(name, info.context, _COLUMNS, header if isinstance(header, str) else "")
         return {**values, "wavenumbers": table["q"], "densities": table["C"]}
+
+    @model_validator(mode="after")
+    def _no_gaps(self) -> Self:
+        """Refuse zeros between positive rows, which are empty bins and no density."""
+        full = np.flatnonzero(self.densities)
+        gaps = np.setdiff1d(np.arange(full[0], full[-1]), full) if full.size else full
+        if gaps.size:
+            said = (
+                f"row {gaps[0] + 1} is zero between positive ones, as an empty bin of an average is: its energy would"
+            )
+            raise PydanticCustomError("table_gaps", f"{said} be lost; leave such rows out")
+        return self
 
     @functools.cached_property
     def rows(self) -> PowerLaws:
         """The table as a chain of power laws, with the 4π² in the integral."""
-        density = NORMALIZATIONS[self.normalization] * np.array(self.densities)
-        return PowerLaws(np.array(self.wavenumbers), density)
+        return self._scaled(self._chain(NORMALIZATIONS[self.normalization]))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """What is to be known of the normalization."""
+        own = {where: self._chain(factor) for where, factor in NORMALIZATIONS.items()}
+        rms = {where: math.sqrt(float(chain.cumulative(chain.q[-1]))) for where, chain in own.items()}
+        other = next(where for where in NORMALIZATIONS if where != self.normalization)
+        words = {"in_integral": "in the integral", "in_density": "in the density"}
+        if self.rms is not None and abs(math.log(self.rms / rms[other])) < _NEAR:
+            said = f"the table has the rms of {self.rms:.3g} Pa with the 4π² {words[other]}, to which it is scaled:"
+            return (f'{said} normalization = "{other}" may be meant',)
+        if self.rms is None and self.file:
+            said = f"the table is read with the 4π² {words[self.normalization]}, rms {rms[self.normalization]:.3g} Pa;"
+            said += f" {words[other]} it would be {rms[other]:.3g} Pa, and the energy 39.5 times as"
+            more = "large" if rms[other] > rms[self.normalization] else "small"
+            return (f"{said} {more}: shear.spectrum.normalization chooses, rms fixes it",)
+        return ()

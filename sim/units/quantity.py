@@ -33,6 +33,8 @@ _FACTOR = rf"{_NAME}(?:\s*(?:\^|\*\*)\s*-?[1-9][0-9]?|-?[1-9][0-9]?)?"
 _UNIT = re.compile(rf"(?:1?\s*/\s*)?{_FACTOR}(?:\s*[*/]\s*{_FACTOR}|\s+{_FACTOR})*")
 _LONGEST_TEXT, _LONGEST_UNIT = 200, 60
 _MOST_SCALES = 512
+#: Words of a unit by which it counts angles.
+_ANGLES = re.compile("rad|cycle|turn|rev|deg|°")
 _TYPESET = str.maketrans("−·⋅×⁄⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-***/-0123456789")
 
 # Beyond these nothing is measurable, and products of a few such numbers leave the range of floats.
@@ -186,6 +188,8 @@ class Quantity:
     ``above`` and ``below`` exclude the bound, ``at_least`` and ``at_most`` include it. Beside its
     own bounds no number may exceed 1e60, nor one that excludes zero fall below 1e-60. Messages show
     ``typical`` as an example, without it a usual value of the unit. A ``whole`` number is read as an int.
+    ``mistaken`` are units of what is taken for this quantity, each with what to say of it. A unit of angle per length
+    must name the angle: 1/m may count radians or cycles.
 
     Examples
     --------
@@ -203,6 +207,7 @@ class Quantity:
     at_most: float = math.inf
     typical: str = ""
     whole: bool = False
+    mistaken: tuple[tuple[str, str], ...] = ()
 
     def read(self, value: Any) -> float:
         """The value in SI from a number or a string such as ``"42 mJ/m^2"``.
@@ -275,8 +280,17 @@ class Quantity:
             said = 'has the unknown unit "{given}"; {cure}'
             raise self._fault("unknown_unit", said, given=given[:40], cure=cure) from None
         if scale is None:
+            for unit, said in self.mistaken:
+                if _scale(_written(given), unit) is not None:
+                    raise self._fault("mistaken", f'has the unit "{{given}}": {said}', given=given[:40])
             said = 'has the unit "{given}", which is not a unit of {wanted}; write for example {example}'
             raise self._fault("wrong_dimension", said, given=given[:40])
+        if self.unit.startswith("rad/") and not _ANGLES.search(given):
+            named = re.search(r"1?/\s*(\w+)|([A-Za-zµμ]+)\s*(?:\^|\*\*)?\s*-1", given)
+            length = next(filter(None, named.groups())) if named else self.unit.partition("/")[2]
+            said = 'has the unit "{given}", which may count radians or cycles: write "rad/{length}" where it is 2π over'
+            said += ' the wavelength, "cycles/{length}" where it is 1 over it'
+            raise self._fault("no_angle", said, given=given[:40], length=length)
         return scale
 
     def _near(self, given: str) -> str | None:

@@ -37,17 +37,20 @@ class TableError(ValueError):
         self.names = tuple(names)
 
 
-def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.float64]]:
+def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, NDArray[np.float64]]:
     """Named columns of a CSV text in SI units.
 
     Parameters
     ----------
     text : str
-        Comma-separated cells. The first line that is neither empty nor a ``#`` comment names the
-        columns, each with its unit in brackets; a column without brackets is in SI units. Columns
-        that nobody wants are ignored.
+        Cells with commas, semicolons or tabs between them. The first line that is neither empty nor a ``#``
+        comment names the columns, each with its unit in brackets; a column without brackets is in SI
+        units. Columns that nobody wants are ignored.
     wanted : dict of str to Quantity
         The columns to read, each with its SI unit and bounds.
+    header : str, optional
+        Names of the columns of a text without that line, whose numbers blanks may separate, too. An empty one
+        stands for a key ``header`` that would give them.
 
     Returns
     -------
@@ -58,7 +61,8 @@ def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.floa
     ------
     TableError
         If a column is missing or there twice, its unit is unknown or of another dimension, a row has
-        another number of cells, or a cell is no finite number within the bounds.
+        another number of cells, or a cell is no finite number within the bounds; if ``header`` is given and the
+        text has one.
 
     Examples
     --------
@@ -69,17 +73,27 @@ def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.floa
     example = ", ".join(_column(name, quantity) for name, quantity in wanted.items())
     found: dict[str, tuple[int, str]] = {}
     parts: dict[str, list[NDArray[np.float64]]] = {name: [] for name in wanted}
-    number, header = 0, list[str]()
+    number, names = 0, list[str]()
     for lines, rows in _rows(text):
-        if not header:
-            number, header = lines.pop(0), [cell.strip() for cell in rows.pop(0)]
-            found = _header(number, header, wanted, example)
-        if at := _ragged(lines, rows, len(header)):
-            said = f"line {at[0]}: {at[1]} cells where the header has {len(header)}"
+        if not names:
+            number, names, at_top = lines[0], rows[0], f"line {lines[0]}"
+            if header is not None and _are_numbers(names):
+                if not header:
+                    said = "the columns have no header; add one, or name it by the key header"
+                    raise TableError(f'{at_top}: {said}, such as header = "{example}"')
+                names, at_top = header.split(","), "header"
+            elif header:
+                raise TableError(f"{at_top}: the columns have a header of their own; leave the key header out")
+            else:
+                del lines[0], rows[0]
+            names = [cell.strip() for cell in names]
+            found = _header(at_top, names, wanted, example)
+        if at := _ragged(lines, rows, len(names)):
+            said = f"line {at[0]}: {at[1]} cells where the header has {len(names)}"
             raise TableError(f"{said}; separate cells by commas, write decimals with a point")
         for name, (place, unit) in found.items():
             parts[name].append(_numbers(name, lines, [row[place] for row in rows], unit, wanted[name]))
-    if not header:
+    if not names:
         raise TableError(f'the table is empty; begin with a header such as "{example}", then rows of numbers')
     columns = {name: np.concatenate(several) for name, several in parts.items()}
     if not all(map(len, columns.values())):
@@ -87,8 +101,10 @@ def columns(text: str, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.floa
     return columns
 
 
-def matrix(text: str, quantity: Quantity) -> NDArray[np.float64]:
-    """A plain rectangular block of comma-separated SI numbers, shape (rows, columns).
+def matrix(text: str, quantity: Quantity, gaps: bool = False) -> NDArray[np.float64]:
+    """A plain rectangular block of SI numbers, separated as in ``columns`` or by blanks, shape (rows, columns).
+
+    With ``gaps`` some may be nan.
 
     Raises
     ------
@@ -101,7 +117,7 @@ def matrix(text: str, quantity: Quantity) -> NDArray[np.float64]:
         if at := _ragged(lines, rows, width):
             raise TableError(f"line {at[0]}: {at[1]} cells where the first row has {width}; complete the row")
         cells = list(itertools.chain.from_iterable(rows))
-        parts.append(_numbers("value", np.repeat(lines, width), cells, "", quantity))
+        parts.append(_numbers("value", np.repeat(lines, width), cells, "", quantity, gaps))
     if not parts:
         raise TableError("the table is empty; write one row of comma-separated numbers per line")
     return np.concatenate(parts).reshape(-1, width)
@@ -109,7 +125,7 @@ def matrix(text: str, quantity: Quantity) -> NDArray[np.float64]:
 
 def _rows(text: str) -> Iterator[tuple[list[int], list[list[str]]]]:
     """Line numbers and cells of all lines that are neither empty nor comments, some thousands at a time."""
-    start, number = len(text) - len(text.removeprefix("\ufeff")), 1
+    start, number, sign = len(text) - len(text.removeprefix("\ufeff")), 1, ""
     while start < len(text):
         end = text.find("\n", start + _AT_ONCE) + 1 or len(text)
         if end - start > _LONGEST_LINE:
@@ -117,16 +133,32 @@ def _rows(text: str) -> Iterator[tuple[list[int], list[list[str]]]]:
         lines = text[start:end].splitlines()
         found = [at for at, line in enumerate(lines, number) if (bare := line.lstrip()) and bare[0] != "#"]
         if found:
-            yield found, [_cells(at, line) if '"' in (line := lines[at - number]) else line.split(",") for at in found]
+            sign = sign or _separator(lines[found[0] - number])
+            yield found, [_cells(at, lines[at - number], sign) for at in found]
         start, number = end, number + len(lines)
 
 
-def _cells(at: int, line: str) -> list[str]:
-    """The cells of a line in which some are quoted."""
+def _separator(line: str) -> str:
+    """The sign between the cells of a table, by its first line: blanks only between plain numbers."""
+    blank = " " if _are_numbers(line.split()) else ","
+    return next((sign for sign in ";,\t" if sign in line), blank)
+
+
+def _are_numbers(cells: list[str]) -> bool:
     try:
-        return next(csv.reader([line], skipinitialspace=True, strict=True))
+        return len(list(map(float, cells))) > 0
+    except ValueError:
+        return False
+
+
+def _cells(at: int, line: str, sign: str) -> list[str]:
+    """The cells of a line, some of them perhaps quoted."""
+    if '"' not in line:
+        return line.split(sign.strip(" ") or None)
+    try:
+        return next(csv.reader([line], delimiter=sign, skipinitialspace=True, strict=True))
     except csv.Error as fault:
-        raise TableError(f"line {at}: cannot be read as comma-separated cells ({fault})") from None
+        raise TableError(f"line {at}: cannot be read as separated cells ({fault})") from None
 
 
 def _ragged(lines: list[int], rows: list[list[str]], width: int) -> tuple[int, int] | None:
@@ -140,46 +172,51 @@ def _column(name: str, quantity: Quantity) -> str:
     return name if quantity.unit == "1" else f"{name} [{quantity.unit}]"
 
 
-def _header(at: int, header: list[str], wanted: dict[str, Quantity], example: str) -> dict[str, tuple[int, str]]:
-    """Place and unit of each wanted column, "" for SI."""
+def _header(at: str, header: list[str], wanted: dict[str, Quantity], example: str) -> dict[str, tuple[int, str]]:
+    """Place and unit of each wanted column, "" for SI; ``at`` is where the header stands."""
     split = [match for cell in header if (match := _HEADER.fullmatch(cell))]
     if len(split) != len(header):
-        raise TableError(f'line {at}: a header cell cannot be read; write the header as "{example}"')
+        raise TableError(f'{at}: a header cell cannot be read; write the header as "{example}"')
     names = [match["name"] for match in split]
     found = {}
     for name, quantity in wanted.items():
         if names.count(name) != 1:
             what = "is there twice" if name in names else "is missing"
-            raise TableError(f'line {at}: column "{name}" {what}; write the header as "{example}"', names)
+            raise TableError(f'{at}: column "{name}" {what}; write the header as "{example}"', names)
         place = names.index(name)
         found[name] = (place, _unit(at, name, split[place]["unit"], quantity))
     return found
 
 
-def _unit(at: int, name: str, unit: str | None, quantity: Quantity) -> str:
+def _unit(at: str, name: str, unit: str | None, quantity: Quantity) -> str:
     """A header's unit, checked; "" where the column is in SI."""
     if unit is None or (unit in ("", "1", "-") and quantity.unit == "1"):
         return ""
-    free = Quantity(quantity.unit, quantity.meaning)  # one unit need not lie within the bounds
+    free = Quantity(quantity.unit, quantity.meaning, mistaken=quantity.mistaken)  # one unit may exceed the bounds
     try:
-        if not re.match(r"[A-Za-zµμΩ°%]|1/", unit):
+        if not re.match(r"[A-Za-zµμΩ°%]|1\s*/", unit):
             raise ValueError(unit)
         free.read(f"1 {unit}")
-    except ValueError:
+    except ValueError as fault:
         said = f'has a unit that is not a unit of {quantity.unit}; write the column as "{_column(name, quantity)}"'
-        raise TableError(f'line {at}: column "{name}" {said}') from None
+        if isinstance(fault, PydanticCustomError) and fault.type in ("no_angle", "mistaken"):
+            said = fault.message()
+        raise TableError(f'{at}: column "{name}" {said}') from None
     return unit
 
 
-def _numbers(name: str, lines: Iterable[int], cells: list[str], unit: str, quantity: Quantity) -> NDArray[np.float64]:
+def _numbers(
+    name: str, lines: Iterable[int], cells: list[str], unit: str, quantity: Quantity, gaps: bool = False
+) -> NDArray[np.float64]:
     """The numbers in cells of some lines, in SI: all at once, or where that fails one by one to say what is wrong."""
     try:
         with np.errstate(over="ignore"):
-            return _sound(quantity.scaled(np.array(list(map(float, cells))), unit), quantity)
+            numbers = quantity.scaled(np.array(list(map(float, cells))), unit)
+        _sound(numbers[~np.isnan(numbers)] if gaps else numbers, quantity)
+        return numbers
     except ValueError:
-        return np.array(
-            [_number(at, name, cell.strip(), unit, quantity) for at, cell in zip(lines, cells, strict=True)]
-        )
+        each = zip(lines, cells, strict=True)
+        return np.array([_number(at, name, cell.strip(), unit, quantity, gaps) for at, cell in each])
 
 
 def _sound(numbers: NDArray[np.float64], quantity: Quantity) -> NDArray[np.float64]:
@@ -201,12 +238,14 @@ def at_once(quantity: Quantity) -> WrapValidator:
     return WrapValidator(check)
 
 
-def _number(at: int, name: str, cell: str, unit: str, quantity: Quantity) -> float:
+def _number(at: int, name: str, cell: str, unit: str, quantity: Quantity, gaps: bool) -> float:
     try:
         number = float(cell)
     except ValueError:
-        said = "" if cell else " an empty cell,"
-        raise TableError(f"line {at}: {name} is{said} not a number; write a plain number") from None
+        said, cure = "" if cell else " an empty cell,", ", decimals with a point" if "," in cell else ""
+        raise TableError(f"line {at}: {name} is{said} not a number; write a plain number{cure}") from None
+    if gaps and number != number:
+        return number
     try:
         return quantity.read(f"{number!r} {unit}" if unit else number)
     except ValueError as fault:
@@ -250,10 +289,12 @@ def file_text(name: str, context: Any) -> str:
         return context["files"].text(name) if context and "files" in context else plain_text(Path(name))
 
 
-def file_columns(name: str, context: Any, wanted: dict[str, Quantity]) -> dict[str, NDArray[np.float64]]:
+def file_columns(
+    name: str, context: Any, wanted: dict[str, Quantity], header: str | None = None
+) -> dict[str, NDArray[np.float64]]:
     """Columns of a CSV file that a scenario names; arguments as of ``file_text`` and ``columns``."""
     try:
-        return columns(file_text(name, context), wanted)
+        return columns(file_text(name, context), wanted, header)
     except TableError as fault:
         raise file_fault(name, fault, context) from None
 

@@ -270,3 +270,30 @@ def test_displacement_grows_with_the_size_of_the_cell():
     field = stress_map(12)
     wide, narrow = halfspace.displacement(field, 2e-4, 1e6), halfspace.displacement(field, 1e-4, 1e6)
     assert np.max(np.abs(wide - 2.0 * narrow)) < 1e-13 * np.max(np.abs(wide))
+
+
+@pytest.mark.parametrize(("points", "sides"), [((12, 7), (3.0, 1.4)), ((8, 8), (1.0, 2.0)), ((9, 16), (2.0, 2.0))])
+def test_energy_and_displacement_of_a_rectangle_belong_together(points, sides):
+    field = np.random.default_rng(5).standard_normal((3, *points)) + 2.0
+    moved = halfspace.displacement(field, sides, 2.0, 0.3)
+    energy = halfspace.surface_energy(field, sides, 2.0, 0.3)
+    assert_allclose(energy, 0.5 * np.mean(field * moved, axis=(-2, -1)), rtol=1e-12)
+    twice = np.concatenate([field, field], axis=-1)  # the same field in a cell twice as wide
+    assert_allclose(halfspace.surface_energy(twice, (sides[0], 2.0 * sides[1]), 2.0, 0.3), energy, rtol=1e-12)
+    turned = halfspace.surface_energy(np.swapaxes(field, -1, -2), sides[::-1], 2.0, 0.0)
+    assert_allclose(turned, halfspace.surface_energy(field, sides, 2.0, 0.0), rtol=1e-12)  # at nu = 0 x is as y
+
+
+def test_white_noise_of_pixels_seems_to_store_a_closed_form():
+    exact = 3 * mpmath.asinh(1) / (4 * mpmath.pi)
+    assert_allclose(halfspace.noise_energy(3.0, 2.0, 5.0), float(exact) * 9.0 * 2.0 / 5.0, rtol=1e-15)
+    assert_allclose(float(exact), 0.210412, rtol=5e-6)
+    # a periodic cell of n pixels lacks 0.23278/n of it, as the pixel of q = 0 is left out; the rest falls as 1/n²
+    for n in (31, 101):
+        grid = Grid(float(n), n)
+        mean = 0.5 * grid.mode_sum(halfspace.compliance(*grid.wavevectors, 1.0)) / grid.cell**2
+        assert_allclose(n * (mean - float(exact)), -3 / (16 * math.pi) * 3.900265, atol=1.0 / n)
+        weight = 0.5 * halfspace.compliance(*grid.wavevectors, 1.0) / grid.cell**2
+    noise = np.random.default_rng(6).standard_normal((50, n, n))
+    spread = math.sqrt(2.0 * float(grid.mode_sum(weight**2)) / len(noise))  # each of a pair ±q has the same square
+    assert abs(np.mean(halfspace.surface_energy(noise, float(n), 1.0)) - mean) < 5.0 * spread

@@ -9,7 +9,7 @@ from helpers.fields import field_of
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.numerics.grid import Grid
+from sim.numerics.grid import Grid, Rectangle
 from sim.spectrum.families import Band, SelfAffine, Spectrum
 from sim.spectrum.measured import Measured
 from sim.spectrum.periodogram import periodogram, radial_average
@@ -84,7 +84,7 @@ def test_rows_of_hundreds_of_decades_do_not_overflow():
 
 
 def test_a_table_is_read_from_csv_with_its_units(files):
-    (files.folder / "psd.csv").write_text("# rubber\nq [1/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n")
+    (files.folder / "psd.csv").write_text("# rubber\nq [rad/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n")
     table = read(files, model="tabulated", file="psd.csv", normalization="in_density")
     assert_allclose(table.wavenumbers, [1e3, 3e3], rtol=1e-15, atol=0)
     assert_allclose(table.densities, [2e-6, 4e-6], rtol=1e-15, atol=0)
@@ -98,8 +98,19 @@ def test_a_table_is_read_from_csv_with_its_units(files):
     ("text", "words"),
     [
         ("q [rad/m], C [Pa^2 m^2]\n1, 2\n", "at least two rows"),
-        ("q [rad/m], C [Pa^2 m^2]\n1, 2\n1, 2\n", "row 2 does not exceed the one before; sort"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 2\n1, 2\n", "row 2 does not go on from the one before; sort"),
         ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 0\n", "every density is zero"),
+        ("q [rad/m], C [Pa^2 m^2]\n3, 1\n1, 1\n2, 1", "row 3 does not go on from the one before; sort"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 0\n2, 1\n3, 0\n4, 1\n5, 0", "row 3 is zero between .*; leave such rows out"),
+        ("q [1/um], C [Pa^2 m^2]\n1, 1\n2, 1\n", 'psd.csv: line 1: column "q" .* "rad/um" where .* "cycles/um" where'),
+        (
+            "q [rad/m], C [um^4]\n1, 1\n2, 1\n",
+            'column "C" has the unit "um\\^4": it is a spectrum of heights; a stress',
+        ),
+        ("q [rad/m], C [m^3]\n1, 1\n2, 1\n", "it is a spectrum of heights"),
+        ("q [rad/m], C [kPa^2 um]\n1, 1\n2, 1\n", "it is the spectrum of a line; give that of the plane"),
+        ("1 1\n2 1\n", r'psd.csv: line 1: the columns have no header; .* header = "q \[rad/m\], C \[Pa\^2 m\^2\]"'),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C must be finite"),
         ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
         ("q [rad/m], C [Pa^2 m^2]\n1, -1\n2, 0\n", "line 2: C must be at least 0"),
         ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", 'line 1: column "C" has a unit that is not a unit of'),
@@ -206,14 +217,72 @@ def test_a_measured_map_is_a_table_of_its_own_density(files, points):
     assert files.reads == 1
 
 
-def test_a_map_that_is_not_square_is_cropped_to_its_leading_square(files):
-    field = white_map(32, 1.0, 3.2)
-    long = np.concatenate([field, np.full((5, 32), 9.0)])
-    for name, one in {"a.csv": field, "b.csv": long, "c.csv": long.T}.items():
-        np.savetxt(files.folder / name, one, delimiter=",")
-    a, b, c = (read(files, model="measured", file=name, spacing=0.1) for name in ("a.csv", "b.csv", "c.csv"))
-    assert a.densities == b.densities
-    assert_allclose(c.densities, a.densities, rtol=1e-12, atol=0)  # exchange of x and y
+def test_a_map_that_is_not_square_is_used_whole(files):
+    field = np.random.default_rng(3).normal(size=(48, 30))
+    np.savetxt(files.folder / "a.csv", field, delimiter=";")
+    np.save(files.folder / "b.npy", np.asfortranarray(field.T))
+    a, b = (read(files, model="measured", file=name, spacing=0.1) for name in ("a.csv", "b.npy"))
+    assert_allclose(a.densities, b.densities, rtol=1e-12, atol=0)  # exchange of x and y
+    lattice = Rectangle((4.8, 3.0), (48, 30))
+    density, (qx, qy) = periodogram(field, lattice.sides), lattice.wavevectors
+    assert_allclose(lattice.mode_sum(density) / lattice.area, np.var(field), rtol=1e-13, atol=0)
+    width = TURN / math.sqrt(4.8 * 3.0)
+    ring = np.maximum(np.floor(np.hypot(qx, qy) / width + 0.5), 1.0)
+    ring[0, 0] = 0.0
+    counted = lattice.multiplicity * np.ones(ring.shape)
+    for k, found in enumerate(a.densities[1:-1], 1):
+        assert_allclose(found, np.average(density[ring == k], weights=counted[ring == k]), rtol=1e-12, atol=0)
+    assert_allclose(a.support, (0.5 * width, (len(a.densities) - 1.5) * width), rtol=1e-15, atol=0)
+    assert a.support[1] > 0.9 * math.pi / 0.1
+
+
+def test_a_spectrum_keeps_its_shape_at_another_rms(files):
+    field = white_map(16, 1.0, 1.6)
+    np.savetxt(files.folder / "map.txt", field)
+    rows = (1.0, 2.0, 4.0), (3.0, 2.0, 0.5)
+    plain = (
+        Tabulated(*rows),
+        Tabulated(*rows, normalization="in_density"),
+        read(files, model="measured", file="map.txt", spacing=0.1),
+    )
+    for one in plain:
+        for rms in (2e4, 1e-3):
+            scaled = TypeAdapter(Spectrum).validate_python(TypeAdapter(type(one)).dump_python(one) | {"rms": rms})
+            assert_allclose(scaled.variance, rms**2, rtol=1e-14, atol=0)
+            q = np.geomspace(1.0, 4.0, 5)
+            factor = rms**2 / one.variance
+            assert_allclose(scaled.radial_density(q), factor * one.radial_density(q), rtol=1e-13, atol=0)
+            assert_allclose(scaled.surface_energy(1.0), factor * one.surface_energy(1.0), rtol=1e-13, atol=0)
+
+
+def test_a_falling_table_is_the_rising_one():
+    rows = np.array([1.0, 2.0, 4.0]), np.array([3.0, 2.0, 0.5])
+    rising, falling = Tabulated(*rows), Tabulated(rows[0][::-1], rows[1][::-1])
+    q = np.geomspace(1.0, 4.0, 9)
+    assert np.array_equal(rising.radial_density(q), falling.radial_density(q))
+    assert (rising.support, rising.variance) == (falling.support, falling.variance)
+
+
+def test_what_numpy_saves_as_text_is_read_by_a_header_that_is_given(files):
+    q, density = np.geomspace(1.0, 4.0, 5), np.array([2.0, 1.0, 0.5, 0.2, 0.1])
+    np.savetxt(files.folder / "psd.txt", np.c_[q, density], header="wavevector, density")
+    found = read(files, model="tabulated", file="psd.txt", header="q [cycles/um], C [kPa^2 um^2]")
+    assert_allclose(found.wavenumbers, q * TURN * 1e6, rtol=1e-15, atol=0)
+    assert_allclose(found.densities, density * 1e-6, rtol=1e-15, atol=0)
+
+
+def test_a_table_of_a_file_says_what_the_other_normalization_would_make_of_it(files):
+    (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 2\n")
+    given = {"model": "tabulated", "file": "psd.csv"}
+    (said,) = read(files, **given).remarks
+    assert "rms 1.13e+05 Pa" in said and "7.09e+05 Pa" in said and "39.5 times as large" in said
+    (said,) = read(files, **given, normalization="in_density").remarks
+    assert "rms 7.09e+05 Pa" in said and "1.13e+05 Pa" in said and "39.5 times as small" in said
+    assert read(files, **given, rms="113 kPa").remarks == ()  # as it is
+    assert read(files, **given, rms="400 kPa").remarks == ()  # a shape
+    (said,) = read(files, **given, rms="0.7 MPa").remarks
+    assert 'normalization = "in_density" may be meant' in said
+    assert Tabulated((1.0, 2.0), (1.0, 1.0)).remarks == ()
 
 
 def dataset(fields, spacing, units="Pa", metre=1.0, unit="m", dims=("member", "x", "y")):
@@ -251,6 +320,7 @@ def test_netcdf_without_coordinates_takes_the_spacing_of_the_key(files):
         (lambda d: d.assign_coords(y=d.y.to_numpy() * 2), "not spaced by one step"),
         (lambda d: d.assign_coords(x=d.x.to_numpy() ** 2), "not spaced by one step"),
         (lambda d: d.assign_coords(x=d.x.to_numpy() * 2, y=d.y.to_numpy() * 2), "equal in x and y and to the key"),
+        (lambda d: d.assign_coords(x=d.x.to_numpy() * np.nan), "not spaced by one step"),
         (lambda d: d.where(d.x > 0.05), "gaps"),
         (lambda d: d * 0.0, "every density is zero"),
         (lambda d: d.isel(x=slice(5)), "too small"),

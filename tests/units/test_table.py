@@ -47,6 +47,56 @@ def test_comments_blank_lines_other_columns_order_and_a_byte_order_mark_do_not_m
     assert table["speed"].tolist() == [3.0, 4.0]
 
 
+@pytest.mark.parametrize("sign", [", ", ";", "; ", "\t", " \t "])
+def test_commas_semicolons_or_tabs_stand_between_cells(sign):
+    text = f"speed [mm/s]{sign}remark{sign}time [s]\n1{sign}a b{sign}2\n3{sign}c{sign}4\n"
+    found = columns(text, WANTED)
+    assert found["time"].tolist() == [2.0, 4.0]
+    assert found["speed"].tolist() == [0.001, 0.003]
+    assert matrix(f"# Pa\n1{sign}2\n3{sign}4\n", SPEED).tolist() == [[1.0, 2.0], [3.0, 4.0]]
+
+
+@pytest.mark.parametrize("sign", [" ", "\t", ";", ","])
+def test_numbers_without_a_header_are_read_by_one_that_is_given(sign):
+    text = f"# of an instrument\n0{sign}1\n\n250{sign}-2.5e3"
+    found = columns(text, WANTED, "time [ms], speed [mm/s]")
+    assert found["time"].tolist() == [0.0, 0.25]
+    assert found["speed"].tolist() == [0.001, -2.5]
+
+
+@pytest.mark.parametrize(
+    ("text", "header", "words"),
+    [
+        ("1 2\n3 4", "", r'line 1: the columns have no header; .* header = "time \[s\], speed \[m/s\]"'),
+        ("1 2\n3 4", "time [s], sped", 'header: column "speed" is missing'),
+        ("1 2\n3 4", "time [s], speed [m]", 'header: column "speed" has a unit that is not'),
+        ("1 2\n3 4", "time, speed, other", "line 1: 2 cells where the header has 3"),
+        ("1 2\n3 4 5", "time, speed", "line 2: 3 cells where the header has 2"),
+        ("time, speed\n3, 4", "time, speed", "line 1: the columns have a header of their own; leave the key header"),
+    ],
+)
+def test_a_header_that_does_not_fit_its_columns_is_refused(text, header, words):
+    with pytest.raises(TableError, match=words):
+        columns(text, WANTED, header)
+
+
+@pytest.mark.parametrize("unit", ["1/um", "um^-1", "1 / um", "um**-1"])
+def test_a_wavenumber_that_may_count_radians_or_cycles_is_refused_with_both_spellings(unit):
+    wavenumber = Quantity("rad/m", "wavenumber")
+    with pytest.raises(TableError, match=r'"rad/um" where .* "cycles/um" where'):
+        columns(f"q [{unit}]\n1", {"q": wavenumber})
+    with pytest.raises(ValueError, match=r'"rad/um" where .* "cycles/um" where'):
+        wavenumber.read(f"2 {unit}")
+
+
+@pytest.mark.parametrize(
+    ("unit", "factor"), [("rad/um", 1e6), ("cycles/um", 2e6 * np.pi), ("cycle um^-1", 2e6 * np.pi)]
+)
+def test_a_wavenumber_counts_what_its_unit_says(unit, factor):
+    found = columns(f"q [{unit}]\n2", {"q": Quantity("rad/m", "wavenumber")})
+    np.testing.assert_allclose(found["q"], 2.0 * factor, rtol=1e-15)
+
+
 def test_quoted_cells_are_read():
     assert columns('"time [s]","speed [m/s]"\n"1","2"', WANTED)["time"].tolist() == [1.0]
 
@@ -63,8 +113,9 @@ def test_units_of_more_than_one_word_are_read():
         ("# only this\n\n", "the table is empty"),
         ("time [s], speed [m/s]\n", "line 1: no rows follow the header"),
         ("time [s], sped [m/s]\n1,2", r'line 1: column "speed" is missing; write the header'),
-        ("time [s]; speed [m/s]\n1;2", 'line 1: a header cell cannot be read; write the header as "time'),
-        ("time [s]\tspeed [m/s]\n1\t2", "line 1: a header cell cannot be read"),
+        ("time [s] speed [m/s]\n1 2", 'line 1: a header cell cannot be read; write the header as "time'),
+        ("time [s]; speed [m/s]\n1,5;2", "line 2: time is not a number; .* decimals with a point"),
+        ("time [s]\tspeed [m/s]\n1,2", "line 2: 1 cells where the header has 2"),
         ("1, 2\n3, 4", 'line 1: column "time" is missing'),
         ("time [s], time [ms], speed [m/s]\n1,2,3", 'column "time" is there twice'),
         ("#\ntime [s], speed [m]\n1,2", r'line 2: column "speed" has a unit that is not a unit of m/s; .*\['),

@@ -116,7 +116,7 @@ class _Model:
         plane, rms = float(spectrum.surface_energy(*solid)), math.sqrt(spectrum.variance)
         if not plane > 0.0:
             return []
-        said = []
+        said = list(spectrum.remarks)
         if self.paid_by_adhesion > 0.0:
             said.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
             if spectrum.bond_made:

@@ -481,8 +481,10 @@ def banded(spectrum=SPECTRUM, **keys):
         (lambda: scene(shear=banded(cell=None), contact=None), "contact"),
         (lambda: Tabulated((1e5, 2e5), (1.0, -1.0)), r"densities.1\s+must be at least 0 Pa\^2 m\^2, not -1"),
         (lambda: Tabulated((-1e5, 2e5), (1.0, 1.0)), r"wavenumbers.0\s+must be above 0 rad/m, not -100000"),
-        (lambda: Tabulated((2e5, 1e5), (1.0, 1.0)), "row 2 does not exceed the one before; sort the rows and merge"),
-        (lambda: Tabulated((1e5, 1e5), (1.0, 1.0)), "row 2 does not exceed the one before; sort the rows and merge"),
+        (
+            lambda: Tabulated((1e5, 1e5), (1.0, 1.0)),
+            "row 2 does not go on from the one before; sort the rows and merge",
+        ),
         (lambda: Tabulated((1e5, 2e5), (0.0, 0.0)), "every density is zero; give a row with a positive one"),
     ],
 )

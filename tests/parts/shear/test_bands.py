@@ -306,7 +306,7 @@ def test_counted_cells_have_the_mean_and_variance_of_all_modes(name, points):
 def test_a_cliff_in_a_table_is_counted_to_a_few_parts_in_ten_thousand():
     # the density falls to zero within less than two pixels, 320 from the origin, and rises again
     q = 2 * np.pi / CELL * np.array([160.0, 240.0, 318.0, 319.6, 342.0])
-    off = counted_and_listed(Tabulated(tuple(q), (0.0, 1.0, 1.0, 0.0, 1.0)), 700)
+    off = counted_and_listed(Measured("map.csv", wavenumbers=tuple(q), densities=(0.0, 1.0, 1.0, 0.0, 1.0)), 700)
     assert np.all(np.abs(off[:2]) < (1e-6, 3e-4))
     assert np.all(np.abs(off[2:]) < 3e-3)
 
