@@ -10,13 +10,15 @@ from sim.analysis.correlation import IntegralTime, correlation_time, integral_ti
 from sim.analysis.events import events, loop_energy, peaks
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
-from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary, where
+from sim.analysis.stationary import distribution, over_time
+from sim.analysis.statistics import QUANTILES, averaging, shares, skewness_error, statistics, summary, where
 from sim.analysis.tables import highlights, notes, table, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
     "QUANTILES", "Control", "IntegralTime", "averaging", "bond_work", "concise", "control", "correlation_time",
-    "engineering", "events", "highlights", "integral_time", "is_stationary", "is_steady", "loop_energy", "notes",
-    "observables", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables", "shares",
-    "statistics", "summary", "sweep_dims", "table", "to_csv", "where",
+    "distribution", "engineering", "events", "highlights", "integral_time", "is_stationary", "is_steady",
+    "loop_energy", "notes", "observables", "over_time", "peaks", "reference_radii", "scaled", "setting",
+    "settled", "share_observables", "shares", "skewness_error", "statistics", "summary", "sweep_dims", "table",
+    "to_csv", "where",
 ]  # fmt: skip

@@ -1,13 +1,13 @@
-"""Integral correlation times of the fluctuations in a stationary run."""
+"""Correlation in time of a stationary run: integral correlation times, and the error of a mean over time."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
 import xarray as xr
 
-from sim.analysis.scene import MEMBERS, steady_points
+from sim.analysis.scene import MEMBERS, steady_points, sweep_dims
 
 #: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
 _WINDOW = 6.0
@@ -15,6 +15,8 @@ _WINDOW = 6.0
 _FEWEST = 2.0
 #: How many of its standard errors the correlation of neighbouring records is below that of ``_FEWEST``.
 _SURELY = 4.0
+#: Numbers that are transformed at once.
+_AT_ONCE = 2**21
 
 
 class IntegralTime(NamedTuple):
@@ -23,6 +25,9 @@ class IntegralTime(NamedTuple):
     time: float
     sem: float
     below: float = math.nan
+
+
+_NOTHING = IntegralTime(math.nan, math.nan)
 
 
 def integral_time(values: np.ndarray, step: float) -> IntegralTime:
@@ -69,16 +74,16 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     IntegralTime(time=nan, sem=nan, below=20.0)
     """
     members, records = values.shape
-    nothing = IntegralTime(math.nan, math.nan)
     if records < 2 or not np.all(np.isfinite(values)):
-        return nothing
-    free = max(members - 1, 1)
-    deviation = values - (values.mean(axis=0) if members > 1 else values.mean())
-    size = scipy.fft.next_fast_len(2 * records, real=True)
-    power = np.abs(scipy.fft.rfft(deviation, size, axis=1)) ** 2
-    covariance = scipy.fft.irfft(power.sum(axis=0), size)[:records] / (free * np.arange(records, 0, -1))
-    if not covariance[0] > (1e-10 * np.max(np.abs(values))) ** 2:
-        return nothing
+        return _NOTHING
+    return time_of(autocovariance(values), members, step, max(values.max(), -values.min()))
+
+
+def time_of(covariance: np.ndarray, members: int, step: float, largest: float) -> IntegralTime:
+    """The ``integral_time`` of an autocovariance of so many members, whose values are as large as ``largest``."""
+    records, free = len(covariance), max(members - 1, 1)
+    if records < 2 or not covariance[0] > (1e-10 * largest) ** 2:
+        return _NOTHING
     correlation = covariance / covariance[0]
     coarse = math.exp(-1.0 / _FEWEST)
     if correlation[1] < coarse:
@@ -89,10 +94,77 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     sums = np.cumsum(weights * correlation)
     windows = np.flatnonzero(np.arange(records) >= _WINDOW * sums)
     if len(windows) == 0:
-        return nothing
+        return _NOTHING
     window = int(windows[0])
     time = step * float(sums[window])
     return IntegralTime(time, time * math.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)))
+
+
+def autocovariance(values: np.ndarray, mean: np.ndarray | None = None) -> np.ndarray:
+    """Covariance of records by the number of records between them, averaged over members and times.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        Independent members of one process.
+    mean : array, optional
+        What their deviations are from. By default it is the ensemble mean at each record, of a single member its own
+        mean in time; and one member less counts as free. If it is given, the result is a sum over the members.
+
+    Returns
+    -------
+    array, shape (records,)
+    """
+    members, records = values.shape
+    free = 1.0 if mean is not None else max(members - 1.0, 1.0)
+    if mean is None:
+        mean = values.mean(axis=0) if members > 1 else values.mean(axis=1)
+    size, power = scipy.fft.next_fast_len(2 * records, real=True), 0.0
+    rows = max(1, _AT_ONCE // size)
+    for start in range(0, members, rows):
+        power = power + (np.abs(scipy.fft.rfft(values[start : start + rows] - mean, size, axis=1)) ** 2).sum(axis=0)
+    return scipy.fft.irfft(power, size)[:records] / (free * np.arange(records, 0, -1))
+
+
+class Inflation(NamedTuple):
+    """How many records tell as much as one free value, and of how many free values the estimate of that is."""
+
+    records: float
+    freedom: float
+
+
+def inflation(covariance: np.ndarray, members: int) -> Inflation:
+    """Variance of a mean over correlated records, in that of a mean over as many independent ones.
+
+    Parameters
+    ----------
+    covariance : array, shape (records,)
+        As of ``autocovariance``.
+    members : int
+        Of how many members it is.
+
+    Returns
+    -------
+    Inflation
+        ``1 + 2 sum of the autocorrelation`` over records up to Sokal's window (see ``integral_time``), and the degrees
+        of freedom of a variance that is estimated with it, ``n/(2W + 1)``; nan where there is no window.
+
+    Notes
+    -----
+    Of a single series the sum is corrected for the deviations being from its own mean (U. Wolff, Comput. Phys. Commun.
+    156 (2004) 143).
+    """
+    records = len(covariance)
+    if not covariance[0] > 0.0:
+        return Inflation(math.nan, math.nan)
+    sums = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
+    windows = np.flatnonzero(np.arange(records) >= 0.5 * _WINDOW * sums)
+    if len(windows) == 0:
+        return Inflation(math.nan, math.nan)
+    window, free = int(windows[0]), max(members - 1, 1)
+    wide = (2.0 * window + 1.0) / records
+    found = max(float(sums[window]), 1.0 / records) * (1.0 + wide if members == 1 else 1.0)
+    return Inflation(found, free / wide)
 
 
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
@@ -108,17 +180,22 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         ``correlation_time_below`` [s] with the sweep's dimensions.
     """
     energy = dataset.get("fluctuation_energy")
-    times = [xr.full_like(dataset["contact_modulus"], math.nan)] * 3
+    times = [xr.full_like(dataset["contact_modulus"], math.nan) for _ in range(3)]
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
-        stationary = energy.astype(float).where(steady_points(dataset))  # nan has no correlation time
-        dims: Any = {"input_core_dims": [[MEMBERS, "t"]], "output_core_dims": [[]] * 3}
-        times = xr.apply_ufunc(lambda values: integral_time(values, step), stationary, vectorize=True, **dims)
+        all_points = steady_points(dataset).broadcast_like(dataset["contact_modulus"])
+        steady = all_points.transpose(*sweep_dims(dataset)).to_numpy()
+        for point in np.ndindex(steady.shape):
+            if steady[point]:
+                values = energy.isel(dict(zip(sweep_dims(dataset), point, strict=True))).to_numpy()
+                found_here = integral_time(values.astype(float, copy=False), step)
+                for each, number in zip(times, found_here, strict=True):
+                    each[point] = number
     about = "integral correlation time of the fluctuation energy"
     texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"what the {about} is below"}
     found = xr.Dataset()
-    for (suffix, text), values in zip(texts.items(), times, strict=True):
-        found[f"correlation_time{suffix}"] = values
+    for (suffix, text), numbers in zip(texts.items(), times, strict=True):
+        found[f"correlation_time{suffix}"] = numbers
         found[f"correlation_time{suffix}"].attrs = {"units": "s", "long_name": text}
     found["correlation_time"].attrs["symbol"] = "t_c"
     return found

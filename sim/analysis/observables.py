@@ -102,7 +102,7 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
             found[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")
-    return xr.Dataset(found)
+    return xr.Dataset(found, attrs=dataset.attrs)
 
 
 def observables(dataset: xr.Dataset) -> xr.Dataset:

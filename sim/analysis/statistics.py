@@ -1,12 +1,13 @@
 """Statistics over the members of an ensemble, at each time and sweep value."""
 
-import warnings
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from scipy import special
 
+from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import KEPT, observables, pure, reference_radii, share_observables
@@ -17,7 +18,33 @@ from sim.units.refusals import renamed
 
 QUANTILES = (0.05, 0.5, 0.95)
 
-_OF = {"mean": "ensemble mean", "std": "standard deviation", "sem": "standard error of the ensemble mean"}
+#: Share of repeated ensembles whose intervals hold the truth, and half of such an interval of a normal law in errors.
+LEVEL = 0.95
+_WIDE = float(special.ndtri(0.5 + 0.5 * LEVEL))
+
+#: A spread below this share of the mean is of rounding.
+_ROUNDING = 1e-12
+
+#: Observables that are 0 or 1 in each member: the interval of their mean is that of a share.
+_COUNTED = ("fraction_detached", "fraction_masked", "ever_detached")
+
+_OF = {
+    "mean": "ensemble mean",
+    "std": "standard deviation",
+    "sem": "standard error of the ensemble mean",
+    "low": "lower end of the 95 % interval of the ensemble mean",
+    "high": "upper end of the 95 % interval of the ensemble mean",
+    "skewness": "skewness",
+    "effective_samples": "number of independent values that tell as much of the mean",
+    "correlation_time": "integral correlation time",
+    "correlation_time_sem": "standard error of the integral correlation time",
+    "quantile": "quantiles",
+    "quantile_low": "lower end of the 95 % intervals of the quantiles",
+    "quantile_high": "upper end of the 95 % intervals of the quantiles",
+}
+
+#: Units of statistics that are not in that of their observable.
+_UNITS = {"skewness": "1", "effective_samples": "1", "correlation_time": "s", "correlation_time_sem": "s"}
 
 #: How far from a swept value, in parts of it, one may be chosen: as far as rounding to three digits.
 _NEAR = 5e-3
@@ -79,7 +106,7 @@ def averaging(dataset: xr.Dataset, late: bool) -> str:
 
 
 def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
-    """Mean, standard deviation, standard error and quantiles over the members.
+    """Mean, spread, quantiles and skewness over the members, each mean and quantile with its error.
 
     Parameters
     ----------
@@ -92,42 +119,137 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        For each observable ``…_mean``, ``…_std``, ``…_sem`` and ``…_quantile`` (with the dimension
-        ``quantile``: 5, 50, 95 %). The standard error and deviation of a single member are nan. A
+        For each observable ``…_mean``, ``…_std`` (standard deviation), ``…_sem`` (standard error of the mean),
+        ``…_low`` and ``…_high`` (95 % interval of the mean), ``…_skewness``, and ``…_quantile``, ``…_quantile_low``,
+        ``…_quantile_high`` (with the dimension ``quantile``: 5, 50, 95 %). The errors of a single member are nan. A
         member that has no value (the indentation of an open contact) is left out.
+
+    Notes
+    -----
+    The interval of a mean is Student's, that of a share of the members Wilson's (J. Am. Stat. Assoc. 22 (1927) 209).
+    That of a quantile lies between order statistics, with linear interpolation, and holds for any law; where so few
+    members have none (a 5 % quantile of less than 59), it is nan. The skewness is corrected for the number of members;
+    of n members of a normal law it has the standard error ``skewness_error(n)``.
     """
     found: dict[str, xr.DataArray] = {}
+    members = float(trajectories.attrs.get("members", 1))
     for key, variable in trajectories.data_vars.items():
         name = str(key)
-        if name.rpartition("_")[2] in KEPT:
+        stem, _, kind = name.rpartition("_")
+        if kind in KEPT:
             found[name] = variable
+            if kind == "mean" and f"{stem}_sem" in trajectories:
+                ends = interval(stem, variable.to_numpy(), trajectories[f"{stem}_sem"].to_numpy(), members)
+                for end, at in zip(("low", "high"), ends, strict=True):
+                    text = f"{_OF[end]} of {variable.attrs.get('long_name', stem).removeprefix(_OF['mean'] + ' of ')}"
+                    found[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(long_name=text)
             continue
         for kind, values in _statistics_of(variable.astype(float), quantiles).items():
-            text = f"{_OF.get(kind, 'quantiles')} of {variable.attrs.get('long_name', name)}"
-            found[f"{name}_{kind}"] = values.assign_attrs(variable.attrs, long_name=text)
+            found[f"{name}_{kind}"] = values.assign_attrs(described(kind, variable))
     return xr.Dataset(found)
+
+
+def described(kind: str, variable: xr.DataArray) -> dict[str, Any]:
+    """Attributes of a statistic of an observable."""
+    other = {"units": _UNITS[kind], "symbol": ""} if kind in _UNITS else {}
+    return variable.attrs | other | {"long_name": f"{_OF[kind]} of {variable.attrs.get('long_name', variable.name)}"}
 
 
 def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.DataArray]:
     if MEMBERS not in variable.dims:
         none = xr.zeros_like(variable).where(variable.notnull())
-        levels = {"quantile": variable.expand_dims(quantile=list(QUANTILES))} if quantiles else {}
-        return {"mean": variable, "std": none, "sem": none} | levels
-    values, axis = variable.to_numpy(), variable.get_axis_num(MEMBERS)
-    count = np.sum(~np.isnan(values), axis, dtype=float)
-    with warnings.catch_warnings():  # nan is the answer where no member has a value
-        warnings.filterwarnings("ignore", "Mean of empty slice|All-NaN slice", RuntimeWarning)
-        mean = np.nanmean(values, axis)
-        if quantiles:
-            levels = (np.nanquantile if np.any(count < values.shape[axis]) else np.quantile)(values, QUANTILES, axis)
-    squares = np.nansum((values - np.expand_dims(mean, axis)) ** 2, axis)
-    deviation = (squares / np.where(count > 1.0, count - 1.0, np.nan)) ** 0.5
-    error = deviation / np.where(count > 0.0, count, np.nan) ** 0.5
-    one = variable.isel({MEMBERS: 0}, drop=True)
-    found = {name: one.copy(data=data) for name, data in (("mean", mean), ("std", deviation), ("sem", error))}
+        levels = variable.expand_dims(quantile=list(QUANTILES))
+        ends = ("quantile", "quantile_low", "quantile_high") if quantiles else ()
+        alike = {"mean": variable, "std": none, "sem": none, "low": variable, "high": variable}
+        return alike | {"skewness": xr.full_like(none, np.nan)} | dict.fromkeys(ends, levels)
+    values = np.ascontiguousarray(np.moveaxis(variable.to_numpy(), variable.get_axis_num(MEMBERS), -1))
     if quantiles:
-        found["quantile"] = one.expand_dims(quantile=list(QUANTILES)).copy(data=levels)
+        values = np.sort(values)  # nan last
+    count = np.sum(~np.isnan(values), axis=-1, dtype=float)
+    one = variable.isel({MEMBERS: 0}, drop=True)
+    found = {kind: one.copy(data=data) for kind, data in _moments(str(variable.name), values, count).items()}
+    if quantiles:
+        for kind, data in _quantiles(values, count).items():
+            found[kind] = one.expand_dims(quantile=list(QUANTILES)).copy(data=data)
     return found
+
+
+def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
+    """Statistics over the last axis, of ``count`` numbers each, that need no order."""
+    with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there are too few
+        mean = np.nansum(values, axis=-1) / count
+        deviations = values - mean[..., None]
+        squares = np.nansum(deviations**2, axis=-1)
+        std = np.sqrt(squares / np.where(count > 1.0, count - 1.0, np.nan))
+        error = std / np.sqrt(count)
+        third = np.nansum(deviations**3, axis=-1) / count
+        biased = np.where(std > _ROUNDING * abs(mean), third / (squares / count) ** 1.5, np.nan)
+        skewness = np.where(count > 2.0, biased * np.sqrt(count * (count - 1.0)) / (count - 2.0), np.nan)
+    low, high = interval(name, mean, error, count)
+    return {"mean": mean, "std": std, "sem": error, "low": low, "high": high, "skewness": skewness}
+
+
+def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
+    """Both ends of the 95 % interval of the mean of an observable over ``count`` members; nan for a single one."""
+    count = np.asarray(count, float)
+    if name not in _COUNTED:
+        half = special.stdtrit(np.where(count > 1.0, count - 1.0, np.nan), 0.5 + 0.5 * LEVEL) * sem
+        return mean - half, mean + half
+    with np.errstate(invalid="ignore", divide="ignore"):  # time averages of the members count for more than one each
+        several = np.where(sem > 0.0, mean * (1.0 - mean) / sem**2, 0.0)
+    count = np.where(count > 1.0, np.maximum(count, several), np.nan)
+    shrunk = 1.0 + _WIDE**2 / count
+    middle = (mean + 0.5 * _WIDE**2 / count) / shrunk
+    half = _WIDE / shrunk * np.sqrt(np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * _WIDE / count) ** 2)
+    return middle - half, middle + half
+
+
+def skewness_error(count: float) -> float:
+    """Standard error of the skewness of ``count`` numbers that follow a normal law, beyond which it tells something."""
+    n = count
+    return float(np.sqrt(6.0 * n * (n - 1.0) / ((n - 2.0) * (n + 1.0) * (n + 3.0)))) if n > 2.0 else np.nan
+
+
+def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
+    """Quantiles over the last axis, whose first ``count`` numbers are in order, and both ends of their intervals."""
+    levels = np.array(QUANTILES)
+    counts, of = np.unique(count, return_inverse=True)
+    places = {"quantile": levels * (counts[:, None] - 1.0)}
+    places["quantile_low"], places["quantile_high"] = quantile_ranks(counts[:, None], levels)
+    return {
+        kind: np.moveaxis(_at_ranks(ordered, place[of.reshape(count.shape)]), -1, 0) for kind, place in places.items()
+    }
+
+
+def quantile_ranks(count: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Places, from 0 on and between, in ``count`` ordered numbers, that a quantile of their law lies between.
+
+    The number of them below the quantile is binomial. Where one tail of it cannot be as small as half of what may be
+    left out, the other takes the rest; nan where there is no such interval.
+
+    >>> low, high = quantile_ranks(np.array([64.0]), np.array([0.5]))
+    >>> print(f"{low[0]:.2f} {high[0]:.2f}")
+    23.69 39.31
+    """
+    left = 1.0 - LEVEL
+    lowest, highest = (1.0 - level) ** count, level**count  # chances of all numbers above the quantile, and below
+    below = np.where(highest > 0.5 * left, left - highest, np.maximum(lowest, 0.5 * left))
+    above = np.where(lowest > 0.5 * left, left - lowest, np.maximum(highest, 0.5 * left))
+    with np.errstate(invalid="ignore"):
+        low = np.where(below > lowest, special.bdtrik(below, count, level), 0.0)
+        high = np.where(above > highest, special.bdtrik(1.0 - above, count, level), count - 1.0)
+    none = (below < lowest) | (above < highest)
+    return np.where(none, np.nan, low), np.where(none, np.nan, high)
+
+
+def _at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Values at places along the last axis, from 0 on and between; nan where a place is."""
+    known = places >= 0.0
+    below = np.where(known, places, 0.0).astype(np.intp)
+    above = np.minimum(below + 1, ordered.shape[-1] - 1)
+    share = places - below
+    low, high = (np.take_along_axis(ordered, at, axis=-1) for at in (below, above))
+    return np.where(share > 0.0, low + share * (high - low), np.where(known, low, np.nan))
 
 
 def statistics(dataset: xr.Dataset) -> xr.Dataset:
@@ -147,7 +269,12 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
         ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
         has stopped is left out from there on; ``fraction_detached`` counts it.
     """
-    return summary(observables(dataset)).merge(summary(events(dataset))).merge(correlation_time(dataset))
+    dims = ("t", *sweep_dims(dataset))
+    return (
+        in_blocks(dataset, dims, lambda some: summary(observables(some)))
+        .merge(summary(events(dataset).assign_attrs(dataset.attrs)))
+        .merge(correlation_time(dataset))
+    )
 
 
 def shares(dataset: xr.Dataset) -> xr.Dataset:

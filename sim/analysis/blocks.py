@@ -1,0 +1,69 @@
+"""Pieces of a dataset that fit into memory, whatever the size of its file."""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+#: Bytes of trajectories that are read at once.
+ROOM = 2**26
+
+
+def blocks(dataset: xr.Dataset, dims: Sequence[str], room: int | None = None) -> Iterator[dict[str, slice]]:
+    """Slices of a dataset that take little memory each.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, opened lazily.
+    dims : sequence of str
+        Dimensions to slice along, the first one first, the others where that is not enough; along none a piece of what
+        a file packs together is cut before all are down to one such piece.
+    room : int
+        Bytes of one; ``ROOM`` by default.
+    """
+    timed = [variable for variable in dataset.variables.values() if "t" in variable.dims]
+    lengths = {name: dataset.sizes[name] for name in dims if name in dataset.sizes}
+    over = 8.0 * sum(variable.size for variable in timed) / (ROOM if room is None else room)
+    for least, name in itertools.product(({n: _packed(timed, n) for n in lengths}, dict.fromkeys(lengths, 1)), lengths):
+        if over > 1.0:
+            size, piece = lengths[name], min(least[name], lengths[name])
+            lengths[name] = max(piece, int(size / over) // piece * piece)
+            over *= lengths[name] / size
+    ranges = [range(0, dataset.sizes[name], length) for name, length in lengths.items()]
+    for starts in itertools.product(*ranges):
+        yield {n: slice(at, at + lengths[n]) for n, at in zip(lengths, starts, strict=True)}
+
+
+def _packed(variables: list[xr.Variable], name: str) -> int:
+    """Length along a dimension of what the file packs together."""
+    return max((_chunk(variable, name) for variable in variables if name in variable.dims), default=1)
+
+
+def _chunk(variable: xr.Variable, name: str) -> int:
+    chunks = variable.encoding.get("chunksizes") or (1,) * variable.ndim
+    return int(chunks[variable.dims.index(name)])
+
+
+def in_blocks(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dataset], xr.Dataset]) -> xr.Dataset:
+    """What a function makes of a dataset, made of its ``blocks`` one after the other and put together.
+
+    The function works at each value of these dimensions by itself.
+    """
+    found: dict[str, xr.DataArray] = {}
+    for block in blocks(dataset, dims):
+        part = reduce(dataset.isel(block))
+        if all(part.sizes.get(name, 1) == dataset.sizes.get(name, 1) for name in block):
+            return part
+        for key, values in part.items():
+            whole = found.get(str(key))
+            if whole is None:
+                sizes = [dataset.sizes[name] if name in block else values.sizes[name] for name in values.dims]
+                kept: dict[Any, Any] = {n: c for n, c in values.coords.items() if not set(c.dims) & set(block)}
+                kept |= {n: dataset[n] for n in values.coords if n not in kept and n in dataset.coords}
+                whole = xr.DataArray(np.empty(sizes, values.dtype), kept, values.dims, attrs=values.attrs)
+                found[str(key)] = whole
+            whole[{name: block[name] for name in values.dims if name in block}] = values.to_numpy()
+    return xr.Dataset(found)
