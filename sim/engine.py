@@ -85,30 +85,37 @@ def start(scenario: Scenario, dice: Dice) -> State:
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy)
     touch = contact.start(motion, scenario.times.duration, terms)
     if drive.feeds_back:
-        around = _around(scenario, touch, shear.energy, 1)
+        around = _around(scenario, touch, shear.energy, range(1, 2))
         slider = coupling.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
 
 
 def advance(scenario: Scenario, state: State, dice: Dice, steps: range) -> tuple[State, Course]:
-    """The state after a block of clock steps, of a single one where a part feeds back, and what it went through."""
+    """The state after a block of clock steps and what it went through.
+
+    Where a drive feels the friction the block ends, perhaps earlier, where the contact opens or closes.
+    """
     drive, population, process, contact = scenario.parts
+    slider: Sliding
     if drive.feeds_back:
-        around = _around(scenario, state.contact, state.shear.energy, steps.start)
+        around = _around(scenario, state.contact, state.shear.energy, steps)
         before = state.drive, state.bonds
-        slider, motions, bonds, bonding = coupling.advance(scenario.parts, before, around, scenario.times, steps.start)
+        passed, motions, bonds, bonding = coupling.advance(scenario.parts, before, around, scenario.times, steps)
+        slider, driven = passed.at(-1), drive.readings(passed)
     else:
         slider, motions = drive.advance(state.drive, scenario.times, steps)
         bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, dice.bonds)
+        driven = during(drive.readings(slider), len(steps))
     shear, energy = process.advance(state.shear, motions, bonding, dice.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, energy)
     touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
+    if drive.feeds_back and (stand := coupling.agreed(passed, touch.radius)) < len(steps):
+        return advance(scenario, state, dice, steps[:stand])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
     largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions)
     end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
     of_bonds = bonding.fraction, bonding.stress, bonding.strength
-    driven = during(drive.readings(slider), len(energy))
     return end, Course(motions.time, motions.position, motions.speed, *of_bonds, energy, driven, *touch)
 
 
@@ -181,10 +188,10 @@ def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array)
     return Balance(bonded, fluctuating, strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _around(scenario: Scenario, touch: Touching, energy: Array, step: int) -> Around:
-    """Contact and half-space at the start of a clock step, for a drive that feels the friction."""
+def _around(scenario: Scenario, touch: Touching, energy: Array, steps: range) -> Around:
+    """Contact and half-space at the start of some clock steps, for a drive that feels the friction."""
     contact, bodies, times, adhesion = scenario.contact, scenario.bodies, scenario.times, scenario.adhesion
-    first, last = contact.held_between(times.at(step - 1.0), times.at(float(step)), times.duration)
+    first, last = contact.held_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
     share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(touch.radius, nan=0.0))
     bare = adhesion.work_of_bonds(0.0) - scenario.fluctuations.paid_by_adhesion * share * energy
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)

@@ -229,11 +229,17 @@ def _slider(points: Sequence[Scenario]) -> Rows:
         if drive.mass > 0.0 or firm < math.inf:
             stiffest = float(np.nanmax(behind.stiffness))
             rows.setdefault(("with mass and k_t", "N/m of the spring, without damping"), []).append(stiffest)
+        if drive.mass == 0.0:
+            grows = float(bonds.amplitude(speeds)[worst])
+            said = "suddenly, with large slips; on the way back they last to a stiffer spring"
+            if grows > 0.0:
+                said = f"gradually: friction swings by {grows:.3g} √(1 − K/K_c) of itself"
+            rows.setdefault(("sets in there", f"{said} (mean field, constant area)"), [])
         soft = 4.0 * math.pi * point.solid.effective[0] * float(area[worst] / alone.stiffness[worst])
         if 0.5 * soft < 2.0 * radius:
             said = "m and longer: such waves along the sliding oscillate by themselves, across half as long ones"
             rows.setdefault(("half-space", said), []).append(soft)
-    return [(name, f"{_span(values)} {said}") for (name, said), values in rows.items()]
+    return [(name, f"{_span(values)} {said}" if values else said) for (name, said), values in rows.items()]
 
 
 def _power(point: Scenario) -> float:

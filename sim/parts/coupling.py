@@ -17,27 +17,39 @@ from sim.parts.bonds.two_state import Population, Steady, Unbroken
 from sim.parts.coupling_equations import Law, Resting, Slider
 from sim.parts.coupling_rows import advance_rows
 from sim.parts.drive.driven import FIRST, STORED, Driven, Force, Spring
-from sim.parts.exchange import Array, Bonding, Motions, Parts, Sliding, Times
+from sim.parts.exchange import Array, Bonding, Flags, Motions, Parts, Sliding, Times
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
+#: Columns of a row that are measured by a stretch.
+_STRETCHED = [
+    columns.BODY,
+    columns.SHEARED,
+    columns.MOMENT,
+    columns.SPEED,
+    columns.POSITION,
+    columns.SLIP,
+    columns.PATH,
+]
+#: Relative difference up to which two radii are the same equilibrium, found on two ways.
+_SAME = 1e-9
 
 
 class Held(NamedTuple):
     """What holds the sphere: load [N], displacement of the base [m], stiffness behind it [N/m]; 0 what does not."""
 
-    load: float
-    base: float
+    load: float | Array
+    base: float | Array
     stiffness: float
 
 
 class Around(NamedTuple):
-    """Contact and half-space around slider and bonds during a clock step.
+    """Contact and half-space around slider and bonds during some clock steps.
 
     Attributes
     ----------
     radius : array
-        Contact radius at its start [m], nan where it is open.
+        Contact radius at their start [m], nan where it is open.
     bare : array
         Work of adhesion that is left without bonds [J/m²].
     bonded : float
@@ -45,9 +57,9 @@ class Around(NamedTuple):
     reversible : float
         Share of the mean stress's energy that adhesion pays [1].
     held : tuple of Held
-        What holds the sphere at start and end of the step.
+        What holds the sphere at start and end of each step.
     stays : bool
-        Whether the radius stays during the step.
+        Whether the radius stays during a step.
     sphere_radius, modulus, poisson_ratio : float
         R [m], E* [Pa], ν [1].
     shear_modulus : float
@@ -121,73 +133,95 @@ def felt(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
 
 
 def advance(
-    parts: Parts, state: tuple[Sliding, tuple[object, ...]], around: Around, times: Times, step: int
-) -> tuple[Sliding, Motions, tuple[object, ...], Bonding]:
-    """Slider, its motion, bonds and their readings after a clock step, from the slider and the bonds before it."""
+    parts: Parts, state: tuple[Sliding, tuple[object, ...]], around: Around, times: Times, steps: range
+) -> tuple[Driven, Motions, tuple[object, ...], Bonding]:
+    """Slider at the end of each of some clock steps, its motion, the bonds after the last and their readings at each.
+
+    The contact is that at the start, but for its equilibrium with the bonds: ``agreed`` counts the steps that stand.
+    """
     drive, bonds = cast(Force | Spring, parts.drive), cast(FirstMoment | Unbroken | Steady, parts.bonds)
     slider, population = cast(Driven, state[0]), state[1]
-    begin, end = times.at(step - 1.0), times.at(float(step))
-    units = _units(drive, bonds, around, end - begin)
+    ends = times.at(np.arange(steps.start - 1.0, steps.stop))
+    units = _units(drive, bonds, around, times.step)
     stretch, force = units
-    bound, moment, seen = _population(bonds, population, slider, around, stretch)
+    bound, moment, seen = _population(bonds, population, around.radius)
+    radius = around.radius
+    if not around.stays:  # the sub-steps go on with their own
+        radius = np.where(_agree(slider.radius, radius), slider.radius, radius)
     rows = np.zeros((len(slider.speed), columns.COLUMNS))
     of_rows = {
-        columns.FORCE: slider.spring_force / force, columns.BODY: slider.body_speed / stretch,
-        columns.SHEARED: slider.sheared / stretch, columns.BOUND: bound, columns.MOMENT: moment / stretch,
-        columns.SPEED: slider.speed / stretch,
-        columns.RADIUS: around.radius, columns.NEXT: slider.next_step, columns.ENDED: slider.runaway_time,
+        columns.FORCE: slider.spring_force, columns.BODY: slider.body_speed, columns.SHEARED: slider.sheared,
+        columns.BOUND: bound, columns.MOMENT: moment, columns.SPEED: slider.speed, columns.POSITION: slider.position,
+        columns.RADIUS: radius, columns.NEXT: slider.next_step, columns.COUNT: slider.substeps,
+        columns.ENDED: slider.runaway_time,
     }  # fmt: skip
     for column, values in of_rows.items():
         rows[:, column] = values
-    energies = np.zeros(slider.energies.shape)
-    energies[:, STORED] = slider.energies[:, STORED] / (stretch * force)
-    pieces = drive.driven(np.array([begin, end]), times.duration)
+    scales = np.ones(columns.COLUMNS)
+    scales[columns.FORCE], scales[_STRETCHED] = force, stretch
+    pieces, duration = drive.driven(ends, times.duration), np.diff(ends)
     scale = 1.0 / (stretch if drive.spring else force)
-    given = np.stack([pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
+    given = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
+    clock, energies = _clock(around, ends), slider.energies.copy()
+    passed, spent = np.empty((columns.COLUMNS, len(steps), len(rows))), np.empty((len(steps), *energies.shape))
+    numbers = _numbers(drive, bonds, around, units)
     bare = around.bare + np.zeros(len(rows))
-    advance_rows(rows, energies, bare, given, begin, *_numbers(drive, bonds, around, units, end - begin))
-    gained = energies * (stretch * force)
-    gained[:, :STORED] += slider.energies[:, :STORED]
-    gained[:, FIRST] = slider.energies[:, FIRST]
-    stage = (pieces.integral.sum(), pieces.last[-1]) if drive.spring else (0.0, 0.0)
-    speed = rows[:, columns.SPEED] * stretch
+    advance_rows(rows, energies, bare, given, clock, scales, stretch * force, *numbers, passed, spent)
+    stage, stage_speed = np.zeros((2, *passed[0].shape))
+    if drive.spring:
+        whole = pieces.joined
+        stage[:], stage_speed[:] = whole.integral[:, np.newaxis], whole.last[:, np.newaxis]
+        stage[0] += slider.stage_position
+        np.add.accumulate(stage, out=stage)
     after = Driven(
-        slider.position + rows[:, columns.POSITION] * stretch, rows[:, columns.BODY] * stretch, speed,
-        rows[:, columns.FORCE] * force, rows[:, columns.SHEARED] * stretch, slider.stage_position + stage[0],
-        stage[1] + 0.0 * speed, rows[:, columns.NEXT], slider.substeps + rows[:, columns.COUNT], rows[:, columns.ENDED],
-        gained,
+        passed[columns.POSITION], passed[columns.BODY], passed[columns.SPEED], passed[columns.FORCE],
+        passed[columns.SHEARED], stage, stage_speed, passed[columns.RADIUS], passed[columns.NEXT],
+        passed[columns.COUNT], passed[columns.ENDED], spent,
     )  # fmt: skip
-    bound, moment = rows[:, columns.BOUND].copy(), rows[:, columns.MOMENT] * stretch
-    time, duration = np.full((1, 1), end), np.full((1, 1), end - begin)
-    slid = rows[:, columns.SLIP] * stretch, rows[:, columns.PATH] * stretch, slider.speed, speed, after.position
-    motions = Motions(step, time, duration, *(values[np.newaxis] for values in slid))
+    first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
+    slid = passed[columns.SLIP], passed[columns.PATH], first, after.speed, after.position
+    motions = Motions(steps.start, ends[1:, np.newaxis], duration[:, np.newaxis], *slid)
+    bound, moment = passed[columns.BOUND], passed[columns.MOMENT]
     if isinstance(bonds, FirstMoment):
-        bonding = bonds.bonding(Stretches(bound[np.newaxis], moment[np.newaxis]))
-        return after, motions, Stretches(bound, moment, seen), felt(parts, bonding, speed)
+        found = felt(parts, bonds.bonding(Stretches(bound, moment)), after.speed)
+        return after, motions, Stretches(bound[-1].copy(), moment[-1].copy(), seen), found
     stress = bonds.stress / stretch * moment
-    bonding = Bonding(bound[np.newaxis], stress[np.newaxis], stress[np.newaxis])
-    return after, motions, Population(bound, np.sign(stress), seen), felt(parts, bonding, speed)
+    left = Population(bound[-1].copy(), np.sign(stress[-1]), seen)
+    return after, motions, left, felt(parts, Bonding(bound, stress, stress), after.speed)
+
+
+def agreed(passed: Driven, radius: Array) -> int:
+    """Number of clock steps up to the first that ends with another contact radius [m] than its sub-steps."""
+    apart = ~np.all(_agree(passed.radius, radius), axis=1)
+    return int(np.argmax(apart)) + 1 if apart[:-1].any() else len(apart)
+
+
+def _agree(own: Array, radius: Array) -> Flags:
+    """True where two radii of a contact differ by rounding alone, or both are those of an open one."""
+    size = np.nan_to_num(radius, nan=0.0)
+    same: Flags = np.abs(own - size) <= _SAME * size
+    return same
 
 
 def _population(
-    bonds: FirstMoment | Unbroken | Steady, population: tuple[object, ...], slider: Driven, around: Around, unit: float
+    bonds: FirstMoment | Unbroken | Steady, population: tuple[object, ...], radius: Array
 ) -> tuple[Array, Array, Array]:
     """Share of the sites that is bound, times the mean stretch [m], and the contact radius that they have seen.
 
-    Of bonds without a stretch the share of those of rest, with the sense of the sliding in place of a stretch.
+    Of bonds without a stretch the share of those of rest.
     """
     if isinstance(bonds, FirstMoment):
         stretches = cast(Stretches, population)
-        share, seen = bonds.kept(stretches.seen, around.radius)
+        share, seen = bonds.kept(stretches.seen, radius)
         return stretches.bound * share, stretches.stretch * share, seen
     left = cast(Population, population)
-    return left.bound, left.bound * np.sign(slider.speed) * unit, left.seen
+    return left.bound, np.zeros(len(left.bound)), left.seen
 
 
 def _numbers(
-    drive: Force | Spring, bonds: FirstMoment | Unbroken | Steady, around: Around, units: _Units, duration: float
+    drive: Force | Spring, bonds: FirstMoment | Unbroken | Steady, around: Around, units: _Units
 ) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
-    """The numbers of slider, bonds and contact for one step, in its units."""
+    """The numbers of slider, bonds and contact, but for what holds the sphere, in their units."""
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * around.area)
     yields, slope = (stiff * value for value in drive.yields(around.shear_modulus, around.poisson_ratio))
@@ -203,10 +237,18 @@ def _numbers(
     if around.reversible:
         stress = density * stretch
         taken = around.reversible * float(mean_stress_energy(1.0, stress, around.modulus, around.poisson_ratio))
-    (load, base, behind), (later, beyond, _) = around.held
-    rates = (later - load) / duration, (beyond - base) / duration
     held = Resting(
-        float(around.stays), around.bonded / of_rest, taken, load, rates[0], base, rates[1], behind,
+        float(around.stays), around.bonded / of_rest, taken, 0.0, 0.0, 0.0, 0.0, around.held[0][2],
         1.0 / around.sphere_radius, around.modulus, around.area,
     )  # fmt: skip
     return tuple(slider), tuple(breaking), tuple(held)
+
+
+def _clock(around: Around, ends: Array) -> Array:
+    """Beginning of each step, load and displacement of the base there, each with its rate; shape (steps, 5)."""
+    duration = np.diff(ends)
+    clock = np.zeros((len(duration), 5))
+    clock[:, 0] = ends[:-1]
+    for column, (first, last) in enumerate(zip(*(held[:2] for held in around.held), strict=True)):
+        clock[:, 2 * column + 1], clock[:, 2 * column + 2] = first, (last - first) / duration
+    return clock

@@ -18,6 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device
+from sim.parts.exchange import Array
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -32,6 +33,23 @@ RATES = np.array(
 )
 BENDS = np.array([[sum(row[k] * RATES[k, j] for k in range(3)) for j in range(3)] for row in RATES])
 _OFF = np.array([sum(row) for row in RATES])
+#: Weights of the nodes in a mean slope.
+WEIGHTS = np.array([1.0, 1.0, 1.0]) / 3.0
+
+
+def _modes() -> tuple[float, complex, Array, Array]:
+    """Eigenvalues of ``RATES``, one real and one of the complex pair; matrices that lead back to nodes and from them.
+
+    The last two columns are the real part and minus the imaginary part of the vector of the complex one.
+    """
+    values, vectors = np.linalg.eig(RATES)
+    real, pair = int(np.argmin(np.abs(values.imag))), int(np.argmax(values.imag))
+    turning = vectors[:, pair]
+    forth = np.stack([vectors[:, real].real, turning.real, -turning.imag], axis=1)
+    return float(values[real].real), complex(values[pair]), forth, np.linalg.inv(forth)
+
+
+PACE, TURNING, FORTH, BACK = _modes()
 #: Columns of a row: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the body,
 #: slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway.
 FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED = range(13)
@@ -174,94 +192,103 @@ def pull_on(time, start, way, row, slider, piece):
 
 
 @device
-def solve(matrix, right):
-    """Gaussian elimination in place with row exchange; whether there is a solution, which replaces ``right``."""
-    n = right.size
-    for k in range(n):
-        best = k
-        for i in range(k + 1, n):
-            if math.fabs(matrix[i, k]) > math.fabs(matrix[best, k]):
-                best = i
-        if not math.fabs(matrix[best, k]) > 0.0:
-            return False
-        if best != k:
-            for j in range(k, n):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-            right[k], right[best] = right[best], right[k]
-        for i in range(k + 1, n):
-            share = matrix[i, k] / matrix[k, k]
-            if share != 0.0:
-                for j in range(k + 1, n):
-                    matrix[i, j] -= share * matrix[k, j]
-                right[i] -= share * right[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            right[k] -= matrix[k, j] * right[j]
-        right[k] /= matrix[k, k]
-    return True
+def _sum(weights, i, values, k):
+    """A row of weights times what stands at the three nodes of one unknown."""
+    return weights[i, 0] * values[k, 0] + weights[i, 1] * values[k, 1] + weights[i, 2] * values[k, 2]
 
 
 @device
-def equations(row, z, start, step, bare, slider, law, held, piece, right, matrix):
-    """Residuals and their matrix at the three nodes for slip, u, N, M there; whether there are any."""
+def equations(row, z, start, step, bare, slider, law, held, piece, right, radii):
+    """Residuals at the three nodes for slip, u, N, M there, and their slopes, a mean over the nodes.
+
+    ``radii``: contact radii at the nodes, which the next ones are searched from. The slopes are those of the balance of
+    forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ; nan where there is no equilibrium.
+    """
     _, mass, damping, viscosity, _, _, _, _ = slider
-    matrix[:] = 0.0
+    balance = bending = thickness = u_bound = u_moment = u_speed = 0.0
+    n_bound = n_moment = n_speed = m_bound = m_moment = m_speed = 0.0
     for i in range(3):
-        time, b = start + NODES[i] * step, 4 * i
-        slip, body, bend, bound, moment = (
-            0.0,
-            0.0,
-            -_OFF[i] * row[BODY] / step,
-            row[BOUND] + z[2, i],
-            row[MOMENT] + z[3, i],
-        )
-        for j in range(3):
-            slip += RATES[i, j] * z[0, j] / step
-            body += RATES[i, j] * (z[0, j] + z[1, j]) / step
-            bend += BENDS[i, j] * (z[0, j] + z[1, j]) / (step * step)
-        if not bound >= 0.0:
-            return False
-        radius, area, by_bound, by_moment = contact_area(bound, moment, time, row[RADIUS], bare, held)
-        if not area >= 0.0:
-            return False
-        of_bound, of_moment, on, turn, _, _ = kinetics(bound, moment, slip, law)
-        stress = moment + viscosity * slip
-        to_bound, to_moment, thick = by_bound * stress, area + by_moment * stress, area * viscosity
+        time, bound, moment = start + NODES[i] * step, row[BOUND] + z[2, i], row[MOMENT] + z[3, i]
+        speed = _sum(RATES, i, z, 0) / step
+        body = speed + _sum(RATES, i, z, 1) / step
+        radius, area, by_bound, by_moment = contact_area(bound, moment, time, radii[i], bare, held)
+        if not (bound >= 0.0 and area >= 0.0):
+            return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        radii[i] = radius
+        stress = moment + viscosity * speed
         yields, softer = compliance(radius, slider)
-        softer *= held[10] / (2.0 * math.pi * radius) if radius > 0.0 else 0.0
-        pull = pull_on(time, start, z[0, i] + z[1, i], row, slider, piece)
-        right[b] = area * stress + damping * body + mass * bend - pull
-        right[b + 1] = row[SHEARED] + z[1, i] - yields * area * stress
-        right[b + 2] = -step * of_bound[0]
-        right[b + 3] = -step * of_moment[0]
-        matrix[b, b] += slider[0]
-        matrix[b, b + 1] += slider[0]
-        matrix[b, b + 2] += to_bound
-        matrix[b, b + 3] += to_moment
-        matrix[b + 1, b + 1] += 1.0
-        matrix[b + 1, b + 2] -= yields * to_bound + softer * by_bound * area * stress
-        matrix[b + 1, b + 3] -= yields * to_moment + softer * by_moment * area * stress
-        matrix[b + 2, b + 2] -= step * of_bound[1]
-        matrix[b + 2, b + 3] -= step * of_bound[2]
-        matrix[b + 3, b + 2] -= step * of_moment[1]
-        matrix[b + 3, b + 3] -= step * on[0]
-        for j in range(3):
-            d, rate = 4 * j, RATES[i, j]
-            heavy = damping * rate / step + mass * BENDS[i, j] / (step * step)
-            right[b + 2] += rate * z[2, j]
-            right[b + 3] += rate * z[3, j]
-            matrix[b, d] += heavy + thick * rate / step
-            matrix[b, d + 1] += heavy
-            matrix[b + 1, d] -= yields * thick * rate / step
-            matrix[b + 2, d + 2] += rate
-            matrix[b + 3, d + 3] += rate
-            matrix[b + 2, d] -= turn * rate
-            matrix[b + 3, d] -= on[1] * rate
+        softer *= held[10] / (2.0 * math.pi * radius) * area * stress if radius > 0.0 else 0.0
+        to_bound, to_moment, thick = by_bound * stress, area + by_moment * stress, area * viscosity
+        right[0, i] = area * stress + damping * body - pull_on(time, start, z[0, i] + z[1, i], row, slider, piece)
+        if mass > 0.0:
+            bend = (_sum(BENDS, i, z, 0) + _sum(BENDS, i, z, 1)) / step - _OFF[i] * row[BODY]
+            right[0, i] += mass * bend / step
+        right[1, i] = row[SHEARED] + z[1, i] - yields * area * stress
+        share = WEIGHTS[i]
+        balance += share * to_bound
+        bending += share * to_moment
+        thickness += share * thick
+        u_bound -= share * (yields * to_bound + softer * by_bound)
+        u_moment -= share * (yields * to_moment + softer * by_moment)
+        u_speed -= share * yields * thick
         if law[5] != 0.0:  # bonds without a stretch follow the speed at once
-            share = share_left(slip, law)
-            right[b + 2], right[b + 3] = bound - share, moment - law[5] * bound
-            matrix[b + 2 : b + 4, :] = 0.0
-            matrix[b + 2, b + 2], matrix[b + 3, b + 2], matrix[b + 3, b + 3] = 1.0, -law[5], 1.0
-            for j in range(3):
-                matrix[b + 2, 4 * j] = law[6] * law[5] * share * share * RATES[i, j] / step
-    return True
+            left = share_left(speed, law)
+            right[2, i], right[3, i] = bound - left, moment - law[5] * bound
+            n_bound -= share
+            n_speed -= share * law[6] * law[5] * left * left
+            m_bound += share * law[5]
+            m_moment -= share
+        else:
+            of_bound, of_moment, on, turn, _, _ = kinetics(bound, moment, speed, law)
+            right[2, i] = _sum(RATES, i, z, 2) / step - of_bound[0]
+            right[3, i] = _sum(RATES, i, z, 3) / step - of_moment[0]
+            n_bound += share * of_bound[1]
+            n_moment += share * of_bound[2]
+            n_speed += share * turn
+            m_bound += share * of_moment[1]
+            m_moment += share * on[0]
+            m_speed += share * on[1]
+    of_bonds = n_bound, n_moment, n_speed, m_bound, m_moment, m_speed
+    return balance, bending, thickness, u_bound, u_moment, u_speed, *of_bonds
+
+
+@device
+def resolved(rate, slopes, slider, law, balance, yielding, bonds, stretches):
+    """Slip, u, N and M that take the residuals away of a mode of the method, in which a derivative is a ``rate``."""
+    n_bound, n_moment, n_speed, m_bound, m_moment, m_speed = slopes[6:]
+    own = rate if law[5] == 0.0 else 0.0 * rate
+    n, m = own - n_bound, own - m_moment
+    scale = 1.0 / (n * m - n_moment * m_bound)
+    bound, moment = (m * bonds + n_moment * stretches) * scale, (m_bound * bonds + n * stretches) * scale
+    by_slip = rate * scale
+    bound_slip, moment_slip = (m * n_speed + n_moment * m_speed) * by_slip, (m_bound * n_speed + n * m_speed) * by_slip
+    sheared = yielding - slopes[3] * bound - slopes[4] * moment
+    sheared_slip = -(slopes[5] * rate + slopes[3] * bound_slip + slopes[4] * moment_slip)
+    firm = slider[0] + rate * (slider[2] + rate * slider[1])
+    resists = firm * (1.0 + sheared_slip) + rate * slopes[2] + slopes[0] * bound_slip + slopes[1] * moment_slip
+    slip = (balance - firm * sheared - slopes[0] * bound - slopes[1] * moment) / resists
+    return slip, sheared + sheared_slip * slip, bound + bound_slip * slip, moment + moment_slip * slip
+
+
+@device
+def correct(slopes, step, slider, law, right):
+    """Replace residuals by what takes them away, slopes being the same at all nodes.
+
+    Then the method's modes, one real and two complex, are on their own (Hairer & Wanner II, IV.8).
+    """
+    ahead, turned = PACE / step, complex(TURNING.real / step, TURNING.imag / step)
+    real = _sum(BACK, 0, right, 0), _sum(BACK, 0, right, 1), _sum(BACK, 0, right, 2), _sum(BACK, 0, right, 3)
+    slip, sheared, bound, moment = resolved(ahead, slopes, slider, law, *real)
+    pair = (
+        complex(_sum(BACK, 1, right, 0), _sum(BACK, 2, right, 0)),
+        complex(_sum(BACK, 1, right, 1), _sum(BACK, 2, right, 1)),
+        complex(_sum(BACK, 1, right, 2), _sum(BACK, 2, right, 2)),
+        complex(_sum(BACK, 1, right, 3), _sum(BACK, 2, right, 3)),
+    )
+    slips, sheareds, bounds, moments = resolved(turned, slopes, slider, law, *pair)
+    for i in range(3):
+        first, real_part, other = FORTH[i, 0], FORTH[i, 1], FORTH[i, 2]
+        right[0, i] = first * slip + real_part * slips.real + other * slips.imag
+        right[1, i] = first * sheared + real_part * sheareds.real + other * sheareds.imag
+        right[2, i] = first * bound + real_part * bounds.real + other * bounds.imag
+        right[3, i] = first * moment + real_part * moments.real + other * moments.imag

@@ -8,6 +8,8 @@ from sim.numerics.jit import device, kernel
 from sim.parts.coupling_equations import (
     BODY,
     BOUND,
+    COLUMNS,
+    COUNT,
     ENDED,
     FORCE,
     MOMENT,
@@ -25,7 +27,7 @@ from sim.parts.coupling_equations import (
     pull_on,
     share_left,
 )  # fmt: skip
-from sim.parts.coupling_step import book, error_of, newton
+from sim.parts.coupling_step import book, newton, tried
 from sim.parts.drive.driven import AREA, STORED, WORK
 
 #: Share of a clock step below which a sub-step means that there is no solution to go on with.
@@ -101,13 +103,11 @@ def _later(held, time, stays):
 
 
 @device
-def _piece(row, bare, slider, law, held, piece, room, energy):
+def _piece(row, bare, slider, law, held, piece, room, at_nodes, energy):
     """Go through one piece of a clock step; the time after which it ends or there is no way on.
 
-    The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
-    tolerance. A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
+    A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
-    z, right, matrix, at_nodes = room
     start, length = 0.0, piece[0]
     for _ in range(_MOST_STEPS):
         left = length - start
@@ -119,16 +119,11 @@ def _piece(row, bare, slider, law, held, piece, room, energy):
             held = _later(held, 0.0, 1.0)
             row[NEXT] = 0.0
             continue
-        if not newton(row, z, start, step, bare, slider, law, held, piece, right, matrix):
-            row[NEXT] = 0.25 * step
+        grows, stands = tried(row, start, step, bare, slider, law, held, piece, room)
+        if not stands:
+            row[NEXT] = step * grows
             continue
-        error = error_of(row, z, start, step, bare, slider, law, held, piece)
-        error *= math.sqrt(error) / slider[7]
-        grows = min(6.0, max(0.1, 0.9 * error ** (-1.0 / 6.0))) if error > 0.0 else 6.0
-        if not error <= 1.0:
-            row[NEXT] = step * (grows if error < math.inf else 0.25)
-            continue
-        book(row, z, start, step, bare, slider, law, held, piece, at_nodes, energy)
+        book(row, start, step, bare, slider, law, held, piece, room, at_nodes, energy)
         row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
         if step == left:
             return length
@@ -197,9 +192,8 @@ def _jump(row, time, bare, slider, law, held):
 
 
 @device
-def _slide(row, start, sense, bare, slider, law, held, piece, room, energy):
+def _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, energy):
     """Slip until the speed comes to zero or the piece ends; the time reached, negative where there is no way on."""
-    z, right, matrix, at_nodes = room
     length = piece[0]
     along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
     for _ in range(_MOST_STEPS):
@@ -209,16 +203,11 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, energy):
         if not step > _LEAST * length:
             row[NEXT] = 0.0
             return start if slider[1] == 0.0 or row[SPEED] == 0.0 else -1.0
-        if not newton(row, z, start, step, bare, slider, along, held, piece, right, matrix):
-            row[NEXT] = 0.25 * step
+        grows, stands = tried(row, start, step, bare, slider, along, held, piece, room)
+        if not stands:
+            row[NEXT] = step * grows
             continue
-        error = error_of(row, z, start, step, bare, slider, along, held, piece)
-        error *= math.sqrt(error) / slider[7]
-        grows = min(6.0, max(0.1, 0.9 * error ** (-1.0 / 6.0))) if error > 0.0 else 6.0
-        if not error <= 1.0:
-            row[NEXT] = step * (grows if error < math.inf else 0.25)
-            continue
-        speed = _last_speed(z, step) * sense
+        speed = _last_speed(room[0], step) * sense
         stops = speed <= 0.0
         if stops and row[SPEED] == 0.0:
             row[NEXT] = 0.25 * step
@@ -227,9 +216,9 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, energy):
             near, above, far, below, side = 0.0, row[SPEED] * sense, step, speed, 0
             for _ in range(100):
                 step = near + (far - near) * (above / (above - below))
-                if not newton(row, z, start, step, bare, slider, along, held, piece, right, matrix):
+                if not newton(row, start, step, bare, slider, along, held, piece, room):
                     break
-                speed = _last_speed(z, step) * sense
+                speed = _last_speed(room[0], step) * sense
                 if math.fabs(speed) <= 1e-13 * math.fabs(row[SPEED]) or far - near <= 1e-15 * far:
                     break
                 if speed > 0.0:
@@ -240,7 +229,7 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, energy):
                     far, below = step, speed
                     above *= 0.5 if side < 0 else 1.0
                     side = -1
-        book(row, z, start, step, bare, slider, along, held, piece, at_nodes, energy)
+        book(row, start, step, bare, slider, along, held, piece, room, at_nodes, energy)
         row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
         start = length if step == left else start + step
         if stops:
@@ -257,7 +246,7 @@ def _last_speed(z, step):
 
 
 @device
-def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
+def _sticking_piece(row, bare, slider, law, held, piece, room, at_nodes, energy):
     """Go through one piece with bonds that bear any pull up to their strength at rest; the time reached."""
     start, length = 0.0, piece[0]
     stuck = 0
@@ -278,7 +267,7 @@ def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
             row[MOMENT] = sense * row[BOUND]
         else:
             sense = math.copysign(1.0, row[SPEED])
-        start = _slide(row, start, sense, bare, slider, law, held, piece, room, energy)
+        start = _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, energy)
         if start < 0.0:
             return 0.0
         if start < length:
@@ -286,43 +275,75 @@ def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
     return length
 
 
-@kernel(
-    "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64, UniTuple(float64, 8),"
-    " UniTuple(float64, 7), UniTuple(float64, 11))"
-)
-def advance_rows(rows, energies, bare, pieces, begin, slider, law, held):
-    """Advance all rows through a clock step that begins at a time, each row by itself.
+@device
+def _clock_step(row, bare, slider, law, held, pieces, room, at_nodes, energy):
+    """Go through the pieces of a clock step; the time reached, and whether something holds the body still."""
+    is_open = not row[RADIUS] > 0.0
+    row[RADIUS] = 0.0 if is_open else row[RADIUS]
+    now, time, worked, going = _later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
+    for p in range(len(pieces)):
+        piece = pieces[p, 1], pieces[p, 2], pieces[p, 3], pieces[p, 4]
+        room[4][0] = 0.0
+        if p == 0:
+            if law[5] == 0.0:
+                going = _elastic(row, 0.0, bare, slider, now, piece, energy)
+            elif slider[4] > 0.0:
+                row[FORCE] = driven(0.0, piece)[1]
+            energy[AREA] += energy[WORK] - worked - _stored(row, bare, 0.0, slider, law, now) + energy[STORED]
+        later, reached = _later(now, time, now[0]), 0.0
+        if going and law[5] == 0.0:
+            reached = _piece(row, bare, slider, law, later, piece, room, at_nodes, energy)
+        elif going:
+            reached = _sticking_piece(row, bare, slider, law, later, piece, room, at_nodes, energy)
+        time += reached
+        if not (going and reached == piece[0]):
+            return time, False
+    energy[STORED] = _stored(row, bare, time, slider, law, now)
+    return time, True
 
-    ``bare``: work of adhesion of each row without bonds. ``pieces``: length of each, value of the drive at its ends and
-    its integral. A row that nothing holds any longer ends there; its bonds and contact stay as they were.
+
+@kernel(
+    "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64,"
+    " UniTuple(float64, 8), UniTuple(float64, 7), UniTuple(float64, 11), float64[:, :, ::1], float64[:, :, ::1])"
+)
+def advance_rows(rows, energies, bare, pieces, clock, units, work, slider, law, held, passed, spent):
+    """Advance all rows and their energies through some clock steps, each row by itself.
+
+    ``bare``: work of adhesion of each row without bonds. ``pieces``: number of the clock step, length, value of the
+    drive at both ends and its integral. ``clock``: beginning of each step, load and its rate, base and its rate.
+    ``units`` of the columns and of ``work``, by which rows differ from the numbers of slider, bonds and contact.
+    ``passed``, ``spent``: columns and energies at the end of each step, shape (columns, steps, rows) and (steps, rows,
+    energies). A row that nothing holds any longer ends there; its bonds and contact stay as they were.
     """
-    room = np.empty((4, 3)), np.empty(12), np.empty((12, 12)), np.empty((3, 3))
+    room = np.empty((4, 3)), np.empty((4, 3)), np.empty(3), np.empty((4, 3)), np.zeros(2)
+    at_nodes, row, energy = np.empty((3, 3)), np.empty(COLUMNS), np.empty(energies.shape[1])
     for m in range(len(rows)):
-        row, energy = rows[m], energies[m]
-        row[SLIP], row[PATH] = 0.0, 0.0
-        if not math.isnan(row[ENDED]):
-            continue
-        is_open = not row[RADIUS] > 0.0
-        row[RADIUS] = 0.0 if is_open else row[RADIUS]
-        now, time, worked, going = _later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
-        for p in range(len(pieces)):
-            piece = pieces[p, 0], pieces[p, 1], pieces[p, 2], pieces[p, 3]
-            if p == 0:
-                if law[5] == 0.0:
-                    going = _elastic(row, 0.0, bare[m], slider, now, piece, energy)
-                elif slider[4] > 0.0:
-                    row[FORCE] = driven(0.0, piece)[1]
-                energy[AREA] += energy[WORK] - worked - _stored(row, bare[m], 0.0, slider, law, now) + energy[STORED]
-            later, reached = _later(now, time, now[0]), 0.0
-            if going and law[5] == 0.0:
-                reached = _piece(row, bare[m], slider, law, later, piece, room, energy)
-            elif going:
-                reached = _sticking_piece(row, bare[m], slider, law, later, piece, room, energy)
-            time += reached
-            going = going and reached == piece[0]
-            if not going:
-                row[ENDED], row[POSITION], row[SPEED], row[BODY] = begin + time, math.nan, math.nan, math.nan
-                energy[:] = math.nan
-                break
-        if going:
-            energy[STORED] = _stored(row, bare[m], time, slider, law, now)
+        stop = 0
+        for k in range(len(clock)):
+            start = stop
+            while stop < len(pieces) and pieces[stop, 0] == k:
+                stop += 1
+            for c in range(COLUMNS):
+                row[c] = rows[m, c] / units[c]
+            row[POSITION], row[SLIP], row[PATH], row[COUNT] = 0.0, 0.0, 0.0, 0.0
+            if law[5] != 0.0:
+                row[MOMENT] = math.copysign(row[BOUND], row[SPEED]) if row[SPEED] != 0.0 else 0.0
+            energy[:] = 0.0
+            energy[STORED] = energies[m, STORED] / work
+            if math.isnan(row[ENDED]):
+                now = held[:3] + (clock[k, 1], clock[k, 2], clock[k, 3], clock[k, 4]) + held[7:]
+                time, going = _clock_step(row, bare[m], slider, law, now, pieces[start:stop], room, at_nodes, energy)
+                if not going:
+                    row[ENDED], row[POSITION], row[SPEED], row[BODY] = clock[k, 0] + time, math.nan, math.nan, math.nan
+                    energy[:] = math.nan
+            position, count = rows[m, POSITION], rows[m, COUNT]
+            for c in range(COLUMNS):
+                rows[m, c] = row[c] * units[c]
+            rows[m, POSITION] += position
+            rows[m, COUNT] += count
+            for c in range(COLUMNS):
+                passed[c, k, m] = rows[m, c]
+            for c in range(STORED):
+                energies[m, c] += energy[c] * work
+            energies[m, STORED] = energy[STORED] * work
+            spent[k, m] = energies[m]

@@ -235,8 +235,14 @@ class Scenario:
 
     @property
     def by_steps(self) -> bool:
-        """True if a part feeds back, so that a run goes step by step and not by blocks of steps."""
-        return any(part.feeds_back for part in self.chosen)
+        """True if a part feeds back, so that a run goes step by step and not by blocks of steps.
+
+        Under a drive that feels the friction bonds and an equilibrium contact follow within its own sub-steps; a block
+        of them needs fluctuations that the contact does not feel, or that stay as they are.
+        """
+        _, bonds, shear, contact = self.chosen
+        alone = contact.lags or not (shear.paid_by_adhesion == 0.0 or shear.stays) or not bonds.in_blocks
+        return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.feeds_back and alone)
 
     def remarks(self) -> list[str]:
         """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""

@@ -24,6 +24,7 @@ from sim.laws.schallamach import (
     cut_off_fraction,
     cut_off_moments,
     cut_off_stress,
+    first_moment_amplitude,
     first_moment_fraction,
     first_moment_onset,
     first_moment_peak,
@@ -636,6 +637,20 @@ def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues(speed, be
     found = first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, 1.0)
     assert_allclose(found, (stiffness, frequency), rtol=2e-6)
     assert np.isnan(first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, 1.0)).all()
+
+
+def test_oscillations_set_in_gradually_at_high_speeds_and_suddenly_at_low_ones():
+    def amplitude(speed, beta=1.0):
+        return first_moment_amplitude(speed, 1.0, 1.0, 1.0, beta)
+
+    assert_allclose(amplitude(100.0), 6.366370, rtol=1e-7)
+    for beta, turn in ((0.1, 15.372886), (1.0, 20.372634), (10.0, 60.085501)):
+        assert amplitude(turn * (1.0 + 1e-6), beta) > 100.0
+        assert np.isnan(amplitude(turn * (1.0 - 1e-6), beta))
+    assert np.isnan(amplitude([0.0, 0.5, -0.5, 10.0])).all()
+    assert_allclose(amplitude([-100.0, 50.0]), [amplitude(100.0), amplitude(50.0)], rtol=1e-12)
+    # of the rates and forces only ratios count
+    assert_allclose(first_moment_amplitude(100.0, 3.0, 2.0, 6.0, 3.0), amplitude(100.0), rtol=1e-13)
 
 
 def test_area_mass_and_a_contact_that_yields_raise_the_stiffness_at_the_onset():

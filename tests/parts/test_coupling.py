@@ -160,8 +160,9 @@ def growth(stiffness, keys, steps=300, step=0.02, share=0.0):
     """Growth rate and frequency of the slowest mode of the bonds after a small jump of the speed."""
     stage = {"time": (0.0, step, step, 1e3), "value": tuple(v * STRETCH for v in (10.0, 10.0, 10.0001, 10.0001))}
     drive = spring(stiffness, stage, start="steady", tolerance=1e-11, **keys)
-    states, _ = marched(scenario(steps * step, steps, drive, share=share, start="steady"))
-    changes = np.diff(reached(states, "bound")[steps // 2 :, 0])
+    scene = scenario(steps * step, steps, drive, share=share, start="steady")
+    passed = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
+    changes = np.diff(passed.fraction[steps // 2 :, 0])
     modes = 4 if {"contact", "mass"} <= keys.keys() else 2  # there the body rings for long
     shifted = np.stack([changes[modes - 1 - k : -1 - k] for k in range(modes)], axis=1)
     found = np.roots([1.0, *-np.linalg.lstsq(shifted, changes[modes:])[0]])
@@ -229,11 +230,13 @@ def test_a_force_below_the_threshold_makes_creep(load, share, speed):
 
 @pytest.mark.parametrize(("load", "time"), [(0.28, 11.0634348789), (0.3, 2.52331513753), (0.4, 0.687585303603)])
 def test_a_force_above_the_threshold_runs_away_in_time(load, time):
-    states, read = marched(scenario(12.0, 12, force(load, tolerance=1e-8)))
+    scene = scenario(12.0, 12, force(load, tolerance=1e-8))
+    states, read = marched(scene)
     assert_allclose(read["runaway_time"][-1], time, rtol=1e-7)
     ended = states[-1]
     assert np.isnan([ended.drive.position, ended.drive.speed]).all()
     assert np.isfinite([ended.bonds.bound, ended.contact.radius]).all()
+    check_blocks(scene, states)
 
 
 @pytest.mark.parametrize(("x0", "time", "halfway"), [(0.5, 0.559773594776, 0.858292500361),
@@ -275,6 +278,18 @@ def test_the_half_space_yields_with_its_stiffness_in_series_with_the_bonds():
     assert_allclose(read["stored_energy"][-1], 0.5 * 0.01 * UNIT * states[-1].drive.position[0], rtol=1e-6)
 
 
+def check_blocks(scene, states, every=1):
+    """Blocks of steps give what a march gave of all members, bit for bit."""
+    assert not scene.by_steps
+    members = np.arange(len(states[0].drive.speed))
+    end, passed = follow(scene, Dice.of(scene.seed, members), None, range(0, scene.times.steps + 1, every))
+    readings = [scene.parts.drive.readings(state.drive) for state in states[::every]]
+    assert np.array_equal(passed.driven, readings, equal_nan=True)
+    assert np.array_equal(passed.radius, [state.contact.radius for state in states[::every]], equal_nan=True)
+    one, other = pack(end), pack(states[-1])
+    assert [name for name in one if not np.array_equal(one[name], other[name], equal_nan=True)] == []
+
+
 @pytest.mark.parametrize("keys", [{}, {"mass": 1e-3, "damping": 1e-3}, {"contact": 0.2},
                                   {"contact": 0.2, "mass": 1e-4, "viscosity": 1e-3}])  # fmt: skip
 def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys):
@@ -289,9 +304,7 @@ def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys):
     for key, values in single.items():
         whole = one[key][1:2] if one[key].ndim and len(one[key]) == 3 else one[key]
         assert np.array_equal(whole, values, equal_nan=True), key
-    end, passed = follow(scene, Dice.of(scene.seed, np.arange(3)), None, range(0, 161, 4))
-    assert np.array_equal(passed.driven[:, 0, 2], [state.drive.spring_force[0] for state in straight[::4]])
-    assert np.array_equal(end.drive.position, straight[-1].drive.position)
+    check_blocks(scene, straight, 4)
 
 
 @pytest.mark.parametrize("stiffness", [4e-8, 1.0, 4e4])
@@ -306,11 +319,13 @@ def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_
         "time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0),
         "value": tuple(v * STRETCH for v in (10.0, 10.0, -10.0, -10.0, 0, 0)),
     }
-    states, read = marched(scenario(8.0, 16, spring(0.2, turns, start_after=1.0, damping=1e-2), share=0.5))
+    scene = scenario(8.0, 16, spring(0.2, turns, start_after=1.0, damping=1e-2), share=0.5)
+    states, read = marched(scene)
     assert_allclose(read["stage_position"][[2, 6, 10, 16]] / STRETCH, [0.0, 20.0, 0.0, 0.0], atol=1e-12)
     assert states[6].bonding.stress[0] > 0.0 > states[10].bonding.stress[0]
     assert abs(states[16].bonding.stress[0]) < 0.2 * abs(states[10].bonding.stress[0])
     assert residual(read) < 1e-5
+    check_blocks(scene, states)
 
 
 def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again():
@@ -323,6 +338,7 @@ def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_
     assert_allclose(read["spring_force"][12:20], 0.0, atol=1e-12 * UNIT)
     assert read["spring_force"][-1] > 0.05 * UNIT
     assert np.isfinite(read["energy_residual"]).all()
+    check_blocks(scene, states)
 
 
 def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
@@ -365,6 +381,13 @@ def test_what_would_run_shows_where_the_slider_oscillates():
     assert f"{0.1997241668 * STIFF:.4g} N/m" in rows["with mass and k_t"]
     assert f"{0.05 * STIFF:.4g} N/m" in rows["contact k_t"]
     assert f"{math.sqrt(1.0 / 1e-3) / (2.0 * math.pi):.4g} Hz" in rows["natural frequency"]
+
+
+@pytest.mark.parametrize(("speed", "how"), [(100.0, "gradually: friction swings by 6.37"), (10.0, "suddenly")])
+def test_what_would_run_shows_whether_oscillations_set_in_gradually(speed, how):
+    shown = sim.check(scenario(1.0, 4, spring(1.0, speed))).partition("\nslider\n")[2]
+    assert how in next(line for line in shown.splitlines() if "sets in there" in line)
+    assert "sets in there" not in sim.check(scenario(1.0, 4, spring(1.0, speed, mass=1e-3)))
 
 
 def test_what_would_run_shows_the_slider_of_bonds_without_a_stretch():
@@ -468,8 +491,9 @@ def test_steady_sliding_on_falling_friction_is_stable_where_damping_outweighs_th
         stage = {"time": (0.0, step, step, 1e3), "value": (STRETCH, STRETCH, 1.00001 * STRETCH, 1.00001 * STRETCH)}
         keys = {"stage": stage, "stiffness": stiffness * HELD / STRETCH, "start": "steady", "tolerance": 1e-11}
         heavy = {"mass": mass * HELD / STRETCH, "damping": damping * HELD / STRETCH}
-        states, _ = marched(stuck(400 * step, 400, bonds, Spring(**keys, **heavy, contact_stiffness="rigid")))
-        changes = np.diff([state.drive.speed[0] / STRETCH for state in states[2:]])
+        scene = stuck(400 * step, 400, bonds, Spring(**keys, **heavy, contact_stiffness="rigid"))
+        passed = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(401))[1]
+        changes = np.diff(passed.speed[2:, 0] / STRETCH)
         found = np.roots([1.0, *-np.linalg.lstsq(np.stack([changes[1:-1], changes[:-2]], axis=1), changes[2:])[0]])
         rate = np.log(found[0]).real / step
         assert_allclose(rate, 0.5 * (fall - damping) / mass, rtol=1e-3)

@@ -28,6 +28,7 @@ from sim.laws.schallamach.cluster import cluster_lifetime
 from sim.laws.schallamach.cut_off import cut_off_fraction, cut_off_moments, cut_off_stress
 from sim.laws.schallamach.first_moment import (
     Onset,
+    first_moment_amplitude,
     first_moment_fraction,
     first_moment_onset,
     first_moment_peak,

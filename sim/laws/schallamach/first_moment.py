@@ -217,3 +217,73 @@ def first_moment_onset(
     behind = np.divide(alone, 1.0 - yields, out=np.full(np.shape(yields), np.inf), where=yields < 1.0)
     stiffness = np.where(np.isnan(alone), np.nan, np.multiply(mass, square) + behind)
     return Onset(stiffness[()], np.sqrt(square)[()])
+
+
+def first_moment_amplitude(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):
+    """Growth of the oscillations of a mean-field Bell population behind a spring beyond their onset.
+
+    Parameters
+    ----------
+    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate : float or array
+        As in ``first_moment_stress``.
+
+    Returns
+    -------
+    float or array
+        Amplitude of friction over its mean, divided by sqrt(1 - K/K_c) for a spring K just below that of the onset;
+        nan where oscillations set in suddenly, with an amplitude that does not vanish with K_c - K, and where there
+        is no onset.
+
+    Notes
+    -----
+    Without mass, behind a contact of constant area that does not yield,
+
+        ``N' = k_on (1 - N) - k N``,  ``x' = K (V - k x)/(K + N) - k_on x (1 - N)/N + k x``,  ``k = k_0 e^x``
+
+    for the share N bound and x the stretch over f_b/kappa. The oscillations' complex amplitude z grows at the onset
+    with ``z' = (sigma + i omega) z + c z |z|^2`` (Kuznetsov, Elements of Applied Bifurcation Theory, 3.5): gradually if
+    the real part of c is negative, then to |z|^2 = -sigma/Re c. It changes its sign at 20.37 times the speed
+    k_0 f_b/kappa if k_on = k_0.
+
+    Examples
+    --------
+    Fast sliding begins to oscillate gradually, slow sliding suddenly:
+
+    >>> print("%.4f %.4f" % tuple(first_moment_amplitude([100.0, 10.0], 1.0, 1.0, 1.0, 1.0)))
+    6.3664 nan
+    """
+    x = np.abs(bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / bell_force)
+    binding = np.divide(rebinding_rate, zero_force_rate)
+    falls = (x - 1.0) * np.exp(x) > binding
+    x = np.where(falls, x, 1.0)
+    k = np.exp(x)
+    n = binding / (binding + k)
+    share = np.where(falls, (x * k - binding - k) / ((1.0 + x) * k), 0.5)  # K/(K + n) at the onset
+    # derivatives, by the letters: of K/(K + n), of -k_on (1/n - 1), and of V - k x over x
+    q_n, r_n, p_x = (share - 1.0) * share / n, binding / n**2, -(1.0 + x) * k
+    q_nn, r_nn, r_nnn = 2.0 * q_n**2 / share, -2.0 * r_n / n, 6.0 * r_n / n**2
+    by_n, by_x = (-binding - k, x * r_n), (-k * n, x * k + p_x * share)
+    turns = np.sqrt(np.where(falls, by_n[0] * by_x[1] - by_x[0] * by_n[1], 1.0))
+    right, left = (1.0, (1j * turns - by_n[0]) / by_x[0]), (1.0, (1j * turns - by_n[0]) / by_n[1])
+    back, scale = tuple(map(np.conj, right)), left[0] * right[0] + left[1] * right[1]
+
+    def projected(of_bound, of_stretch):
+        return (left[0] * of_bound + left[1] * of_stretch) / scale
+
+    def second(u, v):
+        crossed, curved = u[0] * v[1] + u[1] * v[0], u[1] * v[1]
+        of_stretch = x * r_nn * u[0] * v[0] + (p_x * q_n + r_n) * crossed + (2.0 + x) * k * (1.0 - share) * curved
+        return projected(-k * (n * curved + crossed), of_stretch)
+
+    def third(u, v, w):
+        once = u[0] * v[1] * w[1] + u[1] * v[0] * w[1] + u[1] * v[1] * w[0]
+        twice = u[0] * v[0] * w[1] + u[0] * v[1] * w[0] + u[1] * v[0] * w[0]
+        curved = u[1] * v[1] * w[1]
+        of_stretch = x * r_nnn * u[0] * v[0] * w[0] + (p_x * q_nn + r_nn) * twice
+        of_stretch = of_stretch - (2.0 + x) * k * q_n * once + (3.0 + x) * k * (1.0 - share) * curved
+        return projected(-k * (n * curved + once), of_stretch)
+
+    bends = np.real(0.5j * second(right, right) * second(right, back) / turns + 0.5 * third(right, right, back))
+    grows = -0.5 * p_x * share * (1.0 - share)
+    size = np.sqrt(grows / np.where(falls & (bends < 0.0), -bends, np.nan))
+    return (2.0 * size * np.abs(x * right[0] + n * right[1]) / (n * x))[()]

@@ -40,6 +40,8 @@ class Common:
     in_place: ClassVar[bool] = False
     #: Whether a drive that feels the friction can be solved together with this model.
     driven: ClassVar[bool] = False
+    #: Whether they are solved through blocks of clock steps.
+    in_blocks: ClassVar[bool] = False
     #: Whether slip may break more than it stretches, so that nothing but the body's delay holds it.
     snaps: ClassVar[bool] = False
     #: Rough time of a step of a batch where it is made alone, for estimates [s].

@@ -19,6 +19,7 @@ from sim.laws.schallamach import (
     catch_moments,
     constant_moments,
     cut_off_moments,
+    first_moment_amplitude,
     first_moment_onset,
     first_moment_peak,
 )
@@ -90,6 +91,10 @@ class _Law:
         """Onset of oscillations behind a spring at speeds [m/s]; the rest as of the law ``first_moment_onset``."""
         return Onset(*np.full((2, *speed.shape), np.nan))
 
+    def first_moment_amplitude(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> Array:
+        """Growth of the oscillations beyond their onset at speeds [m/s], as of the law ``first_moment_amplitude``."""
+        return np.full(speed.shape, np.nan)
+
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Constant(_Law):
@@ -134,6 +139,10 @@ class Bell(_Law):
     ) -> Onset:
         law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate, site_density
         return cast(Onset, first_moment_onset(speed, *law, *contact))
+
+    def first_moment_amplitude(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> Array:
+        law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
+        return cast(Array, first_moment_amplitude(speed, *law))
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

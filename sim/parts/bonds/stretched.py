@@ -109,6 +109,7 @@ class FirstMoment(OverArea, _Separable):
     state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
     driven: ClassVar[bool] = True
+    in_blocks: ClassVar[bool] = True
 
     @property
     def snaps(self) -> bool:  # type: ignore[override]
@@ -136,6 +137,10 @@ class FirstMoment(OverArea, _Separable):
         """Onset of oscillations behind a spring at speeds [m/s]; the rest as of the law ``first_moment_onset``."""
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
         return self.rupture.first_moment_onset(speed, *recipe, *contact)
+
+    def amplitude(self, speed: Array) -> Array:
+        """Growth of the oscillations beyond their onset at speeds [m/s], as of the law ``first_moment_amplitude``."""
+        return self.rupture.first_moment_amplitude(speed, self.bond_stiffness, self.rebinding_rate)
 
     def remarks(self, setting: Setting) -> list[str]:
         excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)

@@ -108,6 +108,7 @@ class _AtOnce(_WithoutStretch):
     """Bonds that are steady at every speed."""
 
     driven: ClassVar[bool] = True
+    in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))

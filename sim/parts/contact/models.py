@@ -116,10 +116,10 @@ class _Controlled:
     def _control(self, value: float | Array) -> Control:
         return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
 
-    def held_between(self, begin: float, end: float, duration: float) -> tuple[Control, Control]:
-        """The control at the two ends of an interval of a run [s], before any jump at its end."""
-        pieces = self.course.pieces(np.array([begin, end]), duration)
-        return self._control(float(pieces.first[0])), self._control(float(pieces.last[-1]))
+    def held_between(self, ends: Array, duration: float) -> tuple[Control, Control]:
+        """The control at the two ends of each interval between some times of a run [s], before any jump at its end."""
+        pieces = self.course.pieces(ends, duration).joined
+        return self._control(pieces.first), self._control(pieces.last)
 
     @property
     def makes_load(self) -> bool:

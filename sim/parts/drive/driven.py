@@ -57,6 +57,8 @@ class Driven(NamedTuple):
         Shear displacement of the contact between body and interface [m].
     stage_position, stage_speed : array
         Displacement [m] and speed [m/s] of the stage; 0 without one.
+    radius : array
+        Contact radius in the sub-steps [m], 0 where it is open.
     next_step : array
         Length of the next sub-step [s].
     substeps : array
@@ -74,10 +76,15 @@ class Driven(NamedTuple):
     sheared: Array
     stage_position: Array
     stage_speed: Array
+    radius: Array
     next_step: Array
     substeps: Array
     runaway_time: Array
     energies: Array
+
+    def at(self, k: int) -> "Driven":
+        """The slider at the end of step k of a block."""
+        return Driven(*(values[k] for values in self))
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
@@ -141,11 +148,11 @@ class _Driven:
         return self.course.pieces(ends, duration)
 
     def readings(self, state: Driven) -> Array:
-        """Recorded quantities of the drive, columns ``READINGS``, shape (members, columns)."""
-        made, *spent, stored, first = state.energies.T
+        """Recorded quantities of the drive, columns ``READINGS``, as last axis."""
+        made, *spent, stored, first = np.moveaxis(state.energies, -1, 0)
         residual = made - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
-        return np.stack([*stage, made, stored, *spent, residual, state.substeps, state.runaway_time], axis=1)
+        return np.stack([*stage, made, stored, *spent, residual, state.substeps, state.runaway_time], axis=-1)
 
     def remarks(self, setting: Setting) -> list[str]:
         return []
@@ -208,10 +215,10 @@ class Spring(_Driven):
         if after <= ends[0]:
             found = self.course.pieces(ends - after, duration - after)
             return found._replace(start=found.start + after, stop=found.stop + after)
+        if after >= ends[-1]:
+            return _zeros(ends)
         rests, cut = ends[ends < after], ends[ends > after]
-        still = _zeros(np.append(rests, min(after, ends[-1])))
-        if not len(cut):
-            return still
+        still = _zeros(np.append(rests, after))
         found = self.course.pieces(np.append(0.0, cut - after), duration - after)
         moving = found._replace(start=found.start + after, stop=found.stop + after)
         pieces = Pieces(*(np.concatenate(pair) for pair in zip(still, moving, strict=True)))

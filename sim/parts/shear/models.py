@@ -87,6 +87,11 @@ class _Model:
         return self
 
     @property
+    def stays(self) -> bool:
+        """Whether what the contact feels of the fluctuations is the same at all times, whatever the rest does."""
+        return False
+
+    @property
     def reads_stress(self) -> bool:
         """Whether the size of the field follows the bonds."""
         return self.amplitude.reads_stress or self.spectrum.bond_made
@@ -151,6 +156,7 @@ class Uniform(_Model):
     contact = "plane"
 
     model: Literal["uniform"] = "uniform"
+    stays: ClassVar[bool] = True  # type: ignore[misc]
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         return SmoothProcess(0.0, Constant())
@@ -174,6 +180,10 @@ class Mean(_Model):
             said = 'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"'
             raise PydanticCustomError("mean_has_no_memory", said)
         return self
+
+    @property
+    def stays(self) -> bool:
+        return self.amplitude.model == "constant" and self.contact == "plane" and not self.spectrum.bond_made
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         kind = SiteMean if self.spectrum.bond_made else SmoothProcess
