@@ -230,7 +230,7 @@ def first_moment_amplitude(speed, zero_force_rate, bell_force, bond_stiffness, r
     Returns
     -------
     float or array
-        Amplitude of friction over its mean, divided by sqrt(1 - K/K_c), for a spring K just below that of the onset [1];
+        Amplitude of friction over its mean [1], divided by sqrt(1 - K/K_c) for a spring K just below that of the onset;
         nan where oscillations set in suddenly, with an amplitude that does not vanish with K_c - K, and where there
         is no onset.
 
