@@ -8,7 +8,9 @@ peak); ``summary`` turns both into statistics over the members.
 
 from sim.analysis.correlation import IntegralTime, correlation_time, integral_time
 from sim.analysis.events import events, loop_energy, peaks
+from sim.analysis.lifetimes import Lifetime, first_passage, lifetime
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
+from sim.analysis.over_speed import crossing, loss_speeds
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.stationary import distribution, over_time
 from sim.analysis.statistics import QUANTILES, averaging, shares, skewness_error, statistics, summary, where
@@ -16,9 +18,9 @@ from sim.analysis.tables import highlights, notes, table, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
-    "QUANTILES", "Control", "IntegralTime", "averaging", "bond_work", "concise", "control", "correlation_time",
-    "distribution", "engineering", "events", "highlights", "integral_time", "is_stationary", "is_steady",
-    "loop_energy", "notes", "observables", "over_time", "peaks", "reference_radii", "scaled", "setting",
-    "settled", "share_observables", "shares", "skewness_error", "statistics", "summary", "sweep_dims", "table",
-    "to_csv", "where",
+    "QUANTILES", "Control", "IntegralTime", "Lifetime", "averaging", "bond_work", "concise", "control",
+    "correlation_time", "crossing", "distribution", "engineering", "events", "first_passage", "highlights",
+    "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "notes", "observables",
+    "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables", "shares",
+    "skewness_error", "statistics", "summary", "sweep_dims", "table", "to_csv", "where",
 ]  # fmt: skip

@@ -10,7 +10,8 @@ import itertools
 import numpy as np
 import xarray as xr
 
-from sim.analysis.scene import MEMBERS, answered, setting, stays_held, where_recorded
+from sim.analysis.scene import MEMBERS, answered, control, setting, stays_held, where_recorded, word
+from sim.laws import jkr
 
 KEPT = ("mean", "std", "sem")
 
@@ -102,6 +103,51 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
             found[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")
+    return xr.Dataset(found, attrs=dataset.attrs)
+
+
+def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
+    """The shares of JKR's area that fluctuations and bonds take if the fluctuations are charged first.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``lost_to_fluctuations_first``, ``lost_to_bonds_last``, which add up to ``lost_to_bonds`` and
+        ``lost_to_fluctuations``, and ``order_of_charging``, what one order gives the fluctuations more than the
+        other. Each is of one member, whose noise both orders share: so is the error of their difference.
+
+    Raises
+    ------
+    ValueError
+        If the dataset does not say: members were not recorded, or the contact is on a disc of finite radius.
+
+    Notes
+    -----
+    Fluctuations alone leave w = Δγ(1) - χ ΔΓ. Where no equilibrium with that exists, the area is 0.
+    """
+    charged = share_observables(dataset)
+    if "fluctuation_energy" not in dataset or bool((word(dataset, "shear.contact", "plane") != "plane").any()):
+        raise ValueError("the other order of charging needs the fluctuation energy of each member, on a plane")
+    try:
+        held, share = control(dataset), setting(dataset, "shear.paid_by_adhesion")
+        given = dataset["applied_load"] if "applied_load" in dataset else dataset.get("contact_load")
+    except KeyError as fault:
+        raise ValueError(f"the other order of charging is not known: {fault.args[0]}") from None
+    work = setting(dataset, "adhesion.work") - share * dataset["fluctuation_energy"].astype(float)
+    sphere = work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]
+    if held.kind == "load":
+        radius = xr.apply_ufunc(jkr.radius_at_load, given, *sphere)
+    elif held.kind == "indentation":
+        radius = xr.apply_ufunc(jkr.radius_at_indentation, dataset["indentation"], *sphere)
+    else:
+        radius = xr.apply_ufunc(jkr.radius_at_displacement, dataset["displacement"], held.stiffness, *sphere)
+    area, full = dataset["contact_area"].astype(float), full_area(dataset)
+    alone = (np.pi * radius.fillna(0.0) ** 2).where(area.notnull())
+    first = pure((full - alone) / full, "share of JKR's area lost to fluctuations, which are charged first")
+    both = charged["lost_to_bonds"] + charged["lost_to_fluctuations"]
+    last = pure(both - first, "share of JKR's area lost to broken bonds, after the fluctuations")
+    more = pure(first - charged["lost_to_fluctuations"], "what fluctuations take more if they are charged first")
+    found = {"lost_to_fluctuations_first": first, "lost_to_bonds_last": last, "order_of_charging": more}
     return xr.Dataset(found, attrs=dataset.attrs)
 
 

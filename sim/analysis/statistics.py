@@ -1,5 +1,6 @@
 """Statistics over the members of an ensemble, at each time and sweep value."""
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,7 +11,7 @@ from scipy import special
 from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import KEPT, observables, pure, reference_radii, share_observables
+from sim.analysis.observables import KEPT, charged_in_turn, observables, pure, reference_radii, share_observables
 from sim.analysis.scene import MEMBERS, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
@@ -285,7 +286,8 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Statistics (``…_mean``, ``…_std``, ``…_sem``, ``…_quantile``) over the members of
         ``lost_to_bonds`` and ``lost_to_fluctuations``, with ``contact.reversible`` above zero
-        ``lost_to_mean_stress``, in a rate-dependent contact ``lost_to_lag``; and ``radius_jkr``, ``radius_hertz``
+        ``lost_to_mean_stress``, in a rate-dependent contact ``lost_to_lag``; of the other order of charging, see
+        ``sim.analysis.observables.charged_in_turn``; and ``radius_jkr``, ``radius_hertz``
         [m] and ``area_ratio_hertz`` at each sweep value, and time where what holds the sphere changes.
         nan where the contact with the full work of adhesion is open.
 
@@ -305,4 +307,13 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     """
     radii = reference_radii(dataset)
     ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz's contact area over JKR's")
-    return summary(share_observables(dataset)).merge(radii).assign(area_ratio_hertz=ratio)
+    dims = ("t", *sweep_dims(dataset))
+    return in_blocks(dataset, dims, lambda some: summary(_charged(some))).merge(radii).assign(area_ratio_hertz=ratio)
+
+
+def _charged(dataset: xr.Dataset) -> xr.Dataset:
+    """Shares in the one order of charging and, where it is known, in the other."""
+    found = share_observables(dataset)
+    with contextlib.suppress(ValueError):
+        found = found.merge(charged_in_turn(dataset))
+    return found

@@ -10,8 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
-from sim.analysis import averaging, bond_work, is_stationary, is_steady, settled, speed_of, summary, sweep_dims
+from sim.analysis import averaging, bond_work, is_stationary, is_steady, settled, summary, sweep_dims
 from sim.analysis.observables import all_observables
+from sim.analysis.over_speed import speed_dim
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
 
 #: Different points up to which each carries a marker.
@@ -291,13 +292,6 @@ def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, 
     for words, at, sign in zip(("pull-off", "jump-in"), scene.openings(line), (_CROSS, _RING), strict=True):
         if at.size:
             panel.plot(x[at], mean[at], color=line.colour, label=words if named else "", **sign)
-
-
-def speed_dim(dataset: xr.Dataset) -> str | None:
-    """The sweep's dimension along which the speed changes."""
-    speed = speed_of(dataset).isel(t=0)
-    varying = (n for n in sweep_dims(dataset) if n in speed.dims and bool((speed != speed.isel({n: 0})).any()))
-    return next(varying, None)
 
 
 def over_speed(dataset: xr.Dataset) -> Scene:

@@ -1,0 +1,155 @@
+"""The speeds at which sliding has taken the contact area, with the error that members of one noise leave them."""
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from scipy import special
+
+from sim.analysis.blocks import ROOM, blocks
+from sim.analysis.observables import observables, reference_radii
+from sim.analysis.scene import MEMBERS, is_steady, speed_of, stays_held, sweep_dims
+from sim.analysis.statistics import LEVEL
+
+#: Shares of JKR's area whose loss has a speed.
+LOSSES = (0.05, 0.5)
+#: Groups of members that are left out in turn, at most.
+_GROUPS = 64
+_WORDS = {f"speed_at_{100.0 * loss:.0f}_percent_lost": f"lost {100.0 * loss:.0f} % of JKR's" for loss in LOSSES}
+_WORDS["speed_halfway_to_hertz"] = "lost half of what it can, down to Hertz's"
+_ENDS = {"": "", "_low": "lower end of the 95 % interval of the ", "_high": "upper end of the 95 % interval of the "}
+#: Within how many standard errors of a level speeds are near it.
+_NEAR = 4.0
+_READ = {"contact_area", "jkr_radius", "hertz_radius"}
+
+
+class Crossing(NamedTuple):
+    """A speed, and the ends of its 95 % interval; nan what is not known."""
+
+    speed: float
+    low: float
+    high: float
+
+
+def crossing(speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: np.ndarray | float) -> Crossing:
+    """Speed at which the mean of a falling quantity has first fallen to a level.
+
+    Parameters
+    ----------
+    speeds : array, shape (speeds,)
+        Rising, above 0.
+    groups : array, shape (groups, speeds)
+        Means over groups of members.
+    sizes : array, shape (groups,)
+        How many members each is of.
+    level : float or array
+        The level, of shape (speeds,) where it changes with the speed.
+
+    Notes
+    -----
+    A straight line over the logarithm of the speed goes through the mean at the speeds about the first one below the
+    level: the two about it, and the next ones as long as they are within four standard errors of the level. The
+    interval is Student's, symmetric in the logarithm, with the error of the jackknife that leaves each group out of
+    the whole curve: so noise that members have in common at different speeds counts as in common.
+    """
+    above, weights, several = groups - level, sizes[:, None] / sizes.sum(), len(groups) > 1
+    mean = np.sum(weights * above, axis=0)
+    below = np.flatnonzero(mean <= 0.0)
+    if not (mean[0] > 0.0 and below.size):
+        return Crossing(math.nan, math.nan, math.nan)
+    error = float(above[:, below[0]].std(ddof=1)) / math.sqrt(len(groups)) if several else 0.0
+    window = _about(int(below[0]), np.abs(mean) <= _NEAR * error)
+    x = np.log(speeds[window])
+    at = float(_zero(x, mean[window]))
+    if not several:
+        return Crossing(math.exp(at), math.nan, math.nan)
+    without = _zero(x, ((mean - weights * above) / (1.0 - weights))[:, window])
+    half = special.stdtrit(len(groups) - 1.0, 0.5 + 0.5 * LEVEL) * math.sqrt(
+        (len(groups) - 1.0) * float(np.var(without))
+    )
+    return Crossing(*map(math.exp, (at, at - half, at + half)))
+
+
+def _about(first: int, near: np.ndarray) -> slice:
+    """The places about a first one and that before it, and those beside them that are near without a gap."""
+    low, high = first - 1, first + 1
+    while low > 0 and near[low - 1]:
+        low -= 1
+    while high < len(near) and near[high]:
+        high += 1
+    return slice(low, high)
+
+
+def _zero(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Where the straight lines through the values along the last axis are zero."""
+    aside = x - x.mean()
+    return x.mean() - y.mean(axis=-1) * np.sum(aside**2) / np.sum(aside * y, axis=-1)
+
+
+def speed_dim(dataset: xr.Dataset) -> str | None:
+    """The sweep's dimension along which the speed changes."""
+    speed = speed_of(dataset).isel(t=0)
+    varying = (n for n in sweep_dims(dataset) if n in speed.dims and bool((speed != speed.isel({n: 0})).any()))
+    return next(varying, None)
+
+
+def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
+    """Speeds at which the mean contact area has lost 5 and 50 % of JKR's, and half of what it can down to Hertz's.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it: a ramp of the speed, or a sweep of steady speeds, then of means over the second half
+        of the run.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``speed_at_5_percent_lost``, ``speed_at_50_percent_lost``, ``speed_halfway_to_hertz`` [m/s] with ``…_low`` and
+        ``…_high`` (see ``crossing``), for each point of the sweep of other keys; nan where the area
+        does not get there, or is there from the lowest speed on. Empty where speeds neither rise nor are swept, what
+        holds the sphere changes, or the area or its references were not recorded.
+    """
+    speed = speed_of(dataset)
+    along = str(speed_dim(dataset)) if is_steady(dataset) else "t"
+    speed = speed if along == "t" else speed.isel(t=0, drop=True)
+    known = along in speed.dims and bool((speed.diff(along) > 0.0).all()) and bool(stays_held(dataset).all())
+    if not known or not dataset.keys() >= _READ or bool((speed <= 0.0).any()):
+        return xr.Dataset()
+    radii = reference_radii(dataset)
+    hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
+    levels = {f"speed_at_{100.0 * loss:.0f}_percent_lost": 1.0 - loss + 0.0 * hertz for loss in LOSSES}
+    levels["speed_halfway_to_hertz"] = 0.5 * (1.0 + hertz)
+    groups, sizes = _group_means(dataset, along)
+    dims, found = [[along], ["group", along], ["group"], [along]], {}
+    for name, level in levels.items():
+        inputs = speed, groups, sizes, level + 0.0 * speed
+        ends = xr.apply_ufunc(crossing, *inputs, input_core_dims=dims, output_core_dims=[[]] * 3, vectorize=True)
+        for end, values in zip(("", "_low", "_high"), ends, strict=True):
+            text = f"{_ENDS[end]}sliding speed at which the mean contact area has {_WORDS[name]}"
+            found[name + end] = values.assign_attrs(units="m/s", long_name=text)
+    return xr.Dataset(found)
+
+
+def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.DataArray]:
+    """Means of A/A_JKR over groups of members, of steady speeds over the second half of the run; and their sizes."""
+    timed = [name for name, variable in dataset.data_vars.items() if "t" in variable.dims and name not in _READ]
+    read, sweep = dataset.drop_vars(timed), sweep_dims(dataset)
+    if along != "t":
+        read = read.isel(t=slice(dataset.sizes["t"] // 2, None))
+    kept = {name: dataset.sizes[name] for name in (*sweep, *(["t"] if along == "t" else []))}
+    members = dataset.sizes.get(MEMBERS, 1)
+    count = min(members, _GROUPS, max(2, ROOM // (8 * math.prod(kept.values()))))
+    of = np.arange(members) % count
+    sums = np.zeros((count, *kept.values()))
+    for block in blocks(read, (*sweep, MEMBERS)):
+        ratio = observables(read.isel(block))["area_ratio"]
+        ratio = ratio if along == "t" else ratio.mean("t")
+        ratio = ratio if MEMBERS in ratio.dims else ratio.expand_dims(MEMBERS)
+        at: Any = of[block.get(MEMBERS, slice(None))], *(block[name] for name in sweep)
+        np.add.at(sums, at, ratio.transpose(MEMBERS, *kept).to_numpy())
+    sizes = np.bincount(of).astype(float)
+    means = sums / sizes.reshape(-1, *[1] * len(kept))
+    coords = {name: dataset[name] for name in kept if name in dataset.coords}
+    return xr.DataArray(means, coords, ("group", *kept)), xr.DataArray(sizes, dims="group")

@@ -1,0 +1,136 @@
+"""Speeds at which area is lost, and the loss in both orders of charging: against curves and laws that are known."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers import lens
+from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
+
+from sim import analysis
+from sim.analysis.observables import charged_in_turn, share_observables
+from sim.ensemble.simulate import run
+from sim.laws import jkr
+from sim.parts.bonds import models as bonds
+from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.scenario.clock import Clock, Ensemble, Record
+
+SPEEDS = np.geomspace(1e-3, 1e3, 61)
+NAMES = ("speed_at_5_percent_lost", "speed_at_50_percent_lost", "speed_halfway_to_hertz")
+
+
+def falling(speeds):
+    """Falls by half at speed 1; straight lines over the speed's logarithm are off by far less than errors."""
+    return 1.0 / (1.0 + speeds)
+
+
+def test_a_crossing_is_exact_on_straight_lines_over_the_logarithm():
+    curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
+    found = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
+    np.testing.assert_allclose(found.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
+    assert math.isnan(found.low) and math.isnan(found.high)
+    for level in (1.5, -1.0):  # there from the lowest speed on; never there
+        assert math.isnan(analysis.crossing(SPEEDS, curve[None], np.ones(1), level).speed)
+
+
+@pytest.mark.parametrize(("count", "spread"), [(61, 0.03), (1201, 0.1)], ids=["below the steps", "above the steps"])
+@pytest.mark.parametrize("groups", [64, 8])
+def test_intervals_of_a_speed_hold_what_they_promise(groups, count, spread):
+    """Half of the variance is shared along the curve, as some of that of members at different speeds is."""
+    rng, speeds, hits = np.random.default_rng(31), np.geomspace(1e-3, 1e3, count), []
+    about = np.abs(np.log(speeds)) < 1.0  # what noise there is elsewhere changes nothing
+    for _ in range(1000):
+        noise = np.zeros((groups, count))
+        noise[:, about] = rng.normal(size=(groups, 1)) + rng.normal(size=(groups, about.sum()))
+        means = falling(speeds) + spread * math.sqrt(groups / 64.0 / 2.0) * noise
+        found = analysis.crossing(speeds, means, np.full(groups, 64.0 / groups), 0.5)
+        hits.append(found.low <= 1.0 <= found.high)
+    assert 0.92 < np.mean(hits) < 0.98
+
+
+def jkr_area(work):
+    return math.pi * jkr.radius_at_load(LOAD, work, RADIUS, MODULUS) ** 2
+
+
+def speed_of_loss(loss):
+    """At which steady bonds alone take a share of the area: w = W/(1 + V/V_c) with V_c = 10 mm/s."""
+    works = np.linspace(0.0, WORK, 200_001)
+    work = np.interp(1.0 - loss, jkr_area(works) / jkr_area(WORK), works)
+    return 1e-2 * (WORK / work - 1.0)
+
+
+@pytest.mark.parametrize("swept", [True, False], ids=["sweep", "ramp"])
+def test_speeds_of_bonds_that_break_are_those_of_the_law(swept):
+    quiet = {"bonds": bonds.Steady(critical_speed=1e-2, stress=3e5), "shear": shear.Uniform()}
+    if swept:
+        speeds = {"drive.speed": list(np.geomspace(1e-4, 1.0, 161)), "contact.load": [LOAD, 2 * LOAD]}
+        clock = Clock(duration=0.02, step=0.01)
+        found = analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, clock=clock, **quiet)))
+        found = found.isel(contact_load=0)
+    else:
+        found = analysis.loss_speeds(
+            run(
+                scene(
+                    drive=drive.Ramp(start=1e-4, stop=1.0, scale="log"), clock=Clock(duration=1.6, step=0.01), **quiet
+                )
+            )
+        )
+    hertz = jkr_area(0.0) / jkr_area(WORK)
+    for name, loss in ((NAMES[0], 0.05), (NAMES[2], 0.5 * (1.0 - hertz))):
+        # the largest curvature of the loss over log V is below one: (log step)^2/8 of it between speeds
+        np.testing.assert_allclose(found[name], speed_of_loss(loss), rtol=2e-2)
+    assert math.isnan(found[NAMES[1]])  # Hertz's area is two thirds
+    assert found[NAMES[0]].attrs["units"] == "m/s"
+
+
+def test_speeds_of_fluctuating_members_have_an_error_and_statistics_alone_none():
+    found = analysis.loss_speeds(lens.ramp())
+    low, at, high = (float(found[NAMES[0] + end]) for end in ("_low", "", "_high"))
+    assert 1e-5 < low < at < high < 1e-1
+    assert not analysis.loss_speeds(run(scene(record=Record(per_member=False))))
+    assert not analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))))
+
+
+@pytest.mark.parametrize(
+    "contact",
+    [
+        Equilibrium(load=LOAD),
+        Equilibrium(indentation=1e-6),
+        Equilibrium(displacement=2e-6, stiffness=2e3),
+        Equilibrium(load=LOAD, reversible=0.2),
+    ],
+    ids=["load", "indentation", "displacement", "reversible"],
+)
+def test_both_orders_of_charging_add_up_to_the_same_loss(contact):
+    dataset = run(scene(contact=contact))
+    charged, other = share_observables(dataset), charged_in_turn(dataset)
+    both = charged["lost_to_bonds"] + charged["lost_to_fluctuations"]
+    np.testing.assert_allclose(
+        other["lost_to_fluctuations_first"] + other["lost_to_bonds_last"], both, rtol=0, atol=1e-14
+    )
+    assert float(abs(other["order_of_charging"]).max()) > 1e-3
+
+
+def test_fluctuations_alone_leave_the_area_of_their_work():
+    dataset = lens.ramp()
+    left = jkr_area(WORK - dataset["fluctuation_energy"].to_numpy())
+    found = charged_in_turn(dataset)["lost_to_fluctuations_first"]
+    np.testing.assert_allclose(found, 1.0 - left / jkr_area(WORK), rtol=0, atol=1e-14)
+    unbroken = run(scene(bonds=bonds.Unbroken()))
+    np.testing.assert_allclose(charged_in_turn(unbroken)["order_of_charging"], 0.0, atol=1e-14)
+
+
+def test_the_error_of_the_difference_of_orders_is_that_of_what_members_share():
+    shared, charged = analysis.shares(lens.ramp()), charged_in_turn(lens.ramp())
+    apart = np.hypot(shared["lost_to_fluctuations_sem"], shared["lost_to_fluctuations_first_sem"])
+    differ = float(charged["order_of_charging"].isel(t=-8).std("member", ddof=1)) / math.sqrt(6.0)
+    np.testing.assert_allclose(shared["order_of_charging_sem"][-8], differ, rtol=1e-9)
+    assert differ < 0.9 * float(apart[-8])
+
+
+def test_where_the_other_order_is_not_known_it_is_left_out():
+    assert "order_of_charging_mean" not in analysis.shares(run(scene(record=Record(per_member=False))))
+    with pytest.raises(ValueError, match="each member"):
+        charged_in_turn(run(scene(record=Record(per_member=False), ensemble=Ensemble(members=4))))
