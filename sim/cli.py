@@ -13,6 +13,7 @@ from typing import Any, NoReturn
 import click
 
 from sim.ensemble.progress import Stages, announce_compiling, named, note, progress_bar, while_read
+from sim.units import options
 from sim.units.terminal import print_rows, replace_unknown, say, usage
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
@@ -116,9 +117,13 @@ def run(
 
     announce_compiling(quiet)
     until = time.monotonic() + (
-        math.inf if max_time is None else _quantity(max_time, "--max-time", "s", above=0, typical="8 h")
+        math.inf if max_time is None else options.quantity(max_time, "--max-time", "s", above=0, typical="8 h")
     )
-    memory = math.inf if max_memory is None else _quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
+    memory = (
+        math.inf
+        if max_memory is None
+        else options.quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
+    )
     with named("making modes and bands of the fluctuations", quiet):
         scene = load(scenario, _overrides(changes, seed, members), option="--set")
     if force and resume:
@@ -155,41 +160,10 @@ def run(
         say(f"shard {shard} is done; when all are: sim merge {target}" if shard else str(target))
 
 
-def _quantity(text: str, option: str, unit: str, **bounds: Any) -> float:
-    """The value of an option with a unit, in SI."""
-    from sim.units.quantity import Quantity
-    from sim.units.refusals import BadInput
-
-    value: str | float = text
-    with contextlib.suppress(ValueError):
-        value = float(text)
-    try:
-        return Quantity(unit, option, **bounds).read(value)
-    except ValueError as fault:
-        raise BadInput([f"{option} {text}: {fault}"]) from None
-
-
-def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
-    """The values that an option gives to keys, each read as TOML, else taken as a string."""
-    import tomllib
-
-    found: dict[str, Any] = {}
-    for pair in pairs:
-        key, sign, text = pair.partition("=")
-        if not sign or not key.strip():
-            raise click.UsageError(f'{option} takes TABLE.KEY=VALUE, such as contact.load="2 mN", not {pair!r}')
-        try:
-            document = tomllib.loads(f"value = {text}")
-        except (ValueError, RecursionError):
-            document = {}
-        found[key.strip()] = document["value"] if len(document) == 1 else text.strip()
-    return found
-
-
 def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> dict[str, Any]:
     """The values of --set, --seed and --members."""
     given = {"seed": seed, "ensemble.members": members}
-    return _values(changes, "--set") | {key: value for key, value in given.items() if value is not None}
+    return options.values(changes, "--set") | {key: value for key, value in given.items() if value is not None}
 
 
 def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]], list[str]]:
@@ -309,7 +283,7 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
             done = f"{100 * dataset.attrs['share_done']:.0f} % is computed, the rest is nan"
             say(f"note: {path} is of a run that is not done: {done}", err=True)
         try:
-            found = analysis.where(dataset, _values(chosen, "--where"))
+            found = analysis.where(dataset, options.values(chosen, "--where"))
         except ValueError as fault:
             _fail(f"{path}: --where {fault}", BAD_INPUT)
         try:
@@ -347,8 +321,8 @@ def converge(
     """
     from sim.scenario.reader import load
 
-    seconds = _quantity(budget, "--budget", "s", above=0)
-    accepted = None if tolerance is None else _quantity(tolerance, "--tolerance", "1", above=0, below=1)
+    seconds = options.quantity(budget, "--budget", "s", above=0)
+    accepted = None if tolerance is None else options.quantity(tolerance, "--tolerance", "1", above=0, below=1)
     scene = load(scenario, _overrides(changes), option="--set")
     from sim.study import converge as convergence
 
