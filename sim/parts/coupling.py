@@ -158,7 +158,7 @@ def advance(
     for column, values in of_rows.items():
         rows[:, column] = values
     scales = np.ones(columns.COLUMNS)
-    scales[columns.FORCE], scales[_STRETCHED] = force, stretch
+    scales[columns.FORCE], scales[_STRETCHED], scales[columns.SQUARE] = force, stretch, stretch**2
     pieces, duration = drive.driven(ends, times.duration), np.diff(ends)
     scale = 1.0 / (stretch if drive.spring else force)
     given = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
@@ -179,8 +179,10 @@ def advance(
         passed[columns.COUNT], passed[columns.ENDED], spent,
     )  # fmt: skip
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
-    slid = passed[columns.SLIP], passed[columns.PATH], first, after.speed, after.position
-    motions = Motions(steps.start, ends[1:, np.newaxis], duration[:, np.newaxis], *slid)
+    slid, path, spans = passed[columns.SLIP], passed[columns.PATH], duration[:, np.newaxis]
+    unsteady = np.maximum(passed[columns.SQUARE] - path**2 / spans, 0.0)  # what slips at once is spread over the step
+    slid = slid, path, first, after.speed, after.position, unsteady
+    motions = Motions(steps.start, ends[1:, np.newaxis], spans, *slid)
     bound, moment = passed[columns.BOUND], passed[columns.MOMENT]
     if isinstance(bonds, FirstMoment):
         found = felt(parts, bonds.bonding(Stretches(bound, moment)), after.speed)

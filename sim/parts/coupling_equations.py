@@ -51,9 +51,10 @@ def _modes() -> tuple[float, complex, Array, Array]:
 
 PACE, TURNING, FORTH, BACK = _modes()
 #: Columns of a row: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the body,
-#: slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway.
-FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED = range(13)
-COLUMNS = 13
+#: slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway, integral of
+#: the squared speed of the interface over the clock step.
+FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED, SQUARE = range(14)
+COLUMNS = 14
 
 
 class Slider(NamedTuple):

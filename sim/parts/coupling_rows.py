@@ -21,6 +21,7 @@ from sim.parts.coupling_equations import (
     SHEARED,
     SLIP,
     SPEED,
+    SQUARE,
     compliance,
     contact_area,
     driven,
@@ -325,7 +326,7 @@ def advance_rows(rows, energies, bare, pieces, clock, units, work, slider, law, 
                 stop += 1
             for c in range(COLUMNS):
                 row[c] = rows[m, c] / units[c]
-            row[POSITION], row[SLIP], row[PATH], row[COUNT] = 0.0, 0.0, 0.0, 0.0
+            row[POSITION], row[SLIP], row[PATH], row[SQUARE], row[COUNT] = 0.0, 0.0, 0.0, 0.0, 0.0
             if law[5] != 0.0:
                 row[MOMENT] = math.copysign(row[BOUND], row[SPEED]) if row[SPEED] != 0.0 else 0.0
             energy[:] = 0.0

@@ -24,6 +24,7 @@ from sim.parts.coupling_equations import (
     SHEARED,
     SLIP,
     SPEED,
+    SQUARE,
     compliance,
     contact_area,
     correct,
@@ -223,6 +224,7 @@ def book(row, start, step, bare, slider, law, held, piece, room, at_nodes, energ
         if law[5] != 0.0:
             energy[RUPTURE] += share * area * moment * speed
         energy[AREA] -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
+        row[SQUARE] += share * speed * speed
         row[PATH] += math.fabs(z[0, i] - way)
         way = z[0, i]
     pull = pull_on(start + step, start, z[0, 2] + z[1, 2], row, slider, piece)

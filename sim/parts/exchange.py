@@ -9,7 +9,6 @@ members agree; a state, and what is of one step, has the member as first axis. T
 in +x is positive.
 """
 
-from collections.abc import Iterator
 from typing import NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -69,6 +68,15 @@ class Setting(NamedTuple):
     times: Times
 
 
+def _constant(value: float) -> Array:
+    array = np.full(1, value)
+    array.setflags(write=False)
+    return array
+
+
+_NONE, _UNKNOWN = _constant(0.0), _constant(np.nan)
+
+
 class Motion(NamedTuple):
     """Sliding during one clock step, from the drive to all; each array of shape (1,) or (members,).
 
@@ -88,6 +96,8 @@ class Motion(NamedTuple):
         Speed at the beginning of the step [m/s]; after a jump of the speed, the new one.
     speed : array
         Speed at the end of the step [m/s]; before a jump there, the old one.
+    unsteady : array
+        Integral over the step of the square of what the absolute speed differs from its mean there [m²/s].
     """
 
     step: int
@@ -97,6 +107,7 @@ class Motion(NamedTuple):
     path: Array
     first: Array
     speed: Array
+    unsteady: Array = _NONE
 
 
 class Motions(NamedTuple):
@@ -106,7 +117,7 @@ class Motions(NamedTuple):
     ----------
     step : int
         Number of the first step.
-    time, duration, slip, path, first, speed : array
+    time, duration, slip, path, first, speed, unsteady : array
         As of ``Motion``.
     position : array
         Displacement of the slider since the start, at the end of each step [m].
@@ -120,25 +131,12 @@ class Motions(NamedTuple):
     first: Array
     speed: Array
     position: Array
-
-    def each(self) -> Iterator[Motion]:
-        """The motion of one step after the other."""
-        for k, (time, duration) in enumerate(zip(self.time.flat, self.duration.flat, strict=True)):
-            yield Motion(self.step + k, time, duration, self.slip[k], self.path[k], self.first[k], self.speed[k])
+    unsteady: Array = _NONE[np.newaxis]
 
 
 def during(values: Array, steps: int) -> Array:
     """What stays during a block, with the step as first axis."""
     return values[np.newaxis] if steps == 1 else np.repeat(values[np.newaxis], steps, axis=0)
-
-
-def _constant(value: float) -> Array:
-    array = np.full(1, value)
-    array.setflags(write=False)
-    return array
-
-
-_NONE, _UNKNOWN = _constant(0.0), _constant(np.nan)
 
 
 class Bonding(NamedTuple):

@@ -99,11 +99,11 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
     spectrum = _spectrum(shear["spectrum"])
     if spectrum.wavevector is not None:
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
-    if shear["amplitude"].get("relaxing"):  # the field lags behind its amplitude: only the shape can be compared
+    amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
+    if amplitude.relaxing or amplitude.remembers:  # the amplitude has a past: only the shape can be compared
         grid = _grid_of(stress)
         cells = modes(spectrum, grid.cell, grid.points)
         return spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled"
-    amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
     factor = amplitude.factor(*(_then(dataset, name, at, stress) for name in ("speed", "shear_stress")))
     return spectrum, float(np.mean(factor**2)), "target"
 

@@ -87,22 +87,23 @@ class Expected(Renewing):
         return cls(np.bincount(place, waves) / count, tables, constants, correlation, amplitude)
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
+        past, amplitude = self.amplitude.started(motion, bonding.strength)
         size = amplitude if self.amplitude.relaxing else np.ones(1)
-        return self._with_energy(amplitude, size**2 * np.ones(self.wavenumber.size))
+        return self._with_energy(amplitude, size**2 * np.ones(self.wavenumber.size), past)
 
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
-        amplitude, energies = self.amplitude.factor(motions.speed, bonding.strength), []
+        past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
+        energies = []
         sizes = renewed_size(self.amplitude, state, motions, amplitude)
         for now, size, keep, renew in zip(amplitude, sizes, *self._shares(motions), strict=True):
-            state = self._with_energy(now, keep[0] ** 2 * state.values + (renew[0] * size) ** 2)
+            state = self._with_energy(now, keep[0] ** 2 * state.values + (renew[0] * size) ** 2, past)
             energies.append(state.energy)
         return state, np.array(energies)
 
-    def _with_energy(self, amplitude: Array, values: Array) -> Fluctuation:
-        state = Fluctuation(values, amplitude, values)
+    def _with_energy(self, amplitude: Array, values: Array, past: Array) -> Fluctuation:
+        state = Fluctuation(values, amplitude, values, past)
         return state._replace(energy=self.cumulants(state)[0, :1])
 
     def cumulants(self, state: Fluctuation) -> Array:
@@ -125,7 +126,7 @@ def quiet(scenario: Scenario, sets: Sequence[Gammas]) -> Scenario:
         changes["shear"] = kept | {"model": "mean"}
     found = scenario.with_values(changes)
     if found.fluctuations.per_member:
-        found.__dict__["process"] = Expected.of(sets, part.correlation, part.amplitude)
+        found.__dict__["process"] = Expected.of(sets, part.correlation, part.law)
     return found
 
 

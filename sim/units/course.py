@@ -29,7 +29,7 @@ class Pieces(NamedTuple):
 
     ``interval`` is the number of the interval in which a piece lies; each interval has one or more. ``start`` and
     ``stop`` are the piece's ends [s], ``first`` and ``last`` the values there; ``integral`` is that of the value over
-    time, ``path`` that of its magnitude.
+    time, ``path`` that of its magnitude, ``unsteady`` that of the square of what the magnitude differs from its mean.
     """
 
     interval: Indices
@@ -39,6 +39,7 @@ class Pieces(NamedTuple):
     last: Array
     integral: Array
     path: Array
+    unsteady: Array
 
     @property
     def joined(self) -> "Pieces":
@@ -47,22 +48,32 @@ class Pieces(NamedTuple):
         if len(opening) == len(self.interval):
             return self
         closing = np.append(opening[1:], len(self.interval)) - 1
-        sums = np.add.reduceat([self.integral, self.path], opening, axis=1)
+        squares = self.unsteady + _steady_square(self.path, self.stop - self.start)
+        integral, path, square = np.add.reduceat([self.integral, self.path, squares], opening, axis=1)
         for k in np.flatnonzero(closing - opening > 1):
             inside = slice(opening[k], closing[k] + 1)
-            sums[:, k] = math.fsum(self.integral[inside]), math.fsum(self.path[inside])
+            integral[k], path[k] = math.fsum(self.integral[inside]), math.fsum(self.path[inside])
         ends = self.start[opening], self.stop[closing], self.first[opening], self.last[closing]
-        return Pieces(self.interval[opening], *ends, *sums)
+        unsteady = np.maximum(square - _steady_square(path, ends[1] - ends[0]), 0.0)
+        unsteady = np.where(closing > opening, unsteady, self.unsteady[opening])
+        return Pieces(self.interval[opening], *ends, integral, path, unsteady)
+
+
+def _steady_square(path: Array, span: Array) -> Array:
+    """Integral over time of the square of a value that stays and has this integral."""
+    return np.divide(path * path, span, out=np.zeros(path.shape), where=span > 0.0)
 
 
 def linear_pieces(interval: Indices, start: Array, stop: Array, first: Array, last: Array) -> Pieces:
     """Pieces in which the value changes linearly."""
     integral = 0.5 * (first + last) * (stop - start)
     path, turns = np.abs(integral), first * last < 0.0
+    unsteady = (last - first) ** 2 * (stop - start) / 12.0
     if turns.any():
         one, other, span = first[turns], last[turns], (stop - start)[turns]
         path[turns] = 0.5 * (one**2 + other**2) / np.abs(other - one) * span
-    return Pieces(interval, start, stop, first, last, integral, path)
+        unsteady[turns] = (one**2 + one * other + other**2) / 3.0 * span - _steady_square(path[turns], span)
+    return Pieces(interval, start, stop, first, last, integral, path, unsteady)
 
 
 def _within(ends: Array, times: Array, apart: float = 0.0) -> tuple[Array, Indices]:
@@ -162,9 +173,12 @@ class Course:
         if rate == 0.0:
             return pieces
         rates = np.copysign(rate, np.abs(pieces.last) - np.abs(pieces.first))
-        growth = [math.expm1(share) for share in (rates * (pieces.stop - pieces.start)).tolist()]
+        span = pieces.stop - pieces.start
+        growth, twice = ([math.expm1(n * share) for share in (rates * span).tolist()] for n in (1, 2))
         integral = pieces.first * np.array(growth) / rates
-        return pieces._replace(integral=integral, path=np.abs(integral))
+        square = pieces.first**2 * np.array(twice) / (2.0 * rates)
+        unsteady = np.maximum(square - _steady_square(integral, span), 0.0)
+        return pieces._replace(integral=integral, path=np.abs(integral), unsteady=unsteady)
 
 
 def table_pieces(times: Array, values: Array, ends: Array, duration: float) -> Pieces:

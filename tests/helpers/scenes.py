@@ -9,7 +9,7 @@ from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import Force, Spring, prescribed as drive
 from sim.parts.exchange import Motions
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Constant as ConstantAmplitude, Onset, Stress
+from sim.parts.shear.amplitude import Constant as ConstantAmplitude, Onset, SlipRate, Stress
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario
@@ -88,6 +88,13 @@ SHEARS = {
         tolerance=0.1,
         correlation=Wave(waves=2.0),
         amplitude=Stress(reference=2e5, relaxing=True),
+    ),
+    "banded, relaxing slip rate": shear.Banded(
+        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=SlipRate(floor=0.1, relaxing=True)
+    ),
+    "mean, slip rate": shear.Mean(spectrum=SPECTRUM, amplitude=SlipRate(memory_length=2e-6)),
+    "modal, fixed, slip rate": shear.Modal(
+        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=SlipRate(), mode_amplitudes="fixed"
     ),
     "banded, fixed": shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), mode_amplitudes="fixed"),
     "modal on a disc": shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), contact="disc"),

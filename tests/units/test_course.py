@@ -47,12 +47,16 @@ def test_pieces_hold_the_integral_and_the_path_of_the_value(name, start, stop):
     kinks = [t for t in (*TURNS, 0.2, 0.4, 0.5 + 0.3 * 0.25, 0.8, 1.0) if start < t < stop]
     exact = [
         quad(lambda t, f=f: f(at(name, t)), start, stop, points=kinks, epsabs=0.0, epsrel=1e-12)[0]
-        for f in (float, abs)
+        for f in (float, abs, np.square)
     ]
     found = pieces(name, start, stop)
-    assert_allclose([sum(piece.integral for piece in found), sum(piece.path for piece in found)], exact, rtol=1e-11)
+    squares = [piece.unsteady + piece.path**2 / (piece.stop - piece.start) for piece in found]
+    sums = sum(piece.integral for piece in found), sum(piece.path for piece in found), sum(squares)
+    assert_allclose(sums, exact, rtol=1e-11)
+    assert name != "number" or found[0].unsteady == 0.0
     whole = course(name).pieces(np.array([start, stop]), DURATION).joined
-    assert_allclose([whole.integral, whole.path], np.transpose([exact]), rtol=1e-11)
+    square = whole.unsteady + whole.path**2 / (stop - start)
+    assert_allclose([whole.integral, whole.path, square], np.transpose([exact]), rtol=1e-11)
     assert (whole.start, whole.stop, whole.first) == (start, stop, found[0].first)
 
 
@@ -92,7 +96,7 @@ def test_a_step_that_ends_at_a_turn_but_for_rounding_has_one_piece(name):
 
 def test_an_instant_is_one_piece_with_the_value_after_a_jump():
     (piece,) = pieces("table", 0.5, 0.5)
-    assert piece == (0, 0.5, 0.5, -0.5, -0.5, 0.0, 0.0)
+    assert piece == (0, 0.5, 0.5, -0.5, -0.5, 0.0, 0.0, 0.0)
 
 
 def test_the_values_of_rows_are_their_own_and_sums_over_many_rows_are_rounded_once():

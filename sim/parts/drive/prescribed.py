@@ -46,13 +46,13 @@ class _Sliding:
 
     def advance(self, state: Slider, times: Times, steps: range) -> tuple[Slider, Motions]:
         found = self._of_steps(times, steps) if len(steps) > 1 else self._of_one(times, steps.start)
-        time, duration, slip, path, first, speed = found
+        time, duration, slip, path, first, speed, unsteady = found
         position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
-        motions = Motions(steps.start, time, duration, slip, path, first, speed, position)
+        motions = Motions(steps.start, time, duration, slip, path, first, speed, position, unsteady)
         return Slider(position[-1], speed[-1]), motions
 
     def _of_steps(self, times: Times, steps: range) -> Array:
-        """Rows of ``_sums`` for a block of steps, shape (6, steps, 1)."""
+        """Rows of ``_sums`` for a block of steps, shape (7, steps, 1)."""
         ends = times.at(np.arange(steps.start - 1.0, steps.stop))
         return np.array(self._sums(ends, times.duration))[:, :, np.newaxis]
 
@@ -85,9 +85,12 @@ class _Sliding:
         return Motion(step, time.item(), span.item(), *sums)
 
     def _sums(self, ends: Array, duration: float) -> tuple[Array, ...]:
-        """End and length of each interval between times [s], slip and path in it [m], speeds at its ends [m/s]."""
+        """End and length of each interval between times [s], slip and path in it [m], speeds at its ends [m/s].
+
+        Last ``unsteady`` of ``Motion``.
+        """
         pieces = self.pieces(ends, duration).joined
-        return ends[1:], np.diff(ends), pieces.integral, pieces.path, pieces.first, pieces.last
+        return ends[1:], np.diff(ends), pieces.integral, pieces.path, pieces.first, pieces.last, pieces.unsteady
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})

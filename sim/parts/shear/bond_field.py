@@ -21,8 +21,8 @@ from sim.parts.shear.process import Fluctuation, SmoothProcess
 class SiteMean(SmoothProcess):
     """The ensemble mean of ΔΓ: ``energy`` is that for n E[f²] = 1 N²/m²."""
 
-    def _level(self, speed: Array, bonding: Bonding) -> tuple[Array, Array]:
-        return (bonding.frozen + bonding.varying) * self.energy, np.ones(speed.shape)
+    def _level(self, amplitude: Array, bonding: Bonding) -> Array:
+        return (bonding.frozen + bonding.varying) * self.energy
 
 
 class SiteModes(ModalProcess):

@@ -122,17 +122,18 @@ class FixedProcess(ModalProcess):
     """Modes that keep their modulus and diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
+        past, amplitude = self.amplitude.started(motion, bonding.strength)
         phases = 2.0 * np.pi * noise.uniforms(motion.step, len(self.wavenumber))
-        return Fluctuation(self._energy(amplitude), amplitude, phases)
+        return Fluctuation(self._energy(amplitude), amplitude, phases, past)
 
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
-        amplitude, phases = self.amplitude.factor(motions.speed, bonding.strength), state.values.copy()
+        past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
+        phases = state.values.copy()
         turn_phases(phases, self.correlation.exponents(self.wavenumber, motions), *noise.at(motions.step))
         energy = self._energy(amplitude)
-        return Fluctuation(energy[-1], amplitude[-1], phases), energy
+        return Fluctuation(energy[-1], amplitude[-1], phases, past), energy
 
     def _energy(self, amplitude: Array) -> Array:
         return amplitude**2 * (2.0 * np.sum(self.weights))

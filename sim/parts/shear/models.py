@@ -81,6 +81,10 @@ class _Model:
             raise PydanticCustomError("fixed_cannot_relax", said)
         if self.spectrum.bond_made and self.amplitude.model != "constant":
             raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
+        law = self.amplitude
+        if law.model == "slip_rate" and law.memory_length is None and math.isnan(self._memory):
+            said = 'slip_rate remembers a distance: give memory_length, or shear.correlation.model = "slip"'
+            raise PydanticCustomError("no_memory", said)
         if self.spectrum.bond_made and fixed:
             said = 'bonds at random places make mode_amplitudes = "gaussian"; leave it out'
             raise PydanticCustomError("bond_made", said)
@@ -90,6 +94,16 @@ class _Model:
     def stays(self) -> bool:
         """Whether what the contact feels of the fluctuations is the same at all times, whatever the rest does."""
         return False
+
+    @property
+    def _memory(self) -> float:
+        """Correlation length of the field [m]; nan where its modes have none in common."""
+        return math.nan
+
+    @property
+    def law(self) -> Amplitude:
+        """The law of the amplitude in this field."""
+        return self.amplitude.within(self._memory)
 
     @property
     def reads_stress(self) -> bool:
@@ -187,7 +201,7 @@ class Mean(_Model):
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> SmoothProcess:
         kind = SiteMean if self.spectrum.bond_made else SmoothProcess
-        return kind(float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)), self.amplitude)
+        return kind(float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)), self.law)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -210,6 +224,10 @@ class _Fluctuating(_Model):
     @property
     def per_member(self) -> bool:
         return self.mode_amplitudes == "gaussian"  # fixed ones give all members one ΔΓ
+
+    @property
+    def _memory(self) -> float:
+        return self.correlation.length if self.correlation.model == "slip" else math.nan
 
     def side(self, cell: float) -> float:
         return cell if self.cell is None else self.cell
@@ -254,7 +272,7 @@ class Modal(_Fluctuating):
         free_or_fixed = FixedProcess if self.mode_amplitudes == "fixed" else ModalProcess
         kind = SiteModes if self.spectrum.bond_made else free_or_fixed
         found = modes(self.spectrum, self.side(cell), self.points)
-        return kind(found, shear_modulus, poisson_ratio, self.correlation, self.amplitude)
+        return kind(found, shear_modulus, poisson_ratio, self.correlation, self.law)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -305,8 +323,8 @@ class Banded(_Fluctuating):
         unit, errors = _grouped(spectrum, cell_of)
         bands = replace(unit, weight=unit.weight * (size / shear_modulus))
         if self.mode_amplitudes == "fixed":
-            return SmoothProcess(bands.mean, self.amplitude)
-        return BandedProcess(bands, errors, self.correlation, self.amplitude)
+            return SmoothProcess(bands.mean, self.law)
+        return BandedProcess(bands, errors, self.correlation, self.law)
 
 
 def _of_unit_size(spectrum: Family) -> tuple[Family, float]:

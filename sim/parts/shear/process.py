@@ -12,7 +12,7 @@ import numpy as np
 from sim.numerics.jit import device, kernel
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
-from sim.parts.shear.amplitude import Amplitude
+from sim.parts.shear.amplitude import NO_PAST, Amplitude
 from sim.parts.shear.correlation import Correlation
 
 
@@ -28,11 +28,15 @@ class Fluctuation(NamedTuple):
     values : array
         Own numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
         standard deviation, or phases (members, pairs) [rad]; empty where there are none.
+    past : array
+        What the law of the amplitude keeps of the sliding before, shape (1, 4) or (members, 4); empty of one that
+        keeps nothing.
     """
 
     energy: Array
     amplitude: Array
     values: Array
+    past: Array = NO_PAST
 
 
 @dataclass(frozen=True)
@@ -45,18 +49,19 @@ class SmoothProcess:
     state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        return Fluctuation(*self._level(motion.speed, bonding), np.empty(0))
+        past, amplitude = self.amplitude.started(motion, bonding.strength)
+        return Fluctuation(self._level(amplitude, bonding), amplitude, np.empty(0), past)
 
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
-        energy, amplitude = self._level(motions.speed, bonding)
-        return Fluctuation(energy[-1], amplitude[-1], np.empty(0)), energy
+        past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
+        energy = self._level(amplitude, bonding)
+        return Fluctuation(energy[-1], amplitude[-1], np.empty(0), past), energy
 
-    def _level(self, speed: Array, bonding: Bonding) -> tuple[Array, Array]:
-        """Energy [J/m²] and amplitude [1] of the fluctuations at a speed [m/s]."""
-        amplitude = self.amplitude.factor(speed, bonding.strength)
-        return amplitude**2 * self.energy, amplitude
+    def _level(self, amplitude: Array, bonding: Bonding) -> Array:
+        """Energy of the fluctuations at an amplitude [J/m²]."""
+        return amplitude**2 * self.energy
 
     @property
     def gammas(self) -> Gammas:
@@ -89,20 +94,21 @@ class Renewing:
         raise NotImplementedError
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
-        amplitude = self.amplitude.factor(motion.speed, bonding.strength)
+        past, amplitude = self.amplitude.started(motion, bonding.strength)
         size = amplitude if self.amplitude.relaxing else np.ones(1)
         values = self._empty(len(noise.members))
         energy = self._renew(values, np.zeros((1, 1, 1)), np.ones((1, 1, 1)), size[np.newaxis], motion.step, noise)
-        return Fluctuation(self._scaled(amplitude, energy[0]), amplitude, values)
+        return Fluctuation(self._scaled(amplitude, energy[0]), amplitude, values, past)
 
     def advance(
         self, state: Fluctuation, motions: Motions, bonding: Bonding, noise: Noise
     ) -> tuple[Fluctuation, Array]:
-        amplitude, values = self.amplitude.factor(motions.speed, bonding.strength), state.values.copy()
+        past, amplitude = self.amplitude.followed(state.past, motions, bonding.strength)
+        values = state.values.copy()
         size = renewed_size(self.amplitude, state, motions, amplitude)
         energy = self._renew(values, *self._shares(motions), size, motions.step, noise)
         energy = self._scaled(amplitude, energy)
-        return Fluctuation(energy[-1], amplitude[-1], values), energy
+        return Fluctuation(energy[-1], amplitude[-1], values, past), energy
 
     def _shares(self, motions: Motions) -> tuple[Array, Array]:
         """Shares of a number that a step keeps and renews, whose squares add up to one."""
@@ -120,12 +126,12 @@ def renewed_size(law: Amplitude, state: Fluctuation, motions: Motions, amplitude
     """Amplitude of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
 
     Second order in the step. Its beginning is seen after a jump of the speed; stress has no jumps
-    but under bonds that follow the speed at once.
+    but under bonds that follow the speed at once, nor has what is remembered of the past.
     """
     if not law.relaxing:
         return np.ones((len(amplitude), 1))
     before = np.concatenate([state.amplitude[np.newaxis], amplitude[:-1]])
-    if not law.reads_stress:
+    if not (law.reads_stress or law.remembers):
         before = law.factor(motions.first, np.zeros(1))
     return np.sqrt(0.5 * (amplitude**2 + before**2))
 

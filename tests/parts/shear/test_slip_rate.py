@@ -1,0 +1,194 @@
+"""The amplitude that unsteady sliding makes: closed forms, what is remembered, drives that feel the friction."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.scenes import CELL, SPECTRUM, scene
+from numpy.testing import assert_allclose
+from scipy.integrate import quad
+
+from sim.engine import march
+from sim.parts.bonds import Steady as Weakening, Unbroken
+from sim.parts.contact.bodies import Adhesion
+from sim.parts.drive import Ramp, Spring, Steady, Table
+from sim.parts.exchange import Motion, Motions
+from sim.parts.shear import Banded, Mean
+from sim.parts.shear.amplitude import SlipRate
+from sim.parts.shear.correlation import Slip, Wave
+from sim.scenario.clock import Clock
+from sim.spectrum import Gaussian
+from sim.units.refusals import BadInput
+
+SPEED, PERIOD, STEPS = 2e-3, 1e-2, 40
+TIMES = np.linspace(0.0, PERIOD, STEPS + 1)
+#: Slip in a period over the memory length; weights within a period differ by a factor of 1 + SHORT at the most.
+SHORT = 1e-6
+
+
+def moved(path, square, step=PERIOD / STEPS):
+    """Motions of given paths [m] and integrals of the squared speed [m²/s] in equal steps."""
+    path, square = np.asarray(path)[:, np.newaxis], np.asarray(square)[:, np.newaxis]
+    time, still = step * np.arange(1.0, len(path) + 1.0)[:, np.newaxis], np.zeros(path.shape)
+    spread = np.maximum(square - path**2 / step, 0.0)
+    return Motions(1, time, np.full(path.shape, step), path, path, still, still, still, spread)
+
+
+def amplitudes(law, *blocks, speed=0.0):
+    """g at the ends of all steps of some blocks of motions, the first from a given speed."""
+    start = np.full(1, speed)
+    past, _ = law.started(Motion(0, 0.0, 0.0, start, start, start, start), start)
+    found = []
+    for motions in blocks:
+        past, amplitude = law.followed(past, motions, start)
+        found.extend(amplitude[:, 0])
+    return np.array(found)
+
+
+def law(length=SPEED * PERIOD / SHORT, floor=0.0):
+    return SlipRate(memory_length=length, floor=floor)
+
+
+def wave(mean, swing):
+    """Paths and integrals of the squared speed of mean + swing cos(2π t/PERIOD)."""
+    turn = 2.0 * math.pi / PERIOD
+    path = mean * TIMES + swing * np.sin(turn * TIMES) / turn
+    square = (mean**2 + 0.5 * swing**2) * TIMES + 2.0 * mean * swing * np.sin(turn * TIMES) / turn
+    square += 0.25 * swing**2 * np.sin(2.0 * turn * TIMES) / turn
+    return np.diff(path), np.diff(square)
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.3])
+@pytest.mark.parametrize("swing", [0.0, 0.1, 0.7, 1.0])
+def test_a_modulated_speed_gives_half_the_square_of_its_swing_over_the_mean_square(swing, floor):
+    (last,) = amplitudes(law(floor=floor), moved(*wave(SPEED, swing * SPEED)))[-1:]
+    unsteady = 0.5 * swing**2 / (1.0 + 0.5 * swing**2)
+    assert_allclose(last**2, floor**2 + (1.0 - floor**2) * unsteady, rtol=2.0 * SHORT, atol=1e-14)
+    if swing == 1.0:
+        assert_allclose(unsteady, 1.0 / 3.0, rtol=1e-15)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.5])
+def test_stick_slip_at_one_speed_has_the_share_of_the_time_at_rest(share):
+    moves = np.tile(np.arange(STEPS) < share * STEPS, 3)
+    path = np.where(moves, SPEED * PERIOD / STEPS, 0.0)
+    motions = moved(path, path**2 / (PERIOD / STEPS))
+    ends = amplitudes(law(), motions, moved(path[:1], path[:1] ** 2 / (PERIOD / STEPS)))
+    moving = 3 * round(share * STEPS) + 1  # with the step that resumes the sliding
+    assert_allclose(ends[-1] ** 2, 1.0 - moving / (3 * STEPS + 1), rtol=6.0 * SHORT)
+
+
+def test_rest_holds_the_amplitude_and_counts_once_sliding_resumes():
+    path, square = wave(SPEED, 0.5 * SPEED)
+    still = np.zeros(200)
+    ends = amplitudes(law(), moved(path, square), moved(still, still), moved(path[:1], square[:1]))
+    assert np.all(ends[STEPS - 1 : STEPS + 200] == ends[STEPS - 1])
+    assert ends[-1] ** 2 > 0.7  # five sixths of the time were spent at rest
+    assert np.all(amplitudes(law(), moved(still, still)) == 0.0)
+    # and a rest before any sliding is no part of the past
+    rested = amplitudes(law(), moved(still, still), moved(path, square))
+    assert np.all(rested[len(still) :] == amplitudes(law(), moved(path, square)))
+
+
+def test_sliding_at_one_speed_has_the_floor_from_the_first_step_on():
+    for floor in (0.0, 0.2):
+        shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e-6, floor))
+        for drive in (Steady(speed=SPEED), Table(time=(0.0, 0.003, 0.003, 1.0), speed=(0.0, 0.0, SPEED, SPEED))):
+            for state in march(scene(1, 16, drive=drive, shear=shear), np.arange(1)):
+                assert_allclose(state.shear.amplitude, floor, rtol=1e-14, atol=1e-15)
+
+
+def test_a_step_of_the_speed_is_forgotten_with_the_slip():
+    # from speed v to r v at once: with w = e^(−s/l), A0 = (w + (1 − w)/r) l/v, A1 = l, A2 = (w + (1 − w) r) l v
+    length, ratio, slip = 1e-6, 8.0, np.array([0.1, 0.5, 1.0, 3.0, 9.0]) * 1e-6
+    steps = np.diff(slip, prepend=0.0)
+    found = []
+    past, _ = law(length).started(Motion(0, 0.0, 0.0, *[np.full(1, SPEED)] * 4), np.zeros(1))
+    for path in steps:
+        duration = path / (ratio * SPEED)
+        past, amplitude = law(length).followed(past, moved([path], [path**2 / duration], duration), np.zeros(1))
+        found.append(amplitude.item() ** 2)
+    left = np.exp(-slip / length)
+    exact = 1.0 - 1.0 / ((left + (1.0 - left) / ratio) * (left + (1.0 - left) * ratio))
+    assert_allclose(found, exact, rtol=1e-12)
+
+
+def test_the_error_of_a_step_falls_with_its_square():
+    # a speed that rises from v to 5 v in T: A_j = ∫ e^(−(p(T) − p(t))/l) v^j dt, and what was before counts e^(−p(T)/l)
+    length, duration, first, last = 3e-6, 2e-3, 1e-3, 5e-3
+
+    def speed(t):
+        return first + (last - first) * t / duration
+
+    def to_the_end(t):
+        return 0.5 * (speed(t) + last) * (duration - t)
+
+    sums = []
+    for j in range(3):
+        part = quad(lambda t, j=j: math.exp(-to_the_end(t) / length) * speed(t) ** j, 0.0, duration, epsabs=0.0)[0]
+        sums.append(part + math.exp(-to_the_end(0.0) / length) * length * first ** (j - 1))
+    exact = 1.0 - sums[1] ** 2 / (sums[0] * sums[2])
+    errors = []
+    for steps in (32, 64, 128):
+        clock = Clock(duration=duration, step=duration / steps)
+        shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=SlipRate(memory_length=length))
+        parts = {"clock": clock, "drive": Ramp(start=first, stop=last), "shear": shear}
+        *_, state = march(scene(1, **parts), np.arange(1))
+        errors.append(state.shear.amplitude[0] ** 2 - exact)
+    assert_allclose([errors[0] / errors[1], errors[1] / errors[2]], 4.0, rtol=0.02)
+    assert abs(errors[-1]) < 1e-3 * exact
+
+
+#: Stick and slip behind a massless spring in closed form: strength, critical speed, damping, stiffness, stage speed.
+STRENGTH, SLOW, DAMPING, STIFF, STAGE = 1e-2, 1e-3, 0.4, 100.0, 1e-3
+
+
+def test_bonds_that_weaken_with_speed_make_unsteady_sliding_behind_a_spring():
+    still = scene(1, bonds=Unbroken(stress=1.0))
+    bonds = Weakening(critical_speed=SLOW, stress=STRENGTH / still.contact_area)
+    drive = Spring(stage=STAGE, stiffness=STIFF, damping=DAMPING, contact_stiffness="rigid", tolerance=1e-9)
+    shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e3), paid_by_adhesion=0.0)
+    lowest = math.sqrt(STRENGTH * SLOW / DAMPING) - SLOW  # where the friction is least
+    least, highest = 2.0 * math.sqrt(STRENGTH * SLOW * DAMPING) - DAMPING * SLOW, STRENGTH / DAMPING - SLOW
+
+    def pace(v):  # dt/dv of a slip
+        return (DAMPING - STRENGTH * SLOW / (SLOW + v) ** 2) / (STIFF * (STAGE - v))
+
+    lasts, slip, square = (quad(lambda v, j=j: v**j * pace(v), highest, lowest, epsrel=1e-11)[0] for j in range(3))
+    stick = (STRENGTH - least) / (STIFF * STAGE)
+    step = 2e-4
+    duration = STRENGTH / (STIFF * STAGE) + 2.5 * stick + 3.0 * lasts
+    clock = Clock(duration=step * round(duration / step), step=step)
+    same_area = Adhesion(work=42e-3, bond_share=0.0)
+    moving = scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear, adhesion=same_area)
+    states = list(march(moving, np.arange(1)))
+    weight, mean, spread, _ = states[-1].shear.past[0]
+    assert states[-1].drive.speed[0] == 0.0
+    assert_allclose([weight * mean, spread + weight * mean**2], [3.0 * slip, 3.0 * square], rtol=1e-5)
+    # all steps count from the one in which the first slip begins to the one in which the last ends
+    assert 3.0 * lasts + 2.0 * stick <= weight * (1.0 + 1e-9) <= 3.0 * lasts + 2.0 * stick + 2.0 * step
+    assert_allclose(states[-1].shear.amplitude[0] ** 2, 1.0 - (3.0 * slip) ** 2 / (weight * 3.0 * square), rtol=1e-5)
+
+
+def test_a_mass_behind_a_spring_on_coulomb_friction_has_three_halves_of_the_square_of_its_mean_speed():
+    # from rest it moves with V (1 − cos ωt), whose unsteadiness over whole periods is a third
+    mass, stiffness, stage, strength = 1e-3, 1e3, 1e-3, 1e-3
+    period, begins = 2.0 * math.pi * math.sqrt(mass / stiffness), strength / (stiffness * stage)
+    drive = Spring(stage=stage, stiffness=stiffness, mass=mass, contact_stiffness="rigid", tolerance=1e-10)
+    shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e3), paid_by_adhesion=0.0)
+    bonds = Unbroken(stress=strength / scene(1).contact_area)
+    duration = begins + 2.0 * period
+    clock = Clock(duration=duration, step=duration / 7)
+    states = list(march(scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear), np.arange(1)))
+    weight, mean, spread, _ = states[-1].shear.past[0]
+    slip = 2.0 * period * stage
+    assert_allclose([weight * mean, spread + weight * mean**2], [slip, 1.5 * stage * slip], rtol=1e-8)
+
+
+def test_a_field_without_a_length_of_its_own_needs_that_of_its_memory():
+    banded = {"spectrum": SPECTRUM, "cell": CELL, "amplitude": SlipRate()}
+    assert Banded(**banded, correlation=Slip(length=5e-6)).law.memory_length == 5e-6
+    with pytest.raises(ValueError, match="memory_length"):
+        Banded(**banded, correlation=Wave(waves=2.0))
+    with pytest.raises((ValueError, BadInput), match="memory_length"):
+        Mean(spectrum=SPECTRUM, amplitude=SlipRate())
