@@ -8,6 +8,7 @@ import xarray as xr
 
 from sim.analysis.observables import masks, ordered, pure
 from sim.analysis.scene import MEMBERS, answered, control, setting, where_recorded, word
+from sim.analysis.stick_slip import stick_slip
 
 #: A maximum is one if it stands above the ends of the run by more than rounding.
 _ROUNDING = 1e-9
@@ -38,11 +39,13 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
         - ``loop_energy``, ``loop_dissipation`` [J]: means over the cycles there and back; see ``loop_energy``.
         - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
           ``peak_friction_time``, ``peak_friction_speed``: of a start or a ramp; see ``peaks``.
+        - ``slip_count``, ``static_friction``, ``kinetic_friction`` [N], ``slip_amplitude`` [m] and more, of a slider
+          behind a spring; see ``stick_slip``.
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
     found = _openings(dataset)
-    for part in (_masks, peaks):
+    for part in (_masks, peaks, stick_slip):
         with where_recorded():
             found = found.merge(part(dataset))
     for suffix in ("", "_mean", "_std", "_sem"):

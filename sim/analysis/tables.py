@@ -70,11 +70,24 @@ _EVENTS = (
     _Column("peak_friction", "peak of\nfriction"),
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
+    _Column(
+        "slip_count", "slips", meaning="falls of the spring's force by 2 % or more, means over them; times of records"
+    ),
+    _Column("static_friction", "static\nfriction", math.nan, meaning="force at which a slip begins"),
+    _Column("kinetic_friction", "kinetic\nfriction", math.nan, meaning="work of the stage over its way"),
+    _Column("force_drop", "drop", math.nan),
+    _Column("stress_drop", "drop of\nstress", math.nan),
+    _Column("slip_amplitude", "slip", math.nan),
+    _Column("slip_duration", "slip\nlasts", math.nan),
+    _Column("stick_duration", "stick\nlasts", math.nan),
+    _Column("recurrence_time", "slip\nevery", math.nan),
 )
 
 #: Heading and meaning of the correlation time.
 _MEMORY = _Column("correlation_time", "t_c", meaning="integral correlation time of ΔΓ")
 
+#: Pure numbers that are no shares of something.
+_NO_SHARES = ("bond_fraction", "slip_count")
 #: Shares below it are nothing.
 _ROUNDING = 1e-13
 
@@ -198,7 +211,7 @@ def _shown(found: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
             continue
         mean, sem = (_at(found.get(f"{name}_{kind}"), points) for kind in ("mean", "sem"))
         unit = found[f"{name}_mean"].attrs.get("units", "1")
-        if unit == "1" and name != "bond_fraction":  # a share; differences of areas leave rounding behind
+        if unit == "1" and name not in _NO_SHARES:  # differences of areas leave rounding behind
             unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | np.isnan(mean)):
             cells |= _cells(heading, unit, mean, sem)

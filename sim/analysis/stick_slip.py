@@ -1,0 +1,158 @@
+"""Stick and slip of a slider behind a spring: its slips one by one, and what each member has of them in a run."""
+
+import itertools
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from scipy.signal import find_peaks
+
+from sim.analysis.observables import ordered
+from sim.analysis.scene import MEMBERS, is_stationary, sweep_dims
+
+#: Fall of the spring's force over its largest in the run that makes a slip.
+LEAST = 0.02
+
+#: What is known of each slip: unit and meaning.
+_SLIPS = {
+    "slip_time": ("s", "time at which a slip begins"),
+    "slip_duration": ("s", "time from the beginning of a slip to its end"),
+    "stick_duration": ("s", "time from the end of a slip to the beginning of the next"),
+    "recurrence_time": ("s", "time from the beginning of a slip to that of the next"),
+    "slip_amplitude": ("m", "displacement of the slider in a slip"),
+    "slip_speed": ("m/s", "speed of the stage at which a slip begins"),
+    "static_friction": ("N", "force of the spring at which a slip begins"),
+    "force_drop": ("N", "fall of the spring's force in a slip"),
+    "stress_drop": ("Pa", "fall of the shear stress in a slip"),
+}
+_READ = ("spring_force", "slider_position", "stage_speed", "shear_stress")
+
+
+def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
+    """Slips of a slider that a stage pulls through a spring, one by one.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive ``spring`` with each member recorded.
+    least : float
+        How much the force of the spring falls in a slip at least, over its largest in the run [1].
+
+    Returns
+    -------
+    xarray.Dataset
+        With the dimension ``slip`` last, nan beyond a member's last: ``slip_time``, ``slip_duration``,
+        ``stick_duration`` until the next one, ``recurrence_time`` [s], ``slip_amplitude`` [m], ``slip_speed`` of
+        the stage [m/s], ``static_friction`` and ``force_drop`` [N], ``stress_drop`` [Pa].
+
+    Raises
+    ------
+    ValueError
+        If no stage pulls, or only statistics were recorded.
+
+    Notes
+    -----
+    In a slip the slider is faster than the stage, so that the spring's force falls: from a maximum to the lowest value
+    before the next. Forces and displacements are taken in the sense in which the stage moves, and what its
+    reversal unloads is no slip. All times are those of records: let a slip last several.
+    """
+    if "stage_speed_mean" in dataset:
+        raise ValueError("slips need each member; record them: [record] per_member = true")
+    if "stage_speed" not in dataset:
+        raise ValueError('slips need a stage that pulls through a spring: [drive] model = "spring"')
+    outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in dataset["spring_force"].dims]
+    shape = tuple(dataset.sizes[name] for name in outer)
+    read = [dataset[name].astype(float).broadcast_like(dataset["spring_force"]) for name in _READ]
+    series = [values.transpose(*outer, "t").to_numpy() for values in read]
+    time = dataset["t"].to_numpy()
+    rows = [_slips(least, time, *(values[at] for values in series)) for at in np.ndindex(*shape)]
+    most = max(len(row) for row in rows)
+    table = np.full((len(rows), most, len(_SLIPS)), np.nan)
+    for own, row in zip(table, rows, strict=True):
+        own[: len(row)] = row
+    table = table.reshape(*shape, most, len(_SLIPS))
+    described: dict[str, Any] = {
+        name: ((*outer, "slip"), table[..., k], {"units": unit, "long_name": text})
+        for k, (name, (unit, text)) in enumerate(_SLIPS.items())
+    }
+    number = ("slip", np.arange(1, most + 1), {"long_name": "number of the slip"})
+    return xr.Dataset(described, {name: dataset[name] for name in outer} | {"slip": number})
+
+
+def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stress: Any) -> np.ndarray:
+    """The slips of one member, a row each, columns ``_SLIPS``."""
+    there = np.isfinite(force) & np.isfinite(position)
+    if not np.any(there):
+        return np.empty((0, len(_SLIPS)))
+    sense = _sense(stage)
+    turns = np.flatnonzero(np.diff(sense)) + 1
+    ends = np.unique([0, *turns[turns < there.sum()], there.sum()])
+    fall = least * np.max(np.abs(force[there]))
+    found = []
+    for start, stop in itertools.pairwise(ends):
+        along = sense[start] * force[start:stop]
+        tops = find_peaks(along, prominence=fall)[0] if fall > 0.0 else np.empty(0, int)
+        until = np.append(tops, stop - start)[1:]
+        lows = [top + int(np.argmin(along[top:end])) for top, end in zip(tops, until, strict=True)]
+        pairs = [(top, low) for top, low in zip(tops, lows, strict=True) if along[top] - along[low] >= fall]
+        if pairs and pairs[-1][1] == stop - start - 1:  # the last one has not ended
+            pairs.pop()
+        top, low = start + np.array(pairs, int).reshape(-1, 2).T
+        after = np.append(time[top], np.nan)[1:]  # when the next one begins
+        found.append(np.stack([
+            time[top], time[low] - time[top], after - time[low], after - time[top],
+            sense[start] * (position[low] - position[top]),
+            np.abs(stage[top]), sense[start] * force[top], sense[start] * (force[top] - force[low]),
+            sense[start] * (stress[top] - stress[low]),
+        ], axis=1))  # fmt: skip
+    return np.concatenate(found)
+
+
+def _sense(stage: np.ndarray) -> np.ndarray:
+    """Sense in which the stage moves, 1 or -1; where it rests the one before, at the beginning the one after."""
+    moves = np.flatnonzero(np.nan_to_num(stage))
+    if not moves.size:
+        return np.ones(len(stage))
+    last = np.searchsorted(moves, np.arange(len(stage)), "right") - 1
+    return np.sign(stage[moves[np.maximum(last, 0)]])
+
+
+def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
+    """Mean stick and slip of each member, static and kinetic friction.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one speed those that
+        begin in the second half of the run. ``kinetic_friction`` [N] is the work of the stage over its way, from the
+        beginning of the first of these slips to that of the last, without slips over that time. Empty for other
+        drives, and where only statistics were recorded.
+    """
+    if "stage_speed" not in dataset or not {*_READ, "drive_work", "stage_position"} <= set(dataset):
+        return xr.Dataset()
+    found = slips(dataset).pad(slip=(0, 1))  # where there is none, too, a mean is over something
+    begins, half = found["slip_time"], float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
+    counted = begins >= half
+    means = found.where(counted).mean("slip", keep_attrs=True)
+    counts = counted.sum("slip").astype(float).assign_attrs(units="1", long_name="number of slips")
+    first, last = begins.where(counted).min("slip"), begins.where(counted).max("slip")
+    several = last > first
+    end = dataset["t"].where(dataset["spring_force"].notnull()).max("t")
+    first, last = first.where(several, half), last.where(several, end)
+    made, gone = (_between(dataset, name, first, last) for name in ("drive_work", "stage_position"))
+    kinetic = (made / gone.where(gone != 0.0)).assign_attrs(units="N", long_name="work of the stage over its way")
+    every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
+    return every.map(ordered, keep_attrs=True)
+
+
+def _between(dataset: xr.Dataset, name: str, first: xr.DataArray, last: xr.DataArray) -> xr.DataArray:
+    """Growth of a recorded quantity from one time to another."""
+    values = dataset[name].astype(float).broadcast_like(dataset["spring_force"])
+    dims: Any = {"input_core_dims": [[], ["t"], ["t"]], "vectorize": True}
+    before, after = (xr.apply_ufunc(np.interp, time, dataset["t"], values, **dims) for time in (first, last))
+    return after - before

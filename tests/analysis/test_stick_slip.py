@@ -1,0 +1,122 @@
+"""Stick and slip read from a dataset: closed relaxation cycles, made-up forces, reversals, noise."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from helpers.scenes import scene
+from numpy.testing import assert_allclose
+
+from sim import analysis
+from sim.ensemble.simulate import run
+from sim.parts.bonds import Steady, Unbroken
+from sim.parts.contact.bodies import Adhesion
+from sim.parts.drive import Spring
+from sim.scenario.clock import Clock
+
+#: Relaxation cycles of bonds N0/(1 + V/Vc), damping 0.04, stiffness 1, speed 1, in units of 5 mN and 5 um.
+FORCE, LENGTH, RECORD = 5e-3, 5e-6, 4e-3
+STICKS, SLIPS, LEAST, MEAN = 0.64, 0.0546142733837, 0.36, 0.673327582372
+
+
+@functools.cache
+def cycles():
+    """A slider that sticks and slips, in units of FORCE, LENGTH and seconds; do not change it."""
+    area, stiff = scene(1).contact_area, FORCE / LENGTH
+    bonds = Steady(critical_speed=LENGTH, stress=FORCE / area)
+    drive = Spring(stage=LENGTH, stiffness=stiff, damping=0.04 * stiff, contact_stiffness="rigid")
+    same_area = Adhesion(work=42e-3, bond_share=0.0)
+    return run(scene(2, clock=Clock(duration=5.0, step=RECORD), drive=drive, bonds=bonds, adhesion=same_area))
+
+
+def made(force, stage=1.0, step=1.0):
+    """A dataset of one member with this force of the spring and speed of the stage."""
+    dataset = cycles().isel(t=slice(0, len(force)), member=slice(0, 1))
+    force, stage = np.asarray(force, float), np.broadcast_to(stage, len(force)).astype(float)
+    way = np.concatenate([[0.0], np.cumsum(stage[1:])]) * step
+    series = {"spring_force": force, "stage_speed": stage, "stage_position": way, "slider_position": way - force}
+    series |= {"shear_stress": 2.0 * force, "drive_work": 0.0 * force}
+    dataset = dataset.assign_coords(t=step * np.arange(len(force)))
+    return dataset.assign({name: (("member", "t"), values[np.newaxis]) for name, values in series.items()})
+
+
+def test_stick_and_slip_are_those_of_the_closed_cycle_to_a_record():
+    found = analysis.slips(cycles())
+    first, twice = 1.0, 2.0 * RECORD
+    period, count = STICKS + SLIPS, 6
+    assert found.sizes["slip"] == count and found["slip_time"].dims == ("member", "slip")
+    assert_allclose(found["slip_time"], np.tile(first + period * np.arange(count), (2, 1)), atol=twice, rtol=0)
+    assert_allclose(found["slip_duration"], SLIPS, atol=twice, rtol=0)
+    assert_allclose(found["stick_duration"][:, :-1], STICKS, atol=twice, rtol=0)
+    assert_allclose(found["recurrence_time"][:, :-1], period, atol=twice, rtol=0)
+    assert np.isnan(found["recurrence_time"][:, -1]).all()
+    # between a record and the next the stick loads the spring by K V dt, and no more
+    force, drop = found["static_friction"] / FORCE, found["force_drop"] / FORCE
+    assert np.all(force <= 1.0 + 1e-6) and np.all(force >= 1.0 - twice)
+    assert np.all(drop <= 1.0 - LEAST + 1e-6) and np.all(drop >= 1.0 - LEAST - 2.0 * twice)
+    # the body goes as far as the spring shortens and the stage moves on
+    moved = drop + found["slip_duration"]
+    assert_allclose(found["slip_amplitude"] / LENGTH, moved, rtol=1e-6)
+    assert_allclose(found["slip_speed"], LENGTH, rtol=1e-14)
+
+
+def test_the_work_of_the_stage_over_its_way_is_the_mean_force_of_the_cycle():
+    found = analysis.stick_slip(cycles())
+    begins = 1.0 + (STICKS + SLIPS) * np.arange(6)
+    late = begins[begins >= 2.5]
+    assert np.all(found["slip_count"] == late.size)
+    # both ends lie within a record of their place in the cycle, where the force is at most 1
+    error = 2.0 * RECORD / (late[-1] - late[0])
+    assert_allclose(found["kinetic_friction"] / FORCE, MEAN, atol=error, rtol=0)
+    assert_allclose(found["recurrence_time"], STICKS + SLIPS, atol=2.0 * RECORD / (late.size - 1), rtol=0)
+
+
+def test_statistics_and_the_table_show_stick_and_slip_behind_a_spring():
+    found = analysis.statistics(cycles())
+    assert_allclose(found["static_friction_mean"] / FORCE, 1.0, atol=2.0 * RECORD)
+    assert found["static_friction_mean"].attrs["units"] == "N"
+    (row,) = analysis.highlights(cycles())
+    cells = {" ".join(heading.split()): cell for heading, cell in row.items()}
+    assert cells["slips"].startswith("3") and cells["kinetic friction (mN)"].startswith("3.3")
+
+
+def test_sliding_without_slips_has_a_kinetic_friction_alone():
+    area = scene(1).contact_area
+    drive = Spring(stage=LENGTH, stiffness=1e3, damping=1.0, contact_stiffness="rigid")
+    dataset = run(scene(1, steps=400, clock=Clock(duration=4.0, step=0.02), drive=drive,
+                        bonds=Unbroken(stress=FORCE / area)))  # fmt: skip
+    found = analysis.stick_slip(dataset)
+    assert found["slip_count"].item() == 0.0 and math.isnan(found["static_friction"].item())
+    assert_allclose(found["kinetic_friction"], FORCE + LENGTH, rtol=1e-6)
+
+
+def test_slips_follow_the_sense_of_the_stage_and_reversals_are_none():
+    saw = np.tile([0.0, 1.0, 2.0, 3.0, 4.0, 1.0], 3)  # falls by three after each four
+    for sense in (1.0, -1.0):
+        found = analysis.slips(made(sense * saw, sense))
+        assert_allclose(found["force_drop"], [[4.0, 4.0]], rtol=1e-14)
+        assert_allclose(found["static_friction"], 4.0, rtol=1e-14)
+        assert_allclose(found["slip_amplitude"], 6.0, rtol=1e-14)  # the stage moves two meanwhile
+        assert_allclose(found["stress_drop"], 8.0, rtol=1e-14)
+    # there and back: the force falls from 3 to -3 as the stage turns, and nothing slips
+    there = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0])
+    assert analysis.slips(made(there, np.where(np.arange(9) < 5, 1.0, -1.0))).sizes["slip"] == 0
+
+
+def test_what_falls_by_less_than_the_least_is_no_slip():
+    saw = np.array([0.0, 2.0, 4.0, 3.95, 4.0, 3.0, 4.0, 3.5, 4.2])
+    assert analysis.slips(made(saw)).sizes["slip"] == 2
+    assert analysis.slips(made(saw), least=0.01).sizes["slip"] == 3
+    assert analysis.slips(made(saw), least=0.2).sizes["slip"] == 1
+    # a slip that lasts beyond the end of the run is not counted
+    assert analysis.slips(made([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
+
+
+def test_slips_of_other_drives_and_of_statistics_are_refused():
+    dataset = cycles().drop_vars("stage_speed")
+    with pytest.raises(ValueError, match="spring"):
+        analysis.slips(dataset)
+    assert not analysis.stick_slip(dataset)
+    with pytest.raises(ValueError, match="per_member"):
+        analysis.slips(cycles().rename(stage_speed="stage_speed_mean"))
