@@ -103,6 +103,27 @@ def test_the_mechanisms_are_told_apart_with_the_same_noise():
     assert_allclose(work[1, 1] - work[0, 0], (work[1, 0] - work[0, 0]) + (work[0, 1] - work[0, 0]), rtol=1e-12)
 
 
+def test_the_energy_of_few_waves_is_spread_as_is_known_beforehand_and_the_area_with_it():
+    dataset = at("ten_wavelengths").isel(t=-1)
+    energy, area = (dataset[name].values for name in ("fluctuation_energy", "contact_area"))
+    centred = energy - energy.mean(axis=1, keepdims=True)
+    fourth = (centred**4).mean(axis=1) / (centred**2).mean(axis=1) ** 2
+    error = np.sqrt((fourth - 1.0) / 4.0 / energy.shape[1])  # of a standard deviation, relative
+    found = energy.std(axis=1, ddof=1) / energy.mean(axis=1) / dataset["member_spread_energy"].values
+    assert np.all(abs(found - 1.0) < 5.0 * error)
+    assert np.all(np.diff(area.std(axis=1)) < 0.0)
+
+
+def test_a_jkr_test_of_a_slow_edge_reads_two_works_of_adhesion():
+    dataset = at("jkr_test")
+    held = np.flatnonzero(np.isclose(dataset["normal_load"].isel(contact_front_speed=0), 1e-3, rtol=1e-9))
+    half = dataset.sizes["t"] // 2
+    radius = dataset["contact_radius"].isel(t=[held[held < half][-1], held[-1]])
+    loading, unloading = jkr.energy_release_rate(radius.transpose("t", ...).values, 1e-3, 2e-3, 6.4e6)
+    assert np.all(loading < 42e-3) and np.all(unloading > 42e-3)
+    assert np.all(np.diff(loading) > 0.0) and np.all(np.diff(unloading) < 0.0)
+
+
 def bell(dataset):
     """Rates, force and stiffness of a scenario's bonds, as the laws take them."""
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate")
@@ -187,6 +208,7 @@ GOLDEN = {
     "decomposition": (4.303852355076199e-08, 0.009838144173897688),
     "fixed_grips": (1.7007233155381927e-08, 0.003998478821274799),
     "friction_maximum": (4.12663152393395e-08, 0.004502167913896796),
+    "jkr_test": (3.278041210714769e-08, 0.0),
     "masking": (3.8870006327848614e-08, 0.0),
     "pdms_lens": (4.0232986563229426e-08, 0.009507511588392243),
     "peeling": (3.44730056493401e-09, 0.0),
@@ -197,6 +219,7 @@ GOLDEN = {
     "soft_lens": (1.1643866279338594e-05, 0.5292666490608452),
     "static_peak": (3.5753868919814446e-08, 0.0008909207055409984),
     "whole static_peak": (3.768020628008867e-08, 0.0012382541726702443),
+    "ten_wavelengths": (4.033500042885014e-08, 0.0),
     "uniform_stress": (3.849406592790275e-08, 0.013472923074765964),
 }
 
