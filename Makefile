@@ -6,7 +6,7 @@ EXTRAS ?= test,lint
 STAMP = $(VENV)/.installed-$(subst $(comma),-,$(EXTRAS))
 comma := ,
 
-.PHONY: run test verify bench lint lines clean
+.PHONY: run test verify bench gallery lint lines clean
 
 run: $(STAMP)
 	$(BIN)/sim run scenarios/pdms_lens.toml --force
@@ -47,6 +47,10 @@ LOWEST = .venv-lowest
 # `make bench` measures all rows of docs/speed.md, `make bench ROWS="modal disc"` those of some groups.
 bench: $(STAMP)
 	$(BIN)/python -m benchmarks.run $(ROWS)
+
+# `make gallery` runs and draws all questions of docs/gallery, `make gallery NAMES="masking"` some.
+gallery: $(STAMP)
+	$(BIN)/python docs/make_gallery.py $(NAMES)
 
 lines:
 	$(PYTHON) benchmarks/lines.py

@@ -1,13 +1,19 @@
 """The documentation keeps up with the code."""
 
+import doctest
 import importlib.util
 import inspect
 import re
 from pathlib import Path
 
 import pytest
+from numpy.testing import assert_allclose
 
 ROOT = Path(__file__).parent.parent
+PAGES = [
+    "README.md",
+    *(f"docs/{n}.md" for n in ("choosing", "design", "gallery/README", "jkr_only", "paper", "theory")),
+]
 
 
 def maker_of(page):
@@ -31,14 +37,14 @@ def test_every_law_has_a_unit_on_its_page():
             assert inspect.isclass(thing) or api.units(thing), f"{name}.{law}: no unit in Returns or the first line"
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/design.md", "docs/paper.md"])
+@pytest.mark.parametrize("page", PAGES)
 def test_links_between_pages_lead_somewhere(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     for target in re.findall(r"\]\((?!https?:)([^)#]+)", text):
         assert (ROOT / page).parent.joinpath(target).exists(), target
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/design.md"])
+@pytest.mark.parametrize("page", PAGES)
 def test_names_of_code_in_the_pages_exist(page):
     text = (ROOT / page).read_text(encoding="utf-8")
     for name in set(re.findall(r"`(sim(?:\.\w+)+)(?:\([^`]*\))?`", text)):
@@ -52,3 +58,35 @@ def test_names_of_code_in_the_pages_exist(page):
             assert hasattr(found, part), name
             found = getattr(found, part)
         assert found is not None, name
+
+
+def test_the_page_for_newcomers_shows_what_its_code_gives():
+    assert doctest.testfile(str(ROOT / "docs" / "jkr_only.md"), module_relative=False).failed == 0
+
+
+GALLERY = maker_of("gallery")
+NUMBERS = GALLERY.kept()
+
+
+def test_every_scenario_has_its_question_in_the_gallery():
+    there = {path.stem for path in (ROOT / "scenarios").glob("*.toml")}
+    missing = there - {entry.scenario for entry in GALLERY.ENTRIES}
+    assert not missing, "give it an entry in docs/make_gallery.py, then make gallery"
+
+
+def test_the_gallery_shows_the_numbers_that_were_computed():
+    found = GALLERY.PAGE.read_text(encoding="utf-8")
+    assert found == GALLERY.text(NUMBERS), "run make gallery"
+    for entry in GALLERY.ENTRIES:  # and no number is typed
+        typed = re.sub(r"\{.*?\}|`.*?`|\]\(.*?\)|[χα] = [01]|theory of 2018", "", entry.answer)
+        assert not re.search(r"\d", typed), entry.name
+        assert 0 < (GALLERY.FOLDER / f"{entry.name}.png").stat().st_size < GALLERY.MOST_BYTES
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("entry", GALLERY.ENTRIES, ids=lambda entry: entry.name)
+def test_an_answer_of_the_gallery_is_found_again(entry):
+    found = entry.numbers(entry.run())
+    assert found.keys() == NUMBERS[entry.name].keys()
+    for name, number in found.items():
+        assert_allclose(number, NUMBERS[entry.name][name], rtol=1e-6, atol=1e-9, err_msg=name)

@@ -1,0 +1,488 @@
+"""Writes docs/gallery: each scenario's question with its figure, its answer and the commands that give both.
+
+``python docs/make_gallery.py`` runs all scenarios; with names, those alone. The numbers of the answers are kept in
+``gallery/numbers.json``, from which the page is made.
+"""
+
+import io
+import json
+import sys
+import textwrap
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from PIL import Image
+
+import sim
+from sim import analysis, laws
+from sim.analysis import concise, shares, statistics
+
+ROOT = Path(__file__).parent.parent
+FOLDER = Path(__file__).with_name("gallery")
+PAGE, NUMBERS = FOLDER / "README.md", FOLDER / "numbers.json"
+HEAD = """# Gallery
+
+Questions, each with a figure, an answer and the commands that give the figure. Made by `make gallery` from [the
+scenarios](../../scenarios), which say what they assume. Numbers are computed from the datasets; where members differ
+they are means over the members, with the standard error of the last digits in brackets.
+"""
+#: Pixels an inch and colours of a picture, the first with which it is small enough, and its bytes.
+FINENESS, MOST_BYTES = ((140, 64), (140, 32), (120, 24), (110, 16)), 60_000
+#: A number of an answer, or one with its standard error.
+Number = float | tuple[float, float]
+
+
+Reading = Callable[[xr.Dataset], dict[str, Number]]
+
+
+class Entry(NamedTuple):
+    """A question to a scenario: ``numbers`` reads them from its dataset, ``answer`` has a place for each.
+
+    ``changes`` are overrides of the scenario, ``kind`` is that of the figure and ``where`` the values of swept keys
+    that it shows; ``name`` is that of the picture.
+    """
+
+    name: str
+    scenario: str
+    question: str
+    answer: str
+    numbers: Reading
+    kind: str | None = None
+    changes: Mapping[str, Any] = MappingProxyType({})
+    where: Mapping[str, str] = MappingProxyType({})
+
+    @property
+    def commands(self) -> list[str]:
+        """What gives the figure at a terminal."""
+        options = "".join(f" --set '{key}={_toml(value)}'" for key, value in self.changes.items())
+        output = f" -o outputs/{self.name}.nc" if self.changes else ""
+        chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
+        dataset = self.name if self.changes else self.scenario
+        shown = " ".join(filter(None, ["sim plot", f"outputs/{dataset}.nc", self.kind]))
+        return [f"sim run scenarios/{self.scenario}.toml{options}{output}", f"{shown}{chosen}"]
+
+    def run(self) -> xr.Dataset:
+        """The dataset of the question."""
+        return sim.run(sim.load(ROOT / "scenarios" / f"{self.scenario}.toml", dict(self.changes)))
+
+    def draw(self, dataset: xr.Dataset) -> None:
+        """Make the picture, of few colours and as many pixels as its size allows."""
+        figure = sim.plot(dataset, self.kind, where=dict(self.where))
+        for dpi, colours in FINENESS:
+            drawn, small = io.BytesIO(), io.BytesIO()
+            figure.savefig(drawn, format="png", dpi=dpi)
+            Image.open(drawn).convert("RGB").quantize(colours, dither=Image.Dither.NONE).save(
+                small, "png", optimize=True
+            )
+            if small.tell() < MOST_BYTES:
+                break
+        (FOLDER / f"{self.name}.png").write_bytes(small.getvalue())
+
+    def text(self, numbers: dict[str, Any]) -> str:
+        """The part of the page with the question, its figure, its answer and the commands."""
+        commands = "\n".join(f"    {command}" for command in self.commands)
+        figure = f"![{self.question}]({self.name}.png)"
+        scenario = f"[`{self.scenario}`](../../scenarios/{self.scenario}.toml)"
+        answer = textwrap.fill(
+            f"{self.said(numbers)} ({scenario})", 120, break_long_words=False, break_on_hyphens=False
+        )
+        return f"## {self.question}\n\n{figure}\n\n{answer}\n\n{commands}\n"
+
+    def said(self, numbers: dict[str, Any]) -> str:
+        """The answer with its numbers."""
+        shown = {name: concise(*value) if isinstance(value, list | tuple) else value for name, value in numbers.items()}
+        return " ".join(self.answer.format(**shown).split())
+
+
+def _toml(value: Any) -> str:
+    """A value as an override on a command line has it."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f'"{key}" = {_toml(inner)}' for key, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    return f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def pair(found: xr.Dataset, variable: str, factor: float = 1.0, **at: float) -> Number:
+    """A mean of the statistics with its standard error where it has one, at the records nearest to some values."""
+    index = {name: nearest(found[name], value) for name, value in at.items()}
+    value, error = (factor * float(found[f"{variable}_{kind}"].isel(index).squeeze()) for kind in ("mean", "sem"))
+    return (value, error) if error > 0.0 else value
+
+
+def mean(variable: str, dataset: xr.Dataset, factor: float = 1.0, **at: float) -> Number:
+    """Mean over the members with its standard error."""
+    return pair(statistics(dataset), variable, factor, **at)
+
+
+def share(variable: str, dataset: xr.Dataset, **at: float) -> Number:
+    """Mean share of JKR's area with its standard error [%]."""
+    return pair(shares(dataset), variable, 100.0, **at)
+
+
+def modulus_of(dataset: xr.Dataset) -> float:
+    """Shear modulus of the half-space, the same at all points of the sweep [Pa]."""
+    return float(dataset["effective_shear_modulus"].max())
+
+
+def nearest(values: xr.DataArray, wanted: float) -> int:
+    """Place of the value that is nearest."""
+    return int(np.argmin(np.abs(values.to_numpy() - wanted)))
+
+
+def speeds(dataset: xr.Dataset) -> xr.DataArray:
+    """Prescribed speed over time, at the first point of the sweep [m/s]."""
+    course = analysis.speed_of(dataset)
+    return course.isel({name: 0 for name in course.dims if name != "t"})
+
+
+def at_speed(dataset: xr.Dataset, speed: float) -> tuple[float, float]:
+    """Time [s] and speed [m/s] of the record whose speed is nearest."""
+    course = speeds(dataset)
+    place = nearest(course, speed)
+    return float(dataset["t"][place]), float(course[place])
+
+
+#: All questions, in the order of the page.
+ENTRIES: list[Entry] = []
+
+
+def asks(scenario: str, question: str, answer: str, **how: Any) -> Callable[[Reading], Reading]:
+    """Add a question to the page; the function below it reads the numbers of its answer from the dataset."""
+
+    def add(reading: Reading) -> Reading:
+        ENTRIES.append(Entry(reading.__name__, scenario, question, answer, reading, **how))
+        return reading
+
+    return add
+
+
+@asks(
+    "uniform_stress",
+    "Does a uniform shear stress change the contact?",
+    """No. From {low:g} to {high:g} MPa the radius under {load:g} mN stays {radius:.2f} µm (it changes by
+    {change:g} %), while friction grows to {friction:.1f} mN: the drive pays for all that a uniform stress
+    stores. What follows is the paper's theorem, which `sim paper` checks line by line.""",
+)
+def uniform_stress(dataset: xr.Dataset) -> dict[str, Number]:
+    stress, load = 1e-6 * dataset["bonds_stress"], 1e3 * dataset["contact_load"]
+    radii = 1e6 * dataset["contact_radius"].isel(t=-1, contact_load=-2)
+    change = 100.0 * float(abs(radii / radii[0] - 1.0).max())
+    friction = 1e3 * dataset["friction_force"].isel(t=-1, contact_load=-2)
+    return {"low": float(stress[0]), "high": float(stress[-1]), "load": float(load[-2]), "radius": float(radii[-1]),
+            "change": change, "friction": float(friction[-1])}  # fmt: skip
+
+
+@asks(
+    "theories",
+    "Does it, by the other theories?",
+    """By most of them it shrinks. At {stress:g} kPa the area of the corrected theory is JKR's; where adhesion
+    pays a share α = {share:g} of the energy of the mean stress {some:.1f} % of it are left, where it pays for
+    all {all:.1f} %, which is Hertz's. Savkoor and Briggs, whose contact sticks, end at {ends:.1f} mN of
+    tangential force and jump to Hertz. The uncorrected theory of 2018 has friction enlarge the contact.""",
+    kind="theories",
+)
+def theories(dataset: xr.Dataset) -> dict[str, Number]:
+    place = nearest(dataset["bonds_stress"], 50e3)
+    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1, bonds_stress=place)
+    numbers = (float(dataset[name]) for name in ("contact_load", "adhesion_work", "sphere_radius"))
+    return {"stress": 1e-3 * float(dataset["bonds_stress"][place]), "share": float(dataset["contact_reversible"][1]),
+            "some": float(ratio[1]), "all": float(ratio[2]),
+            "ends": 1e3 * float(laws.theories.savkoor_briggs_limit(*numbers))}  # fmt: skip
+
+
+@asks(
+    "masking",
+    "How strong must a ripple of the stress be to mask adhesion?",
+    """An amplitude of {amplitude:.1f} kPa, at a wavelength of {wavelength:g} µm, a tenth of the contact's
+    width: there the energy that it stores equals the work of adhesion and the contact is Hertz's, {hertz:.1f} %
+    of JKR's area. Beyond, the area falls no further.""",
+)
+def masking(dataset: xr.Dataset) -> dict[str, Number]:
+    wavelength, work = float(dataset["shear_spectrum_wavelength"]), float(dataset["adhesion_work"])
+    unit = laws.halfspace.ripple_energy(1.0, 2 * np.pi / wavelength, 0.0, modulus_of(dataset))
+    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1)
+    return {"amplitude": 1e-3 * float(np.sqrt(work / unit)), "wavelength": 1e6 * wavelength, "hertz": float(ratio[-1])}
+
+
+@asks(
+    "masking",
+    "Does it matter which way the ripple runs?",
+    """It doubles the energy. A ripple of {amplitude:g} kPa along the sliding stores {along:.2f} mJ/m², the same
+    across it {across:.2f} mJ/m²: across it the half-space is half as stiff. The area left falls from {wide:.1f}
+    to {narrow:.1f} % of JKR's.""",
+    changes={"shear.spectrum.amplitude": "300 kPa",
+             "sweep": {"shear.spectrum.angle": {"from": "0 deg", "to": "90 deg", "count": 19}}},
+)  # fmt: skip
+def direction(dataset: xr.Dataset) -> dict[str, Number]:
+    energy = 1e3 * dataset["fluctuation_energy"].isel(t=-1)
+    ratio = 100.0 * statistics(dataset)["area_ratio_mean"].isel(t=-1)
+    return {"amplitude": 1e-3 * float(dataset["shear_spectrum_amplitude"]), "along": float(energy[0]),
+            "across": float(energy[-1]), "wide": float(ratio[0]), "narrow": float(ratio[-1])}  # fmt: skip
+
+
+@asks(
+    "pdms_lens",
+    "Does the contact of a PDMS lens shrink because its bonds break, or because its stress fluctuates?",
+    """Because of both, as assumed. Up to {slow:.2g} mm/s the area stays at {kept} % of JKR's. At {fast:.2g}
+    mm/s {left} % are left; broken bonds, charged first, took {bonds} %, the fluctuations {fluctuations} %. The
+    fluctuations set in where the scenario prescribes it; what a spring makes of that by itself is another
+    question.""",
+)
+def pdms_lens(dataset: xr.Dataset) -> dict[str, Number]:
+    (slow, slower), (fast, faster) = (at_speed(dataset, speed) for speed in (1e-3, 8e-3))
+    return {"slow": 1e3 * slower, "fast": 1e3 * faster, "kept": mean("area_ratio", dataset, 100.0, t=slow),
+            "left": mean("area_ratio", dataset, 100.0, t=fast), "bonds": share("lost_to_bonds", dataset, t=fast),
+            "fluctuations": share("lost_to_fluctuations", dataset, t=fast)}  # fmt: skip
+
+
+@asks(
+    "decomposition",
+    "Do the two mechanisms add up?",
+    """Not the areas. At {speed:.2g} mm/s broken bonds alone leave {bonds} % of the area, fluctuations alone
+    {fluctuations} %; the product of the two would be {product:.1f} %, and together they leave {both} %. What
+    adds up is the work of adhesion, of which the area is no straight function.""",
+)
+def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
+    then, speed = at_speed(dataset, 8e-3)
+    left = [
+        mean("area_ratio", dataset, 100.0, t=then, adhesion_bond_share=bonds, shear_paid_by_adhesion=paid)
+        for bonds, paid in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
+    ]
+    bonds, fluctuations = (float(np.max(one)) for one in left[:2])
+    return {"speed": 1e3 * speed, "bonds": left[0], "fluctuations": left[1],
+            "both": left[2], "product": 0.01 * bonds * fluctuations}  # fmt: skip
+
+
+@asks(
+    "soft_lens",
+    "How small a fluctuation masks the adhesion of a softer, larger contact?",
+    """With G = {modulus:g} MPa and a contact {width:.1f} mm wide an rms of {rms:g} kPa masks it {masked} % of
+    the time: it stores {energy} mJ/m² where the bonds at this speed hold {work:.1f} mJ/m².""",
+)
+def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
+    rms = 30e3
+    found = analysis.summary(analysis.settled(analysis.observables(dataset))).sel(shear_spectrum_rms=rms)
+    work = analysis.bond_work(dataset).isel(t=-1)
+    return {"modulus": 1e-6 * modulus_of(dataset),
+            "width": 2e3 * float(dataset["radius_at_rest"].max()), "rms": 1e-3 * rms,
+            "masked": pair(found, "fraction_masked", 100.0), "energy": pair(found, "fluctuation_energy", 1e3),
+            "work": 1e3 * float(work.max())}  # fmt: skip
+
+
+@asks(
+    "ten_wavelengths",
+    "How wide is the area's distribution when the contact holds ten wavelengths?",
+    """Its standard deviation is {ten} % of the mean area, nine contacts in ten lie between {low:.1f} and
+    {high:.1f} % of JKR's area. With three wavelengths it is {three} %, with thirty {thirty} %: the energy is a
+    sum over the waves in the contact, so that its spread falls about as one over their number along a side.""",
+)
+def ten_wavelengths(dataset: xr.Dataset) -> dict[str, Number]:
+    area, ratio = (dataset["contact_area"].isel(t=-1), statistics(dataset)["area_ratio_quantile"].isel(t=-1))
+    count = dataset.sizes["member"]
+    spread = 100.0 * (area.std("member", ddof=1) / area.mean("member")).to_numpy()
+    three, ten, thirty = ((float(one), float(one) / np.sqrt(2.0 * (count - 1))) for one in spread)
+    low, high = (100.0 * float(ratio.isel(shear_spectrum_longest=1).sel(quantile=level)) for level in (0.05, 0.95))
+    return {"three": three, "ten": ten, "thirty": thirty, "low": low, "high": high}
+
+
+@asks(
+    "soft_lens",
+    "What does a fluctuating shear stress look like?",
+    """A map of it, and of the displacement that it makes, around the contact (circle). Waves across the sliding
+    move the surface twice as far as those along it, so that the displacement is streaky along x. This
+    realisation has an rms of {rms:.1f} kPa and stores {energy:.1f} mJ/m²; the displacement has an rms of
+    {moved:.2f} µm.""",
+    kind="map",
+    changes={
+        "sweep": {},
+        "ensemble.members": 1,
+        "shear.model": "mapped",
+        "record.maps": ["2 s"],
+        "clock.step": "0.1 s",
+    },
+)
+def stress_map(dataset: xr.Dataset) -> dict[str, Number]:
+    stress = dataset["shear_map"].squeeze(drop=True)
+    cell = float(dataset["x"][1] - dataset["x"][0]) * dataset.sizes["x"]
+    modulus = modulus_of(dataset)
+    moved = laws.halfspace.displacement(stress.to_numpy(), cell, modulus)
+    return {"rms": 1e-3 * float(stress.std()), "moved": 1e6 * float(np.std(moved)),
+            "energy": 1e3 * float(laws.halfspace.surface_energy(stress.to_numpy(), cell, modulus))}  # fmt: skip
+
+
+@asks(
+    "uniform_stress",
+    "What is the shape of a sliding contact?",
+    """Adhesion pulls at the edge, the sphere presses in the middle; sliding at {stress:g} MPa shifts the
+    surface by {shift:.1f} µm in the middle, along the sliding, which is {part:.0f} % of the contact's radius.
+    Normal and tangential fields do not feel each other in an incompressible half-space.""",
+    kind="profile",
+    where={"bonds.stress": "0.3 MPa", "contact.load": "4 mN"},
+)
+def profile(dataset: xr.Dataset) -> dict[str, Number]:
+    chosen = dataset.sel(bonds_stress=0.3e6, contact_load=4e-3).isel(t=-1)
+    radius, stress = float(chosen["contact_radius"]), float(chosen["shear_stress"])
+    shift = float(laws.halfspace.disc_displacement(0.0, 0.0, radius, stress, modulus_of(dataset)))
+    return {"stress": 1e-6 * stress, "shift": 1e6 * shift, "part": 100.0 * shift / radius}
+
+
+@asks(
+    "friction_maximum",
+    "Why does the friction of rubber first rise and then fall with speed?",
+    """A bond that is pulled faster carries more before it breaks, until too few sites hold one. Bell's bonds
+    have a maximum of {stress:.1f} kPa at {speed:.2f} mm/s, where {bound:.0f} % of the bonds of rest are left;
+    the area has lost {lost:.1f} % there.""",
+)
+def friction_maximum(dataset: xr.Dataset) -> dict[str, Number]:
+    top = int(dataset["shear_stress"].argmax("t"))
+    left = float(statistics(dataset)["area_ratio_mean"][top])
+    return {"stress": 1e-3 * float(dataset["peak_stress"]), "speed": 1e3 * float(dataset["speed"][top]),
+            "bound": 100.0 * float(dataset["bond_fraction"][top]), "lost": 100.0 - 100.0 * left}  # fmt: skip
+
+
+@asks(
+    "static_peak",
+    "How does the peak of static friction grow with the time at rest and the speed of the start?",
+    """With the logarithm of the speed: after {rest:g} s it is {slow:.0f} kPa at {slower:g} µm/s and {fast:.0f}
+    kPa at {faster:g} µm/s. With the time at rest it grows to an end: after {short:g} s it has {share:.0f} % of
+    that height. One rebinding rate makes no logarithm of time.""",
+)
+def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
+    peak, rest, speed = (dataset[name] for name in ("peak_stress", "drive_rest", "drive_speed"))
+    longest, shortest = 1e-3 * peak.isel(drive_rest=-1), 1e-3 * peak.isel(drive_rest=0)
+    return {"rest": float(rest[-1]), "short": float(rest[0]), "slower": 1e6 * float(speed[0]),
+            "faster": 1e6 * float(speed[-1]), "slow": float(longest[0]), "fast": float(longest[-1]),
+            "share": 100.0 * float(shortest[-1] / longest[-1])}  # fmt: skip
+
+
+@asks(
+    "bond_noise",
+    "Do the bonds themselves make fluctuations that matter?",
+    """Hardly. They store at most {energy:.2f} mJ/m², {part:.2f} % of the work of adhesion, at a speed where
+    broken bonds cost {bonds:.0f} % of it. Whether adhesion pays for that energy (χ = 1) or friction has done so
+    already (χ = 0) moves the area by {moved:.2f} % at most.""",
+)
+def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
+    energy = dataset["fluctuation_energy"].max("shear_paid_by_adhesion")
+    work, top = float(dataset["adhesion_work"]), int(energy.argmax("t"))
+    area = dataset["contact_area"]
+    moved = 1.0 - area.isel(shear_paid_by_adhesion=1) / area.isel(shear_paid_by_adhesion=0)
+    fraction = dataset["bond_fraction"].isel(t=top).min()
+    return {"energy": 1e3 * float(energy[top]), "part": 100.0 * float(energy[top]) / work,
+            "bonds": 100.0 - 100.0 * float(fraction), "moved": 100.0 * float(moved.max())}  # fmt: skip
+
+
+@asks(
+    "fixed_grips",
+    "What if the sphere is held at a depth instead of under a load?",
+    """It holds on further. At an indentation of {deep:g} µm the contact keeps {kept} % of its JKR area at
+    {speed:.0f} mm/s; held above the surface at {high:g} µm, where no load could hold it, it comes off on the
+    way: {open} % of the members, on average at {off} ms, at a speed of {at:.1f} mm/s.""",
+)
+def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
+    depth, found = dataset["contact_indentation"], statistics(dataset)
+    high, deep = found.isel(contact_indentation=0), found.isel(contact_indentation=-1, t=-1)
+    off = pair(high, "first_detachment", 1e3)
+    then = 1e-3 * (off[0] if isinstance(off, tuple) else off)
+    return {"deep": 1e6 * float(depth[-1]), "high": 1e6 * float(depth[0]), "kept": pair(deep, "area_ratio", 100.0),
+            "speed": 1e3 * float(speeds(dataset)[-1]), "open": pair(high, "ever_detached", 100.0), "off": off,
+            "at": 1e3 * float(speeds(dataset).sel(t=then, method="nearest"))}  # fmt: skip
+
+
+@asks(
+    "pull_off",
+    "Where does a sphere pull off a soft spring and a stiff one?",
+    """At the same load behind all of them, {pull:.3f} mN at the most, as JKR has it; but a cycle loses
+    {soft:.2f} nJ behind {softest:g} N/m and {stiff:.2f} nJ behind {stiffest:g} N/m: the sphere jumps off the
+    soft spring far out, from the stiff one nearly at the surface. Nothing in the material is lost.""",
+)
+def pull_off(dataset: xr.Dataset) -> dict[str, Number]:
+    lost = 1e9 * analysis.loop_energy(dataset)["loop_dissipation"].mean("cycle")
+    stiffness = dataset["contact_stiffness"]
+    return {"pull": -1e3 * float(dataset["pull_off_load"].min()), "soft": float(lost[0]), "stiff": float(lost[-1]),
+            "softest": float(stiffness[0]), "stiffest": float(stiffness[-1])}  # fmt: skip
+
+
+@asks(
+    "peeling",
+    "How much harder does a sphere hold when its edge cannot follow?",
+    """Pulled off with an edge that runs at {fast:g} mm/s at twice the work of adhesion it bears {quick:.2f} mN,
+    with one at {slow:g} µm/s {slack:.2f} mN, {times:.0f} times what JKR's contact bears. A cycle then loses
+    {lost:.1f} nJ.""",
+)
+def peeling(dataset: xr.Dataset) -> dict[str, Number]:
+    pull, speed = -1e3 * dataset["pull_off_load"], dataset["contact_front_speed"]
+    work, size = float(dataset["adhesion_work"]), float(dataset["sphere_radius"])
+    lost = 1e9 * analysis.loop_energy(dataset)["loop_dissipation"].mean("cycle")
+    return {"fast": 1e3 * float(speed[-1]), "slow": 1e6 * float(speed[0]), "quick": float(pull[-1]),
+            "slack": float(pull[0]), "lost": float(lost[0]),
+            "times": float(pull[0]) / (-1e3 * float(laws.jkr.pull_off_load(work, size)))}  # fmt: skip
+
+
+@asks(
+    "jkr_test",
+    "What work of adhesion does a JKR test read off a contact whose edge lags?",
+    """Two, and neither is right. Under {load:g} mN the radius on loading gives {loading:.1f} mJ/m², that on
+    unloading {unloading:.1f} mJ/m², where {work:g} mJ/m² are true, if the edge runs at {speed:g} µm/s; if at
+    {faster:g} µm/s they are {closer:.1f} and {nearer:.1f} mJ/m². The loads over time are a made-up record,
+    [jkr_test.csv](../../scenarios/jkr_test.csv).""",
+)
+def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
+    size, modulus = float(dataset["sphere_radius"]), float(dataset["contact_modulus"].max())
+    load, top = dataset["normal_load"].isel(contact_front_speed=0), int(dataset["normal_load"].argmax("t")[0])
+    held = np.flatnonzero(np.isclose(load, 1e-3, rtol=1e-9))  # up to the ends of the two stays at this load
+    ends = [int(held[held < top][-1]), int(held[-1])]
+    radius = dataset["contact_radius"].isel(t=ends).transpose("contact_front_speed", "t").to_numpy()
+    read = 1e3 * laws.jkr.energy_release_rate(radius, 1e-3, size, modulus)
+    speed = 1e6 * dataset["contact_front_speed"]
+    return {"load": 1.0, "loading": read[0, 0], "unloading": read[0, 1], "closer": read[-1, 0],
+            "nearer": read[-1, 1], "work": 1e3 * float(dataset["adhesion_work"]), "speed": float(speed[0]),
+            "faster": float(speed[-1])}  # fmt: skip
+
+
+@asks(
+    "afm_tip",
+    "Is the friction of an AFM tip a measure of its contact area?",
+    """In the model yes: friction is {stress:g} GPa times JKR's area, also in tension, down to the pull-off at
+    {off:.0f} nN, where {friction:.0f} nN of it are left. Without load it is {zero:.0f} nN.""",
+)
+def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
+    last, load = dataset.isel(t=-1), dataset["contact_load"]
+    force = 1e9 * last["friction_force"].where(last["in_contact"] == 1, drop=True)
+    zero = 1e9 * last["friction_force"][nearest(load, 0.0)]
+    return {"stress": 1e-9 * float(last["shear_stress"].max()), "off": 1e9 * float(dataset["jkr_pull_off_load"].max()),
+            "friction": float(force[0]), "zero": float(zero)}  # fmt: skip
+
+
+def text(numbers: dict[str, dict[str, Any]]) -> str:
+    """The page."""
+    return "\n".join([HEAD, *(entry.text(numbers[entry.name]) for entry in ENTRIES)])
+
+
+def kept() -> dict[str, dict[str, Any]]:
+    """The numbers of all answers as they were last computed."""
+    return json.loads(NUMBERS.read_text(encoding="utf-8")) if NUMBERS.exists() else {}
+
+
+def main(names: list[str]) -> None:
+    """Run, draw and answer questions, all or some, and write the page."""
+    numbers = kept()
+    for entry in ENTRIES:
+        if not names or entry.name in names:
+            dataset = entry.run()
+            numbers[entry.name] = entry.numbers(dataset)
+            entry.draw(dataset)
+            sys.stdout.write(f"{entry.name}: {entry.said(numbers[entry.name])}\n")
+    ordered = {entry.name: numbers[entry.name] for entry in ENTRIES}
+    NUMBERS.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(text(ordered), encoding="utf-8")
+    sys.stdout.write(f"{PAGE}\n")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
