@@ -185,7 +185,7 @@ def scaled_angle_at_indentation(indentation, work, tangential_force, mixity, sph
 
 
 def shear_share_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load and a tangential force by ``G + lambda G_s = w``; otherwise as ``scaled_angle_at_load``.
+    """Contact radius at a load and a tangential force by ``G + lambda G_s = w`` [m], as ``scaled_angle_at_load``.
 
     Notes
     -----
@@ -201,7 +201,7 @@ def shear_share_at_indentation(indentation, work, tangential_force, mixity, sphe
 
 
 def scaled_tangent_at_load(load, work, tangential_force, mixity, sphere_radius, modulus, poisson_ratio=0.5):
-    """Contact radius at a load and a tangential force by ``f = 1 + (1 - lambda) tan^2 psi``.
+    """Contact radius at a load and a tangential force by ``f = 1 + (1 - lambda) tan^2 psi`` [m].
 
     Otherwise as ``scaled_angle_at_load``. However large the force, a share 1 - lambda of adhesion is left: the
     radius tends to JKR's at ``(1 - lambda) w`` and never to Hertz's, and only a contact that is pulled harder
