@@ -24,6 +24,7 @@ MODULES = (
     "sim.spectrum",
     "sim.analysis",
     "sim.plots",
+    "sim.report",
 )
 _RETURNS = re.compile(r"^(?:Returns|Yields)\n-+\n(.*?)(?=^\S[^\n]*\n-{3,}|\Z)", re.S | re.M)
 _UNIT = re.compile(r"\[((?:1/)?[A-Za-zµ1][\w µ^/²³().½-]*)\]")

@@ -37,7 +37,7 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
 
 Path = str | os.PathLike[str]
 _FROM = {"BadInput": "sim.units.refusals", "Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
-_FOLDERS = ("analysis", "laws", "plots", "spectrum")
+_FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
 __all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "open", "plot", "run", "stats"])
 
 

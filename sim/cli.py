@@ -267,6 +267,19 @@ def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str
         say(str(plots.drawn(dataset, kind, output, picture, force)))
 
 
+@cli.command()
+@click.argument("output", type=_PATH)
+@click.option("-o", "--page", type=_PATH, help="The page; default beside the dataset.")
+@_WHERE
+@_FORCE
+def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool) -> None:
+    """One page of a run as HTML: question, answer, figures, tables, errors, cost, and how to repeat it."""
+    from sim.report import written
+
+    with _opened(output, chosen) as dataset:
+        say(str(written(dataset, output, page, force)))
+
+
 @contextlib.contextmanager
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """A dataset of ours, at chosen values of its sweep, or one message."""

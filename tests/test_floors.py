@@ -18,9 +18,10 @@ BESIDE |= {f"helpers.{path.stem}": path for path in sorted((ROOT.parent / "tests
 
 #: The folders and the two modules beside them, lowest first.
 FLOORS = ("units", "numerics", "laws", "spectrum", "parts", "scenario", "engine", "ensemble")
-FLOORS += ("analysis", "plots", "study", "cli", "__main__")
+FLOORS += ("analysis", "plots", "report", "study", "cli", "__main__")
 #: What a floor must not read although it stands below.
 FORBIDDEN = {"analysis": {"parts", "scenario", "engine", "ensemble"}, "plots": {"engine", "ensemble"}}
+FORBIDDEN |= {"report": {"ensemble"}}
 
 
 def module_name(path):

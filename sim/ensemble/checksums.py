@@ -7,7 +7,6 @@ SHA-256 of the lines before. Both files are read as bytes: HDF5 itself may crash
 
 import hashlib
 import itertools
-import json
 import re
 import shlex
 from collections.abc import Iterator
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from sim.numerics.files import explained, read_whole
+from sim.scenario.toml_text import toml
 from sim.units.refusals import BadInput
 
 #: Manifest of the parts of a run that is not done.
@@ -58,17 +58,9 @@ def _command(source: dict[str, Any]) -> str:
     """The command that runs a scenario of this source, without its output; "" if no file and overrides describe it."""
     if not source.get("text"):
         return ""
-    changes = (f"{key}={_toml(value)}" for key, value in source["overrides"].items())
+    changes = (f"{key}={toml(value)}" for key, value in source["overrides"].items())
     words = ["sim", "run", source["path"], *(word for change in changes for word in ("--set", change))]
     return "".join(sign if sign.isprintable() else "?" for sign in shlex.join(words))[:_MOST_TEXT]
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, dict):
-        return f"{{{', '.join(f'{json.dumps(key)} = {_toml(inner)}' for key, inner in value.items())}}}"
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else str(value)
 
 
 def content(dataset: Path, source: dict[str, Any], run: dict[str, Any]) -> bytes:

@@ -1,6 +1,7 @@
 """From a TOML file to its document, and overrides on top of it."""
 
 import errno
+import json
 import os
 import re
 import stat
@@ -72,6 +73,19 @@ def parse(text: str, file: str) -> dict[str, Any]:
     if not document:
         raise _refusal(f"{file}: is empty; `sim new` writes a starter scenario")
     return document
+
+
+def toml(value: Any) -> str:
+    """A value as TOML has it.
+
+    >>> print(toml({"model": "steady", "speeds": [1e-3, True]}))
+    {"model" = "steady", "speeds" = [0.001, true]}
+    """
+    if isinstance(value, dict):
+        return f"{{{', '.join(f'{json.dumps(key)} = {toml(inner)}' for key, inner in value.items())}}}"
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(toml, value))}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else str(value)
 
 
 def _refusal(problem: str) -> BadInput:

@@ -1,0 +1,218 @@
+"""The answer of a run in a sentence, by the kind of its scene: numbers of ``sim stats`` with their standard errors."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+
+from sim.analysis import concise, engineering, events, is_stationary, is_steady, settled, summary, sweep_dims
+from sim.analysis.observables import all_observables
+from sim.analysis.scene import answered, speed_name
+from sim.plots import kinds
+from sim.plots.curves import speed_dim
+from sim.units.notation import scaled
+
+#: The space between a number and its unit, where no line breaks.
+TIE = "\u00a0"
+#: Two means are the same within this many standard errors of their difference, or this part of them.
+_ERRORS, _ROUNDING = 3.0, 1e-9
+#: Mechanisms that take area, in the order in which they are charged.
+_TAKEN = {
+    "lost_to_bonds": "broken bonds take", "lost_to_fluctuations": "fluctuations",
+    "lost_to_mean_stress": "the mean stress", "lost_to_lag": "the edge's lag",
+}  # fmt: skip
+
+
+class Mean(NamedTuple):
+    """A mean with its standard error [SI unit], nan where that is not known."""
+
+    value: float
+    error: float
+    unit: str
+
+    def __str__(self) -> str:
+        return self.beside(self)
+
+    def beside(self, other: "Mean") -> str:
+        """The number with its error, in the unit that suits another one."""
+        if self.unit == "1":
+            return f"{concise(100.0 * self.value, 100.0 * self.error)}{TIE}%"
+        factor, shown = scaled(other.value, self.unit)
+        return f"{concise(factor * self.value, factor * self.error)}{TIE}{shown}".replace("-", "−")
+
+    def equals(self, other: "Mean") -> bool:
+        """Whether the two are the same within their errors."""
+        apart = abs(self.value - other.value)
+        errors = np.nan_to_num([self.error, other.error])
+        return bool(apart <= max(_ERRORS * float(np.hypot(*errors)), _ROUNDING * abs(self.value)))
+
+
+class Found(NamedTuple):
+    """Statistics at one place: a point of the sweep, at one time or of a whole run, in words."""
+
+    statistics: xr.Dataset
+    words: str
+
+    def mean(self, name: str) -> Mean | None:
+        """The mean of an observable there; None where it is not known."""
+        if f"{name}_mean" not in self.statistics:
+            return None
+        mean, error = (self.statistics.get(f"{name}_{kind}", xr.DataArray(np.nan)) for kind in ("mean", "sem"))
+        value = float(mean)
+        return Mean(value, float(error), mean.attrs.get("units", "1")) if np.isfinite(value) else None
+
+
+def answers(dataset: xr.Dataset) -> list[str]:
+    """Sentences with numbers that answer the question of a scene; none where no kind of scene fits.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+
+    Returns
+    -------
+    list of str
+        A number in brackets is the standard error in the last digits; a number without has none.
+    """
+    kind = kinds.default(dataset)
+    said: list[str] = []
+    for answer in _ANSWERS.get(kind, ()):
+        with contextlib.suppress(ValueError, KeyError), answered():
+            said += answer(dataset)
+    return said
+
+
+def _places(dataset: xr.Dataset, found: xr.Dataset) -> list[Found]:
+    """Each point of the sweep, with the swept values in words."""
+    several = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
+    shape = [dataset.sizes[name] for name in sweep_dims(dataset)]
+    places = []
+    for at in np.ndindex(*shape):
+        point = dict(zip(sweep_dims(dataset), at, strict=True))
+        words = ", ".join(_swept(dataset[name][point[name]]) for name in several)
+        places.append(Found(found.isel(point, missing_dims="ignore"), words))
+    return places
+
+
+def _swept(value: xr.DataArray) -> str:
+    """A swept value with its name: ``normal load 4 mN``."""
+    if value.dtype.kind not in "fi":
+        return f"{str(value.name).replace('_', ' ')} {value.item()}"
+    name = value.attrs.get("long_name", str(value.name).replace("_", " ")).partition(",")[0]
+    number = engineering(value.item(), value.attrs.get("units", "1"))
+    return f"{name} {number.replace('-', '−').replace(' ', TIE)}"
+
+
+def _at_the_end(dataset: xr.Dataset) -> xr.Dataset:
+    """Statistics over the members at the last record; of steady runs those of the means over the second half."""
+    if is_stationary(dataset):
+        return summary(settled(all_observables(dataset)), quantiles=False).isel(t=-1)
+    return summary(all_observables(dataset.isel(t=[-1])), quantiles=False).isel(t=-1)
+
+
+def _range(places: list[Found], name: str) -> tuple[Found, Mean, Found, Mean] | None:
+    """Where an observable is least and where it is largest; None where it is known nowhere."""
+    known = [(place, mean) for place in places if (mean := place.mean(name)) is not None]
+    if not known:
+        return None
+    low, high = (pick(known, key=lambda one: one[1].value) for pick in (min, max))
+    return *low, *high
+
+
+def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
+    """A sentence on an observable over the sweep: what it is, or its least and largest values and where they are."""
+    if (found := _range(places, name)) is None:
+        return
+    low, least, high, most = found
+    if len(places) == 1 or least.equals(most):
+        yield f"{what} is {most}{' everywhere in the sweep' if len(places) > 1 else ''}."
+    else:
+        yield f"{what} goes from {least.beside(most)} ({low.words}) to {most} ({high.words})."
+
+
+def _area_over_speed(dataset: xr.Dataset) -> Iterator[str]:
+    """What the area loses from the lowest to the highest speed, and to which mechanism."""
+    if is_steady(dataset):
+        axis, found = str(speed_dim(dataset)), _at_the_end(dataset)
+        dataset = dataset.isel({axis: [0]})
+    else:
+        axis, found = "t", summary(all_observables(dataset.isel(t=[0, -1])), quantiles=False)
+    speed = speed_name(dataset)
+    sizes = abs(found[f"{speed}_mean"]).max([name for name in found[f"{speed}_mean"].dims if name != axis])
+    ends = int(np.argmin(sizes.to_numpy())), int(np.argmax(sizes.to_numpy()))
+    slow, fast = (_places(dataset, found.isel({axis: end})) for end in ends)
+    for before, after in zip(slow, fast, strict=True):
+        area, left = before.mean("area_ratio"), after.mean("area_ratio")
+        speeds = [place.mean(speed) for place in (before, after)]
+        if area is None or left is None or None in speeds:
+            continue
+        at = f"{after.words}: " if after.words else ""
+        way = f"from {speeds[0]} to {speeds[1]}"
+        if area.equals(left):
+            yield f"{at}The contact area does not change {way}: it is {left} of JKR's."
+            continue
+        verb = "falls" if left.value < area.value else "grows"
+        yield f"{at}The contact area {verb} from {area} to {left} of JKR's, {way}{_taken(after)}."
+
+
+def _taken(place: Found) -> str:
+    """What each mechanism takes of JKR's area at a place, in words."""
+    shares = {words: place.mean(name) for name, words in _TAKEN.items()}
+    taken = [f"{words} {mean}" for words, mean in shares.items() if mean is not None and abs(mean.value) > _ROUNDING]
+    if not taken:
+        return ""
+    listed = " and ".join([", ".join(taken[:-1]), taken[-1]] if len(taken) > 1 else taken)
+    return f"; there {listed} of JKR's area{', charged in this order' if len(taken) > 1 else ''}"
+
+
+def _area_over_sweep(dataset: xr.Dataset) -> Iterator[str]:
+    """The range of the area over a sweep or of a single run, over JKR's."""
+    when = "" if is_stationary(dataset) else " at the end of the run"
+    places = _places(dataset, _at_the_end(dataset))
+    yield from _ranged(places, "area_ratio", f"The contact area over JKR's{when}")
+    if len(places) == 1 and (taken := _taken(places[0])):
+        yield f"{taken.removeprefix('; ').capitalize()}."
+
+
+def _of_the_run(*asked: tuple[str, str]) -> Callable[[xr.Dataset], Iterator[str]]:
+    """Sentences on what a whole run has once: names of events, and what each is in words."""
+
+    def answer(dataset: xr.Dataset) -> Iterator[str]:
+        places = _places(dataset, summary(events(dataset), quantiles=False))
+        for name, words in asked:
+            yield from _ranged(places, name, words)
+
+    return answer
+
+
+def _friction(dataset: xr.Dataset) -> Iterator[str]:
+    """The largest friction in both directions, of the means over the members."""
+    found = summary(all_observables(dataset), quantiles=False)
+    mean = found["friction_force_mean"]
+    for end, words in ((mean.argmax("t"), "one"), (mean.argmin("t"), "the other")):
+        yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", f"Friction in {words} direction")
+
+
+#: What answers the question of a scene, by the kind of figure that fits it.
+_ANSWERS: dict[str, tuple[Callable[[xr.Dataset], Iterator[str]], ...]] = {
+    "loop": (
+        _of_the_run(
+            ("loop_dissipation", "The energy dissipated in a cycle there and back"),
+            ("pull_off_load", "The load at which the contact comes off"),
+        ),
+    ),
+    "theories": (_area_over_sweep,),
+    "stress": (
+        _of_the_run(
+            ("peak_stress", "The largest shear stress after the start"),
+            ("peak_time", "The time from the start to that peak"),
+        ),
+    ),
+    "friction": (_friction,),
+    "curve": (_area_over_speed, _of_the_run(("peak_stress", "The maximum of the shear stress on the ramp"))),
+    "sweep": (_area_over_sweep,),
+    "time": (_area_over_sweep,),
+}

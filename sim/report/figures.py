@@ -1,0 +1,171 @@
+"""Figures as SVG within a page: without names that clash, in the page's colours, with values that show on hover."""
+
+import io
+import itertools
+import re
+from collections.abc import Iterator
+from typing import NamedTuple
+from xml.etree import ElementTree as Tree
+
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from sim.plots import kinds
+from sim.units.terminal import one_line
+
+#: What to look at in a figure of each kind.
+SEE = {
+    "loop": "Going out and coming back are two curves: the area between them is energy lost in jumps, a cross where the"
+    " contact comes off, a ring where it jumps in. Dashed is JKR's contact at the full work of adhesion.",
+    "theories": "The simulated areas lie on the curve of the theory whose balance they have; where curves part, a"
+    " measured area can tell between them.",
+    "stress": "A ring marks the largest stress, and the legend says how large it is and at which speed; thin lines are"
+    " closed forms to hold the simulation to.",
+    "stability": "Dark is where the slider sticks and slips, white where it slides steadily. Below the line steady"
+    " sliding is unstable in theory; dark beyond it on the way back is hysteresis.",
+    "creep": "A straight line of slope one is sliding at a constant speed; what bends up runs away.",
+    "friction": "Above, friction over time; below, over the slider's position, where the area of the loop is the work"
+    " that friction takes.",
+    "curve": "From JKR's line at 1 down: blue is what broken bonds take of the area, vermilion what fluctuations take,"
+    " black what is left. Where black meets the dotted line of Hertz, adhesion is masked.",
+    "sweep": "Each point is a run of its own. The contact lies between JKR's radius, with all adhesion, and Hertz's,"
+    " with none.",
+    "time": "The contact between JKR's radius, with all adhesion, and Hertz's, with none, and below what moves it.",
+    "phase": "A closed orbit is stick-slip: the force grows while the slider rests, and falls while it is faster than"
+    " the stage.",
+    "incipient": "On the way to sliding the area falls with the square of the force at first; where it leaves the"
+    " dashed law, slip has begun.",
+    "map": "The shear stress fluctuates about its mean; the circle is the edge of the contact.",
+    "spectrum": "The spectrum of the maps beside the one that the scenario asks for.",
+    "profile": "The gap beyond the contact's edge: the neck is what adhesion pulls up.",
+}
+#: Kinds that are drawn wherever they can be, beside those that fit.
+_ALSO = ("stress", "phase", "incipient", "map", "spectrum")
+#: Points of a curve that show their values, and of a figure.
+_POINTS, _MOST = 40, 800
+#: Inks of figures that follow the page from light to dark.
+_INKS = {"#000000": "currentColor", "#ffffff": "var(--paper)"}
+#: Letters of mathematics in plain text.
+_LETTERS = {
+    "alpha": "α", "beta": "β", "gamma": "γ", "Gamma": "Γ", "delta": "δ", "Delta": "Δ", "theta": "θ", "lambda": "λ",
+    "nu": "ν", "xi": "ξ", "pi": "π", "sigma": "σ", "tau": "τ", "chi": "χ", "psi": "ψ", "oint": "∮", "langle": "⟨",
+    "rangle": "⟩", "times": "×", "pm": "±", "infty": "∞",
+}  # fmt: skip
+_NUMBER = re.compile(r"\d+\.\d{3,}")
+_REFERENCE = re.compile(r"url\(#([^)]+)\)")
+
+
+class Drawing(NamedTuple):
+    """A figure of a page: its kind, what it shows and what to see in it, and its SVG; without one what it lacks."""
+
+    kind: str
+    shows: str
+    see: str
+    svg: str = ""
+    lacks: str = ""
+
+
+def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
+    """The figures of a dataset: the one that fits it best, then others that show more of it."""
+    best = kinds.default(dataset)
+    others = [kind for kind in kinds.drawable(dataset) if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
+    for number, kind in enumerate(dict.fromkeys([best, *others])):
+        found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
+        try:
+            yield found._replace(svg=svg_of(kinds.draw(dataset, kind), f"f{number}-"))
+        except ValueError as fault:  # such as more curves than can be told apart
+            yield found._replace(lacks=str(fault))
+
+
+def svg_of(figure: Figure, prefix: str) -> str:
+    """A figure as an SVG element for a page of HTML.
+
+    ``prefix`` begins all its ids. It has neither script nor namespaces, nor any address outside of itself; black and
+    white are the page's ink and paper, and points of curves carry their values as a ``<title>``.
+    """
+    content = io.BytesIO()
+    figure.savefig(content, format="svg", transparent=True)
+    root = Tree.fromstring(content.getvalue())
+    for parent in list(root.iter()):
+        for child in [child for child in parent if child.tag.endswith(("}metadata", "}style"))]:
+            parent.remove(child)
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+        element.text = element.tail = None
+        for key, value in list(element.attrib.items()):
+            del element.attrib[key]
+            name = key.rpartition("}")[2]
+            if name == "id":
+                value = prefix + value
+            elif name == "href" and value.startswith("#"):
+                value = f"#{prefix}{value[1:]}"
+            elif name in ("d", "x", "y"):
+                value = _NUMBER.sub(lambda found: f"{float(found[0]):.2f}", " ".join(value.split()))
+            elif name in ("style", "clip-path"):
+                value = _REFERENCE.sub(rf"url(#{prefix}\1)", value)
+                for ink, own in _INKS.items():
+                    value = value.replace(ink, own)
+            element.set(name, value)
+    width, height = (72.0 * inches for inches in figure.get_size_inches())
+    root.attrib = {"viewBox": f"0 0 {width:g} {height:g}", "role": "img", "fill": "currentColor"}
+    root.set("style", f"min-width: {0.9 * width:.0f}px; max-width: {1.9 * width:.0f}px")
+    points = Tree.SubElement(root, "g", {"class": "values"})
+    for x, y, words in itertools.islice(_values(figure), _MOST):
+        point = Tree.SubElement(points, "circle", {"cx": f"{x:.1f}", "cy": f"{height - y:.1f}", "r": "3"})
+        Tree.SubElement(point, "title").text = words
+    return Tree.tostring(root, encoding="unicode")
+
+
+def _values(figure: Figure) -> Iterator[tuple[float, float, str]]:
+    """Places [pt from the lower left corner] of points of the curves, and their values in words."""
+    panels = [panel for panel in figure.axes if panel.get_xlabel() or panel.lines]
+    names = {_look(line): line.get_label() for panel in panels for line in panel.lines if _is_named(line)}
+    for panel in panels:
+        below = [other.get_xlabel() for other in panel.get_shared_x_axes().get_siblings(panel)]
+        axis = panel.get_xlabel() or next(filter(None, below), "")
+        for line in panel.lines:
+            if line.get_transform() != panel.transData or not line.get_visible():
+                continue  # a level across the whole panel
+            words = plain_text(str(names.get(_look(line), "")))
+            yield from _points(panel, line, figure.dpi, f"{words}: " if words else "", axis)
+
+
+def _points(panel: Axes, line: Line2D, dpi: float, name: str, axis: str) -> Iterator[tuple[float, float, str]]:
+    """Points of one curve within its panel."""
+    data = np.column_stack([np.asarray(values, float) for values in line.get_data()])
+    data = data[np.all(np.isfinite(data), axis=1)]
+    data = data[np.unique(np.linspace(0, len(data) - 1, _POINTS).round().astype(int))] if len(data) else data
+    for place, (x, y) in zip(panel.transData.transform(data) if len(data) else (), data, strict=True):
+        if panel.bbox.padded(1.0).contains(*place):
+            yield *(72.0 / dpi * place), f"{name}{_number(axis, x)}, {_number(panel.get_ylabel(), y)}"
+
+
+def _look(line: Line2D) -> tuple[str, str, str]:
+    return str(line.get_color()), str(line.get_linestyle()), str(line.get_marker())
+
+
+def _is_named(line: Line2D) -> bool:
+    return bool(line.get_label()) and not str(line.get_label()).startswith("_")
+
+
+def _number(label: str, value: float) -> str:
+    """A value with the words and the unit of its axis.
+
+    >>> print(_number("sliding speed $V$ (mm/s)", -2.5))
+    sliding speed V = −2.5 mm/s
+    """
+    words, _, unit = plain_text(label).removesuffix(")").partition(" (")
+    return f"{words} = {value:.4g} {unit}".strip().replace("-", "−")
+
+
+def plain_text(label: str) -> str:
+    r"""A label without the marks of mathematics, on one line.
+
+    >>> print(plain_text(r"contact area $A/A_\mathrm{JKR}$, $\tau_0$"))
+    contact area A/A_JKR, τ_0
+    """
+    text = re.sub(r"\\([A-Za-z]+) ?", lambda found: _LETTERS.get(found[1], ""), label.replace(r"\,", " "))
+    return one_line(" ".join(re.sub(r"[${}]", "", text).split()))

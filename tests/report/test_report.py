@@ -1,0 +1,377 @@
+"""The page of a run: whole, harmless, and in numbers what the statistics are."""
+
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import netCDF4
+import numpy as np
+import pytest
+from helpers.commands import SCENE, sim
+from helpers.pictured import STEADY, drawn, mapped, simulated
+
+from sim import analysis
+from sim.parts.bonds import models as bonds
+from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.plots import kinds
+from sim.plots.style import BOTH
+from sim.report import answers, document, figures, html
+from sim.scenario.clock import Clock, Ensemble, Record
+
+REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.3, 0.3, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3))
+UNBROKEN = bonds.Unbroken()
+VOID = {"meta", "link", "img", "br", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """What stands in a page: its elements with their attributes, its texts, and the texts of its tables' cells."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.elements, self.open, self.texts = [], [], []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag, attrs):
+        self.elements.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append((self.open[-1] if self.open else "", data))
+
+    def words(self, *tags):
+        return [text for tag, text in self.texts if tag in tags and text.strip()]
+
+
+def harmless(page):
+    """Whether a page has no script, asks for nothing outside of itself, and every part that it refers to is there."""
+    assert not page.open
+    assert {tag for tag, _ in page.elements} <= TAGS
+    names = [given["id"] for _, given in page.elements if "id" in given]
+    assert len(set(names)) == len(names)
+    for _, given in page.elements:
+        assert not [name for name in given if name.startswith("on")]
+        for key in ("src", "href", "xlink:href"):
+            assert given.get(key, "#").startswith(("#", "data:image/png;base64,"))
+        used = [given["href"]] if given.get("href", "").startswith("#") else []
+        used += re.findall(r"url\(([^)]*)\)", " ".join(str(value) for value in given.values()))
+        assert {one.lstrip("#") for one in used} <= set(names)
+    return page
+
+
+TAGS = {
+    "html", "head", "meta", "title", "style", "body", "main", "header", "h1", "h2", "p", "b", "code", "pre", "div",
+    "figure", "figcaption", "table", "thead", "tbody", "tr", "th", "td",
+    "svg", "g", "defs", "path", "use", "circle", "clippath", "rect", "image",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def ramp():
+    return simulated()
+
+
+@pytest.fixture(scope="module")
+def page(ramp):
+    return harmless(Page(html(ramp)))
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """An empty folder to work in, with one dataset."""
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(f"# Does it stick?\n#\n# Nobody\n# knows.\n\n{SCENE}")
+    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet", "--no-table").exit_code == 0
+    return tmp_path
+
+
+@pytest.fixture
+def bare(monkeypatch):
+    """Pages without figures, which take most of the time."""
+    monkeypatch.setattr(document, "drawings", lambda dataset: [])
+
+
+# -- the page ---------------------------------------------------------------------------------
+
+
+def test_a_page_is_whole_in_itself_with_a_caption_to_every_figure(page):
+    assert [tag for tag, _ in page.elements].count("svg") == len(page.words("b")) >= 3
+    assert page.words("h2")[:2] == ["Figures", "Numbers"]
+
+
+@pytest.mark.usefixtures("bare")
+def test_equal_datasets_give_equal_pages(ramp):
+    assert html(ramp) == html(ramp)
+    assert len({figures.svg_of(kinds.draw(ramp, "friction"), "x-") for _ in range(2)}) == 1
+
+
+@pytest.mark.usefixtures("bare")
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"sweep": {"contact.load": [1e-3, 4e-3]}},
+        {"record": Record(per_member=False)},
+        {"ensemble": Ensemble(members=1)},
+        {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform()},
+        {"drive": REVERSING, "shear": shear.Uniform()},
+        {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
+    ],
+    ids=["sweep", "statistics only", "one member", "never closed", "reversing", "two records"],
+)
+def test_every_shape_of_dataset_has_its_page(changes):
+    harmless(Page(html(simulated(**changes))))
+
+
+def test_maps_are_within_the_page():
+    found = harmless(Page(figures.svg_of(kinds.draw(mapped(), "map"), "x-")))
+    assert any(given.get("href", "").startswith("data:image/png") for tag, given in found.elements if tag == "image")
+
+
+def test_numbers_are_those_of_the_statistics(ramp, page):
+    cells = page.words("td")
+    for row in (*analysis.table(ramp, 24), *analysis.highlights(ramp, 24)):
+        assert set(row.values()) <= set(cells)
+
+
+def test_figures_that_hold_too_much_are_left_out_with_the_reason():
+    loads = {"from": 1e-3, "to": 2e-3, "count": 21}
+    dataset = simulated(
+        drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": loads}, clock=Clock(duration=0.04, step=0.02)
+    )
+    assert {one.kind: "too many" in one.lacks for one in figures.drawings(dataset)} == {"sweep": False, "time": True}
+
+
+def test_points_of_curves_lie_on_them_and_carry_their_values(ramp):
+    figure = kinds.draw(ramp, "curve")
+    picture = Page(figures.svg_of(figure, "x-"))
+    titles = [text for tag, text in picture.texts if tag == "title"]
+    places = [(float(given["cx"]), float(given["cy"])) for tag, given in picture.elements if tag == "circle"]
+    speed, ratio = drawn(figure.axes[0], BOTH)
+    wanted = f"sliding speed V = {speed[-1]:.4g} mm/s, contact area A/A_JKR = {ratio[-1]:.4g}"
+    (at,) = [place for place, text in zip(places, titles, strict=True) if text.endswith(f"members: {wanted}")]
+    paths = [given.get("d", "") for tag, given in picture.elements if tag == "path"]
+    drawn_at = np.array([pair for path in paths for pair in re.findall(r"[ML] ([-\d.]+) ([-\d.]+)", path)], float)
+    for place in [at, *places[:40]]:
+        assert np.min(np.hypot(*(drawn_at - place).T)) < 0.08  # places have one decimal, paths two
+
+
+def test_ink_and_paper_of_figures_are_those_of_the_page(ramp):
+    picture = figures.svg_of(kinds.draw(ramp, "curve"), "x-")
+    assert "currentColor" in picture and "#000000" not in picture and "#ffffff" not in picture
+    assert "#0072b2" in picture
+
+
+# -- the answer -------------------------------------------------------------------------------
+
+
+def the_mean(found, name, **at):
+    return float(found[f"{name}_mean"].isel(at)), float(found[f"{name}_sem"].isel(at))
+
+
+def test_a_ramp_says_what_the_area_loses_and_to_what(ramp):
+    found = analysis.statistics(ramp).merge(analysis.shares(ramp))
+    first, last, bonds, rest = (
+        analysis.concise(*(100.0 * number for number in the_mean(found, name, t=at)))
+        for name, at in (("area_ratio", 0), ("area_ratio", -1), ("lost_to_bonds", -1), ("lost_to_fluctuations", -1))
+    )
+    (said, *_) = plainly(answers.answers(ramp))
+    assert said == (
+        f"The contact area falls from {first} % to {last} % of JKR's, from 10 µm/s to 100 mm/s; there broken bonds take"
+        f" {bonds} % and fluctuations {rest} % of JKR's area, charged in this order."
+    )
+
+
+def plainly(sentences):
+    return [sentence.replace(answers.TIE, " ") for sentence in sentences]
+
+
+def test_steady_speeds_of_a_sweep_are_answered_by_the_second_half_of_their_runs():
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"drive.speed": [1e-2, 1e-3, 4e-2]})
+    (said, *_) = plainly(answers.answers(dataset))
+    ratio = [f"{100 * value:.4g} %" for value in analysis.statistics(dataset)["area_ratio_mean"].isel(t=-1).values]
+    # from the first point of the sweep to the last
+    assert said.startswith(f"The contact area falls from {ratio[1]} to {ratio[2]} of JKR's, from 1 mm/s to 40 mm/s")
+
+
+def test_a_contact_that_stays_is_said_to_stay():
+    (said, *_) = plainly(answers.answers(simulated(shear=shear.Uniform(), bonds=UNBROKEN)))
+    assert said == "The contact area does not change from 10 µm/s to 100 mm/s: it is 100 % of JKR's."
+
+
+def test_a_loop_a_start_a_sweep_and_a_reversal_have_their_sentences():
+    course = {"from": 1e-6, "to": -4e-6, "cycles": 2}
+    contact, clock = Equilibrium(indentation=course, after_pull_off="reattach"), Clock(duration=0.4, step=0.002)
+    cycles = simulated(contact=contact, clock=clock, drive=STEADY, shear=shear.Uniform(), bonds=UNBROKEN)
+    lost = float(analysis.events(cycles)["loop_dissipation"])
+    assert lost > 0.0
+    assert plainly(answers.answers(cycles))[0] == (
+        f"The energy dissipated in a cycle there and back is {analysis.engineering(lost, 'J')}."
+    )
+    start = simulated(drive=drive.Start(rest=0.1, speed=1e-3), sweep={"contact.load": [1e-3, 4e-3]})
+    assert answers.answers(start) == [] or "after the start" in answers.answers(start)[0]
+    loads = simulated(drive=STEADY, sweep={"contact.load": [1e-3, 4e-3]})
+    found = analysis.summary(analysis.settled(analysis.observables(loads))).isel(t=-1)
+    low, high = (
+        f"{analysis.concise(*(100.0 * number for number in the_mean(found, 'area_ratio', contact_load=at)))} %"
+        for at in (0, 1)
+    )
+    assert plainly(answers.answers(loads)) == [
+        f"The contact area over JKR's goes from {low} (normal load 1 mN) to {high} (normal load 4 mN)."
+    ]
+    there = plainly(answers.answers(simulated(drive=REVERSING, shear=shear.Uniform())))
+    assert [sentence.partition(" is ")[0] for sentence in there] == [
+        "Friction in one direction", "Friction in the other direction"
+    ]  # fmt: skip
+
+
+def test_where_no_kind_of_scene_fits_nothing_is_claimed(monkeypatch, ramp):
+    monkeypatch.setattr(answers, "_ANSWERS", {})
+    assert answers.answers(ramp) == []
+    monkeypatch.setattr(document, "drawings", lambda dataset: [])
+    assert "No sentence of this page fits" in " ".join(Page(html(ramp)).words("p"))
+
+
+# -- errors, cost, question, repetition -------------------------------------------------------
+
+
+def test_errors_known_beforehand_stand_beside_those_measured():
+    dataset = simulated(drive=STEADY, ensemble=Ensemble(members=400), clock=Clock(duration=0.04, step=0.02))
+    rows = {row.words: row for row in document.known(dataset)}
+    row = rows["spread of ΔΓ between members, over its mean"]
+    energy = dataset["fluctuation_energy"].isel(t=-1).to_numpy()
+    left_out = [np.delete(energy, k) for k in range(energy.size)]
+    each = np.array([np.std(some, ddof=1) / np.mean(some) for some in left_out])
+    error = np.sqrt((energy.size - 1) * np.var(each))
+    spread = np.std(energy, ddof=1) / np.mean(energy)
+    assert row.measured == f"{analysis.concise(100 * spread, 100 * error)} %"
+    assert abs(spread - float(dataset["member_spread_energy"])) < 5.0 * error
+    assert row.before == f"{100 * float(dataset['member_spread_energy']):.3g} %"
+
+
+def test_the_question_is_the_first_paragraph_of_the_scenarios_comment_else_its_name(ramp):
+    text = "# Why\n# so?\n#\n# Because\n# of that.\n#\n# Really.\nname = 'x'\n# no more\n"
+    asked = document.question(ramp.assign_attrs(scenario_toml=text, title="x"))
+    assert asked == ("x", "Why so?", ["Because of that.", "Really."])
+    assert document.question(ramp.assign_attrs(scenario_toml="", title="x")) == ("x", "x", [])
+
+
+@pytest.mark.usefixtures("bare")
+def test_the_page_of_a_file_has_its_scenario_cost_and_the_commands_that_repeat_it(here):
+    override = ["--set", 'contact.load="2 mN"', "--seed", "7"]
+    assert sim("run", "scene.toml", *override, "-o", "y.nc", "--quiet", "--no-table").exit_code == 0
+    done = sim("report", "y.nc")
+    assert (done.exit_code, done.stdout) == (0, "y.html\n")
+    found = harmless(Page(Path("y.html").read_text(encoding="utf-8")))
+    assert found.words("h1") == ["Does it stick?"] and "Nobody knows." in found.words("p")
+    assert found.words("pre")[0] == Path("scene.toml").read_text()
+    assert "What it cost" in found.words("h2") and {"in all", "of it simulating"} <= set(found.words("th"))
+    command = found.words("pre")[-1].splitlines()[0]
+    assert command == "sim run y.toml -o y.nc --set 'contact.load=\"2 mN\"' --set seed=7"
+    Path("y.toml").write_text(found.words("pre")[0])
+    arguments = ["-o", "z.nc", "--set", 'contact.load="2 mN"', "--set", "seed=7", "--quiet", "--no-table"]
+    assert sim("run", "y.toml", *arguments).exit_code == 0
+    assert Path("z.nc").read_bytes() == Path("y.nc").read_bytes()
+
+
+# -- hostile files and bad input --------------------------------------------------------------
+
+MARKUP = "</pre></style><script>alert(1)</script><img src=x onerror=alert(1)>{{ 7 * 7 }}\"'&lt;"
+
+
+def test_markup_in_a_file_is_shown_and_does_nothing(here):
+    with netCDF4.Dataset("x.nc", "a") as file:
+        file.title = MARKUP
+        file.scenario_toml = f"# {MARKUP}\n#\n# {MARKUP}\n\x1b]0;x\x07\u202e\nname = '{MARKUP}'\n"
+        file.scenario_overrides = f'{{"{MARKUP[:30]}": "{MARKUP[:30]}"}}'
+        file.scenario_files = f'{{"{MARKUP[:30]}": 1}}'
+        file.history = file.source = file.references = MARKUP
+        for name, variable in file.variables.items():
+            variable.long_name = MARKUP
+            if name != "t":
+                variable.symbol = "<b>"
+    Path("x.nc.log").write_text(f'{{"began": "{MARKUP[:40]}", "seconds": 1, "stages": {{"<b>": 2}}}}\n')
+    assert sim("report", "x.nc", "--force").exit_code == 0
+    text = Path("x.html").read_text(encoding="utf-8")
+    found = harmless(Page(text))
+    assert found.words("h1") == [MARKUP] and found.words("title")[0] == MARKUP
+    assert [words for words in found.words("pre") if MARKUP in words and r"\x1b]0;x\x07\u202e" in words]
+    assert "49" not in found.words("h1")[0] and "\x1b" not in text
+    assert [given for tag, given in found.elements if tag == "style"] == [{}]
+
+
+@pytest.mark.parametrize(
+    "log", ["", "no JSON\n", '{"seconds": "x"}\n', "[1]\n", '{"began": 1, "seconds": 1}\n', "\xff\n"]
+)
+def test_a_log_that_is_none_costs_only_its_table(here, log):
+    Path("x.nc.log").write_bytes(log.encode("latin-1"))
+    assert document.cost(Path("x.nc.log")) == {}
+
+
+@pytest.mark.usefixtures("bare")
+def test_a_page_that_is_there_is_replaced_only_if_asked(here):
+    Path("x.html").write_text("mine")
+    done = sim("report", "x.nc")
+    assert done.exit_code == 73 and "x.html exists" in done.stderr and Path("x.html").read_text() == "mine"
+    assert sim("report", "x.nc", "-o", "x.nc", "--force").exit_code == 2
+    assert sim("report", "x.nc", "-o", "none/of/it/x.html").exit_code == 0
+    assert sim("report", "x.nc", "--force").exit_code == 0 and "<h1>" in Path("x.html").read_text()
+
+
+@pytest.mark.usefixtures("bare")
+def test_what_is_no_dataset_is_refused_in_one_line_and_nothing_written(here):
+    content = Path("x.nc").read_bytes()
+    Path("short.nc").write_bytes(content[: len(content) // 2])
+    with netCDF4.Dataset("other.nc", "w") as file:
+        file.title = "another program's"
+    before = sorted(path.name for path in here.iterdir())
+    for name in ("short.nc", "other.nc", "scene.toml", "missing.nc"):
+        done = sim("report", name)
+        assert (done.exit_code, done.stdout, len(done.stderr.splitlines())) == (2, "", 1), name
+        assert name in done.stderr
+    assert sorted(path.name for path in here.iterdir()) == before
+
+
+# -- as a browser shows it, and how large it is -----------------------------------------------
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@pytest.mark.verify
+@pytest.mark.skipif(BROWSER is None, reason="no Chromium is installed")
+@pytest.mark.parametrize("width", [390, 1000])
+def test_a_browser_shows_the_page_without_complaint(here, width):
+    assert sim("report", "x.nc").exit_code == 0
+    options = ["--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={here}/browser"]
+    options += ["--enable-logging=stderr", "--v=0", f"--window-size={width},3000", "--screenshot=x.png"]
+    done = subprocess.run([BROWSER, *options, f"file://{here}/x.html"], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0 and "CONSOLE" not in done.stderr
+    shown = figure_of(Path("x.png"))
+    assert shown.shape[:2] == (3000, width)
+    ink = np.any(shown[..., :3] < 128, axis=-1)
+    assert ink[:300].any() and ink[1000:].any() and not ink[:, -8:].any()  # text and figures, nothing cut at the edge
+
+
+def figure_of(path):
+    """Pixels of a picture, from 0 to 255."""
+    from matplotlib.image import imread
+
+    return np.round(255.0 * imread(path))
+
+
+@pytest.mark.verify
+def test_a_page_of_a_thousand_members_at_five_loads_is_below_5_mb(here):
+    sweep = 'sweep={"contact.load" = {from = "1 mN", to = "16 mN", count = 5}}'
+    assert sim("run", "scene.toml", "--members", 1000, "--set", sweep, "-o", "large.nc", "--quiet").exit_code == 0
+    assert sim("report", "large.nc").exit_code == 0
+    assert Path("large.html").stat().st_size < 5e6
