@@ -82,7 +82,7 @@ def start(scenario: Scenario, dice: Dice) -> State:
     if drive.feeds_back:
         bonding = coupling.felt(scenario.parts, bonding, motion.speed)
     shear = process.start(motion, bonding, dice.shear)
-    terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy)
+    terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy, slider.position)
     touch = contact.start(motion, scenario.times.duration, terms)
     if drive.feeds_back:
         around = _around(scenario, touch, shear.energy, range(1, 2))
@@ -108,7 +108,7 @@ def advance(scenario: Scenario, state: State, dice: Dice, steps: range) -> tuple
         bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, dice.bonds)
         driven = during(drive.readings(slider), len(steps))
     shear, energy = process.advance(state.shear, motions, bonding, dice.shear)
-    terms = balance(scenario, bonding.fraction, bonding.strength, energy)
+    terms = balance(scenario, bonding.fraction, bonding.strength, energy, motions.position)
     touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
     if drive.feeds_back and (stand := coupling.agreed(passed, touch.radius)) < len(steps):
         return advance(scenario, state, dice, steps[:stand])
@@ -182,10 +182,11 @@ def course_of(scenario: Scenario, state: State) -> Course:
     return Course(*(values[np.newaxis] for values in (*moving, state.shear.energy, driven, *state.contact)))
 
 
-def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array) -> Balance:
+def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array, position: Array) -> Balance:
     """The terms of the effective work of adhesion w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*)."""
+    margin = None if scenario.margin is None else scenario.margin.at(position)
     bonded, fluctuating = scenario.adhesion.work_of_bonds(fraction), scenario.fluctuations.paid_by_adhesion * energy
-    return Balance(bonded, fluctuating, strength, scenario.margin, scenario.bodies, scenario.adhesion.work)
+    return Balance(bonded, fluctuating, strength, margin, scenario.bodies, scenario.adhesion.work)
 
 
 def _around(scenario: Scenario, touch: Touching, energy: Array, steps: range) -> Around:

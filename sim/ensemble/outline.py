@@ -13,7 +13,7 @@ from sim.ensemble.netcdf import Described, Outline, Piece, Place
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
 from sim.numerics import hdf5
-from sim.parts.shear.modal import ModalProcess
+from sim.numerics.grid import Lattice
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
 from sim.scenario.sweep import Axis, written
@@ -216,17 +216,17 @@ def moments(values: np.ndarray) -> np.ndarray:
 def _maps(made: Outline, plan: Plan) -> None:
     """The variables of the stress maps."""
     scene = plan.points[0]
-    process = cast(ModalProcess, scene.process)
-    points, cell = process.modes.points, process.modes.cell
+    lattice = cast(Lattice, scene.map_lattice)
+    nx, ny = lattice.shape
     count = min(scene.record.map_members, plan.members)
-    made.sizes |= {"map_member": count, "map_time": len(scene.record.maps), "x": points, "y": points}
+    made.sizes |= {"map_member": count, "map_time": len(scene.record.maps), "x": nx, "y": ny}
     _add(made, "map_member", "i4", ("map_member",), "1", "member of a map", "", np.arange(count))
     _add(made, "map_time", "f8", ("map_time",), "s", "time of a map", "t", sorted(scene.record.maps))
-    for axis, text in (("x", "along"), ("y", "across")):
-        places = np.arange(points) * (cell / points)
+    for axis, text, points, side in zip("xy", ("along", "across"), lattice.shape, lattice.sides, strict=True):
+        places = np.arange(points) * (side / points)
         _add(made, axis, "f8", (axis,), "m", f"position {text} the sliding direction", axis, places)
     names = (*_sweep_names(plan), "map_member", "map_time", "x", "y")
-    chunks = (1,) * (len(names) - 2) + (points, points)
+    chunks = (1,) * (len(names) - 2) + (nx, ny)
     _add(made, MAP[0], "f8", names, *MAP[1:], None, chunks)
     made.places[MAP[0]] = Place({"": MAP[0]})
     if all(point.margin is not None for point in plan.points):

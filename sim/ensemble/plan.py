@@ -170,7 +170,7 @@ class Plan:
         else:
             intervals = (range(first, first + clock.stride, longest) for first in range(0, clock.steps, clock.stride))
             ends = {clock.steps, *itertools.chain(*intervals)}
-        if point.map_size is not None:
+        if point.map_lattice is not None:
             ends |= {*snapshots(point)[:: self.snapshots_of_block(point)]}
         stops = sorted(ends)
         return [Block(start, end, clock.stride) for start, end in zip([-1, *stops], stops, strict=False)]
@@ -283,9 +283,9 @@ def seconds_a_step(point: Scenario, members: int, speeds: np.ndarray | None = No
 
 def map_bytes(point: Scenario, members: int) -> float:
     """Size of the maps of some members at one point of a sweep [byte]."""
-    if point.map_size is None:
+    if point.map_lattice is None:
         return 0.0
-    return 8.0 * min(point.record.map_members, members) * len(point.record.maps) * point.map_size[1] ** 2
+    return 8.0 * min(point.record.map_members, members) * len(point.record.maps) * math.prod(point.map_lattice.shape)
 
 
 def work(plan: Plan, number: int = 1, of: int = 1) -> int:

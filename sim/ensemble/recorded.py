@@ -8,7 +8,7 @@ import numpy as np
 from sim.engine import Course, State, balance
 from sim.laws import jkr
 from sim.parts import extremes
-from sim.parts.contact.balance import BONDED, CLOSED, SETTLED, STRESSLESS, WHOLE, Balance
+from sim.parts.contact.balance import BONDED, CLOSED, SETTLED, STRESSLESS, WHOLE, Balance, Shares
 from sim.parts.contact.control import Control, LoadControl
 from sim.parts.drive import READINGS
 from sim.scenario.scenario import Scenario
@@ -62,7 +62,14 @@ def _applied_load(scene: Scenario, course: Course) -> np.ndarray:
 
 
 def _terms(scene: Scenario, course: Course) -> Balance:
-    return balance(scene, course.fraction, course.strength, course.energy)
+    return balance(scene, course.fraction, course.strength, course.energy, course.position)
+
+
+def _stored(scene: Scenario, course: Course) -> np.ndarray:
+    """ΔΓ, of a measured map on a disc that on the contact, per area."""
+    if not scene.fluctuations.passes:
+        return course.energy
+    return course.energy * cast(Shares, _terms(scene, course).margin).mean(_radius(scene, course))
 
 
 def _hertz_radius(scene: Scenario, course: Course) -> np.ndarray:
@@ -132,7 +139,7 @@ VARIABLES: tuple[Variable, ...] = (
     Variable("shear_stress", "Pa", "mean shear stress at the interface", "tau_0", "bonds",
           lambda scene, course: course.stress),
     Variable("fluctuation_energy", "J/m^2", "elastic energy of the shear-stress fluctuations per area",
-          "DeltaGamma", "shear", lambda scene, course: course.energy),
+          "DeltaGamma", "shear", _stored),
     Variable("work_of_adhesion", "J/m^2", "work of adhesion left to the contact", "w", "contact",
           _until_stopped(lambda scene, course: course.work)),
     Variable("contact_radius", "m", "contact radius", "a", "contact", _until_stopped(_radius)),

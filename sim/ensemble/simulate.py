@@ -29,6 +29,7 @@ from sim.ensemble.workers import share_out
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, claim, explained
 from sim.parts.drive import READINGS
+from sim.parts.shear.carried import CarriedProcess
 from sim.parts.shear.modal import ModalProcess
 from sim.parts.shear.process import Fluctuation
 from sim.scenario.declared import files_read
@@ -240,15 +241,19 @@ def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
 
     ½⟨τ1 w1⟩, and ⟨τ1 w0⟩ with the displacement w0 of the mean stress [J/m²], shape (maps,).
     """
-    process = cast(ModalProcess, point.process)
+    process = cast(ModalProcess | CarriedProcess, point.process)
     maps = process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)
     if point.margin is None:
         return {MAP[0]: maps}
-    cell, solid, found = process.modes.cell, point.solid.effective, (state.contact.radius, state.bonding.stress)
+    solid, found, (square, cell) = (
+        point.solid.effective,
+        (state.contact.radius, state.bonding.stress),
+        process.centred(maps),
+    )
     radius, stress = (np.broadcast_to(values, max(len(values), drawn))[:drawn] for values in found)
     radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
-    own = disc_energy_of_map(maps, cell, radius, *solid)
-    cross = cross_energy_of_map(maps, cell, radius, stress, *solid)
+    own = disc_energy_of_map(square, cell, radius, *solid)
+    cross = cross_energy_of_map(square, cell, radius, stress, *solid)
     return {MAP[0]: maps, DISC_ENERGIES[0][0]: own, DISC_ENERGIES[1][0]: cross}
 
 

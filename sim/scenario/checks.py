@@ -20,6 +20,8 @@ from sim.scenario.clock import Clock, Ensemble, Record
 from sim.spectrum.bond_made import BondMade
 
 _STEPS_A_CYCLE = 2
+#: Times between which the slip of a run is looked at.
+_MOST_SLIPS = 2**16
 _TOO_SHORT = "the table ends at {:g} s, before clock.duration ({:g} s); add rows or shorten the run"
 
 
@@ -87,6 +89,22 @@ def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
     elif drive.at_once and bonds.snaps:
         said = "bonds with a cut-off stretch break in an avalanche, which nothing holds back: give drive.damping,"
         yield ("drive",), f'{said} mass or viscosity, such as viscosity = "10 Pa s/m", or another rupture'
+
+
+def _off_the_map(
+    shear: Model, drive: Drive, clock: Clock, contact: Contact, adhesion: Adhesion, sphere: Sphere, solid: Solid
+) -> Faults:
+    if not shear.passes:
+        return
+    if drive.feeds_back:
+        said = 'a measured map under a disc needs a slip that is known beforehand: prescribe the speed, or give "plane"'
+        yield ("shear", "contact"), said
+        return
+    ends = np.linspace(0.0, clock.duration, min(clock.steps, _MOST_SLIPS) + 1)
+    positions = np.cumsum(drive.pieces(ends, clock.duration).joined.integral)
+    reach = min(0.0, float(positions.min())), max(0.0, float(positions.max()))
+    widest = contact.largest_radius(adhesion.work, sphere.radius, solid.contact_modulus)
+    yield from ((("shear", "field", *([key] if key else [])), said) for key, said in shear.off_the_map(reach, widest))
 
 
 def _no_adhesion(contact: Contact, adhesion: Adhesion) -> Faults:
@@ -161,7 +179,7 @@ def _shear_faults(
 _CHECKS: dict[Callable[..., Faults], list[str]] = {
     check: list(inspect.signature(check).parameters)
     for check in (_table_too_short, _control_too_short, _cannot_be_driven, _no_stress, _no_forces, _no_adhesion)
-    + (_reversible_under_a_drive, _no_maps, _unrecorded_maps, _too_many_map_members, _shear_faults)
+    + (_reversible_under_a_drive, _no_maps, _unrecorded_maps, _too_many_map_members, _shear_faults, _off_the_map)
 }
 #: The parts that the checks read.
 CHECKED = sorted({name for reads in _CHECKS.values() for name in reads} - {"radius", "built"})

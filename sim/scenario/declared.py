@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, cast, get_args
 
 from pydantic import Tag
 from pydantic.fields import FieldInfo
+from pydantic.json_schema import SkipJsonSchema
 
 from sim.scenario.source import Source
 from sim.units.quantity import Quantity
@@ -18,7 +19,12 @@ from sim.units.quantity import Quantity
 def keys(table: type) -> dict[str, FieldInfo]:
     """The keys of a table as they are written in a file, with their declarations."""
     declared: dict[str, FieldInfo] = getattr(table, "__pydantic_fields__", {})
-    return {field.alias or name: field for name, field in declared.items() if not field.exclude}
+    return {field.alias or name: field for name, field in declared.items() if not (field.exclude or _read(field))}
+
+
+def _read(field: FieldInfo) -> bool:
+    """Whether a key is none of a file but what was read from one: it is left out of the schema."""
+    return any(isinstance(note, cast(type, SkipJsonSchema)) for note in field.metadata)
 
 
 @functools.cache
@@ -113,7 +119,7 @@ def _listed(table: type) -> list[tuple[str, str, Quantity | None]]:
     for item in sorted(fields(table), key=lambda item: item.name != "model"):
         field = getattr(table, "__pydantic_fields__", {}).get(item.name)
         meaning = (field and field.description) or item.name.replace("_", " ")
-        quantity = None if field is None else declaration(field) or Quantity("1", meaning)
+        quantity = None if field is None or _read(field) else declaration(field) or Quantity("1", meaning)
         listed.append((item.name, (field and field.alias) or item.name, quantity))
     return listed
 

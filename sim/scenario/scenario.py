@@ -3,7 +3,7 @@
 import math
 from collections.abc import Hashable
 from dataclasses import fields
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Annotated, Any, cast
 
@@ -12,13 +12,16 @@ from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError, model
 from pydantic.dataclasses import dataclass
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
+from sim.numerics.grid import Lattice
 from sim.parts.bonds import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
+from sim.parts.contact.balance import Shares
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.control import Bodies
 from sim.parts.drive import Drive, Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
+from sim.parts.shear.carried import CarriedProcess
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
 from sim.scenario.clock import Clock, Ensemble, Record
@@ -26,7 +29,6 @@ from sim.scenario.declared import as_html, entries, with_models
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import read_sweep, set_key
-from sim.spectrum.finite_contact import Margin
 from sim.units.quantity import Quantity
 from sim.units.refusals import BadInput
 
@@ -35,8 +37,6 @@ _CELL_ERROR = 0.05
 _Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
 #: Points of a sweep whose shear processes are all tried.
 _MOST_BUILT = 64
-#: Points of a sweep that differ elsewhere share it with its spline.
-_margin = lru_cache(maxsize=32)(Margin)
 
 
 @cache
@@ -168,12 +168,9 @@ class Scenario:
         return math.sqrt(math.pi) * self.rest_radius
 
     @property
-    def map_size(self) -> tuple[float, int] | None:
-        """Side of the cell [m] and points along it of the maps that are recorded; None where none is."""
-        if not self.record.maps:
-            return None
-        modes = cast(ModalProcess, self.process).modes
-        return modes.cell, modes.points
+    def map_lattice(self) -> Lattice | None:
+        """Sides and points of the maps that are recorded; None where none is."""
+        return cast(ModalProcess | CarriedProcess, self.process).lattice if self.record.maps else None
 
     @cached_property
     def bodies(self) -> Bodies:
@@ -181,11 +178,13 @@ class Scenario:
         return Bodies(self.sphere.radius, self.solid.contact_modulus, self.solid.effective[1])
 
     @cached_property
-    def margin(self) -> Margin | None:
+    def margin(self) -> Shares | None:
         """Share of ΔΓ that a contact of finite radius pays when it grows; None where waves are taken as short."""
-        shear = self.fluctuations
-        solid = *self.solid.effective, self.sphere.radius
-        return None if shear.contact == "plane" else _margin(shear.spectrum, *solid)
+        if self.fluctuations.contact == "plane":
+            return None
+        bodies = self.sphere.radius, self.solid.contact_modulus
+        widest = self.contact.largest_radius(self.adhesion.work, *bodies)
+        return self.fluctuations.margin(self.solid.effective, self.sphere.radius, widest)
 
     @cached_property
     def times(self) -> Times:
@@ -230,7 +229,8 @@ class Scenario:
         """For each part, and the control of the contact, whether its values differ between members: by its class."""
         driven = self.drive.per_member
         bonded = driven or self.population.per_member
-        sheared = driven or self.fluctuations.per_member or (self.fluctuations.reads_stress and bonded)
+        by_bonds = bonded and (self.fluctuations.reads_stress or self.fluctuations.passes)
+        sheared = driven or self.fluctuations.per_member or by_bonds
         return {"drive": driven, "bonds": bonded, "shear": sheared, "contact": bonded or sheared, "control": False}
 
     @property
@@ -248,6 +248,10 @@ class Scenario:
         """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""
         said = [remark for part in self.chosen for remark in part.remarks(self.setting)]
         said += remarks_between(*self.chosen[1:], self.setting, self.speeds(41), self.varies["shear"])
+        if self.ensemble.members > 1 and self.fluctuations.given and not any(self.varies.values()):
+            said.append(
+                "the map is the same for all members and seeds, and nothing else is random: one member is enough"
+            )
         if self.solid.poisson_ratio != 0.5:
             said.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         off = (abs(value) for name, value in self.process.known_errors().items() if name.startswith("cell_error"))
@@ -297,7 +301,7 @@ class Scenario:
             raise BadInput([f"some values do not go together: {said}" for said in fault.problems]) from None
         for what, found in (
             ("records; give clock.record", {point.clock.records for point in points}),
-            ("maps; run once for each cell and number of points", {point.map_size for point in points}),
+            ("maps; run once for each cell and number of points", {point.map_lattice for point in points}),
         ):
             if len(found) > 1:
                 raise BadInput([f"the points of the sweep would have different {what}"])

@@ -244,6 +244,20 @@ class Margin:
         """Mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
         return self._share(radius, disc_energy)
 
+    def at(self, position: Array) -> "Margin":
+        """The same share at any position of the slider."""
+        return self
+
+    @property
+    def least(self) -> float:
+        """0: no wave gives energy back, on average over its phases."""
+        return 0.0
+
+    @property
+    def each(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float], Array]]:
+        """The ``terms``, which are the same at all steps."""
+        return [self.terms]
+
     def _share(self, radius: Array, law: Callable[..., Array]) -> Array:
         if self.spectrum.wavevector is not None and self._plane > 0.0:
             share = law(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane

@@ -63,7 +63,7 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     Raises
     ------
     BadInput
-        If the drive feels the friction.
+        If the drive feels the friction, or the field is a measured map.
 
     Notes
     -----
@@ -79,6 +79,9 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
             f'drive.model is "{scenario.drive.model}", whose slider feels the noise: no law gives its truth; study the'
         )
         raise BadInput([f'{said} scene at a speed that is prescribed, such as [drive] model = "ramp"'])
+    if scenario.fluctuations.given:
+        said = "shear.field is a measured map, which no simpler model stands for: study random fields of its spectrum,"
+        raise BadInput([f'{said} spectrum = {{ model = "measured", file = "..." }}'])
     left_out: list[str] = []
     base = plain(scenario)
     accepted = tolerance_of(scenario) if tolerance is None else tolerance

@@ -237,7 +237,7 @@ class Walk(NamedTuple):
     def _equilibrium(self, record: int, energy: Array, fraction: Array) -> Array:
         """Equilibrium radius for values of ΔΓ and of the bond fraction [m]; nan without one."""
         scene, none, strength = self.calm, np.zeros(1), self.strength[record : record + 1]
-        terms = balance(scene, np.maximum(fraction, 0.0), strength, np.maximum(energy, 0.0))
+        terms = balance(scene, np.maximum(fraction, 0.0), strength, np.maximum(energy, 0.0), none)
         motion = Motion(0, scene.times.at(int(self.steps[record])), 0.0, none, none, none, none)
         return scene.contact.start(motion, scene.times.duration, terms).radius
 

@@ -1,14 +1,38 @@
 """Terms of the effective work of adhesion, and the phases of a contact."""
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
 from sim.parts.contact.control import Bodies
 from sim.parts.exchange import Array
-from sim.spectrum.finite_contact import Margin
+
+
+class Shares(Protocol):
+    """Share of ``fluctuating`` that a contact of finite radius pays, as ``sim.spectrum.finite_contact.Margin``."""
+
+    def __call__(self, radius: Array) -> Array:
+        """Share of new contact at the edge, at contact radii [m]."""
+
+    def mean(self, radius: Array) -> Array:
+        """Mean of the share over the area of the disc."""
+
+    def at(self, position: Array) -> "Shares":
+        """The shares at positions of the slider [m]."""
+
+    @property
+    def least(self) -> Array | float:
+        """The lowest share at any radius, 0 where none is negative."""
+
+    @property
+    def each(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float], Array]]:
+        """Inputs of ``share_of``, one for each position or one for all."""
+
+    @property
+    def terms(self) -> tuple[tuple[float, float, float], tuple[float, float, float], Array]:
+        """Those of a single position."""
 
 
 class Balance(NamedTuple):
@@ -22,7 +46,7 @@ class Balance(NamedTuple):
         Energy of the shear-stress fluctuations that adhesion pays, waves being short beside the contact: χ ΔΓ [J/m²].
     stress : array
         Magnitude of the mean shear stress τ0 [Pa].
-    margin : Margin, optional
+    margin : Shares, optional
         Share of ``fluctuating`` that a contact of finite radius [m] pays when it grows [1].
     bodies : Bodies
         Sphere and half-space.
@@ -33,7 +57,7 @@ class Balance(NamedTuple):
     bonded: Array
     fluctuating: Array
     stress: Array
-    margin: Margin | None
+    margin: Shares | None
     bodies: Bodies
     reference: float
 

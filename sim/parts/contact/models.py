@@ -135,6 +135,12 @@ class _Controlled:
         """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
         return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
 
+    def largest_radius(self, work: float, sphere_radius: float, modulus: float) -> float:
+        """JKR radius for a work of adhesion where the control presses most [m]; 0 without equilibrium."""
+        control = self._control(max(self.course.extremes))
+        radius = control.radius(np.array([work]), np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
+        return float(np.nan_to_num(radius[0]))
+
     def start(self, motion: Motion, duration: float, balance: Balance) -> Touching:
         """The contact at the start, in equilibrium."""
         control = self.control(motion.time, duration)
@@ -177,14 +183,16 @@ class _Controlled:
         if balance.margin is None:
             return control.radius(balance.work(np.zeros(1)), balance.stress, self.reversible, balance.bodies)
         bodies = balance.bodies
-        wide = control.radius(balance.bonded + 0.0 * balance.fluctuating, balance.stress, self.reversible, bodies)
+        most = balance.bonded - balance.margin.least * balance.fluctuating
+        wide = control.radius(most, balance.stress, self.reversible, bodies)
         hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, bodies)
         taken = self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
         terms = (wide, hertz, *control.held[:2], balance.bonded, balance.fluctuating, taken)
-        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(len(terms), -1)
-        radius = np.empty(contacts.shape[1])
-        sphere = 1.0 / bodies.sphere_radius, bodies.modulus
-        widest_crossings(contacts, (*sphere, control.held[2]), *balance.margin.terms, radius)
+        each, sphere = balance.margin.each, (1.0 / bodies.sphere_radius, bodies.modulus)
+        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(len(terms), len(each), -1)
+        radius = np.empty(contacts.shape[1:])
+        for k, margin in enumerate(each):
+            widest_crossings(np.ascontiguousarray(contacts[:, k]), (*sphere, control.held[2]), *margin, radius[k])
         return radius.reshape(wide.shape)
 
     def _left(self, radius: Array, balance: Balance) -> Array:

@@ -99,6 +99,15 @@ class ModalProcess(Renewing):
         """The grid of the map."""
         return Grid(self.modes.cell, self.modes.points)
 
+    @property
+    def lattice(self) -> Grid:
+        """The lattice of the maps."""
+        return self.grid
+
+    def centred(self, maps: Array) -> tuple[Array, float]:
+        """The squares of maps around the middle of a disc, and their side [m]: the maps."""
+        return maps, self.modes.cell
+
     @cached_property
     def _spare(self) -> list[tuple[Array, Array]]:
         """Half spectra that no map is being made of; the first of two is zero but at the modes."""

@@ -21,6 +21,7 @@ from sim.parts.shear.amplitude import Amplitude, Constant
 from sim.parts.shear.banded import BandedProcess
 from sim.parts.shear.bands import Bands, group
 from sim.parts.shear.bond_field import SiteMean, SiteModes
+from sim.parts.shear.carried import Passing
 from sim.parts.shear.correlation import Correlation
 from sim.parts.shear.modal import FixedProcess, ModalProcess
 from sim.parts.shear.mode_pairs import cell_pairs
@@ -28,18 +29,16 @@ from sim.parts.shear.modes import cell_variance, modes
 from sim.parts.shear.process import SmoothProcess
 from sim.spectrum.families import Ripple, Spectrum
 from sim.spectrum.family import Family
-from sim.spectrum.finite_contact import marginal_energy
+from sim.spectrum.finite_contact import Margin, marginal_energy
 from sim.units import kept
 from sim.units.quantity import Quantity
 
 #: Side and points of a cell, Poisson's ratio; power of the rates, tolerance, and whether the amplitude relaxes.
 _CellOf = tuple[float, int | None, float, int, float, bool]
-_Paid = Annotated[
-    float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)
-]
+Paid = Annotated[float, Quantity("1", "share of the fluctuation energy paid by adhesion", "chi", at_least=0, at_most=1)]
 _Cell = Annotated[float, Quantity("m", "side of the periodic cell", "L", above=0)]
 _Tolerance = Annotated[float, Quantity("1", "tolerance of the errors of banding", "", above=0, below=1)]
-_Contact = Annotated[
+Contact = Annotated[
     Literal["plane", "disc"],
     Field(description='"disc": the energy that a contact of finite size pays when it grows, instead of the plane\'s'),
 ]
@@ -56,13 +55,20 @@ _MOST_STORED = 1000.0
 
 Process = SmoothProcess | BandedProcess | ModalProcess
 
+#: Points of a sweep that differ elsewhere share it with its spline.
+_margin = functools.lru_cache(maxsize=32)(Margin)
 
-class _Model:
+
+class ShearModel:
     """Attributes of all shear models."""
 
     feeds_back: ClassVar[bool] = False
     draws_maps: ClassVar[bool] = False
     keeps_modes: ClassVar[bool] = False
+    #: Whether one given pattern is all that any member and seed has.
+    given: ClassVar[bool] = False
+    #: Whether the energy on a disc depends on where the slider is.
+    passes: ClassVar[bool] = False
     #: Rough time that one step of a mode pair takes on one core, for estimates [s].
     pair_seconds: ClassVar[float] = 10e-9
     spectrum: Spectrum
@@ -130,6 +136,18 @@ class _Model:
         """Reasons why the process cannot be built on a solid and a contact at rest, each as (key, words)."""
         return []
 
+    def margin(self, solid: tuple[float, float], sphere_radius: float, widest: float) -> Margin | Passing:
+        """Share of ΔΓ that a contact of finite radius pays, on a solid (G, ν) and a contact of at most a radius [m]."""
+        return _margin(self.spectrum, *solid, sphere_radius)
+
+    def off_the_map(self, positions: tuple[float, float], radius: float) -> list[tuple[str, str]]:
+        """Reasons why a contact of a radius [m] cannot slide between two positions [m], each as (key, words)."""
+        return []
+
+    def details(self, setting: Setting) -> list[tuple[str, str]]:
+        """What is to be known of a given pattern, each as (name, words)."""
+        return []
+
     def remarks(self, setting: Setting) -> list[str]:
         spectrum, radius, solid = self.spectrum, setting.rest_radius, (setting.shear_modulus, setting.poisson_ratio)
         plane, rms = float(spectrum.surface_energy(*solid)), math.sqrt(spectrum.variance)
@@ -160,7 +178,7 @@ class _Model:
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Uniform(_Model):
+class Uniform(ShearModel):
     """No fluctuation: a uniform shear stress, which stores nothing at the expense of adhesion."""
 
     per_member: ClassVar[bool] = False
@@ -177,15 +195,15 @@ class Uniform(_Model):
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class Mean(_Model):
+class Mean(ShearModel):
     """The ensemble mean of ΔΓ on the infinite plane, in closed form. Limit: uniform as rms -> 0."""
 
     per_member: ClassVar[bool] = False
 
     spectrum: Spectrum
     amplitude: Amplitude = Field(default_factory=Constant)
-    paid_by_adhesion: _Paid = 1.0
-    contact: _Contact = "plane"
+    paid_by_adhesion: Paid = 1.0
+    contact: Contact = "plane"
     model: Literal["mean"] = "mean"
 
     @model_validator(mode="after")
@@ -205,7 +223,7 @@ class Mean(_Model):
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
-class _Fluctuating(_Model):
+class _Fluctuating(ShearModel):
     """Keys of the models with a periodic cell and a correlation.
 
     ``cell`` None means √π times the radius at rest, the square of the contact's area; ``points``
@@ -218,8 +236,8 @@ class _Fluctuating(_Model):
     cell: _Cell | None = None
     points: _Points | None = None
     mode_amplitudes: _ModeAmplitudes = "gaussian"
-    paid_by_adhesion: _Paid = 1.0
-    contact: _Contact = "plane"
+    paid_by_adhesion: Paid = 1.0
+    contact: Contact = "plane"
 
     @property
     def per_member(self) -> bool:
@@ -368,8 +386,8 @@ class Auto:
     points: _Points | None = None
     mode_amplitudes: _ModeAmplitudes = "gaussian"
     tolerance: _Tolerance = 0.01
-    paid_by_adhesion: _Paid = 1.0
-    contact: _Contact = "plane"
+    paid_by_adhesion: Paid = 1.0
+    contact: Contact = "plane"
     model: Literal["auto"] = "auto"
 
     def chosen(self, maps: bool) -> "Mean | Banded | Modal":
@@ -395,9 +413,3 @@ class Auto:
         if self.spectrum.bond_made:
             return "the field that bonds make has a frozen part, so each mode is followed"
         return "a correlation is given and no maps are recorded: energies in time are all the contact feels"
-
-
-#: A model that has a process.
-Model = Uniform | Mean | Banded | Modal | Mapped
-
-Shear = Annotated[Uniform | Mean | Banded | Modal | Mapped | Auto, Field(discriminator="model")]

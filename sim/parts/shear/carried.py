@@ -1,0 +1,182 @@
+"""A measured map of the stress as the field itself, carried with the slider, on the plane or under a disc.
+
+On the plane the map is periodic and its energy does not change. Under a disc only the stress in the contact counts:
+the pattern passes under the sphere, and a unit of new contact at the edge pays dE/dA of this very pattern, of either
+sign, which several radii may balance.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+import scipy
+
+from sim.laws.disc import disc_energies_of_map, soft_disc
+from sim.numerics.grid import Lattice
+from sim.parts.exchange import Array
+from sim.parts.shear.process import Fluctuation, SmoothProcess
+from sim.spectrum.stress_map import StressMap
+
+#: Radius [pixels] below which a disc is not resolved, and most radii at which energies are found.
+_RESOLVED, _MOST_RADII = 5.0, 48
+#: Pixels around the widest disc, and whole pixels between which energies are interpolated.
+_AROUND, _NODES = 6, np.arange(-1, 3)
+
+Terms = tuple[tuple[float, float, float], tuple[float, float, float], Array]
+
+
+@dataclass(frozen=True)
+class CarriedProcess(SmoothProcess):
+    """ΔΓ = g² × that of a measured map, and the map at any position of the slider.
+
+    On a disc the energy is that of the whole map, of which ``Passing`` gives the share.
+    """
+
+    field: StressMap
+    on_disc: bool
+
+    @property
+    def lattice(self) -> Lattice:
+        """The lattice of the maps."""
+        return self.field.lattice
+
+    def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
+        """Stress maps τ1(x, y) of the first ``members``, shape (members, nx, ny) [Pa].
+
+        At ``position`` X [m] the pattern has moved by X. Under a disc it stands so that the contact is in the middle,
+        and there is no stress beyond it; else it is periodic.
+        """
+        lattice, ahead = self.field.lattice, self.field.middle - self.field.begin if self.on_disc else 0.0
+        places = lattice.sides[0] / lattice.shape[0] * np.arange(lattice.shape[0])
+        spectrum, (qx, _), nyquist = np.fft.rfft2(self.field.field), lattice.wavevectors, lattice.shape[0] // 2
+        moved = np.empty((members, *lattice.shape))
+        for one, x, size in zip(
+            moved, *(np.broadcast_to(a, members) for a in (position, state.amplitude)), strict=True
+        ):
+            turned = np.exp(-1j * qx * (x + ahead))
+            if lattice.shape[0] % 2 == 0:  # the Nyquist row holds both signs
+                turned[nyquist] = turned[nyquist].real
+            one[:] = size * np.fft.irfft2(spectrum * turned, lattice.shape)
+            came = places - (x + ahead)
+            if self.on_disc:
+                one[(came < 0.0) | (came >= lattice.sides[0])] = 0.0
+        return moved
+
+    def centred(self, maps: Array) -> tuple[Array, float]:
+        """The squares of maps around the middle of a disc, and their side [m]."""
+        half = min(self.field.shape) // 2
+        first, second = (points // 2 - half for points in self.field.shape)
+        return maps[:, first : first + 2 * half, second : second + 2 * half], 2 * half * self.field.pixels[0]
+
+
+@dataclass(frozen=True)
+class Passing:
+    """Share of a map's energy that a contact of finite radius pays when it grows, as the pattern passes under it.
+
+    Energies are found where the middle of the disc is at a whole number of pixels, at radii up to ``widest`` [m], with
+    cubics between; the share of new contact is the derivative of the energy's own cubics, so that its integral over
+    the area is the energy. ``position`` of the slider [m] has the shape (1,) or (steps, 1).
+    """
+
+    field: StressMap
+    poisson_ratio: float
+    widest: float
+    position: Array
+
+    def at(self, position: Array) -> "Passing":
+        """The shares at other positions of the slider [m], the same for all members."""
+        moved = replace(self, position=position[..., :1])
+        moved.__dict__.update(_rows=self._rows, _discs=self._discs, radii=self.radii)
+        return moved
+
+    @cached_property
+    def _rows(self) -> dict[int, Array]:
+        """Shares of the mean energy per area at the radii, by the pixel at which the disc's middle is."""
+        return {}
+
+    @cached_property
+    def _discs(self) -> list[Array]:
+        return [soft_disc(float(radius / self.field.pixels[0])) for radius in self.radii]
+
+    @cached_property
+    def radii(self) -> Array:
+        """Radii at which energies are found [m], evenly spaced in their logarithm."""
+        pixel = self.field.pixels[0]
+        low = min(_RESOLVED * pixel, 0.5 * self.widest)
+        count = math.ceil(self.widest / pixel * math.log(self.widest / low))
+        return np.geomspace(low, self.widest, min(max(count, 8), _MOST_RADII))
+
+    def _row(self, place: int) -> Array:
+        if place not in self._rows:
+            pixel, across = self.field.pixels[0], self.field.shape[1] // 2
+            half = math.ceil(self.widest / pixel) + _AROUND
+            padded = np.pad(self.field.field, half)
+            window = padded[place : place + 2 * half, across : across + 2 * half]
+            found = disc_energies_of_map(window, pixel, self.radii, 1.0, self.poisson_ratio, self._discs)
+            self._rows[place] = found / self.field.surface_energy(1.0, self.poisson_ratio)
+        return self._rows[place]
+
+    @cached_property
+    def _mean(self) -> Array:
+        """Cubics of the mean share over ln a at each position, shape (steps, 4, pieces)."""
+        shares = np.empty((self.position.size, self.radii.size))
+        last = self.field.shape[0]
+        for one, x in zip(shares, self.position.flat, strict=True):
+            place = (self.field.begin - x) / self.field.pixels[0]
+            nodes = [min(max(math.floor(place) + int(node), 0), last) for node in _NODES]
+            s = place - math.floor(place)
+            weights = (
+                -s * (s - 1.0) * (s - 2.0) / 6.0, (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
+                -(s + 1.0) * s * (s - 2.0) / 2.0, (s + 1.0) * s * (s - 1.0) / 6.0,
+            )  # fmt: skip
+            one[:] = sum(weight * self._row(node) for weight, node in zip(weights, nodes, strict=True) if weight != 0.0)
+        return scipy.interpolate.CubicSpline(np.log(self.radii), shares, axis=1).c.transpose(2, 0, 1)
+
+    @cached_property
+    def _new(self) -> Array:
+        """Cubics of the share of new contact: with F the mean share, dE/dA = F + ½ dF/d ln a."""
+        a, b, c, d = self._mean.transpose(1, 0, 2)
+        return np.stack([a, b + 1.5 * a, c + b, d + 0.5 * c], axis=1)
+
+    def __call__(self, radius: Array) -> Array:
+        """Share at contact radii [m]; nan at nan."""
+        return self._read(self._new, radius)
+
+    def mean(self, radius: Array) -> Array:
+        """Mean of the share over the area of the disc: E/(πa²) over the energy of the whole map [1]."""
+        return self._read(self._mean, radius)
+
+    def _read(self, cubics: Array, radius: Array) -> Array:
+        shape = np.broadcast_shapes(self.position.shape, radius.shape)
+        radii = np.broadcast_to(radius, shape).reshape(len(cubics), -1)
+        low, step = self.radii[0], self._step
+        at = np.log(np.clip(np.nan_to_num(radii, nan=low), low, self.radii[-1]) / low) / step
+        piece = np.minimum(at.astype(int), self.radii.size - 2)
+        s = (at - piece) * step
+        a, b, c, d = (np.take_along_axis(cubics[:, k], piece, axis=1) for k in range(4))
+        share = ((a * s + b) * s + c) * s + d
+        share = np.where(radii < low, share * np.maximum(radii, 0.0) / low, share)
+        return np.where(np.isnan(radii), np.nan, share).reshape(shape)
+
+    @property
+    def _step(self) -> float:
+        return math.log(self.radii[-1] / self.radii[0]) / (self.radii.size - 1)
+
+    @property
+    def least(self) -> Array:
+        """The lowest share of new contact at any radius, or 0 where none is negative."""
+        lowest = self._new[:, 3].min(axis=1)
+        return np.minimum(lowest, 0.0).reshape(self.position.shape)
+
+    @property
+    def each(self) -> list[Terms]:
+        """Inputs of ``sim.spectrum.finite_contact.share_of`` at each position."""
+        low = float(self.radii[0])
+        cubics = self._new.transpose(0, 2, 1) * self._step ** np.arange(3, -1, -1)
+        return [((0.0, 0.0, 0.0), (low, math.log(low), 1.0 / self._step), np.ascontiguousarray(one)) for one in cubics]
+
+    @property
+    def terms(self) -> Terms:
+        """Those of a single position."""
+        return self.each[0]

@@ -1,0 +1,327 @@
+"""A measured map as the field of a scene: carried on the plane, and passing under a disc."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.commands import sim as command
+from helpers.scenes import scene
+from numpy.testing import assert_allclose
+
+import sim
+from sim.engine import Dice, follow, march
+from sim.laws import jkr
+from sim.laws.disc import ripple_energy, ripple_marginal_energy
+from sim.laws.halfspace import disc_tangential_energy, surface_energy
+from sim.numerics.grid import Grid
+from sim.parts.bonds.models import Counted, Unbroken
+from sim.parts.contact import Equilibrium, RateDependent
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import Carried, Mapped
+from sim.parts.shear.amplitude import Onset, Stress
+from sim.parts.shear.carried import Passing
+from sim.parts.shear.correlation import Slip
+from sim.scenario.clock import Ensemble, Record
+from sim.scenario.scenario import Scenario
+from sim.spectrum.families import Band
+from sim.spectrum.stress_map import StressMap
+from sim.units.refusals import BadInput
+from tests.spectrum.test_measured import white_map
+
+G = 1.6e6
+
+
+def map_of(field, pixel=6e-6, **keys):
+    field = np.ascontiguousarray(field, float)
+    return StressMap(file="map.npy", pixel=pixel, values=field.tobytes(), shape=field.shape, **keys)
+
+
+def patchy(nx=64, ny=48, seed=3, rms=1e5):
+    """A map of patches some pixels wide."""
+    noise = np.fft.rfft2(np.random.default_rng(seed).normal(size=(nx, ny)))
+    q = np.hypot(np.fft.fftfreq(nx)[:, None], np.fft.rfftfreq(ny))
+    field = np.fft.irfft2(noise * np.exp(-((20.0 * q) ** 2) / 4), (nx, ny))
+    return rms * field / field.std()
+
+
+def measured(field=None, contact="plane", pixel=6e-6, keys=None, **given):
+    return Carried(field=map_of(patchy() if field is None else field, pixel, **(keys or {})), contact=contact, **given)
+
+
+def sliding(shear, steps=40, speed=1e-3, **parts):
+    parts = {"bonds": Unbroken(stress=3e5), "drive": drive.Steady(speed=speed)} | parts
+    return scene(members=parts.pop("members", 1), steps=steps, shear=shear, **parts)
+
+
+def test_the_field_on_the_plane_has_the_energy_of_the_file_at_every_step():
+    field = patchy()
+    found = sim.run(sliding(measured(field)))
+    exact = surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
+    assert_allclose(found["fluctuation_energy"], exact, rtol=1e-12)
+    assert_allclose(found["contact_radius"], jkr.radius_at_load(4e-3, 42e-3 - exact, 2e-3, 4 * G), rtol=1e-12)
+
+
+def test_the_map_moves_with_the_slider():
+    field, pixel = patchy() + 2e5, 6e-6
+    record = Record(maps=(0.0, 12e-3, 15e-3))
+    maps = sim.run(sliding(measured(field), record=record, speed=2.5 * pixel / 1e-3))["shear_map"].values[0]
+    assert_allclose(maps[0], field - field.mean(), rtol=0.0, atol=1e-9 * 1e5)
+    assert_allclose(maps[1], np.roll(maps[0], 30, axis=0), rtol=0.0, atol=1e-9 * 1e5)
+    between = Grid(1.0, 64)  # half a pixel further: the Fourier series between the samples, here of one column
+    half = np.exp(-1j * between.wavevectors[0] * 0.5 / 64)
+    half[32] = half[32].real
+    moved = np.fft.ifft(np.fft.fft(np.roll(maps[0], 37, axis=0), axis=0) * half, axis=0).real
+    assert_allclose(maps[2], moved, rtol=0.0, atol=1e-9 * 1e5)
+    assert_allclose(
+        surface_energy(maps[2], (64 * pixel, 48 * pixel), G),
+        surface_energy(field, (64 * pixel, 48 * pixel), G),
+        rtol=1e-3,
+    )
+
+
+def test_the_amplitude_multiplies_the_map():
+    parts = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "record": Record(maps=(20e-3,))}
+    whole = sim.run(sliding(measured(), **parts))
+    law = Onset(speed=2e-3, width=0.3, floor=0.1)
+    found = sim.run(sliding(measured(amplitude=law), **parts))
+    factor = law.factor(found["speed"].values, np.zeros(1))
+    assert_allclose(found["fluctuation_energy"], factor**2 * whole["fluctuation_energy"], rtol=1e-13)
+    assert_allclose(found["shear_map"], factor[20] * whole["shear_map"], rtol=1e-13)
+
+
+def test_a_map_that_was_drawn_saved_and_read_back_gives_the_same_trajectory(tmp_path):
+    random = Mapped(spectrum=Band(1e5, 120e-6, 40e-6), cell=0.3e-3, points=24, correlation=Slip(length=1e30))
+    parts = {"record": Record(maps=(0.0, 30e-3)), "bonds": Unbroken(stress=3e5)}
+    drawn = sim.run(sliding(random, **parts))
+    drawn[["shear_map"]].isel(map_time=[0]).to_netcdf(tmp_path / "drawn.nc")
+    field = StressMap(file=str(tmp_path / "drawn.nc"))
+    found = sim.run(sliding(Carried(field=field), **parts))
+    for name in ("fluctuation_energy", "work_of_adhesion", "contact_radius", "friction_force"):
+        assert_allclose(
+            found[name], drawn[name].isel(member=0) if "member" in drawn[name].dims else drawn[name], rtol=1e-11
+        )
+    assert_allclose(found["shear_map"], drawn["shear_map"], rtol=0.0, atol=1e-9 * 1e5)
+
+
+def test_random_fields_of_the_spectrum_of_a_map_have_its_mean_energy(tmp_path):
+    points, cell = 48, 0.3e-3
+    field = white_map(points, 1.0, cell)
+    half, (qx, qy) = np.fft.rfft2(field), Grid(cell, points).wavevectors
+    half[np.hypot(qx, qy) >= 24 * 2 * math.pi / cell * 23.5 / 24] = 0.0  # the rings that a radial spectrum holds
+    field = 1e11 * np.fft.irfft2(half, (points, points))
+    np.save(tmp_path / "map.npy", field)
+    given = {"model": "measured", "file": str(tmp_path / "map.npy"), "spacing": cell / points}
+    random = {"model": "modal", "spectrum": given, "cell": cell, "correlation": {"model": "time", "time": "1 ms"}}
+    base = sliding(measured(field, pixel=cell / points), steps=2)
+    document = {name: getattr(base, name) for name in ("clock", "solid", "sphere", "adhesion", "contact", "bonds")}
+    members = 100
+    found = sim.run(Scenario(**document, shear=random, ensemble=Ensemble(members=members)))
+    own = float(sim.run(base)["fluctuation_energy"][0])
+    energy = found["fluctuation_energy"].isel(t=0)
+    spread = float(found["member_spread_energy"])
+    # the circle cuts pixels where the lattice does not: 0.3 % of the energy at most
+    assert abs(float(energy.mean()) / own - 1.0) < 5.0 * spread / math.sqrt(members) + 3e-3
+
+
+def passing(field, widest, pixel=1.0, nu=0.5, **keys):
+    return Passing(map_of(field, pixel, **keys), nu, widest, np.zeros(1))
+
+
+def test_a_uniform_stress_on_a_disc_stores_the_closed_form():
+    # half of the map is +1 and half -1, so that no mean is taken off; the disc stands on the first
+    field = np.where(np.arange(64) < 16, -1.0, np.where(np.arange(64) < 48, 1.0, -1.0)) * np.ones((40, 1))
+    shares = passing(3.0 * field, 15.0)
+    radius = np.array([6.0, 8.5, 11.5])
+    whole = shares.field.surface_energy(1.0)
+    exact = disc_tangential_energy(radius, 3.0, 1.0) / (math.pi * radius**2)
+    # what the soft edge costs falls as (pixel/a)²
+    assert_allclose(whole * shares.mean(radius), exact, rtol=0.2 / 6.0**2)
+    assert_allclose(whole * shares(radius), 1.5 * exact, rtol=0.2 / 6.0**2)
+    small = np.array([0.0, 0.5, 2.0])
+    assert_allclose(shares.mean(small), shares.mean(np.array([5.0])) * small / 5.0, rtol=1e-12)
+    assert np.isnan(shares(np.array([np.nan, 3.0]))).tolist() == [True, False]
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.5 * math.pi])
+def test_a_wave_that_passes_pays_on_average_what_the_closed_form_has(angle):
+    waves = np.cos(2 * math.pi / 12 * np.arange(96))
+    field = waves[:, None] * np.ones(96) if angle == 0.0 else waves * np.ones((96, 1))
+    q, radius = 2 * math.pi / 12, np.array([14.0, 18.0, 21.5])
+    # a disc at twelve places of the wave: along x by sliding, across it by the map itself
+    mean, new = np.zeros(3), np.zeros(3)
+    for place in range(12):
+        moved = field if angle == 0.0 else np.roll(field, place, axis=1)
+        shares = passing(moved, 25.0).at(np.full((1, 1), float(place) if angle == 0.0 else 0.0))
+        mean += shares.mean(radius)[0] / 12
+        new += shares(radius)[0] / 12
+    whole = passing(field, 25.0).field.surface_energy(1.0)
+    # the soft edge costs 0.65 (pixel/a)² for each wave on the diameter at most
+    lost = 0.7 * np.max(2 * radius / 12 / radius**2)
+    assert_allclose(whole * mean, ripple_energy(1.0, q, angle, radius, 1.0), rtol=lost)
+    assert_allclose(whole * new, ripple_marginal_energy(1.0, q, angle, radius, 1.0), rtol=lost)
+
+
+def test_what_new_contact_pays_adds_up_to_the_energy():
+    shares = passing(patchy(), 20.0).at(np.array([[0.0], [2.3]]))
+    nodes, weights = np.polynomial.legendre.leggauss(400)
+    ends = 5.0, 19.0
+    a = 0.5 * (ends[1] - ends[0]) * nodes + 0.5 * sum(ends)
+    grown = 0.5 * (ends[1] - ends[0]) * (shares(np.tile(a, (2, 1))) * 2 * math.pi * a) @ weights
+    whole = [math.pi * end**2 * shares.mean(np.full((2, 1), end))[:, 0] for end in ends]
+    # the second derivative of a cubic spline jumps at its knots, which a Gauss rule over them sees as 1/n³
+    assert_allclose(grown, whole[1] - whole[0], rtol=1e-5)
+
+
+def test_the_shares_go_smoothly_from_pixel_to_pixel():
+    shares = passing(patchy(), 20.0)
+    radius = np.array([12.0])
+    at = {x: shares.at(np.full((1, 1), x))(radius)[0, 0] for x in (0.0, 1.0, 1.0 + 1e-9, 1.5, 2.0)}
+    assert_allclose(at[1.0], at[1.0 + 1e-9], rtol=1e-7)
+    moved = passing(np.roll(patchy(), 1, axis=0), 20.0)  # the pattern one pixel further
+    assert_allclose(at[1.0], moved(radius)[0], rtol=0.05)  # but for what came in at the end of the map
+    shifted = np.fft.irfft2(np.fft.rfft2(patchy()) * np.exp(-2j * np.pi * np.fft.fftfreq(64) * 1.5)[:, None], (64, 48))
+    assert_allclose(at[1.5], passing(shifted, 20.0)(radius)[0], rtol=0.05)
+
+
+def test_a_contact_feels_the_pattern_that_passes_under_it():
+    field = patchy(rms=4e4)
+    shear = measured(field, "disc", keys={"start": 240e-6})
+    found = sim.run(sliding(shear, steps=80, record=Record(maps=(0.0, 80e-3))))
+    own = surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
+    assert found["fluctuation_energy"].std() > 0.02 * own
+    # the equilibrium holds at the edge: G = w - dE/dA of the pattern there, w of the dataset
+    radius, work = found["contact_radius"].values, found["work_of_adhesion"].values
+    rate = (4 * 4 * G * radius**3 / (3 * 2e-3) - 4e-3) ** 2 / (8 * math.pi * 4 * G * radius**3)
+    assert_allclose(rate, work, rtol=1e-9)
+    assert np.ptp(radius) > 1e-3 * radius.mean()
+    # and the maps, which stand with the contact in the middle, store what is recorded
+    energies = found["fluctuation_energy"].isel(t=[0, 80])
+    assert_allclose(found["disc_energy"].values[0], energies, rtol=0.01)
+
+
+def test_batches_blocks_and_restarts_agree_under_a_measured_map():
+    for shear in (measured(), measured(patchy(rms=4e4), "disc", amplitude=Stress(reference=2e5))):
+        bonds = Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=40, stress=2e5)
+        scenario = sliding(shear, steps=12, bonds=bonds, members=3)
+        states = list(march(scenario, np.arange(3)))
+        alone = list(march(scenario, np.array([2])))
+        radii = np.array([state.contact.radius for state in states])
+        assert np.array_equal(radii[:, 2], [state.contact.radius[0] for state in alone])
+        _, course = follow(scenario, Dice.of(scenario.seed, np.arange(3)), None, range(13))
+        assert np.array_equal(course.radius, radii)
+        again = list(march(scenario, np.arange(3), states[5]))
+        assert np.array_equal([state.contact.radius for state in again], radii[6:])
+        found = sim.run(scenario)["fluctuation_energy"]
+        assert ("member" in found.dims) == (shear.contact == "disc" or shear.reads_stress)
+
+
+@pytest.mark.parametrize(
+    ("shear", "parts", "words"),
+    [
+        (
+            {"keys": {"start": 150e-6}},
+            {"speed": 3e-3},
+            r'slides beyond the end of the map.*; begin elsewhere: start = "',
+        ),
+        ({}, {"speed": 1e-2}, "slides beyond the end of the map.*; shorten the slip to 0.00014"),
+        ({"field": patchy(64, 30)}, {}, "the map is 0.00018 m wide, the contact up to 0.00024"),
+        ({"keys": {"window": "hann"}}, {}, "a disc needs square pixels and no window"),
+        ({"keys": {"pixel_y": 7e-6}}, {}, "a disc needs square pixels and no window"),
+        ({"contact": "plane", "keys": {"start": 1e-4}}, {}, "start is where a disc begins"),
+        ({"amplitude": Onset(speed=1e-3, width=0.3, relaxing=True)}, {}, "never renewed: give relaxing = false"),
+        ({}, {"contact": Equilibrium(load={"from": 4e-3, "to": 0.5})}, "the map is 0.000288 m wide, the contact up to"),
+    ],
+)
+def test_a_scene_that_leaves_the_map_is_refused_with_the_cure(shear, parts, words):
+    with pytest.raises((BadInput, ValueError), match=words):
+        sliding(measured(**({"contact": "disc"} | shear)), **({"speed": 1e-3} | parts))
+
+
+def test_a_drive_that_feels_the_friction_cannot_know_where_a_map_ends():
+    from helpers.scenes import BONDS, DRIVES
+
+    assert np.all(sim.run(sliding(measured(), drive=DRIVES["spring"], bonds=BONDS["rate, bell"]))["contact_radius"] > 0)
+    with pytest.raises(BadInput, match="needs a slip that is known beforehand"):
+        sliding(measured(contact="disc"), drive=DRIVES["spring"], bonds=BONDS["rate, bell"])
+
+
+def test_a_rate_dependent_edge_follows_the_pattern():
+    shear = measured(patchy(rms=4e4), "disc")
+    still = sliding(shear, steps=400, speed=0.0, contact=RateDependent(load=4e-3, front_speed=1e-3))
+    at_rest = sliding(shear, steps=1, speed=0.0)
+    assert_allclose(sim.run(still)["contact_radius"][-1], sim.run(at_rest)["contact_radius"][-1], rtol=1e-6)
+    moving = sim.run(sliding(shear, steps=40, contact=RateDependent(load=4e-3, front_speed=1e-4)))
+    assert np.all(moving["equilibrium_radius"] > 0.0)
+    assert abs(moving["equilibrium_radius"] - moving["contact_radius"]).max() > 1e-8
+
+
+TOML = """
+[clock]
+duration = "10 ms"
+step = "1 ms"
+[solid]
+shear_modulus = "1.6 MPa"
+[sphere]
+radius = "2 mm"
+[adhesion]
+work = "42 mJ/m^2"
+[contact]
+load = "4 mN"
+[bonds]
+model = "none"
+stress = "0.3 MPa"
+[shear]
+model = "mapped"
+field = { file = "map.csv", pixel = "6 um", noise = "1 kPa" }
+"""
+
+
+def test_check_prints_the_energy_of_the_map_beside_that_of_its_spectrum(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(TOML)
+    field = patchy() - patchy().mean()
+    np.savetxt(tmp_path / "map.csv", field.T + 5e4, delimiter=",")
+    answer = command("check", "scene.toml", "--members", "5")
+    said = answer.stdout
+    assert answer.exit_code == 0
+    own = surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
+    radial = float(map_of(field).spectrum.surface_energy(G))
+    assert f"{own:.4g} J/m^2, {100 * abs(own / radial - 1):.2g} % {'more' if own > radial else 'less'}" in said
+    assert "64 × 48 points of 6e-06 m" in said and "5e+04 Pa" in said and "bear 3e+05 Pa" in said
+    assert "noise of the map" in said
+    assert "one member is enough" in said
+    assert "one member is enough" not in command("check", "scene.toml").stdout
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("x [m], stress [Pa]\n1, 2\n", "value is not a number"),
+        ("1\n", "too small"),
+        ("1, 2\n3\n", "complete the row"),
+        ("\n".join(["1, nan, 3, 4, 5, 6, 7, 8"] * 8), "gaps"),
+    ],
+)
+def test_a_bad_map_ends_in_one_message_and_nothing_is_written(tmp_path, monkeypatch, content, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "scene.toml").write_text(TOML)
+    (tmp_path / "map.csv").write_text(content)
+    for arguments in (("run", "scene.toml"), ("check", "scene.toml")):
+        answer = command(*arguments)
+        wrong = answer.stderr
+        assert answer.exit_code == 2 and not answer.stdout
+        assert wrong.startswith("scene.toml:18: shear.field.file: map.csv: ") and words in wrong
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map.csv", "scene.toml"]
+
+
+def test_a_map_has_no_convergence_to_study(tmp_path):
+    from sim.study.converge import converge
+
+    with pytest.raises(BadInput, match="measured map, which no simpler model stands for"):
+        converge(sliding(measured()), 1.0)
+
+
+def test_the_other_keys_of_mapped_do_not_go_with_a_field():
+    given = {"model": "mapped", "field": {"file": "map.npy"}, "correlation": {"model": "time", "time": 1.0}}
+    with pytest.raises(BadInput, match="correlation"):
+        sim.load({"shear": given, "clock": {"duration": 1.0, "step": 0.1}})
