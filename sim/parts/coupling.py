@@ -12,8 +12,10 @@ import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
 from sim.parts import coupling_equations as columns
-from sim.parts.bonds.stretched import FirstMoment, Stretches
+from sim.parts.bonds.cohorts import Cohorts, numbers_of
+from sim.parts.bonds.stretched import Ages, Cohort, FirstMoment, Stretches
 from sim.parts.bonds.two_state import Population, Steady, Unbroken
+from sim.parts.coupling_cohorts import advance_cohorts
 from sim.parts.coupling_equations import Law, Resting, Slider
 from sim.parts.coupling_rows import advance_rows
 from sim.parts.drive.driven import FIRST, STORED, Driven, Force, Spring
@@ -30,9 +32,17 @@ _STRETCHED = [
     columns.POSITION,
     columns.SLIP,
     columns.PATH,
+    columns.BEND,
 ]
 #: Relative difference up to which two radii are the same equilibrium, found on two ways.
 _SAME = 1e-9
+
+
+#: What goes through clock steps: rows, energies, work of adhesion without bonds, pieces of the drive, clock and
+#: contact, units of the columns and of energies.
+_Rows = tuple[Array, Array, Array, Array, Array, Array, float]
+#: Numbers of slider, bonds and contact.
+_Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 
 
 class Held(NamedTuple):
@@ -81,6 +91,11 @@ class Around(NamedTuple):
     area: float
 
 
+#: Bonds that are solved together with a slider; those with a stretch.
+_Driven = FirstMoment | Cohort | Unbroken | Steady
+_WITH_STRETCH = FirstMoment | Cohort
+
+
 class _Units(NamedTuple):
     """Units in which a step is made: a stretch b [m], and a force over the area at rest [N].
 
@@ -91,9 +106,9 @@ class _Units(NamedTuple):
     force: float
 
 
-def _units(drive: Force | Spring, bonds: FirstMoment | Unbroken | Steady, around: Around, step: float) -> _Units:
+def _units(drive: Force | Spring, bonds: _Driven, around: Around, step: float) -> _Units:
     most = max(map(abs, drive.course.extremes))
-    if not isinstance(bonds, FirstMoment):
+    if not isinstance(bonds, _WITH_STRETCH):
         force = bonds.stress * around.area
         if drive.spring:
             return _Units(force / drive.spring, force)
@@ -139,19 +154,18 @@ def advance(
 
     The contact is that at the start, but for its equilibrium with the bonds: ``agreed`` counts the steps that stand.
     """
-    drive, bonds = cast(Force | Spring, parts.drive), cast(FirstMoment | Unbroken | Steady, parts.bonds)
+    drive, bonds = cast(Force | Spring, parts.drive), cast(_Driven, parts.bonds)
     slider, population = cast(Driven, state[0]), state[1]
     ends = times.at(np.arange(steps.start - 1.0, steps.stop))
     units = _units(drive, bonds, around, times.step)
     stretch, force = units
-    bound, moment, seen = _population(bonds, population, around.radius)
     radius = around.radius
     if not around.stays:  # the sub-steps go on with their own
         radius = np.where(_agree(slider.radius, radius), slider.radius, radius)
     rows = np.zeros((len(slider.speed), columns.COLUMNS))
     of_rows = {
         columns.FORCE: slider.spring_force, columns.BODY: slider.body_speed, columns.SHEARED: slider.sheared,
-        columns.BOUND: bound, columns.MOMENT: moment, columns.SPEED: slider.speed, columns.POSITION: slider.position,
+        columns.SPEED: slider.speed, columns.POSITION: slider.position, columns.BEND: slider.acceleration,
         columns.RADIUS: radius, columns.NEXT: slider.next_step, columns.COUNT: slider.substeps,
         columns.ENDED: slider.runaway_time,
     }  # fmt: skip
@@ -166,7 +180,8 @@ def advance(
     passed, spent = np.empty((columns.COLUMNS, len(steps), len(rows))), np.empty((len(steps), *energies.shape))
     numbers = _numbers(drive, bonds, around, units)
     bare = around.bare + np.zeros(len(rows))
-    advance_rows(rows, energies, bare, given, clock, scales, stretch * force, *numbers, passed, spent)
+    at = rows, energies, bare, given, clock, scales, stretch * force
+    population, bonding = _advanced(bonds, population, around.radius, at, numbers, (passed, spent))
     stage, stage_speed = np.zeros((2, *passed[0].shape))
     if drive.spring:
         whole = pieces.joined
@@ -176,20 +191,49 @@ def advance(
     after = Driven(
         passed[columns.POSITION], passed[columns.BODY], passed[columns.SPEED], passed[columns.FORCE],
         passed[columns.SHEARED], stage, stage_speed, passed[columns.RADIUS], passed[columns.NEXT],
-        passed[columns.COUNT], passed[columns.ENDED], spent,
+        passed[columns.COUNT], passed[columns.ENDED], spent, passed[columns.BEND],
     )  # fmt: skip
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
     slid, path, spans = passed[columns.SLIP], passed[columns.PATH], duration[:, np.newaxis]
     unsteady = np.maximum(passed[columns.SQUARE] - path**2 / spans, 0.0)  # what slips at once is spread over the step
     slid = slid, path, first, after.speed, after.position, unsteady
     motions = Motions(steps.start, ends[1:, np.newaxis], spans, *slid)
-    bound, moment = passed[columns.BOUND], passed[columns.MOMENT]
+    return after, motions, population, felt(parts, bonding, after.speed)
+
+
+def _advanced(
+    bonds: _Driven,
+    population: tuple[object, ...],
+    radius: Array,
+    at: _Rows,
+    numbers: _Numbers,
+    passed: tuple[Array, Array],
+) -> tuple[tuple[object, ...], Bonding]:
+    """Bonds after some clock steps, which the rows ``at`` their start go through, and their readings at each.
+
+    ``radius`` of the contact at the start [m]; ``passed``: what rows and energies come to. Bonds without a stretch have
+    the sense of the sliding in place of one.
+    """
+    rows, stretch = at[0], float(at[5][columns.SLIP])
+    if isinstance(bonds, Cohort):
+        ages = cast(Ages, population)
+        share, seen = bonds.kept(ages.seen, radius)
+        cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *passed[0].shape[1:]))
+        rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance, math.inf)
+        advance_cohorts(*at, numbers[0], numbers[2], *passed, share, rules, *cohorts, sums)
+        return Ages(cohorts, seen), bonds.read(sums)
     if isinstance(bonds, FirstMoment):
-        found = felt(parts, bonds.bonding(Stretches(bound, moment)), after.speed)
-        return after, motions, Stretches(bound[-1].copy(), moment[-1].copy(), seen), found
+        stretches = cast(Stretches, population)
+        share, seen = bonds.kept(stretches.seen, radius)
+        rows[:, columns.BOUND], rows[:, columns.MOMENT] = stretches.bound * share, stretches.stretch * share
+    else:
+        rows[:, columns.BOUND], seen = cast(Population, population).bound, cast(Population, population).seen
+    advance_rows(*at, *numbers, *passed)
+    bound, moment = passed[0][columns.BOUND], passed[0][columns.MOMENT]
+    if isinstance(bonds, FirstMoment):
+        return Stretches(bound[-1].copy(), moment[-1].copy(), seen), bonds.bonding(Stretches(bound, moment))
     stress = bonds.stress / stretch * moment
-    left = Population(bound[-1].copy(), np.sign(stress[-1]), seen)
-    return after, motions, left, felt(parts, Bonding(bound, stress, stress), after.speed)
+    return Population(bound[-1].copy(), np.sign(stress[-1]), seen), Bonding(bound, stress, stress)
 
 
 def agreed(passed: Driven, radius: Array) -> int:
@@ -205,31 +249,14 @@ def _agree(own: Array, radius: Array) -> Flags:
     return same
 
 
-def _population(
-    bonds: FirstMoment | Unbroken | Steady, population: tuple[object, ...], radius: Array
-) -> tuple[Array, Array, Array]:
-    """Share of the sites that is bound, times the mean stretch [m], and the contact radius that they have seen.
-
-    Of bonds without a stretch the share of those of rest.
-    """
-    if isinstance(bonds, FirstMoment):
-        stretches = cast(Stretches, population)
-        share, seen = bonds.kept(stretches.seen, radius)
-        return stretches.bound * share, stretches.stretch * share, seen
-    left = cast(Population, population)
-    return left.bound, np.zeros(len(left.bound)), left.seen
-
-
-def _numbers(
-    drive: Force | Spring, bonds: FirstMoment | Unbroken | Steady, around: Around, units: _Units
-) -> tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]:
+def _numbers(drive: Force | Spring, bonds: _Driven, around: Around, units: _Units) -> _Numbers:
     """The numbers of slider, bonds and contact, but for what holds the sphere, in their units."""
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * around.area)
     yields, slope = (stiff * value for value in drive.yields(around.shear_modulus, around.poisson_ratio))
     body = drive.spring / stiff, drive.mass / stiff, drive.damping / stiff, drive.viscosity / density
     slider = Slider(*body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
-    if isinstance(bonds, FirstMoment):
+    if isinstance(bonds, _WITH_STRETCH):
         law, of_rest = bonds.law, bonds.bound_at_rest
         breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, law.limit / stretch, bonds.rebinding_rate, 1.0)
     else:

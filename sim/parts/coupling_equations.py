@@ -52,9 +52,9 @@ def _modes() -> tuple[float, complex, Array, Array]:
 PACE, TURNING, FORTH, BACK = _modes()
 #: Columns of a row: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the body,
 #: slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway, integral of
-#: the squared speed of the interface over the clock step.
-FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED, SQUARE = range(14)
-COLUMNS = 14
+#: the squared speed of the interface over the clock step, acceleration of the interface.
+FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED, SQUARE, BEND = range(15)
+COLUMNS = 15
 
 
 class Slider(NamedTuple):

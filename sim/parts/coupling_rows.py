@@ -32,8 +32,8 @@ from sim.parts.coupling_step import book, newton, tried
 from sim.parts.drive.driven import AREA, STORED, WORK
 
 #: Share of a clock step below which a sub-step means that there is no solution to go on with.
-_LEAST = 1e-13
-_MOST_STEPS = 2_000_000
+LEAST = 1e-13
+MOST_STEPS = 2_000_000
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
 #: Turns in which area and stress of a slider at rest settle.
@@ -41,7 +41,7 @@ _FEW_TURNS = 20
 
 
 @device
-def _elastic(row, time, bare, slider, held, piece, energy):
+def elastic(row, time, bare, slider, held, piece, energy):
     """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
 
     Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
@@ -96,7 +96,7 @@ def _stored(row, bare, time, slider, law, held):
 
 
 @device
-def _later(held, time, stays):
+def later(held, time, stays):
     """The contact's numbers some time later, its radius as it is from there on if it ``stays``."""
     _, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area = held
     load, base = load + load_rate * time, base + base_rate * time
@@ -110,14 +110,14 @@ def _piece(row, bare, slider, law, held, piece, room, at_nodes, energy):
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
     start, length = 0.0, piece[0]
-    for _ in range(_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         left = length - start
         step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
         step = left if step > 0.999 * left else min(step, 0.5 * left)
-        if not step > _LEAST * length:
+        if not step > LEAST * length:
             if held[0] > 0.0:
                 return start
-            held = _later(held, 0.0, 1.0)
+            held = later(held, 0.0, 1.0)
             row[NEXT] = 0.0
             continue
         grows, stands = tried(row, start, step, bare, slider, law, held, piece, room)
@@ -197,11 +197,11 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, en
     """Slip until the speed comes to zero or the piece ends; the time reached, negative where there is no way on."""
     length = piece[0]
     along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
-    for _ in range(_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         left = length - start
         step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
         step = left if step > 0.999 * left else min(step, 0.5 * left)
-        if not step > _LEAST * length:
+        if not step > LEAST * length:
             row[NEXT] = 0.0
             return start if slider[1] == 0.0 or row[SPEED] == 0.0 else -1.0
         grows, stands = tried(row, start, step, bare, slider, along, held, piece, room)
@@ -281,26 +281,52 @@ def _clock_step(row, bare, slider, law, held, pieces, room, at_nodes, energy):
     """Go through the pieces of a clock step; the time reached, and whether something holds the body still."""
     is_open = not row[RADIUS] > 0.0
     row[RADIUS] = 0.0 if is_open else row[RADIUS]
-    now, time, worked, going = _later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
+    now, time, worked, going = later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
     for p in range(len(pieces)):
         piece = pieces[p, 1], pieces[p, 2], pieces[p, 3], pieces[p, 4]
         room[4][0] = 0.0
         if p == 0:
             if law[5] == 0.0:
-                going = _elastic(row, 0.0, bare, slider, now, piece, energy)
+                going = elastic(row, 0.0, bare, slider, now, piece, energy)
             elif slider[4] > 0.0:
                 row[FORCE] = driven(0.0, piece)[1]
             energy[AREA] += energy[WORK] - worked - _stored(row, bare, 0.0, slider, law, now) + energy[STORED]
-        later, reached = _later(now, time, now[0]), 0.0
+        ahead, reached = later(now, time, now[0]), 0.0
         if going and law[5] == 0.0:
-            reached = _piece(row, bare, slider, law, later, piece, room, at_nodes, energy)
+            reached = _piece(row, bare, slider, law, ahead, piece, room, at_nodes, energy)
         elif going:
-            reached = _sticking_piece(row, bare, slider, law, later, piece, room, at_nodes, energy)
+            reached = _sticking_piece(row, bare, slider, law, ahead, piece, room, at_nodes, energy)
         time += reached
         if not (going and reached == piece[0]):
             return time, False
     energy[STORED] = _stored(row, bare, time, slider, law, now)
     return time, True
+
+
+@device
+def take_up(row, energy, given, gained, units, work):
+    """Lay out a row and its energies for a clock step, in the units of the equations."""
+    for c in range(COLUMNS):
+        row[c] = given[c] / units[c]
+    row[POSITION], row[SLIP], row[PATH], row[SQUARE], row[COUNT] = 0.0, 0.0, 0.0, 0.0, 0.0
+    energy[:] = 0.0
+    energy[STORED] = gained[STORED] / work
+
+
+@device
+def put_down(row, energy, given, gained, units, work, passed, spent):
+    """Take back a row and its energies after a clock step, and write what has been reached."""
+    position, count = given[POSITION], given[COUNT]
+    for c in range(COLUMNS):
+        given[c] = row[c] * units[c]
+    given[POSITION] += position
+    given[COUNT] += count
+    for c in range(COLUMNS):
+        passed[c] = given[c]
+    for c in range(STORED):
+        gained[c] += energy[c] * work
+    gained[STORED] = energy[STORED] * work
+    spent[:] = gained
 
 
 @kernel(
@@ -324,27 +350,13 @@ def advance_rows(rows, energies, bare, pieces, clock, units, work, slider, law, 
             start = stop
             while stop < len(pieces) and pieces[stop, 0] == k:
                 stop += 1
-            for c in range(COLUMNS):
-                row[c] = rows[m, c] / units[c]
-            row[POSITION], row[SLIP], row[PATH], row[SQUARE], row[COUNT] = 0.0, 0.0, 0.0, 0.0, 0.0
+            take_up(row, energy, rows[m], energies[m], units, work)
             if law[5] != 0.0:
                 row[MOMENT] = math.copysign(row[BOUND], row[SPEED]) if row[SPEED] != 0.0 else 0.0
-            energy[:] = 0.0
-            energy[STORED] = energies[m, STORED] / work
             if math.isnan(row[ENDED]):
                 now = held[:3] + (clock[k, 1], clock[k, 2], clock[k, 3], clock[k, 4]) + held[7:]
                 time, going = _clock_step(row, bare[m], slider, law, now, pieces[start:stop], room, at_nodes, energy)
                 if not going:
                     row[ENDED], row[POSITION], row[SPEED], row[BODY] = clock[k, 0] + time, math.nan, math.nan, math.nan
                     energy[:] = math.nan
-            position, count = rows[m, POSITION], rows[m, COUNT]
-            for c in range(COLUMNS):
-                rows[m, c] = row[c] * units[c]
-            rows[m, POSITION] += position
-            rows[m, COUNT] += count
-            for c in range(COLUMNS):
-                passed[c, k, m] = rows[m, c]
-            for c in range(STORED):
-                energies[m, c] += energy[c] * work
-            energies[m, STORED] = energy[STORED] * work
-            spent[k, m] = energies[m]
+            put_down(row, energy, rows[m], energies[m], units, work, passed[:, k, m], spent[k, m])

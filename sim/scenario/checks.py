@@ -74,8 +74,8 @@ def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
     if not drive.feeds_back:
         return
     if not bonds.driven:
-        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use "none", "steady", or "rate" with a'
-        said += " rupture"
+        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use "none", "steady", "cohort", or'
+        said += ' "rate" with a rupture'
         yield ("bonds", "model"), said
     elif not bonds.stretched:
         if drive.contact_stiffness != "rigid":

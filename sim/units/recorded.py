@@ -9,7 +9,8 @@ Recorded = Literal[
     "masked", "detachment_time", "dissipated_energy", "jkr_radius", "hertz_radius", "bonds_radius",
     "fluctuations_radius", "equilibrium_radius", "applied_load",
     "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
-    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_area", "energy_residual", "substeps",
+    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
+    "substeps",
     "runaway_time",
     "peak_stress", "peak_friction", "peak_time", "pull_off_load", "pull_off_time",
 ]  # fmt: skip

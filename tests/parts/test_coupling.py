@@ -4,83 +4,39 @@ import math
 
 import numpy as np
 import pytest
+from helpers.driven import (
+    AREA,
+    BELL,
+    DENSITY,
+    ENERGY,
+    KAPPA,
+    LOAD,
+    MODULUS,
+    STIFF,
+    STRETCH,
+    UNIT,
+    WORK,
+    R,
+    fields,
+    force,
+    marched,
+    reached,
+    residual,
+    scenario,
+    spring,
+)  # fmt: skip
 from numpy.testing import assert_allclose
 
 import sim
 from sim.analysis.tables import notes
 from sim.engine import Dice, follow, march, pack, unpack
 from sim.laws import jkr
-from sim.parts.bonds import Cohort, FirstMoment, Steady, Unbroken
-from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.contact import Equilibrium
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.drive import READINGS, Force, Spring, Steady as AtSpeed
-from sim.scenario.clock import Clock, Ensemble
+from sim.parts.bonds import FirstMoment, Steady, Tracked, Unbroken
+from sim.parts.bonds.rupture import Constant, CutOff
+from sim.parts.contact.bodies import Adhesion
+from sim.parts.drive import Force, Spring, Steady as AtSpeed
 from sim.scenario.scenario import Scenario
 from sim.units.refusals import BadInput
-
-#: Bonds whose unit of stretch is 10 nm and of time 1 s.
-STRETCH, DENSITY, KAPPA = 1e-8, 1e15, 4e-4
-BELL = Bell(zero_force_rate=1.0, bell_force=STRETCH * KAPPA)
-R, MODULUS = 2e-3, 6.4e6
-#: Work of adhesion at which the load is π w R, which the trajectory with a changing area takes.
-LOAD = 4e-3
-WORK = LOAD / (math.pi * R)
-
-
-def scenario(duration, steps, drive, share=0.0, rupture=BELL, rebinding=1.0, start="bonded", members=1, **contact):
-    """A lens whose bonds carry ``share`` of the work of adhesion."""
-    return Scenario(
-        clock=Clock(duration=duration, step=duration / steps),
-        solid=Solid(shear_modulus=MODULUS / 4.0),
-        sphere=Sphere(radius=R),
-        adhesion=Adhesion(work=WORK, bond_share=share),
-        contact=Equilibrium(**({"load": LOAD} | contact)),
-        bonds=FirstMoment(
-            rupture=rupture, bond_stiffness=KAPPA, rebinding_rate=rebinding, site_density=DENSITY, start_from=start
-        ),
-        drive=drive,
-        ensemble=Ensemble(members=members),
-    )
-
-
-AREA = math.pi * jkr.radius_at_load(LOAD, WORK, R, MODULUS) ** 2
-#: Force over displacement of all sites of the contact at rest; force at the unit of stretch; energy.
-STIFF = DENSITY * KAPPA * AREA
-UNIT, ENERGY = STIFF * STRETCH, STIFF * STRETCH**2
-
-
-def spring(stiffness, speed=10.0, mass=0.0, damping=0.0, contact=math.inf, viscosity=0.0, **keys):
-    """A spring drive in units of all sites bound: stiffness and k_t over n κ A, speed in stretches a second."""
-    return Spring(
-        stage=speed * STRETCH if isinstance(speed, float) else speed, stiffness=stiffness * STIFF, mass=mass * STIFF,
-        damping=damping * STIFF, viscosity=viscosity * DENSITY * KAPPA,
-        contact_stiffness="rigid" if contact == math.inf else contact * STIFF, **keys,
-    )  # fmt: skip
-
-
-def force(load, **keys):
-    return Force(force=load * UNIT, **({"contact_stiffness": "rigid"} | keys))
-
-
-def marched(scene):
-    """States of a single member, and the readings of the drive in each, by name."""
-    states = list(march(scene, np.arange(1)))
-    readings = np.array([scene.parts.drive.readings(state.drive)[0] for state in states])
-    return states, dict(zip(READINGS, readings.T, strict=True))
-
-
-def residual(read):
-    """Largest energy that is missing, over all the work of the drive."""
-    return np.max(np.abs(read["energy_residual"])) / read["drive_work"][-1]
-
-
-def reached(states, *names):
-    """Some quantities of bonds and drive in the units of the bonds, one row a state."""
-    units = {"position": STRETCH, "body_speed": STRETCH, "bound": 1.0, "stretch": STRETCH}
-    parts = {"position": "drive", "body_speed": "drive", "bound": "bonds", "stretch": "bonds"}
-    return np.array([[getattr(getattr(state, parts[n]), n)[0] / units[n] for n in names] for state in states])
-
 
 #: X, N, F at 1, 1.5, 2, 2.5 and 4 of a massless slider, by two integrators that agree to 2e-12.
 MASSLESS = {
@@ -345,7 +301,7 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
     lens = {name: getattr(scenario(1.0, 4, spring(1.0)), name) for name in ("clock", "solid", "sphere", "contact")}
     recipe = {"bond_stiffness": KAPPA, "rebinding_rate": 1.0, "site_density": DENSITY}
     for bonds, keys, place, cure in (
-        (Cohort(rupture=BELL, **recipe), {}, "bonds.model", '"rate"'),
+        (Tracked(rupture=BELL, sites=10, **recipe), {}, "bonds.model", '"rate"'),
         (Unbroken(stress=1e5), {}, "drive", "mass"),
         (Unbroken(stress=1e5), {"mass": 1e-3, "contact": 1.0}, "drive.contact_stiffness", "rigid"),
         (Unbroken(), {"mass": 1e-3}, "bonds.stress", "stress"),
@@ -421,11 +377,7 @@ HELD = COULOMB * AREA
 def stuck(duration, steps, bonds, drive, members=1):
     """A lens whose bonds have no stretch; their strength and the unit of length make the unit of stiffness."""
     scene = scenario(duration, steps, spring(1.0), members=members)
-    return Scenario(**{**_fields(scene), "bonds": bonds, "drive": drive})
-
-
-def _fields(scene):
-    return {name: getattr(scene, name) for name in ("clock", "solid", "sphere", "adhesion", "contact", "ensemble")}
+    return Scenario(**{**fields(scene), "bonds": bonds, "drive": drive})
 
 
 def pulled(stiffness=1.0, speed=1.0, mass=0.0, damping=0.0, **keys):

@@ -26,13 +26,13 @@ class Rules(NamedTuple):
 
 
 @device
-def _rules(numbers):
+def rules_of(numbers):
     own = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7]
     return Rules(law_of(numbers[8:]), *own)
 
 
 @device
-def _inside(stretch, width, limit):
+def inside(stretch, width, limit):
     """The part of a segment that lies between ± ``limit``."""
     if width == 0.0:
         return 1.0 if math.fabs(stretch) < limit else 0.0
@@ -41,8 +41,11 @@ def _inside(stretch, width, limit):
 
 
 @device
-def _survive(pool, count, move, speed, step, rules):
-    """Bonds that outlive a third of a step and all of it; pool[4] gets what outlives it, cohort by cohort."""
+def survive(pool, count, move, speed, step, off, rules):
+    """Bonds that outlive a third of a step and all of it; pool[4] gets what outlives it, cohort by cohort.
+
+    Their stretch is ``off`` by so much on average from that of a motion at constant speed.
+    """
     weight, stretch, width, steepness, kept, kept_early = pool[0], pool[1], pool[2], pool[3], pool[4], pool[8]
     early, short = step / 3.0, move / 3.0
     soon, late = fresh_integral(early, speed, rules.law), fresh_integral(step, speed, rules.law)
@@ -52,25 +55,25 @@ def _survive(pool, count, move, speed, step, rules):
     at_early, at_end = 0.0, 0.0
     for i in range(count):
         if steepness[i] == 0.0:
-            kept_early[i] = weight[i] * math.exp(-hazard_integral(stretch[i], short, early, rules.law))
-            kept[i] = weight[i] * math.exp(-hazard_integral(stretch[i], move, step, rules.law))
+            kept_early[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, short, early, rules.law))
+            kept[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, move, step, rules.law))
         if rules.limit < math.inf:
-            kept_early[i] *= _inside(stretch[i] + short, width[i], rules.limit)
-            kept[i] *= _inside(stretch[i] + move, width[i], rules.limit)
+            kept_early[i] *= inside(stretch[i] + short, width[i], rules.limit)
+            kept[i] *= inside(stretch[i] + move, width[i], rules.limit)
         at_early += kept_early[i]
         at_end += kept[i]
     return at_early, at_end
 
 
 @device
-def _steepen(pool, count, slip, rules):
+def steepen(pool, count, slip, off, rules):
     """pool[3]: ∫k dt of each bond over that of a fresh one, where such a factor exists; 0 marks the others."""
     for i in range(count):
-        pool[3, i] = growth(pool[1, i], slip, rules.law)
+        pool[3, i] = growth(pool[1, i] + off, slip, rules.law)
 
 
 @device
-def _births(free, early, late, step, speed, rules):
+def births(free, early, late, step, speed, rules):
     """Births of a step by Radau IIA: weights at its third and at its end, free sites then, and the error.
 
     F(t) = 1 − R(t) − ∫k_on F(s) S(t − s)ds at t = h/3 and h, R = ``early`` and ``late``, the integral by the
@@ -93,7 +96,7 @@ def _births(free, early, late, step, speed, rules):
 
 
 @device
-def _carry(pool, count, move, one, two, rules):
+def carry(pool, count, move, off, one, two, rules):
     """Accept a step: keep what survived, move it, drop the negligible, add the births; the new count."""
     weight, stretch, width, kept = pool[0], pool[1], pool[2], pool[4]
     whole = one + two
@@ -110,7 +113,7 @@ def _carry(pool, count, move, one, two, rules):
             left += 1
     if one + two <= 1e-18 * whole:
         return left
-    far = 2.0 / 3.0 * move
+    far = 2.0 / 3.0 * move - 4.0 / 3.0 * off
     if rules.limit < math.inf or far == 0.0:
         share = one / (one + two)
         weight[left], stretch[left], width[left] = one + two, share * far, 0.0
@@ -122,12 +125,12 @@ def _carry(pool, count, move, one, two, rules):
 
 
 @device
-def _try(pool, count, move, speed, step, free, rules):
+def try_step(pool, count, move, speed, step, off, free, rules):
     """One step tried: births at its two stages, and the factor by which the step should change; < 1 refuses it."""
-    early, late = _survive(pool, count, move, speed, step, rules)
+    early, late = survive(pool, count, move, speed, step, off, rules)
     if rules.rebinding == 0.0:
         return 0.0, 0.0, 4.0
-    one, two, lowest, error = _births(free, early, late, step, speed, rules)
+    one, two, lowest, error = births(free, early, late, step, speed, rules)
     if lowest < -1e-14:
         return one, two, 0.2
     allowed = rules.tolerance / 3.0 * (late + one + two + 1e-9 * (1.0 - free)) + 1e-15 * (1.0 + rules.rebinding * step)
@@ -154,7 +157,7 @@ def _forgets(pool, other, count, speed, duration, rules):
     rest = duration - lives * life
     if rest <= 0.0:
         return 0, 0.0
-    _, left = _survive(pool, count, speed * rest, speed, rest, rules)
+    _, left = survive(pool, count, speed * rest, speed, rest, 0.0, rules)
     return (found if left <= 1e-3 * rules.tolerance * (life / cycle) else 0), life
 
 
@@ -163,7 +166,7 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
     """Advance one population by a clock step in steps of its own; cohorts, slider position and settled number."""
     speed = min(max(slip / duration, -1e200), 1e200) if duration > 0.0 else 0.0
     direction = -1.0 if slip < 0.0 else 1.0
-    _steepen(pool, count, slip, rules)
+    steepen(pool, count, slip, 0.0, rules)
     found, _ = _forgets(pool, pool[5:], count, speed, duration, rules)
     if found > 0:
         for k in range(3):
@@ -189,11 +192,11 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
         for i in range(count):
             bound += pool[0, i]
         move = speed * step if done > 0.0 or going else slip
-        one, two, factor = _try(pool, count, move, speed, step, max(0.0, 1.0 - bound), rules)
+        one, two, factor = try_step(pool, count, move, speed, step, 0.0, max(0.0, 1.0 - bound), rules)
         if factor < 1.0 and step > shortest:
             step, going = max(step * factor, shortest), True
             continue
-        count = _carry(pool, count, move, one, two, rules)
+        count = carry(pool, count, move, 0.0, one, two, rules)
         travelled += move
         done += step
         step *= max(factor, 1.0)
@@ -201,12 +204,12 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
             count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
             settled = count
         if going:
-            _steepen(pool, count, slip, rules)
+            steepen(pool, count, slip, 0.0, rules)
     return count, travelled, settled
 
 
 @device
-def _read(pool, weight, stretch, width, share):
+def read_row(pool, weight, stretch, width, share):
     """Read a ``share`` of each cohort of a row into a pool, empty places left out; their number."""
     count = 0
     for i in range(weight.size):
@@ -237,12 +240,12 @@ def step_rows(
     sums,
 ):
     """Advance all rows by all steps, each row by itself from a ``share`` of its bonds; its sums after each step."""
-    rules = _rules(numbers)
+    rules = rules_of(numbers)
     rows, capacity = new_weight.shape
     pool = np.empty((9, capacity + 520))
     for m in range(rows):
         old = m % len(weight)
-        count = _read(pool, weight[old], stretch[old], width[old], share[m % share.size])
+        count = read_row(pool, weight[old], stretch[old], width[old], share[m % share.size])
         travelled, settled = lattice[old, 0], lattice[old, 1]
         for k in range(duration.size):
             moved = slip[k, m % slip.shape[1]]
@@ -253,14 +256,14 @@ def step_rows(
                 settled = count
             if rules.cell < math.inf:
                 travelled = travelled % (1048576.0 * rules.cell)
-            _write(pool, count, new_weight[m], new_stretch[m], new_width[m])
-            _sum(new_weight[m], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
-            count = _read(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
+            write_row(pool, count, new_weight[m], new_stretch[m], new_width[m])
+            sum_row(new_weight[m], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
+            count = read_row(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
         new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
 
 
 @device
-def _write(pool, count, weight, stretch, width):
+def write_row(pool, count, weight, stretch, width):
     """Write the first ``count`` cohorts of a pool into a row, zeros behind them; a row of one width has none."""
     weight[:count], stretch[:count] = pool[0, :count], pool[1, :count]
     weight[count:], stretch[count:] = 0.0, 0.0
@@ -269,7 +272,7 @@ def _write(pool, count, weight, stretch, width):
 
 
 @device
-def _sum(weight, stretch, width, rules, lost, sums):
+def sum_row(weight, stretch, width, rules, lost, sums):
     """Sums over the cohorts of a row: as of ``cohorts.moments``; ``lost`` is room for a number of each."""
     sums[:] = 0.0
     for i in range(weight.size):
@@ -292,19 +295,19 @@ def _sum(weight, stretch, width, rules, lost, sums):
 @kernel("void(float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])")
 def sum_rows(weight, stretch, width, numbers, sums):
     """Sums over the cohorts of each row, shape (5, rows)."""
-    rules, lost = _rules(numbers), np.empty(weight.shape[1])
+    rules, lost = rules_of(numbers), np.empty(weight.shape[1])
     for m in range(len(weight)):
-        _sum(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
+        sum_row(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
 
 
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
 def settle_steady(speed, numbers, weight, stretch, width, lattice):
     """The merged steady state of one row."""
-    rules = _rules(numbers)
+    rules = rules_of(numbers)
     pool = np.empty((3, weight.shape[1] + 520))
     count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
     count = settle(pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules)
-    _write(pool, count, weight[0], stretch[0], width[0])
+    write_row(pool, count, weight[0], stretch[0], width[0])
     lattice[0, 1] = count
 
 

@@ -85,7 +85,7 @@ def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance:
     if rebinding_rate == 0.0 or speed == 0.0:
         return resting(rupture, rebinding_rate, tolerance)
     found = empty(rupture, tolerance)
-    numbers = _numbers(rupture, rebinding_rate, tolerance, math.inf)
+    numbers = numbers_of(rupture, rebinding_rate, tolerance, math.inf)
     settle_steady(float(speed), numbers, found.weight, found.stretch, found.width, found.lattice)
     return found
 
@@ -144,7 +144,7 @@ def advance(
         )
     before = cohorts.weight, cohorts.stretch, cohorts.width, cohorts.lattice
     after, sums = [np.zeros((rows, array.shape[1])) for array in before], np.empty((5, len(duration), rows))
-    step_rows(*before, share, slip, duration, _numbers(rupture, rebinding_rate, tolerance, largest), *after, sums)
+    step_rows(*before, share, slip, duration, numbers_of(rupture, rebinding_rate, tolerance, largest), *after, sums)
     return Cohorts(*after), sums
 
 
@@ -162,7 +162,7 @@ def moments(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
     the cells that are merged, which is what the tolerance resolves.
     """
     found = np.empty((5, len(cohorts.weight)))
-    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, _numbers(rupture, 0.0, tolerance, math.inf), found)
+    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, numbers_of(rupture, 0.0, tolerance, math.inf), found)
     return found
 
 
@@ -187,7 +187,7 @@ _KINK = 66.0
 
 
 @functools.lru_cache(maxsize=256)
-def _numbers(rupture: RuptureRate, rebinding_rate: float, tolerance: float, largest: float) -> Array:
+def numbers_of(rupture: RuptureRate, rebinding_rate: float, tolerance: float, largest: float) -> Array:
     """``Rules`` as an array.
 
     A two-point Gauss rule over a cell of width d errs by d⁴/4320 of the cell's bonds, a uniform segment

@@ -57,6 +57,10 @@ class _Stretched(Common):
         """Share of sites that are bound at rest [1]."""
         return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
 
+    def onset(self, speed: Array, *contact: Array | float) -> Onset:
+        """Onset of oscillations behind a spring at speeds [m/s], nan where it is not known."""
+        return Onset(*np.full((2, *speed.shape), np.nan))
+
     def _bonding(self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array) -> Bonding:
         """Readings of a population of these moments per site.
 
@@ -182,6 +186,8 @@ class Cohort(OverArea, _Stretched):
 
     state_class: ClassVar[type[Ages]] = Ages
     step_seconds: ClassVar[float] = 10e-6
+    driven: ClassVar[bool] = True
+    in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
         recipe = self.law, self.rebinding_rate
@@ -191,17 +197,21 @@ class Cohort(OverArea, _Stretched):
             first = cohorts.resting(*recipe, self.tolerance)
         else:
             first = cohorts.empty(self.law, self.tolerance)
-        rows = len(self.rows(noise))
+        rows = max(len(self.rows(noise)), len(motion.first))  # a drive that feels the friction has its members
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
     def advance(self, state: Ages, motions: Motions, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
         share, seen = self.kept(state.seen, radius)
         recipe, duration = (self.law, self.rebinding_rate, self.tolerance), motions.duration[:, 0]
         after, sums = cohorts.advance(state.cohorts, motions.slip, duration, *recipe, share=share)
-        return Ages(after, seen), self._bonding(*sums)
+        return Ages(after, seen), self.read(sums)
 
     def bonding(self, state: Ages) -> Bonding:
-        return self._bonding(*cohorts.moments(state.cohorts, self.law, self.tolerance))
+        return self.read(cohorts.moments(state.cohorts, self.law, self.tolerance))
+
+    def read(self, sums: Array) -> Bonding:
+        """Readings of populations of these ``cohorts.moments``."""
+        return self._bonding(*sums)._replace(stored=0.5 * self.site_density * self.bond_stiffness * sums[2])
 
     def steady(self, speed: Array) -> Bonding:
         rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]

@@ -31,14 +31,14 @@ _ContactStiffness = Annotated[
     Field(description='"half_space": that of the half-space under a uniform stress'),
 ]
 
-#: Columns of ``Driven.energies``: work of the drive; lost to damping, viscosity, rupture and to the area as it changes;
-#: stored now, and at the start.
-WORK, DAMPING, VISCOSITY, RUPTURE, AREA, STORED, FIRST = range(7)
+#: Columns of ``Driven.energies``: work of the drive; lost to damping, viscosity, rupture, snaps and to the area as it
+#: changes; stored now, and at the start.
+WORK, DAMPING, VISCOSITY, RUPTURE, SNAP, AREA, STORED, FIRST = range(8)
 #: Columns of the readings of a drive that feels the friction.
 READINGS = (
     "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
-    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_area", "energy_residual", "substeps",
-    "runaway_time",
+    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
+    "substeps", "runaway_time",
 )  # fmt: skip
 
 
@@ -65,8 +65,10 @@ class Driven(NamedTuple):
         Sub-steps since the start.
     runaway_time : array
         Time at which nothing held the body any longer [s], nan if never.
-    energies : array, shape (members, 7)
+    energies : array, shape (members, 8)
         Energies since the start [J], columns ``WORK`` to ``FIRST``.
+    acceleration : array
+        Acceleration of the interface in the last sub-step [m/s²], where bonds resolved by stretch use it, else 0.
     """
 
     position: Array
@@ -81,6 +83,7 @@ class Driven(NamedTuple):
     substeps: Array
     runaway_time: Array
     energies: Array
+    acceleration: Array
 
     def at(self, k: int) -> "Driven":
         """The slider at the end of step k of a block."""
@@ -122,7 +125,7 @@ class _Driven:
         speed = np.full(members, self._first_speed(times.duration))
         zero = np.zeros(members)
         state = Driven(*(zero for _ in Driven._fields))._replace(
-            body_speed=speed, speed=speed, runaway_time=np.full(members, np.nan), energies=np.zeros((members, 7))
+            body_speed=speed, speed=speed, runaway_time=np.full(members, np.nan), energies=np.zeros((members, 8))
         )
         return state, Motion(0, 0.0, 0.0, zero, zero, speed, speed)
 

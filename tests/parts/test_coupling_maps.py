@@ -1,0 +1,236 @@
+"""Slider and bonds resolved by stretch, solved together, against renewal theory, Volterra's equation, closed forms."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from helpers.driven import AREA, ENERGY, STRETCH, UNIT, force, marched, residual, scenario, spring
+from numpy.testing import assert_allclose
+
+import sim
+from sim.engine import Dice, follow, march, pack, unpack
+from sim.parts.bonds import Cohort
+from sim.parts.bonds.rupture import Catch, Constant, CutOff
+from sim.parts.drive import Steady as AtSpeed
+
+#: Way, share bound and force a site of a massless slider, from a collocation that agrees with itself to 5e-14.
+MASSLESS = {
+    1: (0.24906095818, 0.48098883322, 0.09501878084),
+    2: (0.68088419038, 0.43430069113, 0.18638231619),
+    3: (1.56682763855, 0.35697313147, 0.26866344723),
+    4: (4.68048270968, 0.19621361549, 0.30639034581),
+    5: (21.94669882582, 0.25170252458, 0.06106602348),
+    6: (22.50223838418, 0.36122338140, 0.14995523232),
+    8: (25.32320859919, 0.25646688168, 0.29353582802),
+}
+
+
+def driven(duration, steps, drive, tolerance, **keys):
+    """A lens whose bonds are cohorts held to a tolerance."""
+    return scenario(duration, steps, drive, make=functools.partial(Cohort, tolerance=tolerance), **keys)
+
+
+def reached(states):
+    """Way of the slider, share bound and force a site over the area at rest, in the units of the bonds."""
+    return np.array([
+        (state.drive.position[0] / STRETCH, 0.5 * state.bonding.fraction[0], state.bonding.stress[0] * AREA / UNIT)
+        for state in states
+    ])  # fmt: skip
+
+
+def off(states):
+    """Largest errors of way, share and force of a massless slider."""
+    found = reached([states[place] for place in MASSLESS])
+    return np.max(np.abs(found - np.array(list(MASSLESS.values()))), axis=0)
+
+
+def test_a_massless_slider_follows_its_reference_through_a_slip():
+    states, read = marched(driven(4.0, 8, spring(0.02, tolerance=1e-8), 1e-5))
+    assert np.all(off(states) < 1e-6)
+    assert_allclose(read["spring_force"], [state.bonding.stress[0] * AREA for state in states], rtol=1e-8, atol=1e-9)
+    assert residual(read) < 1e-7
+
+
+@pytest.mark.verify
+def test_a_massless_slider_follows_its_reference_to_the_last_of_its_digits():
+    states, read = marched(driven(4.0, 8, spring(0.02, tolerance=1e-10), 1e-10))
+    assert np.all(off(states) < 2e-9)
+    assert residual(read) < 1e-9
+
+
+def test_errors_and_the_missing_energy_fall_with_the_tolerance_as_of_a_method_of_order_two_or_more():
+    errors, missing, counts = [], [], []
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        states, read = marched(driven(4.0, 8, spring(0.02, tolerance=tolerance), 1e-3 * tolerance**0.5))
+        errors.append(off(states)[2])
+        missing.append(residual(read))
+        counts.append(read["substeps"][-1])
+    orders = -np.diff(np.log(errors)) / np.diff(np.log(counts))
+    assert np.all(orders > 2.0)
+    assert np.all(np.array(missing) < 10.0 * np.array([1e-4, 1e-6, 1e-8]))
+    assert missing[2] < missing[1] < missing[0]
+
+
+def test_the_static_peak_behind_a_spring_is_that_of_the_volterra_equation():
+    time = 1.92453394
+    before, peak, after = (
+        reached(marched(driven(time + late, 1, spring(0.02, tolerance=1e-8), 1e-6))[0][-1:])[0, 2]
+        for late in (-0.01, 0.0, 0.01)
+    )
+    assert_allclose(peak, 0.3102332895, rtol=1e-8)
+    assert max(before, after) < peak
+
+
+@pytest.mark.parametrize(
+    "keys",
+    [{}, {"mass": 1e-3, "damping": 1e-3}, {"viscosity": 0.1}, {"contact": 0.2},
+     {"contact": 0.2, "mass": 1e-3, "damping": 0.1, "viscosity": 0.03}],
+)  # fmt: skip
+def test_bonds_of_a_constant_rupture_rate_move_as_their_first_moment_does(keys):
+    # no closure: the first moment of such bonds is exact, and its slider is solved by another method
+    lens, recipe = (1.0, 4), {"rupture": Constant(rate=1.0)}
+    exact, _ = marched(scenario(*lens, spring(0.2, tolerance=1e-11, **keys), **recipe))
+    errors, missing, counts = [], [], []
+    for tolerance in (1e-5, 1e-8):
+        states, read = marched(driven(*lens, spring(0.2, tolerance=tolerance, **keys), tolerance, **recipe))
+        errors.append(np.max(np.abs(reached(states) - reached(exact))))
+        counts.append(read["substeps"][-1])
+        missing.append(residual(read))
+    assert missing[1] < 0.1 * missing[0] < 1e-5
+    assert math.log(errors[0] / errors[1]) / math.log(counts[1] / counts[0]) > 1.8
+
+
+@pytest.mark.parametrize(("x0", "time", "later"), [(0.5, 0.559773594776, ((0.5, 0.858292500361), (0.9, 1.90289022829))),
+                                                   (2.0, 0.0489005107, ())])  # fmt: skip
+def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(x0, time, later):
+    # E1(x(t)) = E1(x0) - k0 t; they are remade so rarely that it does not show
+    scene = driven(2.0 * time, 20, force(0.5 * x0, tolerance=1e-9), 1e-6, rebinding=1e-13)
+    first = next(march(scene, np.arange(1)))
+    first.bonds.cohorts.weight[0, 0] = 0.5
+    states = list(march(scene, np.arange(1), first))
+    assert_allclose(states[-1].drive.runaway_time, time, rtol=1e-7)
+    for share, stretch in later:
+        found = reached([states[round(10 * share) - 1]])[0]
+        assert_allclose(found[2] / (2e-13 * found[1]), stretch, rtol=1e-7)
+
+
+def test_a_force_makes_creep_at_the_speed_of_steady_sliding_under_it():
+    # 0.16660872 a site is the friction at a speed of 1 stretch a mean life
+    states, read = marched(driven(40.0, 4, force(0.16660871, tolerance=1e-6), 1e-6))
+    assert_allclose(states[-1].drive.speed / STRETCH, 1.0, rtol=1e-5)
+    assert_allclose(reached(states[-1:])[0, 1], 0.37356992, rtol=1e-5)
+    assert np.isnan(read["runaway_time"]).all()
+
+
+def test_a_force_above_what_steady_bonds_can_bear_runs_away_and_one_below_does_not():
+    for load, runs in ((0.99 * 0.218485, False), (1.05 * 0.218485, True)):
+        _, read = marched(driven(60.0, 2, force(load, tolerance=1e-5), 1e-5))
+        assert np.isfinite(read["runaway_time"][-1]) == runs
+
+
+def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_speed():
+    for keys in ({}, {"mass": 1e-3, "damping": 2e-3, "contact": 0.5}):
+        lens = {"share": 0.3, "start": "steady"}
+        ends = [
+            list(march(driven(0.5, 2, drive, 1e-8, **lens), np.arange(1)))[-1].bonding.stress
+            for drive in (spring(1.0, start="steady", tolerance=1e-8, **keys), AtSpeed(speed=10.0 * STRETCH))
+        ]
+        assert_allclose(ends[0], ends[1], rtol=1e-8)
+
+
+def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness():
+    given = [s.bonding.stress[0] for s in march(driven(1.0, 10, AtSpeed(speed=10.0 * STRETCH), 1e-7), np.arange(1))]
+    errors = []
+    for stiffness in (40.0, 4e2, 4e3):
+        states, _ = marched(driven(1.0, 10, spring(stiffness, tolerance=1e-7), 1e-7))
+        errors.append(np.max(np.abs([s.bonding.stress[0] for s in states] - np.array(given))) / max(given))
+    assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.05)
+
+
+@pytest.mark.parametrize("keys", [{}, {"mass": 1e-3, "damping": 1e-3}, {"contact": 0.2, "viscosity": 1e-3}])
+def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys):
+    scene = driven(4.0, 80, spring(0.02, **keys), 1e-4, share=0.5)
+    straight = list(march(scene, np.arange(3)))
+    slip = max(range(80), key=lambda k: straight[k].drive.speed[0])
+    assert straight[slip].drive.speed[0] > 3.0 * 10.0 * STRETCH
+    again = list(march(scene, np.arange(3), unpack(scene, pack(straight[slip]))))
+    alone = list(march(scene, np.array([1])))
+    one, other, single = (pack(states[-1]) for states in (straight, again, alone))
+    assert all(np.array_equal(one[key], other[key], equal_nan=True) for key in one)
+    for key, values in single.items():
+        whole = one[key][1:2] if one[key].ndim and len(one[key]) == 3 else one[key]
+        assert np.array_equal(whole, values, equal_nan=True), key
+    _, passed = follow(scene, Dice.of(scene.seed, np.arange(3)), None, range(0, 81, 4))
+    assert np.array_equal(passed.driven[:, 0, 2], [state.drive.spring_force[0] for state in straight[::4]])
+
+
+@pytest.mark.parametrize("stiffness", [4e-8, 1.0, 4e4])
+@pytest.mark.parametrize("keys", [{}, {"damping": 1e-3}, {"mass": 1e-9}, {"contact": 1.0}])
+def test_springs_from_soft_to_stiff_keep_the_energies_balanced(stiffness, keys):
+    _, read = marched(driven(20.0, 5, spring(stiffness, **keys), 1e-3, share=0.3))
+    assert residual(read) < 1e-5
+
+
+@pytest.mark.parametrize("start", ["bonded", "empty", "steady"])
+def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_signs(start):
+    turns = {
+        "time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0),
+        "value": tuple(v * STRETCH for v in (10.0, 10.0, -10.0, -10.0, 0, 0)),
+    }
+    states, read = marched(driven(8.0, 16, spring(0.2, turns, start_after=1.0), 1e-4, share=0.5, start=start))
+    assert_allclose(read["stage_position"][[2, 6, 10, 16]] / STRETCH, [0.0, 20.0, 0.0, 0.0], atol=1e-12)
+    assert states[6].bonding.stress[0] > 0.0 > states[10].bonding.stress[0]
+    assert abs(states[16].bonding.stress[0]) < 0.2 * abs(states[10].bonding.stress[0])
+    assert residual(read) < 1e-5
+
+
+def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again():
+    base = {"time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0), "value": tuple(4e-3 * v for v in (1, 1, -1, -1, 1, 1))}
+    lens = {"share": 0.5, "load": base, "after_pull_off": "reattach"}
+    for keys in ({}, {"area": "carried"}):
+        make = functools.partial(Cohort, tolerance=1e-4, **keys)
+        scene = scenario(3.0, 30, spring(1.0), make=make, **lens)
+        states, read = marched(scene)
+        open_ = np.isnan([state.contact.radius[0] for state in states])
+        assert open_[11:20].all()
+        assert not open_[21:].any()
+        assert_allclose(read["spring_force"][12:20], 0.0, atol=1e-12 * UNIT)
+        assert read["spring_force"][-1] > 0.05 * UNIT
+        assert np.isfinite(read["energy_residual"]).all()
+
+
+def test_bonds_that_only_a_stretch_breaks_snap_where_nothing_delays_them():
+    # all unstretched at first, they bear n κ ℓ and break together: theirs is ½ n κ ℓ², what the spring has the snap's
+    cut = CutOff(stretch=3.0 * STRETCH)
+    states, read = marched(driven(20.0, 40, spring(0.02, 10.0), 1e-4, rupture=cut, rebinding=1e-9))
+    force = reached(states)[:, 2]
+    falls = 3.0 * 1.02 / 0.02 / 10.0
+    held = np.linspace(0.0, 20.0, 41) < falls
+    assert_allclose(force[held], 10.0 * 0.02 / 1.02 * np.linspace(0.0, 20.0, 41)[held], rtol=1e-6)
+    assert np.all(force[~held] < 1e-6)
+    assert_allclose(read["dissipated_by_snaps"][-1] / ENERGY, 0.5 * 9.0 / 0.02, rtol=1e-6)
+    assert_allclose(read["dissipated_by_rupture"][-1] / ENERGY, 0.5 * 9.0, rtol=1e-6)
+    assert residual(read) < 1e-9
+
+
+def test_bonds_of_many_stretches_snap_again_and_again_behind_a_soft_spring_and_never_behind_a_stiff_one():
+    cut = CutOff(stretch=STRETCH)
+    for stiffness, often in ((0.05, True), (20.0, False)):
+        _, read = marched(driven(200.0, 50, spring(stiffness, 1.0), 1e-4, rupture=cut))
+        snaps = np.diff(read["dissipated_by_snaps"]) > 1e-9 * read["drive_work"][-1]
+        assert (np.sum(snaps) > 5) == often
+        assert residual(read) < 1e-6
+
+
+def test_catch_bonds_feel_a_drive():
+    catch = Catch(catch_rate=1.0, catch_force=STRETCH * 4e-4, slip_rate=0.2, slip_force=STRETCH * 4e-4)
+    states, read = marched(driven(4.0, 8, spring(0.02), 1e-5, rupture=catch))
+    assert residual(read) < 1e-5
+    assert np.all(np.diff(reached(states)[:4, 2]) > 0.0)
+
+
+def test_what_would_run_shows_the_slider_of_bonds_whose_onset_is_not_known_in_closed_form():
+    text = sim.check(driven(1.0, 4, spring(1.0, mass=1e-3), 1e-4))
+    assert "natural frequency" in text.partition("\nslider\n")[2]
+    assert "oscillates below" not in text
