@@ -14,14 +14,18 @@ the attributes `units`, `long_name` and `symbol`. *Sweep* stands for the dimensi
 with an underscore for each dot (`contact_load`); a run without a sweep has none.
 """
 SECTIONS = {
-    "Coordinates": "",
+    "Coordinates": """`speed` is an auxiliary coordinate, too, where it is the same for all members, as it is if a drive
+prescribes it: `dataset.contact_area.mean("member").plot(x="speed")`.
+""",
     "Recorded at each time": """A variable that differs between members has the dimension `member`, too. With
 `per_member = false` it becomes `<name>_mean`, `<name>_std` and `<name>_sem` instead: mean, standard deviation and
 standard error of the mean over the members.
 """,
     "Numbers of the scene": "Every quantity of the scenario is a variable, too, named as its key with underscores.\n",
     "Known before the run": "As far as the model of `[shear]` has them. The largest errors are attributes, too.\n",
-    "Stress maps": "",
+    "Stress maps": """`dataset.shear_map[0, 0].plot(x="x")` draws a map with the sliding direction across, as
+`sim plot OUT.nc map` does.
+""",
 }
 MAPS = "record.maps"
 COORDINATES = (

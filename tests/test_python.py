@@ -8,9 +8,11 @@ from pathlib import Path
 import netCDF4
 import numpy as np
 import pytest
+import xarray as xr
 from click.testing import CliRunner
 
 import sim
+from sim import analysis
 from sim.cli import cli
 
 SCENE = {
@@ -70,6 +72,27 @@ def test_progress_is_told_to_a_function_or_shown(capsys, monkeypatch):
     monkeypatch.setattr("time.monotonic", iter(range(0, 10_000, 31)).__next__)
     sim.run(SCENE, progress=True)
     assert "100 % of 11 member-steps" in capsys.readouterr().err
+
+
+def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statistics(file, dataset, tmp_path):
+    spring = {"model": "spring", "stage": "1 mm/s", "stiffness": "1 N/m", "damping": 10, "contact_stiffness": "rigid"}
+    assert "speed" in sim.run(swapped(drive=spring)).data_vars
+    with sim.open(file) as opened, xr.open_dataset(file, decode_times=False) as plainly:
+        for found in (dataset, opened, plainly):
+            assert "speed" in found.contact_area.coords
+            assert float(found.contact_area.swap_dims(t="speed").sel(speed=5e-3)) == dataset.contact_area[5]
+            variable = found.reset_coords("speed")
+            for function in (analysis.observables, analysis.statistics, analysis.events, analysis.shares):
+                xr.testing.assert_identical(function(found), function(variable))
+            assert analysis.table(found) == analysis.table(variable)
+        opened.to_netcdf(tmp_path / "again.nc")
+    assert "speed" in sim.open(tmp_path / "again.nc").coords
+
+
+def test_dir_lists_what_is_public():
+    for module in (sim, sim.analysis, sim.laws, sim.plots, sim.spectrum):
+        assert set(dir(module)) == set(module.__all__)
+        assert all(hasattr(module, name) for name in dir(module))
 
 
 def test_check_reads_as_the_command_prints(tmp_path):

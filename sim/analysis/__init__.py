@@ -25,3 +25,7 @@ __all__ = [
     "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables", "shares",
     "skewness_error", "slips", "statistics", "stick_slip", "summary", "sweep_dims", "table", "to_csv", "where",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -7,7 +7,7 @@ import numpy as np
 import xarray as xr
 
 from sim.analysis.observables import masks, ordered, pure
-from sim.analysis.scene import MEMBERS, answered, control, setting, where_recorded, word
+from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, where_recorded, word
 from sim.analysis.stick_slip import stick_slip
 
 #: A maximum is one if it stands above the ends of the run by more than rounding.
@@ -20,6 +20,7 @@ _NOTHING = 1e-12
 _PEAKS = (("peak_stress", "peak", "shear_stress", "Pa"), ("peak_friction", "peak_friction", "friction_force", "N"))
 
 
+@of_dataset
 def events(dataset: xr.Dataset) -> xr.Dataset:
     """Events of a run, once per member, or once for all where they agree.
 
@@ -77,6 +78,7 @@ def _masks(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset({f"time_masked{suffix}": pure(share, "share of the time in which adhesion was masked")})
 
 
+@of_dataset
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
     """The friction peak after a start from rest, and the friction maximum of a ramp of the speed.
 

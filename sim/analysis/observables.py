@@ -10,7 +10,7 @@ import itertools
 import numpy as np
 import xarray as xr
 
-from sim.analysis.scene import MEMBERS, answered, control, setting, stays_held, where_recorded, word
+from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, stays_held, where_recorded, word
 from sim.laws import jkr
 
 KEPT = ("mean", "std", "sem")
@@ -33,6 +33,7 @@ def pure(values: xr.DataArray, text: str, symbol: str = "") -> xr.DataArray:
     return ordered(values).assign_attrs(units="1", long_name=text, symbol=symbol)
 
 
+@of_dataset
 def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
     """Radii of the contacts with the full work of adhesion and with none, held as the sphere is.
 
@@ -54,6 +55,7 @@ def full_area(dataset: xr.Dataset) -> xr.DataArray:
     return np.pi * reference_radii(dataset)["radius_jkr"] ** 2
 
 
+@of_dataset
 def bond_work(dataset: xr.Dataset) -> xr.DataArray:
     """Work of adhesion that the bonds left would give without fluctuations: Δγ(fraction) [J/m^2].
 
@@ -66,6 +68,7 @@ def bond_work(dataset: xr.Dataset) -> xr.DataArray:
     return ordered(left).assign_attrs(units="J/m^2", symbol="Δγ", long_name="work of adhesion of the bonds left")
 
 
+@of_dataset
 def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     """The shares of JKR's area that each mechanism takes, per member and time.
 
@@ -151,6 +154,7 @@ def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(found, attrs=dataset.attrs)
 
 
+@of_dataset
 def observables(dataset: xr.Dataset) -> xr.Dataset:
     """Every recorded trajectory, per member where members differ, and what follows from them.
 
@@ -189,6 +193,7 @@ def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     return {f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text) for kind in KEPT}
 
 
+@of_dataset
 def settled(trajectories: xr.Dataset) -> xr.Dataset:
     """Observables averaged over the second half of the run, one record long.
 

@@ -9,9 +9,9 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, get_args
+from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args
 
 import numpy as np
 import xarray as xr
@@ -19,6 +19,9 @@ import xarray as xr
 from sim.numerics import files, hdf5
 from sim.units.recorded import Recorded
 from sim.units.refusals import BadInput, refuse_old
+
+Given = ParamSpec("Given")
+T = TypeVar("T")
 
 MEMBERS = "member"
 #: What is said of a file that cannot be read.
@@ -65,7 +68,23 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         if changed := _fault(dataset):
             raise BadInput([f"{path}: {changed}: it was changed after its run; run the scenario again"])
         refused.pop_all()
-    return dataset
+    return hdf5.located(dataset)
+
+
+def plain(dataset: xr.Dataset) -> xr.Dataset:
+    """A dataset whose speed is a variable like others, as statistics need it."""
+    return dataset.reset_coords("speed") if "speed" in dataset.coords else dataset
+
+
+def of_dataset(function: Callable[Given, T]) -> Callable[Given, T]:
+    """Let a function of a dataset take one whose speed is a coordinate, too."""
+
+    @functools.wraps(function)
+    def taking(*given: Given.args, **named: Given.kwargs) -> T:
+        first: Any = plain(given[0]) if given and isinstance(given[0], xr.Dataset) else None
+        return function(*given, **named) if first is None else function(first, *given[1:], **named)  # type: ignore[arg-type]
+
+    return taking
 
 
 def _fault(dataset: xr.Dataset) -> str:

@@ -13,7 +13,7 @@ from scipy import special
 from sim.analysis.blocks import blocks
 from sim.analysis.correlation import autocovariance, inflation, time_of
 from sim.analysis.observables import all_observables
-from sim.analysis.scene import MEMBERS, sweep_dims
+from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quantile_ranks
 
 #: From so many members on the spread of their means gives the error, whatever the correlation in time.
@@ -233,6 +233,7 @@ def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str
     return series.found()
 
 
+@of_dataset
 def distribution(dataset: xr.Dataset) -> xr.Dataset:
     """Statistics of every observable over the members and the second half of the run, at each point of the sweep.
 

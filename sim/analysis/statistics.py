@@ -12,7 +12,7 @@ from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import KEPT, charged_in_turn, observables, pure, reference_radii, share_observables
-from sim.analysis.scene import MEMBERS, sweep_dims
+from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 from sim.units.refusals import renamed
@@ -106,6 +106,7 @@ def averaging(dataset: xr.Dataset, late: bool) -> str:
     return f"mean over the {' and '.join(over)}" if over else ""
 
 
+@of_dataset
 def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     """Mean, spread, quantiles and skewness over the members, each mean and quantile with its error.
 
@@ -253,6 +254,7 @@ def _at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.where(share > 0.0, low + share * (high - low), np.where(known, low, np.nan))
 
 
+@of_dataset
 def statistics(dataset: xr.Dataset) -> xr.Dataset:
     """Statistics over the members of everything recorded, at each sweep value and time.
 
@@ -278,6 +280,7 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
     )
 
 
+@of_dataset
 def shares(dataset: xr.Dataset) -> xr.Dataset:
     """Which share of the lost contact area comes from which mechanism.
 

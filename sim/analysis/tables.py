@@ -15,7 +15,7 @@ import xarray as xr
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.observables import all_observables, settled
-from sim.analysis.scene import answered, is_stationary, resolved, stays_held, sweep_dims, word
+from sim.analysis.scene import answered, is_stationary, of_dataset, resolved, stays_held, sweep_dims, word
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary
 from sim.numerics.files import output
 from sim.units.notation import concise, scaled
@@ -92,6 +92,7 @@ _NO_SHARES = ("bond_fraction", "slip_count")
 _ROUNDING = 1e-13
 
 
+@of_dataset
 def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """The statistics in about a dozen rows for the terminal.
 
@@ -150,6 +151,7 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     return [*dict.fromkeys(lines), *filter(None, [words])]
 
 
+@of_dataset
 def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """What each point of the sweep has once in its whole run, in a dozen rows at most; none where there is nothing.
 
@@ -295,6 +297,7 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         beside.write_bytes(text)
 
 
+@of_dataset
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
     found = statistics(dataset)

@@ -19,6 +19,8 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.sweep import Axis, written
 
 _FLAGS = "detached in_contact"
+#: The auxiliary coordinate of all that is recorded over time, where it is prescribed.
+SPEED = "speed"
 _STATISTICS = {
     "mean": "ensemble mean of",
     "std": "standard deviation over the ensemble of",
@@ -183,6 +185,11 @@ def _derived_variables(made: Outline, plan: Plan) -> None:
             made.attributes[name] = max(values, key=abs)
 
 
+def _prescribed(plan: Plan) -> bool:
+    """Whether the speed is recorded and the same for all members, so that it serves as a coordinate."""
+    return any(one.name == SPEED and not plan.varies(one) for one in plan.variables)
+
+
 def _recorded(made: Outline, plan: Plan, recorded: Variable) -> Place:
     """Make the variables of a quantity at each record, or of each whole run."""
     shape, varies, whole = _sweep_shape(plan), plan.varies(recorded), recorded in plan.largest
@@ -197,6 +204,8 @@ def _recorded(made: Outline, plan: Plan, recorded: Variable) -> Place:
     for statistic, of in (_STATISTICS if varies and not each else {"": ""}).items():
         kind = "f4" if plan.scenario.record.precision == "float32" and not (statistic or whole) else "f8"
         flags: dict[str, Any] = {} if whole else {"compression": plan.scenario.record.compression}
+        if not whole and recorded.name != SPEED and _prescribed(plan):
+            flags["coordinates"] = SPEED
         if recorded.name == "in_contact" and not statistic:
             kind, flags = "i1", {"compression": flags["compression"].replace("digits", "zlib")}
             flags |= {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}

@@ -28,6 +28,7 @@ from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variab
 from sim.ensemble.workers import share_out
 from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, claim, explained
+from sim.numerics.hdf5 import located
 from sim.parts.drive import READINGS
 from sim.parts.shear.carried import CarriedProcess
 from sim.parts.shear.modal import ModalProcess
@@ -113,7 +114,7 @@ def run(
             simulate(plan, kept, progress, jobs, stop, scheduler=scheduler)
             stage("writing")
             made = outline(plan)
-            return xarray.Dataset(in_memory(made, kept), attrs=made.attributes)
+            return located(xarray.Dataset(in_memory(made, kept), attrs=made.attributes))
     claim(Path(to), replace or resume, files_read(scenario), BESIDE)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():

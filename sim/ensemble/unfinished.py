@@ -26,6 +26,7 @@ from sim.ensemble.part_files import (
 )  # fmt: skip
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
+from sim.numerics.hdf5 import located
 from sim.scenario.scenario import Scenario
 from sim.scenario.source import Files, Source
 from sim.units.kept import digest
@@ -103,7 +104,7 @@ def dataset(target: Path) -> Any:
             values = LazilyIndexedArray(_lazy(made, parts, quantities[name], name))
         variables[name] = one.dimensions, values, one.attributes
     done = sum(task.done(parts) for task in plan.tasks())
-    return xarray.Dataset(variables, attrs=made.attributes | {"share_done": done / work(plan)})
+    return located(xarray.Dataset(variables, attrs=made.attributes | {"share_done": done / work(plan)}))
 
 
 class _Found(dict[str, PartFiles]):

@@ -3,8 +3,14 @@
 import importlib
 from types import ModuleType
 
+__all__ = ["disc", "halfspace", "jkr", "mixed_mode", "profiles", "reversible", "schallamach", "theories"]
+
 
 def __getattr__(name: str) -> ModuleType:
-    if name in ("disc", "halfspace", "jkr", "mixed_mode", "profiles", "reversible", "schallamach", "theories"):
+    if name in __all__:
         return importlib.import_module(f"sim.laws.{name}")
     raise AttributeError(f"module 'sim.laws' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__

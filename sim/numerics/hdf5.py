@@ -139,6 +139,17 @@ def lazily(path: str | os.PathLike[str]) -> "xarray.Dataset":
         return xr.open_dataset(NetCDF4DataStore(file, lock=HDF5), decode_times=False, decode_coords=False)
 
 
+def located(dataset: "xarray.Dataset") -> "xarray.Dataset":
+    """A dataset whose prescribed speed is a coordinate, as its variables name it."""
+    named = [name for name, variable in dataset.variables.items() if variable.attrs.get("coordinates") == "speed"]
+    if not named or "speed" not in dataset:
+        return dataset
+    found = dataset.assign({name: dataset[name].copy(deep=False) for name in named}).set_coords("speed")
+    for name in named:
+        found[name].attrs.pop("coordinates")  # xarray writes it again where a dataset is saved
+    return found
+
+
 def tables(text: object) -> dict[str, Any]:
     """The tables that an attribute holds as JSON; none for what is no such text, or nests too deeply."""
     try:

@@ -12,7 +12,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
-from sim.analysis.scene import answered, claim
+from sim.analysis.scene import answered, claim, of_dataset
 from sim.numerics.files import output
 from sim.plots import panels
 from sim.plots.bond_laws import rest_of
@@ -55,11 +55,13 @@ KINDS: dict[str, Kind] = {
 }
 
 
+@of_dataset
 def default(dataset: xr.Dataset) -> str:
     """The kind of figure that fits a dataset best."""
     return next(name for name, kind in KINDS.items() if not _missing(dataset, name) and kind.fits(dataset))
 
 
+@of_dataset
 def drawable(dataset: xr.Dataset) -> list[str]:
     """Kinds of figures whose needs a dataset meets."""
     return [kind for kind in KINDS if not _missing(dataset, kind)]
@@ -77,6 +79,7 @@ def _missing(dataset: xr.Dataset, kind: str) -> str:
     return ""
 
 
+@of_dataset
 def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
     """Draw a figure of a dataset.
 

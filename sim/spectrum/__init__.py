@@ -11,3 +11,7 @@ __all__ = [
     "AnisotropicGaussian", "Band", "BondMade", "Gaussian", "Measured", "Ripple", "SelfAffine", "Spectrum",
     "Tabulated", "VonKarman", "disc_energy", "marginal_energy", "periodogram", "radial_average",
 ]  # fmt: skip
+
+
+def __dir__() -> list[str]:
+    return __all__

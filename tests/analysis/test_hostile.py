@@ -285,7 +285,7 @@ def test_a_map_that_is_declared_and_not_there_is_refused(here, side):
 
 
 def test_a_map_of_many_numbers_is_refused_before_it_is_read(here, monkeypatch):
-    monkeypatch.setattr("sim.spectrum.measured._MOST", 255)
+    monkeypatch.setattr("sim.spectrum.map_file._MOST", 255)
     assert '"shear_map" has more than' in mapped(lambda file: None).stderr
 
 
