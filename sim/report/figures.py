@@ -13,6 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from sim.analysis import is_stationary
 from sim.plots import kinds
 from sim.units.terminal import one_line
 
@@ -72,7 +73,10 @@ def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
     """The figures of a dataset: the one that fits it best, then others that show more of it."""
     best = kinds.default(dataset)
     others = [kind for kind in kinds.drawable(dataset) if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
-    for number, kind in enumerate(dict.fromkeys([best, *others])):
+    # the end of a run that is on its way says little, and time is no more than another axis for a speed that rises
+    less = {"sweep": not is_stationary(dataset), "time": best == "curve"}
+    shown = [best, *(kind for kind in others if not less.get(kind, False))]
+    for number, kind in enumerate(dict.fromkeys(shown)):
         found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
         try:
             yield found._replace(svg=svg_of(kinds.draw(dataset, kind), f"f{number}-"))
