@@ -198,8 +198,9 @@ def _around(scenario: Scenario, touch: Touching, energy: Array, steps: range) ->
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
     area = scenario.contact_area
     held = cast(tuple[Held, Held], (first.held, last.held))
+    stays = contact.lags or not (contact.changes or bonded or contact.reversible)
     solid = *bodies, scenario.solid.effective[0]
-    return Around(touch.radius, bare, bonded, contact.reversible, held, contact.lags, *solid, area)
+    return Around(touch.radius, bare, bonded, contact.reversible, held, stays, *solid, area)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

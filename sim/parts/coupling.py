@@ -258,10 +258,10 @@ def _numbers(drive: Force | Spring, bonds: _Driven, around: Around, units: _Unit
     slider = Slider(*body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
     if isinstance(bonds, _WITH_STRETCH):
         law, of_rest = bonds.law, bonds.bound_at_rest
-        breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, law.limit / stretch, bonds.rebinding_rate, 1.0)
+        breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, stretch / law.limit, bonds.rebinding_rate, 1.0)
     else:
         slows = stretch / bonds.critical_speed if isinstance(bonds, Steady) else 0.0
-        breaking, of_rest = Law(0.0, 0.0, math.inf, 0.0, 1.0, 1.0, slows), 1.0
+        breaking, of_rest = Law(0.0, 0.0, 0.0, 0.0, 1.0, 1.0, slows), 1.0
     taken = 0.0
     if around.reversible:
         stress = density * stretch

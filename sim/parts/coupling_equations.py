@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.numerics.jit import device
+from sim.numerics.jit import device, inlined
 from sim.parts.exchange import Array
 
 _S6 = math.sqrt(6.0)
@@ -33,8 +33,6 @@ RATES = np.array(
 )
 BENDS = np.array([[sum(row[k] * RATES[k, j] for k in range(3)) for j in range(3)] for row in RATES])
 _OFF = np.array([sum(row) for row in RATES])
-#: Weights of the nodes in a mean slope.
-WEIGHTS = np.array([1.0, 1.0, 1.0]) / 3.0
 
 
 def _modes() -> tuple[float, complex, Array, Array]:
@@ -55,6 +53,10 @@ PACE, TURNING, FORTH, BACK = _modes()
 #: the squared speed of the interface over the clock step, acceleration of the interface.
 FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED, SQUARE, BEND = range(15)
 COLUMNS = 15
+#: Rows of the room for a sub-step, each with what stands at its three nodes: first the unknowns slip, u, N, M, then
+#: their residuals, the unknowns of the last sub-step, contact radii, forces on a body that stays, areas, k_t; and
+#: length and root of the error of the last sub-step.
+RIGHT, PAST, RADII, PULLS, AREAS, FIRMS, LAST, ROOM = 4, 8, 12, 13, 14, 15, 16, 17
 
 
 class Slider(NamedTuple):
@@ -71,14 +73,14 @@ class Slider(NamedTuple):
 
 
 class Law(NamedTuple):
-    """Numbers of the bonds: k0, its growth with the stretch (1 or 0), cut-off stretch, k_on, scale of a stretch.
+    """Numbers of the bonds: k0, its growth with the stretch (1 or 0), 1/cut-off stretch, k_on, scale of a stretch.
 
     Bonds without a stretch have the ``sense`` of the sliding, 1 or -1, else 0, and a share 1/(1 + ``slows`` speed).
     """
 
     rate: float
     softness: float
-    limit: float
+    cuts: float
     binding: float
     scale: float
     sense: float = 0.0
@@ -156,11 +158,11 @@ def compliance(radius, slider):
 @device
 def kinetics(bound, moment, speed, law):
     """Ṅ and its slopes over N and M; Ṁ and its slope over N; that over M, and over the speed; Ṅ's; k, \\|speed\\|/l."""
-    rate, softness, limit, binding, _, _, _ = law
+    rate, softness, cuts, binding, _, _, _ = law
     stretch = moment / bound if bound > 0.0 else 0.0
     k = rate * math.exp(min(softness * math.fabs(stretch), 690.0))
     steeper = math.copysign(k * softness, stretch)
-    travel, turn = math.fabs(speed) / limit, math.copysign(1.0 / limit, speed)
+    travel, turn = math.fabs(speed) * cuts, math.copysign(cuts, speed)
     to_bound = binding * (1.0 - bound) - (k + travel) * bound, -binding - k - travel + steeper * stretch, -steeper
     to_moment = bound * speed - (k + 2.0 * travel) * moment, speed + steeper * stretch * stretch
     moment_turn = -(k + 2.0 * travel) - steeper * stretch, bound - 2.0 * turn * moment
@@ -198,98 +200,121 @@ def _sum(weights, i, values, k):
     return weights[i, 0] * values[k, 0] + weights[i, 1] * values[k, 1] + weights[i, 2] * values[k, 2]
 
 
-@device
-def equations(row, z, start, step, bare, slider, law, held, piece, right, radii):
-    """Residuals at the three nodes for slip, u, N, M there, and their slopes, a mean over the nodes.
+@inlined
+def equations(row, room, start, step, bare, slider, law, held):
+    """Residuals at the three nodes for slip, u, N, M there, and their slopes at the middle one.
 
-    ``radii``: contact radii at the nodes, which the next ones are searched from. The slopes are those of the balance of
-    forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ; nan where there is no equilibrium.
+    The slopes are those of the balance of forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ; nan where
+    there is no equilibrium.
     """
-    _, mass, damping, viscosity, _, _, _, _ = slider
-    balance = bending = thickness = u_bound = u_moment = u_speed = 0.0
-    n_bound = n_moment = n_speed = m_bound = m_moment = m_speed = 0.0
+    stiffness, mass, damping, viscosity, _, _, _, _ = slider
+    over = 1.0 / step
+    radius, area, by_bound, by_moment = row[RADIUS], 0.0, 0.0, 0.0
+    if held[0] > 0.0:
+        area = math.pi * radius * radius / held[10]
+    of_balance, of_u = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    of_bonds = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        time, bound, moment = start + NODES[i] * step, row[BOUND] + z[2, i], row[MOMENT] + z[3, i]
-        speed = _sum(RATES, i, z, 0) / step
-        body = speed + _sum(RATES, i, z, 1) / step
-        radius, area, by_bound, by_moment = contact_area(bound, moment, time, radii[i], bare, held)
+        bound, moment = row[BOUND] + room[2, i], row[MOMENT] + room[3, i]
+        if held[0] == 0.0:
+            now = start + NODES[i] * step
+            radius, area, by_bound, by_moment = contact_area(bound, moment, now, room[RADII, i], bare, held)
+            room[RADII, i] = radius
         if not (bound >= 0.0 and area >= 0.0):
             return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        radii[i] = radius
+        speed = _sum(RATES, i, room, 0) * over
+        body = speed + _sum(RATES, i, room, 1) * over
         stress = moment + viscosity * speed
         yields, softer = compliance(radius, slider)
-        softer *= held[10] / (2.0 * math.pi * radius) * area * stress if radius > 0.0 else 0.0
-        to_bound, to_moment, thick = by_bound * stress, area + by_moment * stress, area * viscosity
-        right[0, i] = area * stress + damping * body - pull_on(time, start, z[0, i] + z[1, i], row, slider, piece)
+        room[RIGHT, i] = area * stress + damping * body - room[PULLS, i] + stiffness * (room[0, i] + room[1, i])
         if mass > 0.0:
-            bend = (_sum(BENDS, i, z, 0) + _sum(BENDS, i, z, 1)) / step - _OFF[i] * row[BODY]
-            right[0, i] += mass * bend / step
-        right[1, i] = row[SHEARED] + z[1, i] - yields * area * stress
-        share = WEIGHTS[i]
-        balance += share * to_bound
-        bending += share * to_moment
-        thickness += share * thick
-        u_bound -= share * (yields * to_bound + softer * by_bound)
-        u_moment -= share * (yields * to_moment + softer * by_moment)
-        u_speed -= share * yields * thick
+            bend = (_sum(BENDS, i, room, 0) + _sum(BENDS, i, room, 1)) * over - _OFF[i] * row[BODY]
+            room[RIGHT, i] += mass * bend * over
+        room[RIGHT + 1, i] = row[SHEARED] + room[1, i] - yields * area * stress
         if law[5] != 0.0:  # bonds without a stretch follow the speed at once
             left = share_left(speed, law)
-            right[2, i], right[3, i] = bound - left, moment - law[5] * bound
-            n_bound -= share
-            n_speed -= share * law[6] * law[5] * left * left
-            m_bound += share * law[5]
-            m_moment -= share
+            room[RIGHT + 2, i], room[RIGHT + 3, i] = bound - left, moment - law[5] * bound
+            if i == 1:
+                of_bonds = -1.0, 0.0, -law[6] * law[5] * left * left, law[5], -1.0, 0.0
         else:
             of_bound, of_moment, on, turn, _, _ = kinetics(bound, moment, speed, law)
-            right[2, i] = _sum(RATES, i, z, 2) / step - of_bound[0]
-            right[3, i] = _sum(RATES, i, z, 3) / step - of_moment[0]
-            n_bound += share * of_bound[1]
-            n_moment += share * of_bound[2]
-            n_speed += share * turn
-            m_bound += share * of_moment[1]
-            m_moment += share * on[0]
-            m_speed += share * on[1]
-    of_bonds = n_bound, n_moment, n_speed, m_bound, m_moment, m_speed
-    return balance, bending, thickness, u_bound, u_moment, u_speed, *of_bonds
+            room[RIGHT + 2, i] = _sum(RATES, i, room, 2) * over - of_bound[0]
+            room[RIGHT + 3, i] = _sum(RATES, i, room, 3) * over - of_moment[0]
+            if i == 1:
+                of_bonds = of_bound[1], of_bound[2], turn, of_moment[1], on[0], on[1]
+        if i == 1:
+            of_balance = by_bound * stress, area + by_moment * stress, area * viscosity
+            if yields > 0.0:
+                softer *= held[10] / (2.0 * math.pi * radius) * area * stress
+                of_u = (
+                    -yields * of_balance[0] - softer * by_bound,
+                    -yields * of_balance[1] - softer * by_moment,
+                    -yields * of_balance[2],
+                )
+    return of_balance + of_u + of_bonds
 
 
 @device
-def resolved(rate, slopes, slider, law, balance, yielding, bonds, stretches):
-    """Slip, u, N and M that take the residuals away of a mode of the method, in which a derivative is a ``rate``."""
+def _over(number):
+    """1/number, of a complex one with a single division."""
+    return number.conjugate() * (1.0 / (number.real * number.real + number.imag * number.imag))
+
+
+@device
+def _resolved(rate, slopes, slider, law):
+    """How slip, u, N, M take away residuals of a mode of the method, in which a derivative is a ``rate``.
+
+    N and M over their residuals, and over the slip; u over the slip; the slip over all residuals.
+    """
+    to_bound, to_moment, thick, u_bound, u_moment, u_speed = slopes[:6]
     n_bound, n_moment, n_speed, m_bound, m_moment, m_speed = slopes[6:]
     own = rate if law[5] == 0.0 else 0.0 * rate
     n, m = own - n_bound, own - m_moment
-    scale = 1.0 / (n * m - n_moment * m_bound)
-    bound, moment = (m * bonds + n_moment * stretches) * scale, (m_bound * bonds + n * stretches) * scale
-    by_slip = rate * scale
-    bound_slip, moment_slip = (m * n_speed + n_moment * m_speed) * by_slip, (m_bound * n_speed + n * m_speed) * by_slip
-    sheared = yielding - slopes[3] * bound - slopes[4] * moment
-    sheared_slip = -(slopes[5] * rate + slopes[3] * bound_slip + slopes[4] * moment_slip)
+    scale = _over(n * m - n_moment * m_bound)
+    nn, nm, mn, mm = m * scale, n_moment * scale, m_bound * scale, n * scale
+    n_slip, m_slip = rate * (nn * n_speed + nm * m_speed), rate * (mn * n_speed + mm * m_speed)
+    u_slip = -(u_speed * rate + u_bound * n_slip + u_moment * m_slip)
     firm = slider[0] + rate * (slider[2] + rate * slider[1])
-    resists = firm * (1.0 + sheared_slip) + rate * slopes[2] + slopes[0] * bound_slip + slopes[1] * moment_slip
-    slip = (balance - firm * sheared - slopes[0] * bound - slopes[1] * moment) / resists
-    return slip, sheared + sheared_slip * slip, bound + bound_slip * slip, moment + moment_slip * slip
+    yields = _over(firm * (1.0 + u_slip) + rate * thick + to_bound * n_slip + to_moment * m_slip)
+    by_n, by_m = firm * u_bound - to_bound, firm * u_moment - to_moment
+    slip = yields, -firm * yields, (by_n * nn + by_m * mn) * yields, (by_n * nm + by_m * mm) * yields
+    return (nn, nm, mn, mm, n_slip, m_slip, u_slip) + slip
+
+
+@inlined
+def resolved(slopes, step, slider, law):
+    """Solutions of the method's modes, one real and two complex, with the same slopes at all nodes.
+
+    So they are on their own (Hairer & Wanner II, IV.8).
+    """
+    turning = complex(TURNING.real / step, TURNING.imag / step)
+    return _resolved(PACE / step, slopes, slider, law), _resolved(turning, slopes, slider, law)
 
 
 @device
-def correct(slopes, step, slider, law, right):
-    """Replace residuals by what takes them away, slopes being the same at all nodes.
+def _taken(mode, slopes, balance, yielding, bonds, stretches):
+    """Slip, u, N and M that take residuals of a mode away."""
+    nn, nm, mn, mm, n_slip, m_slip, u_slip, by_balance, by_u, by_n, by_m = mode
+    bound, moment = nn * bonds + nm * stretches, mn * bonds + mm * stretches
+    slip = by_balance * balance + by_u * yielding + by_n * bonds + by_m * stretches
+    sheared = yielding - slopes[3] * bound - slopes[4] * moment + u_slip * slip
+    return slip, sheared, bound + n_slip * slip, moment + m_slip * slip
 
-    Then the method's modes, one real and two complex, are on their own (Hairer & Wanner II, IV.8).
-    """
-    ahead, turned = PACE / step, complex(TURNING.real / step, TURNING.imag / step)
-    real = _sum(BACK, 0, right, 0), _sum(BACK, 0, right, 1), _sum(BACK, 0, right, 2), _sum(BACK, 0, right, 3)
-    slip, sheared, bound, moment = resolved(ahead, slopes, slider, law, *real)
-    pair = (
-        complex(_sum(BACK, 1, right, 0), _sum(BACK, 2, right, 0)),
-        complex(_sum(BACK, 1, right, 1), _sum(BACK, 2, right, 1)),
-        complex(_sum(BACK, 1, right, 2), _sum(BACK, 2, right, 2)),
-        complex(_sum(BACK, 1, right, 3), _sum(BACK, 2, right, 3)),
-    )
-    slips, sheareds, bounds, moments = resolved(turned, slopes, slider, law, *pair)
+
+@inlined
+def correct(modes, slopes, room):
+    """Replace residuals at the nodes by what takes them away."""
+    b, u, n, m = RIGHT, RIGHT + 1, RIGHT + 2, RIGHT + 3
+    real = _sum(BACK, 0, room, b), _sum(BACK, 0, room, u), _sum(BACK, 0, room, n), _sum(BACK, 0, room, m)
+    one = _taken(modes[0], slopes, real[0], real[1], real[2], real[3])
+    two = _taken(modes[1], slopes, _turned(room, b), _turned(room, u), _turned(room, n), _turned(room, m))
     for i in range(3):
-        first, real_part, other = FORTH[i, 0], FORTH[i, 1], FORTH[i, 2]
-        right[0, i] = first * slip + real_part * slips.real + other * slips.imag
-        right[1, i] = first * sheared + real_part * sheareds.real + other * sheareds.imag
-        right[2, i] = first * bound + real_part * bounds.real + other * bounds.imag
-        right[3, i] = first * moment + real_part * moments.real + other * moments.imag
+        first, second, third = FORTH[i, 0], FORTH[i, 1], FORTH[i, 2]
+        for k in range(4):
+            room[RIGHT + k, i] = first * one[k] + second * two[k].real + third * two[k].imag
+
+
+@device
+def _turned(room, k):
+    """Part of an unknown's residuals in the complex modes."""
+    return complex(_sum(BACK, 1, room, k), _sum(BACK, 2, room, k))

@@ -12,12 +12,14 @@ from sim.parts.coupling_equations import (
     COUNT,
     ENDED,
     FORCE,
+    LAST,
     MOMENT,
     NEXT,
     PATH,
     POSITION,
     RADIUS,
     RATES,
+    ROOM,
     SHEARED,
     SLIP,
     SPEED,
@@ -104,7 +106,7 @@ def later(held, time, stays):
 
 
 @device
-def _piece(row, bare, slider, law, held, piece, room, at_nodes, energy):
+def _piece(row, bare, slider, law, held, piece, room, energy):
     """Go through one piece of a clock step; the time after which it ends or there is no way on.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
@@ -124,7 +126,7 @@ def _piece(row, bare, slider, law, held, piece, room, at_nodes, energy):
         if not stands:
             row[NEXT] = step * grows
             continue
-        book(row, start, step, bare, slider, law, held, piece, room, at_nodes, energy)
+        book(row, start, step, bare, slider, law, held, piece, room, energy)
         row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
         if step == left:
             return length
@@ -193,7 +195,7 @@ def _jump(row, time, bare, slider, law, held):
 
 
 @device
-def _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, energy):
+def _slide(row, start, sense, bare, slider, law, held, piece, room, energy):
     """Slip until the speed comes to zero or the piece ends; the time reached, negative where there is no way on."""
     length = piece[0]
     along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
@@ -208,7 +210,7 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, en
         if not stands:
             row[NEXT] = step * grows
             continue
-        speed = _last_speed(room[0], step) * sense
+        speed = _last_speed(room, step) * sense
         stops = speed <= 0.0
         if stops and row[SPEED] == 0.0:
             row[NEXT] = 0.25 * step
@@ -219,7 +221,7 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, en
                 step = near + (far - near) * (above / (above - below))
                 if not newton(row, start, step, bare, slider, along, held, piece, room):
                     break
-                speed = _last_speed(room[0], step) * sense
+                speed = _last_speed(room, step) * sense
                 if math.fabs(speed) <= 1e-13 * math.fabs(row[SPEED]) or far - near <= 1e-15 * far:
                     break
                 if speed > 0.0:
@@ -230,7 +232,7 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, en
                     far, below = step, speed
                     above *= 0.5 if side < 0 else 1.0
                     side = -1
-        book(row, start, step, bare, slider, along, held, piece, room, at_nodes, energy)
+        book(row, start, step, bare, slider, along, held, piece, room, energy)
         row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
         start = length if step == left else start + step
         if stops:
@@ -241,13 +243,13 @@ def _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, en
 
 
 @device
-def _last_speed(z, step):
+def _last_speed(room, step):
     """Speed of the interface at the end of a sub-step."""
-    return (RATES[2, 0] * z[0, 0] + RATES[2, 1] * z[0, 1] + RATES[2, 2] * z[0, 2]) / step
+    return (RATES[2, 0] * room[0, 0] + RATES[2, 1] * room[0, 1] + RATES[2, 2] * room[0, 2]) / step
 
 
 @device
-def _sticking_piece(row, bare, slider, law, held, piece, room, at_nodes, energy):
+def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
     """Go through one piece with bonds that bear any pull up to their strength at rest; the time reached."""
     start, length = 0.0, piece[0]
     stuck = 0
@@ -268,7 +270,7 @@ def _sticking_piece(row, bare, slider, law, held, piece, room, at_nodes, energy)
             row[MOMENT] = sense * row[BOUND]
         else:
             sense = math.copysign(1.0, row[SPEED])
-        start = _slide(row, start, sense, bare, slider, law, held, piece, room, at_nodes, energy)
+        start = _slide(row, start, sense, bare, slider, law, held, piece, room, energy)
         if start < 0.0:
             return 0.0
         if start < length:
@@ -277,14 +279,14 @@ def _sticking_piece(row, bare, slider, law, held, piece, room, at_nodes, energy)
 
 
 @device
-def _clock_step(row, bare, slider, law, held, pieces, room, at_nodes, energy):
+def _clock_step(row, bare, slider, law, held, pieces, room, energy):
     """Go through the pieces of a clock step; the time reached, and whether something holds the body still."""
     is_open = not row[RADIUS] > 0.0
     row[RADIUS] = 0.0 if is_open else row[RADIUS]
     now, time, worked, going = later(held, 0.0, 1.0 if is_open else held[0]), 0.0, energy[WORK], True
     for p in range(len(pieces)):
         piece = pieces[p, 1], pieces[p, 2], pieces[p, 3], pieces[p, 4]
-        room[4][0] = 0.0
+        room[LAST, 0] = 0.0
         if p == 0:
             if law[5] == 0.0:
                 going = elastic(row, 0.0, bare, slider, now, piece, energy)
@@ -293,9 +295,9 @@ def _clock_step(row, bare, slider, law, held, pieces, room, at_nodes, energy):
             energy[AREA] += energy[WORK] - worked - _stored(row, bare, 0.0, slider, law, now) + energy[STORED]
         ahead, reached = later(now, time, now[0]), 0.0
         if going and law[5] == 0.0:
-            reached = _piece(row, bare, slider, law, ahead, piece, room, at_nodes, energy)
+            reached = _piece(row, bare, slider, law, ahead, piece, room, energy)
         elif going:
-            reached = _sticking_piece(row, bare, slider, law, ahead, piece, room, at_nodes, energy)
+            reached = _sticking_piece(row, bare, slider, law, ahead, piece, room, energy)
         time += reached
         if not (going and reached == piece[0]):
             return time, False
@@ -342,8 +344,7 @@ def advance_rows(rows, energies, bare, pieces, clock, units, work, slider, law, 
     ``passed``, ``spent``: columns and energies at the end of each step, shape (columns, steps, rows) and (steps, rows,
     energies). A row that nothing holds any longer ends there; its bonds and contact stay as they were.
     """
-    room = np.empty((4, 3)), np.empty((4, 3)), np.empty(3), np.empty((4, 3)), np.zeros(2)
-    at_nodes, row, energy = np.empty((3, 3)), np.empty(COLUMNS), np.empty(energies.shape[1])
+    room, row, energy = np.empty((ROOM, 3)), np.empty(COLUMNS), np.empty(energies.shape[1])
     for m in range(len(rows)):
         stop = 0
         for k in range(len(clock)):
@@ -355,7 +356,7 @@ def advance_rows(rows, energies, bare, pieces, clock, units, work, slider, law, 
                 row[MOMENT] = math.copysign(row[BOUND], row[SPEED]) if row[SPEED] != 0.0 else 0.0
             if math.isnan(row[ENDED]):
                 now = held[:3] + (clock[k, 1], clock[k, 2], clock[k, 3], clock[k, 4]) + held[7:]
-                time, going = _clock_step(row, bare[m], slider, law, now, pieces[start:stop], room, at_nodes, energy)
+                time, going = _clock_step(row, bare[m], slider, law, now, pieces[start:stop], room, energy)
                 if not going:
                     row[ENDED], row[POSITION], row[SPEED], row[BODY] = clock[k, 0] + time, math.nan, math.nan, math.nan
                     energy[:] = math.nan

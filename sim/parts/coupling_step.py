@@ -8,18 +8,25 @@ import math
 
 import numpy as np
 
-from sim.numerics.jit import device
+from sim.numerics.jit import device, inlined
 from sim.parts.coupling_equations import (
+    AREAS,
     BODY,
     BOUND,
     COUNT,
+    FIRMS,
     FORCE,
+    LAST,
     MOMENT,
     NODES,
+    PAST,
     PATH,
     POSITION,
+    PULLS,
+    RADII,
     RADIUS,
     RATES,
+    RIGHT,
     SHARES,
     SHEARED,
     SLIP,
@@ -32,6 +39,7 @@ from sim.parts.coupling_equations import (
     equations,
     kinetics,
     pull_on,
+    resolved,
     share_left,
 )
 from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, VISCOSITY, WORK
@@ -57,55 +65,69 @@ _VALUES, _SLOPES = _between()
 _FEW, _SOME = 1e-12, 0.1
 #: Most turns of Newton's method.
 _TURNS = 12
+#: Slopes before the first ones are known.
+_UNKNOWN = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0)
+#: Correction over the last one above which the slopes are taken anew.
+_SLOW = 0.1
 #: Lagrange's denominators at the nodes, the polynomial through the start as well.
 _BASE = np.array([1.0 / np.prod([c - d for d in (0.0, *NODES) if d != c]) for c in NODES])
 
 
-@device
-def _ahead(row, z, past, gone, step, law):
-    """Guess slip, u, N, M at the nodes: the last sub-step's polynomial, ``gone`` long, or the slopes at the start."""
+@inlined
+def _ahead(row, room, step, law):
+    """Guess slip, u, N, M at the nodes: the last sub-step's polynomial, or the slopes at the start."""
     of_bound, of_moment, _, _, _, _ = kinetics(row[BOUND], row[MOMENT], row[SPEED], law)
     for i in range(3):
-        if gone > 0.0:
-            x = 1.0 + NODES[i] * step / gone
+        if room[LAST, 0] > 0.0:
+            x = 1.0 + NODES[i] * step / room[LAST, 0]
             first, second = x - NODES[0], x - NODES[1]
             one = x * second * (x - 1.0) * _BASE[0]
             two = x * first * (x - 1.0) * _BASE[1]
             last = x * first * second * _BASE[2] - 1.0
             for k in range(4):
-                z[k, i] = one * past[k, 0] + two * past[k, 1] + last * past[k, 2]
+                room[k, i] = one * room[PAST + k, 0] + two * room[PAST + k, 1] + last * room[PAST + k, 2]
         else:
             time = NODES[i] * step
-            z[0, i], z[1, i], z[2, i], z[3, i] = row[SPEED] * time, 0.0, of_bound[0] * time, of_moment[0] * time
-            if law[5] != 0.0:
-                z[2, i], z[3, i] = 0.0, 0.0
-        z[2, i] = max(z[2, i], -0.5 * row[BOUND])
+            room[0, i], room[1, i], room[2, i], room[3, i] = row[SPEED] * time, 0.0, 0.0, 0.0
+            if law[5] == 0.0:
+                room[2, i], room[3, i] = of_bound[0] * time, of_moment[0] * time
+        room[2, i] = max(room[2, i], -0.5 * row[BOUND])
 
 
 @device
 def newton(row, start, step, bare, slider, law, held, piece, room):
-    """Solve for slip, u, N, M at the nodes, by Newton's method with a mean of the slopes; whether that worked."""
-    z, right, radii, past, gone = room
-    _ahead(row, z, past, gone[0], step, law)
-    radii[:] = row[RADIUS]
-    before, close = math.inf, min(1e-7, 0.01 * slider[7])
+    """Solve for slip, u, N, M at the nodes, by Newton's method with the middle one's slopes; whether that worked.
+
+    It ends where the next correction would be small, at the pace of the last two.
+    """
+    _ahead(row, room, step, law)
+    for i in range(3):
+        room[RADII, i] = row[RADIUS]
+        room[PULLS, i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider, piece)
+    bound = min(row[BOUND], row[BOUND] + room[2, 2]) + _FEW
+    moment = min(math.fabs(row[MOMENT]), math.fabs(row[MOMENT] + room[3, 2]))
+    of_slip, of_bound, of_moment = 1.0 / (law[4] + math.fabs(room[0, 2])), 1.0 / bound, 1.0 / (law[4] * bound + moment)
+    before, close = math.inf, min(1e-6, 0.1 * slider[7])
+    slopes, shrinks = _UNKNOWN, 0.5
+    modes = resolved(slopes, step, slider, law)
     for turn in range(_TURNS):
-        slopes = equations(row, z, start, step, bare, slider, law, held, piece, right, radii)
-        if math.isnan(slopes[0]):
+        latest = equations(row, room, start, step, bare, slider, law, held)
+        if math.isnan(latest[0]):
             return False
-        correct(slopes, step, slider, law, right)
+        if shrinks > _SLOW:
+            slopes = latest
+            modes = resolved(slopes, step, slider, law)
+        correct(modes, slopes, room)
         part, change = 1.0, 0.0
         for i in range(3):
-            bound = row[BOUND] + z[2, i]
-            if bound - right[2, i] < 0.1 * bound:  # N stays above zero
-                part = min(part, 0.9 * bound / right[2, i])
+            bound = row[BOUND] + room[2, i]
+            if bound - room[RIGHT + 2, i] < 0.1 * bound:  # N stays above zero
+                part = min(part, 0.9 * bound / room[RIGHT + 2, i])
         for i in range(3):
-            bound, moment = row[BOUND] + z[2, i] + _FEW, row[MOMENT] + z[3, i]
-            change = max(change, math.fabs(right[0, i]) / (law[4] + math.fabs(z[0, i])))
-            change = max(change, math.fabs(right[2, i]) / bound)
-            change = max(change, math.fabs(right[3, i]) / (law[4] * bound + math.fabs(moment)))
+            change = max(change, math.fabs(room[RIGHT, i]) * of_slip)
+            change = max(change, math.fabs(room[RIGHT + 2, i]) * of_bound, math.fabs(room[RIGHT + 3, i]) * of_moment)
             for k in range(4):
-                z[k, i] -= part * right[k, i]
+                room[k, i] -= part * room[RIGHT + k, i]
         shrinks = change / before if turn > 0 else 0.5
         if change * min(1.0, shrinks / max(1.0 - shrinks, 1e-3)) <= close:
             return True
@@ -115,7 +137,7 @@ def newton(row, start, step, bare, slider, law, held, piece, room):
     return False
 
 
-@device
+@inlined
 def error_of(row, start, step, bare, slider, law, held, piece, room):
     """Defect of the equations between nodes, as an error of a stretch: of order 4 in the sub-step, over its scale.
 
@@ -123,26 +145,25 @@ def error_of(row, start, step, bare, slider, law, held, piece, room):
     balance of forces, of N, of M and, with a mass, of the speed is taken over what resists it.
     """
     stiffness, mass, damping, viscosity, _, _, _, _ = slider
-    z, _, radii, _, _ = room
     slip, body, bound, moment = 0.0, 0.0, row[BOUND], row[MOMENT]
     speed, to_bound, to_moment, going = 0.0, 0.0, 0.0, 0.0
     pace, bend = _VALUES[3] * row[BODY], _SLOPES[3] * row[BODY] / step
     for j in range(3):
         at_node = 0.0
         for k in range(3):
-            at_node += RATES[j, k] * (z[0, k] + z[1, k]) / step
+            at_node += RATES[j, k] * (room[0, k] + room[1, k]) / step
         pace += _VALUES[j] * at_node
         bend += _SLOPES[j] * at_node / step
-        slip += _VALUES[j] * z[0, j]
-        body += _VALUES[j] * (z[0, j] + z[1, j])
-        going += _SLOPES[j] * (z[0, j] + z[1, j]) / step
-        speed += _SLOPES[j] * z[0, j] / step
-        bound += _VALUES[j] * z[2, j]
-        moment += _VALUES[j] * z[3, j]
-        to_bound += _SLOPES[j] * z[2, j]
-        to_moment += _SLOPES[j] * z[3, j]
+        slip += _VALUES[j] * room[0, j]
+        body += _VALUES[j] * (room[0, j] + room[1, j])
+        going += _SLOPES[j] * (room[0, j] + room[1, j]) / step
+        speed += _SLOPES[j] * room[0, j] / step
+        bound += _VALUES[j] * room[2, j]
+        moment += _VALUES[j] * room[3, j]
+        to_bound += _SLOPES[j] * room[2, j]
+        to_moment += _SLOPES[j] * room[3, j]
     time = start + _BETWEEN * step
-    radius, area, _, _ = contact_area(bound, moment, time, radii[0], bare, held)
+    radius, area, _, _ = contact_area(bound, moment, time, room[RADII, 0], bare, held)
     if not (area >= 0.0 and bound >= 0.0):
         return math.inf
     of_bound, of_moment, on, _, _, _ = kinetics(bound, moment, speed, law)
@@ -166,7 +187,7 @@ def error_of(row, start, step, bare, slider, law, held, piece, room):
     return max(found, firm * step * math.fabs(going - pace) / law[4]) if mass > 0.0 else found
 
 
-@device
+@inlined
 def tried(row, start, step, bare, slider, law, held, piece, room):
     """Solve for a sub-step: length of the next over that of this one, and whether this one stands.
 
@@ -180,44 +201,51 @@ def tried(row, start, step, bare, slider, law, held, piece, room):
     error *= math.sqrt(error) / slider[7]
     if not error < math.inf:
         return 0.25, False
-    grows, last = 0.9 * max(error, 1e-6) ** (-1.0 / 6.0), room[4]
+    root = max(error, 1e-6) ** (1.0 / 6.0)
     if not error <= 1.0:
-        return max(0.1, grows), False
-    if last[0] > 0.0:
-        grows *= min(1.0, step / last[0] * (last[1] / max(error, 1e-6)) ** (1.0 / 6.0))
-    last[1] = max(error, 1e-2)
+        return max(0.1, 0.9 / root), False
+    grows = 0.9 / root
+    if room[LAST, 0] > 0.0:
+        grows *= min(1.0, step / room[LAST, 0] * room[LAST, 1] / root)
+    room[LAST, 1] = max(root, 0.5)
     return min(6.0, max(0.1, grows)), True
 
 
-@device
-def book(row, start, step, bare, slider, law, held, piece, room, at_nodes, energy):
+@inlined
+def book(row, start, step, bare, slider, law, held, piece, room, energy):
     """Take an accepted sub-step: integrals of the powers by the method's own shares, and the row at its end."""
     _, _, damping, viscosity, forced, _, _, _ = slider
-    z, _, radii, past, gone = room
     way, speed, body = 0.0, 0.0, 0.0
+    follows = held[0] == 0.0
+    first, firm = math.pi * row[RADIUS] * row[RADIUS] / held[10], 0.0
+    if follows:
+        _, first, _, _ = contact_area(row[BOUND], row[MOMENT], start, row[RADIUS], bare, held)
+        yields, _ = compliance(row[RADIUS], slider)
+        firm = 1.0 / yields if yields > 0.0 else 0.0
     for i in range(3):
-        bound, moment = row[BOUND] + z[2, i], row[MOMENT] + z[3, i]
-        radius, area, _, _ = contact_area(bound, moment, start + NODES[i] * step, radii[i], bare, held)
-        yields, _ = compliance(radius, slider)
-        at_nodes[0, i], at_nodes[1, i], at_nodes[2, i] = area, 1.0 / yields if yields > 0.0 else 0.0, radius
-    _, first, _, _ = contact_area(row[BOUND], row[MOMENT], start, row[RADIUS], bare, held)
-    yields, _ = compliance(row[RADIUS], slider)
-    firm = 1.0 / yields if yields > 0.0 else 0.0
+        room[AREAS, i] = first
+        if follows:
+            bound, moment = row[BOUND] + room[2, i], row[MOMENT] + room[3, i]
+            time = start + NODES[i] * step
+            room[RADII, i], room[AREAS, i], _, _ = contact_area(bound, moment, time, room[RADII, i], bare, held)
+            yields, _ = compliance(room[RADII, i], slider)
+            room[FIRMS, i] = 1.0 / yields if yields > 0.0 else 0.0
     for i in range(3):
-        bound, moment, area = row[BOUND] + z[2, i], row[MOMENT] + z[3, i], at_nodes[0, i]
+        bound, moment, area = row[BOUND] + room[2, i], row[MOMENT] + room[3, i], room[AREAS, i]
         speed, body, spreads, firms = 0.0, 0.0, 0.0, 0.0
         for j in range(3):
-            speed += RATES[i, j] * z[0, j] / step
-            body += RATES[i, j] * (z[0, j] + z[1, j]) / step
-            spreads += RATES[i, j] * (at_nodes[0, j] - first)
-            firms += RATES[i, j] * (at_nodes[1, j] - firm)
-        time, sheared = start + NODES[i] * step, row[SHEARED] + z[1, i]
-        pull = pull_on(time, start, z[0, i] + z[1, i], row, slider, piece)
+            speed += RATES[i, j] * room[0, j] / step
+            body += RATES[i, j] * (room[0, j] + room[1, j]) / step
+            if follows:
+                spreads += RATES[i, j] * (room[AREAS, j] - first)
+                firms += RATES[i, j] * (room[FIRMS, j] - firm)
+        sheared, pull = row[SHEARED] + room[1, i], room[PULLS, i] - slider[0] * (room[0, i] + room[1, i])
+        given = body if forced > 0.0 else driven(start + NODES[i] * step, piece)[1]
         _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
         square = moment * moment / bound if bound > 0.0 and law[5] == 0.0 else 0.0
         fresh = law[3] * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
         share = SHARES[i] * step
-        energy[WORK] += share * pull * (body if forced > 0.0 else driven(time, piece)[1])
+        energy[WORK] += share * pull * given
         energy[DAMPING] += share * damping * body * body
         energy[VISCOSITY] += share * area * viscosity * speed * speed
         energy[RUPTURE] += share * 0.5 * area * (square * (k + 3.0 * travel) + fresh)
@@ -225,14 +253,17 @@ def book(row, start, step, bare, slider, law, held, piece, room, at_nodes, energ
             energy[RUPTURE] += share * area * moment * speed
         energy[AREA] -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
         row[SQUARE] += share * speed * speed
-        row[PATH] += math.fabs(z[0, i] - way)
-        way = z[0, i]
-    pull = pull_on(start + step, start, z[0, 2] + z[1, 2], row, slider, piece)
-    row[FORCE], row[BODY], row[SPEED], row[RADIUS] = pull, body, speed, at_nodes[2, 2]
-    row[SHEARED] += z[1, 2]
-    row[BOUND] = min(row[BOUND] + z[2, 2], 1.0)
-    row[MOMENT] += z[3, 2]
-    row[POSITION] += z[0, 2] + z[1, 2]
-    row[SLIP] += z[0, 2]
+        row[PATH] += math.fabs(room[0, i] - way)
+        way = room[0, i]
+    row[FORCE], row[BODY], row[SPEED] = room[PULLS, 2] - slider[0] * (room[0, 2] + room[1, 2]), body, speed
+    row[RADIUS] = room[RADII, 2]
+    row[SHEARED] += room[1, 2]
+    row[BOUND] = min(row[BOUND] + room[2, 2], 1.0)
+    row[MOMENT] += room[3, 2]
+    row[POSITION] += room[0, 2] + room[1, 2]
+    row[SLIP] += room[0, 2]
     row[COUNT] += 1.0
-    past[:], gone[0] = z, step
+    for k in range(4):
+        for i in range(3):
+            room[PAST + k, i] = room[k, i]
+    room[LAST, 0] = step
