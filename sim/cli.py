@@ -260,9 +260,15 @@ class _Plot(click.Command):
 @_WHERE
 @_FORCE
 def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str, ...], force: bool) -> None:
-    """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset."""
+    """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset.
+
+    Of a scenario, OUTPUT.toml, that of its spectrum before any run.
+    """
     from sim.plots import kinds as plots
 
+    if output.suffix == ".toml":
+        say(str(plots.planned(output, kind, picture, force)))
+        return
     with _opened(output, chosen) as dataset:
         say(str(plots.drawn(dataset, kind, output, picture, force)))
 

@@ -1,7 +1,7 @@
-"""Figures of stress maps: the map and its displacement, and its spectrum."""
+"""Figures of the fluctuations: a map and its displacement, its spectrum, and C(q) before any run."""
 
 import contextlib
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 import xarray as xr
@@ -12,13 +12,18 @@ from scipy.signal import resample
 
 from sim.analysis import setting
 from sim.analysis.scene import resolved, word
-from sim.laws.halfspace import displacement
-from sim.numerics.grid import Grid
+from sim.laws.halfspace import angular_compliance, displacement
+from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.modes import Modes, modes
 from sim.plots import style
 from sim.spectrum.families import Spectrum
+from sim.spectrum.finite_contact import Waves
 from sim.spectrum.periodogram import periodogram, radial_average
+from sim.spectrum.radial import Rowed
+
+if TYPE_CHECKING:
+    from sim.scenario.scenario import Scenario
 
 #: Pixels that a cell has at least in a picture.
 PIXELS = 384
@@ -39,15 +44,16 @@ def map_figure(dataset: xr.Dataset) -> Figure:
     """The last stress map of the first member and the displacement that it makes."""
     at, point = style.first_point(dataset)
     stress = _maps_of(dataset, at).isel(map_member=0)
-    cell = _grid_of(stress).cell
+    sides, measured = _lattice_of(stress).sides, bool(word(dataset, "shear.field.file", ""))
     modulus, ratio = (style.number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
-    moved = displacement(stress.to_numpy(), cell, modulus, ratio)
+    moved = displacement(stress.to_numpy(), sides, modulus, ratio)
     radius, speed = (float(_then(dataset, name, at, stress)) for name in ("contact_radius", "speed"))
     figure, axes = style.pairs(3.1, shared=True)
-    length = style.Unit.of(np.array([cell]), "m")
-    cell, radius = length.factor * cell, length.factor * radius
-    _draw_map(figure, axes[0], stress.to_numpy(), cell, radius, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
-    _draw_map(figure, axes[1], moved, cell, radius, ("m", "displacement $w_1$", "PuOr_r"))
+    length = style.Unit.of(np.array(sides), "m")
+    sizes = length.factor * sides[0], length.factor * sides[1], length.factor * radius
+    draw = _draw_measured if measured else _draw_map
+    draw(figure, axes[0], stress.to_numpy(), sizes, ("Pa", r"shear stress $\tau_1$", "RdBu_r"))
+    draw(figure, axes[1], moved, sizes, ("m", "displacement $w_1$", "PuOr_r"))
     arrow = {-1.0: r"$\longleftarrow$ sliding", 0.0: "at rest", 1.0: r"sliding $\longrightarrow$"}
     box = {"boxstyle": "round,pad=0.2", "facecolor": "white", "alpha": 0.85, "linewidth": 0}
     for panel in axes:
@@ -65,25 +71,43 @@ def _then(dataset: xr.Dataset, name: str, at: dict[str, int], stress: xr.DataArr
     return (values.sel(member=stress["map_member"]) if "member" in values.dims else values).to_numpy()
 
 
-def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, cell: float, radius: float, about: tuple) -> None:
-    """One field around the contact, continued periodically where the contact is wider than the cell."""
-    si, words, colours = about
+def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, about: tuple) -> None:
+    """One field around the contact, continued periodically where the contact is wider than the cell.
+
+    ``sizes`` are the two sides of the cell and the radius of the contact, ``about`` is what is shown.
+    """
+    cell, _, radius = sizes
     # between its samples by its own Fourier series: nothing is smoothed
     points = field.shape[0] * -(-PIXELS // field.shape[0])
     field = resample(resample(field, points, axis=0), points, axis=1)
     side = max(cell, 2.3 * radius) if 2.3 * radius < 3.0 * cell else cell
     half = int(np.ceil(0.5 * side / cell * points))
     index = np.arange(-half, half + 1) % points
-    unit = style.Unit.of(field, si)
-    most = unit.factor * float(np.max(np.abs(field))) or 1.0
     reach = (half + 0.5) * cell / points
-    look: Any = {"cmap": colours, "vmin": -most, "vmax": most, "origin": "lower", "interpolation": "nearest"}
-    tiled = unit.factor * field[np.ix_(index, index)].T
-    image = panel.imshow(tiled, extent=(-reach, reach, -reach, reach), **look)
-    figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
+    _image(figure, panel, field[np.ix_(index, index)], (-reach, reach, -reach, reach), about)
     if 0.0 < radius < 1.5 * cell:
         style.contact_circle(panel, radius)
     panel.set(xlim=(-0.5 * side, 0.5 * side), ylim=(-0.5 * side, 0.5 * side))
+
+
+def _draw_measured(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, about: tuple) -> None:
+    """A measured field as it is, pixel by pixel, with the contact in its middle."""
+    ends = []
+    for points, side in zip(field.shape, sizes, strict=False):
+        first = -(points // 2 + 0.5) * side / points
+        ends += [first, first + side]
+    _image(figure, panel, field, tuple(ends), about)
+    style.contact_circle(panel, sizes[2])
+
+
+def _image(figure: Figure, panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
+    """A field (x, y) with x to the right, and its colours; ``about`` are its SI unit, what it is, and the colours."""
+    si, words, colours = about
+    unit = style.Unit.of(field, si)
+    most = unit.factor * float(np.max(np.abs(field))) or 1.0
+    look: Any = {"cmap": colours, "vmin": -most, "vmax": most, "origin": "lower", "interpolation": "nearest"}
+    image = panel.imshow(unit.factor * field.T, extent=extent, **look)
+    figure.colorbar(image, cax=panel.inset_axes((1.03, 0.0, 0.045, 1.0)), label=unit.label(words))
 
 
 def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tuple[Any, float, str]:
@@ -115,6 +139,12 @@ def _spectrum(table: dict[str, Any]) -> Any:
     return TypeAdapter(Spectrum).validate_python(table)
 
 
+def _lattice_of(stress: xr.DataArray) -> Grid | Rectangle:
+    shape = stress.sizes["x"], stress.sizes["y"]
+    sides = (float(stress[axis][1] - stress[axis][0]) * points for axis, points in zip("xy", shape, strict=True))
+    return lattice_of(cast(tuple[float, float], tuple(sides)), shape)
+
+
 def _grid_of(stress: xr.DataArray) -> Grid:
     points = stress.sizes["x"]
     return Grid(float(stress["x"][1] - stress["x"][0]) * points, points)
@@ -138,6 +168,8 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
         raise ValueError("the last map holds no stress; record one where fluctuations have grown")
     if word(dataset, "shear.spectrum.model", "") == "bonds":
         raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
+    if word(dataset, "shear.field.file", ""):
+        raise ValueError("a measured map has no spectrum to follow; `sim plot` of the scenario draws its own")
     (spectrum, raised, name), grid = _target(dataset, stress, at), _grid_of(stress)
     expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
@@ -167,4 +199,55 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     below.errorbar(q, measured / expected, error / expected, **dots)
     below.set_ylabel("realised/discretised")
     style.across(below, q, f"wavenumber $q$ (rad/{length.name})", "log", 0.03)
+    return figure
+
+
+def density_figure(scene: "Scenario") -> Figure:
+    """Spectral density of a scenario's fluctuations before any run, and which waves hold variance and energy.
+
+    Raises
+    ------
+    ValueError
+        If there is none: the stress is uniform, or a single wave.
+    """
+    shear, radius = scene.fluctuations, scene.rest_radius if scene.rest_radius > 0.0 else 0.01 * scene.sphere.radius
+    spectrum = shear.spectrum
+    if spectrum.wavevector is not None:
+        raise ValueError("the stress is uniform, or a single wave, which has no spectral density; run and draw the map")
+    low, high = cast(Waves, spectrum).reach(radius)
+    q = np.geomspace(0.7 * low, min(1.4 * high, 1e4 * low), 1500)
+    along, across = spectrum.density(q, 0.0), spectrum.density(0.0, q)
+    length = style.Unit.of(2 * np.pi / q, "m", logarithmic=True)
+    figure, (panel, below) = style.rows([1.9, 1.1])
+    shown = q / length.factor
+    split = not np.allclose(along, across, rtol=1e-9, atol=0.0)
+    for density, look, name in ((along, "-", "along the sliding"), (across, "--", "across it"))[: 1 + split]:
+        line = np.where(density > 0.0, density, np.nan)
+        panel.loglog(shown, line, look, color=style.FLUCTUATIONS, label=name if split else "$C(q)$")
+    if getattr(spectrum, "file", ""):
+        rows = cast(Rowed, spectrum).rows
+        marks: Any = style.HOLLOW | {"markersize": 3.0, "markeredgewidth": 0.6, "color": style.BOTH}
+        panel.plot(rows.q / length.factor, np.where(rows.density > 0.0, rows.density, np.nan), label="rows", **marks)
+    most = float(np.max(np.maximum(along, across)))
+    panel.set_ylim(max(0.3 * np.min(along[along > 0.0], initial=most), 1e-9 * most), 3.0 * most)
+    sizes = {
+        r"$\pi/a$, a wave as wide as the contact": np.pi / radius,
+        "$2\\pi$/cell": 2 * np.pi / shear.side(scene.setting.cell),
+    }
+    for (name, place), look in zip(sizes.items(), (":", "-."), strict=True):
+        if shown[0] < place / length.factor < shown[-1]:
+            panel.axvline(place / length.factor, linestyle=look, **style.GREY, label=name)
+            below.axvline(place / length.factor, linestyle=look, **style.GREY)
+    panel.set_ylabel(
+        r"spectral density $C$ (Pa² m²)" if not spectrum.bond_made else r"$C$ for $n\langle f^2\rangle$ = 1 N²/m²"
+    )
+    style.legend(panel)
+    mean, lean = cast(Waves, spectrum).harmonics(q)
+    level, swing = angular_compliance(np.asarray(scene.solid.effective[1]))
+    for weight, look, name in ((q * mean, "-", "variance"), (level * mean - swing * lean, "--", "stored energy")):
+        held = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(q) * (weight[1:] + weight[:-1]))])
+        below.plot(shown, held / held[-1], look, color=style.BOTH, label=name)
+    below.set_ylabel("share of longer waves")
+    below.legend(loc="lower right")
+    style.across(below, shown, f"wavenumber $q$ (rad/{length.name})", "log")
     return figure

@@ -5,7 +5,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import matplotlib as mpl
 import xarray as xr
@@ -13,16 +13,19 @@ from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
 from sim.analysis.scene import answered, claim, of_dataset
-from sim.numerics.files import output
+from sim.numerics.files import claim as claim_file, output
 from sim.plots import panels
 from sim.plots.bond_laws import rest_of
-from sim.plots.field import map_figure, needs_maps, spectrum_figure
+from sim.plots.field import density_figure, map_figure, needs_maps, spectrum_figure
 from sim.plots.loop import loop_figure, needs_course
 from sim.plots.profile import profile_figure, shapes_of
 from sim.plots.stress import needs_stress, stress_figure
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.plots.theories import case_of, sweeps_theories, theories_figure
 from sim.units.refusals import BadInput, renamed
+
+if TYPE_CHECKING:
+    from sim.scenario.scenario import Scenario
 
 
 class Kind(NamedTuple):
@@ -134,6 +137,34 @@ def drawn(dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None
     except ValueError as fault:
         raise BadInput([f"{source}: {fault}"]) from None
     return target
+
+
+def planned(source: Path, kind: str | None, path: Path | None, replace: bool) -> Path:
+    """Draw what a scenario file says of its fluctuations before any run, C(q); the picture's path.
+
+    Raises
+    ------
+    BadInput
+        If the scenario cannot be read or has no such figure, or the picture is not to be made.
+    """
+    from sim.scenario.declared import files_read
+    from sim.scenario.reader import load  # heavy: pydantic, where a dataset needs none
+
+    scene, target = load(source), path or Path("outputs") / f"{source.stem}-spectrum.png"
+    if kind not in (None, "spectrum"):
+        raise BadInput([f'{source}: before a run only "spectrum" can be drawn; for "{kind}" run it: sim run {source}'])
+    claim_file(target, replace, files_read(scene))
+    try:
+        save(spectrum_of(scene), target)
+    except ValueError as fault:
+        raise BadInput([f"{source}: {fault}"]) from None
+    return target
+
+
+def spectrum_of(scene: "Scenario") -> Figure:
+    """Spectral density of a scene's fluctuations before any run; errors as of ``density_figure``."""
+    with mpl.rc_context(STYLE):
+        return density_figure(scene)
 
 
 def save(figure: Figure, path: Path) -> None:

@@ -92,7 +92,7 @@ class StressMap:
     noise: Annotated[float, _NOISE] = 0.0
     start: Annotated[float, _START] | None = None
     variable: Annotated[str, Field(description="name of the map in a netCDF file")] = "shear_map"
-    values: _Values = b""
+    values: _Values = Field(default=b"", repr=False)
     shape: _Shape = (0, 0)
 
     @model_validator(mode="before")

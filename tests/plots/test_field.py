@@ -1,18 +1,26 @@
 """Figures of stress maps show the map, its displacement and its spectrum."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from helpers.commands import sim
 from helpers.pictured import CELL, STEADY, field, mapped, rendered, simulated
 from matplotlib.patches import Circle
 
 from sim.numerics.grid import Grid
 from sim.parts.drive import prescribed as drive
-from sim.parts.shear import models as shear
+from sim.parts.shear import Carried, models as shear
 from sim.parts.shear.amplitude import Onset, Stress
 from sim.parts.shear.modes import modes
 from sim.plots import field as field_figures, kinds as plots
 from sim.scenario.clock import Ensemble, Record
+from sim.scenario.reader import load
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
+from sim.spectrum.stress_map import StressMap
+from sim.spectrum.tabulated import Tabulated
+
+STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 
 
 @pytest.mark.parametrize("points", [32, 33])
@@ -127,3 +135,87 @@ def test_a_spectrum_that_cannot_be_compared_says_why():
     with pytest.raises(ValueError, match="holds no stress"):
         plots.draw(resting, "spectrum")
     assert plots.draw(resting, "map").axes
+
+
+SCENE = {
+    "clock": {"duration": "4 ms", "step": "1 ms"},
+    "solid": {"shear_modulus": "1.6 MPa"},
+    "sphere": {"radius": "2 mm"},
+    "adhesion": {"work": "42 mJ/m^2"},
+    "contact": {"load": "4 mN"},
+}
+ANISOTROPIC = {"model": "anisotropic_gaussian", "rms": "100 kPa", "length_x": "12 um", "length_y": "40 um"}
+
+
+def before(**spectrum):
+    """The figure of a scene that has not run."""
+    return plots.spectrum_of(load(SCENE | {"shear": {"model": "mean", "spectrum": spectrum}}))
+
+
+def test_a_spectrum_is_drawn_before_any_run(tmp_path, monkeypatch):
+    q, density = np.geomspace(1e4, 1e6, 9), np.geomspace(1.0, 1e-4, 9)
+    monkeypatch.chdir(tmp_path)
+    rows = "\n".join(f"{a}; {b}" for a, b in zip(q, density, strict=True))
+    Path("psd.csv").write_text(f"q [rad/m]; C [Pa^2 m^2]\n{rows}")
+    panel, below = before(model="tabulated", file="psd.csv").axes
+    line, rows = panel.lines[:2]
+    table = Tabulated(q, density)
+    np.testing.assert_allclose(line.get_xdata() * 1e6, np.geomspace(7e3, 1.4e6, 1500), rtol=1e-12)
+    inside = np.isfinite(line.get_ydata())
+    np.testing.assert_allclose(
+        line.get_ydata()[inside], table.radial_density(line.get_xdata()[inside] * 1e6), rtol=1e-9
+    )
+    np.testing.assert_allclose(rows.get_ydata(), density, rtol=1e-9)
+    variance = below.lines[
+        -2
+    ]  # by trapezoids, one of which begins at the jump of the density: half of it counts too much
+    exact = table.cumulative(variance.get_xdata() * 1e6) / table.variance
+    np.testing.assert_allclose(variance.get_ydata(), exact, rtol=0, atol=1e-3)
+
+
+def test_a_spectrum_that_differs_along_and_across_is_drawn_twice():
+    along, across = before(**ANISOTROPIC).axes[0].lines[:2]
+    assert [line.get_label() for line in (along, across)] == ["along the sliding", "across it"]
+    spectrum = AnisotropicGaussian(1e5, 12e-6, 40e-6)
+    q = along.get_xdata() * 1e6
+    np.testing.assert_allclose(np.nan_to_num(along.get_ydata()), spectrum.density(q, 0.0), rtol=1e-12)
+    np.testing.assert_allclose(np.nan_to_num(across.get_ydata()), spectrum.density(0.0, q), rtol=1e-12)
+
+
+def test_sim_plot_draws_a_scenario_before_its_run_and_replaces_nothing(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("scene.toml").write_text(STARTER.read_text())
+    answer = sim("plot", "scene.toml")
+    assert (answer.exit_code, answer.stdout) == (0, "outputs/scene-spectrum.png\n")
+    made = Path("outputs/scene-spectrum.png").read_bytes()
+    assert made.startswith(b"\x89PNG")
+    assert sim("plot", "scene.toml").exit_code == 73
+    for arguments, words in (
+        (("scene.toml", "curve"), 'before a run only "spectrum"'),
+        (("scene.toml", "-o", "scene.toml", "--force"), "reads what it would write"),
+        (("none.toml",), "none.toml"),
+    ):
+        answer = sim("plot", *arguments)
+        assert answer.exit_code == 2 and words in answer.stderr
+    Path("ripple.toml").write_text(STARTER.read_text().partition("[shear]")[0])
+    answer = sim("plot", "ripple.toml")
+    assert answer.exit_code == 2 and "has no spectral density" in answer.stderr
+    assert sorted(path.name for path in Path("outputs").iterdir()) == ["scene-spectrum.png"]
+
+
+def test_a_measured_map_is_drawn_as_it_is_with_the_contact_in_its_middle():
+    values = np.random.default_rng(2).normal(size=(40, 32)) * 1e4
+    found = StressMap(file="map.npy", pixel=9e-6, values=values.tobytes(), shape=values.shape)
+    dataset = simulated(
+        drive=drive.Steady(speed=0.0), shear=Carried(field=found, contact="disc"), record=Record(maps=(0.4,)),
+        ensemble=Ensemble(members=1),
+    )  # fmt: skip
+    panel = plots.draw(dataset, "map").axes[0]
+    (image,) = panel.images
+    np.testing.assert_allclose(image.get_array().T * 1e3, values - values.mean(), rtol=0, atol=1e-6)
+    left, right, low, high = image.get_extent()
+    np.testing.assert_allclose((left, right, low, high), 9.0 * np.array([-20.5, 19.5, -16.5, 15.5]), rtol=1e-12)
+    (circle,) = (patch for patch in panel.patches if isinstance(patch, Circle))
+    assert circle.center == (0.0, 0.0)
+    with pytest.raises(ValueError, match="measured map has no spectrum to follow"):
+        plots.draw(dataset, "spectrum")
