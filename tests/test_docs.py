@@ -3,6 +3,7 @@
 import doctest
 import importlib.util
 import inspect
+import json
 import re
 from pathlib import Path
 
@@ -90,3 +91,29 @@ def test_an_answer_of_the_gallery_is_found_again(entry):
     assert found.keys() == NUMBERS[entry.name].keys()
     for name, number in found.items():
         assert_allclose(number, NUMBERS[entry.name][name], rtol=1e-6, atol=1e-9, err_msg=name)
+
+
+@pytest.mark.verify
+def test_the_python_of_the_readme_makes_its_scenes_and_figures(tmp_path, monkeypatch):
+    code = re.search(r"In Python:\n\n```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)[1]
+    (tmp_path / "scenarios").symlink_to(ROOT / "scenarios")
+    monkeypatch.chdir(tmp_path)
+    exec(code.replace('sim.open("outputs/pdms_lens.nc")', "dataset"), {})
+    assert (tmp_path / "first.png").stat().st_size > 1000
+
+
+def test_the_notebook_is_kept_without_its_results():
+    cells = json.loads((ROOT / "docs" / "first_steps.ipynb").read_text(encoding="utf-8"))["cells"]
+    assert all(not cell.get("outputs") and cell.get("execution_count") is None for cell in cells)
+
+
+@pytest.mark.verify
+@pytest.mark.filterwarnings("default")  # those of the notebook's own packages
+def test_the_notebook_runs_to_its_end():
+    nbclient, nbformat = (pytest.importorskip(name, reason="in the extra verify") for name in ("nbclient", "nbformat"))
+    notebook = nbformat.read(ROOT / "docs" / "first_steps.ipynb", 4)
+    where = {"metadata": {"path": str(ROOT / "docs")}}
+    nbclient.NotebookClient(notebook, timeout=600, kernel_name="python3", resources=where).execute()
+    results = [one for cell in notebook.cells for one in cell.get("outputs", [])]
+    assert sum("image/png" in one.get("data", {}) for one in results) == 3
+    assert [one for one in results if one.get("name") == "stderr"] == []

@@ -4,6 +4,7 @@ One colour means one thing throughout: blue what broken bonds do, vermilion what
 do, black the contact with both; grey lines are closed forms, such as JKR's and Hertz's contacts.
 """
 
+import io
 import itertools
 import re
 import textwrap
@@ -24,6 +25,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from sim.analysis import engineering, scaled, sweep_dims
 
 COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
+_ON_SCREEN = 120  # dots an inch
 
 BONDS, FLUCTUATIONS, BOTH, REFERENCE = "#0072B2", "#D55E00", "#000000", "#777777"
 
@@ -57,6 +59,12 @@ class Picture(Figure):
         undated = {"pdf": {"CreationDate": None}, "svg": {"Date": None}}.get(str(fname).rpartition(".")[2].lower())
         with mpl.rc_context(STYLE):
             super().savefig(fname, **({"metadata": undated} | options))
+
+    def _repr_png_(self) -> bytes:
+        """The picture as a notebook shows it."""
+        shown = io.BytesIO()
+        self.savefig(shown, format="png", dpi=_ON_SCREEN)
+        return shown.getvalue()
 
 
 def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
