@@ -124,7 +124,7 @@ def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None)
 
     ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
     """
-    from sim.analysis.tables import frame
+    from sim.analysis.long_table import frame
 
     return _plainly(frame, dataset, where)
 

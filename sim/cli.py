@@ -171,7 +171,8 @@ def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]]
     from sim import analysis
 
     rows, once = analysis.table(dataset, most), analysis.highlights(dataset, most)
-    return [shown for shown in (rows, once) if shown], analysis.notes(dataset, rows, once)
+    further = analysis.losses(dataset, most), analysis.spread(dataset)
+    return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once)
 
 
 def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:

@@ -1,5 +1,6 @@
 """The commands: what they print, write and refuse, and with which exit code."""
 
+import csv
 import io
 import json
 import os
@@ -477,7 +478,8 @@ def test_stats_prints_a_table_and_writes_csv(dataset, here):
     done = sim("stats", dataset, "--csv", "new/table.csv")
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1] == "new/table.csv"
-    assert len(Path("new/table.csv").read_text().splitlines()) == 1 + 11  # header, records
+    header, *rows = csv.reader(Path("new/table.csv").read_text().splitlines())
+    assert len({len(row) for row in (header, *rows)}) == 1 and sum("contact_area" in row for row in rows) == 11
     assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
 
 
@@ -523,7 +525,7 @@ def test_what_exists_is_replaced_only_if_asked(made, monkeypatch, arguments, fil
     before = content(made)
     with monkeypatch.context() as patched:
         patched.setattr("sim.study.converge.converge", None)  # computing would fail
-        patched.setattr("sim.analysis.tables.frame", None)
+        patched.setattr("sim.analysis.long_table.tidy", None)
         done = sim(*arguments)
     assert (done.exit_code, done.stderr) == (73, f"{file} exists; replace it with --force or name another file\n")
     assert content(made) == before

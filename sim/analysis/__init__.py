@@ -9,21 +9,23 @@ peak); ``summary`` turns both into statistics over the members.
 from sim.analysis.correlation import IntegralTime, correlation_time, integral_time
 from sim.analysis.events import events, loop_energy, peaks
 from sim.analysis.lifetimes import Lifetime, first_passage, lifetime
+from sim.analysis.long_table import tidy, to_csv
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, loss_speeds
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.stationary import distribution, over_time
 from sim.analysis.statistics import QUANTILES, averaging, shares, skewness_error, statistics, summary, where
 from sim.analysis.stick_slip import slips, stick_slip
-from sim.analysis.tables import highlights, notes, table, to_csv
+from sim.analysis.tables import highlights, losses, notes, spread, table
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [
     "QUANTILES", "Control", "IntegralTime", "Lifetime", "averaging", "bond_work", "concise", "control",
     "correlation_time", "crossing", "distribution", "engineering", "events", "first_passage", "highlights",
-    "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "notes", "observables",
-    "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables", "shares",
-    "skewness_error", "slips", "statistics", "stick_slip", "summary", "sweep_dims", "table", "to_csv", "where",
+    "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "losses", "notes",
+    "observables", "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables",
+    "shares", "skewness_error", "slips", "spread", "statistics", "stick_slip", "summary", "sweep_dims", "table",
+    "tidy", "to_csv", "where",
 ]  # fmt: skip
 
 

@@ -54,6 +54,9 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
             lost = dataset[f"dissipated_energy{suffix}"].astype(float).isel(t=-1, drop=True)
             text = "energy dissipated by opening and closing, in all"
             found[f"total_dissipated{suffix}"] = lost.assign_attrs(units="J", long_name=text, symbol="W")
+        for name in ("pull_off_load", "pull_off_time"):
+            if name + suffix in dataset:
+                found[name + suffix] = dataset[name + suffix].astype(float)
     with contextlib.suppress(ValueError), answered():
         found = found.merge(loop_energy(dataset).mean("cycle", keep_attrs=True))
     return found

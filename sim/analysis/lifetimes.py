@@ -8,7 +8,7 @@ import xarray as xr
 from scipy import stats
 
 from sim.analysis.observables import ordered
-from sim.analysis.scene import MEMBERS
+from sim.analysis.scene import MEMBERS, is_stationary
 from sim.analysis.statistics import LEVEL
 
 
@@ -90,7 +90,7 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
     level : float
         In the unit of the observable.
     """
-    above = observable.astype(float) - level
+    above = observable.reset_coords(drop=True).astype(float) - level
     side = np.sign(above.isel(t=0))
     crossed = (above * side <= 0.0) & (side != 0.0)
     at = crossed.argmax("t")
@@ -102,6 +102,16 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
     found = found.where(side != 0.0, float(times[0]))
     text = f"time at which the {observable.attrs.get('long_name', observable.name)} first crosses {level:.6g}"
     return ordered(found).assign_attrs(units="s", long_name=text)
+
+
+def half_lives(dataset: xr.Dataset, found: xr.Dataset) -> xr.Dataset:
+    """Median time and, in a stationary run, rate of the first detachment, from the ``events`` of a dataset."""
+    if "first_detachment" not in found:
+        return xr.Dataset()
+    of = lifetimes(dataset, found["first_detachment"], "detached", "detached")
+    return (
+        of if is_stationary(dataset) else of.drop_vars([name for name in of if str(name).startswith("detached_rate")])
+    )
 
 
 def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:

@@ -109,6 +109,7 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(found, attrs=dataset.attrs)
 
 
+@of_dataset
 def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
     """The shares of JKR's area that fluctuations and bonds take if the fluctuations are charged first.
 
@@ -176,11 +177,14 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     return found.drop_vars([n for n in found if str(n).startswith(("in_contact", "masked"))])
 
 
+@of_dataset
 def all_observables(dataset: xr.Dataset) -> xr.Dataset:
-    """``observables``, with the shares of the lost area where they are known."""
+    """``observables``, with the shares of the lost area where they are known, in both orders of charging."""
     found = observables(dataset)
     with contextlib.suppress(ValueError), answered():
         found = found.merge(share_observables(dataset))
+    with contextlib.suppress(ValueError), answered():
+        found = found.merge(charged_in_turn(dataset))
     return found
 
 

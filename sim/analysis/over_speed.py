@@ -9,7 +9,7 @@ from scipy import special
 
 from sim.analysis.blocks import ROOM, blocks
 from sim.analysis.observables import observables, reference_radii
-from sim.analysis.scene import MEMBERS, is_steady, speed_of, stays_held, sweep_dims
+from sim.analysis.scene import MEMBERS, is_steady, of_dataset, speed_of, stays_held, sweep_dims
 from sim.analysis.statistics import LEVEL
 
 #: Shares of JKR's area whose loss has a speed.
@@ -94,6 +94,7 @@ def speed_dim(dataset: xr.Dataset) -> str | None:
     return next(varying, None)
 
 
+@of_dataset
 def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
     """Speeds at which the mean contact area has lost 5 and 50 % of JKR's, and half of what it can down to Hertz's.
 

@@ -21,7 +21,7 @@ QUANTILES = (0.05, 0.5, 0.95)
 
 #: Share of repeated ensembles whose intervals hold the truth, and half of such an interval of a normal law in errors.
 LEVEL = 0.95
-_WIDE = float(special.ndtri(0.5 + 0.5 * LEVEL))
+WIDE = float(special.ndtri(0.5 + 0.5 * LEVEL))
 
 #: A spread below this share of the mean is of rounding.
 _ROUNDING = 1e-12
@@ -200,9 +200,9 @@ def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | f
     with np.errstate(invalid="ignore", divide="ignore"):  # time averages of the members count for more than one each
         several = np.where(sem > 0.0, mean * (1.0 - mean) / sem**2, 0.0)
     count = np.where(count > 1.0, np.maximum(count, several), np.nan)
-    shrunk = 1.0 + _WIDE**2 / count
-    middle = (mean + 0.5 * _WIDE**2 / count) / shrunk
-    half = _WIDE / shrunk * np.sqrt(np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * _WIDE / count) ** 2)
+    shrunk = 1.0 + WIDE**2 / count
+    middle = (mean + 0.5 * WIDE**2 / count) / shrunk
+    half = WIDE / shrunk * np.sqrt(np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * WIDE / count) ** 2)
     return middle - half, middle + half
 
 

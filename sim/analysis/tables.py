@@ -1,23 +1,21 @@
 """Statistics as rows: a dozen for the terminal, all of them as CSV."""
 
-import contextlib
 import math
-import os
 import re
 from collections.abc import Iterable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
+from sim.analysis.lifetimes import half_lives
 from sim.analysis.observables import all_observables, settled
-from sim.analysis.scene import answered, is_stationary, of_dataset, resolved, stays_held, sweep_dims, word
-from sim.analysis.statistics import QUANTILES, averaging, shares, statistics, summary
-from sim.numerics.files import output
+from sim.analysis.over_speed import loss_speeds
+from sim.analysis.scene import MEMBERS, is_stationary, of_dataset, resolved, stays_held, sweep_dims, word
+from sim.analysis.stationary import distribution
+from sim.analysis.statistics import QUANTILES, WIDE, averaging, summary
 from sim.units.notation import concise, scaled
 
 #: Cells of columns by heading.
@@ -47,6 +45,7 @@ _COLUMNS = (
     _Column("area_ratio", "A/A_JKR", meaning="contact area over that with the full work of adhesion"),
     _Column("lost_to_bonds", "lost to\nbonds", meaning="share of A_JKR, bonds charged first"),
     _Column("lost_to_fluctuations", "lost to\nfluct."),
+    _Column("lost_to_fluctuations_first", "fluct.\nfirst", meaning="lost to fluctuations if charged before the bonds"),
     _Column("lost_to_mean_stress", "lost to\nstress"),
     _Column("lost_to_lag", "lost to\nlag"),
     _Column("friction_force", "F"),
@@ -58,7 +57,9 @@ _COLUMNS = (
 _EVENTS = (
     _Column("time_masked", "masked,\nof the time"),
     _Column("ever_detached", "detached,\nof members"),
-    _Column("first_detachment", "first\ndetached"),
+    _Column("first_detachment", "first\ndetached", meaning="mean of those that did"),
+    _Column("half_detached", "half\ndetached", math.nan, meaning="time by which half of the members did"),
+    _Column("detached_rate", "rate of\ndetaching", meaning="detached, per time in contact of all members"),
     _Column("loop_energy", "∮P dΔ,\nper cycle", meaning="work put in over a cycle"),
     _Column("loop_dissipation", "dissipated,\nper cycle"),
     _Column("total_dissipated", "dissipated,\nin all"),
@@ -81,6 +82,12 @@ _EVENTS = (
     _Column("slip_duration", "slip\nlasts", math.nan),
     _Column("stick_duration", "stick\nlasts", math.nan),
     _Column("recurrence_time", "slip\nevery", math.nan),
+)
+
+_LOSSES = (
+    _Column("speed_at_5_percent_lost", "5 % of area\nlost at V", math.nan),
+    _Column("speed_at_50_percent_lost", "50 % of area\nlost at V", math.nan),
+    _Column("speed_halfway_to_hertz", "halfway to\nHertz at V", math.nan),
 )
 
 #: Heading and meaning of the correlation time.
@@ -137,7 +144,7 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
             f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: nothing held the body"
         )
     if any("(" in cell for row in rows for cell in row.values()):
-        said.append("in brackets the standard error in the last digits")
+        said.append("in brackets the standard error in the last digits, wider where members are few")
     lines = ["; ".join(said)] if said else []
     for shown, total in ((rows, points if whole else points * dataset.sizes["t"]), (once, points)):
         if 0 < len(shown) < total:
@@ -147,6 +154,9 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
         kept = ", ".join(names) or "contact_radius alone"
         lines.append(f"columns of what was not recorded are left out; record.quantities keeps {kept}")
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
+    if _spreads(dataset):
+        over = averaging(dataset, True).removeprefix("mean over the ")
+        lines.append(f"by quantity: over the {over}; free values: independent ones that tell as much of the mean")
     words = "; ".join(f"{' '.join(column.heading.split())}: {column.meaning}" for column in known)
     return [*dict.fromkeys(lines), *filter(None, [words])]
 
@@ -169,7 +179,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
         how much it dissipated, and the friction peak of a start or a ramp.
     """
-    found = summary(events(dataset))
+    found = once(dataset)
     points = _points(dataset.sizes, _thinned(dataset, rows))
     shown = _shown(found, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
     cells = _places(dataset, points)
@@ -211,13 +221,19 @@ def _shown(found: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
     for name, heading, dull, *_ in columns:
         if f"{name}_mean" not in found:
             continue
-        mean, sem = (_at(found.get(f"{name}_{kind}"), points) for kind in ("mean", "sem"))
+        mean, sem = _at(found[f"{name}_mean"], points), _error(found, name, points)
         unit = found[f"{name}_mean"].attrs.get("units", "1")
         if unit == "1" and name not in _NO_SHARES:  # differences of areas leave rounding behind
             unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | np.isnan(mean)):
             cells |= _cells(heading, unit, mean, sem)
     return cells
+
+
+def _error(found: xr.Dataset, name: str, points: Points) -> np.ndarray:
+    """Half of the 95 % interval in errors of a normal law: the standard error, wider where few members tell it."""
+    low, high = (_at(found.get(f"{name}_{end}"), points) for end in ("low", "high"))
+    return (high - low) / (2.0 * WIDE)
 
 
 def _at(variable: xr.DataArray | None, points: Points) -> np.ndarray:
@@ -238,12 +254,15 @@ def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
     whole = is_stationary(dataset) and bool(sweep_dims(dataset))
     if not whole:  # of the records only those that are shown
         dataset = dataset.isel(t=_spread(dataset.sizes["t"], counts["t"]))
-    trajectories = all_observables(dataset)
-    found = summary(settled(trajectories) if whole else trajectories, quantiles=False).merge(memory)
+    if whole and "contact_radius" in dataset:
+        found = distribution(dataset)
+    else:
+        trajectories = all_observables(dataset)
+        found = summary(settled(trajectories) if whole else trajectories, quantiles=False)
     if "applied_load" in dataset:  # it is known of open contacts too
-        found["normal_load_mean"] = dataset["applied_load"].fillna(found["normal_load_mean"])
-        found["normal_load_sem"] = found["normal_load_sem"].where(dataset["applied_load"].isnull(), 0.0)
-    return found, _points(found.sizes, counts)
+        for kind in ("mean", "low", "high"):
+            found[f"normal_load_{kind}"] = dataset["applied_load"].fillna(found[f"normal_load_{kind}"])
+    return found.merge(memory), _points({**found.sizes, "t": found.sizes.get("t", 1)}, counts)
 
 
 def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
@@ -252,9 +271,9 @@ def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
     return {name: xr.DataArray(index.ravel(), dims="row") for name, index in zip(counts, chosen, strict=True)}
 
 
-def _thinned(dataset: xr.Dataset, rows: int) -> dict[str, int]:
+def _thinned(dataset: xr.Dataset, rows: int, names: tuple[str, ...] | None = None) -> dict[str, int]:
     """How many values of each dimension of the sweep make at most ``rows`` points, two of each at least."""
-    counts = {name: dataset.sizes[name] for name in sweep_dims(dataset)}
+    counts = {name: dataset.sizes[name] for name in (sweep_dims(dataset) if names is None else names)}
     while math.prod(counts.values()) > rows and max(counts.values()) > 2:
         counts[max(counts, key=lambda name: counts[name])] -= 1
     return counts
@@ -277,40 +296,62 @@ def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | flo
     return {f"{heading}{gap}({shown})" if shown else heading: texts}
 
 
-def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
-    """Write all statistics at all times and sweep values as one long table.
+@of_dataset
+def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
+    """How each quantity is spread over members and stationary time, a row each; none of a sweep or of what changes."""
+    if not _spreads(dataset):
+        return []
+    found = distribution(dataset).isel(dict.fromkeys(sweep_dims(dataset), 0))
+    fixed = [column for column in _COLUMNS if not column.changing and f"{column.name}_std" in found]
+    rough = [_ROUNDING * abs(float(found[f"{column.name}_mean"])) for column in fixed]
+    spreads = zip(fixed, rough, strict=True)
+    return [_spread_of(found, column) for column, least in spreads if float(found[f"{column.name}_std"]) > least]
 
-    Parameters
-    ----------
-    dataset : xarray.Dataset
-        As ``sim run`` writes it.
-    path : path
-        The file: a header with SI units in brackets, then one row for each sweep value and time, with the mean,
-        standard deviation, standard error and quantiles over the members at that time; what a whole run has once
-        stands in all of its rows. A file is there whole or, in trouble, as it was before.
-    """
-    long = frame(dataset)
-    units = long.attrs["units"]
-    header = [name if units[name] == "1" else f"{name} [{units[name]}]" for name in long]
-    text = long.to_csv(header=header, index=False, na_rep="nan", lineterminator="\n").encode()
-    with output(Path(path)) as beside:
-        beside.write_bytes(text)
+
+def _spreads(dataset: xr.Dataset) -> bool:
+    """Whether this is one stationary run of members that differ."""
+    single = all(dataset.sizes[name] == 1 for name in sweep_dims(dataset))
+    return single and MEMBERS in dataset.sizes and is_stationary(dataset)
+
+
+def _spread_of(found: xr.Dataset, column: _Column) -> dict[str, str]:
+    """A row of ``spread``."""
+
+    def of(kind: str) -> np.ndarray:
+        return found[f"{column.name}_{kind}"].to_numpy()
+
+    unit = found[f"{column.name}_mean"].attrs.get("units", "1")
+    factor, shown = (100.0, "%") if unit == "1" else scaled(float(np.max(np.abs(of("quantile")))), unit)
+    error, *errors = factor * np.append(of("high") - of("low"), of("quantile_high") - of("quantile_low")) / (2.0 * WIDE)
+    row = {"quantity": f"{' '.join(column.heading.split())} ({shown})"}
+    row |= {"mean": concise(factor * float(of("mean")), error), "sd": f"{factor * of('std'):.3g}"}
+    for level, value, sem in zip(QUANTILES, factor * of("quantile"), errors, strict=True):
+        row[f"{100.0 * level:.0f} %"] = concise(value, sem)
+    time = float(found.get(f"{column.name}_correlation_time", math.nan))
+    step, unit = scaled(time, "s")
+    row |= {"skewness": f"{of('skewness'):.2f}", "t_c": "–"}
+    if time > 0.0:
+        row["t_c"] = f"{concise(step * time, step * float(of('correlation_time_sem')))} {unit}"
+    return row | {"free values": f"{of('effective_samples'):.3g}"}
 
 
 @of_dataset
-def frame(dataset: xr.Dataset) -> pd.DataFrame:
-    """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
-    found = statistics(dataset)
-    with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
-        found = found.merge(shares(dataset))
-    flat: dict[str, xr.DataArray] = {}
-    for key, variable in found.data_vars.items():
-        if "quantile" in variable.dims:  # each is a variable of its own
-            stem = str(key).removesuffix("_quantile")
-            flat |= {f"{stem}_q{100 * level:02.0f}": variable.sel(quantile=level, drop=True) for level in QUANTILES}
-        else:
-            flat[str(key)] = variable
-    long = xr.Dataset(flat)
-    table = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
-    table.attrs["units"] = {str(name): each.attrs.get("units", "1") for name, each in long.variables.items()}
-    return table
+def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+    """At which speeds the area is lost, a row for each point of the sweep of other keys; none where it is not."""
+    found = as_means(loss_speeds(dataset))
+    sizes = {name: dataset.sizes[name] for name in sweep_dims(dataset) if name in found.dims}
+    points = _points(sizes, _thinned(found[list(found)], rows, tuple(sizes)))
+    shown = _shown(found, points, _LOSSES)
+    return _rows(_places(dataset, points) | shown) if shown else []
+
+
+def as_means(found: xr.Dataset) -> xr.Dataset:
+    """With the ending of a mean on what has ends of an interval."""
+    return found.rename({name: f"{name}_mean" for name in found if not str(name).endswith(("_low", "_high"))})
+
+
+@of_dataset
+def once(dataset: xr.Dataset) -> xr.Dataset:
+    """Statistics of what a run has once."""
+    found = events(dataset)
+    return summary(found.assign_attrs(dataset.attrs)).merge(as_means(half_lives(dataset, found)))

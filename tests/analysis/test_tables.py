@@ -1,10 +1,11 @@
 """Rows for the terminal and the CSV: what tells something, and nothing else."""
 
-import csv
 import itertools
+import math
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 from helpers import lens
 from helpers.lens import scene
@@ -16,9 +17,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.scenario.clock import Record
-from sim.units.quantity import Quantity
-from sim.units.table import columns
+from sim.scenario.clock import Clock, Ensemble, Record
 
 
 @pytest.fixture(scope="module", name="ramp")
@@ -86,40 +85,90 @@ def test_table_tells_a_swept_table_by_its_name():
     assert [row["shear"] for row in rows] == ["uniform", "mean"]
 
 
-def test_csv_reads_back_as_the_statistics(ramp, tmp_path):
-    analysis.to_csv(ramp, tmp_path / "out.csv")
-    text = (tmp_path / "out.csv").read_text(encoding="utf-8")
-    wanted = {
-        "t": Quantity("s", "time"),
-        "contact_radius_mean": Quantity("m", "radius"),
-        "contact_radius_sem": Quantity("m", "its error"),
-        "contact_radius_q95": Quantity("m", "95 % quantile"),
-        "lost_to_fluctuations_mean": Quantity("1", "share"),
-    }
-    read, found = columns(text, wanted), analysis.statistics(ramp)
-    np.testing.assert_array_equal(read["t"], ramp["t"])
-    np.testing.assert_array_equal(read["contact_radius_mean"], found["contact_radius_mean"])
-    np.testing.assert_array_equal(read["contact_radius_sem"], found["contact_radius_sem"])
-    np.testing.assert_array_equal(read["contact_radius_q95"], found["contact_radius_quantile"].sel(quantile=0.95))
-    np.testing.assert_array_equal(read["lost_to_fluctuations_mean"], analysis.shares(ramp)["lost_to_fluctuations_mean"])
-    rows = list(csv.reader(text.splitlines()))  # the header is first, and every row is as long
-    assert rows[0][0] == "t [s]" and {len(row) for row in rows} == {len(rows[0])} and len(rows) == 22
+@pytest.fixture(scope="module")
+def long(ramp, tmp_path_factory):
+    """The CSV of the ramp, as whoever has it reads it."""
+    path = tmp_path_factory.mktemp("csv") / "out.csv"
+    analysis.to_csv(ramp, path)
+    return pd.read_csv(path)
+
+
+def of(long, quantity):
+    return long[long["quantity"] == quantity]
+
+
+def test_csv_reads_back_as_the_statistics(ramp, long):
+    found, rows = analysis.statistics(ramp), of(long, "contact_radius")
+    names = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std", "skewness": "skewness"}
+    np.testing.assert_array_equal(rows["t [s]"], ramp["t"])
+    np.testing.assert_array_equal(rows["speed [m/s]"], ramp["speed"])
+    for column, kind in names.items():
+        np.testing.assert_array_equal(rows[column], found[f"contact_radius_{kind}"])
+    np.testing.assert_array_equal(rows["q95"], found["contact_radius_quantile"].sel(quantile=0.95))
+    np.testing.assert_array_equal(rows["q50_low"], found["contact_radius_quantile_low"].sel(quantile=0.5))
+    lost = analysis.shares(ramp)["lost_to_fluctuations_first_mean"]
+    np.testing.assert_array_equal(of(long, "lost_to_fluctuations_first")["mean"], lost)
+    assert set(rows["unit"]) == {"m"} and set(rows["over"]) == {"6 members"} and next(iter(long)) == "t [s]"
 
 
 def test_csv_has_a_row_for_each_point_and_time(tmp_path):
     sweep = {"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 0.5, 1.0]}
     dataset = run(scene(sweep=sweep, shear=shear.Uniform()))
     analysis.to_csv(dataset, tmp_path / "out.csv")
-    text = (tmp_path / "out.csv").read_text(encoding="utf-8")
-    wanted = {
-        "contact_load": Quantity("N", "load"),
-        "adhesion_bond_share": Quantity("1", "share"),
-        "t": Quantity("s", "time"),
-    }
-    read = columns(text, {**wanted, "contact_area_mean": Quantity("m^2", "area")})
+    rows = of(pd.read_csv(tmp_path / "out.csv"), "contact_area")
     expected = itertools.product([1e-3, 4e-3], [0.0, 0.5, 1.0], dataset["t"].to_numpy())
-    assert list(zip(*(read[name].tolist() for name in wanted), strict=True)) == list(expected)
-    np.testing.assert_array_equal(read["contact_area_mean"], dataset["contact_area"].to_numpy().ravel())
+    read = rows[["contact_load [N]", "adhesion_bond_share", "t [s]"]].itertuples(index=False, name=None)
+    assert list(read) == list(expected)
+    np.testing.assert_array_equal(rows["mean"], dataset["contact_area"].to_numpy().ravel())
+
+
+def test_csv_holds_what_is_told_once_of_a_run(ramp, long):
+    (masked,) = of(long, "time_masked").to_dict("records")
+    assert masked["mean"] == float(analysis.statistics(ramp)["time_masked_mean"]) and math.isnan(masked["t [s]"])
+    (dissipated,) = of(long, "total_dissipated").to_dict("records")
+    assert dissipated["q95"] == 0.0 and dissipated["unit"] == "J"
+    (speed,) = of(long, "speed_at_5_percent_lost").to_dict("records")
+    found = analysis.loss_speeds(ramp)["speed_at_5_percent_lost_low"]
+    assert speed["low"] == float(found) and speed["unit"] == "m/s"
+
+
+def test_csv_of_a_steady_sweep_holds_members_and_time_together(tmp_path):
+    speeds = {"drive.speed": [1e-3, 1e-2]}
+    dataset = run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, ensemble=Ensemble(members=2)))
+    analysis.to_csv(dataset, tmp_path / "out.csv")
+    rows = of(pd.read_csv(tmp_path / "out.csv"), "contact_area")
+    late = rows[rows["over"] == "second half of the run and 2 members"]
+    assert set(rows["over"]) == {"2 members", *late["over"]} and late["t [s]"].isna().all()
+    np.testing.assert_array_equal(late["speed [m/s]"], [1e-3, 1e-2])
+    found = analysis.distribution(dataset)
+    np.testing.assert_array_equal(late["mean"], found["contact_area_mean"])
+    np.testing.assert_array_equal(late["effective_samples"], found["contact_area_effective_samples"])
+
+
+def test_a_steady_run_has_a_table_of_how_each_quantity_is_spread():
+    dataset = run(
+        scene(drive=drive.Steady(speed=4e-3), clock=Clock(duration=0.8, step=2e-3), ensemble=Ensemble(members=20))
+    )
+    found = {row["quantity"].partition(" (")[0]: row for row in analysis.spread(dataset)}
+    assert set(found) == {"ΔΓ", "w", "a", "A/A_JKR", "lost to fluct.", "fluct. first", "F"}
+    energy, law = found["ΔΓ"], analysis.distribution(dataset)
+    assert list(energy) == ["quantity", "mean", "sd", "5 %", "50 %", "95 %", "skewness", "t_c", "free values"]
+    np.testing.assert_allclose(float(energy["sd"]), 1e3 * float(law["fluctuation_energy_std"]), rtol=5e-3)
+    np.testing.assert_allclose(
+        float(energy["free values"]), float(law["fluctuation_energy_effective_samples"]), rtol=5e-3
+    )
+    assert "(" in energy["mean"] and "(" in energy["95 %"] and energy["t_c"].endswith(" ms")
+    assert analysis.spread(lens.ramp()) == []
+
+
+def test_a_table_says_at_which_speeds_area_is_lost():
+    sweep = {"contact.load": [1e-3, 4e-3]}
+    (low, high) = analysis.losses(run(scene(sweep=sweep)))
+    assert low["contact_load\n(mN)"] == "1" and high["contact_load\n(mN)"] == "4"
+    assert float(low["5 % of area\nlost at V (mm/s)"].partition("(")[0]) < float(
+        high["5 % of area\nlost at V (mm/s)"].partition("(")[0]
+    )
+    assert analysis.losses(run(scene(drive=drive.Steady(speed=1e-3)))) == []
 
 
 def test_table_of_a_cycle_tells_what_holds_the_sphere():
@@ -142,14 +191,6 @@ def test_table_of_a_swept_course_at_one_speed_shows_it_in_time():
 def test_highlights_tell_nothing_where_there_is_nothing():
     dataset = run(scene(bonds=bonds.Unbroken(), shear=shear.Uniform()))
     assert analysis.highlights(dataset) == []
-
-
-def test_csv_holds_what_is_told_once_of_a_run(ramp, tmp_path):
-    analysis.to_csv(ramp, tmp_path / "out.csv")
-    wanted = {"time_masked_mean": Quantity("1", "share"), "total_dissipated_q95": Quantity("J", "energy")}
-    read = columns((tmp_path / "out.csv").read_text(encoding="utf-8"), wanted)
-    np.testing.assert_array_equal(read["time_masked_mean"], np.full(21, analysis.statistics(ramp)["time_masked_mean"]))
-    np.testing.assert_array_equal(read["total_dissipated_q95"], 0.0)
 
 
 def test_csv_in_trouble_leaves_an_older_file_as_it_was(ramp, tmp_path, monkeypatch):
@@ -175,7 +216,10 @@ def test_csv_goes_through_a_link_to_where_it_points(ramp, tmp_path):
 def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mean(ramp):
     rows = analysis.table(ramp)
     said = analysis.notes(ramp, rows, analysis.highlights(ramp))
-    assert said[0] == "mean over the 6 members; in brackets the standard error in the last digits"
+    assert (
+        said[0]
+        == "mean over the 6 members; in brackets the standard error in the last digits, wider where members are few"
+    )
     assert said[1].startswith("12 of 21 rows shown") and "--where" in said[1] and "A/A_JKR: " in said[2]
     whole = analysis.table(ramp, rows=10**9)
     assert len(whole) == 21 and not any("shown" in line for line in analysis.notes(ramp, whole, []))
