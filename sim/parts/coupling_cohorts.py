@@ -39,9 +39,10 @@ from sim.parts.coupling_maps import (
     AT_SHEARED,
     AT_SQUARE,
     AT_WAY,
-    GAMMA,
     SOME,
+    bend_of,
     book_nodes,
+    error_of_way,
     go_to_node,
     start_of,
     stored_energy,
@@ -84,19 +85,22 @@ def _lacking(way, pool, count, row, time, bare, slider, held, unit, rules):
 def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy):
     """Slip at once to where bonds bear the pull again, if an avalanche has begun; bonds left, below zero if none has.
 
-    The first such place is looked for in steps of half the width to which stretches are resolved.
+    The first such place is looked for in steps of at most half the width to which stretches are resolved.
     """
     sense, step, limit = math.copysign(1.0, row[FORCE]), 0.5 * rules.cell / unit, rules.limit / unit
     here, area, _, _, _ = _lacking(0.0, pool, count, row, time, bare, slider, held, unit, rules)
     near, _, _, _, _ = _lacking(sense * _TRIED * limit, pool, count, row, time, bare, slider, held, unit, rules)
-    if not (near > here or here > _TRIED * math.fabs(row[FORCE])):
+    if not (near > here or here > _TRIED * math.fabs(row[FORCE])):  # merged stretches reach a little beyond the limit
         return -1
-    way, low, high = 0.0, 0.0, 0.0
+    way, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
     while high < 2.0 * limit:
-        low, high = high, high + step
+        low, high = high, high + min(high, step)
         lacks, _, _, _, _ = _lacking(sense * high, pool, count, row, time, bare, slider, held, unit, rules)
-        if lacks <= 0.0 and low > 0.0:
+        if begun and lacks <= 0.0:
             break
+        begun = begun or lacks > 0.0
+        if not begun and high > step:
+            return -1
     if high < 2.0 * limit:
         for _ in range(60):
             middle = 0.5 * (low + high)
@@ -149,8 +153,7 @@ def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
     """
     pool, saved, nodes = room
     count, travelled, settled = bonds
-    _, mass, damping, viscosity, _, _, _, tolerance = slider
-    brittle = rules.limit < math.inf and mass + damping + viscosity == 0.0
+    brittle = rules.limit < math.inf and slider[1] + slider[2] + slider[3] == 0.0
     start, length = 0.0, piece[0]
     nodes[0, :] = 0.0
     sums_at(pool, count, unit, rules, nodes[0])
@@ -185,8 +188,8 @@ def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
             factor = min(factor, other)
         way, bend, error = nodes[2, AT_WAY], 0.0, math.inf
         if found >= 0:
-            bend = 2.0 / step * ((way - nodes[1, AT_WAY]) / (1.0 - GAMMA) - nodes[1, AT_WAY] / GAMMA) / step
-            error = step * step / 24.0 * math.fabs(bend - row[BEND]) / (1.0 + math.fabs(way)) / tolerance
+            bend = bend_of(nodes, step)
+            error = error_of_way(bend, step, nodes, row, slider)
         grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)
         if not (error <= 1.0 and factor >= 1.0):
             pool[:3, :count] = saved[:, :count]
@@ -198,7 +201,7 @@ def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
                     count, row[NEXT] = found, 1e-6 * length
                     travelled += unit * (row[SLIP] - slid)
             continue
-        book_nodes(row, nodes, start, step, slider, held, piece, unit, rules, energy)
+        book_nodes(row, nodes, start, step, slider, piece, rules.limit / unit, energy)
         count, row[BEND] = found, bend
         travelled += unit * way
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:

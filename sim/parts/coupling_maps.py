@@ -129,68 +129,86 @@ def start_of(row, node, yields, slider):
 
 
 @device
+def before_node(place, nodes, at_start, start, step, row, slider):
+    """Numbers of the way to a node: its duration and end, the rate of speeds, what they lack of it, a first guess."""
+    mass, (speed, body_speed, force_on_mass) = slider[1], at_start
+    duration = (GAMMA if place == 1 else 1.0 - GAMMA) * step
+    time, rate, share = start + PLACES[place] * step, 2.0 / (GAMMA * step), 1.0 / (GAMMA * (1.0 - GAMMA) * step)
+    if place == 1:
+        heavy = mass * rate * body_speed + force_on_mass
+        way = duration * (speed + 0.5 * row[BEND] * duration)
+        return duration, time, rate, speed, body_speed, heavy, way
+    before = nodes[1]
+    heavy = mass * (rate * body_speed + share * (rate * before[AT_BODY] - 2.0 * body_speed))
+    way = duration * (before[AT_WAY] / (GAMMA * step) + 0.5 * row[BEND] * step)
+    return duration, time, rate, share * before[AT_WAY], share * before[AT_BODY], heavy, way
+
+
+@device
+def balance(way, bound, moment, before, after, numbers, start, row, bare, slider, held, piece):
+    """Force in excess at a node with these bonds, its slope if they stay, how small a slip is none; nan without any.
+
+    What belongs to the slip is written to the node.
+    """
+    stiffness, mass, damping, viscosity, _, _, _, tolerance = slider
+    _, time, rate, gone, body_gone, heavy, _ = numbers
+    radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
+    if not area >= 0.0:
+        return math.nan, math.nan, math.nan
+    yields, _ = compliance(radius, slider)
+    slip = before[AT_WAY] + way
+    force = area * (moment + viscosity * (rate * slip - gone))
+    body = slip + yields * force - row[SHEARED]
+    pull = pull_on(time, start, body, row, slider, piece)
+    over = force + (damping + mass * rate) * (rate * body - body_gone) - heavy - pull
+    grows, loads = area * (bound + viscosity * rate), stiffness + rate * (damping + mass * rate)
+    after[AT_WAY], after[AT_BODY], after[AT_AREA], after[AT_RADIUS] = slip, body, area, radius
+    after[AT_SHEARED] = yields * force
+    firm = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0) / (area * (bound + SOME)) if area > 0.0 else 1.0
+    none = max(1e-3 * tolerance / max(1.0, firm), 1e-15 * math.fabs(slip))
+    return over, grows + loads * (1.0 + yields * grows), none
+
+
+@device
 def go_to_node(place, nodes, at_start, pool, count, start, step, row, bare, slider, held, piece, unit, rules):
     """Find the slip to a node and take the bonds there; their number, and the factor of the step for births.
 
     A number below zero where there is no balance of forces or its slope is not that of a short sub-step.
     """
-    stiffness, mass, damping, viscosity, _, _, _, tolerance = slider
-    speed, body_speed, force_on_mass = at_start
-    duration = (GAMMA if place == 1 else 1.0 - GAMMA) * step
-    time, rate, share = start + PLACES[place] * step, 2.0 / (GAMMA * step), 1.0 / (GAMMA * (1.0 - GAMMA) * step)
+    numbers = before_node(place, nodes, at_start, start, step, row, slider)
+    duration, way = numbers[0], numbers[6]
     before, after = nodes[place - 1], nodes[place]
-    if place == 1:
-        gone, body_gone = speed, body_speed
-        heavy = mass * rate * body_speed + force_on_mass
-        way = duration * (speed + 0.5 * row[BEND] * duration)
-    else:
-        gone, body_gone = share * before[AT_WAY], share * before[AT_BODY]
-        heavy = mass * (rate * body_speed + share * (rate * before[AT_BODY] - 2.0 * body_speed))
-        way = duration * (before[AT_WAY] / (GAMMA * step) + 0.5 * row[BEND] * step)
     bent = -row[BEND] * duration * duration / 12.0
     off = unit * min(max(bent, -_MOST_BENT), _MOST_BENT)
     free, ahead = max(0.0, 1.0 - before[AT_BOUND]), way >= 0.0
     steepen(pool, count, way, off, rules)
-    last_way, last_over, slope, elasticity = 0.0, 0.0, 0.0, 0.0
+    last_way, last_over, slope = 0.0, 0.0, 0.0
     for turn in range(_TURNS):
         if (way >= 0.0) != ahead:
             ahead = way >= 0.0
             steepen(pool, count, way, off, rules)
         bound, moment, one, two, factor = _tried(pool, count, unit * way, duration, off, free, rules)
-        moment /= unit
-        radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
-        if not area >= 0.0:
-            return -1, 0.0
-        yields, _ = compliance(radius, slider)
-        slip = before[AT_WAY] + way
-        force = area * (moment + viscosity * (rate * slip - gone))
-        body = slip + yields * force - row[SHEARED]
-        pull = pull_on(time, start, body, row, slider, piece)
-        over = force + (damping + mass * rate) * (rate * body - body_gone) - heavy - pull
-        grows, loads = area * (bound + viscosity * rate), stiffness + rate * (damping + mass * rate)
-        elasticity = grows + loads * (1.0 + yields * grows)
+        over, elasticity, none = balance(
+            way, bound, moment / unit, before, after, numbers, start, row, bare, slider, held, piece
+        )
         if turn == 0:
             slope = elasticity
         elif math.fabs(way - last_way) > 1e-9 * (1.0 + math.fabs(way)):
             slope = (over - last_over) / (way - last_way)
         if not slope > (_FALLING if rules.limit == math.inf else _FLAT) * elasticity:
             return -1, 0.0
-        change = over / slope
-        firm = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0) / (area * (bound + SOME)) if area > 0.0 else 1.0
-        if math.fabs(change) <= max(1e-3 * tolerance / max(1.0, firm), 1e-15 * math.fabs(slip)):
-            after[AT_WAY], after[AT_BODY], after[AT_AREA], after[AT_RADIUS] = slip, body, area, radius
-            after[AT_SHEARED] = yields * force
+        if math.fabs(over / slope) <= none:
             after[AT_CUT] = _cut(pool, count, unit * way, duration, rules) if rules.limit < math.inf else 0.0
             count = carry(pool, count, unit * way, off, one, two, rules)
             sums_at(pool, count, unit, rules, after)
             return count, factor
         last_way, last_over = way, over
-        way -= change
+        way -= over / slope
     return -1, 0.0
 
 
 @device
-def book_nodes(row, nodes, start, step, slider, held, piece, unit, rules, energy):
+def book_nodes(row, nodes, start, step, slider, piece, limit, energy):
     """Take an accepted sub-step: integrals of the powers over it, and the row at its end."""
     _, _, damping, viscosity, forced, _, _, _ = slider
     firms = np.empty(3)
@@ -211,7 +229,6 @@ def book_nodes(row, nodes, start, step, slider, held, piece, unit, rules, energy
         energy[AREA] -= share * 0.5 * (node[AT_SQUARE] * spreads[i] + node[AT_SHEARED] * node[AT_SHEARED] * firmer[i])
         row[SQUARE] += share * speeds[i] * speeds[i]
         if i > 0:
-            limit = rules.limit / unit
             if node[AT_CUT] > 0.0:
                 energy[RUPTURE] += 0.25 * (nodes[i - 1, AT_AREA] + node[AT_AREA]) * node[AT_CUT] * limit * limit
             row[PATH] += math.fabs(node[AT_WAY] - nodes[i - 1, AT_WAY])
@@ -222,6 +239,19 @@ def book_nodes(row, nodes, start, step, slider, held, piece, unit, rules, energy
     row[POSITION] += last[AT_BODY]
     row[SLIP] += last[AT_WAY]
     row[COUNT] += 1.0
+
+
+@device
+def bend_of(nodes, step):
+    """Acceleration of the interface in a sub-step."""
+    early, late = nodes[1, AT_WAY] / GAMMA, (nodes[2, AT_WAY] - nodes[1, AT_WAY]) / (1.0 - GAMMA)
+    return 2.0 / step * (late - early) / step
+
+
+@device
+def error_of_way(bend, step, nodes, row, slider):
+    """Error of a sub-step's way by the change of its acceleration, over the tolerance."""
+    return step * step / 24.0 * math.fabs(bend - row[BEND]) / (1.0 + math.fabs(nodes[2, AT_WAY])) / slider[7]
 
 
 @device

@@ -115,6 +115,34 @@ def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(x0, tim
         assert_allclose(found[2] / (2e-13 * found[1]), stretch, rtol=1e-7)
 
 
+#: Speed, stiffness of the spring at the onset of oscillations of bonds resolved by stretch at k_on = k0, frequency.
+ONSETS = ((10.0, 0.0295565, 4.25784), (20.0, 0.0352161, 8.66919), (100.0, 0.02052, 36.2893))
+
+
+def growth(speed, stiffness, frequency, steps=240):
+    """Growth rate and frequency of the mode of that frequency, over it, after a small jump of the speed."""
+    step = 2.0 * math.pi / frequency / 25.0
+    rises = {"time": (0.0, step, step, 1e3), "value": tuple(speed * STRETCH * v for v in (1.0, 1.0, 1.0001, 1.0001))}
+    drive = spring(stiffness, rises, start="steady", tolerance=1e-8)
+    states, _ = marched(driven(steps * step, steps, drive, 1e-5, start="steady"))
+    changes = np.diff(reached(states)[steps // 3 :, 2])
+    shifted = np.stack([changes[3 - k : -1 - k] for k in range(4)], axis=1)
+    modes = np.log(np.roots([1.0, *-np.linalg.lstsq(shifted, changes[4:])[0]]).astype(complex)) / step / frequency
+    nearest = min(modes[modes.imag > 0.0], key=lambda mode: abs(mode.imag - 1.0))
+    return nearest.real, nearest.imag
+
+
+@pytest.mark.parametrize(("speed", "stiffness", "frequency"), ONSETS)
+def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_within_a_hundredth_of_it(
+    speed, stiffness, frequency
+):
+    rate, turns = growth(speed, stiffness, frequency)
+    assert abs(rate) < 1e-4
+    assert_allclose(turns, 1.0, rtol=1e-3)
+    assert growth(speed, 0.99 * stiffness, frequency)[0] > 2e-3
+    assert growth(speed, 1.01 * stiffness, frequency)[0] < -2e-3
+
+
 def test_a_force_makes_creep_at_the_speed_of_steady_sliding_under_it():
     # 0.16660872 a site is the friction at a speed of 1 stretch a mean life
     states, read = marched(driven(40.0, 4, force(0.16660871, tolerance=1e-6), 1e-6))
@@ -216,9 +244,9 @@ def test_bonds_that_only_a_stretch_breaks_snap_where_nothing_delays_them():
 
 def test_bonds_of_many_stretches_snap_again_and_again_behind_a_soft_spring_and_never_behind_a_stiff_one():
     cut = CutOff(stretch=STRETCH)
-    for stiffness, often in ((0.05, True), (20.0, False)):
-        _, read = marched(driven(200.0, 50, spring(stiffness, 1.0), 1e-4, rupture=cut))
-        snaps = np.diff(read["dissipated_by_snaps"]) > 1e-9 * read["drive_work"][-1]
+    for stiffness, speed, often in ((0.05, 1.0, True), (0.05, 2.0, True), (20.0, 1.0, False)):
+        _, read = marched(driven(200.0, 50, spring(stiffness, speed), 1e-4, rupture=cut))
+        snaps = np.diff(read["dissipated_by_snaps"]) > 1e-6 * read["drive_work"][-1]
         assert (np.sum(snaps) > 5) == often
         assert residual(read) < 1e-6
 
