@@ -129,7 +129,7 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one speed those that
-        begin in the second half of the run. ``kinetic_friction`` [N] is the work of the stage over its way, from the
+        begin in the second half of the run. ``kinetic_friction`` [N] is the work of the stage over its path, from the
         beginning of the first of these slips to that of the last, without slips over that time. Empty for other
         drives, and where only statistics were recorded.
     """
@@ -144,15 +144,16 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     several = last > first
     end = dataset["t"].where(dataset["spring_force"].notnull()).max("t")
     first, last = first.where(several, half), last.where(several, end)
-    made, gone = (_between(dataset, name, first, last) for name in ("drive_work", "stage_position"))
-    kinetic = (made / gone.where(gone != 0.0)).assign_attrs(units="N", long_name="work of the stage over its way")
+    path = abs(dataset["stage_position"].diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
+    made, gone = (_between(dataset, values, first, last) for values in (dataset["drive_work"], path))
+    kinetic = (made / gone.where(gone != 0.0)).assign_attrs(units="N", long_name="work of the stage over its path")
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
     return every.map(ordered, keep_attrs=True)
 
 
-def _between(dataset: xr.Dataset, name: str, first: xr.DataArray, last: xr.DataArray) -> xr.DataArray:
-    """Growth of a recorded quantity from one time to another."""
-    values = dataset[name].astype(float).broadcast_like(dataset["spring_force"])
+def _between(dataset: xr.Dataset, values: xr.DataArray, first: xr.DataArray, last: xr.DataArray) -> xr.DataArray:
+    """Growth of a quantity from one time to another."""
+    values = values.astype(float).broadcast_like(dataset["spring_force"])
     dims: Any = {"input_core_dims": [[], ["t"], ["t"]], "vectorize": True}
     before, after = (xr.apply_ufunc(np.interp, time, dataset["t"], values, **dims) for time in (first, last))
     return after - before

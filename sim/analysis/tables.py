@@ -75,7 +75,7 @@ _EVENTS = (
         "slip_count", "slips", meaning="falls of the spring's force by 2 % or more, means over them; times of records"
     ),
     _Column("static_friction", "static\nfriction", math.nan, meaning="force at which a slip begins"),
-    _Column("kinetic_friction", "kinetic\nfriction", math.nan, meaning="work of the stage over its way"),
+    _Column("kinetic_friction", "kinetic\nfriction", math.nan, meaning="work of the stage over its path"),
     _Column("force_drop", "drop", math.nan),
     _Column("stress_drop", "drop of\nstress", math.nan),
     _Column("slip_amplitude", "slip", math.nan),

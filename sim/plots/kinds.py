@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from sim.analysis import sweep_dims
 from sim.analysis.scene import answered, claim, of_dataset
 from sim.numerics.files import claim as claim_file, output
-from sim.plots import panels
+from sim.plots import panels, slider
 from sim.plots.bond_laws import rest_of
 from sim.plots.field import density_figure, map_figure, needs_maps, spectrum_figure
 from sim.plots.loop import loop_figure, needs_course
@@ -42,16 +42,21 @@ class Kind(NamedTuple):
         return (self.draw.__doc__ or "").partition("\n")[0]
 
 
+_OF_FORCE = ("spring_force", "contact_area")
 _OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
 #: What can be drawn, by name; the first line of what draws it is its help. The default is the first kind that fits.
 KINDS: dict[str, Kind] = {
     "loop": Kind(loop_figure, needs_course, lambda dataset: True, ("normal_load", "displacement")),
     "theories": Kind(theories_figure, case_of, sweeps_theories, ("shear_stress", "contact_area")),
     "stress": Kind(stress_figure, needs_stress, lambda dataset: rest_of(dataset) is not None, ("speed",)),
+    "stability": Kind(slider.stability_figure, slider.needs_map, lambda dataset: True, ("spring_force",)),
+    "creep": Kind(slider.creep_figure, slider.needs_force, lambda dataset: True, ("slider_position", "speed")),
     "friction": Kind(panels.friction_figure, panels.needs_friction, panels.turns, ("speed",)),
     "curve": Kind(panels.curve_figure, panels.needs_speeds, lambda dataset: not panels.turns(dataset), _OF_CURVE),
     "sweep": Kind(panels.sweep_figure, panels.needs_sweep, lambda dataset: True),
     "time": Kind(panels.time_figure, fits=lambda dataset: True),
+    "phase": Kind(slider.phase_figure, slider.needs_one, reads=("spring_force", "speed")),
+    "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=_OF_FORCE),
     "map": Kind(map_figure, needs_maps),
     "spectrum": Kind(spectrum_figure, needs_maps),
     "profile": Kind(profile_figure, shapes_of),

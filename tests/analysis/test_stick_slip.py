@@ -99,6 +99,10 @@ def test_slips_follow_the_sense_of_the_stage_and_reversals_are_none():
         assert_allclose(found["static_friction"], 4.0, rtol=1e-14)
         assert_allclose(found["slip_amplitude"], 6.0, rtol=1e-14)  # the stage moves two meanwhile
         assert_allclose(found["stress_drop"], 8.0, rtol=1e-14)
+    found = analysis.stick_slip(
+        made(saw, np.where(np.arange(18) < 9, 1.0, -1.0)).assign(drive_work=("t", 3.0 * np.arange(18.0)))
+    )
+    assert_allclose(found["kinetic_friction"], 3.0, rtol=1e-14)  # over the path of the stage, not over its way
     # there and back: the force falls from 3 to -3 as the stage turns, and nothing slips
     there = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0])
     assert analysis.slips(made(there, np.where(np.arange(9) < 5, 1.0, -1.0))).sizes["slip"] == 0

@@ -235,7 +235,8 @@ def test_default_figure_fits_the_dataset(changes, kind):
 
 def test_an_unknown_kind_names_the_known_ones(ramp):
     with pytest.raises(
-        ValueError, match='no figure "histogram"; known: loop, theories, stress, friction, curve, sweep, time, map'
+        ValueError,
+        match='no figure "histogram"; known: loop, theories, stress, stability, creep, friction, curve, sweep, time',
     ):
         plots.draw(ramp, "histogram")
 

@@ -1,0 +1,114 @@
+"""Figures of a slider that feels its friction: what they show is what the dataset and the theory have."""
+
+import functools
+
+import numpy as np
+import pytest
+from helpers.pictured import legend_of, lines_of, rendered
+from helpers.scenes import scene
+from numpy.testing import assert_allclose
+
+import sim
+from sim.laws.schallamach import first_moment_onset, first_moment_peak
+from sim.parts.bonds import FirstMoment
+from sim.parts.bonds.rupture import Bell
+from sim.parts.contact.bodies import Adhesion
+from sim.parts.drive import Force, Spring
+from sim.plots import draw
+from sim.scenario.clock import Clock
+
+#: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
+NUMBERS = (25.0, 4e-12, 8e-7, 250.0, 6.5e16)
+BONDS = FirstMoment(
+    rupture=Bell(zero_force_rate=25.0, bell_force=4e-12), bond_stiffness=8e-7, rebinding_rate=250.0, site_density=6.5e16
+)
+
+
+@functools.cache
+def driven(kind):
+    """Small runs, each made once; do not change them."""
+    parts = {"bonds": BONDS, "adhesion": Adhesion(work=42e-3, bond_share=0.0)}
+    most = first_moment_peak(*NUMBERS).stress * scene(1).contact_area
+    ramp = {"from": 1e-3, "to": 3e-2, "scale": "log", "cycles": 1}
+    drives = {
+        "creep": (Force(force=0.5 * most), 0.2, {"drive.force": [0.5 * most, 1.3 * most]}),
+        "map": (Spring(stage=ramp, stiffness=100.0, damping=1e-2, start="steady"), 4.0,
+                {"drive.stiffness": [100.0, 1e4]}),
+        "pull": (Spring(stage=2e-3, stiffness=300.0), 0.1, {}),
+    }  # fmt: skip
+    drive, duration, sweep = drives[kind]
+    if kind == "pull":
+        parts["adhesion"] = Adhesion(work=42e-3)
+    return sim.run(scene(2, clock=Clock(duration=duration, step=duration / 400), drive=drive, sweep=sweep, **parts))
+
+
+def test_creep_is_drawn_from_the_first_step_on_and_a_cross_ends_a_runaway():
+    dataset = driven("creep")
+    figure = rendered(draw(dataset))  # the default
+    position, speed = figure.axes
+    slow, fast = lines_of(speed)[:2]
+    assert_allclose(slow[1], 1e3 * dataset["speed"].isel(drive_force=0, member=0, t=slice(1, None)), rtol=1e-12)
+    assert slow[0][0] > 0.0 and position.get_yscale() == position.get_xscale() == "log"
+    last = int(np.isfinite(fast[1]).sum()) - 1
+    crosses = [line for line in speed.lines if line.get_marker() == "x"]
+    assert len(crosses) == 1 and crosses[0].get_xydata().tolist() == [[fast[0][last], fast[1][last]]]
+    assert "runaway" in legend_of(position)[0]
+
+
+def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():
+    dataset = driven("map")
+    figure = rendered(draw(dataset))
+    up, down = figure.axes[:2]
+    for panel, words in ((up, "faster"), (down, "slower")):
+        assert words in legend_of(panel)[1]
+        ((speed, stiffness),) = lines_of(panel)
+        firm = 0.5 * np.pi**2 * 1.6e6 * float(dataset["radius_at_rest"][0])
+        exact = first_moment_onset(1e-3 * speed, *NUMBERS, scene(1).contact_area, contact_stiffness=firm).stiffness
+        assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
+        swings = panel.collections[0].get_array().reshape(2, -1)
+        # a soft spring sticks and slips at 30 mm/s, one stiffer than the boundary nowhere
+        assert swings[0, -1] > 0.5 and np.nanmax(swings[1]) < 0.1
+    # and nothing does below the friction maximum on the way up
+    slow = first_moment_peak(*NUMBERS).speed
+    edges = np.geomspace(1e-3, 3e-2, swings.shape[1] + 1)
+    assert np.nanmax(up.collections[0].get_array().reshape(2, -1)[:, edges[1:] < slow]) < 0.1
+
+
+def test_the_area_on_the_way_to_sliding_lies_beside_the_law_fitted_to_its_beginning():
+    dataset = driven("pull")
+    figure = rendered(draw(dataset, "incipient"))
+    force, area = (dataset[name].isel(member=0).values for name in ("spring_force", "contact_area"))
+    top = int(np.argmax(force)) + 1
+    own, law = lines_of(figure.axes[0])[:2]
+    assert_allclose(own[0], 1e3 * force[:top], rtol=1e-12)
+    assert_allclose(own[1], area[:top] / area[0], rtol=1e-12)
+    half = own[0] <= 0.5 * own[0][-1]
+    # least squares: what is left of the loss has no component along the law
+    loss, fitted = 1.0 - own[1][half], 1.0 - law[1][half]
+    assert_allclose(np.sum((loss - fitted) * fitted), 0.0, atol=1e-12 * np.sum(fitted**2))
+    assert_allclose(np.diff(np.log(1.0 - law[1][1:])), 2.0 * np.diff(np.log(own[0][1:])), rtol=1e-6)
+    assert any("alpha" in text for text in legend_of(figure.axes[0])[0])
+
+
+def test_a_phase_portrait_is_the_speed_over_the_force_of_one_member():
+    dataset = driven("pull")
+    figure = rendered(draw(dataset, "phase"))
+    (force, speed), *_ = lines_of(figure.axes[0])
+    assert_allclose(force, 1e3 * dataset["spring_force"].isel(member=0), rtol=1e-12)
+    assert_allclose(speed, 1e3 * dataset["speed"].isel(member=0), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("kind", "of", "cure"),
+    [
+        ("phase", "creep", "spring"),
+        ("phase", "map", "where"),
+        ("creep", "pull", "force"),
+        ("stability", "pull", "drive.stiffness"),
+        ("stability", "creep", "spring"),
+        ("incipient", "map", "rest"),
+    ],
+)
+def test_figures_of_a_slider_are_refused_with_the_cure_where_they_cannot_be_drawn(kind, of, cure):
+    with pytest.raises(ValueError, match=cure):
+        draw(driven(of), kind)
