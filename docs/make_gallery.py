@@ -20,6 +20,7 @@ from PIL import Image
 import sim
 from sim import analysis, laws
 from sim.analysis import concise, shares, statistics
+from sim.analysis.observables import all_observables
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).with_name("gallery")
@@ -358,6 +359,142 @@ def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
     return {"rest": float(rest[-1]), "short": float(rest[0]), "slower": 1e6 * float(speed[0]),
             "faster": 1e6 * float(speed[-1]), "slow": float(longest[0]), "fast": float(longest[-1]),
             "share": 100.0 * float(shortest[-1] / longest[-1])}  # fmt: skip
+
+
+@asks(
+    "velocity_step",
+    "How does friction answer a sudden change of the speed?",
+    """It overshoots. When the stage goes from {slow:g} to {fast:g} mm/s at once the force rises from {before:.2f}
+    mN to {peak:.2f} mN within {after:.1f} ms, as the bonds are stretched further before more of them break, and
+    settles at {settled:.2f} mN. Back at the old speed the force is {last:.2f} mN once more, and never below.""",
+    kind="time",
+)
+def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
+    force, stage = (dataset[name].isel(member=0).to_numpy() for name in ("friction_force", "stage_speed"))
+    up, down = (int(place) + 1 for place in np.flatnonzero(np.diff(stage))[[0, -1]])
+    top = up + int(np.argmax(force[up:down]))
+    return {"slow": 1e3 * float(stage[0]), "fast": 1e3 * float(stage[up]), "before": 1e3 * float(force[0]),
+            "peak": 1e3 * float(force[top]), "settled": 1e3 * float(force[down - 1]),
+            "after": 1e3 * float(dataset["t"][top] - dataset["t"][up - 1]),
+            "last": 1e3 * float(force[down:].min())}  # fmt: skip
+
+
+@asks(
+    "friction_loop",
+    "How much of a stroke back and forth is sliding?",
+    """Of the {stage:.0f} µm of each stroke the slider goes {slider:.0f} µm; the rest strains the spring and the
+    contact. Sliding at a steady {force:.2f} mN each way, the stage does {work:.2f} µJ of work in a stroke, all
+    of which ends in bonds that break.""",
+)
+def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
+    one = dataset.isel(member=0)
+    turns = np.flatnonzero(np.diff(np.sign(one["stage_speed"].to_numpy())[1:])) + 1
+    stage, slider, work = (one[name].to_numpy()[turns] for name in ("stage_position", "slider_position", "drive_work"))
+    return {"stage": 1e6 * abs(float(stage[2] - stage[1])), "slider": 1e6 * abs(float(slider[2] - slider[1])),
+            "force": 1e3 * float(abs(one["friction_force"]).max()), "work": 1e6 * float(work[2] - work[1])}  # fmt: skip
+
+
+@asks(
+    "creep",
+    "Which tangential force does a contact bear for ever, and how long a larger one?",
+    """Up to {most:.2f} mN, where Bell's cluster of bonds comes apart. Under {held:g} mN it creeps at {creep:.2f}
+    mm/s for good; under {more:g} mN it gives way after {late:.0f} ms, under {much:g} mN after {soon:.1f} ms.""",
+)
+def creep(dataset: xr.Dataset) -> dict[str, Number]:
+    names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
+    area = np.pi * float(dataset["radius_at_rest"].max()) ** 2
+    most = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names)).stress * area
+    force, last = 1e3 * dataset["drive_force"].to_numpy(), dataset.isel(member=0, t=-1)
+    gone = np.flatnonzero(last["runaway_time"].notnull())
+    speed, ends = 1e3 * last["speed"].to_numpy(), 1e3 * last["runaway_time"].to_numpy()
+    return {"most": 1e3 * float(most), "held": float(force[gone[0] - 1]), "creep": float(speed[gone[0] - 1]),
+            "more": float(force[gone[0]]), "late": float(ends[gone[0]]), "much": float(force[-1]),
+            "soon": float(ends[-1])}  # fmt: skip
+
+
+@asks(
+    "incipient_shear",
+    "How does the contact area fall on the way to sliding?",
+    """About with the square of the tangential force, as measured on many contacts, and faster as the slider gives
+    way: when the force is largest, {small:.1f} % of the area are gone under {least:g} mN, {large:.1f} % under
+    {load:g} mN. Here broken bonds are all of it. The coefficient α falls as the area at rest to the power
+    {power:.2f}; measured contacts have about minus three halves.""",
+    kind="incipient",
+)
+def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
+    one = dataset.isel(member=0)
+    load, lost, area, alpha = 1e3 * one["contact_load"].to_numpy(), [], [], []
+    for place in range(load.size):
+        force, own = (one[name].isel(contact_load=place).to_numpy() for name in ("spring_force", "contact_area"))
+        top = int(np.argmax(force))
+        half = slice(0, int(np.searchsorted(force[:top], 0.5 * force[top])))
+        lost.append(100.0 * (1.0 - own[top] / own[0]))
+        area.append(own[0])
+        alpha.append(np.sum(force[half] ** 2 * (own[0] - own[half])) / np.sum(force[half] ** 4))
+    return {"small": lost[0], "least": float(load[0]), "large": lost[-1], "load": float(load[-1]),
+            "power": float(np.polyfit(np.log(area), np.log(alpha), 1)[0])}  # fmt: skip
+
+
+@asks(
+    "stick_slip",
+    "At which speed does a lens behind a soft spring begin to stick and slip?",
+    """At {onset:.1f} mm/s, as the stage is driven faster: beyond the friction maximum, which mean field has at
+    {peak:.1f} mm/s, and nothing prescribes it. From then on the force falls by {drop:.1f} mN in each slip of
+    {slip:.0f} µm, and the mean force is {kinetic:.1f} mN where slips begin at {static:.1f} mN.""",
+    kind="time",
+)
+def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
+    names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
+    force, stage = (dataset[name].isel(member=0).to_numpy() for name in ("spring_force", "stage_speed"))
+    fallen = int(np.argmax(force < 0.5 * np.maximum.accumulate(force)))
+    peak = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names))
+    slips, found = analysis.slips(dataset).isel(member=0), analysis.stick_slip(dataset).isel(member=0)
+    later = slips.isel(slip=slice(1, None)).mean("slip")
+    return {"onset": 1e3 * float(stage[fallen]), "peak": 1e3 * float(peak.speed),
+            "drop": 1e3 * float(later["force_drop"]), "slip": 1e6 * float(later["slip_amplitude"]),
+            "static": 1e3 * float(later["static_friction"]),
+            "kinetic": 1e3 * float(found["kinetic_friction"])}  # fmt: skip
+
+
+@asks(
+    "stability_map",
+    "For which springs and speeds does a slider stick and slip, and does it matter where it comes from?",
+    """For springs softer than the theory's boundary (blue), about where it says, but with a delay: behind {soft:g}
+    N/m it sticks and slips from {up:.1f} mm/s on when it gets faster, and down to {down:.1f} mm/s when it gets
+    slower. Behind {stiff:.0f} N/m and more it never does here: it leaves the unstable speeds before what
+    disturbs it has grown.""",
+    kind="stability",
+)
+def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
+    slips, stiffness = analysis.slips(dataset).isel(member=0), dataset["drive_stiffness"].to_numpy()
+    slid = slips["slip_amplitude"] > 0.0
+    many = slid.sum("slip") > 10
+    first, last = slips.isel(drive_stiffness=0)["slip_speed"].to_numpy()[
+        [1, int(slid.isel(drive_stiffness=0).sum()) - 1]
+    ]
+    return {"soft": float(stiffness[0]), "up": 1e3 * float(first), "down": 1e3 * float(last),
+            "stiff": float(stiffness[int(many.sum())])}  # fmt: skip
+
+
+@asks(
+    "pdms_lens_spring",
+    "Does the lens shrink where stick-slip sets in, with nothing prescribed?",
+    """Yes, and by the fluctuations. Between {slow:g} mm/s, where it slides steadily, and {fast:g} mm/s, where it
+    sticks and slips, the mean area falls from {before} to {after} % of JKR's. The bonds lose less of it than
+    before, {bonds} % after {bonded} %, as they recover while the slider sticks; the fluctuations that unsteady
+    sliding makes take {noise} % instead of {calm} %. That they are as strong as assumed, an rms of {rms:g} kPa,
+    and how long they remember ({length:g} µm of sliding), is put in.""",
+)
+def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
+    late = analysis.settled(all_observables(dataset))
+    slow, fast = (analysis.summary(late, quantiles=False).sel(drive_stage=speed) for speed in (2e-3, 3e-3))
+    names = {"before": slow, "after": fast}
+    found: dict[str, Number] = {name: pair(one, "area_ratio", 100.0) for name, one in names.items()}
+    return found | {"slow": 2.0, "fast": 3.0, "bonds": pair(fast, "lost_to_bonds", 100.0),
+                    "bonded": pair(slow, "lost_to_bonds", 100.0), "noise": pair(fast, "lost_to_fluctuations", 100.0),
+                    "calm": pair(slow, "lost_to_fluctuations", 100.0),
+                    "rms": 1e-3 * float(dataset["shear_spectrum_rms"]),
+                    "length": 1e6 * float(dataset["shear_correlation_length"])}  # fmt: skip
 
 
 @asks(

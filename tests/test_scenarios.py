@@ -8,9 +8,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from sim import analysis
 from sim.ensemble.simulate import run
 from sim.laws import jkr
-from sim.laws.schallamach import bell_fraction, bell_lives, bell_moments, bell_peak, bell_stress, start_up_force
+from sim.laws.schallamach import (
+    bell_fraction,
+    bell_lives,
+    bell_moments,
+    bell_peak,
+    bell_stress,
+    first_moment_peak,
+    first_moment_stress,
+    start_up_force,
+)
 from sim.scenario.reader import load
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
@@ -23,6 +33,8 @@ SHORT = {
     },
     "pull_off": {"clock.step": "8 ms", "clock.record": "8 ms"},
     "peeling": {"clock.step": "20 ms"},
+    "stability_map": {"clock.duration": "3.2 s", "sweep": {"drive.stiffness": ["100 N/m", "500 N/m", "1600 N/m"]}},
+    "pdms_lens_spring": {"clock.duration": "0.4 s", "sweep": {"drive.stage": ["2 mm/s", "3 mm/s"]}},
 }
 WHOLE = [pytest.param(f"whole {name}", marks=pytest.mark.verify) for name in SHORT]
 
@@ -42,7 +54,8 @@ def test_every_scenario_opens_with_its_question_and_runs(name):
     text = (FOLDER / f"{name.removeprefix('whole ')}.toml").read_text()
     assert text.startswith("# ") and "?" in text.partition("\n\n")[0]
     dataset = four(name)
-    assert np.isfinite(dataset["contact_radius"]).all()
+    going = dataset["runaway_time"].isnull() if "runaway_time" in dataset else True
+    assert (np.isfinite(dataset["contact_radius"]) == going).all()
     assert dataset["contact_radius"].max() > 0.0
 
 
@@ -201,6 +214,107 @@ def test_the_field_that_bonds_make_is_their_force_squared_and_costs_little():
     assert np.all(lost > 0.0) and lost.max() < 0.002
 
 
+def mean_field(dataset):
+    """Rates, force, stiffness and density of a scenario's bonds, as the laws of mean field take them."""
+    return *bell(dataset), float(dataset["bonds_site_density"])
+
+
+def strengths(dataset, name="shear_stress"):
+    """Magnitude of the stress, and that of steady sliding at the speed of the moment."""
+    stress = abs(dataset[name])
+    return stress, stress.copy(data=first_moment_stress(abs(dataset["speed"].values), *mean_field(dataset)))
+
+
+def test_stick_slip_sets_in_beyond_the_friction_maximum_and_below_its_force():
+    dataset = four("stick_slip")
+    peak, slips = first_moment_peak(*mean_field(dataset)), analysis.slips(dataset).isel(member=0)
+    force = dataset["spring_force"].isel(member=0).values
+    began = int(np.argmax(force < 0.5 * np.maximum.accumulate(force)))
+    assert slips.sizes["slip"] > 10
+    assert peak.speed < float(dataset["stage_speed"].isel(member=0)[began]) < 2.0 * peak.speed
+    stress, steady = strengths(dataset.isel(member=0, t=slice(0, began - 125)))
+    assert_allclose(stress, steady, rtol=0.02)  # the ramp is slow beside the bonds: 0.75 decades a second against 25/s
+    assert np.all(slips["force_drop"][1:] > 0.5 * slips["static_friction"][1:])
+
+
+def test_below_the_threshold_creep_settles_and_above_it_the_slider_runs_away():
+    dataset = four("creep").isel(member=0)
+    area, numbers = math.pi * float(dataset["radius_at_rest"][0]) ** 2, mean_field(dataset)
+    most = first_moment_peak(*numbers).stress * area
+    assert_allclose(most, 13.67e-3, rtol=1e-3)
+    for force in dataset["drive_force"].values:
+        last = dataset.sel(drive_force=force).isel(t=-1)
+        assert np.isnan(last["speed"]) == (force > most) == np.isfinite(last["runaway_time"])
+        if force < 0.95 * most:  # nearer to it a second is too short
+            assert_allclose(first_moment_stress(float(last["speed"]), *numbers) * area, force, rtol=1e-6)
+    times = dataset["runaway_time"].isel(t=-1).dropna("drive_force").values
+    assert np.all(np.diff(times) < 0.0)
+
+
+def test_a_step_of_the_speed_overshoots_and_ends_at_the_steady_stress():
+    dataset = four("velocity_step").isel(member=0)
+    stress, steady = strengths(dataset)
+    for time in (0.09, 0.34, 0.6):
+        assert_allclose(stress.sel(t=time, method="nearest"), steady.sel(t=time, method="nearest"), rtol=1e-5)
+    slow, fast = stress.sel(t=[0.09, 0.34], method="nearest").values
+    after = stress.sel(t=slice(0.1, 0.13))
+    assert after.max() > 1.2 * fast
+    # the force itself does not jump: at the most all sites are stretched by what the stage has gone since
+    stiffness = float(dataset["bonds_site_density"] * dataset["bonds_bond_stiffness"])
+    assert slow < float(after[0]) < slow + stiffness * 2e-3 * 0.5e-3
+
+
+def test_the_area_falls_with_the_square_of_the_force_and_more_under_a_smaller_load():
+    dataset = four("incipient_shear").isel(member=0)
+    lost = []
+    for place in range(dataset.sizes["contact_load"]):
+        own = dataset.isel(contact_load=place)
+        rises = slice(0, int(own["spring_force"].argmax("t")) + 1)
+        force, area = own["spring_force"].values[rises], own["contact_area"].values[rises]
+        assert np.all(np.diff(force) > 0.0) and np.all(np.diff(area) < 0.0)
+        share = 1.0 - area / area[0]
+        middle = slice(*np.searchsorted(force, [0.2 * force[-1], 0.5 * force[-1]]))
+        slope = np.polyfit(np.log(force[middle]), np.log(share[middle]), 1)[0]
+        assert 1.6 < slope < 2.2
+        lost.append(share[-1])
+    assert lost[0] > lost[1] > lost[2] > 0.05
+
+
+def test_a_reciprocating_stage_slides_both_ways_at_the_steady_stress_and_its_work_is_all_accounted_for():
+    dataset = four("friction_loop").isel(member=0)
+    stress, steady = strengths(dataset)
+    for time, sense in ((0.59, 1.0), (1.19, -1.0), (1.79, 1.0), (2.4, -1.0)):
+        assert_allclose(stress.sel(t=time, method="nearest"), steady.sel(t=time, method="nearest"), rtol=1e-4)
+        assert np.sign(dataset["friction_force"].sel(t=time, method="nearest")) == sense
+    work = float(dataset["drive_work"][-1])
+    spent = sum(float(dataset[f"dissipated_by_{cause}"][-1]) for cause in ("rupture", "area"))
+    assert_allclose(work, spent + float(dataset["stored_energy"][-1]), rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["stability_map", pytest.param("whole stability_map", marks=pytest.mark.verify)])
+def test_springs_softer_than_the_theory_oscillate_and_stiffer_ones_do_not(name):
+    dataset = four(name).isel(member=0)
+    middle = dataset["t"].size // 2
+    force = dataset["spring_force"].isel(t=slice(middle - middle // 4, middle + middle // 4))  # 10 mm/s to 100 and back
+    swing = 1.0 - (force.min("t") / force.max("t"))
+    assert np.all(swing[dataset["drive_stiffness"] < 300.0] > 0.5)
+    steady, none = strengths(dataset.isel(drive_stiffness=-1))
+    assert_allclose(steady, none, rtol=0.05)
+
+
+@pytest.mark.parametrize("name", ["pdms_lens_spring", pytest.param("whole pdms_lens_spring", marks=pytest.mark.verify)])
+def test_at_the_onset_of_stick_slip_fluctuations_take_more_area_than_the_bonds_give_back(name):
+    found = analysis.shares(four(name))
+    late = found.isel(t=slice(found.sizes["t"] // 2, None)).mean("t")
+    before, after = (late.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
+    bonds, noise = (float(after[f"lost_to_{w}_mean"] - before[f"lost_to_{w}_mean"]) for w in ("bonds", "fluctuations"))
+    assert -0.04 < bonds < -0.015 and 0.05 < noise < 0.075
+    slips = analysis.stick_slip(four(name))["slip_count"]
+    assert np.all(slips.sel(drive_stage=2e-3) == 0.0) and np.all(slips.sel(drive_stage=3e-3) > 1.0)
+
+
+#: Scenarios whose slider feels its friction, solved to a tolerance: what they claim is tested, no last digits.
+DRIVEN = {name for name in NAMES if load(FOLDER / f"{name}.toml").drive.feeds_back}
 #: Mean contact area [m^2] and friction [N] of four members, only to notice an unintended change of the numbers.
 GOLDEN = {
     "afm_tip": (3.935446625827423e-16, 3.541901963244681e-07),
@@ -224,7 +338,11 @@ GOLDEN = {
 }
 
 
-@pytest.mark.parametrize("name", NAMES + WHOLE)
+@pytest.mark.parametrize(
+    "name",
+    [name for name in NAMES if name not in DRIVEN]
+    + [case for case in WHOLE if case.values[0].removeprefix("whole ") not in DRIVEN],
+)
 def test_the_numbers_of_a_scenario_have_not_moved(name):
     # a change that moves them on purpose is listed in the changelog under "Numbers changed"
     dataset = four(name)
