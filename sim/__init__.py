@@ -89,8 +89,14 @@ def run(
         with progress_bar(work(Plan.of(scene))) if progress is True else contextlib.nullcontext(given) as shown:
             how: dict[str, Any] = {"replace": replace, "resume": resume, "jobs": jobs}
             return simulate.run(scene, to, **how, progress=shown.advance, stage=shown.begin)
-    except (simulate.OutputExists, BadInput) as fault:
-        raise BadInput([str(fault).replace("--resume", "resume=True").replace("--force", "replace=True")]) from None
+    except Exception as fault:
+        said = str(fault).replace("the same command", "the same call")
+        said = said.replace("--resume", "resume=True").replace("--force", "replace=True")
+        if isinstance(fault, simulate.OutputExists | BadInput):
+            raise BadInput([said]) from None
+        if said != str(fault):
+            fault.args = (said,)
+        raise
 
 
 def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":

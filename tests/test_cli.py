@@ -406,7 +406,7 @@ def test_a_value_of_set_is_toml_or_else_text(text, value):
 def test_a_whole_table_can_be_set(here):
     done = sim("check", "scene.toml", "--set", 'bonds={ model = "none" }', "--set", 'drive.from="2 mm/s"')
     assert done.exit_code == 0
-    assert "bonds    none         changed by --set" in done.stdout
+    assert "bonds    none         changed by an override" in done.stdout
 
 
 # --- check, new, schema, paper ---

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 import sim
 from sim import analysis
 from sim.cli import cli
+from sim.numerics.files import StoreTrouble
 
 SCENE = {
     "name": "a <scene>",
@@ -65,6 +66,15 @@ def test_a_run_into_a_file_is_replaced_only_if_asked(file, dataset):
     assert sim.run(SCENE, to="out.nc", replace=True) == file
 
 
+def test_trouble_on_the_way_is_worded_for_python(monkeypatch):
+    def trouble(*arguments, **named):
+        raise StoreTrouble("out.nc: no space; make room, and the same command with --resume goes on")
+
+    monkeypatch.setattr("sim.ensemble.simulate.run", trouble)
+    with pytest.raises(StoreTrouble, match=r"^out\.nc: no space; .* the same call with resume=True goes on$"):
+        sim.run(SCENE, to="out.nc")
+
+
 def test_progress_is_told_to_a_function_or_shown(capsys, monkeypatch):
     done = []
     sim.run(SCENE, progress=done.append)
@@ -86,6 +96,8 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
                 xr.testing.assert_identical(function(found), function(variable))
             assert analysis.table(found) == analysis.table(variable)
         opened.to_netcdf(tmp_path / "again.nc")
+    with netCDF4.Dataset(file, "a"):  # as nothing holds it any longer
+        pass
     assert "speed" in sim.open(tmp_path / "again.nc").coords
 
 

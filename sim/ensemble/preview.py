@@ -101,7 +101,7 @@ def _models(plan: Plan) -> Rows:
     rows: Rows = []
     for place, name in enumerate(Parts._fields):
         why = "in the file" if name in named else "left out, so the simplest" if source.text else "given"
-        why = "swept" if name in swept else "changed by --set" if name in changed else why
+        why = "swept" if name in swept else "changed by an override" if name in changed else why
         found: dict[str, tuple[str, ...]] = {}
         for point in plan.points:
             part = getattr(point, name)

@@ -145,6 +145,7 @@ def located(dataset: "xarray.Dataset") -> "xarray.Dataset":
     if not named or "speed" not in dataset:
         return dataset
     found = dataset.assign({name: dataset[name].copy(deep=False) for name in named}).set_coords("speed")
+    found.set_close(dataset._close)
     for name in named:
         found[name].attrs.pop("coordinates")  # xarray writes it again where a dataset is saved
     return found

@@ -65,7 +65,7 @@ def test_the_columns_of_a_block_line_up_and_no_line_trails(name):
 
 def test_each_depth_is_told_with_its_reason():
     lines = told("masking", **{"drive.speed": "2 mm/s"})["models"]
-    assert row(lines, "drive")[1:3] == ["steady", "changed by --set"]
+    assert row(lines, "drive")[1:3] == ["steady", "changed by an override"]
     assert row(lines, "bonds")[1:3] == ["none", "left out, so the simplest"]
     assert row(lines, "shear")[1:3] == ["mean", "in the file"]
     assert row(lines, "contact")[3].startswith("The contact is in JKR equilibrium")
