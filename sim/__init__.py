@@ -25,7 +25,7 @@ import contextlib
 import importlib
 import os
 import pathlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # what a function needs is imported where it is called, so that importing the package costs nothing
@@ -34,11 +34,12 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
     from matplotlib.figure import Figure
 
     from sim.scenario.scenario import Scenario
+    from sim.study.fit import Fit
 
 Path = str | os.PathLike[str]
 _FROM = {"BadInput": "sim.units.refusals", "Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
 _FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
-__all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "open", "plot", "run", "stats"])
+__all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "fit", "open", "plot", "run", "stats"])
 
 
 def run(
@@ -164,6 +165,40 @@ def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str =
     except ValueError as fault:
         raise BadInput([f"budget: {fault}"]) from None
     return study(_scene(scenario), seconds)
+
+
+def fit(
+    scenario: "Scenario | Path | dict[str, Any]",
+    data: "Path | Sequence[Path]",
+    free: "Iterable[str]",
+    common: dict[str, float] | None = None,
+    steady: bool = False,
+) -> "Fit":
+    """Numbers of a scenario calibrated to measured curves.
+
+    Parameters
+    ----------
+    scenario : Scenario, path or dict
+        Its own values are where the search starts.
+    data : path, or several
+        CSV tables whose columns are named as variables of a dataset, with units, ``speed [mm/s]``,
+        ``contact_area [mm^2]``, ``contact_area_error [%]``.
+    free : iterable of str
+        Keys, each ``"bonds.critical_speed"`` or, with bounds, ``"bonds.critical_speed=1 mm/s:1 m/s"``.
+    common : dict, optional
+        Relative errors that all points of a variable share, ``{"contact_area": 0.02}``.
+    steady : bool
+        Whether steady sliding is enough; else the scenario's own models have the last word.
+
+    Returns
+    -------
+    Fit
+        ``scenario`` with the ``values`` found, ``numbers`` with errors and intervals, ``correlations``, ``remarks``.
+    """
+    from sim.study.fit import fit as study
+
+    paths = [data] if isinstance(data, str | os.PathLike) else list(data)
+    return study(_scene(scenario), [pathlib.Path(path) for path in paths], free, common, steady)
 
 
 class Text(str):

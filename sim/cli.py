@@ -14,7 +14,7 @@ import click
 
 from sim.ensemble.progress import Stages, announce_compiling, named, note, progress_bar, while_read
 from sim.units import options
-from sim.units.terminal import print_rows, replace_unknown, say, usage
+from sim.units.terminal import print_rows, print_table, replace_unknown, say, usage
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
@@ -125,7 +125,7 @@ def run(
         else options.quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
     )
     with named("making modes and bands of the fluctuations", quiet):
-        scene = load(scenario, _overrides(changes, seed, members), option="--set")
+        scene = load(scenario, options.overrides(changes, seed, members), option="--set")
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
 
@@ -158,12 +158,6 @@ def run(
         _print_tables(*tables)
     if not quiet:
         say(f"shard {shard} is done; when all are: sim merge {target}" if shard else str(target))
-
-
-def _overrides(changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> dict[str, Any]:
-    """The values of --set, --seed and --members."""
-    given = {"seed": seed, "ensemble.members": members}
-    return options.values(changes, "--set") | {key: value for key, value in given.items() if value is not None}
 
 
 def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]], list[str]]:
@@ -203,7 +197,7 @@ def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: i
     from sim.scenario.reader import load
 
     announce_compiling()
-    say(preview(load(scenario, _overrides(changes, seed, members), option="--set")))
+    say(preview(load(scenario, options.overrides(changes, seed, members), option="--set")))
 
 
 @cli.command()
@@ -343,16 +337,38 @@ def converge(
 
     seconds = options.quantity(budget, "--budget", "s", above=0)
     accepted = None if tolerance is None else options.quantity(tolerance, "--tolerance", "1", above=0, below=1)
-    scene = load(scenario, _overrides(changes), option="--set")
+    scene = load(scenario, options.overrides(changes), option="--set")
     from sim.study import converge as convergence
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
-    picture = convergence.claim(scene, target, force)
-    found = convergence.converge(scene, seconds, accepted)
-    print_rows(convergence.table(found))
-    say(f"{convergence.explanation(found)}\n\n{convergence.recommendation(found)}\n")
-    convergence.save(found, target, picture)
-    say(f"{target}\n{picture}")
+    print_table(*convergence.carried_out(scene, target, force, seconds, accepted))
+
+
+@cli.command(epilog="Exit codes: 0 done; 1 not converged; 2 bad input; 73 an output exists; 74 trouble with files.")
+@click.argument("scenario", type=_PATH)
+@click.argument("data", type=_PATH, nargs=-1, required=True)
+@click.option("--free", "keys", multiple=True, required=True, metavar="KEY[=LOW:HIGH]", help="A number to be found.")
+@click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="An error that a column's points share, as 2 %.")
+@click.option("--steady", is_flag=True, help="Steady sliding is enough: do not run the scenario's own models.")
+@click.option("--compare", "judged", is_flag=True, help="Also which mechanism or theory the data prefer.")
+@click.option("--posterior", "sampled", is_flag=True, help="Also sample all free numbers together by Markov chains.")
+@click.option("-o", "--output", "stem", type=_PATH, help="STEM of STEM_fit.toml, .json, .png; default the scenario's.")
+@_SET
+@_FORCE
+def fit(
+    scenario: Path, data: tuple[Path, ...], keys: tuple[str, ...], common: tuple[str, ...], steady: bool, judged: bool,
+    sampled: bool, stem: Path | None, changes: tuple[str, ...], force: bool,
+) -> None:  # fmt: skip
+    """Calibrate numbers of a scenario to measured curves: CSV columns named as variables of a dataset, with units."""
+    from sim.scenario.reader import load
+
+    scene, target = load(scenario, options.overrides(changes), option="--set"), stem or scenario.with_suffix("")
+    from sim.study import fitted
+
+    found, shown = fitted.carried_out(scene, data, keys, common, target, force, steady, judged, sampled)
+    for rows, text in shown:
+        print_table(rows, text)
+    sys.exit(DONE if found.converged else FAILED)
 
 
 @cli.command()
@@ -371,26 +387,18 @@ def paper() -> None:
 @click.argument("name", default="first.toml", type=_PATH)
 def new(name: Path) -> None:
     """Write a commented starter scenario."""
-    from importlib.resources import files
+    from sim.scenario.schema import write_starter
 
-    target = name if name.suffix else name.with_suffix(".toml")
-    text = files("sim").joinpath("starter.toml").read_text(encoding="utf-8")
-    try:
-        with target.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        _fail(f"{target} exists; name another file", EXISTS)
+    target = write_starter(name)
     say(f"{target}: run it with `sim run {target}`")
 
 
 @cli.command()
 def schema() -> None:
     """Print the JSON schema of scenario files."""
-    import json
+    from sim.scenario.schema import as_text
 
-    from sim.scenario.schema import scenario_schema
-
-    say(json.dumps(scenario_schema(), indent=2))
+    say(as_text())
 
 
 @cli.command()
@@ -399,9 +407,4 @@ def warm(jobs: int | None) -> None:
     """Compile all kernels at once in parallel; else each compiles when a run first calls it."""
     from sim.ensemble.warm import compile_missing
 
-    began = time.monotonic()
-    lacking, left, kernels = compile_missing(jobs)
-    if left:
-        _fail(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written", TROUBLE)
-    took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
-    say(f"{lacking} of {kernels} kernels and laws compiled{took}; the others were there")
+    say(compile_missing(jobs))

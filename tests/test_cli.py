@@ -23,6 +23,7 @@ from sim.ensemble import bounds, progress, simulate
 from sim.numerics import jit
 from sim.scenario.reader import BadInput, load
 from sim.study import paper
+from sim.units import options
 
 LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
 
@@ -400,7 +401,7 @@ def test_a_fault_of_our_own_is_not_hidden(here, monkeypatch):
     ],
 )  # fmt: skip
 def test_a_value_of_set_is_toml_or_else_text(text, value):
-    assert cli._overrides((f"contact.load={text}",)) == {"contact.load": value}
+    assert options.overrides((f"contact.load={text}",)) == {"contact.load": value}
 
 
 def test_a_whole_table_can_be_set(here):

@@ -3,11 +3,13 @@
 import importlib
 import multiprocessing
 import os
+import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 
 from sim.ensemble.progress import progress_bar
 from sim.numerics import jit
+from sim.numerics.files import StoreTrouble
 
 
 def missing() -> list[str]:
@@ -19,14 +21,23 @@ def missing() -> list[str]:
     return [name for name in sorted(names, key=lambda name: -len(texts[_module(name)])) if not jit.cached(name)]
 
 
-def compile_missing(jobs: int | None) -> tuple[int, int, int]:
-    """Compile what is not in the cache; how many that were, how many of them could not be stored, and how many are."""
-    lacking = missing()
+def compile_missing(jobs: int | None) -> str:
+    """Compile what is not in the cache; what was done, in words.
+
+    Raises
+    ------
+    StoreTrouble
+        If code could not be stored.
+    """
+    began, lacking = time.monotonic(), missing()
     if lacking:
         with progress_bar(len(lacking), "kernels") as shown:
             for _ in compile_all(lacking, jobs):
                 shown.advance(1)
-    return len(lacking), sum(not jit.cached(name) for name in lacking), len(jit.compiled)
+    if left := sum(not jit.cached(name) for name in lacking):
+        raise StoreTrouble(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written")
+    took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
+    return f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled{took}; the others were there"
 
 
 def compile_all(names: list[str], jobs: int | None = None) -> Iterator[str]:

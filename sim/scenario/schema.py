@@ -1,12 +1,33 @@
-"""JSON schema of scenario files."""
+"""JSON schema of scenario files, and a starter."""
 
+import json
+from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 from pydantic import TypeAdapter
 
+from sim.numerics.files import OutputExists
 from sim.parts.contact import Equilibrium
 from sim.scenario.declared import all_tables, keys, model
 from sim.scenario.scenario import Scenario
+
+
+def write_starter(name: Path) -> Path:
+    """Write a commented starter scenario where no file is; its path."""
+    target = name if name.suffix else name.with_suffix(".toml")
+    text = files("sim").joinpath("starter.toml").read_text(encoding="utf-8")
+    try:
+        with target.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise OutputExists(f"{target} exists; name another file") from None
+    return target
+
+
+def as_text() -> str:
+    """The JSON schema as text."""
+    return json.dumps(scenario_schema(), indent=2)
 
 
 def scenario_schema() -> dict[str, Any]:

@@ -113,3 +113,26 @@ def put(document: dict[str, Any], overrides: dict[tuple[str, ...], Any]) -> list
         else:
             table[words[-1]] = value
     return faults
+
+
+def written(document: dict[str, Any], table: tuple[str, ...] = ()) -> str:
+    """A document as TOML text: the values of a table first, then the tables in it.
+
+    >>> print(written({"name": "lens", "shear": {"cell": "1 mm", "amplitude": {"width": 0.3}}}), end="")
+    name = "lens"
+    <BLANKLINE>
+    [shear]
+    cell = "1 mm"
+    <BLANKLINE>
+    [shear.amplitude]
+    width = 0.3
+    """
+    values = {key: value for key, value in document.items() if not isinstance(value, dict)}
+    text = "".join(f"{_key(key)} = {toml(value)}\n" for key, value in values.items())
+    if table and (values or not document):
+        text = f"\n[{'.'.join(map(_key, table))}]\n{text}"
+    return text + "".join(written(document[key], (*table, key)) for key in document if key not in values)
+
+
+def _key(word: str) -> str:
+    return word if re.fullmatch(r"[A-Za-z0-9_-]+", word) else json.dumps(word, ensure_ascii=False)

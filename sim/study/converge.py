@@ -27,7 +27,7 @@ from sim.study.settings import Row, at_step, number_of_sites, plain, settings, t
 from sim.study.verdicts import explanation, recommendation, table
 from sim.units.refusals import BadInput
 
-__all__ = ["claim", "converge", "explanation", "figure", "recommendation", "save", "table"]
+__all__ = ["carried_out", "claim", "converge", "explanation", "figure", "recommendation", "save", "table"]
 
 #: Shares of the budget: runs without noise, times, samples.
 _WALKS, _TIMES, _SAMPLES = 0.4, 0.2, 0.4
@@ -106,6 +106,16 @@ def claim(scenario: Scenario, target: Path, replace: bool) -> Path:
     for path in (target, picture):
         files.claim(path, replace, files_read(scenario))
     return picture
+
+
+def carried_out(
+    scenario: Scenario, target: Path, replace: bool, seconds: float, tolerance: float | None
+) -> tuple[list[dict[str, str]], str]:
+    """Study a scene and save dataset and figure; the table to print and the text below it."""
+    picture = claim(scenario, target, replace)
+    found = converge(scenario, seconds, tolerance)
+    save(found, target, picture)
+    return table(found), f"{explanation(found)}\n\n{recommendation(found)}\n\n{target}\n{picture}"
 
 
 def save(found: xr.Dataset, target: Path, picture: Path) -> None:

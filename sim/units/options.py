@@ -35,3 +35,9 @@ def values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
             document = {}
         found[key.strip()] = document["value"] if len(document) == 1 else text.strip()
     return found
+
+
+def overrides(changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> dict[str, Any]:
+    """The values of --set, --seed and --members."""
+    given = {"seed": seed, "ensemble.members": members}
+    return values(changes, "--set") | {key: value for key, value in given.items() if value is not None}

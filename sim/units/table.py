@@ -101,6 +101,26 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -
     return columns
 
 
+def headings(text: str) -> dict[str, str]:
+    """Names of the columns of a CSV text with the texts of their units, "" for a column without one.
+
+    Raises
+    ------
+    TableError
+        If there is no header, or it cannot be read or has a name twice.
+
+    >>> headings("speed [mm/s], share\\n1, 2")
+    {'speed': 'mm/s', 'share': ''}
+    """
+    for lines, rows in _rows(text):
+        split = [_HEADER.fullmatch(cell) for cell in rows[0]]
+        names = [match["name"] for match in split if match]
+        if len(names) < len(split) or not all(names) or len({*names}) < len(names):
+            raise TableError(f"line {lines[0]}: the header needs one name a column, each once, its unit in brackets")
+        return {match["name"]: match["unit"] or "" for match in split if match}
+    raise TableError("the table is empty; begin with a header of names and units, then rows of numbers")
+
+
 def matrix(text: str, quantity: Quantity, gaps: bool = False) -> NDArray[np.float64]:
     """A plain rectangular block of SI numbers, separated as in ``columns`` or by blanks, shape (rows, columns).
 

@@ -52,3 +52,9 @@ def print_rows(rows: list[dict[str, str]]) -> None:
     wide = console.options.update(max_width=10_000)
     console.width = max(console.width, console.measure(shown, options=wide).maximum)  # no number is cut short
     console.print(shown)
+
+
+def print_table(rows: list[dict[str, str]], text: str) -> None:
+    """Print a table and the text below it."""
+    print_rows(rows)
+    say(text)

@@ -50,5 +50,5 @@ def test_a_cache_that_cannot_be_written_is_no_success(cold, monkeypatch):
     (cold / "sliding-sim").write_text("no folder")
     monkeypatch.setattr(warm, "missing", lambda: SOME[:1])
     done = CliRunner().invoke(cli, ["warm"])
-    assert done.exit_code == 74
-    assert "SIM_CACHE_DIR" in done.output
+    assert done.exception.exit_code == 74
+    assert "SIM_CACHE_DIR" in str(done.exception)

@@ -1,0 +1,224 @@
+"""Numbers of a scenario calibrated to measured curves: ``sim fit``.
+
+The curves are fitted by steady sliding, which is quick (``sim.study.predicted``). Then the scenario's own models run
+once with what was found; what they add to steady sliding is added to it, with the error that their members leave, and
+the fit is made anew, until it stays. The same noise is drawn each time.
+"""
+
+import contextlib
+import difflib
+import math
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.scenario.declared import quantities
+from sim.scenario.scenario import Scenario
+from sim.study.fitting import Free, Interval, Minimum, Problem, entangled, idle, interval, problem_of, with_errors
+from sim.study.measured import read
+from sim.study.predicted import asked, groups
+from sim.units.notation import engineering
+from sim.units.quantity import Quantity
+from sim.units.refusals import BadInput
+
+Array = NDArray[np.float64]
+
+#: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
+_WIDE = 1e4
+#: Most runs of the scenario's own models, and the change of every number, over its error, that ends them.
+_RUNS, _STAYS = 3, 0.1
+#: Correlation beyond which the data hardly tell two numbers apart.
+_ALIKE = 0.95
+#: Tables of keys that are not physical.
+_OTHER = ("clock", "record", "ensemble", "seed")
+
+
+class Found(NamedTuple):
+    """What was found of one free number [SI]: its value, standard error, interval, and its value in steady sliding."""
+
+    free: Free
+    value: float
+    error: float
+    interval: Interval
+    steady: float
+
+
+class Fit(NamedTuple):
+    """A calibrated scenario.
+
+    ``scenario`` has the ``numbers`` found; ``problem`` and ``best`` are the curves and where they agree best;
+    ``correlations`` those of the free numbers; ``remarks`` what to know of them.
+    """
+
+    scenario: Scenario
+    problem: Problem
+    best: Minimum
+    numbers: tuple[Found, ...]
+    correlations: Array
+    converged: bool
+    remarks: tuple[str, ...]
+
+    @property
+    def aicc(self) -> float:
+        """Akaike's criterion for few points."""
+        return self.problem.criterion(self.best.chi_square)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Values of the free keys [SI]."""
+        return {one.free.key: one.value for one in self.numbers}
+
+
+def fit(
+    scenario: Scenario, data: Sequence[Path], free: Iterable[str], common: dict[str, float] | None = None,
+    steady: bool = False,
+) -> Fit:  # fmt: skip
+    """Find numbers of a scenario from measured curves.
+
+    Parameters
+    ----------
+    scenario : Scenario
+        Its own values are where the search starts; without its sweep.
+    data : sequence of Path
+        CSV tables (``sim.study.measured.read``), all fitted together.
+    free : iterable of str
+        Keys, each ``"KEY"`` or ``"KEY=LOW:HIGH"`` with bounds such as ``"1 mm/s:100 mm/s"``.
+    common : dict, optional
+        Relative errors that all points of a variable share, as of one lens or one camera.
+    steady : bool
+        Whether steady sliding is enough, so that the scenario's own models are not run.
+
+    Raises
+    ------
+    BadInput
+        If a key is none that can be found, a table cannot be read, or the curves depend on some keys only together.
+    """
+    base = scenario.with_values({"record": {}})
+    chosen = [_free(base, text) for text in free]
+    if len({one.key for one in chosen}) < len(chosen):
+        raise BadInput(["--free: a key is there twice; give each once"])
+    tables = [read(path, base) for path in data]
+    problem = problem_of(tables, [groups(base, table) for table in tables], chosen, common or {})
+    _refuse_entangled(problem)
+    problem, best = with_errors(problem, problem.start)
+    alone, converged = best, best.converged
+    for _ in range(0 if steady else _RUNS):
+        before, numbers = best.x, problem.numbers(best.x)
+        sampled = [
+            asked(several, numbers, [curve.name for curve in table.curves], "t" in table.conditions)
+            for table, several in zip(tables, problem.groups, strict=True)
+        ]
+        problem, best = with_errors(problem.compared(sampled, best.x), best.x)
+        if best.covariance is None or np.all(np.abs(best.x - before) < _STAYS * np.sqrt(np.diag(best.covariance))):
+            break
+    else:
+        converged = steady and converged
+    return _assembled(scenario, problem, best, alone, converged and best.converged)
+
+
+def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minimum, converged: bool) -> Fit:
+    """The fit with its intervals, and what to know of it."""
+    count = len(problem.free)
+    if best.covariance is None:
+        said = ("the errors could not be found: the data do not hold some of the numbers",)
+        none = Interval(math.nan, math.nan, True, True)
+        numbers = [Found(one, one.outer(float(best.x[k])), math.nan, none, one.outer(float(alone.x[k])))
+                   for k, one in enumerate(problem.free)]  # fmt: skip
+        return Fit(scenario, problem, best, tuple(numbers), np.full((count, count), np.nan), False, said)
+    spread = np.sqrt(np.diag(best.covariance))
+    found = []
+    for k, one in enumerate(problem.free):
+        value = one.outer(float(best.x[k]))
+        error = spread[k] * (value if one.logarithmic else 1.0)
+        found.append(Found(one, value, float(error), interval(problem, best, k), one.outer(float(alone.x[k]))))
+    alike = (best.covariance / np.outer(spread, spread))[:count, :count]
+    final = scenario.with_values({one.free.key: one.value for one in found})
+    return Fit(final, problem, best, tuple(found), alike, converged, tuple(_remarks(problem, best, found, alike)))
+
+
+def _remarks(problem: Problem, best: Minimum, found: list[Found], alike: Array) -> list[str]:
+    said = []
+    for i, one in enumerate(found):
+        for j in range(i):
+            if abs(alike[i, j]) > _ALIKE:
+                both = f"{found[j].free.key} and {one.free.key}"
+                said.append(f"the data hardly tell {both} apart (correlation {alike[i, j]:.3f})")
+        if one.interval.low_open or one.interval.high_open:
+            ends = [word for word, is_open in zip(("below", "above"), one.interval[2:], strict=True) if is_open]
+            said.append(f"{one.free.key}: the data do not bound it {' or '.join(ends)}; its bound is given instead")
+    if problem.freedom > 0 and not problem.estimated.any():
+        ratio = best.chi_square / problem.freedom
+        if ratio > 1.0 + 4.0 * math.sqrt(2.0 / problem.freedom):
+            said.append(
+                f"the curves lie further off than their errors (chi^2 {ratio:.3g} a degree of freedom): the model"
+            )
+            said[-1] += " lacks something, or the errors are too small; the intervals hold for neither"
+    if problem.estimated.any():
+        said.append("curves without errors: their scatter around the fit stands for them")
+    return said
+
+
+def _free(scenario: Scenario, text: str) -> Free:
+    """What a text ``KEY`` or ``KEY=LOW:HIGH`` frees."""
+    key, sign, span = text.partition("=")
+    key, known = key.strip(), quantities(scenario)
+    if key not in known or key.partition(".")[0] in _OTHER or known[key][0].whole:
+        physical = [one for one, (quantity, _) in known.items()
+                    if one.partition(".")[0] not in _OTHER and not quantity.whole]  # fmt: skip
+        near = difflib.get_close_matches(key, physical, 1, 0.5)
+        said = "is no physical number of the scenario" + (f'; did you mean "{near[0]}"?' if near else "")
+        raise BadInput([f"--free {key[:80]}: {said or 'is not there'}"])
+    quantity, start = known[key]
+    low, high = max(quantity.at_least, quantity.above), min(quantity.at_most, quantity.below)
+    if sign:
+        low, high = _span(key, span, quantity)
+    elif low >= 0.0 and math.isinf(high):
+        if not start > 0.0:
+            raise BadInput([f"--free {key}: starts at 0; give it a value in the scenario, or bounds, KEY=LOW:HIGH"])
+        low, high = start / _WIDE, start * _WIDE
+    elif low == quantity.above and low == 0.0:
+        low = high / _WIDE**2
+    if not low <= start <= high:
+        shown = f"{engineering(low, quantity.unit)} to {engineering(high, quantity.unit)}"
+        raise BadInput([f"--free {key}: the scenario's value does not lie within {shown}; start inside"])
+    return Free(key, quantity, start, low, high)
+
+
+def _span(key: str, span: str, quantity: Quantity) -> tuple[float, float]:
+    """Bounds in a text ``LOW:HIGH``."""
+    ends = span.split(":")
+    try:
+        low, high = (quantity.read(_number(end)) for end in ends)
+    except ValueError as fault:
+        said = str(fault) if len(ends) == 2 else "takes two bounds"
+        raise BadInput(
+            [f'--free {key}={span[:60]}: {said}; write KEY=LOW:HIGH, such as "{key}={_typical(quantity)}"']
+        ) from None
+    if not low < high:
+        raise BadInput([f"--free {key}={span[:60]}: the bounds are in the wrong order; write the lower one first"])
+    return low, high
+
+
+def _number(text: str) -> str | float:
+    with contextlib.suppress(ValueError):
+        return float(text)
+    return text.strip()
+
+
+def _typical(quantity: Quantity) -> str:
+    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
+    return f"0.1{unit}:0.9{unit}"
+
+
+def _refuse_entangled(problem: Problem) -> None:
+    """Refuse keys that have no effect on the curves, or only together."""
+    said = "has no effect on what was measured, in steady sliding; fix it"
+    faults = [f"--free {key}: {said}" for key in idle(problem)]
+    for several in [] if faults else entangled(problem):
+        names = f"{', '.join(several[:-1])} and {several[-1]}"
+        faults.append(f"--free {names}: the curves depend on them only together, as on a product; free one of them")
+    if faults:
+        raise BadInput(faults)

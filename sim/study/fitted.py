@@ -1,0 +1,229 @@
+"""What ``sim fit`` prints and writes: a table, the calibrated scenario, the numbers as JSON, the figure."""
+
+import copy
+import io
+import json
+import math
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from sim.ensemble.outline import scenario_json
+from sim.ensemble.progress import announce_compiling
+from sim.numerics import files
+from sim.scenario.declared import files_read
+from sim.scenario.scenario import Scenario
+from sim.scenario.toml_text import parse, put, written
+from sim.study.fit import Fit, Found, fit
+from sim.study.fit_figure import figure
+from sim.study.fitting import LEVEL
+from sim.study.mechanisms import Verdict, compare
+from sim.study.posterior import Posterior, posterior
+from sim.units.notation import concise, engineering, scaled
+from sim.units.options import quantity
+
+#: First words of the scenarios that are written here, by which they may be replaced.
+_MADE = "# Made by sim fit"
+
+
+class More(NamedTuple):
+    """What was asked for beside the numbers: a comparison of mechanisms, a posterior."""
+
+    verdict: Verdict | None = None
+    posterior: Posterior | None = None
+
+
+#: A table to print, with the text below it.
+Shown = tuple[list[dict[str, str]], str]
+
+
+def carried_out(
+    scenario: Scenario, data: Sequence[Path], free: Sequence[str], common: Sequence[str], stem: Path, replace: bool,
+    steady: bool, judged: bool, sampled: bool,
+) -> tuple[Fit, list[Shown]]:  # fmt: skip
+    """Fit, judge mechanisms and sample the posterior where wanted, and write the files.
+
+    Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, and of ``claim``.
+    """
+    announce_compiling()
+    pairs = [pair.partition("=")[::2] for pair in common]
+    sizes = {name: quantity(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
+    outputs = claim(scenario, data, stem, replace)
+    found = fit(scenario, data, free, sizes, steady)
+    how = found.problem, found.best, found.scenario.seed
+    more = More(compare(*how) if judged else None, posterior(*how) if sampled else None)
+    save(scenario, found, data, outputs, more)
+    shown: list[Shown] = [(_table(found), f"\n{_explanation(found)}\n")]
+    if more.verdict is not None:
+        shown.append((_comparison(more.verdict), f"\n{more.verdict.words}\n"))
+    if more.posterior is not None:
+        shown.append(_sampled(found, more.posterior))
+    return found, [*shown, ([], "\n".join(map(str, outputs)))]
+
+
+class Outputs(NamedTuple):
+    """The files of a fit: scenario, numbers and figure."""
+
+    toml: Path
+    json: Path
+    png: Path
+
+
+def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -> Outputs:
+    """The files to be written, ``<stem>_fit.toml`` and so on; refused where they exist, unless they are replaced.
+
+    Even then no scenario is replaced but one that a fit has made.
+    """
+    outputs = Outputs(*(stem.with_name(f"{stem.name}_fit.{ending}") for ending in Outputs._fields))
+    read = [*files_read(scenario), *data]
+    for path in outputs:
+        if not (replace and path == outputs.toml and _made_here(path, read)):
+            files.claim(path, replace, read)
+    return outputs
+
+
+def _made_here(path: Path, read: Sequence[Path]) -> bool:
+    """Whether a file is a scenario that a fit has made, and none that is read."""
+    if not path.is_file() or any(one.exists() and path.samefile(one) for one in read):
+        return False
+    with path.open("rb") as file:
+        return file.read(len(_MADE)) == _MADE.encode()
+
+
+def _table(fit: Fit) -> list[dict[str, str]]:
+    """One row for each number found, in units that suit it."""
+    rows = []
+    for one in fit.numbers:
+        factor, unit = scaled(one.value, one.free.quantity.unit)
+        row = {"key": one.free.key, "value": f"{concise(factor * one.value, factor * one.error)} {unit}".rstrip()}
+        ends = zip(one.interval[:2], one.interval[2:], strict=True)
+        low, high = (f"{factor * end:.4g}" + (" (bound)" if is_open else "") for end, is_open in ends)
+        row[f"{LEVEL:.0%} interval"] = f"{low} to {high}"
+        row["start"] = engineering(one.free.start, one.free.quantity.unit)
+        shift = (one.value - one.steady) / one.error if one.error > 0.0 else math.nan
+        alone = engineering(one.steady, one.free.quantity.unit)
+        row["steady sliding alone"] = f"{alone} ({-shift:+.1f} errors)" if one.steady != one.value else alone
+        rows.append(row)
+    return rows
+
+
+def _explanation(fit: Fit) -> str:
+    """How good the fit is, and what to know of its numbers."""
+    problem, best = fit.problem, fit.best
+    lines = [f"chi^2 {best.chi_square:.4g} at {problem.freedom} degrees of freedom, AICc {_number(fit.aicc)}"]
+    if not fit.converged:
+        lines.append("the fit has not converged: start nearer, give bounds, or free fewer keys")
+    return "\n".join([*lines, *fit.remarks])
+
+
+def _comparison(verdict: Verdict) -> list[dict[str, str]]:
+    """One row for each mechanism, the best first."""
+    least = verdict.judged[0].aicc
+    return [
+        {"mechanism": one.name, "chi^2": f"{one.chi_square:.4g}", "AICc - least": f"{one.aicc - least:.3g}",
+         "p": "" if math.isnan(one.p_value) else f"{one.p_value:.3g}", "rejected": "yes" if one.rejected else ""}
+        for one in verdict.judged
+    ]  # fmt: skip
+
+
+def _sampled(fit: Fit, found: Posterior) -> Shown:
+    rows = []
+    for one, low, middle, high in zip(fit.numbers, *found.quantiles(), strict=True):
+        factor, unit = scaled(middle, one.free.quantity.unit)
+        span = f"{factor * low:.4g} to {factor * high:.4g}"
+        rows.append(
+            {"key": one.free.key, "median": f"{factor * middle:.4g} {unit}".rstrip(), f"{LEVEL:.0%} of it": span}
+        )
+    text = f"posterior of {len(found.samples)} samples, chains {found.length:.0f} autocorrelation times long"
+    return rows, f"\n{text}{'' if found.converged else ': too short to be trusted'}\n"
+
+
+def document(fit: Fit, data: Sequence[Path], more: More) -> dict[str, Any]:
+    """All numbers of a fit [SI]."""
+    found: dict[str, Any] = {
+        "scenario": fit.scenario.source.path,
+        "data": [str(path) for path in data],
+        "level": LEVEL,
+        "numbers": {one.free.key: _described(one) for one in fit.numbers},
+        "correlations": {"keys": [one.free.key for one in fit.numbers], "matrix": fit.correlations.tolist()},
+        "common_errors": _common(fit),
+        "chi_square": fit.best.chi_square,
+        "degrees_of_freedom": fit.problem.freedom,
+        "aicc": fit.aicc,
+        "converged": fit.converged,
+        "remarks": list(fit.remarks),
+    }
+    if more.verdict is not None:
+        judged = [one._asdict() for one in more.verdict.judged]
+        found["mechanisms"] = {"preferred": more.verdict.preferred, "words": more.verdict.words, "judged": judged}
+    if more.posterior is not None:
+        found["posterior"] = more.posterior.document()
+    return _without_nan(found)
+
+
+def _described(one: Found) -> dict[str, Any]:
+    ends = one.interval._asdict()
+    described = {"value": one.value, "unit": one.free.quantity.unit, "standard_error": one.error, **ends}
+    return described | {"start": one.free.start, "steady_sliding_alone": one.steady}
+
+
+def _common(fit: Fit) -> dict[str, float]:
+    """What was found of the relative errors that curves share."""
+    found = fit.best.x[len(fit.problem.free) :]
+    return {name: float(size * x) for (name, size), x in zip(fit.problem.common.items(), found, strict=True)}
+
+
+def _without_nan(value: Any) -> Any:
+    """A document in which a number that is not known is null, as JSON has it."""
+    if isinstance(value, dict):
+        return {key: _without_nan(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
+    """The scenario as it was given, with the values found, for a file in a folder."""
+    source = scenario.origin
+    text = source.text or written(_plain(json.loads(scenario_json(scenario))))
+    tables = copy.deepcopy(parse(text, source.path))
+    changed = source.overrides | {
+        one.free.key: one.value if one.free.quantity.unit == "1" else f"{one.value:.12g} {one.free.quantity.unit}"
+        for one in fit.numbers
+    }
+    put(tables, {tuple(key.split(".")): value for key, value in changed.items()})
+    above = Path(source.path).parent
+    if source.path and above.resolve() != folder.resolve():
+        _move(tables, above, folder)
+    keys = ", ".join(one.free.key for one in fit.numbers)
+    return f"{_MADE}: {keys} are calibrated to measured curves.\n{written(tables)}"
+
+
+def _plain(value: Any) -> Any:
+    """Tables without the keys that are left out."""
+    return {key: _plain(one) for key, one in value.items() if one is not None} if isinstance(value, dict) else value
+
+
+def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
+    """Name files from another folder."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            _move(value, above, folder)
+        elif key == "file" and isinstance(value, str):
+            table[key] = os.path.relpath(above / value, folder)
+
+
+def save(scenario: Scenario, fit: Fit, data: Sequence[Path], outputs: Outputs, more: More) -> None:
+    """Write scenario, numbers and figure, each whole."""
+    picture = io.BytesIO()
+    figure(fit.problem, fit.best).savefig(picture, format="png")
+    numbers = json.dumps(document(fit, data, more), indent=2, allow_nan=False) + "\n"
+    texts = scenario_text(scenario, fit, outputs.toml.parent).encode(), numbers.encode(), picture.getvalue()
+    for path, content in zip(outputs, texts, strict=True):
+        with files.output(path) as beside:
+            beside.write_bytes(content)
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}"

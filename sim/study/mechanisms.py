@@ -1,0 +1,168 @@
+"""Mechanisms that measured curves prefer: bonds, fluctuations, both, or a theory of the sheared contact.
+
+Each is fitted to the same curves with the keys that it has, and judged by Akaike's criterion AICc and by the
+likelihood ratio to the scenario as it is. Numbers of a mechanism that is left out lie on their bounds or do not exist,
+so the distribution of the ratio is not a chi-square: it is drawn, by fitting both to curves made by the poorer one.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.scenario.declared import quantities
+from sim.study.fitting import Free, Minimum, Problem, idle, minimum
+from sim.units.quantity import Quantity
+
+Array = NDArray[np.float64]
+
+#: Draws of a likelihood ratio; difference of AICc beyond which none is needed.
+DRAWS, _HOPELESS = 200, 30.0
+#: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1.
+_FINE = 1e-4
+#: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
+_RARE, _WORSE = 0.05, 4.0
+
+_ALPHA = Free("alpha", Quantity("1", "reversible share", at_least=0, at_most=1), 0.1, 0.0, 1.0)
+_LAMBDA = Free("lambda", Quantity("1", "mixity", at_least=0, at_most=1), 0.5, 0.0, 1.0)
+#: Theories by their name in ``sim.laws.theories``: words, and numbers of their own.
+_THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
+    "jkr": ("JKR, whatever the shear", ()),
+    "uncorrected": ("Menga et al. 2018, uncorrected", ()),
+    "savkoor_briggs": ("Savkoor & Briggs, full stick", ()),
+    "reversible_force": ("reversible, force held", ()),
+    "reversible_stress": ("reversible, stress held", ()),
+    "fraction": ("a fraction alpha reversible", (_ALPHA,)),
+    "scaled_angle": ("mixed mode, scaled angle", (_LAMBDA,)),
+    "shear_share": ("mixed mode, shear share", (_LAMBDA,)),
+    "scaled_tangent": ("mixed mode, scaled tangent", (_LAMBDA,)),
+}
+WHOLE = "the scenario as it is"
+
+
+class Judged(NamedTuple):
+    """A mechanism fitted: its numbers by name, and how it compares.
+
+    ``p_value`` is the probability of a likelihood ratio to the whole scenario of at least this size if the mechanism
+    were true; nan where AICc says enough. ``rejected`` is whether both speak against it.
+    """
+
+    name: str
+    numbers: dict[str, float]
+    chi_square: float
+    aicc: float
+    p_value: float
+    rejected: bool
+
+
+class Verdict(NamedTuple):
+    """The mechanisms in the order of AICc, and which one the data prefer, in words."""
+
+    judged: tuple[Judged, ...]
+    preferred: str
+    words: str
+
+
+def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> Verdict:
+    """Judge mechanisms by the curves of a fit.
+
+    Parameters
+    ----------
+    problem, best : Problem, Minimum
+        Of the scenario as it is, its errors and its shift from steady sliding known.
+    seed : int
+        Of the drawn curves.
+    draws : int
+        Curves drawn for each mechanism.
+    """
+    found = [(WHOLE, problem, best)]
+    for name, other in _others(problem):
+        found.append((name, other, _least(other, _starts(other))))
+    criteria = [one.criterion(least.chi_square) for _, one, least in found]
+    worst = min(criteria) + _HOPELESS
+    judged = []
+    for place, ((name, one, least), aicc) in enumerate(zip(found, criteria, strict=True)):
+        p_value = math.nan
+        if place and aicc < worst:
+            rng = np.random.default_rng([seed, place])
+            p_value = _p_value(one, least, problem, best, rng, draws)
+        rejected = place > 0 and aicc - min(criteria) >= _WORSE and not p_value > _RARE
+        judged.append(Judged(name, one.numbers(least.x), least.chi_square, aicc, p_value, rejected))
+    return Verdict(tuple(sorted(judged, key=lambda one: one.aicc)), *_verdict(judged))
+
+
+def _verdict(judged: list[Judged]) -> tuple[str, str]:
+    """The mechanism preferred, "" if the data cannot tell, and that in words."""
+    left = [one for one in judged[1:] if not one.rejected]
+    names = " and ".join(one.name for one in left)
+    if not left:
+        return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
+    if len(left) > 1:
+        return "", f"the data cannot tell: {names} are not rejected"
+    if not left[0].p_value > _RARE:
+        return "", f"the data cannot tell whether {names} is enough"
+    return names, f"the data prefer {names}: they do not ask for more, and reject the others"
+
+
+def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
+    """Mechanisms beside the scenario as it is, each with the keys that it has."""
+    scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
+    bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
+    fluctuating = "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0
+    still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
+    share = {"adhesion.bond_share": 0.0}
+    if bonded and fluctuating:
+        yield "bonds only", _less(problem, still, "shear.")
+        yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
+    if scene.contact.kind == "displacement" or not scene.population.carries_stress:
+        return
+    for theory, (words, more) in _THEORIES.items():
+        other = _less(problem, still | share, "shear.", "adhesion.bond_share")
+        yield words, replace(other, free=(*other.free, *more), theory=theory)
+
+
+def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:
+    """A problem with some numbers fixed, and without the keys that these leave without effect."""
+    free = tuple(one for one in problem.free if not one.key.startswith(without))
+    found = replace(problem, free=free, fixed=fixed)
+    left_out = idle(found)
+    return replace(found, free=tuple(one for one in free if one.key not in left_out))
+
+
+def _starts(problem: Problem) -> list[Array]:
+    """Where to look for the minimum: a theory's own number at several sizes, as most contacts bear only some."""
+    if not problem.theory or problem.theory not in _THEORIES or not _THEORIES[problem.theory][1]:
+        return [problem.start]
+    found = []
+    for size in (0.01, 0.1, 0.5):
+        start = problem.start
+        start[len(problem.free) - 1] = size
+        found.append(start)
+    return found
+
+
+def _least(problem: Problem, starts: list[Array], precision: float = 1e-8) -> Minimum:
+    """The least of the minima from several starts."""
+    found = (minimum(problem, start, precision=precision) for start in starts)
+    return min(found, key=lambda one: one.chi_square)
+
+
+def _p_value(
+    poorer: Problem, least: Minimum, whole: Problem, best: Minimum, rng: np.random.Generator, draws: int
+) -> float:
+    """Share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one."""
+    measured, made, larger = least.chi_square - best.chi_square, poorer.predicted(least.x), 0
+    shared = {one.key: x for one, x in zip(poorer.free, least.x, strict=False)}
+    alike = np.array([shared.get(one.key, x) for one, x in zip(whole.free, best.x, strict=False)])
+    alike = np.append(alike, best.x[len(whole.free) :])
+    for _ in range(draws):
+        values = made + np.hypot(whole.sigma, whole.noise) * rng.standard_normal(len(made))
+        for name, size in whole.common.items():
+            values = np.where(whole.of(name), values * (1.0 + size * rng.standard_normal()), values)
+        drawn, full = (replace(one, values=values) for one in (poorer, whole))
+        ratio = _least(drawn, [least.x], _FINE).chi_square - _least(full, [best.x, alike], _FINE).chi_square
+        larger += ratio >= measured
+    return (1 + larger) / (1 + draws)

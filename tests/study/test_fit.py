@@ -1,0 +1,469 @@
+"""Fits to made-up curves of a known truth: intervals that hold it, mechanisms told apart, tables refused."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.testing import assert_allclose
+
+import sim
+from sim.cli import cli
+from sim.scenario.declared import quantities
+from sim.scenario.reader import load
+from sim.scenario.toml_text import written
+from sim.study import fit as calibration, mechanisms, predicted
+from sim.study.fit import fit
+from sim.study.fitting import minimum, problem_of
+from sim.study.measured import Curve, Measured, read
+from sim.study.posterior import posterior
+from sim.units.refusals import BadInput
+
+SPECTRUM = {"model": "self_affine", "rms": "150 kPa", "hurst": 0.8, "longest": "60 um", "shortest": "1 um",
+            "rolloff": "24 um"}  # fmt: skip
+LENS = {
+    "name": "lens",
+    "seed": 11,
+    "clock": {"duration": "2 s", "step": "1 s"},
+    "solid": {"shear_modulus": "1.6 MPa"},
+    "sphere": {"radius": "2 mm"},
+    "adhesion": {"work": "42 mJ/m^2", "bond_share": 0.6},
+    "drive": {"model": "steady", "speed": "1 mm/s"},
+    "bonds": {"model": "steady", "critical_speed": "10 mm/s", "stress": "0.3 MPa"},
+    "shear": {"model": "mean", "spectrum": SPECTRUM,
+              "amplitude": {"model": "onset", "speed": "1 mm/s", "width": 0.3, "floor": 0.05}},
+    "contact": {"model": "equilibrium", "load": "4 mN"},
+}  # fmt: skip
+SPEEDS = np.geomspace(1e-5, 5e-2, 10)
+#: What the curves of the lens are fitted for, and its true values.
+KEYS = {"bonds.critical_speed": 0.01, "bonds.stress": 3e5, "shear.spectrum.rms": 1.5e5}
+UNITS = {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "contact_radius": ("um", 1e6)}
+
+
+@pytest.fixture(scope="module")
+def truth():
+    """Area and friction of the lens at the speeds, by its own run."""
+    scene = load(LENS | {"sweep": {"drive.speed": SPEEDS.tolist()}})
+    dataset = sim.run(scene).isel(t=-1)
+    return {name: dataset[name].to_numpy() for name in ("contact_area", "friction_force")}
+
+
+def noisy(truth, error, seed):
+    """Curves with relative errors, as a table and as they would be written."""
+    rng = np.random.default_rng([1234, seed])
+    return {name: values * (1.0 + error * rng.standard_normal(len(values))) for name, values in truth.items()}
+
+
+def table(path, conditions, curves, error=None):
+    """Write a CSV table of conditions (header by values) and curves."""
+    columns = {f"{name} [{UNITS[name][0]}]": UNITS[name][1] * values for name, values in curves.items()}
+    columns = dict(conditions) | columns
+    if error is not None:
+        columns |= {f"{name}_error [%]": np.full(len(values), 100.0 * error) for name, values in curves.items()}
+    rows = [",".join(f"{value:.12g}" for value in row) for row in zip(*columns.values(), strict=True)]
+    path.write_text("\n".join([",".join(columns), *rows]) + "\n")
+    return path
+
+
+@pytest.fixture
+def curves(tmp_path, truth):
+    """The table of the lens with errors of half a percent."""
+    return table(tmp_path / "lens.csv", {"speed [mm/s]": 1e3 * SPEEDS}, noisy(truth, 0.005, 1), 0.005)
+
+
+# -- what is predicted ----------------------------------------------------------------------------
+
+
+def rows_of(scene, **conditions):
+    count = len(next(iter(conditions.values())))
+    names = ("contact_radius", "friction_force", "work_of_adhesion", "indentation", "normal_load", "bond_fraction")
+    curves = tuple(Curve(name, np.ones(count), None) for name in names)
+    return Measured(Path("made.csv"), scene.contact.kind, conditions, curves), list(names)
+
+
+SCENES = {
+    "lens": {},
+    "pulled": {"contact.load": -2e-5, "shear.spectrum.rms": 5e4},
+    "indentation": {"contact": {"indentation": "2 um"}},
+    "behind a spring": {"contact": {"displacement": "2 um", "stiffness": "100 N/m"}},
+    "reversible share": {"contact.reversible": 0.01},
+    "disc": {"shear.contact": "disc"},
+    "bonds with a stretch": {"bonds": {"model": "rate", "rupture": {"model": "bell", "zero_force_rate": "100 1/s",
+                             "bell_force": "4 pN"}, "bond_stiffness": "1 mN/m", "rebinding_rate": "500 1/s",
+                             "site_density": "1e15 1/m^2"}},
+    "size by stress": {"shear.amplitude": {"model": "stress", "reference": "0.3 MPa"}},
+    "slow edge": {"contact": {"model": "rate_dependent", "load": "4 mN", "front_speed": "1 mm/s"}},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("changes", SCENES.values(), ids=SCENES)
+def test_steady_sliding_is_what_a_run_at_a_steady_speed_ends_in(changes):
+    scene = load(LENS).with_values(changes)
+    made, names = rows_of(scene, speed=SPEEDS[::3])
+    (group,) = predicted.groups(scene, made)
+    alone = predicted.by_steady_sliding(group, {}, names)
+    sampled = predicted.asked([group], {}, names, False)
+    for name in names:
+        assert np.all(np.isfinite(alone[name]))
+        assert_allclose(alone[name], sampled.mean[name], rtol=1e-12, atol=0)
+        assert np.all(sampled.error[name] == 0.0)
+
+
+def test_rows_have_the_load_and_the_solid_of_their_own():
+    scene = load(LENS)
+    loads, moduli = np.array([-1e-4, 0.0, 4e-3, 4e-3]), np.array([1e6, 1e6, 1e6, 2e6])
+    made, names = rows_of(scene, held=loads, **{"solid.shear_modulus": moduli})
+    groups = predicted.groups(scene, made)
+    assert [group.rows.tolist() for group in groups] == [[0, 1, 2], [3]]
+    for group in groups:
+        found = predicted.by_steady_sliding(group, {"adhesion.work": 0.05}, names)
+        for k, row in enumerate(group.rows):
+            one = {"contact.load": loads[row], "solid.shear_modulus": moduli[row], "adhesion.work": 0.05}
+            point = sim.run(scene.with_values(one)).isel(t=-1)
+            for name in names:
+                assert_allclose(found[name][k], point[name], rtol=1e-12, atol=0)
+
+
+def test_numbers_changed_unchecked_are_those_changed_and_checked():
+    scene = load(LENS)
+    values = {
+        "shear.spectrum.rms": 2e5,
+        "shear.amplitude.speed": 3e-3,
+        "contact.load": 1e-3,
+        "solid.shear_modulus": 1e6,
+    }
+    found = predicted.changed(scene, values)
+    assert quantities(found) == quantities(scene.with_values(values))
+    assert found.rest_radius == scene.with_values(values).rest_radius != scene.rest_radius
+
+
+# -- the truth within its interval ----------------------------------------------------------------
+
+
+def inside(truth, seed, keys, error=0.01, **how):
+    """Whether the interval of each key holds its true value, in a fit to curves drawn anew."""
+    scene, drawn = load(LENS), noisy(truth, error, seed)
+    curves = tuple(Curve(name, values, error * np.abs(truth[name])) for name, values in drawn.items())
+    made = Measured(Path("made.csv"), "load", {"speed": SPEEDS}, curves)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(calibration, "read", lambda path, base: made)
+        found = fit(scene, [Path("made.csv")], keys, steady=True, **how)
+    assert found.converged
+    return [one.interval.low < keys[one.free.key] < one.interval.high for one in found.numbers]
+
+
+def test_intervals_hold_the_truth_in_twenty_fits(truth):
+    outside = 20 - np.sum([inside(truth, seed, KEYS) for seed in range(20)], axis=0)
+    # of 20 fits 1 is expected to fail; more than 4 would have a probability of 0.3 %
+    assert np.all(outside <= 4)
+
+
+@pytest.mark.verify
+def test_intervals_hold_the_truth_in_95_of_100_fits(truth):
+    held = np.mean([inside(truth, seed, KEYS) for seed in range(500)], axis=0)
+    # a binomial standard error of 1 %, three of them
+    assert np.all((held > 0.92) & (held < 0.98)), held
+
+
+def test_more_errors_or_fewer_points_widen_an_interval(tmp_path, truth):
+    widths = []
+    for error, every in ((0.005, 1), (0.005, 3), (0.02, 1)):
+        some = {name: values[::every] for name, values in noisy(truth, error, 3).items()}
+        path = table(tmp_path / "one.csv", {"speed [m/s]": SPEEDS[::every]}, some, error)
+        (one,) = fit(load(LENS), [path], ["bonds.critical_speed"], steady=True).numbers
+        widths.append(math.log(one.interval.high / one.interval.low))
+        # one number: the curve is nearly straight over its interval, 2 x 1.96 standard errors wide
+        assert_allclose(widths[-1], 3.92 * one.error / one.value, rtol=0.05)
+    assert widths[0] < widths[1] and widths[0] < widths[2]
+
+
+def test_curves_without_errors_are_weighed_by_their_scatter(tmp_path, truth):
+    drawn = noisy(truth, 0.01, 4)
+    path = table(tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, drawn)
+    found = fit(load(LENS), [path], ["bonds.critical_speed", "bonds.stress"], steady=True)
+    assert any("without errors" in said for said in found.remarks)
+    for name, number in (("contact_area", 0), ("friction_force", 1)):
+        sigma = found.problem.sigma[found.problem.curve == number]
+        off = found.problem.values - found.problem.predicted(found.best.x)
+        scatter = np.sqrt(np.mean(off[found.problem.curve == number] ** 2) / 0.9)
+        # of the last round: each round changes it by less than the one before
+        assert_allclose(sigma, scatter, rtol=1e-3)
+        assert 0.3 < scatter / (0.01 * truth[name].max()) < 2.0
+    assert_allclose(found.values["bonds.critical_speed"], 0.01, rtol=0.1)
+
+
+def test_an_error_that_all_areas_share_is_found_and_widens_what_it_touches(tmp_path, truth):
+    drawn = noisy(truth, 0.002, 5)
+    drawn["contact_area"] = 1.03 * drawn["contact_area"]
+    path = table(tmp_path / "scaled.csv", {"speed [m/s]": SPEEDS}, drawn, 0.002)
+    keys = ["bonds.critical_speed", "bonds.stress", "adhesion.work"]
+    plain = sim.fit(LENS, path, keys, steady=True)
+    shared = fit(load(LENS), [path], keys, {"contact_area": 0.03}, steady=True)
+    assert_allclose(0.03 * shared.best.x[3], 0.03, atol=0.03)
+    widths = [found.numbers[2].interval.high - found.numbers[2].interval.low for found in (plain, shared)]
+    assert widths[1] > 1.5 * widths[0]
+    assert shared.numbers[2].interval.low < 42e-3 < shared.numbers[2].interval.high
+
+
+def test_loads_fit_work_and_modulus_of_jkr(tmp_path):
+    loads = np.linspace(-2e-4, 8e-3, 12)
+    exact = sim.laws.jkr.radius_at_load(loads, 42e-3, 2e-3, 6.4e6)
+    path = table(tmp_path / "jkr.csv", {"normal_load [N]": loads}, {"contact_radius": exact}, 0.001)
+    scene = load(LENS | {"drive": {"model": "steady"}, "shear": {"model": "uniform"}, "bonds": {"model": "none"}})
+    start = scene.with_values({"adhesion.work": 30e-3, "solid.shear_modulus": 1e6})
+    found = fit(start, [path], ["adhesion.work", "solid.shear_modulus"])
+    assert_allclose([*found.values.values()], [42e-3, 1.6e6], rtol=1e-7)
+
+
+def test_times_are_read_along_the_run(tmp_path):
+    scene = load(LENS).with_values({
+        "drive": {"model": "ramp", "from": "10 um/s", "to": "50 mm/s", "scale": "log"}, "clock.step": "0.01 s"
+    })  # fmt: skip
+    run = sim.run(scene)
+    path = table(tmp_path / "run.csv", {"t [s]": run.t[::20].to_numpy()},
+                 {"contact_area": run.contact_area[::20].to_numpy()}, 0.001)  # fmt: skip
+    start = scene.with_values({"bonds.critical_speed": 5e-3})
+    found = fit(start, [path], ["bonds.critical_speed"])
+    assert_allclose(found.values["bonds.critical_speed"], 0.01, rtol=1e-6)
+    again = table(tmp_path / "ramp.csv", {"speed [m/s]": run.speed[::20].to_numpy()},
+                  {"contact_area": run.contact_area[::20].to_numpy()}, 0.001)  # fmt: skip
+    assert_allclose(fit(start, [again], ["bonds.critical_speed"]).values["bonds.critical_speed"], 0.01, rtol=1e-6)
+    far = table(tmp_path / "far.csv", {"speed [m/s]": [1e-4, 1.0]}, {"contact_area": np.full(2, 4e-8)}, 0.001)
+    with pytest.raises(BadInput, match=r"drive.speed: it goes from 1e-05 to 0.05 m/s"):
+        fit(start, [far], ["bonds.critical_speed"])
+
+
+def test_members_shift_the_fit_and_their_error_joins_the_datas(tmp_path, truth):
+    shear = LENS["shear"] | {"model": "banded", "cell": "0.12 mm", "correlation": {"model": "slip", "length": "5 um"}}
+    scene = load(LENS | {"shear": shear, "ensemble": {"members": 64}, "clock": {"duration": "2 s", "step": "0.1 s"}})
+    path = table(tmp_path / "lens.csv", {"speed [m/s]": SPEEDS}, noisy(truth, 0.002, 6), 0.002)
+    found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
+    (rms, _), noise = found.numbers, found.problem.noise
+    assert found.converged and abs(rms.value - rms.steady) > rms.error and np.all(noise[6:9] > 0.0)
+    again = predicted.asked(found.problem.groups[0], found.values, ["contact_area"], False)
+    assert_allclose(found.problem.predicted(found.best.x)[:10], again.mean["contact_area"], rtol=2e-4)
+    assert_allclose(noise[:10], again.error["contact_area"], rtol=0.05)
+
+
+# -- what cannot be told --------------------------------------------------------------------------
+
+
+def test_keys_that_enter_only_as_a_product_are_refused_together(curves):
+    with pytest.raises(BadInput, match=r"only together") as refused:
+        fit(load(LENS), [curves], ["shear.spectrum.rms", "shear.paid_by_adhesion", "bonds.critical_speed"], steady=True)
+    (said,) = refused.value.problems
+    assert "shear.spectrum.rms and shear.paid_by_adhesion" in said and "critical_speed" not in said
+
+
+def test_a_key_without_effect_is_refused(curves):
+    scene = load(LENS).with_values({"bonds": {"model": "rate", "critical_speed": 0.01, "rebinding_rate": 100.0,
+                                              "stress": 3e5}})  # fmt: skip
+    with pytest.raises(BadInput, match=r"^--free bonds.rebinding_rate: has no effect"):
+        fit(scene, [curves], ["bonds.rebinding_rate", "bonds.stress"])
+
+
+def test_keys_that_the_data_hardly_tell_apart_are_named(curves):
+    found = fit(load(LENS), [curves], ["adhesion.bond_share", "shear.spectrum.rms", "bonds.stress"], steady=True)
+    assert abs(found.correlations[0, 1]) > 0.95
+    assert [said for said in found.remarks if "adhesion.bond_share and shear.spectrum.rms apart" in said]
+
+
+def test_a_number_that_the_data_do_not_bound_ends_at_its_bound(tmp_path, truth):
+    slow = {name: values[:4] for name, values in noisy(truth, 0.02, 7).items()}
+    path = table(tmp_path / "slow.csv", {"speed [m/s]": SPEEDS[:4]}, slow, 0.02)
+    (one,) = fit(load(LENS), [path], ["bonds.critical_speed=1 mm/s:10 m/s"], steady=True).numbers
+    assert one.interval.high_open and one.interval.high == 10.0 and not one.interval.low_open
+
+
+@pytest.mark.parametrize(
+    ("free", "said"),
+    [
+        ("bonds.crital_speed", 'did you mean "bonds.critical_speed"'),
+        ("clock.step", "no physical number"),
+        ("bonds.stress=1:2", "start inside"),
+        ("bonds.stress=2 kPa:1 kPa", "wrong order"),
+        ("bonds.stress=1 m:2 m", "not a unit of Pa"),
+        ("bonds.stress=1 kPa", "LOW:HIGH"),
+        ("shear.amplitude.floor=", "LOW:HIGH"),
+    ],
+)
+def test_what_cannot_be_freed_is_refused(free, said, curves):
+    with pytest.raises(BadInput, match=said):
+        fit(load(LENS), [curves], [free], steady=True)
+
+
+# -- mechanisms -----------------------------------------------------------------------------------
+
+
+def judged(scene, made, keys, draws):
+    free = [calibration._free(scene, key) for key in keys]
+    problem = problem_of([made], [predicted.groups(scene, made)], free, {})
+    return mechanisms.compare(problem, minimum(problem, problem.start, errors=True), scene.seed, draws)
+
+
+def drawn_of(scene, error, seed):
+    """Area and friction of a scene at the speeds, with errors."""
+    made, _ = rows_of(scene, speed=SPEEDS)
+    (group,) = predicted.groups(scene, made)
+    exact = predicted.by_steady_sliding(group, {}, ["contact_area", "friction_force"])
+    curves = noisy(exact, error, seed)
+    return made._replace(curves=tuple(Curve(n, v, error * np.abs(exact[n])) for n, v in curves.items()))
+
+
+#: A contact for which theories are not compared: bonds, fluctuations or both.
+SPRUNG = LENS | {"contact": {"model": "equilibrium", "displacement": "2 um", "stiffness": "1 kN/m"}}
+MECHANISM_KEYS = ["adhesion.bond_share", "bonds.critical_speed", "bonds.stress", "shear.spectrum.rms"]
+
+
+def test_data_that_can_tell_prefer_the_mechanism_that_made_them():
+    verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.005, 8), MECHANISM_KEYS, 20)
+    assert verdict.preferred == verdict.judged[0].name == mechanisms.WHOLE
+    assert {one.name for one in verdict.judged if one.rejected} == {"bonds only", "fluctuations only"}
+
+
+def test_data_that_cannot_tell_say_so():
+    verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.3, 9), ["adhesion.bond_share", "shear.spectrum.rms"], 20)
+    assert verdict.preferred == "" and verdict.words.startswith("the data cannot tell")
+
+
+@pytest.mark.verify
+def test_a_theory_is_preferred_by_its_own_data():
+    scene = load(LENS).with_values({"bonds.stress": 6e4})
+    made, _ = rows_of(scene, speed=SPEEDS)
+    (group,) = predicted.groups(scene, made)
+    values = {"adhesion.bond_share": 0.0, "shear.paid_by_adhesion": 0.0}
+    names = ["contact_area", "friction_force"]
+    exact = predicted.by_steady_sliding(group, values | {"lambda": 0.4}, names, "scaled_angle")
+    exact_curves = tuple(Curve(n, v, 0.002 * np.abs(v)) for n, v in noisy(exact, 0.002, 10).items())
+    verdict = judged(scene, made._replace(curves=exact_curves), ["bonds.critical_speed", "bonds.stress"], 20)
+    assert verdict.judged[0].name == "mixed mode, scaled angle" and len(verdict.judged) == 12
+    assert_allclose(verdict.judged[0].numbers["lambda"], 0.4, rtol=0.1)
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("truth", ["both", "bonds only", "fluctuations only"])
+def test_the_right_mechanism_is_preferred_in_95_of_100(truth):
+    still = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only": {"adhesion.bond_share": 0.0}}
+    scene = load(SPRUNG).with_values(still.get(truth, {}))
+    wanted = mechanisms.WHOLE if truth == "both" else truth
+    right = 0
+    for seed in range(100):
+        verdict = judged(load(SPRUNG), drawn_of(scene, 0.005, seed), MECHANISM_KEYS, 40)
+        right += verdict.preferred == wanted
+    assert right >= 95
+
+
+@pytest.mark.verify
+def test_a_posterior_agrees_with_the_profile(curves):
+    found = fit(load(LENS), [curves], KEYS, steady=True)
+    sampled = posterior(found.problem, found.best, 1)
+    assert sampled.converged
+    for one, (low, middle, high) in zip(found.numbers, sampled.quantiles().T, strict=True):
+        # chains of 50 autocorrelation times of 24 walkers: some 1200 independent samples, whose 2.5 % quantile
+        # has a standard error of 0.08 standard deviations; five of them
+        assert_allclose(
+            [low, middle, high], [one.interval.low, one.value, one.interval.high], atol=0.4 * one.error, rtol=0
+        )
+
+
+# -- tables that are refused ----------------------------------------------------------------------
+
+HEADER = "speed [mm/s],contact_area [mm^2]"
+BAD = {
+    "empty": ("", "the table is empty"),
+    "no unit of an area": ("speed [mm/s],contact_area [mm]\n1,2\n3,4\n", "not a unit of m"),
+    "unknown column": ("speed [mm/s],area [mm^2]\n1,2\n3,4\n", 'column "area" is neither'),
+    "misspelt": ("speed [mm/s],contact_arae [mm^2]\n1,2\n3,4\n", 'did you mean "contact_area"'),
+    "no curve": ("speed [mm/s]\n1\n3\n", "no column was measured"),
+    "no condition": ("contact_area [mm^2]\n0.04\n0.05\n", "where the points were taken"),
+    "nan": (f"{HEADER}\n1,0.04\n2,nan\n", "line 3: contact_area must be finite"),
+    "empty cell": (f"{HEADER}\n1,0.04\n2,\n", "line 3: contact_area is an empty cell"),
+    "ragged": (f"{HEADER}\n1,0.04\n2\n", "line 3: 1 cells"),
+    "one point": (f"{HEADER}\n1,0.04\n", "1 measured number cannot tell 1 free"),
+    "no errors": (f"{HEADER},contact_area_error [mm^2]\n1,0.04,0\n2,0.04,0.1\n", "must be above 0"),
+    "error of nothing": (f"{HEADER},friction_force_error [mN]\n1,2,3\n2,3,4\n", "is the error of"),
+    "time and speed": ("t [s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n", "leave out t"),
+    "twice": ("speed [mm/s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n", "each once"),
+    "of another solid": ("solid_poisson_ratio,contact_area [mm^2]\n0.5,2\n0.7,3\n", "at most 0.5"),
+}  # fmt: skip
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    path = tmp_path / "lens.toml"
+    path.write_text(written(LENS))
+    return path
+
+
+def command(*arguments):
+    return CliRunner().invoke(cli, ["fit", *map(str, arguments)])
+
+
+@pytest.mark.parametrize(("text", "said"), BAD.values(), ids=BAD)
+def test_a_bad_table_is_refused_with_one_line_and_nothing_is_written(text, said, scenario, tmp_path):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    done = command(scenario, path, "--free", "bonds.critical_speed")
+    assert isinstance(done.exception, BadInput) and done.exception.exit_code == 2
+    (line,) = done.exception.problems
+    assert said in line and "\n" not in line and str(path) in line
+    assert {one.name for one in tmp_path.iterdir()} == {"lens.toml", "bad.csv"}
+
+
+def test_what_is_no_table_is_refused(scenario, tmp_path):
+    binary = tmp_path / "binary.csv"
+    binary.write_bytes(b"\x89HDF\xff\xfe")
+    for path, said in ((tmp_path / "none.csv", "cannot be read"), (tmp_path, "Is a directory"), (binary, "UTF-8")):
+        done = command(scenario, path, "--free", "bonds.stress")
+        assert isinstance(done.exception, BadInput) and said in str(done.exception)
+
+
+# -- the command ----------------------------------------------------------------------------------
+
+
+def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unasked(scenario, curves, tmp_path):
+    free = [word for key in KEYS for word in ("--free", key)]
+    done = command(scenario, curves, *free, "--steady", "--common", "contact_area=0.1 %")
+    assert done.exit_code == 0, done.output
+    made = [tmp_path / f"lens_fit.{ending}" for ending in ("toml", "json", "png")]
+    assert done.output.rstrip().endswith("\n".join(map(str, made)))
+    numbers = json.loads(made[1].read_text())
+    found = load(made[0])
+    for key, value in KEYS.items():
+        one = numbers["numbers"][key]
+        assert one["low"] < value < one["high"] and one["start"] == value
+        assert_allclose(quantities(found)[key][1], one["value"], rtol=1e-11)
+    assert {**dict(quantities(found)), **dict.fromkeys(KEYS)} == {**quantities(load(scenario)), **dict.fromkeys(KEYS)}
+    assert (
+        made[2].read_bytes().startswith(b"\x89PNG")
+        and numbers["converged"]
+        and "contact_area" in numbers["common_errors"]
+    )
+    before = [path.read_bytes() for path in made]
+    again = command(scenario, curves, *free, "--steady")
+    assert getattr(again.exception, "exit_code", 0) == 73
+    assert command(scenario, curves, "--free", "bonds.stress", "--steady", "--force").exit_code == 0
+    assert all(path.read_bytes() != old for path, old in zip(made, before, strict=True))
+    made[0].write_text("# my own\n")
+    refused = command(scenario, curves, "--free", "bonds.stress", "--steady", "--force")
+    assert "never replaced" in str(refused.exception) and made[0].read_text() == "# my own\n"
+
+
+def test_a_fit_that_does_not_converge_exits_1(scenario, curves, monkeypatch):
+    monkeypatch.setattr(calibration, "with_errors", lambda problem, start: (
+        problem, minimum(problem, start, errors=True)._replace(converged=False)))  # fmt: skip
+    done = command(scenario, curves, "--free", "bonds.stress", "--steady")
+    assert done.exit_code == 1 and "has not converged" in done.output
+
+
+def test_a_table_of_percent_and_of_units_has_the_same_errors(tmp_path, truth):
+    area = truth["contact_area"]
+    percent = table(tmp_path / "percent.csv", {"speed [m/s]": SPEEDS}, {"contact_area": area}, 0.02)
+    units = tmp_path / "units.csv"
+    rows = [f"{v:.12g};{1e12 * a:.12g};{1e12 * 0.02 * a:.12g}" for v, a in zip(SPEEDS, area, strict=True)]
+    units.write_text("\n".join(["speed [m/s];contact_area [um^2];contact_area_error [um^2]", *rows]))
+    one, other = (read(path, load(LENS)).curves[0] for path in (percent, units))
+    assert_allclose(one.errors, other.errors, rtol=1e-10)
+    assert_allclose(one.values, other.values, rtol=1e-10)
