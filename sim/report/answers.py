@@ -7,11 +7,22 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.analysis import concise, engineering, events, is_stationary, is_steady, settled, summary, sweep_dims
+from sim.analysis import (
+    concise,
+    engineering,
+    events,
+    is_stationary,
+    is_steady,
+    loss_speeds,
+    setting,
+    settled,
+    summary,
+    sweep_dims,
+)
 from sim.analysis.observables import all_observables
+from sim.analysis.over_speed import speed_dim
 from sim.analysis.scene import answered, speed_name
 from sim.plots import kinds
-from sim.plots.curves import speed_dim
 from sim.units.notation import scaled
 
 #: The space between a number and its unit, where no line breaks.
@@ -20,9 +31,16 @@ TIE = "\u00a0"
 _ERRORS, _ROUNDING = 3.0, 1e-9
 #: Mechanisms that take area, in the order in which they are charged.
 _TAKEN = {
-    "lost_to_bonds": "broken bonds take", "lost_to_fluctuations": "fluctuations",
+    "lost_to_bonds": "broken bonds", "lost_to_fluctuations": "fluctuations",
     "lost_to_mean_stress": "the mean stress", "lost_to_lag": "the edge's lag",
 }  # fmt: skip
+#: Losses whose speeds are known, in words.
+_LOSSES = {
+    "speed_at_5_percent_lost": f"5{TIE}% of JKR's", "speed_at_50_percent_lost": f"50{TIE}% of JKR's",
+    "speed_halfway_to_hertz": "half of what lies between JKR's and Hertz's",
+}  # fmt: skip
+#: Points of a sweep that each have a sentence, at most.
+_FEW = 4
 
 
 class Mean(NamedTuple):
@@ -30,13 +48,15 @@ class Mean(NamedTuple):
 
     value: float
     error: float
-    unit: str
+    unit: str  # "1" for a share, "" for a count
 
     def __str__(self) -> str:
         return self.beside(self)
 
     def beside(self, other: "Mean") -> str:
         """The number with its error, in the unit that suits another one."""
+        if self.unit == "":  # a count
+            return concise(self.value, self.error)
         if self.unit == "1":
             return f"{concise(100.0 * self.value, 100.0 * self.error)}{TIE}%"
         factor, shown = scaled(other.value, self.unit)
@@ -61,7 +81,8 @@ class Found(NamedTuple):
             return None
         mean, error = (self.statistics.get(f"{name}_{kind}", xr.DataArray(np.nan)) for kind in ("mean", "sem"))
         value = float(mean)
-        return Mean(value, float(error), mean.attrs.get("units", "1")) if np.isfinite(value) else None
+        unit = "" if name == "slip_count" else str(mean.attrs.get("units", "1"))
+        return Mean(value, float(error), unit) if np.isfinite(value) else None
 
 
 def answers(dataset: xr.Dataset) -> list[str]:
@@ -79,7 +100,7 @@ def answers(dataset: xr.Dataset) -> list[str]:
     """
     kind = kinds.default(dataset)
     said: list[str] = []
-    for answer in _ANSWERS.get(kind, ()):
+    for answer in (*_ANSWERS.get(kind, ()), *_ALWAYS):
         with contextlib.suppress(ValueError, KeyError), answered():
             said += answer(dataset)
     return said
@@ -98,12 +119,16 @@ def _places(dataset: xr.Dataset, found: xr.Dataset) -> list[Found]:
 
 
 def _swept(value: xr.DataArray) -> str:
-    """A swept value with its name: ``normal load 4 mN``."""
-    if value.dtype.kind not in "fi":
-        return f"{str(value.name).replace('_', ' ')} {value.item()}"
-    name = value.attrs.get("long_name", str(value.name).replace("_", " ")).partition(",")[0]
-    number = engineering(value.item(), value.attrs.get("units", "1"))
-    return f"{name} {number.replace('-', '−').replace(' ', TIE)}"
+    """A swept value with its key: ``contact load 4 mN``."""
+    number = value.item()
+    if value.dtype.kind in "fi":
+        number = engineering(number, value.attrs.get("units", "1")).replace("-", "−").replace(" ", TIE)
+    return f"{str(value.name).replace('_', ' ')} {number}"
+
+
+def _led(words: str, sentence: str) -> str:
+    """A sentence with the place that it is of, if that has words."""
+    return f"With {words}, {sentence[0].lower()}{sentence[1:]}" if words else sentence
 
 
 def _at_the_end(dataset: xr.Dataset) -> xr.Dataset:
@@ -123,11 +148,16 @@ def _range(places: list[Found], name: str) -> tuple[Found, Mean, Found, Mean] | 
 
 
 def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
-    """A sentence on an observable over the sweep: what it is, or its least and largest values and where they are."""
+    """A sentence on an observable over the sweep: what it is, or its least and largest values and where they are.
+
+    None where it is zero throughout.
+    """
     if (found := _range(places, name)) is None:
         return
     low, least, high, most = found
-    if len(places) == 1 or least.equals(most):
+    if least.value == most.value == 0.0:
+        return
+    if len(places) == 1 or least.equals(most) or least.beside(most) == str(most):
         yield f"{what} is {most}{' everywhere in the sweep' if len(places) > 1 else ''}."
     else:
         yield f"{what} goes from {least.beside(most)} ({low.words}) to {most} ({high.words})."
@@ -135,6 +165,7 @@ def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
 
 def _area_over_speed(dataset: xr.Dataset) -> Iterator[str]:
     """What the area loses from the lowest to the highest speed, and to which mechanism."""
+    given = dataset
     if is_steady(dataset):
         axis, found = str(speed_dim(dataset)), _at_the_end(dataset)
         dataset = dataset.isel({axis: [0]})
@@ -144,28 +175,40 @@ def _area_over_speed(dataset: xr.Dataset) -> Iterator[str]:
     sizes = abs(found[f"{speed}_mean"]).max([name for name in found[f"{speed}_mean"].dims if name != axis])
     ends = int(np.argmin(sizes.to_numpy())), int(np.argmax(sizes.to_numpy()))
     slow, fast = (_places(dataset, found.isel({axis: end})) for end in ends)
-    for before, after in zip(slow, fast, strict=True):
+    if len(fast) > _FEW:
+        yield from _ranged(fast, "area_ratio", "The contact area over JKR's at the highest speed")
+        return
+    losses = _places(dataset, loss_speeds(given))
+    for before, after, lost in zip(slow, fast, losses, strict=True):
         area, left = before.mean("area_ratio"), after.mean("area_ratio")
         speeds = [place.mean(speed) for place in (before, after)]
         if area is None or left is None or None in speeds:
             continue
-        at = f"{after.words}: " if after.words else ""
         way = f"from {speeds[0]} to {speeds[1]}"
         if area.equals(left):
-            yield f"{at}The contact area does not change {way}: it is {left} of JKR's."
+            yield _led(after.words, f"The contact area does not change {way}: it is {left} of JKR's.")
             continue
         verb = "falls" if left.value < area.value else "grows"
-        yield f"{at}The contact area {verb} from {area} to {left} of JKR's, {way}{_taken(after)}."
+        said = f"The contact area {verb} from {area} to {left} of JKR's, {way}{_taken(after)}."
+        known = list(filter(None, (_speed(lost.statistics, name, words) for name, words in _LOSSES.items())))
+        yield _led(after.words, f"{said} It has lost {', '.join(known)}." if known else said)
+
+
+def _speed(found: xr.Dataset, name: str, words: str) -> str:
+    """A speed in words with its interval, where members differ; "" where it is not known."""
+    speed, low, high = (Mean(float(found.get(f"{name}{end}", np.nan)), 0.0, "m/s") for end in ("", "_low", "_high"))
+    if not np.isfinite(speed.value):
+        return ""
+    spans = np.isfinite(low.value) and high.value - low.value > _ROUNDING * speed.value
+    return f"{words} at {speed}{f' (95{TIE}%: {low.beside(speed)} to {high.beside(speed)})' if spans else ''}"
 
 
 def _taken(place: Found) -> str:
     """What each mechanism takes of JKR's area at a place, in words."""
     shares = {words: place.mean(name) for name, words in _TAKEN.items()}
-    taken = [f"{words} {mean}" for words, mean in shares.items() if mean is not None and abs(mean.value) > _ROUNDING]
-    if not taken:
-        return ""
-    listed = " and ".join([", ".join(taken[:-1]), taken[-1]] if len(taken) > 1 else taken)
-    return f"; there {listed} of JKR's area{', charged in this order' if len(taken) > 1 else ''}"
+    taken = [f"to {words} {mean}" for words, mean in shares.items() if mean is not None and abs(mean.value) > _ROUNDING]
+    order = ", charged in this order" if len(taken) > 1 else ""
+    return f"; of JKR's area there is lost {', '.join(taken)}{order}" if taken else ""
 
 
 def _area_over_sweep(dataset: xr.Dataset) -> Iterator[str]:
@@ -174,14 +217,25 @@ def _area_over_sweep(dataset: xr.Dataset) -> Iterator[str]:
     places = _places(dataset, _at_the_end(dataset))
     yield from _ranged(places, "area_ratio", f"The contact area over JKR's{when}")
     if len(places) == 1 and (taken := _taken(places[0])):
-        yield f"{taken.removeprefix('; ').capitalize()}."
+        yield f"Of{taken.removeprefix('; of')}."
+
+
+def _area_over_theories(dataset: xr.Dataset) -> Iterator[str]:
+    """The range of the area at each share of the stress's energy that adhesion pays for."""
+    (dim,) = setting(dataset, "contact.reversible").dims
+    for number in range(dataset.sizes[dim] if dataset.sizes[dim] <= _FEW else 0):
+        for said in _area_over_sweep(dataset.isel({dim: [number]})):
+            yield _led(_swept(dataset["contact_reversible"][number]), said)
 
 
 def _of_the_run(*asked: tuple[str, str]) -> Callable[[xr.Dataset], Iterator[str]]:
     """Sentences on what a whole run has once: names of events, and what each is in words."""
 
     def answer(dataset: xr.Dataset) -> Iterator[str]:
-        places = _places(dataset, summary(events(dataset), quantiles=False))
+        found = events(dataset)
+        for name in {name for name, _ in asked} & set(dataset.data_vars) - set(found):
+            found[name] = dataset[name].astype(float)
+        places = _places(dataset, summary(found, quantiles=False))
         for name, words in asked:
             yield from _ranged(places, name, words)
 
@@ -196,15 +250,17 @@ def _friction(dataset: xr.Dataset) -> Iterator[str]:
         yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", f"Friction in {words} direction")
 
 
+_OPENINGS = _of_the_run(("ever_detached", "The share of the members that come off"))
+
 #: What answers the question of a scene, by the kind of figure that fits it.
 _ANSWERS: dict[str, tuple[Callable[[xr.Dataset], Iterator[str]], ...]] = {
     "loop": (
         _of_the_run(
             ("loop_dissipation", "The energy dissipated in a cycle there and back"),
-            ("pull_off_load", "The load at which the contact comes off"),
+            ("pull_off_load", "The lowest load that the contact bears"),
         ),
     ),
-    "theories": (_area_over_sweep,),
+    "theories": (_area_over_theories,),
     "stress": (
         _of_the_run(
             ("peak_stress", "The largest shear stress after the start"),
@@ -212,7 +268,17 @@ _ANSWERS: dict[str, tuple[Callable[[xr.Dataset], Iterator[str]], ...]] = {
         ),
     ),
     "friction": (_friction,),
-    "curve": (_area_over_speed, _of_the_run(("peak_stress", "The maximum of the shear stress on the ramp"))),
-    "sweep": (_area_over_sweep,),
-    "time": (_area_over_sweep,),
+    "curve": (_area_over_speed, _of_the_run(("peak_stress", "The maximum of the shear stress on the ramp")), _OPENINGS),
+    "sweep": (_area_over_sweep, _OPENINGS),
+    "time": (_area_over_sweep, _OPENINGS),
 }
+#: What answers it whatever the figure is, where there is such a thing.
+_ALWAYS = (
+    _of_the_run(
+        ("slip_count", "The number of slips of the slider behind its spring"),
+        ("static_friction", "The force at which a slip begins"),
+        ("force_drop", "The fall of the force in a slip"),
+        ("recurrence_time", "The time from slip to slip"),
+        ("kinetic_friction", "The work of the stage over its way, the kinetic friction,"),
+    ),
+)

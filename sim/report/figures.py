@@ -23,7 +23,7 @@ SEE = {
     " contact comes off, a ring where it jumps in. Dashed is JKR's contact at the full work of adhesion.",
     "theories": "The simulated areas lie on the curve of the theory whose balance they have; where curves part, a"
     " measured area can tell between them.",
-    "stress": "A ring marks the largest stress, and the legend says how large it is and at which speed; thin lines are"
+    "stress": "Where the stress has a maximum a mark shows it, and the legend says how large it is; thin lines are"
     " closed forms to hold the simulation to.",
     "stability": "Dark is where the slider sticks and slips, white where it slides steadily. Below the line steady"
     " sliding is unstable in theory; dark beyond it on the way back is hysteresis.",
@@ -73,8 +73,9 @@ def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
     """The figures of a dataset: the one that fits it best, then others that show more of it."""
     best = kinds.default(dataset)
     others = [kind for kind in kinds.drawable(dataset) if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
-    # the end of a run that is on its way says little, and time is no more than another axis for a speed that rises
-    less = {"sweep": not is_stationary(dataset), "time": best == "curve"}
+    # theories have an axis of their own; the end of a run that is on its way says little, and time is no more than
+    # another axis for a speed that rises
+    less = {"sweep": best == "theories" or not is_stationary(dataset), "time": best == "curve"}
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
     for number, kind in enumerate(dict.fromkeys(shown)):
         found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
