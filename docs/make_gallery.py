@@ -583,6 +583,59 @@ def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 @asks(
+    "own_psd",
+    "How strong may a stress of my measured spectrum be before the contact loses its adhesion?",
+    """At an rms of {lost:.0f} kPa its energy is all of the work of adhesion, {work:g} mJ/m². At {rms:g} kPa it stores
+    {energy} mJ/m² and {share} % of JKR's area are left. The spectrum is a made-up table,
+    [own_psd.csv](../../scenarios/own_psd.csv), scaled to each rms; the energy goes with its square.""",
+)
+def own_psd(dataset: xr.Dataset) -> dict[str, Number]:
+    rms, work = 100.0, 1e3 * float(dataset["adhesion_work"])
+    at = {"shear_spectrum_rms": 1e3 * rms, "t": float(dataset["t"][-1])}
+    energy = mean("fluctuation_energy", dataset, 1e3, **at)
+    stored = energy[0] if isinstance(energy, tuple) else energy
+    return {"rms": rms, "work": work, "energy": energy, "share": mean("area_ratio", dataset, 100.0, **at),
+            "lost": rms * float(np.sqrt(work / stored))}  # fmt: skip
+
+
+@asks(
+    "own_map",
+    "What does a contact feel of one measured pattern of stress that passes under it?",
+    """Now less, now more than its mean. The map stores {whole:.1f} mJ/m² as a periodic one, {radial:.1f} mJ/m² by its
+    radial spectrum; on the disc of the contact it stores {low:.1f} to {high:.1f} mJ/m² as it passes. What counts is
+    what a unit of new contact at the edge pays: that lies between {least:.1f} and {most:.1f} mJ/m², and the area
+    between {small:.1f} and {large:.1f} % of JKR's. The map is made up, [own_map.csv](../../scenarios/own_map.csv).""",
+)
+def own_map(dataset: xr.Dataset) -> dict[str, Number]:
+    field = sim.load(ROOT / "scenarios" / "own_map.toml").shear.field
+    energy, area = (
+        1e3 * dataset["fluctuation_energy"],
+        100.0 * dataset["contact_area"] / (np.pi * dataset["jkr_radius"] ** 2),
+    )
+    paid = 1e3 * (dataset["adhesion_work"] - dataset["work_of_adhesion"])
+    ends = {"low": energy.min(), "high": energy.max(), "least": paid.min(), "most": paid.max(),
+            "small": area.min(), "large": area.max()}  # fmt: skip
+    modulus = modulus_of(dataset)
+    return {name: float(value) for name, value in ends.items()} | {
+        "whole": 1e3 * field.surface_energy(modulus), "radial": 1e3 * float(field.spectrum.surface_energy(modulus))
+    }  # fmt: skip
+
+
+@asks(
+    "own_map",
+    "What does such a pattern look like, and where is the contact on it?",
+    """Streaks along the sliding, with an rms of {rms:.1f} kPa on a mean of {mean:.0f} kPa that the bonds bear; the
+    circle is the contact, {width:.0f} µm wide. The pattern moves with the slider; where the map ends there is no
+    stress.""",
+    kind="map",
+)
+def pattern(dataset: xr.Dataset) -> dict[str, Number]:
+    field = sim.load(ROOT / "scenarios" / "own_map.toml").shear.field
+    width = 2e6 * float(dataset["contact_radius"].sel(t=dataset["map_time"][-1], method="nearest"))
+    return {"rms": 1e-3 * field.rms, "mean": 1e-3 * field.mean, "width": width}
+
+
+@asks(
     "afm_tip",
     "Is the friction of an AFM tip a measure of its contact area?",
     """In the model yes: friction is {stress:g} GPa times JKR's area, also in tension, down to the pull-off at

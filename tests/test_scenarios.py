@@ -11,6 +11,7 @@ from numpy.testing import assert_allclose
 from sim import analysis
 from sim.ensemble.simulate import run
 from sim.laws import jkr
+from sim.laws.halfspace import surface_energy
 from sim.laws.schallamach import (
     bell_fraction,
     bell_lives,
@@ -313,6 +314,34 @@ def test_at_the_onset_of_stick_slip_fluctuations_take_more_area_than_the_bonds_g
     assert np.all(slips.sel(drive_stage=2e-3) == 0.0) and np.all(slips.sel(drive_stage=3e-3) > 1.0)
 
 
+def test_a_measured_spectrum_is_scaled_to_each_rms():
+    dataset = four("own_psd")
+    rms, energy = dataset["shear_spectrum_rms"], dataset["fluctuation_energy"]
+    ratio = energy / rms**2  # one realisation at all sizes: the noise is shared
+    assert_allclose(ratio, ratio.isel(shear_spectrum_rms=[0] * rms.size).values, rtol=1e-11)
+    spectrum = load(FOLDER / "own_psd.toml").shear.spectrum
+    exact = float(spectrum.surface_energy(1.6e6)) / spectrum.rms**2
+    # energies are correlated over 5 ms, as e^(-2t/5 ms): 0.2 s are 40 independent ones of each of four members
+    spread, cell = (float(dataset[name][0]) for name in ("member_spread_energy", "cell_error_energy"))
+    assert abs(float(ratio.mean()) / exact - 1.0 - cell) < 5.0 * spread / math.sqrt(4 * 40)
+
+
+def test_a_measured_pattern_is_paid_at_the_edge_of_the_contact():
+    dataset = four("own_map")
+    radius, modulus, load = dataset["contact_radius"], float(dataset["contact_modulus"]), 4e-3
+    rate = jkr.energy_release_rate(radius.values, load, 2e-3, modulus)
+    assert_allclose(rate, dataset["work_of_adhesion"].values, rtol=1e-9)
+    field = load_field("own_map")
+    plane = at("own_map", shear={"model": "mapped", "field": {"file": "own_map.csv", "pixel": "8 um"}})
+    exact = surface_energy(field, (72 * 8e-6, 44 * 8e-6), 1.6e6)
+    assert_allclose(plane["fluctuation_energy"], exact, rtol=1e-12)
+
+
+def load_field(name):
+    """The map of a scenario as its file has it, x along axis 0."""
+    return np.loadtxt(FOLDER / f"{name}.csv", delimiter=",").T
+
+
 #: Scenarios whose slider feels its friction, solved to a tolerance: what they claim is tested, no last digits.
 DRIVEN = {name for name in NAMES if load(FOLDER / f"{name}.toml").drive.feeds_back}
 #: Mean contact area [m^2] and friction [N] of four members, only to notice an unintended change of the numbers.
@@ -327,6 +356,8 @@ GOLDEN = {
     "pdms_lens": (4.0232986563229426e-08, 0.009507511588392243),
     "peeling": (3.44730056493401e-09, 0.0),
     "whole peeling": (3.343116994589865e-09, 0.0),
+    "own_map": (4.089592347724291e-08, 0.00817918469544858),
+    "own_psd": (4.0183248953834534e-08, 0.016073299581533813),
     "pull_off": (4.146672494615672e-09, 0.0),
     "whole pull_off": (4.140449021877637e-09, 0.0),
     "theories": (3.920687657963458e-08, 0.002787734357697382),

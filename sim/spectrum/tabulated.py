@@ -18,7 +18,7 @@ _HEIGHTS = 'it is a spectrum of heights; a stress is needed, whose density over 
 _LINE = 'it is the spectrum of a line; give that of the plane, whose density is in "Pa^2 m^2"'
 _MISTAKEN = (("m^4", _HEIGHTS), ("m^3", _HEIGHTS), ("m^2", _HEIGHTS), ("Pa^2 m", _LINE))
 _DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0, mistaken=_MISTAKEN)
-_RMS = Quantity("Pa", "root mean square of the stress, to which the density is scaled", "σ", above=0)
+_RMS = Quantity("Pa", "root mean square of the shear stress", "σ", above=0)
 Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], at_once(_WAVENUMBER)]
 Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], at_once(_DENSITY)]
 Rescaled = Annotated[float, _RMS]
