@@ -208,7 +208,7 @@ def equations(row, room, start, step, bare, slider, law, held):
     there is no equilibrium.
     """
     stiffness, mass, damping, viscosity, _, _, _, _ = slider
-    over = 1.0 / step
+    over, gives = 1.0 / step, slider[5] + slider[6] > 0.0
     radius, area, by_bound, by_moment = row[RADIUS], 0.0, 0.0, 0.0
     if held[0] > 0.0:
         area = math.pi * radius * radius / held[10]
@@ -223,7 +223,7 @@ def equations(row, room, start, step, bare, slider, law, held):
         if not (bound >= 0.0 and area >= 0.0):
             return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         speed = _sum(RATES, i, room, 0) * over
-        body = speed + _sum(RATES, i, room, 1) * over
+        body = speed + _sum(RATES, i, room, 1) * over if gives else speed
         stress = moment + viscosity * speed
         yields, softer = compliance(radius, slider)
         room[RIGHT, i] = area * stress + damping * body - room[PULLS, i] + stiffness * (room[0, i] + room[1, i])
@@ -302,12 +302,14 @@ def _taken(mode, slopes, balance, yielding, bonds, stretches):
 
 
 @inlined
-def correct(modes, slopes, room):
+def correct(modes, slopes, slider, room):
     """Replace residuals at the nodes by what takes them away."""
     b, u, n, m = RIGHT, RIGHT + 1, RIGHT + 2, RIGHT + 3
-    real = _sum(BACK, 0, room, b), _sum(BACK, 0, room, u), _sum(BACK, 0, room, n), _sum(BACK, 0, room, m)
-    one = _taken(modes[0], slopes, real[0], real[1], real[2], real[3])
-    two = _taken(modes[1], slopes, _turned(room, b), _turned(room, u), _turned(room, n), _turned(room, m))
+    gives = slider[5] + slider[6] > 0.0
+    real = _sum(BACK, 0, room, b), _sum(BACK, 0, room, u) if gives else 0.0, _sum(BACK, 0, room, n)
+    one = _taken(modes[0], slopes, real[0], real[1], real[2], _sum(BACK, 0, room, m))
+    turned = _turned(room, u) if gives else complex(0.0, 0.0)
+    two = _taken(modes[1], slopes, _turned(room, b), turned, _turned(room, n), _turned(room, m))
     for i in range(3):
         first, second, third = FORTH[i, 0], FORTH[i, 1], FORTH[i, 2]
         for k in range(4):

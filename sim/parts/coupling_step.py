@@ -65,8 +65,9 @@ _VALUES, _SLOPES = _between()
 _FEW, _SOME = 1e-12, 0.1
 #: Most turns of Newton's method.
 _TURNS = 12
-#: Slopes before the first ones are known.
+#: Slopes, and solutions of the modes, before the first ones are known.
 _UNKNOWN = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0)
+_NO_MODES = (0.0,) * 11, (0.0j,) * 11
 #: Correction over the last one above which the slopes are taken anew.
 _SLOW = 0.1
 #: Lagrange's denominators at the nodes, the polynomial through the start as well.
@@ -109,7 +110,7 @@ def newton(row, start, step, bare, slider, law, held, piece, room):
     of_slip, of_bound, of_moment = 1.0 / (law[4] + math.fabs(room[0, 2])), 1.0 / bound, 1.0 / (law[4] * bound + moment)
     before, close = math.inf, min(1e-6, 0.1 * slider[7])
     slopes, shrinks = _UNKNOWN, 0.5
-    modes = resolved(slopes, step, slider, law)
+    modes = _NO_MODES
     for turn in range(_TURNS):
         latest = equations(row, room, start, step, bare, slider, law, held)
         if math.isnan(latest[0]):
@@ -117,7 +118,7 @@ def newton(row, start, step, bare, slider, law, held, piece, room):
         if shrinks > _SLOW:
             slopes = latest
             modes = resolved(slopes, step, slider, law)
-        correct(modes, slopes, room)
+        correct(modes, slopes, slider, room)
         part, change = 1.0, 0.0
         for i in range(3):
             bound = row[BOUND] + room[2, i]
