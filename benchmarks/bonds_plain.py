@@ -4,6 +4,7 @@ import math
 
 import numba
 import numpy as np
+from scipy.integrate import solve_ivp
 
 
 class TrackedNumpy:
@@ -127,3 +128,38 @@ def counted_gillespie_numpy(bound, sites, speed_ratio, rebinding_rate, duration,
         bound[active] += np.where(going, np.where(binds, 1, -1), 0)
         active = active[going]
     return bound
+
+
+def pulled_slider(times, stiffness, speed, method, tolerance):
+    """Positions of a massless slider that a spring pulls over bonds under Bell's rupture, by scipy's ``solve_ivp``.
+
+    Parameters
+    ----------
+    times : array
+        At which the position is wanted, in bonds' lives at rest, beginning at 0.
+    stiffness, speed : float
+        Of the spring over that of all sites, n κ A; of the stage, in Bell's stretches a life.
+    method : str
+        "LSODA", "Radau", ...
+    tolerance : float
+        Relative; the absolute one is a tenth of it.
+
+    Returns
+    -------
+    array
+        Positions in Bell's stretches.
+
+    Notes
+    -----
+    The balance of forces gives the sum of stretches, and its time derivative the speed. Rebinding is as fast as rupture
+    at rest, half the sites are bound at the start, and the spring is relaxed.
+    """
+
+    def slopes(time, state):
+        position, bound = state
+        moment = stiffness * (speed * time - position)
+        rupture = math.exp(moment / bound)
+        return (stiffness * speed + rupture * moment) / (stiffness + bound), 1.0 - bound - rupture * bound
+
+    tolerances = {"rtol": tolerance, "atol": 0.1 * tolerance}
+    return solve_ivp(slopes, times[[0, -1]], [0.0, 0.5], method, t_eval=times, **tolerances).y[0]

@@ -19,7 +19,8 @@ user of numpy and scipy would write for the same work, or beside a step that no 
   other's. Ours is the slower one where a row reads "times slower", or more than 1 "times as long".
 - **Goals** for fields are meant beside the textbook's program, which makes its noise by a transform; a leaner one,
   which draws no number that it does not need, stands in the next row without a goal.
-- **Errors**, ours first: of the third cumulant of ΔΓ for bands, of the friction for bonds, of the radius for
+- **Errors**, ours first: of the third cumulant of ΔΓ for bands, of the friction for bonds, of the position (over the
+  largest) for sliders, of the radius for
   contacts. Where none are given, both answers are exact to rounding or follow the same law without an error of the
   step.
 - Memory that a program has freed stays with its process, for ours and the others alike: else the system's time for

@@ -17,7 +17,7 @@ import numba
 import numpy as np
 import scipy
 
-from benchmarks import bonds, contact, fields, growth, page, whole
+from benchmarks import bonds, contact, fields, growth, page, spring, whole
 from benchmarks.timing import Bench, Row
 
 ROOT = Path(__file__).parent.parent
@@ -29,8 +29,8 @@ GROUPS: dict[str, Callable[[Bench], list[Row]]] = {
     group.__name__: group
     for group in (
         fields.banded, whole.large, fields.modal, fields.mapped, fields.energy, bonds.counted, bonds.tracked,
-        bonds.cohorts, contact.radii, contact.disc, whole.memory, whole.commands, whole.first, whole.gallery,
-        whole.files, whole.workers, whole.parts, whole.estimates, growth.growth,
+        bonds.cohorts, spring.spring, contact.radii, contact.disc, whole.memory, whole.commands, whole.first,
+        whole.gallery, whole.files, whole.workers, whole.parts, whole.estimates, growth.growth,
     )
 }  # fmt: skip
 
