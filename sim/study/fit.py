@@ -2,13 +2,15 @@
 
 The curves are fitted by steady sliding, which is quick (``sim.study.predicted``). Then the scenario's own models run
 once with what was found; what they add to steady sliding is added to it, with the error that their members leave, and
-the fit is made anew, until it stays. The same noise is drawn each time.
+the fit is made anew, until it stays. The same noise is drawn each time. Where steady sliding does not depend on a key
+that is free, such as the speed of an edge that lags, every prediction is a run.
 """
 
 import contextlib
 import difflib
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +21,7 @@ from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
 from sim.study.fitting import Free, Interval, Minimum, Problem, entangled, idle, interval, problem_of, with_errors
 from sim.study.measured import read
-from sim.study.predicted import asked, groups
+from sim.study.predicted import groups
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 from sim.units.refusals import BadInput
@@ -102,20 +104,18 @@ def fit(
         raise BadInput(["--free: a key is there twice; give each once"])
     tables = [read(path, base) for path in data]
     problem = problem_of(tables, [groups(base, table) for table in tables], chosen, common or {})
+    if not steady and idle(problem):
+        problem = replace(problem, by_run=True).compared(problem.start)
     _refuse_entangled(problem)
     problem, best = with_errors(problem, problem.start)
     alone, converged = best, best.converged
-    for _ in range(0 if steady else _RUNS):
-        before, numbers = best.x, problem.numbers(best.x)
-        sampled = [
-            asked(several, numbers, [curve.name for curve in table.curves], "t" in table.conditions)
-            for table, several in zip(tables, problem.groups, strict=True)
-        ]
-        problem, best = with_errors(problem.compared(sampled, best.x), best.x)
+    for _ in range(0 if steady or problem.by_run else _RUNS):
+        before = best.x
+        problem, best = with_errors(problem.compared(best.x), best.x)
         if best.covariance is None or np.all(np.abs(best.x - before) < _STAYS * np.sqrt(np.diag(best.covariance))):
             break
     else:
-        converged = steady and converged
+        converged = (steady or problem.by_run) and converged
     return _assembled(scenario, problem, best, alone, converged and best.converged)
 
 
@@ -215,7 +215,7 @@ def _typical(quantity: Quantity) -> str:
 
 def _refuse_entangled(problem: Problem) -> None:
     """Refuse keys that have no effect on the curves, or only together."""
-    said = "has no effect on what was measured, in steady sliding; fix it"
+    said = "has no effect on what was measured; fix it"
     faults = [f"--free {key}: {said}" for key in idle(problem)]
     for several in [] if faults else entangled(problem):
         names = f"{', '.join(several[:-1])} and {several[-1]}"

@@ -22,8 +22,8 @@ _ALONG = {"speed": ("sliding speed $V$", "m/s"), "t": ("time $t$", "s")}
 def figure(problem: Problem, best: Minimum) -> Figure:
     """Each curve over what was varied, with error bars and the fit, above its residuals in standard errors.
 
-    Rows are joined by a line in the order of what was varied. Grey is steady sliding alone, where the scenario's
-    own models add to it.
+    The lines are of many speeds where only the speed was varied, else they join the rows in the order of what was.
+    Grey is steady sliding alone, where the scenario's own models add to it.
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
     off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
@@ -41,9 +41,12 @@ def figure(problem: Problem, best: Minimum) -> Figure:
             both = [(fitted, BOTH, "fit")]
             if np.any(problem.shift):
                 both.append((alone, REFERENCE, "in steady sliding"))
+            fine, smooth = problem.between(best.x, table, curve.name)
             for values, colour, label in both:
-                across_rows = x.factor * along[order], y.factor * values[here][order]
-                upper.plot(*across_rows, color=colour, linewidth=0.9, label=label, zorder=2)
+                line, over = values[here][order], along[order]
+                if fine.size:  # what is added to steady sliding is known at the rows
+                    line, over = smooth + np.interp(fine, over, line - alone[here][order]), fine
+                upper.plot(x.factor * over, y.factor * line, color=colour, linewidth=0.9, label=label, zorder=2)
             upper.set_ylabel(y.label(f"{name.partition(',')[0]} ${symbol}$"))
             upper.tick_params(labelbottom=False)
             lower.plot(x.factor * along, off[here], color=BOTH, **HOLLOW)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from sim.study.measured import Measured
-from sim.study.predicted import Group, Sampled, Values, by_steady_sliding
+from sim.study.predicted import Group, Sampled, Values, asked, by_steady_sliding
 from sim.units.quantity import Quantity
 from sim.units.refusals import BadInput
 
@@ -34,6 +34,10 @@ _OPEN = 1e6
 _STEP, _NOTHING = 1e-4, 1e-5
 #: Change of all rows, in standard errors and over an e-fold, that is none.
 _NO_EFFECT = 1e-6
+#: Square of the relative step of derivatives of runs, which are integrated to 1e-8.
+_RUN_STEP = 1e-8
+#: Speeds of a line that is drawn.
+_DRAWN = 200
 #: Precision of the ends of an interval, over its half width, and most steps towards one.
 _END, _MOST = 1e-3, 30
 #: Rounds in which errors that nobody gave are found.
@@ -70,7 +74,8 @@ class Problem:
     ``values`` are all curves of all ``tables`` in turn, ``curve`` the number of each one's curve; ``sigma`` their
     standard errors, ``estimated`` where nobody gave them. ``shift`` is what the scenario's own models add to
     steady sliding at each of them, and ``noise`` its standard error. ``common`` are relative errors that all points
-    of a variable share. ``fixed`` and ``theory`` make another mechanism of the scenario.
+    of a variable share. ``fixed`` and ``theory`` make another mechanism of the scenario. With ``by_run`` each
+    prediction is a run of the scenario's own models, as steady sliding does not depend on all that is free.
     """
 
     tables: tuple[Measured, ...]
@@ -85,6 +90,7 @@ class Problem:
     noise: Array
     fixed: Values
     theory: str = ""
+    by_run: bool = False
 
     @property
     def start(self) -> Array:
@@ -101,8 +107,10 @@ class Problem:
         return {one.key: one.outer(float(number)) for one, number in zip(self.free, x, strict=False)} | dict(self.fixed)
 
     def steady(self, x: Array) -> Array:
-        """All curves in steady sliding."""
+        """All curves in steady sliding, or by runs."""
         numbers, found = self.numbers(x), []
+        if self.by_run:
+            return self._joined(self.sampled(x))[0]
         for table, several in zip(self.tables, self.groups, strict=True):
             names = [curve.name for curve in table.curves]
             kept = {name: np.empty(table.rows) for name in names}
@@ -112,12 +120,39 @@ class Problem:
             found += [kept[name] for name in names]
         return np.concatenate(found)
 
+    def sampled(self, x: Array) -> list[Sampled]:
+        """The curves of each table by the scenario's own models."""
+        numbers, both = self.numbers(x), zip(self.tables, self.groups, strict=True)
+        return [asked(several, numbers, [curve.name for curve in table.curves], "t" in table.conditions)
+                for table, several in both]  # fmt: skip
+
+    def _joined(self, sampled: Sequence[Sampled]) -> tuple[Array, Array]:
+        """Means and standard errors of all curves."""
+        both: list[list[Array]] = [[], []]
+        for table, found in zip(self.tables, sampled, strict=True):
+            for kept, part in zip(both, found, strict=True):
+                kept += [part[curve.name] for curve in table.curves]
+        return np.concatenate(both[0]), np.concatenate(both[1])
+
     def predicted(self, x: Array) -> Array:
         """All curves, with the shift and the common errors."""
         found = self.steady(x) + self.shift
         for k, (name, size) in enumerate(self.common.items()):
             found = np.where(self.of(name), found * (1.0 + size * x[len(self.free) + k]), found)
         return found
+
+    def between(self, x: Array, table: Measured, name: str) -> tuple[Array, Array]:
+        """Speeds from the least to the largest of a table, and its curve there in steady sliding.
+
+        Without any where more than the speed was varied.
+        """
+        several = next(groups for one, groups in zip(self.tables, self.groups, strict=True) if one is table)
+        speeds = several[0].speed
+        if [*table.conditions] != ["speed"] or self.by_run or not np.min(speeds) > 0.0:
+            return np.empty(0), np.empty(0)
+        fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
+        group = several[0]._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
+        return fine[:, 0], by_steady_sliding(group, self.numbers(x), [name], self.theory)[name]
 
     def of(self, name: str) -> NDArray[np.bool_]:
         """Where a variable is."""
@@ -141,13 +176,14 @@ class Problem:
         left = len(self.values) - count - 1
         return size + 2.0 * count * (count + 1) / left if left > 0 else math.inf
 
-    def compared(self, sampled: Sequence[Sampled], x: Array) -> "Problem":
-        """This problem with the shift from steady sliding at x to what the scenario's own models gave there."""
-        both: list[list[Array]] = [[], []]
-        for table, found in zip(self.tables, sampled, strict=True):
-            for kept, part in zip(both, found, strict=True):
-                kept += [part[curve.name] for curve in table.curves]
-        mean, noise = map(np.concatenate, both)
+    def compared(self, x: Array) -> "Problem":
+        """This problem with the shift from steady sliding at x to what the scenario's own models give there."""
+        mean, noise = self._joined(self.sampled(x))
+        if not np.all(np.isfinite(mean)):
+            place = int(np.flatnonzero(~np.isfinite(mean))[0])
+            name = [curve.name for table in self.tables for curve in table.curves][self.curve[place]]
+            said = "has no value in the run with what was found: is the contact open there?"
+            raise BadInput([f"{name}: row {place - int(np.argmax(self.curve == self.curve[place])) + 1} {said}"])
         return replace(self, shift=mean - self.steady(x), noise=noise)
 
 

@@ -117,8 +117,8 @@ def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     if bonded and fluctuating:
         yield "bonds only", _less(problem, still, "shear.")
         yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
-    if scene.contact.kind == "displacement" or not scene.population.carries_stress:
-        return
+    if scene.contact.kind == "displacement" or not scene.population.carries_stress or problem.by_run:
+        return  # theories are of a load or an indentation, of a stress, and of equilibrium
     for theory, (words, more) in _THEORIES.items():
         other = _less(problem, still | share, "shear.", "adhesion.bond_share")
         yield words, replace(other, free=(*other.free, *more), theory=theory)

@@ -8,7 +8,7 @@ scenario's own run (``asked``) has everything else: members, clock steps, histor
 import functools
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,8 +19,6 @@ from sim.ensemble.plan import together
 from sim.ensemble.recorded import VARIABLES
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Motion
-from sim.parts.shear.bond_field import SiteMean
-from sim.parts.shear.process import SmoothProcess
 from sim.scenario.scenario import Scenario
 from sim.spectrum.family import Family
 from sim.study.measured import Measured
@@ -113,10 +111,9 @@ def steady_course(scenario: Scenario, time: Array, speed: Array) -> Course:
     bonding = type(found)(*(np.broadcast_to(values, len(speed))[:, np.newaxis] for values in found))
     motion = Motion(0, time, 0.0 * time, *(0.0 * speed,) * 2, speed, speed)  # type: ignore[arg-type]
     shear = scenario.fluctuations
-    amplitude: Any = replace(shear.amplitude, relaxing=False) if shear.amplitude.relaxing else shear.amplitude  # type: ignore[arg-type]
-    kind = SiteMean if shear.spectrum.bond_made else SmoothProcess
-    plane = _plane_energy(shear.spectrum, *scenario.solid.effective)
-    energy = kind(plane, amplitude).start(motion, bonding, _NONE).energy
+    size = shear.amplitude.factor(speed, bonding.strength) ** 2
+    size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
+    energy = size * _plane_energy(shear.spectrum, *scenario.solid.effective)
     terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), 0.0 * speed)
     touch = scenario.contact.start(motion, scenario.clock.duration, terms)
     moving = time, 0.0 * speed, speed, bonding.fraction, bonding.stress, bonding.strength, energy
@@ -126,9 +123,6 @@ def steady_course(scenario: Scenario, time: Array, speed: Array) -> Course:
 @functools.lru_cache(maxsize=256)  # most numbers that are changed are none of the spectrum's
 def _plane_energy(spectrum: Family, shear_modulus: float, poisson_ratio: float) -> float:
     return float(spectrum.surface_energy(shear_modulus, poisson_ratio))
-
-
-_NONE: Any = None  # no noise is drawn by a mean
 
 
 def by_steady_sliding(group: Group, values: Values, names: list[str], theory: str = "") -> dict[str, Array]:
