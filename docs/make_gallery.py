@@ -21,6 +21,9 @@ import sim
 from sim import analysis, laws
 from sim.analysis import concise, shares, statistics
 from sim.analysis.observables import all_observables
+from sim.study.fit import Fit
+from sim.study.fit_figure import figure as fitted
+from sim.study.fitting import LEVEL
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).with_name("gallery")
@@ -37,14 +40,15 @@ FINENESS, MOST_BYTES = ((140, 64), (140, 32), (120, 24), (110, 16)), 60_000
 Number = float | tuple[float, float]
 
 
-Reading = Callable[[xr.Dataset], dict[str, Number]]
+Reading = Callable[[Any], dict[str, Number]]
 
 
 class Entry(NamedTuple):
     """A question to a scenario: ``numbers`` reads them from its dataset, ``answer`` has a place for each.
 
     ``changes`` are overrides of the scenario, ``kind`` is that of the figure and ``where`` the values of swept keys
-    that it shows; ``name`` is that of the picture.
+    that it shows; ``name`` is that of the picture. With ``free`` keys the scenario is fitted to the table of its name,
+    and ``numbers`` reads the fit.
     """
 
     name: str
@@ -55,24 +59,32 @@ class Entry(NamedTuple):
     kind: str | None = None
     changes: Mapping[str, Any] = MappingProxyType({})
     where: Mapping[str, str] = MappingProxyType({})
+    free: tuple[str, ...] = ()
 
     @property
     def commands(self) -> list[str]:
         """What gives the figure at a terminal."""
+        path = f"scenarios/{self.scenario}"
+        if self.free:
+            free = "".join(f" --free {key}" for key in self.free)
+            return [f"sim fit {path}.toml {path}.csv{free} -o outputs/{self.name}"]
         options = "".join(f" --set '{key}={_toml(value)}'" for key, value in self.changes.items())
         output = f" -o outputs/{self.name}.nc" if self.changes else ""
         chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
         dataset = self.name if self.changes else self.scenario
         shown = " ".join(filter(None, ["sim plot", f"outputs/{dataset}.nc", self.kind]))
-        return [f"sim run scenarios/{self.scenario}.toml{options}{output}", f"{shown}{chosen}"]
+        return [f"sim run {path}.toml{options}{output}", f"{shown}{chosen}"]
 
-    def run(self) -> xr.Dataset:
-        """The dataset of the question."""
-        return sim.run(sim.load(ROOT / "scenarios" / f"{self.scenario}.toml", dict(self.changes)))
+    def run(self) -> Any:
+        """The dataset of the question, or the fit."""
+        path = ROOT / "scenarios" / f"{self.scenario}.toml"
+        if self.free:
+            return sim.fit(path, path.with_suffix(".csv"), self.free)
+        return sim.run(sim.load(path, dict(self.changes)))
 
-    def draw(self, dataset: xr.Dataset) -> None:
+    def draw(self, found: Any) -> None:
         """Make the picture, of few colours and as many pixels as its size allows."""
-        figure = sim.plot(dataset, self.kind, where=dict(self.where))
+        figure = fitted(found.problem, found.best) if self.free else sim.plot(found, self.kind, where=dict(self.where))
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
@@ -364,9 +376,10 @@ def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "velocity_step",
     "How does friction answer a sudden change of the speed?",
-    """It overshoots. When the stage goes from {slow:g} to {fast:g} mm/s at once the force rises from {before:.2f}
-    mN to {peak:.2f} mN within {after:.1f} ms, as the bonds are stretched further before more of them break, and
-    settles at {settled:.2f} mN. Back at the old speed the force is {last:.2f} mN once more, and never below.""",
+    """It overshoots. When the stage goes from {slow:g} to {fast:g} mm/s at once the force rises from
+    {before:.2f} mN to {peak:.2f} mN within {after:.1f} ms, as the bonds are stretched further before more of
+    them break, and settles at {settled:.2f} mN. Back at the old speed the force is {last:.2f} mN once more, and
+    never below.""",
     kind="time",
 )
 def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
@@ -397,8 +410,9 @@ def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "creep",
     "Which tangential force does a contact bear for ever, and how long a larger one?",
-    """Up to {most:.2f} mN, where Bell's cluster of bonds comes apart. Under {held:g} mN it creeps at {creep:.2f}
-    mm/s for good; under {more:g} mN it gives way after {late:.0f} ms, under {much:g} mN after {soon:.1f} ms.""",
+    """Up to {most:.2f} mN, where Bell's cluster of bonds comes apart. Under {held:g} mN it creeps at
+    {creep:.2f} mm/s for good; under {more:g} mN it gives way after {late:.0f} ms, under {much:g} mN after
+    {soon:.1f} ms.""",
 )
 def creep(dataset: xr.Dataset) -> dict[str, Number]:
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
@@ -415,9 +429,9 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "incipient_shear",
     "How does the contact area fall on the way to sliding?",
-    """About with the square of the tangential force, as measured on many contacts, and faster as the slider gives
-    way: when the force is largest, {small:.1f} % of the area are gone under {least:g} mN, {large:.1f} % under
-    {load:g} mN. Here broken bonds are all of it. The coefficient α falls as the area at rest to the power
+    """About with the square of the tangential force, as measured on many contacts, and faster as the slider
+    gives way: when the force is largest, {small:.1f} % of the area are gone under {least:g} mN, {large:.1f} %
+    under {load:g} mN. Here broken bonds are all of it. The coefficient α falls as the area at rest to the power
     {power:.2f}; measured contacts have about minus three halves.""",
     kind="incipient",
 )
@@ -459,10 +473,10 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "stability_map",
     "For which springs and speeds does a slider stick and slip, and does it matter where it comes from?",
-    """For springs softer than the theory's boundary (blue), about where it says, but with a delay: behind {soft:g}
-    N/m it sticks and slips from {up:.1f} mm/s on when it gets faster, and down to {down:.1f} mm/s when it gets
-    slower. Behind {stiff:.0f} N/m and more it never does here: it leaves the unstable speeds before what
-    disturbs it has grown.""",
+    """For springs softer than the theory's boundary (blue), about where it says, but with a delay: behind
+    {soft:g} N/m it sticks and slips from {up:.1f} mm/s on when it gets faster, and down to {down:.1f} mm/s when
+    it gets slower. Behind {stiff:.0f} N/m and more it never does here: it leaves the unstable speeds before
+    what disturbs it has grown.""",
     kind="stability",
 )
 def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
@@ -479,8 +493,8 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
 @asks(
     "pdms_lens_spring",
     "Does the lens shrink where stick-slip sets in, with nothing prescribed?",
-    """Yes, and by the fluctuations. Between {slow:g} mm/s, where it slides steadily, and {fast:g} mm/s, where it
-    sticks and slips, the mean area falls from {before} to {after} % of JKR's. The bonds lose less of it than
+    """Yes, and by the fluctuations. Between {slow:g} mm/s, where it slides steadily, and {fast:g} mm/s, where
+    it sticks and slips, the mean area falls from {before} to {after} % of JKR's. The bonds lose less of it than
     before, {bonds} % after {bonded} %, as they recover while the slider sticks; the fluctuations that unsteady
     sliding makes take {noise} % instead of {calm} %. That they are as strong as assumed, an rms of {rms:g} kPa,
     and how long they remember ({length:g} µm of sliding), is put in.""",
@@ -559,6 +573,24 @@ def peeling(dataset: xr.Dataset) -> dict[str, Number]:
     return {"fast": 1e3 * float(speed[-1]), "slow": 1e6 * float(speed[0]), "quick": float(pull[-1]),
             "slack": float(pull[0]), "lost": float(lost[0]),
             "times": float(pull[0]) / (-1e3 * float(laws.jkr.pull_off_load(work, size)))}  # fmt: skip
+
+
+@asks(
+    "measured_lens",
+    "Which critical speed and stress of the bonds do measured areas and forces give?",
+    """A critical speed of {speed} mm/s, with {level:g} % confidence between {slowest:.2f} and {fastest:.2f},
+    and a stress of {stress} kPa, between {least:.1f} and {most:.1f}. The measurement,
+    [measured_lens.csv](../../scenarios/measured_lens.csv), is made up; the scenario says with which numbers,
+    and both are found.""",
+    free=("bonds.critical_speed", "bonds.stress"),
+)
+def measured_lens(fit: Fit) -> dict[str, Number]:
+    speed, stress = fit.numbers
+    ends = {"slowest": speed.interval.low, "fastest": speed.interval.high}
+    heights = {"least": stress.interval.low, "most": stress.interval.high}
+    return {"speed": (1e3 * speed.value, 1e3 * speed.error), "stress": (1e-3 * stress.value, 1e-3 * stress.error),
+            "level": 100.0 * LEVEL, **{name: 1e3 * end for name, end in ends.items()},
+            **{name: 1e-3 * end for name, end in heights.items()}}  # fmt: skip
 
 
 @asks(
