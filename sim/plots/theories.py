@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import control, is_steady, setting, settled
+from sim.analysis.scene import of_dataset
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
 from sim.plots.curves import choice
@@ -109,6 +110,7 @@ def case_of(dataset: xr.Dataset) -> Case:
     return Case(held, reversible=(shares or [_FRACTION])[0], **numbers)
 
 
+@of_dataset
 def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Shear stress [Pa] and contact area [m^2] of closed contacts, means over the members.
 
