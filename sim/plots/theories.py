@@ -122,7 +122,7 @@ def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
         found = settled(found)
     else:
         found = found.isel(t=np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int)))
-    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(*found.data_vars.values()))
+    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(found["shear_stress"], found["contact_area"]))
     closed = area > 0.0
     return np.abs(stress[closed]), area[closed]
 
