@@ -173,7 +173,7 @@ def advance(
         rows[:, column] = values
     scales = np.ones(columns.COLUMNS)
     scales[columns.FORCE], scales[_STRETCHED], scales[columns.SQUARE] = force, stretch, stretch**2
-    pieces, duration = drive.driven(ends, times.duration), np.diff(ends)
+    pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
     given = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
     clock, energies = _clock(around, ends), slider.energies.copy()
@@ -244,7 +244,7 @@ def agreed(passed: Driven, radius: Array) -> int:
 
 def _agree(own: Array, radius: Array) -> Flags:
     """True where two radii of a contact differ by rounding alone, or both are those of an open one."""
-    size = np.nan_to_num(radius, nan=0.0)
+    size = np.fmax(radius, 0.0)
     same: Flags = np.abs(own - size) <= _SAME * size
     return same
 
@@ -275,7 +275,7 @@ def _numbers(drive: Force | Spring, bonds: _Driven, around: Around, units: _Unit
 
 def _clock(around: Around, ends: Array) -> Array:
     """Beginning of each step, load and displacement of the base there, each with its rate; shape (steps, 5)."""
-    duration = np.diff(ends)
+    duration = ends[1:] - ends[:-1]
     clock = np.zeros((len(duration), 5))
     clock[:, 0] = ends[:-1]
     for column, (first, last) in enumerate(zip(*(held[:2] for held in around.held), strict=True)):

@@ -44,6 +44,8 @@ class Pieces(NamedTuple):
     @property
     def joined(self) -> "Pieces":
         """One piece for each interval, whose sums are rounded once."""
+        if len(self.interval) == 1:
+            return self
         opening = np.flatnonzero(np.diff(self.interval, prepend=-1))
         if len(opening) == len(self.interval):
             return self

@@ -118,6 +118,8 @@ class _Controlled:
 
     def held_between(self, ends: Array, duration: float) -> tuple[Control, Control]:
         """The control at the two ends of each interval between some times of a run [s], before any jump at its end."""
+        if not self.changes:
+            return self._steady, self._steady
         pieces = self.course.pieces(ends, duration).joined
         return self._control(pieces.first), self._control(pieces.last)
 

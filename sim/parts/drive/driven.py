@@ -152,7 +152,7 @@ class _Driven:
 
     def readings(self, state: Driven) -> Array:
         """Recorded quantities of the drive, columns ``READINGS``, as last axis."""
-        made, *spent, stored, first = np.moveaxis(state.energies, -1, 0)
+        made, *spent, stored, first = (state.energies[..., k] for k in range(FIRST + 1))
         residual = made - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
         return np.stack([*stage, made, stored, *spent, residual, state.substeps, state.runaway_time], axis=-1)
