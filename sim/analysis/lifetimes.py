@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from scipy import stats
 
 from sim.analysis.observables import ordered
 from sim.analysis.scene import MEMBERS, is_stationary
@@ -51,6 +50,8 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     >>> print(f"{found.half:.0f} s, {found.rate:.3f} /s, {found.rate_low:.2f} to {found.rate_high:.2f} /s")
     5 s, 0.125 /s, 0.03 to 0.37 /s
     """
+    from scipy import stats  # heavy: a second, for what few datasets have
+
     happened = np.isfinite(times)
     watched = np.where(happened, times, ends)
     half = low = high = np.nan

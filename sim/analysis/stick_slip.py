@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from scipy.signal import find_peaks
 
 from sim.analysis.observables import ordered
 from sim.analysis.scene import MEMBERS, is_stationary, sweep_dims
@@ -81,6 +80,8 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
 
 def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stress: Any) -> np.ndarray:
     """The slips of one member, a row each, columns ``_SLIPS``."""
+    from scipy.signal import find_peaks  # heavy: for sliders behind a spring alone
+
     there = np.isfinite(force) & np.isfinite(position)
     if not np.any(there):
         return np.empty((0, len(_SLIPS)))

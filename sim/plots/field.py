@@ -8,7 +8,6 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from pydantic import TypeAdapter
-from scipy.signal import resample
 
 from sim.analysis import setting
 from sim.analysis.scene import resolved, word
@@ -76,6 +75,8 @@ def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, abou
 
     ``sizes`` are the two sides of the cell and the radius of the contact, ``about`` is what is shown.
     """
+    from scipy.signal import resample  # heavy: for maps alone
+
     cell, _, radius = sizes
     # between its samples by its own Fourier series: nothing is smoothed
     points = field.shape[0] * -(-PIXELS // field.shape[0])
