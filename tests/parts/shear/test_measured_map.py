@@ -62,7 +62,7 @@ def test_the_field_on_the_plane_has_the_energy_of_the_file_at_every_step():
 
 
 def test_the_map_moves_with_the_slider():
-    field, pixel = patchy() + 2e5, 6e-6
+    field, pixel = patchy() + 2e5 + np.random.default_rng(4).normal(scale=1e4, size=(64, 48)), 6e-6
     record = Record(maps=(0.0, 12e-3, 15e-3))
     maps = sim.run(sliding(measured(field), record=record, speed=2.5 * pixel / 1e-3))["shear_map"].values[0]
     assert_allclose(maps[0], field - field.mean(), rtol=0.0, atol=1e-9 * 1e5)
@@ -197,6 +197,17 @@ def test_a_contact_feels_the_pattern_that_passes_under_it():
     # and the maps, which stand with the contact in the middle, store what is recorded
     energies = found["fluctuation_energy"].isel(t=[0, 80])
     assert_allclose(found["disc_energy"].values[0], energies, rtol=0.01)
+
+
+def test_a_contact_grows_where_new_contact_gives_energy_back():
+    x = 6e-6 * np.arange(-32, 32)
+    radius = np.hypot(x[:, None], x)
+    field = np.where(radius < 110e-6, 8e4, np.where(radius < 170e-6, -8e4, 0.0))  # an edge against its core
+    found = sim.run(sliding(measured(field, "disc"), steps=1, speed=0.0)).isel(t=0)
+    assert float(found["work_of_adhesion"]) > 42e-3
+    assert float(found["contact_radius"]) > 1.005 * float(found["jkr_radius"])
+    rate = jkr.energy_release_rate(float(found["contact_radius"]), 4e-3, 2e-3, 4 * G)
+    assert_allclose(rate, float(found["work_of_adhesion"]), rtol=1e-9)
 
 
 def test_batches_blocks_and_restarts_agree_under_a_measured_map():
