@@ -41,7 +41,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
         - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
           ``peak_friction_time``, ``peak_friction_speed``: of a start or a ramp; see ``peaks``.
         - ``slip_count``, ``static_friction``, ``kinetic_friction`` [N], ``slip_amplitude`` [m] and more, of a slider
-          behind a spring; see ``stick_slip``.
+          behind a spring, ``ran_away`` and ``runaway_after`` [s] of one under a force; see ``stick_slip``.
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """

@@ -129,12 +129,14 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     Returns
     -------
     xarray.Dataset
-        ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one speed those that
-        begin in the second half of the run. ``kinetic_friction`` [N] is the work of the stage over its path, from the
-        beginning of the first of these slips to that of the last, without slips over that time. Empty for other
-        drives, and where only statistics were recorded.
+        Under a stage ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one
+        speed those that begin in the second half of the run. ``kinetic_friction`` [N] is the work of the stage over
+        its path, from the beginning of the first of these slips to that of the last, without slips over that time.
+        Under a prescribed force see ``runaways``. Empty for other drives, and where only statistics were recorded.
     """
-    if "stage_speed" not in dataset or not {*_READ, "drive_work", "stage_position"} <= set(dataset):
+    if "stage_speed" not in dataset and {"runaway_time", "spring_force"} <= set(dataset):
+        return runaways(dataset)
+    if "stage_speed" not in dataset or not {*_READ, "drive_work", "stage_position"} <= set(dataset.variables):
         return xr.Dataset()
     found = slips(dataset).pad(slip=(0, 1))  # where there is none, too, a mean is over something
     begins, half = found["slip_time"], float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
@@ -150,6 +152,32 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     kinetic = (made / gone.where(gone != 0.0)).assign_attrs(units="N", long_name="work of the stage over its path")
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
     return every.map(ordered, keep_attrs=True)
+
+
+def runaways(dataset: xr.Dataset) -> xr.Dataset:
+    """Members that a prescribed force sets off: whether, when, and at which force.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive ``force`` with each member recorded.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``ran_away``, 1 where nothing held the body any longer; ``runaway_after`` [s] and ``static_friction`` [N],
+        the force at that time on the line through the last two records, nan where the body is held to the end.
+    """
+    when, time = dataset["runaway_time"].isel(t=-1).astype(float), dataset["t"]
+    gone, force = when.notnull(), dataset["spring_force"].astype(float)
+    last = (time < when).sum("t").clip(2) - 1
+    now, before = force.isel(t=last), force.isel(t=last - 1)
+    slope = (now - before) / (time.isel(t=last) - time.isel(t=last - 1))
+    at = (now + slope * (when - time.isel(t=last))).drop_vars("t")
+    away = gone.drop_vars("t").astype(float).assign_attrs(units="1", long_name="members that ran away", symbol="")
+    when = when.drop_vars("t").assign_attrs(units="s", long_name="time of the runaway, of those that ran away")
+    at = at.assign_attrs(units="N", long_name="force at which nothing held the body any longer")
+    return xr.Dataset({"ran_away": away, "runaway_after": when, "static_friction": at}).map(ordered, keep_attrs=True)
 
 
 def _between(dataset: xr.Dataset, values: xr.DataArray, first: xr.DataArray, last: xr.DataArray) -> xr.DataArray:

@@ -74,7 +74,9 @@ _EVENTS = (
     _Column(
         "slip_count", "slips", meaning="falls of the spring's force by 2 % or more, means over them; times of records"
     ),
-    _Column("static_friction", "static\nfriction", math.nan, meaning="force at which a slip begins"),
+    _Column("ran_away", "ran away,\nof members"),
+    _Column("runaway_after", "ran away\nafter", math.nan),
+    _Column("static_friction", "static\nfriction", math.nan, meaning="force at which a slip or a runaway begins"),
     _Column("kinetic_friction", "kinetic\nfriction", math.nan, meaning="work of the stage over its path"),
     _Column("force_drop", "drop", math.nan),
     _Column("stress_drop", "drop of\nstress", math.nan),

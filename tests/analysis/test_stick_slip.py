@@ -10,9 +10,10 @@ from numpy.testing import assert_allclose
 
 from sim import analysis
 from sim.ensemble.simulate import run
-from sim.parts.bonds import Steady, Unbroken
+from sim.parts.bonds import FirstMoment, Steady, Unbroken
+from sim.parts.bonds.rupture import Bell
 from sim.parts.contact.bodies import Adhesion
-from sim.parts.drive import Spring
+from sim.parts.drive import Force, Spring
 from sim.scenario.clock import Clock
 
 #: Relaxation cycles of bonds N0/(1 + V/Vc), damping 0.04, stiffness 1, speed 1, in units of 5 mN and 5 um.
@@ -117,8 +118,31 @@ def test_what_falls_by_less_than_the_least_is_no_slip():
     assert analysis.slips(made([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
 
 
+def test_a_runaway_has_its_time_and_the_force_of_that_time():
+    # bonds that none rebinds under a rising force: who is strong enough is held to the end
+    area = scene(1).contact_area
+    bonds = FirstMoment(
+        rupture=Bell(zero_force_rate=1.0, bell_force=4e-12), bond_stiffness=4e-4, rebinding_rate=1.0, site_density=1e15
+    )
+    force = 1e15 * 4e-12 * area
+    ramp = {"time": [0.0, 1.0, 20.0], "value": [0.1 * force, 0.2 * force, 2.0 * force]}
+    drive = Force(force=ramp, contact_stiffness="rigid")
+    dataset = run(scene(2, clock=Clock(duration=12.0, step=0.1), drive=drive, bonds=bonds))
+    found = analysis.stick_slip(dataset)
+    when = dataset["runaway_time"].isel(t=-1).values
+    assert np.all(when > 1.0) and np.all(found["ran_away"] == 1.0)
+    assert_allclose(found["runaway_after"], when, rtol=1e-14)
+    assert_allclose(found["static_friction"], force * (0.2 + 1.8 * (when - 1.0) / 19.0), rtol=1e-9)
+    held = run(scene(1, clock=Clock(duration=0.5, step=0.1), drive=drive, bonds=bonds))
+    calm = analysis.stick_slip(held)
+    assert calm["ran_away"].item() == 0.0 and np.isnan(calm["static_friction"]).all()
+    cells = {" ".join(heading.split()): cell for heading, cell in analysis.highlights(dataset)[0].items()}
+    assert cells["ran away, of members (%)"] == "100"
+    assert not any("ran away" in heading for row in analysis.highlights(held) for heading in row)
+
+
 def test_slips_of_other_drives_and_of_statistics_are_refused():
-    dataset = cycles().drop_vars("stage_speed")
+    dataset = cycles().drop_vars(["stage_speed", "runaway_time"])
     with pytest.raises(ValueError, match="spring"):
         analysis.slips(dataset)
     assert not analysis.stick_slip(dataset)
