@@ -96,14 +96,17 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
 
 def _verdict(judged: list[Judged]) -> tuple[str, str]:
     """The mechanism preferred, "" if the data cannot tell, and that in words."""
+    if len(judged) == 1:
+        return "", "there is no other mechanism to compare with: no fluctuations, and no load or stress for a theory"
     left = [one for one in judged[1:] if not one.rejected]
     names = " and ".join(one.name for one in left)
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
     if len(left) > 1:
         return "", f"the data cannot tell: {names} are not rejected"
-    if not left[0].p_value > _RARE:
-        return "", f"the data cannot tell whether {names} is enough"
+    if left[0].p_value <= _RARE:
+        said = f"though {WHOLE} fits better than by chance (p = {left[0].p_value:.2g})"
+        return names, f"the data prefer {names} to the others, {said}: measure more"
     return names, f"the data prefer {names}: they do not ask for more, and reject the others"
 
 

@@ -364,6 +364,12 @@ def test_data_that_cannot_tell_say_so():
     assert verdict.preferred == "" and verdict.words.startswith("the data cannot tell")
 
 
+def test_without_another_mechanism_nothing_is_preferred():
+    scene = load(SPRUNG | {"shear": {"model": "uniform"}})
+    verdict = judged(scene, drawn_of(scene, 0.01, 12), ["bonds.critical_speed", "bonds.stress"], 2)
+    assert verdict.preferred == "" and "no other mechanism" in verdict.words and len(verdict.judged) == 1
+
+
 @pytest.mark.verify
 def test_a_theory_is_preferred_by_its_own_data():
     scene = load(LENS).with_values({"bonds.stress": 6e4})
