@@ -1,7 +1,6 @@
 """Files of measured stress maps: CSV, npy without pickled objects, netCDF. Declared sizes are not trusted."""
 
 import contextlib
-import errno
 import math
 import os
 import stat
@@ -87,7 +86,7 @@ def _from_npy(path: Path) -> Array:
     with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK), "rb") as file:  # a pipe is not waited for
         about = os.fstat(file.fileno())
         if not stat.S_ISREG(about.st_mode):
-            raise OSError(errno.EINVAL, "it is no plain file")
+            raise ValueError("it is no plain file")
         version = np.lib.format.read_magic(file)
         headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
         if version not in headers:
