@@ -46,6 +46,7 @@ BESIDE = {
     "speeds.csv": "time [s], speed [mm/s]\n0, 1\n1, 2\n",
     "psd.csv": "q [rad/m], C [Pa^2 m^2]\n1e5, 1\n2e5, 1\n",
     "map.csv": "\n".join(",".join(str((7 * i * i + 3 * i * j) % 11) for i in range(10)) for j in range(10)),
+    **{path.name: path.read_text(encoding="utf-8") for path in sorted(FOLDER.glob("*.csv"))},
 }
 STARTER = FOLDER.parent / "sim" / "starter.toml"
 TEXTS = [*(path.read_bytes() for path in sorted(FOLDER.glob("*.toml"))), STARTER.read_bytes(), FILES]
@@ -206,7 +207,7 @@ FOREIGN = re.compile(
 
 def check(seed, folder):
     for name, content in BESIDE.items():
-        (folder / name).write_text(content)
+        (folder / name).write_text(content, encoding="utf-8")
     path = folder / "x.toml"
     path.write_bytes(damaged(seed))
     try:
@@ -222,7 +223,7 @@ def check(seed, folder):
 
 def test_without_damage_all_are_scenarios(tmp_path):
     for name, content in BESIDE.items():
-        (tmp_path / name).write_text(content)
+        (tmp_path / name).write_text(content, encoding="utf-8")
     for text in TEXTS:
         (tmp_path / "x.toml").write_bytes(text)
         assert isinstance(load(tmp_path / "x.toml"), Scenario)
