@@ -73,9 +73,10 @@ def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
     """The figures of a dataset: the one that fits it best, then others that show more of it."""
     best = kinds.default(dataset)
     others = [kind for kind in kinds.drawable(dataset) if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
-    # theories have an axis of their own; the end of a run that is on its way says little, and time is no more than
-    # another axis for a speed that rises
+    # theories have an axis of their own; the end of a run that is on its way says little; time is no more than another
+    # axis for a speed that rises; and only bonds with a rupture law have a maximum of the stress
     less = {"sweep": best == "theories" or not is_stationary(dataset), "time": best == "curve"}
+    less["stress"] = not any(str(name).startswith("bonds_rupture") for name in dataset.variables)
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
     for number, kind in enumerate(dict.fromkeys(shown)):
         found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
