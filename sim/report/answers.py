@@ -164,15 +164,19 @@ def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
 
 
 def _area_over_speed(dataset: xr.Dataset) -> Iterator[str]:
-    """What the area loses from the lowest to the highest speed, and to which mechanism."""
+    """What the area loses from the lowest to the highest speed, to which mechanism, and at which speeds.
+
+    Nothing behind a spring, where the area at one speed of the stage is that of a moment between stick and slip.
+    """
+    if speed_name(dataset) != "speed":
+        return
     given = dataset
     if is_steady(dataset):
         axis, found = str(speed_dim(dataset)), _at_the_end(dataset)
         dataset = dataset.isel({axis: [0]})
     else:
         axis, found = "t", summary(all_observables(dataset.isel(t=[0, -1])), quantiles=False)
-    speed = speed_name(dataset)
-    sizes = abs(found[f"{speed}_mean"]).max([name for name in found[f"{speed}_mean"].dims if name != axis])
+    sizes = abs(found["speed_mean"]).max([name for name in found["speed_mean"].dims if name != axis])
     ends = int(np.argmin(sizes.to_numpy())), int(np.argmax(sizes.to_numpy()))
     slow, fast = (_places(dataset, found.isel({axis: end})) for end in ends)
     if len(fast) > _FEW:
@@ -181,7 +185,7 @@ def _area_over_speed(dataset: xr.Dataset) -> Iterator[str]:
     losses = _places(dataset, loss_speeds(given))
     for before, after, lost in zip(slow, fast, losses, strict=True):
         area, left = before.mean("area_ratio"), after.mean("area_ratio")
-        speeds = [place.mean(speed) for place in (before, after)]
+        speeds = [place.mean("speed") for place in (before, after)]
         if area is None or left is None or None in speeds:
             continue
         way = f"from {speeds[0]} to {speeds[1]}"
@@ -243,11 +247,13 @@ def _of_the_run(*asked: tuple[str, str]) -> Callable[[xr.Dataset], Iterator[str]
 
 
 def _friction(dataset: xr.Dataset) -> Iterator[str]:
-    """The largest friction in both directions, of the means over the members."""
+    """The largest friction in both directions, or the largest and the least; of the means over the members."""
     found = summary(all_observables(dataset), quantiles=False)
-    mean = found["friction_force_mean"]
-    for end, words in ((mean.argmax("t"), "one"), (mean.argmin("t"), "the other")):
-        yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", f"Friction in {words} direction")
+    mean = found["friction_force_mean"].fillna(0.0)
+    both = bool((mean.min() < 0.0) & (mean.max() > 0.0))
+    words = ("Friction in one direction", "Friction in the other") if both else ("The largest friction", "The least")
+    for end, what in zip((mean.argmax("t"), mean.argmin("t")), words, strict=True):
+        yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", what)
 
 
 _OPENINGS = _of_the_run(("ever_detached", "The share of the members that come off"))
@@ -276,7 +282,7 @@ _ANSWERS: dict[str, tuple[Callable[[xr.Dataset], Iterator[str]], ...]] = {
 _ALWAYS = (
     _of_the_run(
         ("slip_count", "The number of slips of the slider behind its spring"),
-        ("static_friction", "The force at which a slip begins"),
+        ("static_friction", "The force at which a slip or sliding begins"),
         ("force_drop", "The fall of the force in a slip"),
         ("recurrence_time", "The time from slip to slip"),
         ("kinetic_friction", "The work of the stage over its way, the kinetic friction,"),
