@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 #: Bytes of trajectories that are read at once.
-ROOM = 2**26
+ROOM = 2**25
 
 
 def blocks(dataset: xr.Dataset, dims: Sequence[str], room: int | None = None) -> Iterator[dict[str, slice]]:
@@ -35,6 +35,12 @@ def blocks(dataset: xr.Dataset, dims: Sequence[str], room: int | None = None) ->
     ranges = [range(0, dataset.sizes[name], length) for name, length in lengths.items()]
     for starts in itertools.product(*ranges):
         yield {n: slice(at, at + lengths[n]) for n, at in zip(lengths, starts, strict=True)}
+
+
+def keep(dataset: xr.Dataset, *names: str) -> xr.Dataset:
+    """The dataset without trajectories of members but those named, for what reads no others."""
+    timed = [str(n) for n, variable in dataset.data_vars.items() if {"member", "t"} <= set(variable.dims)]
+    return dataset.drop_vars([name for name in timed if name not in names])
 
 
 def _packed(variables: list[xr.Variable], name: str) -> int:

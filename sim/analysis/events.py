@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from sim.analysis.blocks import in_blocks, keep
 from sim.analysis.observables import masks, ordered, pure
-from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, where_recorded, word
+from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, sweep_dims, where_recorded, word
 from sim.analysis.stick_slip import stick_slip
 
 #: A maximum is one if it stands above the ends of the run by more than rounding.
@@ -45,13 +46,16 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
-    found = _openings(dataset)
-    for part in (_masks, peaks, stick_slip):
+    dims = (*sweep_dims(dataset), MEMBERS)
+    found = in_blocks(keep(dataset, "detachment_time"), dims, _openings)
+    with where_recorded():
+        found = found.merge(in_blocks(keep(dataset, "masked", "contact_area"), dims, _masks))
+    for part in (peaks, stick_slip):
         with where_recorded():
             found = found.merge(part(dataset))
     for suffix in ("", "_mean", "_std", "_sem"):
         if f"dissipated_energy{suffix}" in dataset:
-            lost = dataset[f"dissipated_energy{suffix}"].astype(float).isel(t=-1, drop=True)
+            lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
             text = "energy dissipated by opening and closing, in all"
             found[f"total_dissipated{suffix}"] = lost.assign_attrs(units="J", long_name=text, symbol="W")
         for name in ("pull_off_load", "pull_off_time"):

@@ -6,10 +6,12 @@ recorded contact is at that time.
 
 import contextlib
 import itertools
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import xarray as xr
 
+from sim.analysis.blocks import keep
 from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, stays_held, where_recorded, word
 from sim.laws import jkr
 
@@ -180,12 +182,28 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
 @of_dataset
 def all_observables(dataset: xr.Dataset) -> xr.Dataset:
     """``observables``, with the shares of the lost area where they are known, in both orders of charging."""
-    found = observables(dataset)
-    with contextlib.suppress(ValueError), answered():
-        found = found.merge(share_observables(dataset))
-    with contextlib.suppress(ValueError), answered():
-        found = found.merge(charged_in_turn(dataset))
+    return observables(dataset).merge(charges(dataset))
+
+
+def charges(dataset: xr.Dataset) -> xr.Dataset:
+    """Shares of the lost area in both orders of charging, as far as they are known."""
+    found = xr.Dataset()
+    for shares in (share_observables, charged_in_turn):
+        with contextlib.suppress(ValueError), answered():
+            found = found.merge(shares(dataset))
     return found
+
+
+def readings(dataset: xr.Dataset) -> Iterator[tuple[xr.Dataset, Callable[[xr.Dataset], xr.Dataset]]]:
+    """A dataset with one trajectory of the members at a time, and what makes observables of it: those of all in turn.
+
+    What one trajectory takes of memory is then all that is taken.
+    """
+    each = [str(name) for name, variable in dataset.data_vars.items() if {MEMBERS, "t"} <= set(variable.dims)]
+    for name in each or [""]:
+        yield keep(dataset, name), observables
+    areas = ("contact_area", *(radius for radius, _ in _LOSSES.values()))
+    yield keep(dataset, *areas, "fluctuation_energy", "indentation", "displacement"), charges
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:

@@ -4,6 +4,7 @@ Everything is read in blocks of members, twice: first for means and a sample, th
 """
 
 import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy import special
 
 from sim.analysis.blocks import blocks
 from sim.analysis.correlation import autocovariance, inflation, time_of
-from sim.analysis.observables import all_observables
+from sim.analysis.observables import readings
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quantile_ranks
 
@@ -20,6 +21,8 @@ from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quant
 _MANY = 16
 #: Values that a sample keeps at least, and how far from its level in it an exact quantile may lie.
 _SAMPLE, _NEAR = 2**17, 0.01
+#: Values from which a correlation time is taken: the first members that have so many, at least 16.
+_TRANSFORMED = 2**23
 _LEVELS = np.array(QUANTILES)
 
 
@@ -44,13 +47,16 @@ class Series:
         self.of_record: Any = 0.0
         self.moments = np.zeros(3)
         self.covariance: Any = 0.0
+        self.transformed = 0
         self.inflated = [(np.nan, np.nan)] * len(_LEVELS)
 
     def first(self, values: np.ndarray) -> None:
         """Read a block of members, shape (members, records), for the first time."""
-        self.means.append(_mean(values))
+        total = values.sum(axis=-1)
+        whole = bool(np.isfinite(total).all())
+        self.means.append(total / values.shape[-1] if whole else _mean(values))
         self.of_record = self.of_record + values.sum(axis=0)
-        self.quantiles.sample(values)
+        self.quantiles.sample(values if whole else values[np.isfinite(values)])
 
     @functools.cached_property
     def mean(self) -> float:
@@ -68,17 +74,22 @@ class Series:
 
     def second(self, values: np.ndarray) -> None:
         """Read a block for the second time, after the first reading of all."""
-        known = np.isfinite(values)
-        deviations = values[known] - self.mean
-        self.moments += [deviations.size, np.sum(deviations**2), np.sum(deviations**3)]
-        flags = [np.where(known, values <= level, np.nan) for level in self.rough]
-        self.under.append([_mean(flag) for flag in flags])
+        known = None if self.whole else np.isfinite(values)
+        deviations = values - self.mean if known is None else values[known] - self.mean
+        squares = deviations * deviations
+        self.moments += [deviations.size, squares.sum(), (squares * deviations).sum()]
+        del deviations, squares
+        for_each = (values <= level for level in self.rough)
+        flags = [flag if known is None else np.where(known, flag, np.nan) for flag in for_each]
+        self.under.append([flag.mean(axis=-1) if known is None else _mean(flag) for flag in flags])
         self.quantiles.gather(values)
         if self.whole and self.members < _MANY:
-            self.inflated = [inflation(autocovariance(flag), self.members) for flag in flags]
-        if self.whole:
+            self.inflated = [inflation(autocovariance(flag.astype(float)), self.members) for flag in flags]
+        rows = values[: max(0, max(_MANY, _TRANSFORMED // values.shape[-1]) - self.transformed)]
+        if self.whole and len(rows):
             mean = self.of_record / self.members if self.members > 1 else np.full(1, self.mean)
-            self.covariance = self.covariance + autocovariance(values, mean) / max(self.members - 1, 1)
+            self.covariance = self.covariance + autocovariance(rows, mean) * self.members / max(self.members - 1, 1)
+            self.transformed += len(rows)
 
     def found(self, differ: bool = True) -> dict[str, Any]:
         """The statistics, by name; see ``over_time``. What does not ``differ`` between members has no error."""
@@ -87,7 +98,9 @@ class Series:
             spread = float(np.sqrt(squares / count))
             spreads = [spread, *np.sqrt(_LEVELS * (1.0 - _LEVELS))]
             means = [np.concatenate(self.means), *np.concatenate(self.under, axis=1)]
-            own = inflation(self.covariance, self.members) if self.whole and self.members < _MANY else (np.nan, np.nan)
+            covariance, own = self.covariance / max(self.transformed, 1), (np.nan, np.nan)
+            if self.whole and self.members < _MANY:
+                own = inflation(covariance, self.members)
             of = zip(means, spreads, [own, *self.inflated], strict=True)
             errors, freedoms = np.transpose([_error(*one, float(count)) for one in of])
             low, high = interval(self.name, np.array(self.mean), errors[0], freedoms[0] + 1.0)
@@ -103,7 +116,7 @@ class Series:
         found = {"mean": self.mean, "std": spread, "sem": errors[0], "low": float(low), "high": float(high)}
         found |= {"skewness": skewness, "effective_samples": several}
         if self.whole:
-            time = time_of(self.covariance, self.members, self.step, self.quantiles.largest)
+            time = time_of(covariance, self.transformed, self.step, self.quantiles.largest)
             found |= {"correlation_time": time.time, "correlation_time_sem": time.sem}
         return found | {f"quantile{end}": self.quantiles.at(levels) for end, levels in ends.items()}
 
@@ -149,10 +162,9 @@ class _Quantiles:
         self.near: list[list[np.ndarray]] = [[] for _ in _LEVELS]
         self.below, self.stride, self.total = [0] * len(_LEVELS), 1, 0
 
-    def sample(self, values: np.ndarray) -> None:
-        known = values[np.isfinite(values)]
+    def sample(self, known: np.ndarray) -> None:
         self.total += known.size
-        self.some.append(known[:: self.stride])
+        self.some.append(known.ravel()[:: self.stride].copy())
         kept = sum(some.size for some in self.some)
         if kept > 2 * _SAMPLE:
             self.some = [np.concatenate(self.some)[:: kept // _SAMPLE]]
@@ -252,25 +264,37 @@ def distribution(dataset: xr.Dataset) -> xr.Dataset:
     late, dims = dataset.isel(t=slice(dataset.sizes["t"] // 2, None)), sweep_dims(dataset)
     step = float(dataset["t"][-1] - dataset["t"][-2]) if dataset.sizes["t"] > 1 else 0.0
     found: dict[str, xr.DataArray] = {}
-    for points in blocks(late, dims):
-        group = late.isel(points)
-        pieces = list(blocks(group, (MEMBERS,))) if group.sizes.get(MEMBERS, 1) >= _MANY else [{}]
-        series: dict[tuple[str, tuple[int, ...]], Series] = {}
-        for reading in (Series.first, Series.second):
-            for piece in pieces:
-                stated = all_observables(group.isel(piece))
-                for key, variable in stated.items():
-                    values, members = _rows(variable, dims), group.sizes[MEMBERS] if MEMBERS in variable.dims else 1
-                    for at in np.ndindex(values.shape[:-2]):
-                        one = series.setdefault((str(key), at), Series(members, str(key), step))
-                        reading(one, values[at])
-        for (name, at), one in series.items():
-            place = tuple(points[dim].start + k for dim, k in zip(dims, at, strict=True))
-            for kind, value in one.found(MEMBERS in stated[name].dims).items():
-                if f"{name}_{kind}" not in found:
-                    found[f"{name}_{kind}"] = _empty(dataset, kind, stated[name])
-                found[f"{name}_{kind}"][place] = value
+    for some, observed in readings(late):
+        before = set(found)
+        for points in blocks(some, dims):
+            for name, (variable, each) in _series(some.isel(points), observed, step, dims).items():
+                for at in np.ndindex(each.shape) if f"{name}_mean" not in before else ():
+                    place = tuple(points[dim].start + k for dim, k in zip(dims, at, strict=True))
+                    for kind, value in each[at].found(MEMBERS in variable.dims).items():
+                        key = f"{name}_{kind}"
+                        found.setdefault(key, _empty(dataset, kind, variable))[place] = value
     return xr.Dataset(found)
+
+
+def _series(
+    group: xr.Dataset, observed: Callable[[xr.Dataset], xr.Dataset], step: float, dims: tuple[str, ...]
+) -> dict[str, tuple[xr.DataArray, Any]]:
+    """Each observable of some points of the sweep, with its series at each of them, read twice in blocks of members."""
+    members = group.sizes.get(MEMBERS, 1)
+    pieces = list(blocks(group, (MEMBERS,))) if members >= _MANY else [{}]
+    found: dict[str, tuple[xr.DataArray, Any]] = {}
+    for reading in (Series.first, Series.second):
+        for piece in pieces:
+            for key, variable in observed(group.isel(piece)).items():
+                name, values = str(key), _rows(variable, dims)
+                if name not in found:
+                    each = np.empty(values.shape[:-2], object)
+                    for at in np.ndindex(each.shape):
+                        each[at] = Series(members if MEMBERS in variable.dims else 1, name, step)
+                    found[name] = variable, each
+                for at in np.ndindex(values.shape[:-2]):
+                    reading(found[name][1][at], values[at])
+    return found
 
 
 def _rows(variable: xr.DataArray, dims: tuple[str, ...]) -> np.ndarray:

@@ -1,6 +1,5 @@
 """Statistics over the members of an ensemble, at each time and sweep value."""
 
-import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -11,7 +10,7 @@ from scipy import special
 from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import KEPT, charged_in_turn, observables, pure, reference_radii, share_observables
+from sim.analysis.observables import KEPT, charges, observables, pure, readings, reference_radii, share_observables
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
@@ -43,6 +42,9 @@ _OF = {
     "quantile_low": "lower end of the 95 % intervals of the quantiles",
     "quantile_high": "upper end of the 95 % intervals of the quantiles",
 }
+
+#: Records whose members are put side by side at once.
+_STRIP = 64
 
 #: Units of statistics that are not in that of their observable.
 _UNITS = {"skewness": "1", "effective_samples": "1", "correlation_time": "s", "correlation_time_sem": "s"}
@@ -164,9 +166,9 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
         ends = ("quantile", "quantile_low", "quantile_high") if quantiles else ()
         alike = {"mean": variable, "std": none, "sem": none, "low": variable, "high": variable}
         return alike | {"skewness": xr.full_like(none, np.nan)} | dict.fromkeys(ends, levels)
-    values = np.ascontiguousarray(np.moveaxis(variable.to_numpy(), variable.get_axis_num(MEMBERS), -1))
+    values = _members_last(variable)
     if quantiles:
-        values = np.sort(values)  # nan last
+        values.sort()  # nan last
     count = np.sum(~np.isnan(values), axis=-1, dtype=float)
     one = variable.isel({MEMBERS: 0}, drop=True)
     found = {kind: one.copy(data=data) for kind, data in _moments(str(variable.name), values, count).items()}
@@ -176,15 +178,28 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
     return found
 
 
+def _members_last(variable: xr.DataArray) -> np.ndarray:
+    """A copy of the values with the members last, made in strips of records that fit into the processor's cache."""
+    given = np.moveaxis(variable.to_numpy(), variable.get_axis_num(MEMBERS), -1)
+    if given.ndim < 2:
+        return given.copy()
+    values = np.empty(given.shape, given.dtype)
+    for start in range(0, given.shape[-2], _STRIP):
+        values[..., start : start + _STRIP, :] = given[..., start : start + _STRIP, :]
+    return values
+
+
 def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
     """Statistics over the last axis, of ``count`` numbers each, that need no order."""
     with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there are too few
         mean = np.nansum(values, axis=-1) / count
         deviations = values - mean[..., None]
-        squares = np.nansum(deviations**2, axis=-1)
+        each = deviations * deviations
+        squares = np.nansum(each, axis=-1)
         std = np.sqrt(squares / np.where(count > 1.0, count - 1.0, np.nan))
         error = std / np.sqrt(count)
-        third = np.nansum(deviations**3, axis=-1) / count
+        each *= deviations
+        third = np.nansum(each, axis=-1) / count
         biased = np.where(std > _ROUNDING * abs(mean), third / (squares / count) ** 1.5, np.nan)
         skewness = np.where(count > 2.0, biased * np.sqrt(count * (count - 1.0)) / (count - 2.0), np.nan)
     low, high = interval(name, mean, error, count)
@@ -272,12 +287,12 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
         ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
         has stopped is left out from there on; ``fraction_detached`` counts it.
     """
-    dims = ("t", *sweep_dims(dataset))
-    return (
-        in_blocks(dataset, dims, lambda some: summary(observables(some)))
-        .merge(summary(events(dataset).assign_attrs(dataset.attrs)))
-        .merge(correlation_time(dataset))
-    )
+    found, dims = xr.Dataset(), ("t", *sweep_dims(dataset))
+    for some, observed in readings(dataset):
+        if observed is observables:  # shares are asked for by themselves
+            part = in_blocks(some, dims, lambda block: summary(observables(block)))
+            found = found.merge(part[[name for name in part if name not in found]])
+    return found.merge(summary(events(dataset).assign_attrs(dataset.attrs))).merge(correlation_time(dataset))
 
 
 @of_dataset
@@ -310,13 +325,6 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     """
     radii = reference_radii(dataset)
     ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz's contact area over JKR's")
-    dims = ("t", *sweep_dims(dataset))
-    return in_blocks(dataset, dims, lambda some: summary(_charged(some))).merge(radii).assign(area_ratio_hertz=ratio)
-
-
-def _charged(dataset: xr.Dataset) -> xr.Dataset:
-    """Shares in the one order of charging and, where it is known, in the other."""
-    found = share_observables(dataset)
-    with contextlib.suppress(ValueError):
-        found = found.merge(charged_in_turn(dataset))
-    return found
+    share_observables(dataset.isel(t=[0]))  # where they are not known it says why
+    dims, read = ("t", *sweep_dims(dataset)), list(readings(dataset))[-1][0]
+    return in_blocks(read, dims, lambda some: summary(charges(some))).merge(radii).assign(area_ratio_hertz=ratio)
