@@ -108,11 +108,22 @@ class Resting(NamedTuple):
 
 
 @device
+def _missing(a, load, base, stiffness, curvature, modulus):
+    """Depth of a contact of Hertz of this radius beyond what holds the sphere, and its slope over the radius."""
+    hertz = a * a * curvature
+    if stiffness == math.inf:
+        return hertz - base, 2.0 * a * curvature
+    series = stiffness + 2.0 * modulus * a
+    missing = (stiffness * (hertz - base) + 4.0 / 3.0 * modulus * a * hertz - load) / series
+    return missing, (2.0 * stiffness * a * curvature + 4.0 * modulus * hertz - 2.0 * modulus * missing) / series
+
+
+@device
 def contact_area(bound, moment, time, radius, bare, held):
     """Contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
 
     Newton's method on the energy release rate, convex in the radius, from the last one: from the right of the root
-    it goes left. nan where there is none.
+    it goes left. nan where there is none; Hertz's radius where adhesion does not pay for the mean stress there.
     """
     stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, unit = held
     if stays > 0.0:
@@ -120,14 +131,17 @@ def contact_area(bound, moment, time, radius, bare, held):
     work, tilt = bare + bonded * bound, taken * moment * moment
     load, base = load + load_rate * time, base + base_rate * time
     a, slope = radius, 1.0
+    if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
+        for _ in range(60):
+            missing, growth = _missing(a, load, base, stiffness, curvature, modulus)
+            a -= min(missing / growth, 0.5 * a)
+            if math.fabs(missing) <= 1e-14 * growth * a:
+                break
+        if not work - tilt * a > 0.0:
+            return a, math.pi * a * a / unit, 0.0, 0.0
+        a = max(a, radius)
     for _ in range(60):
-        hertz = a * a * curvature
-        if stiffness == math.inf:
-            missing, growth = hertz - base, 2.0 * a * curvature
-        else:
-            series = stiffness + 2.0 * modulus * a
-            missing = (stiffness * (hertz - base) + 4.0 / 3.0 * modulus * a * hertz - load) / series
-            growth = (2.0 * stiffness * a * curvature + 4.0 * modulus * hertz - 2.0 * modulus * missing) / series
+        missing, growth = _missing(a, load, base, stiffness, curvature, modulus)
         if work > 0.0:
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
             slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt

@@ -64,9 +64,14 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
         yield ("drive",), _TOO_SHORT.format(drive.end, clock.duration)
 
 
-def _reversible_under_a_drive(drive: Drive, contact: Contact) -> Faults:
-    if drive.feeds_back and contact.reversible > 0.0:
-        said = f'cannot be solved with a "{drive.model}" drive yet: leave it out, or prescribe the speed'
+def _reversible_under_a_drive(drive: Drive, bonds: BondModel, contact: Contact) -> Faults:
+    if not drive.feeds_back or contact.reversible == 0.0:
+        return
+    if bonds.model != "rate" or not bonds.stretched:
+        said = f'is solved with a "{drive.model}" drive for bonds.model = "rate" with a rupture law alone: leave it out'
+        yield ("contact", "reversible"), f"{said}, or prescribe the speed"
+    elif drive.at_once:
+        said = "makes friction fall as the contact shrinks, which nothing delays: give drive.mass, damping or viscosity"
         yield ("contact", "reversible"), said
 
 

@@ -139,7 +139,7 @@ def go_together(case):
     if not part.feeds_back:
         return True
     if CONTACTS[case.get("contact", "load")].reversible:
-        return False
+        return population.model == "rate" and population.stretched and not part.at_once
     if not getattr(population, "driven", False):
         return False
     bears = population.stretched or part.contact_stiffness == "rigid"

@@ -31,7 +31,7 @@ import sim
 from sim.analysis.tables import notes
 from sim.engine import Dice, follow, march, pack, unpack
 from sim.laws import jkr
-from sim.parts.bonds import FirstMoment, Steady, Tracked, Unbroken
+from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import Force, Spring, Steady as AtSpeed
@@ -297,6 +297,21 @@ def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_
     check_blocks(scene, states)
 
 
+@pytest.mark.parametrize("keys", [{"mass": 0.1, "damping": 0.1}, {"contact": 50.0, "viscosity": 1.0}])
+def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within_the_sub_steps(keys):
+    # strong bonds: at their peak the whole energy of the mean stress is more than adhesion can pay
+    strong = {"make": lambda **recipe: FirstMoment(**(recipe | {"site_density": 100.0 * DENSITY})), "share": 0.5}
+    scene = scenario(4.0, 80, spring(2.0, **keys), reversible=1.0, **strong)
+    states, read = marched(scene)
+    radii = np.array([state.contact.radius[0] for state in states[1:]])
+    assert_allclose([state.drive.radius[0] for state in states[1:]], radii, rtol=1e-12)
+    hertz = jkr.radius_at_load(LOAD, 0.0, R, MODULUS)
+    assert_allclose(np.min(radii), hertz, rtol=1e-12)
+    assert np.max(radii) > 1.5 * hertz
+    assert residual(read) < 1e-5
+    check_blocks(scene, states)
+
+
 def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
     lens = {name: getattr(scenario(1.0, 4, spring(1.0)), name) for name in ("clock", "solid", "sphere", "contact")}
     recipe = {"bond_stiffness": KAPPA, "rebinding_rate": 1.0, "site_density": DENSITY}
@@ -310,8 +325,10 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
         with pytest.raises(BadInput) as refused:
             Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=bonds, drive=spring(1.0, **keys))
         assert any(place in said and cure in said for said in refused.value.problems)
-    with pytest.raises(BadInput, match=r"contact\.reversible"):
+    with pytest.raises(BadInput, match=r"contact\.reversible.*mass"):
         scenario(1.0, 4, spring(1.0), reversible=0.01)
+    with pytest.raises(BadInput, match=r"contact\.reversible.*rate"):
+        scenario(1.0, 4, spring(1.0, mass=1e-3), make=Cohort, reversible=0.01)
     damped = FirstMoment(rupture=CutOff(stretch=STRETCH), **recipe)
     scene = Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=damped, drive=spring(1.0, damping=1e-3))
     _, read = marched(scene)
