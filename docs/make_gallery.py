@@ -43,6 +43,13 @@ Number = float | tuple[float, float]
 Reading = Callable[[Any], dict[str, Number]]
 
 
+class _Certain(float):
+    """A number without an error, to four digits where the answer does not say otherwise."""
+
+    def __format__(self, spec: str) -> str:
+        return float.__format__(self, spec or ".4g")
+
+
 class Entry(NamedTuple):
     """A question to a scenario: ``numbers`` reads them from its dataset, ``answer`` has a place for each.
 
@@ -108,6 +115,7 @@ class Entry(NamedTuple):
     def said(self, numbers: dict[str, Any]) -> str:
         """The answer with its numbers."""
         shown = {name: concise(*value) if isinstance(value, list | tuple) else value for name, value in numbers.items()}
+        shown = {name: _Certain(value) if isinstance(value, float) else value for name, value in shown.items()}
         return " ".join(self.answer.format(**shown).split())
 
 
@@ -497,7 +505,8 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     it sticks and slips, the mean area falls from {before} to {after} % of JKR's. The bonds lose less of it than
     before, {bonds} % after {bonded} %, as they recover while the slider sticks; the fluctuations that unsteady
     sliding makes take {noise} % instead of {calm} %. That they are as strong as assumed, an rms of {rms:g} kPa,
-    and how long they remember ({length:g} µm of sliding), is put in.""",
+    how long they remember ({length:g} µm of sliding), and a damping without which the area would not fall there, is
+    put in.""",
 )
 def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     late = analysis.settled(all_observables(dataset))
