@@ -397,17 +397,15 @@ def test_the_right_mechanism_is_preferred_in_95_of_100(truth):
     assert right >= 95
 
 
-@pytest.mark.verify
-def test_a_posterior_agrees_with_the_profile(curves):
-    found = fit(load(LENS), [curves], KEYS, steady=True)
-    sampled = posterior(found.problem, found.best, 1)
-    assert sampled.converged
-    for one, (low, middle, high) in zip(found.numbers, sampled.quantiles().T, strict=True):
-        # chains of 50 autocorrelation times of 24 walkers: some 1200 independent samples, whose 2.5 % quantile
-        # has a standard error of 0.08 standard deviations; five of them
-        assert_allclose(
-            [low, middle, high], [one.interval.low, one.value, one.interval.high], atol=0.4 * one.error, rtol=0
-        )
+def test_a_posterior_of_a_short_chain_lies_where_the_profile_does_and_says_that_it_is_short(curves):
+    found = fit(load(LENS), [curves], ["bonds.critical_speed"], steady=True)
+    (one,) = found.numbers
+    sampled = posterior(found.problem, found.best, 1, steps=120)
+    assert not sampled.converged and sampled.document()["converged"] is False
+    low, middle, high = sampled.quantiles()[:, 0]
+    # some tens of independent samples: half a standard deviation is three of the median's standard errors
+    assert low < middle < high and abs(middle - one.value) < 0.5 * one.error
+    assert 0.5 < (high - low) / (one.interval.high - one.interval.low) < 2.0
 
 
 # -- tables that are refused ----------------------------------------------------------------------
