@@ -616,10 +616,11 @@ def test_what_is_no_dataset_is_told_in_one_line(dataset, here, name):
     Path("empty.nc").write_bytes(b"")
     with netCDF4.Dataset("foreign.nc", "w") as foreign:
         foreign.createDimension("x", 3)
+    of_scenario = "its stress has no spectrum to draw before a run" if name == "plot" else "is a scenario"
     for file, said in (
         ("nope.nc", "nope.nc: there is no such file; name a dataset"),
         (".", ".: is a folder; name a dataset"),
-        ("scene.toml", "scene.toml: is a scenario; name the dataset that `sim run` makes of it"),
+        ("scene.toml", f"scene.toml: {of_scenario}; name the dataset that `sim run` makes of it"),
         ("cut.nc", "cut.nc: is not a netCDF file, or is cut short or damaged; run the scenario again"),
         ("stub.nc", "stub.nc: is not a netCDF file, or is cut short or damaged; run the scenario again"),
         ("empty.nc", "empty.nc: is not a netCDF file, or is cut short or damaged; run the scenario again"),

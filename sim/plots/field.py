@@ -214,7 +214,7 @@ def density_figure(scene: "Scenario") -> Figure:
     shear, radius = scene.fluctuations, scene.rest_radius if scene.rest_radius > 0.0 else 0.01 * scene.sphere.radius
     spectrum = shear.spectrum
     if spectrum.wavevector is not None:
-        raise ValueError("the stress is uniform, or a single wave, which has no spectral density; run and draw the map")
+        raise ValueError("its stress has no spectrum to draw before a run; name the dataset that `sim run` makes of it")
     low, high = cast(Waves, spectrum).reach(radius)
     q = np.geomspace(0.7 * low, min(1.4 * high, 1e4 * low), 1500)
     along, across = spectrum.density(q, 0.0), spectrum.density(0.0, q)
