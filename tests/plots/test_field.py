@@ -199,7 +199,7 @@ def test_sim_plot_draws_a_scenario_before_its_run_and_replaces_nothing(tmp_path,
         assert answer.exit_code == 2 and words in answer.stderr
     Path("ripple.toml").write_text(STARTER.read_text().partition("[shear]")[0])
     answer = sim("plot", "ripple.toml")
-    assert answer.exit_code == 2 and "has no spectral density" in answer.stderr
+    assert answer.exit_code == 2 and "no spectrum to draw before a run" in answer.stderr
     assert sorted(path.name for path in Path("outputs").iterdir()) == ["scene-spectrum.png"]
 
 
