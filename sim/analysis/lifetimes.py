@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
+from scipy import special
 
 from sim.analysis.observables import ordered
 from sim.analysis.scene import MEMBERS, is_stationary
@@ -50,12 +51,12 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     >>> print(f"{found.half:.0f} s, {found.rate:.3f} /s, {found.rate_low:.2f} to {found.rate_high:.2f} /s")
     5 s, 0.125 /s, 0.03 to 0.37 /s
     """
-    from scipy import stats  # heavy: a second, for what few datasets have
-
     happened = np.isfinite(times)
     watched = np.where(happened, times, ends)
     half = low = high = np.nan
     if np.any(happened) and np.all(np.isfinite(watched)):
+        from scipy import stats  # heavy: a second, for what few datasets have
+
         sample = stats.CensoredData(uncensored=watched[happened], right=watched[~happened])
         survival = stats.ecdf(sample).sf
         half = _falls(survival)
@@ -67,8 +68,8 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     count, exposure, tail = float(happened.sum()), float(np.sum(watched)), 0.5 - 0.5 * LEVEL
     if not exposure > 0.0:
         return Lifetime(half, low, high, np.nan, np.nan, np.nan)
-    least = stats.chi2.ppf(tail, 2.0 * count) / 2.0 if count else 0.0
-    most = stats.chi2.ppf(1.0 - tail, 2.0 * count + 2.0) / 2.0
+    least = special.gammaincinv(count, tail) if count else 0.0
+    most = special.gammaincinv(count + 1.0, 1.0 - tail)
     return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
 
 
