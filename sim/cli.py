@@ -284,11 +284,11 @@ def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool
 @contextlib.contextmanager
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """A dataset of ours, at chosen values of its sweep, or one message."""
+    _without_other_arrays()
     from sim import analysis
     from sim.analysis import scene
     from sim.units.refusals import BadInput
 
-    _without_other_arrays()
     opened: Any = scene.open
     if not path.exists() and path.with_name(f"{path.name}.parts").is_dir():
         from sim.ensemble.unfinished import dataset as opened
@@ -310,10 +310,11 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
 
 def _without_other_arrays() -> None:
     """Let xarray find no arrays of pint and dask, whose import takes a second and which no command makes of a file."""
+    known = "dask.array" if "xarray" in sys.modules else "dask"  # which xarray looks for when it is loaded
+    absent = {name for name in ("pint", known) if name not in sys.modules}
+    sys.modules |= dict.fromkeys(absent)  # type: ignore[arg-type]
     import xarray as xr
 
-    absent = {name for name in ("pint", "dask.array") if name not in sys.modules}
-    sys.modules |= dict.fromkeys(absent)  # type: ignore[arg-type]
     xr.Dataset(coords={"t": [0.0]}).t.notnull()
     for name in absent:
         del sys.modules[name]
