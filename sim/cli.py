@@ -35,6 +35,8 @@ _CODES = (
 
 #: Rows of a table on the terminal.
 _ROWS = 12
+#: A dataset of fewer bytes is read at once.
+_SMALL = 10_000_000
 
 
 def main() -> None:
@@ -173,7 +175,7 @@ def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
     """The tables of a run that is done, which trouble with them does not change."""
     try:
         with _opened(target) as dataset:
-            return _tables(dataset)
+            return _tables(dataset.load() if dataset.nbytes < _SMALL else dataset)
     except (MemoryError, OSError) as trouble:
         return [], [f"the output is complete; its table could not be made: {trouble or 'not enough memory'}"]
 
