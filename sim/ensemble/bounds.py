@@ -71,7 +71,7 @@ def takes(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1) -> Takes:
 
 
 def tabulated(plan: Plan) -> bool:
-    """Whether a run ends with a table of its dataset, which is read for that as a whole."""
+    """True if a run ends with a table of its dataset, which is read for that as a whole."""
     return plan.trajectories <= _MOST_TABULATED
 
 

@@ -76,7 +76,7 @@ class Scene(NamedTuple):
 
     @property
     def marked(self) -> bool:
-        """Whether each point carries a marker: where curves over anything but time have few."""
+        """True if each point carries a marker: where curves over anything but time have few."""
         over_time = self.along == "t" and not self.broken
         return not over_time and max(np.unique(own).size for own in self.x) <= MARKED
 

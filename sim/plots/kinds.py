@@ -38,7 +38,7 @@ class Kind(NamedTuple):
 
     @property
     def shows(self) -> str:
-        """What the figure shows, in a line."""
+        """Content of the figure, in a line."""
         return (self.draw.__doc__ or "").partition("\n")[0]
 
 
@@ -76,7 +76,7 @@ def drawable(dataset: xr.Dataset) -> list[str]:
 
 
 def _missing(dataset: xr.Dataset, kind: str) -> str:
-    """What a dataset lacks for a kind of figure, with the cure; "" for nothing."""
+    """Lack of a dataset for a kind of figure, with the cure; "" for nothing."""
     try:
         with answered():
             KINDS[kind].needs(dataset)

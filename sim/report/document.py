@@ -43,7 +43,7 @@ class Known(NamedTuple):
 
 
 class Question(NamedTuple):
-    """What a scenario is for: its name, its question, and what else its first comment says, a paragraph each."""
+    """Purpose of a scenario: its name, its question, and what else its first comment says, a paragraph each."""
 
     name: str
     asked: str
@@ -147,7 +147,7 @@ def scenario(dataset: xr.Dataset) -> str:
 
 
 def commands(dataset: xr.Dataset, stem: str) -> list[str]:
-    """What repeats a run whose scenario is saved as ``<stem>.toml``, or ``<stem>.json`` where Python made it."""
+    """Commands that repeat a run, its scenario saved as ``<stem>.toml``, or ``<stem>.json`` where Python made it."""
     if not dataset.attrs.get("scenario_toml"):
         return [f'sim.run(json.load(open("{stem}.json")), to="{stem}.nc")']
     words = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in changes(dataset).items()]
@@ -157,7 +157,7 @@ def commands(dataset: xr.Dataset, stem: str) -> list[str]:
 
 
 def cost(log: Path) -> dict[str, str]:
-    """What the run took by its log's last line: when it began, seconds in all and of each stage; nothing without."""
+    """Cost of the run by its log's last line: when it began, seconds in all and of each stage; nothing without."""
     try:
         text = read_whole(log) if log.stat().st_size <= _LOG else b""
         entry = json.loads(text.splitlines()[-1])
