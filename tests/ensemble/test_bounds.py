@@ -12,7 +12,8 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
+from helpers.commands import COUNTED, LENS
+from helpers.scenes import SHEARS, sample
 from numpy.testing import assert_allclose
 
 from benchmarks.timing import child
@@ -26,11 +27,6 @@ from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
 from sim.scenario.clock import Clock, Record
 from sim.scenario.reader import load
-
-
-def sample(members=3, steps=9, **parts):
-    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
-    return scene(members, steps, **(defaults | parts))
 
 
 def test_members_whose_file_would_be_too_large_are_pooled_where_the_scenario_leaves_it_and_it_is_said(monkeypatch):
@@ -175,29 +171,12 @@ def test_a_run_of_ten_times_the_members_takes_no_more_memory():
 
 # --- processes of their own ---
 
-LONG = """
-name = "one long member"
-[clock]
-duration = "{steps} ms"
-step = "1 ms"
-record = "{record} ms"
-[solid]
-shear_modulus = "1.6 MPa"
-[sphere]
-radius = "2 mm"
-[adhesion]
-work = "42 mJ/m^2"
-[drive]
-speed = "1 mm/s"
-[bonds]
-model = "counted"
-critical_speed = "10 mm/s"
-rebinding_rate = "500 1/s"
-sites = 50
-stress = "0.3 MPa"
-[contact]
-load = "4 mN"
-"""
+
+def long_scene(steps, record):
+    """The text of a scene of one member with so many steps, recorded seldom."""
+    clock = f'duration = "{steps} ms"\nstep = "1 ms"\nrecord = "{record} ms"\n'
+    lens = LENS.replace('duration = "1 s"\nstep = "0.1 s"\n', clock)
+    return f'{lens}[drive]\nspeed = "1 mm/s"\n{COUNTED}'
 
 
 def started(folder, *arguments):
@@ -207,7 +186,7 @@ def started(folder, *arguments):
 
 @pytest.mark.verify
 def test_a_member_of_a_hundred_million_steps_is_kept_in_stretches_and_goes_on_from_the_last(tmp_path):
-    (tmp_path / "scene.toml").write_text(LONG.format(steps=10**8, record=10**7))
+    (tmp_path / "scene.toml").write_text(long_scene(steps=10**8, record=10**7))
     straight, killed = tmp_path / "straight", tmp_path / "killed"
     for folder in (straight, killed):
         folder.mkdir()
@@ -233,7 +212,7 @@ def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_p
     """The number of processes is the same, so that the memory of all is."""
     largest = []
     for members in (500, 5000):
-        (tmp_path / "scene.toml").write_text(LONG.format(steps=2000, record=2) + f"[ensemble]\nmembers = {members}\n")
+        (tmp_path / "scene.toml").write_text(long_scene(steps=2000, record=2) + f"[ensemble]\nmembers = {members}\n")
         run = ["run", str(tmp_path / "scene.toml"), "-o", str(tmp_path / "x.nc"), "--force", "--no-table", "-j", jobs]
         largest.append(child("-m", "sim", *run)[1])
         plan = Plan.of(load(tmp_path / "scene.toml"))

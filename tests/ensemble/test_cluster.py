@@ -1,34 +1,24 @@
 """Runs on a dask cluster: the bytes of one process, whatever dies; scenes mapped over its threads."""
 
+import functools
 import itertools
 import os
 import signal
-from dataclasses import replace
 
 import pytest
-from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
+from helpers import scenes
+from helpers.scenes import LOADS
 
 import sim
 from sim.ensemble import cluster, plan as plans, simulate as ensemble
 from sim.ensemble.part_files import MemoryParts, Stopped
 from sim.ensemble.plan import Plan
 from sim.ensemble.workers import WorkerDied
-from sim.scenario.scenario import read_sweep
 from sim.units.refusals import BadInput
 
 distributed = pytest.importorskip("distributed")
 
-
-def sample(**parts):
-    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
-    sweep = read_sweep({"contact.load": [1e-3, 4e-3]})
-    return replace(scene(parts.pop("members", 3), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
-
-
-@pytest.fixture
-def many_parts(monkeypatch):
-    monkeypatch.setattr(plans, "_GROUP", 2)
-    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 4.5e-5)
+sample = functools.partial(scenes.sample, sweep=LOADS)
 
 
 @pytest.fixture(scope="module")

@@ -1,18 +1,19 @@
 """Parts of a run: killed at every file operation it goes on as if nothing had happened; files of others stay."""
 
 import errno
+import functools
 import hashlib
 import itertools
 import os
 import signal
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 import xarray as xr
-from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
+from helpers import scenes
+from helpers.scenes import LOADS, scene
 
 from sim.ensemble import plan as plans, simulate as ensemble
 from sim.ensemble.checksums import verify
@@ -20,21 +21,10 @@ from sim.ensemble.part_files import OutputBusy, OutputExists, PartFiles, held
 from sim.ensemble.plan import Plan
 from sim.numerics.files import DiskFull, StoreTrouble, leased, locked
 from sim.scenario.clock import Clock
-from sim.scenario.scenario import read_sweep
 from sim.units.refusals import BadInput
 
-
-@pytest.fixture(autouse=True)
-def many_parts(monkeypatch):
-    """Several groups and blocks even of a small run."""
-    monkeypatch.setattr(plans, "_GROUP", 2)
-    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 4.5e-5)
-
-
-def sample(**parts):
-    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
-    sweep = read_sweep({"contact.load": [1e-3, 4e-3]})
-    return replace(scene(parts.pop("members", 3), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
+pytestmark = pytest.mark.usefixtures("many_parts")
+sample = functools.partial(scenes.sample, sweep=LOADS)
 
 
 def names(folder):

@@ -1,5 +1,6 @@
 """Shards of a run, each in a process of a job array: put together they are the file of an undivided run."""
 
+import functools
 import itertools
 import os
 from dataclasses import replace
@@ -7,7 +8,8 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
-from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
+from helpers import scenes
+from helpers.scenes import LOADS_AND_SHARES
 
 from sim.cli import cli
 from sim.ensemble import plan as plans, simulate as ensemble
@@ -15,21 +17,10 @@ from sim.ensemble.checksums import verify
 from sim.ensemble.part_files import OutputBusy, OutputExists, Stopped, held
 from sim.ensemble.plan import Plan
 from sim.ensemble.unfinished import merge
-from sim.scenario.scenario import read_sweep
 from sim.units.refusals import BadInput
 
-
-@pytest.fixture(autouse=True)
-def many_parts(monkeypatch):
-    """Several groups and blocks even of a small run."""
-    monkeypatch.setattr(plans, "_GROUP", 2)
-    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 4.5e-5)
-
-
-def sample(**parts):
-    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
-    sweep = read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.5, 1.0]})
-    return replace(scene(parts.pop("members", 7), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
+pytestmark = pytest.mark.usefixtures("many_parts")
+sample = functools.partial(scenes.sample, members=7, sweep=LOADS_AND_SHARES)
 
 
 @pytest.fixture

@@ -1,5 +1,6 @@
 """The dataset of a run that is not done: what is computed has the numbers of the finished one, the rest is nan."""
 
+import functools
 import itertools
 import re
 from dataclasses import replace
@@ -8,7 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from click.testing import CliRunner
-from helpers.scenes import BONDS, CELL, CONTACTS, SHEARS, SPECTRUM, scene
+from helpers import scenes
+from helpers.scenes import CELL, LOADS_AND_SHARES, SPECTRUM
 
 import sim
 from sim.cli import cli
@@ -18,22 +20,11 @@ from sim.ensemble.plan import Plan
 from sim.parts.shear import models as shear
 from sim.parts.shear.correlation import Slip
 from sim.scenario.clock import Clock, Record
-from sim.scenario.scenario import read_sweep
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
 
-
-@pytest.fixture(autouse=True)
-def many_parts(monkeypatch):
-    """Several groups and blocks even of a small run."""
-    monkeypatch.setattr(plans, "_GROUP", 2)
-    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 4.5e-5)
-
-
-def sample(**parts):
-    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
-    sweep = read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.5, 1.0]})
-    return replace(scene(parts.pop("members", 5), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
+pytestmark = pytest.mark.usefixtures("many_parts")
+sample = functools.partial(scenes.sample, members=5, sweep=LOADS_AND_SHARES)
 
 
 def stopped(scenario, path, after, **how):

@@ -1,5 +1,6 @@
 """Processes that share a run: the same bytes for any number, whatever dies on the way."""
 
+import functools
 import itertools
 import os
 import signal
@@ -7,17 +8,18 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import replace
 
 import pytest
+from helpers import scenes
 from helpers.chatty import chatty
-from helpers.scenes import BONDS, CONTACTS, SHEARS, scene
+from helpers.scenes import LOADS
 
 from sim.ensemble import plan as plans, simulate as ensemble
 from sim.ensemble.part_files import PartFiles, Stopped
 from sim.ensemble.plan import Plan
 from sim.ensemble.workers import WorkerDied, _call, in_process, share_out
-from sim.scenario.scenario import read_sweep
+
+sample = functools.partial(scenes.sample, sweep=LOADS)
 
 
 def code(text):
@@ -91,12 +93,6 @@ def test_a_daemon_may_run_scenes(tmp_path):
     script += f"m.get_context('fork').Pool(1).apply(in_process, (open, {str(tmp_path / 'made')!r}, 'x'))"
     subprocess.run([sys.executable, "-c", script], check=True)
     assert (tmp_path / "made").exists()
-
-
-def sample(**parts):
-    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
-    sweep = read_sweep({"contact.load": [1e-3, 4e-3]})
-    return replace(scene(parts.pop("members", 3), parts.pop("steps", 9), **(defaults | parts)), sweep=sweep)
 
 
 @pytest.mark.parametrize("jobs", [3, *(pytest.param(jobs, marks=pytest.mark.verify) for jobs in (2, 5))])

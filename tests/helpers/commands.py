@@ -7,8 +7,8 @@ from click.testing import CliRunner
 
 from sim import cli
 
-#: A small scene, some of whose parts are random.
-SCENE = """\
+#: A lens under a load; a ramp of its speed; bonds that are random.
+LENS = """\
 name = "a scene"
 [clock]
 duration = "1 s"
@@ -19,21 +19,25 @@ shear_modulus = "1.6 MPa"
 radius = "2 mm"
 [adhesion]
 work = "42 mJ/m^2"
+[contact]
+load = "4 mN"
+"""
+RAMP = """\
 [drive]
 model = "ramp"
 from = "1 mm/s"
 to = "20 mm/s"
+"""
+COUNTED = """\
 [bonds]
 model = "counted"
 critical_speed = "10 mm/s"
 rebinding_rate = "500 1/s"
 sites = 50
 stress = "0.3 MPa"
-[contact]
-load = "4 mN"
-[ensemble]
-members = 3
 """
+#: A small scene of them.
+SCENE = f"{LENS}{RAMP}{COUNTED}[ensemble]\nmembers = 3\n"
 
 
 def sim(*arguments):

@@ -3,8 +3,9 @@
 import math
 
 import numpy as np
+from numpy.testing import assert_allclose
 
-from sim.engine import march
+from sim.engine import march, pack, unpack
 from sim.laws import jkr
 from sim.parts.bonds import FirstMoment
 from sim.parts.bonds.rupture import Bell
@@ -92,3 +93,48 @@ def reached(states, *names):
     units = {"position": STRETCH, "body_speed": STRETCH, "bound": 1.0, "stretch": STRETCH}
     parts = {"position": "drive", "body_speed": "drive", "bound": "bonds", "stretch": "bonds"}
     return np.array([[getattr(getattr(state, parts[n]), n)[0] / units[n] for n in names] for state in states])
+
+
+def turning(**keys):
+    """A spring on a stage that rests, goes there and back, and stops."""
+    speeds = (10.0, 10.0, -10.0, -10.0, 0.0, 0.0)
+    stage = {"time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0), "value": tuple(v * STRETCH for v in speeds)}
+    return spring(0.2, stage, start_after=1.0, **keys)
+
+
+def check_turned(states, read):
+    """A march of 8 in 16 steps under ``turning``: the stage's way, the signs of the stress, the energies."""
+    assert_allclose(read["stage_position"][[2, 6, 10, 16]] / STRETCH, [0.0, 20.0, 0.0, 0.0], atol=1e-12)
+    assert states[6].bonding.stress[0] > 0.0 > states[10].bonding.stress[0]
+    assert abs(states[16].bonding.stress[0]) < 0.2 * abs(states[10].bonding.stress[0])
+    assert residual(read) < 1e-5
+
+
+#: A load that pulls the contact off and comes back, and what the contact does then.
+PULLED_OFF = {
+    "load": {"time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0), "value": (LOAD, LOAD, -LOAD, -LOAD, LOAD, LOAD)},
+    "after_pull_off": "reattach",
+}
+
+
+def check_pulled_off(states, read):
+    """A march of 3 in 30 steps under ``PULLED_OFF``: no force while the contact is open, and one again at the end."""
+    open_ = np.isnan([state.contact.radius[0] for state in states])
+    assert open_[11:20].all()
+    assert not open_[21:].any()
+    assert_allclose(read["spring_force"][12:20], 0.0, atol=1e-12 * UNIT)
+    assert read["spring_force"][-1] > 0.05 * UNIT
+    assert np.isfinite(read["energy_residual"]).all()
+
+
+def check_members(scene, straight):
+    """Taken up in the middle of its fastest slip, and a member alone, a march ends as that of all, bit for bit."""
+    slip = max(range(len(straight) - 1), key=lambda k: straight[k].drive.speed[0])
+    assert straight[slip].drive.speed[0] > 3.0 * 10.0 * STRETCH
+    again = list(march(scene, np.arange(3), unpack(scene, pack(straight[slip]))))
+    alone = list(march(scene, np.array([1])))
+    one, other, single = (pack(states[-1]) for states in (straight, again, alone))
+    assert all(np.array_equal(one[key], other[key], equal_nan=True) for key in one)
+    for key, values in single.items():
+        whole = one[key][1:2] if one[key].ndim and len(one[key]) == 3 else one[key]
+        assert np.array_equal(whole, values, equal_nan=True), key

@@ -1,5 +1,7 @@
 """Small scenes for the tests: one builder and the depths of every part."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from sim.parts.bonds import models as bonds
@@ -13,6 +15,7 @@ from sim.parts.shear.amplitude import Constant as ConstantAmplitude, Onset, Slip
 from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario
+from sim.scenario.sweep import read_sweep
 from sim.spectrum.families import Band, Gaussian, Ripple, SelfAffine
 
 SPECTRUM = Band(rms=120e3, longest=120e-6, shortest=60e-6)
@@ -157,6 +160,17 @@ def scene(members=3, steps=8, **parts):
         ensemble=Ensemble(members=members),
         **parts,
     )
+
+
+#: Sweeps of one axis and of two.
+LOADS = {"contact.load": [1e-3, 4e-3]}
+LOADS_AND_SHARES = LOADS | {"adhesion.bond_share": [0.5, 1.0]}
+
+
+def sample(members=3, steps=9, sweep=None, **parts):
+    """A small scene whose bonds and fluctuations are random, at each point of a sweep."""
+    defaults = {"shear": SHEARS["modal, slip, onset"], "bonds": BONDS["counted"], "contact": CONTACTS["load"]}
+    return replace(scene(members, steps, **(defaults | parts)), sweep=read_sweep(sweep or {}))
 
 
 def one_step(step, *given):

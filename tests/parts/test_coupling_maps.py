@@ -5,11 +5,26 @@ import math
 
 import numpy as np
 import pytest
-from helpers.driven import AREA, ENERGY, STRETCH, UNIT, force, marched, residual, scenario, spring
+from helpers.driven import (
+    AREA,
+    ENERGY,
+    PULLED_OFF,
+    STRETCH,
+    UNIT,
+    check_members,
+    check_pulled_off,
+    check_turned,
+    force,
+    marched,
+    residual,
+    scenario,
+    spring,
+    turning,
+)  # fmt: skip
 from numpy.testing import assert_allclose
 
 import sim
-from sim.engine import Dice, follow, march, pack, unpack
+from sim.engine import Dice, follow, march
 from sim.parts.bonds import Cohort
 from sim.parts.bonds.rupture import Catch, Constant, CutOff
 from sim.parts.drive import Steady as AtSpeed
@@ -180,15 +195,7 @@ def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness()
 def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys):
     scene = driven(4.0, 80, spring(0.02, **keys), 1e-4, share=0.5)
     straight = list(march(scene, np.arange(3)))
-    slip = max(range(80), key=lambda k: straight[k].drive.speed[0])
-    assert straight[slip].drive.speed[0] > 3.0 * 10.0 * STRETCH
-    again = list(march(scene, np.arange(3), unpack(scene, pack(straight[slip]))))
-    alone = list(march(scene, np.array([1])))
-    one, other, single = (pack(states[-1]) for states in (straight, again, alone))
-    assert all(np.array_equal(one[key], other[key], equal_nan=True) for key in one)
-    for key, values in single.items():
-        whole = one[key][1:2] if one[key].ndim and len(one[key]) == 3 else one[key]
-        assert np.array_equal(whole, values, equal_nan=True), key
+    check_members(scene, straight)
     _, passed = follow(scene, Dice.of(scene.seed, np.arange(3)), None, range(0, 81, 4))
     assert np.array_equal(passed.driven[:, 0, 2], [state.drive.spring_force[0] for state in straight[::4]])
 
@@ -202,30 +209,14 @@ def test_springs_from_soft_to_stiff_keep_the_energies_balanced(stiffness, keys):
 
 @pytest.mark.parametrize("start", ["bonded", "empty", "steady"])
 def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_signs(start):
-    turns = {
-        "time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0),
-        "value": tuple(v * STRETCH for v in (10.0, 10.0, -10.0, -10.0, 0, 0)),
-    }
-    states, read = marched(driven(8.0, 16, spring(0.2, turns, start_after=1.0), 1e-4, share=0.5, start=start))
-    assert_allclose(read["stage_position"][[2, 6, 10, 16]] / STRETCH, [0.0, 20.0, 0.0, 0.0], atol=1e-12)
-    assert states[6].bonding.stress[0] > 0.0 > states[10].bonding.stress[0]
-    assert abs(states[16].bonding.stress[0]) < 0.2 * abs(states[10].bonding.stress[0])
-    assert residual(read) < 1e-5
+    states, read = marched(driven(8.0, 16, turning(), 1e-4, share=0.5, start=start))
+    check_turned(states, read)
 
 
 def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again():
-    base = {"time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0), "value": tuple(4e-3 * v for v in (1, 1, -1, -1, 1, 1))}
-    lens = {"share": 0.5, "load": base, "after_pull_off": "reattach"}
     for keys in ({}, {"area": "carried"}):
         make = functools.partial(Cohort, tolerance=1e-4, **keys)
-        scene = scenario(3.0, 30, spring(1.0), make=make, **lens)
-        states, read = marched(scene)
-        open_ = np.isnan([state.contact.radius[0] for state in states])
-        assert open_[11:20].all()
-        assert not open_[21:].any()
-        assert_allclose(read["spring_force"][12:20], 0.0, atol=1e-12 * UNIT)
-        assert read["spring_force"][-1] > 0.05 * UNIT
-        assert np.isfinite(read["energy_residual"]).all()
+        check_pulled_off(*marched(scenario(3.0, 30, spring(1.0), make=make, share=0.5, **PULLED_OFF)))
 
 
 def test_bonds_that_only_a_stretch_breaks_snap_where_nothing_delays_them():

@@ -5,25 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.commands import LENS
 
 from sim.scenario.reader import BadInput, load
 
-HEAD = """\
-[clock]
-duration = "1 s"
-step = "0.1 s"
-
-[solid]
-shear_modulus = "1.6 MPa"
-
-[sphere]
-radius = "2 mm"
-
-[adhesion]
-work = "42 mJ/m^2"
-
-[contact]
-"""
+HEAD = LENS.removesuffix('load = "4 mN"\n')
 TABLE = HEAD.count("\n")
 FIRST = TABLE + 1
 

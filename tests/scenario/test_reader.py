@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.commands import LENS
 from hypothesis import example, given, strategies as st
 
 from sim.parts.bonds import models as bonds
@@ -25,27 +26,12 @@ FOLDER = Path(__file__).parents[2] / "scenarios"
 STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 NAMES = sorted(path.stem for path in FOLDER.glob("*.toml"))
 
-SCENE = """\
-name = "a scene"
-[clock]
-duration = "1 s"
-step = "0.1 s"
-[solid]
-shear_modulus = "1.6 MPa"
-[sphere]
-radius = "2 mm"
-[adhesion]
-work = "42 mJ/m^2"
-[contact]
-load = "4 mN"
-"""
-
 
 @pytest.fixture
 def scene(tmp_path):
     """Write a scene and load it."""
 
-    def write(text="", overrides=None, base=SCENE):
+    def write(text="", overrides=None, base=LENS):
         path = tmp_path / "x.toml"
         path.write_text(base + text, encoding="utf-8")
         return load(path, overrides)
@@ -174,13 +160,13 @@ def test_a_model_left_out_is_the_simplest(scene):
     assert scenario.bonds == bonds.Unbroken(stress=1e3)
     assert scenario.shear.amplitude.model == "constant"
     schema = scenario_schema()
-    assert fits(schema, schema, tomllib.loads(SCENE + "[drive]\nspeed = 1\n[bonds]\n"))
-    assert not fits(schema, schema, tomllib.loads(SCENE + "[bonds]\ncritical_speed = 1\n"))
+    assert fits(schema, schema, tomllib.loads(LENS + "[drive]\nspeed = 1\n[bonds]\n"))
+    assert not fits(schema, schema, tomllib.loads(LENS + "[bonds]\ncritical_speed = 1\n"))
 
 
 def test_a_dictionary_is_read_as_a_file_is(scene, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    document = tomllib.loads(SCENE)
+    document = tomllib.loads(LENS)
     given = copy.deepcopy(document)
     assert quantities(load(document)) == quantities(scene())
     assert load(document, {"contact.load": "2 mN"}).contact.load == 2e-3
@@ -192,8 +178,8 @@ def test_a_dictionary_is_read_as_a_file_is(scene, tmp_path, monkeypatch):
 
 def test_a_byte_order_mark_and_windows_line_ends_change_nothing(tmp_path):
     path = tmp_path / "x.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + SCENE.replace("\n", "\r\n").encode())
-    (tmp_path / "y.toml").write_text(SCENE)
+    path.write_bytes(b"\xef\xbb\xbf" + LENS.replace("\n", "\r\n").encode())
+    (tmp_path / "y.toml").write_text(LENS)
     assert quantities(load(path)) == quantities(load(tmp_path / "y.toml"))
 
 
@@ -415,7 +401,7 @@ def test_every_scenario_fits_the_schema(path):
 
 def test_a_table_may_name_a_file_or_hold_its_columns_by_the_schema():
     schema = scenario_schema()
-    steady = tomllib.loads(SCENE)
+    steady = tomllib.loads(LENS)
     assert fits(schema, schema, {**steady, "drive": {"model": "table", "file": "speeds.csv"}})
     assert fits(schema, schema, {**steady, "drive": {"model": "table", "time": [0, 1], "speed": [0, 1]}})
     assert not fits(schema, schema, {**steady, "drive": {"model": "table"}})

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.commands import sim as command
+from helpers.commands import LENS, sim as command
 from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
@@ -266,24 +266,13 @@ def test_a_rate_dependent_edge_follows_the_pattern():
     assert abs(moving["equilibrium_radius"] - moving["contact_radius"]).max() > 1e-8
 
 
-TOML = """
-[clock]
-duration = "10 ms"
-step = "1 ms"
-[solid]
-shear_modulus = "1.6 MPa"
-[sphere]
-radius = "2 mm"
-[adhesion]
-work = "42 mJ/m^2"
-[contact]
-load = "4 mN"
+TOML = f"""{LENS}
 [bonds]
 model = "none"
 stress = "0.3 MPa"
 [shear]
 model = "mapped"
-field = { file = "map.csv", pixel = "6 um", noise = "1 kPa" }
+field = {{ file = "map.csv", pixel = "6 um", noise = "1 kPa" }}
 """
 
 
