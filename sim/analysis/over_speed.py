@@ -9,7 +9,7 @@ from scipy import special
 
 from sim.analysis.blocks import ROOM, blocks
 from sim.analysis.observables import observables, reference_radii
-from sim.analysis.scene import MEMBERS, is_steady, of_dataset, speed_of, stays_held, sweep_dims
+from sim.analysis.scene import MEMBERS, is_steady, of_dataset, speed_name, speed_of, stays_held, sweep_dims
 from sim.analysis.statistics import LEVEL
 
 #: Shares of JKR's area whose loss has a speed.
@@ -110,13 +110,15 @@ def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
         ``speed_at_5_percent_lost``, ``speed_at_50_percent_lost``, ``speed_halfway_to_hertz`` [m/s] with ``…_low`` and
         ``…_high`` (see ``crossing``), for each point of the sweep of other keys; nan where the area
         does not get there, or is there from the lowest speed on. Empty where speeds neither rise nor are swept, what
-        holds the sphere changes, or the area or its references were not recorded.
+        holds the sphere changes, or the speed, the area or its references were not recorded.
     """
+    if speed_name(dataset) not in dataset or not dataset.keys() >= _READ:
+        return xr.Dataset()
     speed = speed_of(dataset)
     along = str(speed_dim(dataset)) if is_steady(dataset) else "t"
     speed = speed if along == "t" else speed.isel(t=0, drop=True)
     known = along in speed.dims and bool((speed.diff(along) > 0.0).all()) and bool(stays_held(dataset).all())
-    if not known or not dataset.keys() >= _READ or bool((speed <= 0.0).any()):
+    if not known or bool((speed <= 0.0).any()):
         return xr.Dataset()
     radii = reference_radii(dataset)
     hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2

@@ -230,7 +230,7 @@ def test_a_dataset_lacks_any_variable_and_every_command_has_an_answer(here, soun
         shutil.copy(sound, "less.nc")
         with netCDF4.Dataset("less.nc", "a") as file:
             file.renameVariable(name, "other")
-        for arguments in (["stats"], ["stats", "--all"], ["plot", "time"], ["plot", "curve"]):
+        for arguments in (["stats"], ["stats", "--all"], ["plot", "time", "--force"], ["plot", "curve", "--force"]):
             done = sim(arguments[0], "less.nc", *arguments[1:])
             assert done.exit_code in (0, 2), (name, arguments, done.exception)
             assert done.exit_code == 0 or done.stderr.count("\n") == 1
