@@ -1,5 +1,6 @@
 """The commands. Each imports what it needs when it runs, so that ``sim --help`` is instant."""
 
+import atexit
 import contextlib
 import gc
 import math
@@ -13,7 +14,7 @@ from typing import Any, NoReturn
 import click
 
 from sim.ensemble.progress import Stages, announce_compiling, named, note, progress_bar, while_read
-from sim.units import options
+from sim.units import absent, options
 from sim.units.terminal import print_rows, print_table, replace_unknown, say, usage
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
@@ -41,7 +42,8 @@ _SMALL = 10_000_000
 
 def main() -> None:
     """Run the command line; every foreseen trouble ends in one message and its exit code."""
-    gc.set_threshold(50_000)  # imports make many objects that stay: looking through them is a tenth of a start
+    gc.set_threshold(500_000)  # imports make many objects that stay: looking through them is a tenth of a start,
+    atexit.register(gc.freeze)  # and as much of the end
     for order in (signal.SIGTERM, signal.SIGHUP):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
     replace_unknown()
@@ -166,6 +168,7 @@ def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]]
     """Statistics of a dataset over time and sweep, of each whole run, and what the numbers mean."""
     from sim import analysis
 
+    dataset = analysis.scene.plain(dataset)  # once, not in each of what follows
     rows, once = analysis.table(dataset, most), analysis.highlights(dataset, most)
     further = analysis.losses(dataset, most), analysis.spread(dataset)
     return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once)
@@ -286,7 +289,7 @@ def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool
 @contextlib.contextmanager
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """A dataset of ours, at chosen values of its sweep, or one message."""
-    _without_other_arrays()
+    absent.other_arrays()
     from sim import analysis
     from sim.analysis import scene
     from sim.units.refusals import BadInput
@@ -308,18 +311,6 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
             if "NetCDF" not in str(trouble):
                 raise
             raise BadInput([f"{path}: {scene.BROKEN}"]) from None
-
-
-def _without_other_arrays() -> None:
-    """Let xarray find no arrays of pint and dask, whose import takes a second and which no command makes of a file."""
-    known = "dask.array" if "xarray" in sys.modules else "dask"  # which xarray looks for when it is loaded
-    absent = {name for name in ("pint", known) if name not in sys.modules}
-    sys.modules |= dict.fromkeys(absent)  # type: ignore[arg-type]
-    import xarray as xr
-
-    xr.Dataset(coords={"t": [0.0]}).t.notnull()
-    for name in absent:
-        del sys.modules[name]
 
 
 @cli.command()

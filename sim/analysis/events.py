@@ -115,7 +115,8 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     if not bool((ramp | start).any()):
         return xr.Dataset()
     found, between = {}, float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
-    slides = (ramp | start) & (dataset["t"] >= _beginning(dataset) - 1e-6 * between)  # the record of the start counts
+    beginning = _beginning(dataset)
+    slides = (ramp | start) & (dataset["t"] >= beginning - 1e-6 * between)  # the record of the start counts
     for name, prefix, source, unit in _PEAKS:
         suffix = "" if source in dataset else "_mean"
         recorded = dataset[source + suffix].astype(float)
@@ -127,7 +128,7 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
         text = f"largest {recorded.attrs.get('long_name', source)} while sliding"
         described = {
             name + suffix: (largest, unit, text),
-            f"{prefix}_time": (when - _beginning(dataset), "s", f"time from the start of sliding to the {text}"),
+            f"{prefix}_time": (when - beginning, "s", f"time from the start of sliding to the {text}"),
             f"{prefix}_speed": (dataset["speed"].isel(t=at), "m/s", f"sliding speed at the {text}"),
         }
         if suffix:

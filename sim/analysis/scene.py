@@ -144,7 +144,7 @@ def _there(dataset: xr.Dataset, key: str) -> bool:
     if any(name == table or name.startswith(f"{table}_") for name in sweep_dims(dataset)):
         return True
     with contextlib.suppress(KeyError):
-        return bool(setting(dataset, key).notnull().all())
+        return not np.any(np.isnan(setting(dataset, key).to_numpy()))
     return False
 
 

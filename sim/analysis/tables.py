@@ -11,7 +11,7 @@ import xarray as xr
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.lifetimes import half_lives
-from sim.analysis.observables import all_observables, settled
+from sim.analysis.observables import KEPT, all_observables, settled
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.scene import MEMBERS, is_stationary, of_dataset, resolved, stays_held, sweep_dims, word
 from sim.analysis.stationary import distribution
@@ -260,6 +260,8 @@ def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
         found = distribution(dataset)
     else:
         trajectories = all_observables(dataset)
+        shown = {f"{column.name}{kind}" for column in _COLUMNS for kind in ("", *(f"_{kind}" for kind in KEPT))}
+        trajectories = trajectories[[name for name in trajectories if name in shown]]
         found = summary(settled(trajectories) if whole else trajectories, quantiles=False)
     if "applied_load" in dataset:  # it is known of open contacts too
         for kind in ("mean", "low", "high"):

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
+from sim.units import absent
 from sim.units.terminal import say
 
 #: Seconds between two lines of progress, where no bar is shown.
@@ -131,6 +132,7 @@ def announce_compiling(quiet: bool = False) -> None:
 
     def announce(name: str) -> None:
         jit.on_compiling.clear()
+        absent.blas()
         if not quiet:
             note("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all")
 

@@ -132,11 +132,12 @@ def opened(path: str | os.PathLike[str]) -> netCDF4.Dataset:
 def lazily(path: str | os.PathLike[str]) -> "xarray.Dataset":
     """An ``opened`` file whose numbers are read where they are used."""
     import xarray as xr  # heavy: a run makes its file without
-    from xarray.backends import CachingFileManager, NetCDF4DataStore
+    from xarray.backends import CachingFileManager, NetCDF4DataStore, StoreBackendEntrypoint
 
     with HDF5, _damaged():  # as reading and closing do
         file = CachingFileManager(opened, os.path.abspath(path), lock=HDF5)  # type: ignore[type-var]
-        return xr.open_dataset(NetCDF4DataStore(file, lock=HDF5), decode_times=False, decode_coords=False)
+        store: Any = NetCDF4DataStore(file, lock=HDF5)  # said what it is, no reader of other files is looked for
+        return xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
 
 
 def located(dataset: "xarray.Dataset") -> "xarray.Dataset":
@@ -144,7 +145,7 @@ def located(dataset: "xarray.Dataset") -> "xarray.Dataset":
     named = [name for name, variable in dataset.variables.items() if variable.attrs.get("coordinates") == "speed"]
     if not named or "speed" not in dataset:
         return dataset
-    found = dataset.assign({name: dataset[name].copy(deep=False) for name in named}).set_coords("speed")
+    found = dataset.copy().set_coords("speed")
     found.set_close(dataset._close)
     for name in named:
         found[name].attrs.pop("coordinates")  # xarray writes it again where a dataset is saved

@@ -39,19 +39,15 @@ def replace_unknown() -> None:
 
 
 def print_rows(rows: list[dict[str, str]]) -> None:
-    """Print a table, its headings the keys of the rows."""
-    from rich.console import Console  # heavy: not for `sim check`
-    from rich.table import Table
-
-    shown = Table(box=None, header_style="bold", pad_edge=False)
-    for heading in rows[0] if rows else ():
-        shown.add_column(plain(heading), justify="right", no_wrap=True)
-    for row in rows:
-        shown.add_row(*map(plain, row.values()))
-    console = Console(highlight=False, markup=False, emoji=False)
-    wide = console.options.update(max_width=10_000)
-    console.width = max(console.width, console.measure(shown, options=wide).maximum)  # no number is cut short
-    console.print(shown)
+    """Print a table, its headings the keys of the rows, as wide as its cells are."""
+    headings = [plain(heading).split("\n") for heading in (rows[0] if rows else ())]
+    deep = max(map(len, headings), default=0)
+    table = [list(line) for line in zip(*([""] * (deep - len(lines)) + lines for lines in headings), strict=True)]
+    table += [[one_line(cell) for cell in row.values()] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    for place, row in enumerate(table):
+        line = "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
+        click.echo(click.style(line, bold=True) if place < deep else line, sys.stdout)
 
 
 def print_table(rows: list[dict[str, str]], text: str) -> None:
