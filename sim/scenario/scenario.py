@@ -1,7 +1,7 @@
 """A scenario: one of each part, a clock, and what must hold between them."""
 
 import math
-from collections.abc import Hashable
+from collections.abc import Callable, Hashable
 from dataclasses import fields
 from functools import cache, cached_property
 from pathlib import Path
@@ -269,7 +269,7 @@ class Scenario:
         """
         document = {name: getattr(self, name) for name in _FIELDS if name not in ("source", "sweep")}
         for name in {key.partition(".")[0] for key in values if "." in key} & document.keys():  # the rest stays checked
-            document[name] = _adapter(cast(Hashable, type(document[name]))).dump_python(document[name], by_alias=True)
+            document[name] = self._dumped(name)
         _change(document, values)
         document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
         files = Files(Path(self.source.path).parent, self.source.files)
@@ -311,7 +311,9 @@ class Scenario:
         """The scenario with some values each, made of tables that are read once for each of their own values."""
         read: dict[tuple[Any, ...], Any] = {}
         points, ends = [], (0, len(values) - 1)
-        files = Files(Path(self.source.path).parent, self.source.files)
+        files, origin = Files(Path(self.source.path).parent, self.source.files), self.origin
+        dumped = cache(self._dumped)
+        own = {name: self.__dict__[name] for name in _FIELDS} | {"sweep": ()}
         for place, point in enumerate(values):
             tables: dict[str, dict[str, Any]] = {}
             for key, value in point.items():
@@ -320,25 +322,26 @@ class Scenario:
             for name, changed in tables.items():
                 which = (name, *map(id, changed.values()))  # the values live as long as the sweep
                 if which not in read:
-                    read[which] = self._table(name, changed, files)
+                    read[which] = self._table(name, changed, files, dumped)
                 parts[name] = read[which]
             if any(part is None for part in parts.values()):  # which says what is wrong
                 points.append(self.with_values(point))
                 continue
-            own = {"sweep": (), "source": self.origin.changed(point | {"sweep": {}})}
             made = object.__new__(Scenario)
-            made.__dict__.update({name: self.__dict__[name] for name in _FIELDS} | parts | own)
+            made.__dict__.update(own | parts, source=origin.changed(point | {"sweep": {}}))
             with in_plain_words(Scenario, {}):
                 made._check_across(len(values) <= _MOST_BUILT or place in ends)
             points.append(made)
         return points
 
-    def _table(self, name: str, values: dict[str, Any], files: Files) -> Any:
-        """One table with some keys changed, checked anew; None where it cannot be read by itself."""
+    def _dumped(self, name: str) -> Any:
+        """Keys and values of a table by its name, as in a document."""
         part = getattr(self, name, None)
-        document = {}
-        if values.keys() != {name}:
-            document = {name: _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)}
+        return _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)
+
+    def _table(self, name: str, values: dict[str, Any], files: Files, dumped: Callable[[str], Any]) -> Any:
+        """One table with some keys changed, checked anew; None where it cannot be read by itself."""
+        document = {} if values.keys() == {name} else {name: dumped(name)}
         _change(document, values)
         try:
             return table_adapter(name).validate_python(with_models(Scenario, document)[name], context={"files": files})
