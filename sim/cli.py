@@ -114,7 +114,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
-    from sim.ensemble.part_files import shard_of
+    from sim.ensemble.part_files import PartFiles, folder_of, shard_of
 
     began, stages, share = time.time(), Stages(), shard_of("1/1" if shard is None else shard)
     from sim.scenario.reader import load
@@ -139,7 +139,8 @@ def run(
     from sim.ensemble.workers import orders
 
     plan = plans.Plan.of(scene)
-    jobs, said = preview.announced(plan, jobs, memory, share[1])
+    kept: Any = PartFiles(folder_of(target, share)) if resume else ()
+    jobs, said = preview.announced(plan, jobs, memory, share, kept)
     for line in [] if quiet else said:
         note(line)
     how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}

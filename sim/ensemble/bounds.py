@@ -53,13 +53,16 @@ class Takes(NamedTuple):
     disk: float
 
 
-def takes(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1) -> Takes:
-    """Needs of a run, or of one of some shares of it, at a ``pace`` of the machine: its time over what is counted."""
+def takes(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: float = 1.0) -> Takes:
+    """Needs of a run, or of one of some shares of it, at a ``pace`` of the machine: its time over what is counted.
+
+    Of the steps a part is ``left`` where an unfinished run goes on; the disk holds those that are done as well.
+    """
     points, parts = plan.points, len(plan.packs) * len(plan.groups()) * len(plan.blocks(plan.points[0]))
     packed = plan.maps if plan.scenario.record.compression == "none" else plan.bytes
     modes = _MODE * max(_mode_pairs(point) for point in spread(points, 2))
     disk = _parts(plan)
-    steps = (pace * counted(plan) + parts * _PART + disk * _PART_BYTE) / shares
+    steps = left * (pace * counted(plan) + parts * _PART + disk * _PART_BYTE) / shares
     alone = _START + modes + len(points) * _POINT
     if shares == 1:  # a share makes no dataset
         alone += plan.bytes * _BYTE + packed * _PACKED_BYTE

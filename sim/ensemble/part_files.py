@@ -259,8 +259,7 @@ def held(
     BadInput
         If the output or the unfinished run is of something else.
     """
-    whole = checksums.parts_of(target)
-    folder = whole if shard == WHOLE else whole / "{}-of-{}".format(*shard)
+    whole, folder = checksums.parts_of(target), folder_of(target, shard)
     try:
         with locked(folder / _LOCK, lambda: _make(whole, folder)) as free:
             if not free:
@@ -278,6 +277,12 @@ def held(
         with contextlib.suppress(OSError):  # of a run that goes on, or with files of others
             folder.rmdir()
             whole.rmdir()
+
+
+def folder_of(target: Path, shard: Shard) -> Path:
+    """Folder of the parts of a run that is not done, or of one of its shards."""
+    whole = checksums.parts_of(target)
+    return whole if shard == WHOLE else whole / "{}-of-{}".format(*shard)
 
 
 @contextlib.contextmanager

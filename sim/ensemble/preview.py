@@ -294,19 +294,22 @@ def _run(plan: Plan) -> Rows:
     return rows
 
 
-def announced(plan: Plan, jobs: int | None, memory: float, shares: int = 1) -> tuple[int, list[str]]:
+def announced(
+    plan: Plan, jobs: int | None, memory: float, shard: tuple[int, int] = (1, 1), kept: Any = ()
+) -> tuple[int, list[str]]:
     """Processes of a run, of those wanted as many as ``memory`` [byte] holds, and what is said before it.
 
-    Of a long run, or one of several processes, that is how much it takes; kernels that are missing are compiled for it,
-    before these processes need them.
+    Of a long run, or one of several processes, that is how much it takes beside the parts that are ``kept`` of it;
+    kernels that are missing are compiled for it, before these processes need them.
     """
     wanted, said = jobs or usual_jobs(plan), [f"note: {text}" for text in remarks(plan)]
     if (jobs := bounds.fitting(plan, wanted, memory)) < wanted:
         said.append(f"note: there is memory for {jobs} of {wanted} processes")
     if not bounds.tabulated(plan):
         said.append("note: of so large a dataset `sim stats` prints the table")
-    if jobs > 1 or bounds.counted(plan) > _LONG:
-        found = bounds.takes(plan, jobs, tried(plan, compiling=True) or 1.0, shares)
+    left = 1.0 - sum(task.done(kept) for task in plan.share(*shard)) / work(plan, *shard) if kept else 1.0
+    if jobs > 1 or left * bounds.counted(plan) > _LONG:
+        found = bounds.takes(plan, jobs, tried(plan, compiling=True) or 1.0, shard[1], left)
         if jobs > 1 or found.clock > _LONG:
             room = f"{size(found.memory)} of memory, {size(found.disk)} of disk for a file of {size(found.file)}"
             said.append(f"{_times(found, jobs)}, {room}")

@@ -1,5 +1,6 @@
 """What a run takes: known before it starts, refused where there is no room, and bounded."""
 
+import itertools
 import json
 import math
 import resource
@@ -68,6 +69,18 @@ def test_a_run_has_as_many_processes_as_memory_holds_and_is_refused_where_it_hol
     assert any(bounds.size(needed[0]) in line for line in preview.preview(plan.scenario).splitlines())
     with pytest.raises(bounds.NoRoom, match="are allowed"):
         bounds.fitting(plan, 1, 0.4 * needed[0])
+
+
+def test_what_is_kept_of_a_run_that_goes_on_is_not_counted_again(monkeypatch):
+    plan = Plan.of(sample(2000, 50_000, record=Record(per_member=False)))
+    monkeypatch.setattr(preview, "tried", lambda plan, compiling: 1.0)
+    kept = {name for task in itertools.islice(plan.tasks(), 3) for name in task.names}
+    left = 1.0 - 3 * plan.group / plan.members
+    whole, rest = (bounds.takes(plan, 2, left=share) for share in (1.0, left))
+    assert rest.cpu < 0.9 * whole.cpu
+    assert preview._times(rest, 2) != preview._times(whole, 2)
+    assert preview.announced(plan, 2, math.inf)[1][-1].startswith(preview._times(whole, 2))
+    assert preview.announced(plan, 2, math.inf, kept=kept)[1][-1].startswith(preview._times(rest, 2))
 
 
 def test_a_dataset_in_memory_counts(monkeypatch):
