@@ -7,7 +7,7 @@ import contextlib
 import pickle
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from importlib.metadata import version
 from typing import Any
 
@@ -74,27 +74,17 @@ def share_out(
     Exception
         What the first block that fails has raised.
     """
-    try:
-        from distributed import CancelledError, Client, KilledWorker, wait  # heavy
-        from distributed.comm import CommClosedError, resolve_address
-    except ImportError:
-        raise BadInput(["--scheduler needs dask.distributed; install sliding-sim[cluster]"]) from None
-    try:
-        resolve_address(address)  # a client that fails at it is not closed within its patience
-        client = Client(address, timeout=_PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as trouble:
-        raise WorkerDied(f"no scheduler of dask answers at {address}: {trouble}") from None
     left, running, lost = list(tasks)[::-1], dict[Any, Task](), list[str]()
-    progress(sum(task.done(parts) for task in tasks))
-    with client, client.as_current():
+    with _client(address) as client:
+        from distributed import KilledWorker, wait
+
+        progress(sum(task.done(parts) for task in tasks))
         try:
             while True:
                 room = _AHEAD * max(1, sum(client.nthreads().values())) - len(running)
                 for _ in range(0 if stop() else min(room, len(left))):
                     task = left.pop()
-                    with warnings.catch_warnings():  # a state may be large
-                        warnings.filterwarnings("ignore", "Sending large graph")
-                        running[client.submit(_block, advance, *_order(parts, task), _code(), pure=False)] = task
+                    running[_submitted(client, advance, parts, task)] = task
                 if not running:
                     break
                 with contextlib.suppress(TimeoutError):
@@ -110,12 +100,37 @@ def share_out(
                     progress(task.work[task.names.index(name)])
                     if name != task.names[-1]:
                         left.append(task)
-        except (CancelledError, CommClosedError):
-            raise WorkerDied(f"the scheduler at {address} went away; what is computed is kept") from None
         finally:
             client.cancel(list(running))
     if lost:
         raise WorkerDied(f"workers died again and again at {'; '.join(lost)}; the rest is done and kept")
+
+
+@contextlib.contextmanager
+def _client(address: str) -> Iterator[Any]:
+    """A context with the client of a scheduler, in which it is said that the scheduler went away."""
+    try:
+        from distributed import CancelledError, Client  # heavy
+        from distributed.comm import CommClosedError, resolve_address
+    except ImportError:
+        raise BadInput(["--scheduler needs dask.distributed; install sliding-sim[cluster]"]) from None
+    try:
+        resolve_address(address)  # a client that fails at it is not closed within its patience
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as trouble:
+        raise WorkerDied(f"no scheduler of dask answers at {address}: {trouble}") from None
+    with client, client.as_current():
+        try:
+            yield client
+        except (CancelledError, CommClosedError):
+            raise WorkerDied(f"the scheduler at {address} went away; what is computed is kept") from None
+
+
+def _submitted(client: Any, advance: Advance, parts: Parts, task: Task) -> Any:
+    """The future of the next block of a task."""
+    with warnings.catch_warnings():  # a state may be large
+        warnings.filterwarnings("ignore", "Sending large graph")
+        return client.submit(_block, advance, *_order(parts, task), _code(), pure=False)
 
 
 def _order(parts: Parts, task: Task) -> tuple[bytes, set[str], dict[str, Arrays]]:

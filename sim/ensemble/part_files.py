@@ -124,13 +124,8 @@ class PartFiles:
             content = read_whole(self.path(name))
         try:
             found = _arrays(content) if _sound(content) else None
-        except (
-            ValueError,
-            TypeError,
-            AttributeError,
-            RecursionError,
-        ):  # of others: a sum that fits, of what no run has written
-            found = None
+        except (ValueError, TypeError, AttributeError, RecursionError):
+            found = None  # of others: a sum that fits, of what no run has written
         if found is None:
             raise StoreTrouble(f"{self.path(name)} is damaged; go on with --resume, which computes it anew")
         yield from found.items()
@@ -159,7 +154,19 @@ class PartFiles:
         self, target: Path, wanted: Manifest, source: Manifest, resume: bool, replace: bool,
         read: Callable[[Path], Manifest],
     ) -> bool:  # fmt: skip
-        """Take up a run or begin one, where that is what was asked for; gives whether the output is there already."""
+        """Take up a run or begin one, where that is what was asked for; gives whether the output is there already.
+
+        ============  ===========================================  ===========  =======
+        there is      ``resume``                                   ``replace``  neither
+        ============  ===========================================  ===========  =======
+        nothing       begins                                       begins       begins
+        an output     True if of this run, else refused            begins       refused
+        parts         goes on if they are of this run, else        begins anew  refused
+                      refused
+        both          goes on as with parts, where these were      begins anew  refused
+                      begun to replace the output or it is theirs
+        ============  ===========================================  ===========  =======
+        """
         _refuse_foreign(target)
         folder, older, there = self.folder, manifest_of(self.folder), target.exists()
         run = read(target) if resume and there else {}

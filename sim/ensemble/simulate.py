@@ -229,10 +229,8 @@ def _record(
 def _read(variable: Variable, point: Scenario, course: Course) -> np.ndarray:
     """A recorded quantity, nan once nothing has held the body any longer; a flag or a count, without symbol, stays."""
     values = variable.read(point, course)
-    if (
-        not (point.varies["drive"] and point.varies[variable.part] and variable.symbol)
-        or variable.name == "runaway_time"
-    ):
+    ends = point.varies["drive"] and point.varies[variable.part] and variable.symbol
+    if not ends or variable.name == "runaway_time":
         return cast(np.ndarray, values)
     return np.where(np.isnan(course.driven[..., READINGS.index("runaway_time")]), values, np.nan)
 
@@ -246,11 +244,8 @@ def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
     maps = process.maps(cast(Fluctuation, state.shear), np.broadcast_to(state.drive.position, drawn), drawn)
     if point.margin is None:
         return {MAP[0]: maps}
-    solid, found, (square, cell) = (
-        point.solid.effective,
-        (state.contact.radius, state.bonding.stress),
-        process.centred(maps),
-    )
+    solid, (square, cell) = point.solid.effective, process.centred(maps)
+    found = state.contact.radius, state.bonding.stress
     radius, stress = (np.broadcast_to(values, max(len(values), drawn))[:drawn] for values in found)
     radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
     own = disc_energy_of_map(square, cell, radius, *solid)
