@@ -1,5 +1,6 @@
 """The engine: restart, batch and recording leave every bit as it was; parts know nothing of each other."""
 
+import heapq
 import itertools
 import math
 
@@ -38,8 +39,12 @@ def covering():
     numbers, cases = {}, every(*DEPTHS)
     masks = [sum(1 << numbers.setdefault(pair, len(numbers)) for pair in pairs_of(case)) for case in cases]
     chosen, left = [], (1 << len(numbers)) - 1
+    queue = [(-mask.bit_count(), i) for i, mask in enumerate(masks)]  # by how many there were: there are never more
+    heapq.heapify(queue)
     while left:
-        best = max(range(len(cases)), key=lambda i: (masks[i] & left).bit_count())
+        while (now := -(masks[queue[0][1]] & left).bit_count()) != queue[0][0]:
+            heapq.heapreplace(queue, (now, queue[0][1]))
+        best = queue[0][1]
         chosen.append(cases[best])
         left &= ~masks[best]
     return chosen

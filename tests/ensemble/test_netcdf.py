@@ -233,7 +233,7 @@ def test_a_swept_key_may_keep_one_value():
 
 
 def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
-    scenarios = [sample(members=2, seed=seed) for seed in range(8)]
+    scenarios = [sample(members=2, seed=seed) for seed in range(4)]
     alone = [ensemble.run(scenario) for scenario in scenarios]
 
     def whole(number):
@@ -241,7 +241,7 @@ def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
             return ensemble.run(scenarios[number]), dataset.load()
 
     with ThreadPoolExecutor(4) as pool:
-        for expected, found in zip(alone, pool.map(whole, range(8)), strict=True):
+        for expected, found in zip(alone, pool.map(whole, range(4)), strict=True):
             for dataset in found:
                 xr.testing.assert_identical(dataset, expected)
 

@@ -85,7 +85,7 @@ def killed(operation, scenario, path, **how):
         os._exit(status)
 
 
-@pytest.mark.parametrize("some", [7, pytest.param(1, marks=pytest.mark.verify)])
+@pytest.mark.parametrize("some", [13, pytest.param(1, marks=pytest.mark.verify)])
 def test_a_run_that_was_killed_at_a_file_operation_goes_on_to_the_same_bytes(tmp_path, monkeypatch, some):
     if some > 1:  # the last file in this process, which is quicker
         monkeypatch.setattr("sim.ensemble.netcdf.in_process", lambda work, *arguments: work(*arguments))

@@ -48,7 +48,7 @@ def test_merged_shards_are_the_bytes_of_an_undivided_run(tmp_path, whole):
         with pytest.raises(Stopped, match="lacks") if done else pytest.raises(BadInput, match="there are no shards"):
             merge(path)
         done.append([])
-        ensemble.run(sample(), path, shard=(number, 3), jobs=number, progress=done[-1].append)
+        ensemble.run(sample(), path, shard=(number, 3), jobs=1 + number // 3, progress=done[-1].append)
     assert not path.exists()
     assert [sum(one) for one in done] == [plans.work(Plan.of(sample()), number, 3) for number in (3, 1, 2)]
     assert merge(path).read_bytes() == whole

@@ -1,5 +1,6 @@
 """The contact in scenes: what holds it in time, pull-off and return, dissipation, masking, discs, shares paid."""
 
+import functools
 import math
 from dataclasses import replace
 from fractions import Fraction
@@ -552,17 +553,23 @@ SPECTRA = {
 }
 
 
+@functools.cache
+def margin_of(name):
+    """What a disc pays of a spectrum, made once for all tests."""
+    return Margin(SPECTRA[name][0], 1.6e6, 0.5, 2e-3)
+
+
 @pytest.mark.parametrize("name", SPECTRA)
 def test_the_share_that_a_disc_pays_is_its_marginal_energy(name):
     spectrum, claim = SPECTRA[name]
     radius = 2e-3 * 10.0 ** np.random.default_rng(3).uniform(-4.0, 0.0, 60)
     exact = marginal_energy(spectrum, radius, 1.6e6, 0.5) / float(spectrum.surface_energy(1.6e6, 0.5))
-    assert_allclose(Margin(spectrum, 1.6e6, 0.5, 2e-3)(radius), exact, rtol=0.0, atol=claim)
+    assert_allclose(margin_of(name)(radius), exact, rtol=0.0, atol=claim)
 
 
 @pytest.mark.parametrize("name", SPECTRA)
 def test_the_share_in_compiled_loops_is_that_of_the_margin(name):
-    margin = Margin(SPECTRA[name][0], 1.6e6, 0.5, 2e-3)
+    margin = margin_of(name)
     radius = 2e-3 * 10.0 ** np.random.default_rng(5).uniform(-5.0, 0.3, 100)
     shares = [share_of(one, *margin.terms) for one in radius.tolist()]
     # the place of a radius among 512 pieces of slope below 1 has 512 times the rounding of ln a
