@@ -31,6 +31,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # what a function needs is imported where it is called, so that importing the package costs nothing
     import pandas
     import xarray
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
     from sim.scenario.scenario import Scenario
@@ -141,17 +142,43 @@ def plot(
     kind: str | None = None,
     to: Path | None = None,
     where: dict[str, Any] | None = None,
-) -> "Figure":
+    *,
+    ax: "Axes | None" = None,
+    **choices: Any,
+) -> "Figure | Axes":
     """Draw a figure of a run, of the kind that fits or one of ``sim.plots.KINDS``, and save it if ``to`` is a file.
 
-    ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
-    """
-    from sim.plots.kinds import draw, save
+    Parameters
+    ----------
+    dataset : xarray.Dataset or path
+        As ``run`` makes it.
+    kind : str, optional
+        Name of the kind; without it the one that fits.
+    to : path, optional
+        The picture: PNG, PDF or SVG.
+    where : dict, optional
+        Values of swept keys, ``{"contact.load": "4 mN"}``.
+    ax : matplotlib.axes.Axes, optional
+        Axes in which the first panel is drawn, in place of a figure of its own.
+    **choices
+        ``member=3``, ``at="1.3 s"``, ``x="slider_position"``, ``absolute=True``, ``units=["mm/s"]``,
+        ``data="measured.csv"``: see ``sim.plots.Choices``; ``KINDS[kind].takes`` says which of them a kind takes.
 
-    figure = _plainly(lambda found: draw(found, kind), dataset, where)
+    Returns
+    -------
+    matplotlib.figure.Figure or matplotlib.axes.Axes
+        The figure, whose ``axes`` are its panels, or the axes given.
+    """
+    from sim.plots.choices import Choices
+    from sim.plots.kinds import draw, save
+    from sim.units.refusals import BadInput
+
+    if unknown := choices.keys() - {*Choices._fields}:
+        raise BadInput([f"{sorted(unknown)[0]}: is no choice of a figure; there are: {', '.join(Choices._fields)}"])
+    figure = _plainly(lambda found: draw(found, kind, Choices(ax=ax, **choices)), dataset, where)
     if to is not None:
         save(figure, pathlib.Path(to))
-    return figure
+    return figure if ax is None else ax
 
 
 def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str = "60 s") -> "xarray.Dataset":

@@ -3,7 +3,6 @@
 import atexit
 import contextlib
 import gc
-import math
 import signal
 import sys
 import time
@@ -120,14 +119,8 @@ def run(
     from sim.scenario.reader import load
 
     announce_compiling(quiet)
-    until = time.monotonic() + (
-        math.inf if max_time is None else options.quantity(max_time, "--max-time", "s", above=0, typical="8 h")
-    )
-    memory = (
-        math.inf
-        if max_memory is None
-        else options.quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
-    )
+    until = time.monotonic() + options.quantity(max_time, "--max-time", "s", above=0, typical="8 h")
+    memory = options.quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
     with named("making modes and bands of the fluctuations", quiet):
         scene = load(scenario, options.overrides(changes, seed, members), option="--set")
     if force and resume:
@@ -251,27 +244,35 @@ class _Plot(click.Command):
         from sim.plots.kinds import KINDS
 
         with formatter.section("Kinds"):
-            formatter.write_dl([(name, kind.shows) for name, kind in KINDS.items()])
+            formatter.write_dl([(name, kind.help) for name, kind in KINDS.items()])
 
 
 @cli.command(cls=_Plot)
 @click.argument("output", type=_PATH)
 @click.argument("kind", required=False)
-@click.option("-o", "--picture", type=_PATH, help="The picture; default beside the dataset.")
+@click.option("-o", "--picture", "to", type=_PATH, help="The picture; default beside the dataset.")
 @_WHERE
+@click.option("--member", type=click.IntRange(0), help="Only this member of the ensemble, the first is 0.")
+@click.option("--at", metavar="TIME", help="The record or map nearest to this time, such as 1.3 s.")
+@click.option("--x", default="", metavar="NAME", help="What it is drawn over: t, speed, any variable, a swept key.")
+@click.option("--absolute", is_flag=True, help="Areas in place of shares.")
+@click.option("--units", multiple=True, metavar="UNIT", help="Unit of axes of its dimension, such as mm/s.")
+@click.option("--data", type=_PATH, help="Measured points from a CSV of columns as those of `sim fit`.")
 @_FORCE
-def plot(output: Path, kind: str | None, picture: Path | None, chosen: tuple[str, ...], force: bool) -> None:
+def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...], force: bool, **choices: Any) -> None:
     """Draw a figure: of a KIND, or without one the first of these kinds that fits the dataset.
 
-    Of a scenario, OUTPUT.toml, that of its spectrum before any run.
+    Of a scenario, OUTPUT.toml, that of its spectrum before any run. Any kind takes --where, --member and --units, those
+    below what stands beside them.
     """
     from sim.plots import kinds as plots
 
+    given = plots.Choices(**choices)
     if output.suffix == ".toml":
-        say(str(plots.planned(output, kind, picture, force)))
+        say(str(plots.planned(output, kind, to, force, [*given.given, *chosen])))
         return
     with _opened(output, chosen) as dataset:
-        say(str(plots.drawn(dataset, kind, output, picture, force)))
+        say(str(plots.drawn(dataset, kind, output, to, force, given)))
 
 
 @cli.command()

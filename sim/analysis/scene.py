@@ -148,9 +148,9 @@ def _there(dataset: xr.Dataset, key: str) -> bool:
     return False
 
 
-def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool) -> None:
-    """Refuse a file to be made of the dataset at ``path``; errors as of ``files.claim``."""
-    files.claim(target, replace, [path], guard=functools.partial(_guard, dataset))
+def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others: Path) -> None:
+    """Refuse a file to be made of the dataset at ``path`` and ``others``; errors as of ``files.claim``."""
+    files.claim(target, replace, [path, *others], guard=functools.partial(_guard, dataset))
 
 
 def _guard(dataset: xr.Dataset, path: Path) -> None:

@@ -1,6 +1,8 @@
 """Statistics of a dataset as curves: over time, or over a swept key, one for each other point of the sweep."""
 
 import contextlib
+import difflib
+from math import prod
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -13,13 +15,14 @@ from matplotlib.figure import Figure
 from sim.analysis import averaging, bond_work, is_stationary, is_steady, settled, summary, sweep_dims
 from sim.analysis.observables import all_observables
 from sim.analysis.over_speed import speed_dim
+from sim.plots.measured import Compared, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
 
 #: Different points up to which each carries a marker.
 MARKED = 25
 
-#: Curves that a figure holds at most: named in a legend, and along a colour bar.
-NAMED, MOST = 10, 20
+#: Curves that a panel holds at most: named in a legend, and along a colour bar; and columns of panels.
+NAMED, MOST, COLUMNS = 10, 20, 4
 
 #: Zero while the contact is open: lines break there.
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
@@ -52,9 +55,10 @@ class Line(NamedTuple):
 class Scene(NamedTuple):
     """Statistics laid out for panels: along time or a swept key, one curve for each other point of the sweep.
 
-    ``x`` has shape (curves, points), in the unit of the axis, which has ``words`` and a ``scale``. Points that are
-    categories are not ``joined``; where the speed jumps lines are ``broken``. ``averaged`` is what the curves are
-    means over, in words; ``bar`` a colour bar with its label, in place of the names of many curves.
+    ``x`` has shape (curves, points), in the unit of the axis, which has ``words`` and a ``scale``, and is the variable
+    ``over``. Points that are categories are not ``joined``; where the speed jumps lines are ``broken``. ``averaged`` is
+    what the curves are means over, in words; ``bar`` a colour bar with its label, in place of the names of many curves;
+    ``columns`` the curves of each column of panels, by what they have in common.
     """
 
     found: xr.Dataset
@@ -63,6 +67,10 @@ class Scene(NamedTuple):
     averaged: str
     spread: str
     bar: tuple[ScalarMappable, str] | None = None
+    columns: tuple[tuple[str, list[Line]], ...] = ()
+    over: str = ""
+    heading: str = ""
+    measured: Measured | None = None
     x: np.ndarray = np.empty((0, 0))
     unit: Unit = Unit(1.0, "")
     words: str = ""
@@ -82,18 +90,20 @@ class Scene(NamedTuple):
 
     @property
     def title(self) -> str:
-        """Words for what several curves are means over; a single one says so itself."""
-        return "" if self.single else self.averaged
+        """A heading, or words for what several curves are means over; a single one says so itself."""
+        return self.heading or ("" if self.single else self.averaged)
 
-    def placed(self, x: np.ndarray, words: str, si: str, scale: str = "linear", broken: bool = False) -> "Scene":
-        """With x values [SI], (points,) the same for all curves or (curves, points), and the words of their axis."""
+    def placed(
+        self, over: str, x: np.ndarray, words: str, si: str, scale: str = "linear", broken: bool = False
+    ) -> "Scene":
+        """With values [SI] of a variable along x, (points,) for all curves or (curves, points), and the axis' words."""
         unit = Unit.of(x, si, scale == "log")
         x = np.broadcast_to(unit.factor * x, (len(self.lines), self.found.sizes[self.along]))
-        return self._replace(x=x, unit=unit, words=unit.label(words), scale=scale, broken=broken)
+        return self._replace(over=over, x=x, unit=unit, words=unit.label(words), scale=scale, broken=broken)
 
     def apart(self) -> "Scene":
         """With points that are categories, the curves of each side by side."""
-        shift = (np.arange(len(self.lines)) - 0.5 * (len(self.lines) - 1)) * self.category
+        shift = (np.arange(len(self.lines)) % self.abreast - 0.5 * (self.abreast - 1)) * self.category
         return self._replace(x=self.x + shift[:, None], joined=False)
 
     def middle(self) -> "Scene":
@@ -103,12 +113,23 @@ class Scene(NamedTuple):
     @property
     def category(self) -> float:
         """Width of a curve's place within a category."""
-        return _CATEGORY / len(self.lines)
+        return _CATEGORY / self.abreast
+
+    @property
+    def abreast(self) -> int:
+        """Curves of a panel."""
+        return len(self.columns[0][1] if self.columns else self.lines)
 
     def look(self, style: Any) -> dict[str, Any]:
         """A line style, or the marker that stands for it where points are not joined."""
         marks = {"linestyle": "none", "marker": _MARKS[style], "markersize": 3.5}
         return {"linestyle": style} if self.joined else marks
+
+    @property
+    def reach(self) -> np.ndarray:
+        """Places on the x axis of all that is drawn, curves and measured points."""
+        points = self.measured.column(self.over) if self.measured else None
+        return self.x if points is None else np.append(self.x, self.unit.factor * points.values)
 
     def opened(self, line: Line) -> np.ndarray:
         """True where the contacts of all members are open."""
@@ -130,6 +151,11 @@ class Scene(NamedTuple):
         """Statistics of all curves, shape (statistics * curves, points)."""
         return np.stack([self.values(name, line) for name in names for line in self.lines])
 
+    def extent(self, *names: str) -> np.ndarray:
+        """Statistics of the curves of all columns of panels."""
+        lines = [line for _, own in self.columns for line in own] or self.lines
+        return self._replace(lines=lines).all(*names)
+
     def drawn(self, name: str, line: Line) -> list[np.ndarray]:
         """Mean, its standard error, and both sides of the band; nan where there is no contact that it is of.
 
@@ -144,7 +170,7 @@ class Scene(NamedTuple):
 
     def parted(self, line: Line, *several: np.ndarray) -> list[np.ndarray]:
         """The x values of a curve and values over them, with a nan in each where lines break."""
-        at = jumps(self.speeds(line)) if self.broken else ()
+        at = jumps(self.speeds(line), self.over == "speed") if self.broken else ()
         return [np.insert(values, at, np.nan) for values in (self.x[line.number], *several)]
 
     def speeds(self, line: Line) -> np.ndarray:
@@ -162,15 +188,15 @@ class Scene(NamedTuple):
     def distinct(self, name: str) -> list[Line]:
         """Curves that do not lie on an earlier one."""
         values = [self.values(f"{name}_mean", line).tobytes() for line in self.lines]
-        return [line for line, own in zip(self.lines, values, strict=True) if values.index(own) == line.number]
+        return [line for k, (line, own) in enumerate(zip(self.lines, values, strict=True)) if values.index(own) == k]
 
     def varies(self, name: str) -> bool:
         """True if the observable is there and changes along the axis or between the curves."""
-        return _changes(self.all(f"{name}_mean"))
+        return _changes(self.extent(f"{name}_mean"))
 
     def moves(self, name: str) -> bool:
         """True if the observable changes along the axis."""
-        return any(_changes(values) for values in self.all(f"{name}_mean"))
+        return any(_changes(values) for values in self.extent(f"{name}_mean"))
 
 
 def _changes(values: np.ndarray) -> bool:
@@ -178,16 +204,20 @@ def _changes(values: np.ndarray) -> bool:
     return known.size > 0 and bool(np.ptp(known) > 1e-12 * np.max(np.abs(known)))
 
 
-def jumps(speed: np.ndarray) -> np.ndarray:
+def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
     """Records before which the speed has jumped: its change stands out from those before and after.
+
+    With ``turns`` also those before which it has changed its sign.
 
     >>> jumps(np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]))
     array([3])
-    >>> jumps(np.geomspace(1e-5, 1e-1, 5))
-    array([], dtype=int64)
+    >>> jumps(np.array([2.0, 1.0, -1.0, -2.0])), jumps(np.array([2.0, 1.0, -1.0, -2.0]), turns=True)
+    (array([], dtype=int64), array([2]))
     """
     change = np.abs(np.diff(speed))
-    return np.flatnonzero(change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:])) + 2
+    jumped = np.append(False, change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:]))
+    turned = (speed[1:] * speed[:-1] < 0.0) & turns
+    return np.flatnonzero(np.pad(jumped, (0, change.size - jumped.size)) | turned) + 1
 
 
 def scene_along(dataset: xr.Dataset, along: str) -> Scene:
@@ -196,36 +226,60 @@ def scene_along(dataset: xr.Dataset, along: str) -> Scene:
     Along the sweep they are of the means over the second half of the run where neither speed nor control change,
     else of the last record.
     """
-    lines, bar = _lines_of(dataset, [name for name in sweep_dims(dataset) if name != along])
+    columns, bar, some = _columns_of(dataset, [name for name in sweep_dims(dataset) if name != along])
+    lines = [line for _, own in columns for line in own]
     late, stated = along != "t" and is_stationary(dataset), all_observables(dataset)
     with contextlib.suppress(KeyError):
         stated["bond_work"] = bond_work(dataset)
     if along != "t":
         stated = (settled(stated) if late else stated.isel(t=slice(-1, None))).isel(t=0, drop=True)
     found = summary(stated)
-    words = averaging(dataset, late)
+    words = "; ".join(filter(None, [averaging(dataset, late), some]))
     if len(lines) == 1:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
     spread = "5–95 % of members" if "contact_radius_quantile" in found else "± 1 std. dev. of members"
-    return Scene(found, along, lines, words, f"{spread}' means" if late else spread, bar)
+    return Scene(found, along, lines, words, f"{spread}' means" if late else spread, bar, columns[1:] and columns)
 
 
-def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[ScalarMappable, str] | None]:
-    """One curve for each point of some dimensions, and a colour bar where they are many along one number."""
-    points = [dict(zip(dims, at, strict=True)) for at in np.ndindex(*(dataset.sizes[name] for name in dims))]
-    dims = [name for name in dims if dataset.sizes[name] > 1]
-    count, bar, shades = len(points), None, list(LINES)
-    names = [", ".join(swept_value(dataset, name, at[name]) for name in dims) for at in points]
-    keyed = count > len(LINES) and len(dims) == 1 and dataset[dims[0]].dtype.kind in "fi"
-    if count > (MOST if keyed else NAMED):
-        sizes = " × ".join(f"{dataset.sizes[name]} of {name}" for name in dims)
-        raise ValueError(f"{count} curves ({sizes}) are too many to tell apart; {choice(dataset, dims[0])}")
+def _columns_of(
+    dataset: xr.Dataset, dims: list[str]
+) -> tuple[tuple[tuple[str, list[Line]], ...], tuple[ScalarMappable, str] | None, str]:
+    """Columns of panels, each with its curves, one for each point of some dimensions of the sweep.
+
+    Also a colour bar where the curves are many along one number, and what is said of those that are left out. Of two
+    dimensions or more with many points that of fewer values makes columns.
+    """
+    fixed = {name: 0 for name in dims if dataset.sizes[name] == 1}
+    sizes = {name: dataset.sizes[name] for name in dims if name not in fixed}
+    apart = min(sizes, key=lambda name: sizes[name]) if len(sizes) > 1 and prod(sizes.values()) > len(LINES) else ""
+    places = _spread(sizes.pop(apart), COLUMNS) if apart else [0]
+    points = [dict(zip(sizes, at, strict=True)) for at in np.ndindex(*sizes.values())]
+    keyed = [name for name in sizes if len(sizes) == 1 and len(points) > len(LINES) and _is_number(dataset[name])]
+    drawn = _spread(len(points), MOST if keyed else NAMED)
+    shades, bar = list(LINES), None
     if keyed:
-        bar, shades = _bar(dataset[dims[0]])
-        names = [""] * count
-    elif count > len(LINES):
-        shades = [mpl.colors.to_hex(shade) for shade in mpl.colormaps["turbo"](np.linspace(0.05, 0.95, count))]
-    return [Line(k, points[k], names[k], shades[k]) for k in range(count)], bar
+        bar, shades = _bar(dataset[keyed[0]])
+    elif len(drawn) > len(LINES):
+        shades = [mpl.colors.to_hex(shade) for shade in _shades()(np.linspace(0.0, 1.0, len(points)))]
+    columns: list[tuple[str, list[Line]]] = []
+    for place in places:
+        common, lines = {apart: place} if apart else {}, list[Line]()
+        for k in drawn:
+            words = "" if keyed else ", ".join(swept_value(dataset, name, at) for name, at in points[k].items())
+            lines.append(Line(len(columns) * len(drawn) + len(lines), fixed | common | points[k], words, shades[k]))
+        columns.append((swept_value(dataset, apart, place) if apart else "", lines))
+    left = {"columns": (len(places), dataset.sizes[apart] if apart else 1), "curves": (len(drawn), len(points))}
+    some = [f"{few} of {many} {what} drawn" for what, (few, many) in left.items() if few < many]
+    return tuple(columns), bar, ", ".join(some) and f"{', '.join(some)} (--where draws others)"
+
+
+def _spread(count: int, most: int) -> list[int]:
+    """At most so many places of a count, evenly spread from the first to the last."""
+    return [int(at) for at in np.rint(np.linspace(0, count - 1, min(count, most)))]
+
+
+def _is_number(key: xr.DataArray) -> bool:
+    return key.dtype.kind in "fi"
 
 
 def choice(dataset: xr.Dataset, dim: str) -> str:
@@ -241,10 +295,14 @@ def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
     unit = Unit.of(values, key.attrs.get("units", "1"), logarithmic)
     values = unit.factor * values
     norm = (mpl.colors.LogNorm if logarithmic else mpl.colors.Normalize)(values.min(), values.max())
-    shades = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
-    colours = ScalarMappable(norm, shades)
+    colours = ScalarMappable(norm, _shades())
     words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
     return (colours, unit.label(words)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
+
+
+def _shades() -> mpl.colors.Colormap:
+    """Colours of many curves, none too light for paper."""
+    return mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
 
 
 def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
@@ -269,7 +327,9 @@ def curve(
         panel.vlines(x, low, high, linewidth=5.0, **shade)
     dots: Any = {"marker": "o", "markersize": 2.6} if scene.marked else {}
     width = {"linewidth": _UNDERNEATH} if wide and scene.joined else {}
-    panel.plot(x, mean, color=colour, label=label, **(dots | scene.look(style) | width))
+    panel.plot(
+        x, mean, color=colour, label=label if np.any(np.isfinite(mean)) else "", **(dots | scene.look(style) | width)
+    )
     if scene.along == "t":
         fill(panel, x, mean - sem, mean + sem, color=colour, alpha=0.45)
     elif np.any(sem > 0.0):
@@ -282,8 +342,23 @@ def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
         curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread, wide=wide)
         if name in _OF_CONTACT:
             mark_jumps(panel, scene, name, line, factor)
+    beside(panel, scene, name, factor)
     if name in _OF_CONTACT and all(np.all(scene.opened(line)) for line in scene.lines):
         panel.text(0.5, 0.5, "the contact is open", transform=panel.transAxes, ha="center", va="center", fontsize=7)
+
+
+def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
+    """Measured points beside the curves of a variable, if there are any."""
+    if scene.measured:
+        curves = [_compared(scene, name, line, factor) for line in scene.lines]
+        scene.measured.draw(panel, (scene.over, scene.unit.factor), (name, factor), curves, scene.scale == "log")
+
+
+def _compared(scene: Scene, name: str, line: Line, factor: float) -> Compared:
+    """A curve as measured points are compared with it."""
+    mean, error = (factor * values for values in scene.drawn(name, line)[:2])
+    full = np.pi * scene.values("jkr_radius_mean", line) ** 2
+    return Compared(line.number, line.point, line.colour, scene.x[line.number], mean, error, full)
 
 
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, named: bool = True) -> None:
@@ -299,4 +374,52 @@ def over_speed(dataset: xr.Dataset) -> Scene:
     scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
     speeds = np.stack([scene.speeds(line) for line in scene.lines])
     words = "speed of the stage $V$" if "stage_speed" in dataset else "sliding speed $V$"
-    return scene.placed(speeds, words, "m/s", axis_scale(speeds), broken=scene.along == "t")
+    return scene.placed("speed", speeds, words, "m/s", axis_scale(speeds), broken=scene.along == "t")
+
+
+def over_time(dataset: xr.Dataset) -> Scene:
+    """Statistics over time."""
+    return scene_along(dataset, "t").placed("t", dataset["t"].to_numpy(), "time $t$", "s")
+
+
+def over_key(dataset: xr.Dataset, name: str) -> Scene:
+    """Statistics over a swept key, whose values are numbers or categories."""
+    key, scene = dataset[name], scene_along(dataset, name)
+    words = f"{key.attrs.get('long_name', name).partition(',')[0]} {symbol(key)}".strip()
+    if not _is_number(key):
+        return scene.placed(name, np.arange(key.size, dtype=float), words, "1").apart()
+    values = key.to_numpy().astype(float)
+    return scene.placed(name, values, words, key.attrs["units"], axis_scale(values))
+
+
+def over(dataset: xr.Dataset, name: str) -> Scene:
+    """Statistics over time, the speed, a swept key or anything else recorded of time.
+
+    Raises
+    ------
+    ValueError
+        If there is no such variable, with those there are.
+    """
+    swept = [dim for dim in sweep_dims(dataset) if dataset.sizes[dim] > 1]
+    keys = [dim for dim in swept if dim == name.replace(".", "_") or dim.endswith(f"_{name}")]
+    name = _PLAIN.get(name, name)
+    if name == "speed":
+        return over_speed(dataset)
+    if len(keys) == 1:
+        return over_key(dataset, keys[0])
+    if name == "t":
+        return over_time(dataset)
+    scene = scene_along(dataset, "t")
+    known = [key.removesuffix("_mean") for key in map(str, scene.found) if key.endswith("_mean")]
+    if name not in known:
+        near = difflib.get_close_matches(name, [*known, *swept], 1, 0.6)
+        cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *sorted(known)])}"
+        raise ValueError(f'nothing can be drawn over "{name[:40]}"; {cure}')
+    about = scene.found[f"{name}_std"].attrs
+    words = about.get("long_name", name).partition(" of ")[2].partition(",")[0]
+    words = f"{words} {symbol(scene.found[f'{name}_mean'])}".strip()
+    return scene.placed(name, scene.all(f"{name}_mean"), words, about["units"], broken=True)
+
+
+#: Other words for variables that figures are drawn over.
+_PLAIN = {"time": "t", "load": "normal_load", "travel": "displacement", "drive.speed": "speed"}

@@ -34,19 +34,20 @@ def needs_maps(dataset: xr.Dataset) -> None:
         raise ValueError('there are no stress maps; record some: [shear] model = "mapped" and [record] maps = ["1 s"]')
 
 
-def _maps_of(dataset: xr.Dataset, at: dict[str, int]) -> xr.DataArray:
-    """The last maps at a point of the sweep, those of all members that have them."""
-    return dataset["shear_map"].isel(at).isel(map_time=-1).transpose("map_member", "x", "y")
+def _maps_of(dataset: xr.Dataset, point: dict[str, int], at: float | None) -> xr.DataArray:
+    """The last maps at a point of the sweep, or those nearest to a time [s], of all members that have them."""
+    number = -1 if at is None else int(np.abs(dataset["map_time"].to_numpy() - at).argmin())
+    return dataset["shear_map"].isel(point).isel(map_time=number).transpose("map_member", "x", "y")
 
 
-def map_figure(dataset: xr.Dataset) -> Figure:
-    """The last stress map of the first member and the displacement that it makes."""
-    at, point = style.first_point(dataset)
-    stress = _maps_of(dataset, at).isel(map_member=0)
+def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
+    """The last stress map of a member, or that nearest to a time, and the displacement that it makes."""
+    where, point = style.first_point(dataset)
+    stress = _maps_of(dataset, where, at).isel(map_member=0)
     sides, measured = _lattice_of(stress).sides, bool(word(dataset, "shear.field.file", ""))
-    modulus, ratio = (style.number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
+    modulus, ratio = (style.number_at(dataset[f"effective_{n}"], where) for n in ("shear_modulus", "poisson_ratio"))
     moved = displacement(stress.to_numpy(), sides, modulus, ratio)
-    radius, speed = (float(_then(dataset, name, at, stress)) for name in ("contact_radius", "speed"))
+    radius, speed = (float(_then(dataset, name, where, stress)) for name in ("contact_radius", "speed"))
     figure, axes = style.pairs(3.1, shared=True)
     length = style.Unit.of(np.array(sides), "m")
     sizes = length.factor * sides[0], length.factor * sides[1], length.factor * radius
@@ -161,17 +162,17 @@ def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
     return density
 
 
-def spectrum_figure(dataset: xr.Dataset) -> Figure:
-    """Power spectrum of the last stress maps: target, discretised on the cell, and realised."""
-    at, point = style.first_point(dataset)
-    stress = _maps_of(dataset, at)
+def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
+    """Power spectrum of the stress maps of one time: target, discretised on the cell, and realised."""
+    where, point = style.first_point(dataset)
+    stress = _maps_of(dataset, where, at)
     if not np.any(stress.to_numpy()):
-        raise ValueError("the last map holds no stress; record one where fluctuations have grown")
+        raise ValueError("the map holds no stress; record one where fluctuations have grown")
     if word(dataset, "shear.spectrum.model", "") == "bonds":
         raise ValueError("the field that bonds make follows them, without a spectrum of its own; draw the kind map")
     if word(dataset, "shear.field.file", ""):
         raise ValueError("a measured map has no spectrum to follow; `sim plot` of the scenario draws its own")
-    (spectrum, raised, name), grid = _target(dataset, stress, at), _grid_of(stress)
+    (spectrum, raised, name), grid = _target(dataset, stress, where), _grid_of(stress)
     expected = raised * radial_average(mode_density(modes(spectrum, grid.cell, grid.points), grid), grid).density
     rings = [radial_average(density, grid) for density in periodogram(stress.to_numpy(), grid.cell)]
     fine = np.geomspace(0.4 * rings[0].q[0], rings[0].q[-1], 2000)
@@ -195,7 +196,8 @@ def spectrum_figure(dataset: xr.Dataset) -> Figure:
     panel.set_ylabel("spectral density $C$ (Pa² m²)")
     if np.max(measured) < 100.0 * np.min(measured):
         style.plain_ticks(panel.yaxis)
-    style.legend(panel, point)
+    then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}"
+    style.legend(panel, ", ".join(filter(None, [point, then])))
     below.axhline(1.0, color=style.FLUCTUATIONS)
     below.errorbar(q, measured / expected, error / expected, **dots)
     below.set_ylabel("realised/discretised")

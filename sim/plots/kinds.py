@@ -3,7 +3,9 @@
 ``draw`` gives a matplotlib Figure with a canvas of its own: nothing here needs a display or touches pyplot.
 """
 
-from collections.abc import Callable
+import contextlib
+import inspect
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,8 +16,9 @@ from matplotlib.figure import Figure
 from sim.analysis import sweep_dims
 from sim.analysis.scene import answered, claim, of_dataset
 from sim.numerics.files import claim as claim_file, output
-from sim.plots import panels, slider
+from sim.plots import panels, slider, style
 from sim.plots.bond_laws import rest_of
+from sim.plots.choices import Choices
 from sim.plots.field import density_figure, map_figure, needs_maps, spectrum_figure
 from sim.plots.loop import loop_figure, needs_course
 from sim.plots.profile import profile_figure, shapes_of
@@ -31,7 +34,7 @@ if TYPE_CHECKING:
 class Kind(NamedTuple):
     """A kind of figure: what draws it, what refuses a dataset, which datasets it fits best, and what it reads."""
 
-    draw: Callable[[xr.Dataset], Figure]
+    draw: Callable[..., Figure]
     needs: Callable[[xr.Dataset], object] = lambda dataset: None
     fits: Callable[[xr.Dataset], bool] = lambda dataset: False
     reads: tuple[str, ...] = ()
@@ -40,6 +43,16 @@ class Kind(NamedTuple):
     def shows(self) -> str:
         """Content of the figure, in a line."""
         return (self.draw.__doc__ or "").partition("\n")[0]
+
+    @property
+    def help(self) -> str:
+        """Content of the figure and its options, for the command's help."""
+        return " ".join([self.shows, *(f"--{name}" for name in self.takes if name != "ax")])
+
+    @property
+    def takes(self) -> tuple[str, ...]:
+        """Choices that it takes beside a member and units."""
+        return tuple(inspect.signature(self.draw).parameters)[1:]
 
 
 _OF_FORCE = ("spring_force", "contact_area")
@@ -87,8 +100,14 @@ def _missing(dataset: xr.Dataset, kind: str) -> str:
     return ""
 
 
+def _drawn_over(dataset: xr.Dataset, x: str) -> str:
+    """The kind of figure that is drawn over a variable or swept key, or by default."""
+    swept = {word for dim in style.swept(dataset) for word in (dim, dim.rpartition("_")[2], dim.replace("_", ".", 1))}
+    return {"": default(dataset), "speed": "curve"}.get(x, "sweep" if x in swept else "time")
+
+
 @of_dataset
-def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
+def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None = None) -> Figure:
     """Draw a figure of a dataset.
 
     Parameters
@@ -97,19 +116,23 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
         As ``sim run`` writes it; ``sim.analysis.where`` chooses values of its sweep.
     kind : str, optional
         One of ``KINDS``, whose ``shows`` says what it is; without it the one that fits the dataset best.
+    choices : Choices, optional
+        What of it is drawn, over what and in which units.
 
     Returns
     -------
     Picture
         A matplotlib Figure, one column wide, pictures of two panels side by side two; save it by its
-        ``savefig``, as PNG, PDF or SVG.
+        ``savefig``, as PNG, PDF or SVG. With axes to draw in, theirs.
 
     Raises
     ------
     ValueError
         For an unknown kind, or one that the dataset cannot serve, with the cure and the kinds that it can.
     """
-    kind = kind or default(dataset)
+    choices = choices or Choices()
+    dataset = choices.of_member(dataset)
+    kind = kind or _drawn_over(dataset, choices.x)
     if renamed(kind) in KINDS:
         raise ValueError(f'the figure "{kind}" is now called "{renamed(kind)}"')
     if kind not in KINDS:
@@ -117,15 +140,20 @@ def draw(dataset: xr.Dataset, kind: str | None = None) -> Figure:
     missing = _missing(dataset, kind)
     if missing:
         raise ValueError(f"{missing}; it can be drawn as: {', '.join(drawable(dataset))}")
-    with mpl.rc_context(STYLE), answered():
-        figure = KINDS[kind].draw(dataset)
+    options = choices.options(kind, KINDS[kind].takes, dataset)
+    look = contextlib.nullcontext() if choices.ax else mpl.rc_context(STYLE)  # axes of somebody else keep their own
+    with look, answered(), style.in_units(choices.units):
+        figure = KINDS[kind].draw(dataset, **options)
         fixed = [swept_value(dataset, name, 0) for name in sweep_dims(dataset) if dataset.sizes[name] == 1]
-        if fixed:
+        fixed += [] if choices.member is None else [f"member {choices.member}"]
+        if fixed and not choices.ax:
             figure.suptitle(", ".join(fixed), fontsize=mpl.rcParams["axes.titlesize"])
         return figure
 
 
-def drawn(dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None, replace: bool) -> Path:
+def drawn(
+    dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None, replace: bool, choices: Choices
+) -> Path:
     """Draw the dataset of a file into a picture, by default beside it; the picture's path.
 
     Raises
@@ -135,8 +163,8 @@ def drawn(dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None
     """
     try:
         target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}.png")
-        claim(dataset, source, target, replace)
-        save(draw(dataset, kind), target)
+        claim(dataset, source, target, replace, *filter(None, [choices.data]))
+        save(draw(dataset, kind, choices), target)
     except BadInput:
         raise
     except ValueError as fault:
@@ -144,13 +172,14 @@ def drawn(dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None
     return target
 
 
-def planned(source: Path, kind: str | None, path: Path | None, replace: bool) -> Path:
+def planned(source: Path, kind: str | None, path: Path | None, replace: bool, chosen: Collection[str] = ()) -> Path:
     """Draw what a scenario file says of its fluctuations before any run, C(q); the picture's path.
 
     Raises
     ------
     BadInput
-        If the scenario cannot be read or has no such figure, or the picture is not to be made.
+        If the scenario cannot be read or has no such figure, something is chosen of it, or the picture is not to be
+        made.
     """
     from sim.scenario.declared import files_read
     from sim.scenario.reader import load  # heavy: pydantic, where a dataset needs none
@@ -158,6 +187,9 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool) ->
     scene, target = load(source), path or Path("outputs") / f"{source.stem}-spectrum.png"
     if kind not in (None, "spectrum"):
         raise BadInput([f'{source}: before a run only "spectrum" can be drawn; for "{kind}" run it: sim run {source}'])
+    if chosen:
+        said = f"nothing can be chosen of what is drawn before a run ({', '.join(chosen)})"
+        raise BadInput([f"{source}: {said}; name the dataset that `sim run` makes of it"])
     claim_file(target, replace, files_read(scene))
     try:
         save(spectrum_of(scene), target)

@@ -13,13 +13,17 @@ from sim.analysis.events import cycles_of
 from sim.analysis.scene import stays_held
 from sim.laws import jkr
 from sim.plots import style
-from sim.plots.curves import Line, Scene, colour_bar, mark_jumps, scene_along
+from sim.plots.curves import Line, Scene, beside, colour_bar, mark_jumps, scene_along
+from sim.plots.measured import Measured
 
 #: Radii at which the equilibrium curve is evaluated.
 _FINE = 600
 
 #: Load at the fold of fixed grips over that at the fold of a dead load: 5/6 pi w R over 3/2 pi w R.
 _GRIPS = 5.0 / 9.0
+
+#: Line width of the cycles after the first.
+_LATER = 0.6
 
 #: Height of a name, in that of the panel.
 _NAME = 0.1
@@ -50,68 +54,87 @@ def needs_course(dataset: xr.Dataset) -> None:
         raise ValueError(f"what holds the sphere stays the same, so that there is no loop; move it: {cure}")
 
 
-def loop_figure(dataset: xr.Dataset) -> Figure:
-    """Load and contact radius over displacement or indentation, and the energy lost in a cycle.
+def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
+    """Load and contact radius over displacement, energy lost in a cycle, and radius over load.
 
     A line is broken while the contact is open; there the load is a thin line at zero. Grey is JKR's contact at
     the full work of adhesion: every equilibrium, the unstable ones as well, and the loads at which a dead load and
     fixed grips lose it.
     """
-    kind, stiffness, scene = "", xr.DataArray(np.nan), scene_along(dataset, "t")
+    kind, stiffness, scene = "", xr.DataArray(np.nan), scene_along(dataset, "t")._replace(measured=data)
     with contextlib.suppress(KeyError):  # the whole table [contact] is swept
         kind, stiffness = control(dataset)
     words, symbol = _AXES.get(kind, ("indentation", r"\delta"))
-    scene = scene.placed(scene.all("displacement_mean"), f"{words} ${symbol}$", "m")
+    over = "displacement" if kind in _AXES else "indentation"
+    scene = scene.placed(over, scene.all("displacement_mean"), f"{words} ${symbol}$", "m")
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     numbers = (work, size, dataset["contact_modulus"], stiffness)
     theories = [Theory(*(style.number_at(number, line.point) for number in numbers)) for line in scene.lines]
-    figure, (loads, radii) = style.rows([2.3, 1.6])
+    figure, panels = style.rows([2.1, 1.5, 1.8], shared=False)
+    loads, radii, loaded = panels
     force = style.in_unit(loads.yaxis, "normal load $P$", scene.all("normal_load_mean"), "N")
     length = style.in_unit(radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m")
-    spent, loop = lost_energy(dataset)
+    loaded.set_ylabel(radii.get_ylabel())
+    of_load = scene.placed("normal_load", scene.all("normal_load_mean"), "normal load $P$", "N")
+    (spent, loop), cycles = lost_energy(dataset), cycles_of(dataset)
     named = scene._replace(lines=_named(scene, symbol, spent, loop))
-    for line in named.lines:
-        _cycle(loads, named, "normal_load", line, force, kind)
-    for line in scene.lines:
-        _cycle(radii, scene, "contact_radius", line, length, kind)
-    _equilibria(loads, radii, scene, theories, (scene.unit.factor, force, length))
+    for panel, placed, name, factor in (
+        (loads, named, "normal_load", force),
+        (radii, scene, "contact_radius", length),
+        (loaded, of_load, "contact_radius", length),
+    ):
+        for line in placed.lines:
+            _cycle(panel, placed, name, line, factor, kind, style.number_at(cycles, line.point))
+        beside(panel, placed, name, factor)
+        style.across(panel, placed.reach, placed.words, room=0.03)
+    _equilibria(panels, scene, theories, (scene.unit.factor, force, length))
     _levels(loads, theories, force)
-    radii.set_ylim(bottom=0.0)
+    if data:
+        data.refuse_undrawn(over if data.column(over) else "normal_load")
+    for panel in (radii, loaded):
+        panel.set_ylim(bottom=0.0)
+    loads.sharex(radii)
     cycled = "per cycle: dissipated $W$, and the loop enclosed, each jump a straight line between records"
     style.legend(loads, "dissipated in all: $W$" if loop is None else cycled, columns=1)
     style.legend(radii)
-    colour_bar(figure, [loads, radii], scene)
-    style.across(radii, scene.x, scene.words, room=0.03)
+    colour_bar(figure, panels, scene)
     return figure
 
 
-def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind: str) -> None:
-    """One curve with its jumps: a cross at each pull-off, a ring at each jump-in."""
+def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind: str, cycles: float) -> None:
+    """One curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle."""
     x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
     mean, _, low, high = (np.where(gone, np.nan, factor * values) for values in scene.drawn(name, line))
-    if np.any(high > low):
+    along_load = scene.over == "normal_load"
+    if np.any(high > low) and not along_load:  # where the members' loads differ a band over their mean says nothing
         style.fill(panel, x, low, high, color=line.colour, alpha=0.18, label="" if loads else scene.spread)
-    panel.plot(x, mean, color=line.colour, label=line.label if loads else "")
+    first = int(np.ceil(len(x) / max(cycles, 1.0)))
+    panel.plot(x[:first], mean[:first], color=line.colour, label=line.label if loads else "")
+    if first < len(x):
+        later: Any = {"linewidth": _LATER, "label": "" if loads else "later cycles"}
+        panel.plot(x[first - 1 :], mean[first - 1 :], color=line.colour, **later)
     if loads:
         colour = line.colour if scene.single else style.REFERENCE  # the open spheres of all curves lie on each other
         panel.plot(x, np.where(gone, 0.0, np.nan), color=colour, linewidth=0.4)
-    if kind != "load":  # under a dead load the sphere leaves: no place to draw a jump to
+    if kind != "load" and not along_load:  # under a dead load the sphere leaves: no place to draw a jump to
         jumps = np.concatenate(scene.openings(line))
         panel.vlines(x[jumps], 0.0, mean[jumps], colors=line.colour, linestyles="dotted", linewidth=0.8)
     mark_jumps(panel, scene, name, line, factor, named=not loads)
 
 
-def _equilibria(loads: Axes, radii: Axes, scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:
+def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:
     """JKR's equilibria, each different curve once, as far as its contacts reached."""
     reached: dict[Theory, float] = {}
     for line, theory in zip(scene.lines, theories, strict=True):
         most = float(np.nanmax(np.nan_to_num(scene.values("contact_radius_mean", line))))
         reached[theory] = max(reached.get(theory, 0.0), most)
+    loads, radii, loaded = panels
     for theory, most in reached.items():
         if most > 0.0 and not np.isnan(theory.stiffness):
             x, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
             loads.plot(x, load, "--", **style.GREY)
             radii.plot(x, radius, "--", label="JKR, stable and unstable", **style.GREY)
+            loaded.plot(load, radius, "--", **style.GREY)
 
 
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:

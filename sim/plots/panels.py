@@ -1,7 +1,7 @@
 """Panels of one observable each, and the figures made of them: over speed, time or a swept key, and friction loops."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -12,7 +12,8 @@ from sim.analysis import is_stationary, is_steady, speed_of
 from sim.analysis.scene import stays_held
 from sim.plots import style
 from sim.plots.bond_laws import rest_of
-from sim.plots.curves import Scene, colour_bar, contact_curves, curve, over_speed, scene_along, speed_dim
+from sim.plots.curves import Scene, colour_bar, contact_curves, curve, over, over_key, over_speed, over_time, speed_dim
+from sim.plots.measured import Measured
 
 Panel = Callable[[Axes, Scene], None]
 
@@ -27,7 +28,7 @@ def series(name: str, words: str, si: str) -> Panel:
     """A panel of one observable."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.all(f"{name}_mean"), si))
+        contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.extent(f"{name}_mean"), si))
 
     return panel_of
 
@@ -37,11 +38,23 @@ friction_panel = series("friction_force", "friction $F$", "N")
 
 def radius_panel(panel: Axes, scene: Scene) -> None:
     """Contact radius between Hertz's and JKR's."""
-    radii = scene.all("contact_radius_mean", "jkr_radius_mean")
+    radii = scene.extent("contact_radius_mean", "jkr_radius_mean")
     factor = style.in_unit(panel.yaxis, "contact radius $a$", radii, "m")
     contact_curves(panel, scene, "contact_radius", factor)
     for which, dashes in (("JKR", "--"), ("Hertz", ":")):
         _reference(panel, scene, factor * scene.all(f"{which.lower()}_radius_mean"), dashes, which)
+    style.legend(panel, scene.title)
+
+
+def area_panel(panel: Axes, scene: Scene) -> None:
+    """Contact area between Hertz's and JKR's."""
+    areas = {name: np.pi * scene.all(f"{name.lower()}_radius_mean") ** 2 for name in ("JKR", "Hertz")}
+    most = np.append(scene.extent("contact_area_mean"), areas["JKR"])
+    factor = style.in_unit(panel.yaxis, "contact area $A$", most, "m^2")
+    contact_curves(panel, scene, "contact_area", factor)
+    for (which, values), dashes in zip(areas.items(), ("--", ":"), strict=True):
+        _reference(panel, scene, factor * values, dashes, which)
+    style.legend(panel, scene.title)
 
 
 def _reference(panel: Axes, scene: Scene, values: np.ndarray, dashes: str, name: str) -> None:
@@ -76,14 +89,14 @@ _ENERGIES: Any = (
 
 def energy_panel(panel: Axes, scene: Scene) -> None:
     """Work of adhesion of the bonds left, fluctuation energy, and what both leave to the contact."""
-    drawn = [entry for entry in _ENERGIES if np.any(np.nan_to_num(scene.all(f"{entry[0]}_mean")))]
+    drawn = [entry for entry in _ENERGIES if np.any(np.nan_to_num(scene.extent(f"{entry[0]}_mean")))]
     if _small_fluctuations(scene):
         drawn = [entry for entry in drawn if entry[0] != "fluctuation_energy"]
-    left, work = (scene.all(f"{name}_mean") for name in ("bond_work", "work_of_adhesion"))
+    left, work = (scene.extent(f"{name}_mean") for name in ("bond_work", "work_of_adhesion"))
     # one colour for each curve leaves line styles for the energies; without fluctuations all is left to the contact
     if not scene.single or np.allclose(left, work, rtol=1e-9, atol=0.0, equal_nan=True):
         drawn = [entry for entry in drawn if entry[0] != "bond_work"]
-    values = scene.all(*(f"{name}_mean" for name, *_ in drawn))
+    values = scene.extent(*(f"{name}_mean" for name, *_ in drawn))
     factor = style.in_unit(panel.yaxis, "energy per area", values, "J/m^2")
     for name, text, own, dashes in drawn:
         lines = scene.distinct(name)
@@ -100,14 +113,14 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
 def _small_fluctuations(scene: Scene) -> bool:
     """Whether the fluctuation energy changes, but would be a line at zero beside the work left to the contact."""
     most, work = (
-        float(np.max(np.nan_to_num(scene.all(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
+        float(np.max(np.nan_to_num(scene.extent(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
     )
     return 0.0 < most < _SMALL * work and scene.varies("fluctuation_energy")
 
 
 def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
     """Fluctuation energy where it is small."""
-    energies = scene.all("fluctuation_energy_mean")
+    energies = scene.extent("fluctuation_energy_mean")
     factor = style.in_unit(panel.yaxis, r"fluctuations $\Delta\Gamma$", energies, "J/m^2")
     for line in scene.distinct("fluctuation_energy"):
         colour = style.FLUCTUATIONS if scene.single else line.colour
@@ -143,14 +156,41 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
         style.fill(panel, x, ratio, bonds, color=style.FLUCTUATIONS, alpha=_SHADE, label="lost to fluctuations")
 
 
-def stacked(scene: Scene, panels: list[tuple[float, Panel]], room: float | None = None) -> tuple[Figure, list[Axes]]:
-    """Panels of given heights [in] above each other with one x axis and its label, lettered; a colour bar if any."""
-    figure, axes = style.rows([height for height, _ in panels])
-    for panel, (_, drawing) in zip(axes, panels, strict=True):
-        drawing(panel, scene)
-    colour_bar(figure, axes, scene)
-    style.across(axes[-1], scene.x, scene.words, scene.scale, (0.03 if scene.marked else 0.0) if room is None else room)
-    return figure, axes
+def stacked(
+    scene: Scene, panels: list[tuple[float, Panel]], room: float | None = None, ax: Axes | None = None
+) -> tuple[Figure, list[Axes]]:
+    """Panels of given heights [in] above each other with one x axis and its label, lettered; a colour bar if any.
+
+    Below them are residuals of measured points, if any. The panels of the first column are returned. With ``ax`` the
+    first panel alone is drawn, there.
+    """
+    columns = scene.columns or (("", scene.lines),)
+    compared = scene.measured is not None and scene.measured.has_errors and ax is None
+    if ax is None:
+        heights = [height for height, _ in panels] + [0.8] * compared
+        figure, axes = style.grid(heights, len(columns))
+    else:
+        figure, axes, panels = cast(Figure, ax.figure), np.array([[ax]]), panels[:1]
+        if len(columns) > 1:
+            raise ValueError(f"{len(columns)} panels side by side do not go into one; choose by where, or leave ax out")
+    for number, (words, lines) in enumerate(columns):
+        part = scene._replace(lines=lines)
+        for panel, (_, drawing) in zip(axes[:, number], panels, strict=False):
+            drawing(panel, part)
+        if scene.measured and compared:
+            scene.measured.residual_panel(axes[-1, number], {line.number for line in lines})
+        edge = 0.03 if scene.marked or scene.measured else 0.0
+        style.across(axes[-1, number], scene.reach, scene.words, scene.scale, edge if room is None else room)
+        if words:
+            axes[0, number].set_title(words)
+    if scene.columns:
+        style.legends_of_first(figure, axes)
+    elif ax is not None:
+        style.moved_legend(ax, ax, loc="best")  # above the panel there may be no room
+    if scene.measured:
+        scene.measured.refuse_undrawn(scene.over)
+    colour_bar(figure, list(axes.flat), scene)
+    return figure, list(axes[:, 0])
 
 
 def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
@@ -172,25 +212,28 @@ def needs_speeds(dataset: xr.Dataset) -> None:
         raise ValueError('the speed neither changes in time nor is swept; ramp it: [drive] model = "ramp"')
 
 
-def curve_figure(dataset: xr.Dataset) -> Figure:
+def curve_figure(
+    dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
+) -> Figure:
     """Contact area with what each mechanism takes of it, energies and friction, over speed."""
-    scene = over_speed(dataset)
-    return stacked(scene, [(1.9, share_panel), *further_panels(scene)])[0]
+    scene = (over(dataset, x) if x else over_speed(dataset))._replace(measured=data)
+    return stacked(scene, [(1.9, area_panel if absolute else share_panel), *further_panels(scene)], ax=ax)[0]
 
 
 #: What drives a contact, drawn over time where it changes.
 _DRIVEN = {"speed": ("speed $V$", "m/s"), "normal_load": ("load $P$", "N"), "displacement": (r"base $\Delta$", "m")}
 
 
-def time_figure(dataset: xr.Dataset) -> Figure:
+def time_figure(
+    dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
+) -> Figure:
     """Contact radius, energies, friction, and speed, load and displacement that change, over time."""
-    scene = scene_along(dataset, "t").placed(dataset["t"].to_numpy(), "time $t$", "s")
+    scene = (over(dataset, x) if x else over_time(dataset))._replace(measured=data)
     moved = not bool(stays_held(dataset).all())
-    shown = [name for name in _DRIVEN if scene.moves(name) and (name != "displacement" or moved)]
+    shown = [name for name in _DRIVEN if scene.moves(name) and (name != "displacement" or moved) and name != scene.over]
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
-    figure, axes = stacked(scene, [(1.6, radius_panel), *further_panels(scene), *driven])
-    style.legend(axes[0], scene.title)
-    return figure
+    first = area_panel if absolute else radius_panel
+    return stacked(scene, [(1.6, first), *further_panels(scene), *driven], ax=ax)[0]
 
 
 def turns(dataset: xr.Dataset) -> bool:
@@ -207,18 +250,20 @@ def needs_friction(dataset: xr.Dataset) -> None:
         raise ValueError('the slider does not move; let it: [drive] speed = "1 mm/s"')
 
 
-def friction_figure(dataset: xr.Dataset) -> Figure:
+def friction_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Friction force over time and over the slider's position: the friction loop."""
-    scene = scene_along(dataset, "t")
+    scene = over_time(dataset)._replace(measured=data)
     figure, axes = style.rows([1.7, 2.1], shared=False)
-    for panel, x, words, si, room in (
-        (axes[0], dataset["t"].to_numpy(), "time $t$", "s", 0.0),
-        (axes[1], scene.all("slider_position_mean"), "slider position $x$", "m", 0.03),
+    for panel, name, x, words, si, room in (
+        (axes[0], "t", dataset["t"].to_numpy(), "time $t$", "s", 0.0),
+        (axes[1], "slider_position", scene.all("slider_position_mean"), "slider position $x$", "m", 0.03),
     ):
-        placed = scene.placed(x, words, si, broken=True)
+        placed = scene.placed(name, x, words, si, broken=True)
         friction_panel(panel, placed)
         panel.axhline(0.0, **style.GUIDE)
-        style.across(panel, placed.x, placed.words, room=room)
+        style.across(panel, placed.reach, placed.words, room=room)
+    if data:
+        data.refuse_undrawn("t")
     style.legend(axes[0], scene.title)
     colour_bar(figure, axes, scene)
     return figure
@@ -229,21 +274,19 @@ def needs_sweep(dataset: xr.Dataset) -> None:
         raise ValueError('nothing is swept; sweep a key: [sweep] "contact.load" = ["1 mN", "4 mN"]')
 
 
-def sweep_figure(dataset: xr.Dataset) -> Figure:
+def sweep_figure(
+    dataset: xr.Dataset, x: str = "", absolute: bool = False, data: Measured | None = None, ax: Axes | None = None
+) -> Figure:
     """Contact radius, energies and friction over the first swept key; further keys make curves."""
-    key = dataset[style.swept(dataset)[0]]
-    words = f"{key.attrs.get('long_name', key.name)} {style.symbol(key)}".strip()
-    scene, room, named = scene_along(dataset, str(key.name)), None, key.dtype.kind not in "fi"
-    if named:
-        scene = scene.placed(np.arange(key.size, dtype=float), words, "1").apart()
-        room = (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
-    else:
-        values = key.to_numpy().astype(float)
-        scene = scene.placed(values, words, key.attrs["units"], style.axis_scale(values))
-    figure, axes = stacked(scene, [(1.7, radius_panel), *further_panels(scene)], room)
-    if named:
-        axes[-1].set_xticks(range(key.size), [str(value) for value in key.to_numpy()])
-    style.legend(axes[0], scene.title if is_stationary(dataset) else _at_the_end(dataset, scene.title))
+    scene = (over(dataset, x) if x else over_key(dataset, style.swept(dataset)[0]))._replace(measured=data)
+    room = None if scene.joined else (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
+    if not is_stationary(dataset):
+        scene = scene._replace(heading=_at_the_end(dataset, scene.title))
+    first = area_panel if absolute else radius_panel
+    figure, axes = stacked(scene, [(1.7, first), *further_panels(scene)], room, ax)
+    if not scene.joined:
+        names = dataset[scene.over].to_numpy()
+        axes[-1].set_xticks(range(names.size), [str(value) for value in names])
     return figure
 
 

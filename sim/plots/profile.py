@@ -56,22 +56,26 @@ def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
 _Shown = list[tuple[Shape, dict[str, Any]]]
 
 
-def shapes_of(dataset: xr.Dataset) -> tuple[_Shown, float, float]:
+def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, float, float]:
     """Contacts of the first member at the first point of the sweep: the last closed one, and any at rest.
 
-    Also the time [s] and the speed [m/s] of the former.
+    In place of the last one that of the record nearest to a time [s]. Also the time [s] and speed [m/s] of the former.
 
     Raises
     ------
     ValueError
-        If the member is never in contact.
+        If the member is never in contact, or not at that time.
     """
     at = style.first_point(dataset)[0]
     names = ("contact_radius", "indentation", "shear_stress", "speed")
     radius, depth, stress, speed = (_member(dataset, name, at) for name in names)
     if not np.any(radius > 0.0):
         raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
-    k = int(np.flatnonzero(radius > 0.0)[-1])
+    k = int(np.flatnonzero(radius > 0.0)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
+    if not radius[k] > 0.0:
+        raise ValueError(
+            f"the contact is open at t = {style.text_of(float(dataset['t'][k]), 's')}; choose another time"
+        )
     sphere, work = (style.number_at(setting(dataset, key), at) for key in ("sphere.radius", "adhesion.work"))
     moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
     bodies = (sphere, *(style.number_at(dataset[name], at) for name in moduli))
@@ -84,13 +88,13 @@ def shapes_of(dataset: xr.Dataset) -> tuple[_Shown, float, float]:
     return shown, float(dataset["t"][k]), float(speed[k])
 
 
-def profile_figure(dataset: xr.Dataset) -> Figure:
-    """Pressure, surfaces and tangential displacement across the contact at the last time.
+def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
+    """Pressure, surfaces and tangential displacement across the contact at the last time, or another.
 
     The surfaces are cut along the axis of the sphere; heights are not to the scale of the lengths. The
     shear stress is the mean one, uniform over the contact; without any its displacement is left out.
     """
-    shown, time, speed = shapes_of(dataset)
+    shown, time, speed = shapes_of(dataset, at)
     last, reach = shown[0][0], _REACH * max(shape.radius for shape, _ in shown)
     length = style.Unit.of(np.array([reach]), "m")
     count = 2 if last.stress != 0.0 else 1

@@ -14,8 +14,9 @@ from sim.analysis.scene import MEMBERS, word
 from sim.laws import jkr, schallamach
 from sim.plots import style
 from sim.plots.bond_laws import population_of
-from sim.plots.curves import Line, Scene, choice, scene_along
-from sim.plots.panels import series, stacked
+from sim.plots.curves import Scene, choice, scene_along
+from sim.plots.measured import Measured
+from sim.plots.panels import Panel, series, stacked
 
 #: Speeds of a map, and at which its boundary is drawn.
 _CELLS, _FINE = 28, 400
@@ -64,27 +65,32 @@ def needs_force(dataset: xr.Dataset) -> None:
         raise ValueError('no force is prescribed; let one: [drive] model = "force"')
 
 
-def creep_figure(dataset: xr.Dataset) -> Figure:
+def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Displacement and speed of the slider over time under a prescribed force; a cross ends a runaway."""
     later = dataset.isel(t=slice(1, None))
-    scene = scene_along(later, "t").placed(later["t"].to_numpy(), "time since the force was applied $t$", "s", "log")
-    panels = [series("slider_position", "displacement $x$", "m"), series("speed", "speed $V$", "m/s")]
-    figure, axes = stacked(scene, [(1.8, panels[0]), (1.6, panels[1])])
-    for panel, name in zip(axes, ("slider_position", "speed"), strict=True):
+    scene = scene_along(later, "t")._replace(measured=data)
+    scene = scene.placed("t", later["t"].to_numpy(), "time since the force was applied $t$", "s", "log")
+    position, speed = _run("slider_position", "displacement $x$", "m"), _run("speed", "speed $V$", "m/s")
+    return stacked(scene, [(1.8, position), (1.6, speed)])[0]
+
+
+def _run(name: str, words: str, si: str) -> Panel:
+    """A panel of what grows, with a cross at the last record before a trajectory ends."""
+    curves = series(name, words, si)
+
+    def panel_of(panel: Axes, scene: Scene) -> None:
+        curves(panel, scene)
         panel.set_yscale("log")
-        for line in scene.lines:
-            _runaway(panel, scene, name, line)
-    style.legend(axes[0], scene.title)
-    return figure
+        for k, line in enumerate(scene.lines):
+            values, drawn = scene.values(f"{name}_mean", line), np.asarray(panel.lines[k].get_ydata())
+            there = np.flatnonzero(np.isfinite(values))
+            if 0 < there.size < values.size:
+                look: Any = {"color": line.colour, "markersize": 4, "label": "runaway"}
+                panel.plot(scene.x[line.number][there[-1]], drawn[there[-1]], "x", **look)
+        if name == "slider_position":
+            style.legend(panel, scene.title)
 
-
-def _runaway(panel: Axes, scene: Scene, name: str, line: Line) -> None:
-    """A cross at the last record before a trajectory ends."""
-    values, drawn = scene.values(f"{name}_mean", line), panel.lines[line.number].get_ydata()
-    there = np.flatnonzero(np.isfinite(values))
-    if 0 < there.size < values.size:
-        panel.plot(scene.x[line.number][there[-1]], np.asarray(drawn)[there[-1]], "x", color=line.colour, markersize=4,
-                   label="runaway")  # fmt: skip
+    return panel_of
 
 
 def needs_map(dataset: xr.Dataset) -> None:
@@ -174,7 +180,7 @@ def needs_pull(dataset: xr.Dataset) -> None:
         raise ValueError('the force does not begin at zero; start at rest: [drive] start = "rest"')
 
 
-def incipient_figure(dataset: xr.Dataset) -> Figure:
+def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     """Contact area over the tangential force on the way to sliding, with A0 − αQ² beside it.
 
     The law is fitted by least squares up to half of the largest force.
@@ -184,6 +190,8 @@ def incipient_figure(dataset: xr.Dataset) -> Figure:
     rises = np.arange(force.shape[1]) <= np.nanargmax(force, axis=1)[:, np.newaxis]
     unit = style.Unit.of(force, "N")
     figure, axes = style.rows([2.0, 1.8], shared=False)
+    axes[0].set_ylabel("contact area $A/A_0$")
+    factor = style.in_unit(axes[0].yaxis, "contact area $A$", area, "m^2") if absolute else 1.0
     for line in scene.lines:
         up = rises[line.number]
         pulled, own = force[line.number, up], area[line.number, up]
@@ -193,12 +201,12 @@ def incipient_figure(dataset: xr.Dataset) -> Figure:
         words = rf"$\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
         name = f"{line.label}: {words}" if not scene.single else words
         look = style.GREY | ({} if scene.single else {"color": line.colour})
-        axes[0].plot(unit.factor * pulled, own / own[0], color=line.colour, label=name)
-        axes[0].plot(unit.factor * pulled, 1.0 - law, "--", **look)
+        full = factor * own[0] if absolute else 1.0
+        axes[0].plot(unit.factor * pulled, full * own / own[0], color=line.colour, label=name)
+        axes[0].plot(unit.factor * pulled, full * (1.0 - law), "--", **look)
         axes[1].plot(unit.factor * pulled[1:], 1.0 - own[1:] / own[0], color=line.colour)
         axes[1].plot(unit.factor * pulled[1:], law[1:], "--", **look)
     axes[0].plot([], [], "--", label=r"$A_0 - \alpha Q^2$", **style.GREY)
-    axes[0].set_ylabel("contact area $A/A_0$")
     axes[1].set(ylabel="lost area $1 - A/A_0$", yscale="log")
     words, known = unit.label("tangential force $Q$"), unit.factor * force[rises]
     style.across(axes[0], known, words)

@@ -13,6 +13,7 @@ from sim.analysis import is_steady, setting, sweep_dims
 from sim.plots import style
 from sim.plots.bond_laws import Steady, population_of, rest_of, steady_laws
 from sim.plots.curves import Line, Scene, contact_curves, over_speed, speed_dim
+from sim.plots.measured import Measured
 from sim.plots.panels import Panel, stacked
 
 #: Speeds at which a closed form is drawn.
@@ -43,31 +44,33 @@ def needs_stress(dataset: xr.Dataset) -> None:
         raise ValueError(f"stress is drawn over the speed, which neither changes nor is swept; {cure}")
 
 
-def stress_figure(dataset: xr.Dataset) -> Figure:
+def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | None = None) -> Figure:
     """Shear stress with its maximum, and bonds, over speed; for a start from rest the static peaks."""
     if rest_of(dataset) is not None:
+        if data or ax:
+            raise ValueError("starts from rest have panels of their own; draw the kind time beside data, or on an ax")
         return start_figure(dataset)
-    scene = over_speed(dataset)
-    laws = [law for line in scene.lines for law in _laws_of(dataset, scene, line)]
+    scene = over_speed(dataset)._replace(measured=data)
+    laws = {line.number: _laws_of(dataset, scene, line) for line in scene.lines}
 
-    def thin_lines(panel: Axes, values: Callable[[Steady], np.ndarray]) -> None:
-        for speed, law in laws:
+    def thin_lines(panel: Axes, scene: Scene, values: Callable[[Steady], np.ndarray]) -> None:
+        for speed, law in (law for line in scene.lines for law in laws[line.number]):
             panel.plot(scene.unit.factor * speed, values(law), label=law.words, **_LAWS[law.style])
 
     def stress_panel(panel: Axes, scene: Scene) -> None:
         """Shear stress of the dataset upon closed forms, with the maximum of each curve."""
-        factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa")
+        factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.extent("shear_stress_mean"), "Pa")
         contact_curves(panel, scene._replace(lines=_marked(panel, scene, factor)), "shear_stress", factor)
-        thin_lines(panel, lambda law: factor * law.stress)
+        thin_lines(panel, scene, lambda law: factor * law.stress)
         style.legend(panel, scene.title)
 
     def fraction_panel(panel: Axes, scene: Scene) -> None:
-        thin_lines(panel, lambda law: law.fraction)
+        thin_lines(panel, scene, lambda law: law.fraction)
         contact_curves(panel, scene, "bond_fraction", 1.0)
         panel.set_ylabel("bond fraction $N/N_0$")
 
     panels: list[tuple[float, Panel]] = [(2.1, stress_panel), (1.3, fraction_panel)]
-    return stacked(scene, panels if scene.varies("bond_fraction") else panels[:1])[0]
+    return stacked(scene, panels if scene.varies("bond_fraction") else panels[:1], ax=ax)[0]
 
 
 def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.ndarray, Steady]]:

@@ -4,11 +4,14 @@ One colour means one thing throughout: blue what broken bonds do, vermilion what
 do, black the contact with both; grey lines are closed forms, such as JKR's and Hertz's contacts.
 """
 
+import contextlib
 import io
 import itertools
 import re
+import string
 import textwrap
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextvars import ContextVar
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -23,6 +26,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sim.analysis import engineering, scaled, sweep_dims
+from sim.units.quantity import Quantity
 
 COLUMN, WIDE = 3.4, 7.0  # inches: one column, both columns
 _ON_SCREEN = 120  # dots an inch
@@ -69,10 +73,17 @@ class Picture(Figure):
 
 def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
     """A picture of one column: panels of given heights [in] above each other, lettered; with one x axis if shared."""
-    size = COLUMN, 0.45 + sum(heights)
-    figure, axes = _panels(size, (len(heights), 1), sharex=shared, height_ratios=heights)
+    figure, axes = grid(heights, 1, shared)
+    return figure, list(axes[:, 0])
+
+
+def grid(heights: list[float], columns: int, shared: bool = True) -> tuple[Figure, Any]:
+    """A picture of rows of given heights [in], lettered, whose columns share y axes, and x axes if shared."""
+    size = COLUMN if columns == 1 else WIDE, 0.45 + sum(heights)
+    count = len(heights), columns
+    figure, axes = _panels(size, count, sharex=shared, sharey="row", height_ratios=heights)
     figure.align_ylabels(axes)
-    return figure, axes
+    return figure, np.array(axes).reshape(count)
 
 
 def pairs(height: float, count: int = 1, shared: bool = False) -> tuple[Figure, list[Axes]]:
@@ -86,7 +97,7 @@ def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(*count, squeeze=False, **options).flat)
     corner: Any = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "right", "va": "bottom"}
-    for mark, panel in zip("abcdefg", axes if len(axes) > 1 else (), strict=False):
+    for mark, panel in zip(string.ascii_lowercase, axes if len(axes) > 1 else (), strict=False):
         panel.annotate(f"({mark})", (0.0, 1.0), (-2, 4), fontweight="bold", **corner)
     return figure, axes
 
@@ -99,7 +110,10 @@ def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
         return value
     unit = Unit.of(coordinate.to_numpy(), coordinate.attrs.get("units", "1"))
     number = f"{value * unit.factor:.4g} {unit.name}".strip().replace("-", "−")
-    return f"{symbol(coordinate) or name.replace('_', ' ')} = {number}"
+    sign, key = symbol(coordinate), (name.partition("_")[2] or name).replace("_", " ")
+    if not sign or coordinate.attrs.get("units") == "1":  # the letters of pure numbers are known to few
+        return f"{key} {sign}".strip() + f" = {number}"
+    return f"{sign} = {number}"
 
 
 def swept(dataset: xr.Dataset) -> list[str]:
@@ -170,11 +184,42 @@ class Unit(NamedTuple):
 
     @classmethod
     def of(cls, values: Any, unit: str, logarithmic: bool = False) -> "Unit":
-        """The unit that suits the largest of some values, on a logarithmic axis the middle of them."""
+        """The unit that suits the largest of some values, on a logarithmic axis the middle of them, or one chosen."""
+        chosen = _CHOSEN.get({})
+        for name in chosen:
+            with contextlib.suppress(ValueError):
+                size = Quantity(unit, "unit").read(f"1 {name}")
+                chosen[name] = True
+                return cls(1.0 / size, re.sub("^u(?=.)", "µ", name).replace("^2", "²").replace("^3", "³"))
         sizes = np.abs(values)
         sizes = sizes[np.isfinite(sizes) & (sizes > 0.0)]
         most = sizes.max(initial=0.0)
         return cls(*scaled(float(np.sqrt(sizes.min(initial=most) * most) if logarithmic else most), unit))
+
+
+#: Units chosen for the axes of their dimensions, and whether any axis has them.
+_CHOSEN: ContextVar[dict[str, bool]] = ContextVar("units of axes")
+
+
+@contextlib.contextmanager
+def in_units(units: Iterable[str]) -> Iterator[None]:
+    """A context in which axes have these units, such as ``"mm/s"``, each where it is of their dimension.
+
+    Raises
+    ------
+    ValueError
+        For a unit that no axis can have.
+    """
+    found = dict.fromkeys(units, False)
+    before = _CHOSEN.set(found)
+    try:
+        yield
+    finally:
+        _CHOSEN.reset(before)
+    for name in (name for name, used in found.items() if not used):
+        raise ValueError(
+            f'no axis of this figure can be in "{name[:40]}"; choose a unit of one, such as mm/s of a speed'
+        )
 
 
 def in_unit(axis: Axis, words: str, values: Any, si: str) -> float:
@@ -207,6 +252,26 @@ def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any
         ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1), labelspacing=0.25,
         title="\n".join(textwrap.wrap(title, 62)) or None, title_fontsize=7.0, alignment="left",
     )  # fmt: skip
+
+
+def legends_of_first(figure: Figure, axes: Any) -> None:
+    """One legend a row of panels (rows, columns), that of the first row above the whole picture and its titles."""
+    for panel in axes[:, 1:].flat:
+        if panel.get_legend():
+            panel.get_legend().remove()
+    look = {"ncols": 3, "handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
+    moved_legend(axes[0, 0], figure, loc="outside upper left", **look)
+    for panel in axes.flat:
+        panel.label_outer()
+
+
+def moved_legend(panel: Axes, to: Figure | Axes, **look: Any) -> None:
+    """Move the legend of a panel, if it has one, to another place."""
+    if own := panel.get_legend():
+        own.remove()
+        words = own.get_title().get_text() or None
+        handles: Any = own.legend_handles
+        to.legend(handles, [text.get_text() for text in own.get_texts()], title=words, **look)
 
 
 def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: Any) -> None:

@@ -1,7 +1,5 @@
 """Measured curves: CSV tables whose columns are named as variables of a dataset, with units and errors."""
 
-import difflib
-from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,14 +10,12 @@ from sim.ensemble.outline import variable_name
 from sim.ensemble.recorded import VARIABLES
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
+from sim.units import measured as table
 from sim.units.quantity import Quantity
 from sim.units.refusals import BadInput
-from sim.units.table import TableError, columns, headings, plain_text
 
 Array = NDArray[np.float64]
 
-#: End of the names of columns with standard errors.
-ERROR = "_error"
 #: Column of what holds the sphere, by the key of the contact that prescribes it.
 HELD = {"load": "normal_load", "indentation": "indentation", "displacement": "displacement"}
 #: What is recorded of a history, or is no measured number.
@@ -75,52 +71,16 @@ def read(path: Path, scenario: Scenario) -> Measured:
     BadInput
         With one line.
     """
-    try:
-        text = plain_text(path)
-        return _measured(path, text, scenario)
-    except UnicodeDecodeError:
-        raise BadInput([f"{path}: is not UTF-8 text; save it as plain CSV in UTF-8"]) from None
-    except OSError as fault:
-        raise BadInput([f"{path}: cannot be read ({fault.strerror}); name a CSV file"]) from None
-    except TableError as fault:
-        raise BadInput([f"{path}: {fault}"]) from None
-
-
-def _measured(path: Path, text: str, scenario: Scenario) -> Measured:
-    units = headings(text)
     at, outcomes = _conditions(scenario), _outcomes(scenario)
-    known = {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}
-    wanted: dict[str, Quantity] = {}
-    for name, unit in units.items():
-        base = name.removesuffix(ERROR)
-        if name in known:
-            wanted[name] = known[name]
-        elif base in outcomes and base in units:
-            wanted[name] = Quantity("1" if _relative(unit, outcomes[base]) else outcomes[base].unit, name, above=0)
-        else:
-            raise TableError(_unknown(name, known))
-    found = columns(text, wanted)
-    conditions = {at[name][0]: values for name, values in found.items() if name in at}
-    curves = []
-    for name, values in found.items():
-        if name in outcomes and name not in at:
-            errors = found.get(name + ERROR)
-            if errors is not None and _relative(units[name + ERROR], outcomes[name]):
-                errors = errors * np.abs(values)
-            if errors is not None and not np.all(errors > 0.0):
-                raise TableError(
-                    f'column "{name}" has a value of 0, whose relative error says nothing; give it in units'
-                )
-            curves.append(Curve(name, values, errors))
+    found = table.read(path, {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}, outcomes)
+    conditions = {at[name][0]: points.values for name, points in found.items() if name in at}
+    curves = tuple(Curve(name, *points) for name, points in found.items() if name not in at)
+    unclear = _unclear(scenario, conditions)
     if not curves:
-        raise TableError('no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"')
-    _refuse_unclear(scenario, conditions)
-    return Measured(path, scenario.contact.kind, conditions, tuple(curves))
-
-
-def _relative(unit: str, quantity: Quantity) -> bool:
-    """Whether an error with this unit's text is a share of the value."""
-    return unit == "%" and quantity.unit != "1"
+        unclear = 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
+    if unclear:
+        raise BadInput([f"{path}: {unclear}"])
+    return Measured(path, scenario.contact.kind, conditions, curves)
 
 
 def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
@@ -140,31 +100,19 @@ def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
     return {one.name: Quantity(one.unit, one.long_name) for one in there if one.name not in _NOT_MEASURED}
 
 
-def _unknown(name: str, known: Iterable[str]) -> str:
-    """What to do about a column that is neither a condition nor a variable."""
-    shown = name[:40]
-    if name.endswith(ERROR) and name.removesuffix(ERROR) in known:
-        return f'column "{shown}" is the error of a column that is missing; add it, or leave the error out'
-    near = difflib.get_close_matches(name, [*known], 1, 0.6)
-    cure = f'did you mean "{near[0]}"?' if near else "leave it out, or give it the name of one (docs/dataset.md)"
-    return f'column "{shown}" is neither a variable of a dataset nor a number of the scenario; {cure}'
-
-
-def _refuse_unclear(scenario: Scenario, conditions: dict[str, Array]) -> None:
-    """Refuse a table that does not say at which speed, or under which load, its rows were measured."""
+def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
+    """What a table lacks to say at which speed, or under which load, its rows were measured; "" for nothing."""
     if scenario.drive.feeds_back:
         said = f'drive.model is "{scenario.drive.model}", under which the speed is no condition'
-        raise TableError(f'{said}; fit a scenario with [drive] model = "steady"')
+        return f'{said}; fit a scenario with [drive] model = "steady"'
     if "t" in conditions:
         both = [name for name in ("speed", "held") if name in conditions]
-        if both:
-            raise TableError("times already say the speed and the load, by the scenario; leave out t, or these columns")
-        return
+        said = "times already say the speed and the load, by the scenario; leave out t, or these columns"
+        return said if both else ""
     if "speed" not in conditions and scenario.drive.model != "steady":
         said = f'the speed changes during the run (drive.model = "{scenario.drive.model}")'
-        raise TableError(f'{said}; add a column "speed [mm/s]", or "t [s]"')
+        return f'{said}; add a column "speed [mm/s]", or "t [s]"'
     if "held" not in conditions and scenario.contact.changes:
         name = HELD[scenario.contact.kind]
-        raise TableError(f'contact.{scenario.contact.kind} changes during the run; add a column "{name}", or "t [s]"')
-    if not conditions:
-        raise TableError('no column says where the points were taken; add for example "speed [mm/s]"')
+        return f'contact.{scenario.contact.kind} changes during the run; add a column "{name}", or "t [s]"'
+    return "" if conditions else 'no column says where the points were taken; add for example "speed [mm/s]"'

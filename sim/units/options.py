@@ -1,13 +1,16 @@
 """Values of the options of commands."""
 
 import contextlib
+import math
 from typing import Any
 
 import click
 
 
-def quantity(text: str, option: str, unit: str, **bounds: Any) -> float:
-    """The value of an option with a unit, in SI."""
+def quantity(text: str | None, option: str, unit: str, **bounds: Any) -> float:
+    """The value of an option with a unit, in SI; infinite for one that is not given."""
+    if text is None:
+        return math.inf
     from sim.units.quantity import Quantity
     from sim.units.refusals import BadInput
 

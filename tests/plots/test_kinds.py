@@ -99,7 +99,7 @@ def test_sweep_shows_the_second_half_against_the_swept_key():
     np.testing.assert_allclose(
         drawn(figure.axes[0], pictures.REFERENCE, "--")[1], 1e6 * dataset["radius_at_rest"], rtol=1e-14
     )
-    assert figure.axes[-1].get_xlabel() == "normal load, compression positive $P$ (mN)"
+    assert figure.axes[-1].get_xlabel() == "normal load $P$ (mN)"
     assert figure.axes[0].get_xscale() == "log"
 
 
@@ -266,14 +266,37 @@ def test_many_curves_along_one_number_have_a_colour_bar_in_place_of_names():
     assert len(colours) == 9 and colours == sorted(colours, key=lambda c: sum(mpl.colors.to_rgb(c)[:2]))
 
 
-@pytest.mark.parametrize("sweep", [{"contact.load": 21}, {"contact.load": 4, "sphere.radius": 3}])
-def test_too_many_curves_are_refused_with_the_cure(sweep):
-    axes = {key: {"from": 1e-3, "to": 2e-3, "count": count} for key, count in sweep.items()}
-    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=axes, clock=Clock(duration=0.04, step=0.02))
-    with pytest.raises(ValueError, match=r"too many.*--where contact_load="):
-        plots.draw(dataset, "time")
+def swept(**sweep):
+    axes = {key.replace("_", "."): {"from": 1e-3, "to": 2e-3, "count": count} for key, count in sweep.items()}
+    return simulated(drive=STEADY, shear=shear.Uniform(), sweep=axes, clock=Clock(duration=0.04, step=0.02))
+
+
+def test_of_more_curves_than_can_be_told_apart_some_are_drawn_and_that_is_said():
+    dataset = swept(contact_load=41)
+    panel = plots.draw(dataset, "time").axes[0]
+    drawn = [line.get_ydata()[0] for line in panel.lines if line.get_linestyle() == "-"]
+    places = np.rint(np.linspace(0, 40, 20)).astype(int)
+    np.testing.assert_allclose(drawn, 1e6 * dataset["contact_radius"].isel(contact_load=places, t=0), rtol=1e-14)
+    assert "20 of 41 curves drawn (--where draws others)" in legend_of(panel)[1].replace("\n", " ")
     chosen = plots.draw(analysis.where(dataset, {"contact.load": "1 mN"}), "time")
     assert chosen.get_suptitle() == "$P$ = 1 mN"
+
+
+def test_two_swept_keys_make_columns_of_panels_that_share_their_axes():
+    dataset = swept(contact_load=9, sphere_radius=3)
+    figure = rendered(plots.draw(dataset, "time"))
+    panels = np.array(figure.axes[:-1]).reshape(-1, 3)
+    assert [panel.get_title() for panel in panels[0]] == ["$R$ = 1 mm", "$R$ = 1.5 mm", "$R$ = 2 mm"]
+    assert figure.axes[-1].get_ylabel() == "normal load $P$ (mN)"
+    for column, panel in enumerate(panels[0]):
+        drawn = [line.get_ydata()[-1] for line in panel.lines if line.get_linestyle() == "-"]
+        np.testing.assert_allclose(drawn, 1e6 * dataset["contact_radius"].isel(sphere_radius=column, t=-1), rtol=1e-14)
+        assert panel.get_ylim() == panels[0, 0].get_ylim() and panel.get_legend() is None
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["JKR", "Hertz"]
+    many = plots.draw(swept(contact_load=5, sphere_radius=6), "time")
+    assert "4 of 5 columns drawn" in many.legends[0].get_title().get_text()
+    assert [panel.get_title() for panel in many.axes[:4]] == [f"$P$ = {load} mN" for load in ("1", "1.25", "1.75", "2")]
 
 
 def test_no_line_joins_speeds_before_and_after_a_jump():

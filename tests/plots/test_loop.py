@@ -45,20 +45,23 @@ def marks(panel, marker):
     return [line.get_data() for line in panel.lines if line.get_marker() == marker and len(line.get_xdata())]
 
 
+def cycles_of(panel):
+    """Data of the curve, by its cycles: the first is thick, the later ones are thin."""
+    lines = [line for line in panel.lines if line.get_color() == pictures.BOTH and line.get_linestyle() == "-"]
+    return [line.get_data() for width in (1.2, 0.6) for line in lines if line.get_linewidth() == width]
+
+
 def thick(panel):
-    (line,) = (
-        x
-        for x in panel.lines
-        if x.get_color() == pictures.BOTH and x.get_linewidth() > 1.0 and x.get_linestyle() == "-"
-    )
-    return line.get_data()
+    """Data of the whole curve: the cycles begin where the one before them ends."""
+    first, later = cycles_of(panel)
+    return np.hstack([first, np.array(later)[:, 1:]])
 
 
 # -- what is drawn ----------------------------------------------------------------------------
 
 
 def test_load_and_radius_stand_over_the_indentation_and_break_where_the_contact_is_open(grips):
-    loads, radii = rendered(plots.draw(grips, "loop")).axes
+    loads, radii, _ = rendered(plots.draw(grips, "loop")).axes
     closed = grips["in_contact"].to_numpy() == 1
     assert radii.get_xlabel() == r"indentation $\delta$ (µm)" and not closed.all()
     for panel, name, factor in ((loads, "normal_load", 1e6), (radii, "contact_radius", 1e6)):
@@ -69,8 +72,25 @@ def test_load_and_radius_stand_over_the_indentation_and_break_where_the_contact_
     np.testing.assert_array_equal(thin.get_ydata(), np.where(closed, np.nan, 0.0))
 
 
+def test_the_radius_stands_over_the_load_with_every_equilibrium_too(grips):
+    panel = plots.draw(grips, "loop").axes[2]
+    closed = grips["in_contact"].to_numpy() == 1
+    load, radius = thick(panel)
+    assert panel.get_xlabel() == "normal load $P$ (µN)" and panel.get_ylabel() == "contact radius $a$ (µm)"
+    assert_allclose(load, 1e6 * grips["normal_load"], rtol=1e-14)
+    assert_allclose(radius, np.where(closed, 1e6 * grips["contact_radius"], np.nan), rtol=1e-14)
+    load, radius = drawn(panel, pictures.REFERENCE, "--")
+    assert_allclose(load, 1e6 * jkr.load_at_radius(1e-6 * radius, *JKR), rtol=1e-12, atol=1e-12)
+
+
+def test_cycles_after_the_first_are_thin(machine):
+    first, later = (x for x, _ in cycles_of(plots.draw(machine, "loop").axes[1]))
+    assert len(first) == len(later) == machine.sizes["t"] // 2 + 1 and first[-1] == later[0]
+    assert "later cycles" in legend_of(plots.draw(machine, "loop").axes[1])[0]
+
+
 def test_behind_a_machine_the_axis_is_its_displacement(machine):
-    loads, radii = plots.draw(machine, "loop").axes
+    loads, radii, _ = plots.draw(machine, "loop").axes
     assert radii.get_xlabel() == r"displacement $\Delta$ (µm)"
     assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
 
@@ -78,7 +98,7 @@ def test_behind_a_machine_the_axis_is_its_displacement(machine):
 @pytest.mark.parametrize(("which", "stiffness"), [("grips", np.inf), ("machine", 340.0)])
 def test_grey_are_all_equilibria_of_jkr_stable_or_not(which, stiffness, request):
     dataset = request.getfixturevalue(which)
-    loads, radii = plots.draw(dataset, "loop").axes
+    loads, radii, _ = plots.draw(dataset, "loop").axes
     x, radius = drawn(radii, pictures.REFERENCE, "--")
     again, load = drawn(loads, pictures.REFERENCE, "--")
     a = 1e-6 * radius
@@ -112,7 +132,7 @@ def test_thin_lines_are_the_folds_of_a_dead_load_and_of_fixed_grips(grips):
 
 
 def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine):
-    loads, radii = plots.draw(machine, "loop").axes
+    loads, radii, _ = plots.draw(machine, "loop").axes
     closed = machine["in_contact"].to_numpy().astype(int)
     off, on = np.flatnonzero(np.diff(closed) == -1), np.flatnonzero(np.diff(closed) == 1) + 1
     assert len(off) == len(on) == 2
@@ -134,7 +154,7 @@ def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine
 
 def test_a_dead_load_has_no_jump_to_draw_but_a_cross():
     dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}), clock=COARSE)
-    loads, radii = plots.draw(dataset, "loop").axes
+    loads, radii, _ = plots.draw(dataset, "loop").axes
     assert radii.get_xlabel() == r"indentation $\delta$ (µm)"
     assert not loads.collections and len(marks(loads, "x")) == 1 and not marks(loads, "o")
 
@@ -170,7 +190,7 @@ def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
 
 def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
     dataset = moved(MACHINE, clock=COARSE, sweep={"contact.stiffness": [100.0, 1e3]})
-    loads, radii = plots.draw(dataset).axes
+    loads, radii, _ = plots.draw(dataset).axes
     assert [line.get_color() for line in radii.lines if line.get_linestyle() == "--"] == [pictures.REFERENCE] * 2
     words = [text.get_text() for text in loads.get_legend().get_texts()]
     assert [text.split(":")[0] for text in words] == ["$k$ = 0.1 kN/m", "$k$ = 1 kN/m"]
@@ -194,7 +214,7 @@ def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
 )  # fmt: skip
 def test_every_shape_of_dataset_can_be_drawn(changes):
     dataset = moved(**changes, clock=COARSE)
-    loads, radii = plots.draw(dataset, "loop").axes
+    loads, radii, _ = plots.draw(dataset, "loop").axes
     assert loads.get_ylabel().startswith("normal load") and radii.get_ylabel().startswith("contact radius")
     closed = any(np.isfinite(y).any() for _, y in lines_of(radii))
     assert closed == bool((recorded(dataset, "contact_radius") > 0.0).any())

@@ -1,0 +1,268 @@
+"""What is chosen for a figure is what it shows: a member, a time, an axis, units, measured points, axes to draw in."""
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from helpers.commands import sim as command
+from helpers.pictured import STEADY, drawn, legend_of, lines_of, mapped, rendered, simulated
+from matplotlib.figure import Figure
+from numpy.testing import assert_allclose
+
+import sim
+from sim import analysis
+from sim.parts.contact import Equilibrium
+from sim.parts.drive import prescribed as drive
+from sim.parts.shear import models as shear
+from sim.plots import Choices, kinds as plots, style as pictures
+from sim.scenario.clock import Record
+from sim.units.refusals import BadInput
+
+LOADS = {"contact.load": [1e-3, 4e-3]}
+REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3))
+
+
+def draw(dataset, kind=None, **choices):
+    return plots.draw(dataset, kind, Choices(**choices))
+
+
+@pytest.fixture(scope="module")
+def ramp():
+    return simulated()
+
+
+@pytest.fixture(scope="module")
+def loads():
+    """Two loads under a ramp, without fluctuations."""
+    return simulated(shear=shear.Uniform(), sweep=LOADS)
+
+
+# -- a member, a time -------------------------------------------------------------------------
+
+
+def test_a_member_is_drawn_alone_and_named(ramp):
+    figure = rendered(draw(ramp, "time", member=3))
+    own = ramp["contact_radius"].isel(member=3)
+    assert_allclose(drawn(figure.axes[0], pictures.BOTH)[1], 1e6 * own, rtol=1e-14)
+    assert figure.get_suptitle() == "member 3" and legend_of(figure.axes[0])[0] == ["simulated", "JKR", "Hertz"]
+
+
+def test_a_member_that_is_not_there_is_refused(ramp):
+    with pytest.raises(ValueError, match="there is no member 6; there are members 0 to 5"):
+        draw(ramp, "time", member=6)
+    with pytest.raises(ValueError, match=r"only statistics; .*per_member = true"):
+        draw(simulated(record=Record(per_member=False)), "time", member=1)
+
+
+def test_the_map_of_a_member_nearest_to_a_time_is_drawn_and_says_when():
+    dataset = simulated(
+        shear=mapped.__globals__["field"](shear.Mapped), drive=STEADY, record=Record(maps=(0.2, 0.4), map_members=2)
+    )
+    for member, at, place in ((0, 0.25, 0), (1, "300.1 ms", 1)):
+        figure = draw(dataset, "map", member=member, at=at)
+        shown = figure.axes[0].images[0].get_array()
+        stress = dataset["shear_map"].isel(map_member=member, map_time=place).to_numpy()
+        most = figure.axes[0].images[0].norm.vmax
+        assert_allclose(most, 1e-3 * np.abs(shown.data).max() * 1e3, rtol=1e-12)
+        assert_allclose(np.std(shown.data), 1e-3 * np.std(stress), rtol=0.1)
+        assert f"$t$ = {(200, 400)[place]} ms" in figure.axes[0].get_title()
+    with pytest.raises(ValueError, match="no stress maps"):
+        draw(dataset, "map", member=3)
+
+
+def test_the_profile_at_a_time_is_that_of_the_nearest_record():
+    dataset = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
+    closed = np.flatnonzero(dataset["in_contact"])
+    time = float(dataset["t"][closed[2]])
+    panel = draw(dataset, "profile", at=time + 1e-3).axes[0]
+    assert any(f"$t$ = {1e3 * time:g} ms" in name for name in legend_of(panel)[0])
+    with pytest.raises(ValueError, match="the contact is open at t = 400 ms; choose another time"):
+        draw(dataset, "profile", at="1 h")
+    with pytest.raises(ValueError, match=r"^at 3 mm: "):
+        draw(dataset, "profile", at="3 mm")
+
+
+# -- axes -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("x", "variable", "factor", "label"),
+    [
+        ("time", "t", 1e3, "time $t$ (ms)"),
+        ("speed", "speed", 1e3, "sliding speed $V$ (mm/s)"),
+        ("slider_position", "slider_position", 1e3, "displacement of the slider $X$ (mm)"),
+        ("shear_stress", "shear_stress", 1e-3, r"mean shear stress at the interface $\tau_{0}$ (kPa)"),
+    ],
+)
+def test_curves_are_drawn_over_what_was_chosen(x, variable, factor, label):
+    dataset = simulated(shear=shear.Uniform())
+    figure = rendered(draw(dataset, "time", x=x))
+    over, radius = drawn(figure.axes[0], pictures.BOTH)
+    assert_allclose(over, factor * dataset[variable], rtol=1e-14)
+    assert_allclose(radius, 1e6 * dataset["contact_radius"], rtol=1e-14)
+    assert figure.axes[-1].get_xlabel() == label
+    assert plots.draw(dataset, None, Choices(x=x)).axes[-1].get_xlabel() == label
+
+
+def test_a_swept_key_that_is_chosen_goes_along_the_axis_and_the_others_make_curves():
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=LOADS | {"sphere.radius": ["1 mm", "2 mm", "3 mm"]})
+    figure = draw(dataset, x="sphere.radius")
+    assert figure.axes[-1].get_xlabel() == "radius of the sphere $R$ (mm)"
+    x, radius = drawn(figure.axes[0], pictures.LINES[1])
+    assert_allclose(x, [1.0, 2.0, 3.0], rtol=1e-14)
+    assert_allclose(radius, 1e6 * dataset["contact_radius"].isel(contact_load=1, t=-1), rtol=1e-14)
+
+
+def test_what_nothing_can_be_drawn_over_is_told_with_what_can(ramp):
+    with pytest.raises(ValueError, match=r'over "slider_positon"; did you mean "slider_position"\?'):
+        draw(ramp, "time", x="slider_positon")
+    with pytest.raises(ValueError, match=r'over "zzz"; choose of: t, speed, .*contact_radius'):
+        draw(ramp, "time", x="zzz")
+
+
+def test_lines_break_where_the_speed_changes_its_sign():
+    dataset = simulated(drive=drive.Table(time=(0.0, 0.2, 0.4), speed=(2.1e-3, -2e-3, 2e-3)), shear=shear.Uniform())
+    speed = dataset["speed"].to_numpy()
+    turns = np.flatnonzero(speed[1:] * speed[:-1] < 0.0)
+    x, _ = drawn(draw(dataset, "curve").axes[0], pictures.BOTH)
+    assert len(turns) == 2 and np.flatnonzero(np.isnan(x)).tolist() == [turns[0] + 1, turns[1] + 2]
+
+
+def test_absolute_areas_stand_in_place_of_shares(ramp):
+    found = analysis.statistics(ramp)
+    panel = draw(ramp, "curve", absolute=True).axes[0]
+    assert panel.get_ylabel() == "contact area $A$ (mm²)"
+    assert_allclose(drawn(panel, pictures.BOTH)[1], 1e6 * found["contact_area_mean"], rtol=1e-14)
+    full = 1e6 * np.pi * float(ramp["radius_at_rest"]) ** 2
+    assert_allclose(drawn(panel, pictures.REFERENCE, "--")[1], full, rtol=1e-12)
+    assert draw(ramp, "time", absolute=True).axes[0].get_ylabel() == "contact area $A$ (mm²)"
+
+
+def test_axes_have_the_units_chosen_for_their_dimension(ramp):
+    figure = draw(ramp, "curve", units=("um/s", "kN"), absolute=True)
+    area, *_, friction = figure.axes
+    assert friction.get_xlabel() == "sliding speed $V$ (µm/s)" and friction.get_ylabel() == "friction $F$ (kN)"
+    assert area.get_ylabel().endswith("(mm²)")
+    assert_allclose(drawn(friction, pictures.BOTH)[0], 1e6 * ramp["speed"], rtol=1e-14)
+    for unit in ("mm", "parsnip"):
+        with pytest.raises(ValueError, match=f'no axis of this figure can be in "{unit}"'):
+            draw(ramp, "curve", units=(unit,))
+
+
+def test_a_choice_that_a_kind_does_not_take_is_refused(ramp):
+    with pytest.raises(ValueError, match=r'the figure "profile" has no choice of x; it takes: at$'):
+        draw(ramp, "profile", x="t")
+    with pytest.raises(ValueError, match='"theories" has no choice of data; it takes none but member and units'):
+        draw(ramp, "theories", data="x.csv")
+
+
+# -- measured points --------------------------------------------------------------------------
+
+HEADER = "speed [mm/s], contact_area [mm^2], contact_area_error [%], friction_force [mN]"
+
+
+@pytest.fixture
+def table(tmp_path):
+    def written(text):
+        path = tmp_path / "measured.csv"
+        path.write_text(text)
+        return path
+
+    return written
+
+
+def points_of(panel):
+    """Places of the measured points of a panel."""
+    return [line.get_data() for line in panel.lines if line.get_marker() == "o" and line.get_mfc() == "white"]
+
+
+def test_measured_points_lie_where_they_were_measured_with_residuals_below(table):
+    dataset = simulated(shear=shear.Uniform())
+    path = table(f"{HEADER}\n2, 0.04, 2, 9\n20, 0.03, 2, 4\n500, 0.03, 2, 1\n")
+    area, _, friction, residual = rendered(draw(dataset, "curve", data=path)).axes
+    ((speed, share),) = points_of(area)
+    full = 1e6 * np.pi * float(dataset["radius_at_rest"]) ** 2
+    assert_allclose(speed, [2.0, 20.0, 500.0], rtol=1e-14)
+    assert_allclose(share, np.array([0.04, 0.03, 0.03]) / full, rtol=1e-12)
+    assert_allclose(points_of(friction)[0][1], [9.0, 4.0, 1.0], rtol=1e-14)
+    ((at, off),) = points_of(residual)
+    mean = np.interp(np.log(at[:2]), np.log(1e3 * dataset["speed"]), dataset["contact_area"])
+    assert_allclose(off[:2], (np.array([0.04, 0.03]) - 1e6 * mean) / (0.02 * np.array([0.04, 0.03])), rtol=1e-9)
+    assert np.isnan(off[2])  # beyond the ramp
+    assert any(name.startswith(r"measured, $\chi^2$ =") and name.endswith("of 2") for name in legend_of(area)[0])
+    assert area.get_xlim()[1] > 500.0
+    absolute = draw(dataset, "curve", data=path, absolute=True).axes[0]
+    assert_allclose(points_of(absolute)[0][1], [0.04, 0.03, 0.03], rtol=1e-14)
+    radius = draw(dataset, "time", x="speed", data=path).axes[0]
+    assert_allclose(points_of(radius)[0][1], 1e3 * np.sqrt(np.array([0.04, 0.03, 0.03]) / np.pi), rtol=1e-12)
+
+
+def test_rows_of_a_swept_value_have_the_colour_of_its_curve(loads, table):
+    path = table("contact_load [mN], speed [mm/s], contact_radius [um]\n4, 1, 110\n1, 1, 85\n4, 2, 111\n9, 1, 99\n")
+    panel = draw(loads, "curve", data=path, absolute=True).axes[0]
+    areas = [np.pi * np.square(radii) / 1e6 for radii in ([85.0], [110.0, 111.0])]
+    colours = [line.get_color() for line in panel.lines if line.get_mfc() == "white"]
+    assert colours == list(pictures.LINES[:2])
+    for (_, shown), area in zip(points_of(panel), areas, strict=True):
+        assert_allclose(shown, area, rtol=1e-12)
+    one = analysis.where(loads, {"contact.load": "1 mN"})
+    assert_allclose(points_of(draw(one, "curve", data=path).axes[0])[0][0], [1.0], rtol=1e-14)
+
+
+def test_a_loop_has_measured_points_in_every_panel(table):
+    grips = Equilibrium(indentation={"from": 2e-6, "to": -4e-6, "cycles": 1})
+    dataset = simulated(contact=grips, drive=STEADY, shear=shear.Uniform())
+    path = table("normal_load [mN], contact_radius [um], contact_radius_error [um]\n0, 70, 2\n0.5, 80, 2\n")
+    loads, radii, loaded = draw(dataset, "loop", data=path).axes
+    assert not points_of(loads) and not points_of(radii)
+    assert_allclose(points_of(loaded)[0], [[0.0, 500.0], [70.0, 80.0]], rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("contact_area [mm^2]\n0.04\n", r'no column "speed", which the figure is drawn over; add it, or choose --x'),
+        ("speed [mm/s], contact_aera [mm^2]\n1, 0.04\n", r'"contact_aera" is neither .* did you mean "contact_area"'),
+        ("speed [mm/s], contact_area [mN]\n1, 0.04\n", r"contact_area.* not a unit of m\^2"),
+        ("speed [mm/s], indentation [um]\n1, 1\n", "no row is of what is drawn.*speed, indentation"),
+        ("speed [mm/s], contact_area [mm^2], contact_load [N]\n1, 0.04, 1\n", "no row is of what is drawn"),
+    ],
+)
+def test_a_table_of_which_nothing_can_be_drawn_is_refused(ramp, table, text, said):
+    with pytest.raises(ValueError, match=said):
+        draw(ramp, "curve", data=table(text))
+
+
+# -- in Python and by the command -------------------------------------------------------------
+
+
+def test_the_first_panel_is_drawn_in_axes_that_are_given(loads, table):
+    figure = Figure()
+    left, right = figure.subplots(1, 2)
+    path = table(f"{HEADER}\n2, 0.04, 2, 9\n")
+    before = mpl.rcParams["font.family"]
+    assert sim.plot(loads, "curve", ax=right, absolute=True, data=path) is right
+    assert mpl.rcParams["font.family"] == before and not lines_of(left) and len(figure.axes) == 2
+    assert right.get_xlabel() == "sliding speed $V$ (mm/s)" and right.get_ylabel() == "contact area $A$ (mm²)"
+    assert_allclose(drawn(right, pictures.LINES[0])[1], 1e6 * loads["contact_area"].isel(contact_load=0), rtol=1e-14)
+    with pytest.raises(BadInput, match='"map" has no choice of ax'):
+        sim.plot(mapped(), "map", ax=left)
+    with pytest.raises(BadInput, match="scale: is no choice of a figure; there are: member, at"):
+        sim.plot(loads, "curve", scale=2)
+
+
+def test_the_command_takes_the_choices_and_replaces_no_table(loads, table, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    loads.to_netcdf("x.nc")
+    path = table(f"{HEADER}\n2, 0.04, 2, 9\n")
+    done = command("plot", "x.nc", "curve", "--where", "load=4 mN", "--units", "mm/s", "--absolute", "--data", path)
+    assert done.exit_code == 0, done.stderr
+    assert (tmp_path / "x-curve.png").read_bytes()[:4] == b"\x89PNG"
+    assert command("plot", "x.nc", "time", "--data", path, "-o", path, "--force").exit_code == 2
+    assert path.read_text().startswith("speed")
+    assert (
+        command("plot", "x.nc", "--at", "1 s", "curve", "--force")
+        .stderr.strip()
+        .endswith("it takes: x, absolute, data, ax")
+    )
+    listed = " ".join(command("plot", "--help").stdout.split())
+    assert "over speed. --x --absolute --data" in listed
