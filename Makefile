@@ -12,7 +12,9 @@ run: $(STAMP)
 	$(BIN)/sim run scenarios/pdms_lens.toml --force
 	$(BIN)/sim plot outputs/pdms_lens.nc --force
 
+# Kernels that are not compiled yet are so once, not by each of the processes that test.
 test: $(STAMP)
+	-$(BIN)/sim warm
 	$(BIN)/python -m pytest $(PARALLEL) --doctest-modules --ignore=sim/__main__.py sim tests
 
 PARALLEL = -n 2 --dist worksteal
