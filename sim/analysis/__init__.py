@@ -11,7 +11,7 @@ from sim.analysis.events import events, loop_energy, peaks
 from sim.analysis.lifetimes import Lifetime, first_passage, lifetime
 from sim.analysis.long_table import tidy, to_csv
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
-from sim.analysis.over_speed import crossing, loss_speeds
+from sim.analysis.over_speed import crossing, loss_speeds, speed_curves
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.stationary import distribution, over_time
 from sim.analysis.statistics import QUANTILES, averaging, shares, skewness_error, statistics, summary, where
@@ -24,8 +24,8 @@ __all__ = [
     "correlation_time", "crossing", "distribution", "engineering", "events", "first_passage", "highlights",
     "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "losses", "notes",
     "observables", "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables",
-    "shares", "skewness_error", "slips", "spread", "statistics", "stick_slip", "summary", "sweep_dims", "table",
-    "tidy", "to_csv", "where",
+    "shares", "skewness_error", "slips", "speed_curves", "spread", "statistics", "stick_slip", "summary", "sweep_dims",
+    "table", "tidy", "to_csv", "where",
 ]  # fmt: skip
 
 

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-#: Bytes of trajectories that are read at once.
-ROOM = 2**25
+#: Bytes of trajectories that are worked on at once, and that are read at once where a file packs them together.
+ROOM, READ = 2**25, 2**28
 
 
 def blocks(dataset: xr.Dataset, dims: Sequence[str], room: int | None = None) -> Iterator[dict[str, slice]]:
@@ -59,8 +59,7 @@ def in_blocks(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dat
     The function works at each value of these dimensions by itself.
     """
     found: dict[str, xr.DataArray] = {}
-    for block in blocks(dataset, dims):
-        part = reduce(dataset.isel(block))
+    for block, part in ((block, reduce(some)) for block, some in _loaded(dataset, dims)):
         if all(part.sizes.get(name, 1) == dataset.sizes.get(name, 1) for name in block):
             return part
         for key, values in part.items():
@@ -73,3 +72,29 @@ def in_blocks(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dat
                 found[str(key)] = whole
             whole[{name: block[name] for name in values.dims if name in block}] = values.to_numpy()
     return xr.Dataset(found)
+
+
+def at_records(dataset: xr.Dataset, records: np.ndarray) -> xr.Dataset:
+    """A dataset at some of its records, in their order, what a file packs together read once for all of them."""
+    found = dataset.isel(t=records)
+    for name, variable in dataset.variables.items():
+        if "t" in variable.dims and name != "t":
+            values = np.empty((*variable.shape[:-1], len(records)), variable.dtype)
+            for block in blocks(dataset[[name]], [str(dim) for dim in variable.dims], READ):
+                *outer, times = block.values()
+                inside = (records >= times.start) & (records < times.stop)
+                if inside.any():
+                    wanted = records[inside]
+                    read = variable[(*outer, slice(wanted[0], wanted[-1] + 1))].to_numpy()
+                    values[(*outer, inside)] = read[..., wanted - wanted[0]]
+            found = found.assign({name: found[name].copy(data=values)})
+    return found
+
+
+def _loaded(dataset: xr.Dataset, dims: Sequence[str]) -> Iterator[tuple[dict[str, slice], xr.Dataset]]:
+    """Blocks of a dataset, what a file packs together read once."""
+    for packed in blocks(dataset, dims, READ):
+        read = dataset.isel(packed).load()
+        for block in blocks(read, dims):
+            places = {n: slice(packed[n].start + at.start, packed[n].start + at.stop) for n, at in block.items()}
+            yield places, read.isel(block)

@@ -15,8 +15,8 @@ _WINDOW = 6.0
 _FEWEST = 2.0
 #: How many of its standard errors the correlation of neighbouring records is below that of ``_FEWEST``.
 _SURELY = 4.0
-#: Numbers that are transformed at once.
-_AT_ONCE = 2**21
+#: Numbers that are transformed at once, values that a correlation time is taken from, and records apart at most.
+_AT_ONCE, _VALUES, _LAGS = 2**21, 2**23, 2**16
 
 
 class IntegralTime(NamedTuple):
@@ -76,12 +76,12 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
     members, records = values.shape
     if records < 2 or not np.all(np.isfinite(values)):
         return _NOTHING
-    return time_of(autocovariance(values), members, step, max(values.max(), -values.min()))
+    return time_of(autocovariance(values), members, records, step, max(values.max(), -values.min()))
 
 
-def time_of(covariance: np.ndarray, members: int, step: float, largest: float) -> IntegralTime:
+def time_of(covariance: np.ndarray, members: int, records: int, step: float, largest: float) -> IntegralTime:
     """The ``integral_time`` of an autocovariance of so many members, whose values are as large as ``largest``."""
-    records, free = len(covariance), max(members - 1, 1)
+    free, lags = max(members - 1, 1), np.arange(len(covariance))
     if records < 2 or not covariance[0] > (1e-10 * largest) ** 2:
         return _NOTHING
     correlation = covariance / covariance[0]
@@ -89,10 +89,10 @@ def time_of(covariance: np.ndarray, members: int, step: float, largest: float) -
     if correlation[1] < coarse:
         sure = correlation[1] < coarse - _SURELY / math.sqrt(free * records)
         return IntegralTime(math.nan, math.nan, _FEWEST * step if sure else math.nan)
-    weights = np.where(np.arange(records) % 2, 4.0, 2.0) / 3.0
+    weights = np.where(lags % 2, 4.0, 2.0) / 3.0
     weights[0] /= 2.0
     sums = np.cumsum(weights * correlation)
-    windows = np.flatnonzero(np.arange(records) >= _WINDOW * sums)
+    windows = np.flatnonzero(lags >= _WINDOW * sums)
     if len(windows) == 0:
         return _NOTHING
     window = int(windows[0])
@@ -100,30 +100,73 @@ def time_of(covariance: np.ndarray, members: int, step: float, largest: float) -
     return IntegralTime(time, time * math.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)))
 
 
-def autocovariance(values: np.ndarray, mean: np.ndarray | None = None) -> np.ndarray:
+def seen(members: int, records: int) -> int:
+    """The first so many members are enough for a correlation time."""
+    return min(members, max(2, _VALUES // records))
+
+
+class Covariance:
+    """Covariance of records by the number of records between them, of series that come in pieces.
+
+    Parameters
+    ----------
+    records : int
+        Of each series; of long ones no more than 65,536 between two are looked at.
+    """
+
+    def __init__(self, records: int) -> None:
+        self.records, self.sums = records, np.zeros(min(records, _LAGS))
+        self.pieces: list[np.ndarray] = []
+        self.before = 0
+
+    def add(self, deviations: np.ndarray) -> None:
+        """Go on with the next records of some series, shape (series, records), as deviations from their means."""
+        self.pieces.append(deviations)
+        if sum(piece.shape[1] for piece in self.pieces) - self.before >= len(self.sums):
+            self._sum()
+
+    def end(self) -> None:
+        """End these series, so that others may follow."""
+        if sum(piece.shape[1] for piece in self.pieces) > self.before:
+            self._sum()
+        self.pieces, self.before = [], 0
+
+    def _sum(self) -> None:
+        values, lags, power = np.concatenate(self.pieces, axis=1), len(self.sums), 0.0
+        size = scipy.fft.next_fast_len(values.shape[1] + lags - self.before, real=True)
+        rows = max(1, _AT_ONCE // size)
+        for start in range(0, len(values), rows):
+            some = values[start : start + rows]
+            of_all = new = scipy.fft.rfft(some, size)
+            if self.before:
+                new = of_all - scipy.fft.rfft(some[:, : self.before], size)
+            power = power + (new * of_all.conj()).sum(axis=0)
+        self.sums += scipy.fft.irfft(power, size)[:lags]
+        self.pieces, self.before = [values[:, -lags:]], min(lags, values.shape[1])
+
+    def over(self, free: float) -> np.ndarray:
+        """The covariance, of so many free series."""
+        return self.sums / (free * np.arange(self.records, self.records - len(self.sums), -1))
+
+
+def autocovariance(values: np.ndarray) -> np.ndarray:
     """Covariance of records by the number of records between them, averaged over members and times.
 
     Parameters
     ----------
     values : array, shape (members, records)
-        Independent members of one process.
-    mean : array, optional
-        What their deviations are from. By default it is the ensemble mean at each record, of a single member its own
-        mean in time; and one member less counts as free. If it is given, the result is a sum over the members.
-
-    Returns
-    -------
-    array, shape (records,)
+        Independent members of one process. Deviations are those from the ensemble mean at each record, of a single
+        member from its own mean in time; and one member less counts as free.
     """
     members, records = values.shape
-    free = 1.0 if mean is not None else max(members - 1.0, 1.0)
-    if mean is None:
-        mean = values.mean(axis=0) if members > 1 else values.mean(axis=1)
-    size, power = scipy.fft.next_fast_len(2 * records, real=True), 0.0
-    rows = max(1, _AT_ONCE // size)
+    mean = np.broadcast_to(values.mean(axis=0) if members > 1 else values.mean(), records)
+    found, rows = Covariance(records), max(1, _AT_ONCE // (2 * records))
     for start in range(0, members, rows):
-        power = power + (np.abs(scipy.fft.rfft(values[start : start + rows] - mean, size, axis=1)) ** 2).sum(axis=0)
-    return scipy.fft.irfft(power, size)[:records] / (free * np.arange(records, 0, -1))
+        for at in range(0, records, _LAGS):
+            here = slice(at, at + _LAGS)
+            found.add(values[start : start + rows, here] - mean[here])
+        found.end()
+    return found.over(max(members - 1.0, 1.0))
 
 
 class Inflation(NamedTuple):
@@ -133,15 +176,15 @@ class Inflation(NamedTuple):
     freedom: float
 
 
-def inflation(covariance: np.ndarray, members: int) -> Inflation:
+def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
     """Variance of a mean over correlated records, in that of a mean over as many independent ones.
 
     Parameters
     ----------
-    covariance : array, shape (records,)
+    covariance : array
         As of ``autocovariance``.
-    members : int
-        Of how many members it is.
+    members, records : int
+        Of how many members and records it is.
 
     Returns
     -------
@@ -154,11 +197,10 @@ def inflation(covariance: np.ndarray, members: int) -> Inflation:
     Of a single series the sum is corrected for the deviations being from its own mean (U. Wolff, Comput. Phys. Commun.
     156 (2004) 143).
     """
-    records = len(covariance)
     if not covariance[0] > 0.0:
         return Inflation(math.nan, math.nan)
     sums = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
-    windows = np.flatnonzero(np.arange(records) >= 0.5 * _WINDOW * sums)
+    windows = np.flatnonzero(np.arange(len(sums)) >= 0.5 * _WINDOW * sums)
     if len(windows) == 0:
         return Inflation(math.nan, math.nan)
     window, free = int(windows[0]), max(members - 1, 1)
@@ -183,6 +225,7 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
     times = [xr.full_like(dataset["contact_modulus"], math.nan) for _ in range(3)]
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
+        energy = energy.isel({MEMBERS: slice(seen(energy.sizes[MEMBERS], energy.sizes["t"]))})
         all_points = steady_points(dataset).broadcast_like(dataset["contact_modulus"])
         steady = all_points.transpose(*sweep_dims(dataset)).to_numpy()
         for point in np.ndindex(steady.shape):

@@ -36,7 +36,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
         Without the dimension ``t``; what a scene cannot have is left out.
 
         - ``ever_detached``: 1 where the contact opened; ``first_detachment`` [s], nan where it never did.
-        - ``time_masked``: share of the time in which adhesion was masked.
+        - ``time_masked``: share of the time in which adhesion was masked; ``first_masked`` [s], nan where it never was.
         - ``total_dissipated`` [J]: by opening and closing, to the end of the run.
         - ``loop_energy``, ``loop_dissipation`` [J]: means over the cycles there and back; see ``loop_energy``.
         - ``peak_stress`` [Pa], ``peak_time`` [s], ``peak_speed`` [m/s], and ``peak_friction`` [N] with
@@ -82,7 +82,13 @@ def _masks(dataset: xr.Dataset) -> xr.Dataset:
     masked = found[f"fraction_masked{suffix}"]
     masked = masked if suffix else masked.where(dataset["contact_area"].notnull())
     share = masked.isel(t=slice(min(1, dataset.sizes["t"] - 1), None)).mean("t", skipna=not suffix)
-    return xr.Dataset({f"time_masked{suffix}": pure(share, "share of the time in which adhesion was masked")})
+    found = {f"time_masked{suffix}": pure(share, "share of the time in which adhesion was masked")}
+    if not suffix:
+        ever = masked == 1.0
+        text = "time at which adhesion was first masked, of the contacts in which it was"
+        first = dataset["t"].isel(t=ever.argmax("t")).drop_vars("t").where(ever.any("t"))
+        found["first_masked"] = ordered(first).assign_attrs(units="s", long_name=text)
+    return xr.Dataset(found)
 
 
 @of_dataset
@@ -119,15 +125,14 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     slides = (ramp | start) & (dataset["t"] >= beginning - 1e-6 * between)  # the record of the start counts
     for name, prefix, source, unit in _PEAKS:
         suffix = "" if source in dataset else "_mean"
-        recorded = dataset[source + suffix].astype(float)
-        size = abs(recorded).where(slides)
-        at, known = _maximum(size, ramp)
+        read = dataset[[source + suffix, "contact_modulus"]].assign(slides=slides)
+        largest = _maximum(read, source + suffix, ramp)
+        at, known = largest["at"], largest["known"]
         stepped = not suffix and name in dataset
-        largest = dataset[name] if stepped else size.isel(t=at)
         when = dataset["peak_time"] if stepped and prefix == "peak" else dataset["t"].isel(t=at)
-        text = f"largest {recorded.attrs.get('long_name', source)} while sliding"
+        text = f"largest {dataset[source + suffix].attrs.get('long_name', source)} while sliding"
         described = {
-            name + suffix: (largest, unit, text),
+            name + suffix: (dataset[name] if stepped else largest["size"], unit, text),
             f"{prefix}_time": (when - beginning, "s", f"time from the start of sliding to the {text}"),
             f"{prefix}_speed": (dataset["speed"].isel(t=at), "m/s", f"sliding speed at the {text}"),
         }
@@ -148,31 +153,47 @@ def _beginning(dataset: xr.Dataset) -> xr.DataArray:
     return dataset["t"].isel(t=(first - 1).clip(0)).drop_vars("t")
 
 
-def _maximum(values: xr.DataArray, ramp: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """Record of the largest value, and whether it is a maximum.
+def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
+    """Largest value while it ``slides``: its ``size``, the record ``at`` which it is, whether it is ``known``.
 
     It is one if it stands above the ends by more than rounding; and members must fall from where their mean is largest
     to the ends, in parts of it, by more than noise may.
     """
-    at = values.fillna(-1.0).argmax("t")
-    ends = _ends(values)
-    above = [values.isel(t=at) / (1.0 + _ROUNDING) > end for end in ends]
-    if values.sizes.get(MEMBERS, 1) > 1:
-        peak = values.isel(t=values.mean(MEMBERS).fillna(-1.0).argmax("t"))
-        drops = [1.0 - end / peak.where(peak > 0.0) for end in ends]
-        errors = [drop.std(MEMBERS, ddof=1) / np.sqrt(values.sizes[MEMBERS]) for drop in drops]
+
+    def sizes(some: xr.Dataset) -> xr.DataArray:
+        return abs(some[name].astype(float)).where(some["slides"])
+
+    def mean(some: xr.Dataset) -> xr.Dataset:
+        return xr.Dataset({"mean": sizes(some).mean(MEMBERS)})
+
+    def each(some: xr.Dataset) -> xr.Dataset:
+        values = sizes(some)
+        at = values.fillna(-1.0).argmax("t")
+        first, last = _ends(values)
+        found = {"at": at, "size": values.isel(t=at), "first": first, "last": last}
+        found |= {"peak": values.isel(t=some["top"])} if "top" in some else {}
+        return xr.Dataset({name: values.drop_vars("t", errors="ignore") for name, values in found.items()})
+
+    dims, several = sweep_dims(recorded), recorded.sizes.get(MEMBERS, 1) > 1
+    if several:
+        recorded = recorded.assign(top=in_blocks(recorded, ("t", *dims), mean)["mean"].fillna(-1.0).argmax("t"))
+    found = in_blocks(recorded, (*dims, MEMBERS), each)
+    ends = found["first"], found["last"]
+    above = [found["size"] / (1.0 + _ROUNDING) > end for end in ends]
+    if several:
+        drops = [1.0 - end / found["peak"].where(found["peak"] > 0.0) for end in ends]
+        errors = [drop.std(MEMBERS, ddof=1) / np.sqrt(recorded.sizes[MEMBERS]) for drop in drops]
         falls = [drop.mean(MEMBERS) > _ERRORS * error for drop, error in zip(drops, errors, strict=True)]
         above = [higher & fall for higher, fall in zip(above, falls, strict=True)]
     first, last = above
-    return at, last & (~ramp | first)
+    return found.assign(known=last & (~ramp | first))
 
 
 def _ends(values: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
     """The first and the last value that is there."""
-    count = values.sizes["t"]
-    number, there = xr.DataArray(np.arange(count), dims="t"), values.notnull()
-    first, last = number.where(there, count).min("t"), number.where(there, -1).max("t")
-    return values.isel(t=first.clip(0, count - 1)), values.isel(t=last.clip(0, count - 1))
+    there = values.notnull()
+    first, last = there.argmax("t"), values.sizes["t"] - 1 - there.isel(t=slice(None, None, -1)).argmax("t")
+    return values.isel(t=first), values.isel(t=last)
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
@@ -210,15 +231,22 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     if not bool((cycles >= 1.0).any()):
         said = 'give some, such as [contact] load = { from = "4 mN", to = "-1 mN", cycles = 2 }'
         raise ValueError(f"nothing makes cycles there and back; {said}")
-    cycles = cycles.where(cycles >= 1.0)
+    count = int(cycles.max())
     suffix = "" if "normal_load" in dataset else "_mean"
+    read = (f"{name}{suffix}" for name in ("contact_radius", "normal_load", "displacement", "dissipated_energy"))
+    dims = (*sweep_dims(dataset), MEMBERS)
+    return in_blocks(keep(dataset, *read), dims, lambda some: _loops(some, suffix, count))
+
+
+def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
+    """``loop_energy`` and ``loop_dissipation`` in each of so many cycles."""
+    cycles = cycles_of(dataset)
     going = dataset[f"contact_radius{suffix}"].notnull()
     held = dataset[[f"normal_load{suffix}", f"displacement{suffix}"]].astype(float).where(going)
     load, displacement = held.values()
     number = xr.DataArray(np.arange(dataset.sizes["t"]), dims="t")
     done = (0.5 * (load + load.shift(t=1)) * (displacement - displacement.shift(t=1))).where(number > 0, 0.0)
-    count = int(cycles.max())
-    period = setting(dataset, "clock.duration") / cycles
+    period = setting(dataset, "clock.duration") / cycles.where(cycles >= 1.0)
     put_in = done.fillna(0.0).cumsum("t")
     rounding = _NOTHING * abs(put_in).max("t")
     missing = _per_cycle(done.isnull().cumsum("t").astype(float), period, dataset["t"], count)
@@ -230,8 +258,8 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
         values = _per_cycle(series.astype(float), period, dataset["t"], count).where(missing == 0.0)
         values = values.where(~(abs(values) < rounding), 0.0)
         found[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
-    cycles = xr.DataArray(np.arange(1, count + 1), dims="cycle", attrs={"long_name": "number of the cycle"})
-    return xr.Dataset(found, {"cycle": cycles})
+    cycle = xr.DataArray(np.arange(1, count + 1), dims="cycle", attrs={"long_name": "number of the cycle"})
+    return xr.Dataset(found, {"cycle": cycle})
 
 
 def cycles_of(dataset: xr.Dataset) -> xr.DataArray:

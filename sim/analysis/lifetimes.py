@@ -107,13 +107,15 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
 
 
 def half_lives(dataset: xr.Dataset, found: xr.Dataset) -> xr.Dataset:
-    """Median time and, in a stationary run, rate of the first detachment, from the ``events`` of a dataset."""
-    if "first_detachment" not in found:
-        return xr.Dataset()
-    of = lifetimes(dataset, found["first_detachment"], "detached", "detached")
-    return (
-        of if is_stationary(dataset) else of.drop_vars([name for name in of if str(name).startswith("detached_rate")])
-    )
+    """Median times of the first detachment and masking, in a stationary run rates, from the ``events`` of a dataset."""
+    of = xr.Dataset()
+    for event, name, words in (
+        ("first_detachment", "detached", "detached"),
+        ("first_masked", "masked", "had their adhesion masked"),
+    ):
+        if event in found:
+            of = of.merge(lifetimes(dataset, found[event], name, words))
+    return of if is_stationary(dataset) else of.drop_vars([name for name in of if "_rate" in str(name)])
 
 
 def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:

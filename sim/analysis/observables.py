@@ -6,7 +6,7 @@ recorded contact is at that time.
 
 import contextlib
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 
 import numpy as np
 import xarray as xr
@@ -23,6 +23,8 @@ _LOSSES = {
     "lost_to_mean_stress": ("fluctuations_radius", "the mean stress, after bonds and fluctuations"),
     "lost_to_lag": ("equilibrium_radius", "the edge's lag behind equilibrium, after all else"),
 }
+#: Trajectories that observables of other names follow from.
+_FROM = {"area_ratio": "contact_area", "fraction_detached": "in_contact", "fraction_masked": "masked"}
 
 
 def ordered(variable: xr.DataArray) -> xr.DataArray:
@@ -194,16 +196,21 @@ def charges(dataset: xr.Dataset) -> xr.Dataset:
     return found
 
 
-def readings(dataset: xr.Dataset) -> Iterator[tuple[xr.Dataset, Callable[[xr.Dataset], xr.Dataset]]]:
+def readings(
+    dataset: xr.Dataset, names: Collection[str] | None = None
+) -> Iterator[tuple[xr.Dataset, Callable[[xr.Dataset], xr.Dataset]]]:
     """A dataset with one trajectory of the members at a time, and what makes observables of it: those of all in turn.
 
-    What one trajectory takes of memory is then all that is taken.
+    What one trajectory takes of memory is then all that is taken. Of ``names`` only those that they follow from.
     """
     each = [str(name) for name, variable in dataset.data_vars.items() if {MEMBERS, "t"} <= set(variable.dims)]
+    if names is not None:
+        each = [name for name in each if name in {_FROM.get(one, one) for one in names}]
     for name in each or [""]:
         yield keep(dataset, name), observables
-    areas = ("contact_area", *(radius for radius, _ in _LOSSES.values()))
-    yield keep(dataset, *areas, "fluctuation_energy", "indentation", "displacement"), charges
+    if names is None or any(name.startswith(("lost_to", "order_of")) for name in names):
+        areas = ("contact_area", *(radius for radius, _ in _LOSSES.values()))
+        yield keep(dataset, *areas, "fluctuation_energy", "indentation", "displacement"), charges
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:

@@ -1,4 +1,4 @@
-"""The speeds at which sliding has taken the contact area, with the error that members of one noise leave them."""
+"""Observables over the sliding speed, and the speeds at which sliding has taken the contact area, with their errors."""
 
 import math
 from typing import Any, NamedTuple
@@ -9,11 +9,24 @@ from scipy import special
 
 from sim.analysis.blocks import ROOM, blocks
 from sim.analysis.observables import observables, reference_radii
-from sim.analysis.scene import MEMBERS, is_steady, of_dataset, speed_name, speed_of, stays_held, sweep_dims
-from sim.analysis.statistics import LEVEL
+from sim.analysis.scene import (
+    MEMBERS,
+    answered,
+    is_stationary,
+    is_steady,
+    of_dataset,
+    speed_name,
+    speed_of,
+    stays_held,
+    sweep_dims,
+)
+from sim.analysis.stationary import of_second_half
+from sim.analysis.statistics import LEVEL, over_members
 
 #: Shares of JKR's area whose loss has a speed.
 LOSSES = (0.05, 0.5)
+#: Observables whose curves over the speed are wanted, unless others are named.
+_CURVES = ("contact_area", "friction_force", "shear_stress")
 #: Groups of members that are left out in turn, at most.
 _GROUPS = 64
 _WORDS = {f"speed_at_{100.0 * loss:.0f}_percent_lost": f"lost {100.0 * loss:.0f} % of JKR's" for loss in LOSSES}
@@ -22,6 +35,47 @@ _ENDS = {"": "", "_low": "lower end of the 95 % interval of the ", "_high": "upp
 #: Within how many standard errors of a level speeds are near it.
 _NEAR = 4.0
 _READ = {"contact_area", "jkr_radius", "hertz_radius"}
+
+
+@of_dataset
+def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
+    """Observables over the sliding speed, of a ramp or a sweep of steady speeds: A(V), F(V) and τ(V) by default.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    *names : str
+        Such as ``"area_ratio"``; by default ``contact_area``, ``friction_force`` and ``shear_stress``.
+
+    Returns
+    -------
+    xarray.Dataset
+        Mean ``…_mean`` with ``…_sem``, ``…_low``, ``…_high``, ``…_std`` and more of each, over the dimension ``speed``
+        [m/s] and those of other swept keys: of a ramp over the members (see ``summary``), of steady speeds over members
+        and the second half of the run (see ``distribution``). Where other keys change the ramp, ``speed`` is a
+        coordinate beside ``t``.
+
+    Raises
+    ------
+    ValueError
+        If the speed neither changes nor is swept.
+    """
+    wanted, along, speed = names or _CURVES, "t", speed_of(dataset)
+    if not is_steady(dataset):
+        found = over_members(dataset, wanted)
+    elif is_stationary(dataset) and (swept := speed_dim(dataset)) is not None:
+        along, speed, found = swept, speed.isel(t=0, drop=True), of_second_half(dataset, wanted)
+    else:
+        raise ValueError("the speed neither changes nor is swept while all else stays; curves over it need one of both")
+    with answered():
+        found[[f"{name}_mean" for name in wanted]]
+    kept = [name for name in found if str(name).startswith(tuple(f"{one}_" for one in wanted))]
+    for name in set(speed.dims) - {along}:
+        if bool((speed == speed.isel({name: 0})).all()):
+            speed = speed.isel({name: 0}, drop=True)
+    found = found[kept].assign_coords(speed=speed)
+    return found.swap_dims({along: "speed"}) if speed.dims == (along,) else found
 
 
 class Crossing(NamedTuple):

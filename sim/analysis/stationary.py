@@ -1,10 +1,10 @@
 """Statistics of a stationary run over its members and its second half together, each mean and quantile with its error.
 
-Everything is read in blocks of members, twice: first for means and a sample, then for what is known beside these.
+Everything is read in blocks, twice: first for means and a sample, then for what is known beside these.
 """
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -12,17 +12,15 @@ import xarray as xr
 from scipy import special
 
 from sim.analysis.blocks import blocks
-from sim.analysis.correlation import autocovariance, inflation, time_of
-from sim.analysis.observables import readings
+from sim.analysis.correlation import Covariance, inflation, seen, time_of
+from sim.analysis.observables import all_observables, readings, settled
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
-from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quantile_ranks
+from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quantile_ranks, summary
 
 #: From so many members on the spread of their means gives the error, whatever the correlation in time.
 _MANY = 16
 #: Values that a sample keeps at least, and how far from its level in it an exact quantile may lie.
 _SAMPLE, _NEAR = 2**17, 0.01
-#: Values from which a correlation time is taken: the first members that have so many, at least 16.
-_TRANSFORMED = 2**23
 _LEVELS = np.array(QUANTILES)
 
 
@@ -31,65 +29,74 @@ class Series:
 
     Parameters
     ----------
-    members : int
-        How many there are; less than 16 come in one block.
+    members, records : int
+        How many there are; less than 16 members come together.
     name : str
         Of the observable, which says whether it is a share.
     step : float
         Time between records [s].
     """
 
-    def __init__(self, members: int, name: str = "", step: float = 1.0) -> None:
-        self.members, self.name, self.step = members, name, step
+    def __init__(self, members: int, records: int, name: str = "", step: float = 1.0) -> None:
+        self.members, self.records, self.name, self.step = members, records, name, step
         self.quantiles = _Quantiles()
-        self.means: list[np.ndarray] = []
-        self.under: list[list[np.ndarray]] = []
-        self.of_record: Any = 0.0
+        self.sums, self.counts = np.zeros(members), np.zeros(members)
+        self.of_record = np.zeros(records)
+        self.under = np.zeros((len(_LEVELS), members))
         self.moments = np.zeros(3)
-        self.covariance: Any = 0.0
-        self.transformed = 0
-        self.inflated = [(np.nan, np.nan)] * len(_LEVELS)
+        few = members < _MANY
+        self.seen = members if few else seen(members, records)
+        self.covariance, self.flags = Covariance(records), [Covariance(records) for _ in _LEVELS] if few else []
 
-    def first(self, values: np.ndarray) -> None:
-        """Read a block of members, shape (members, records), for the first time."""
-        total = values.sum(axis=-1)
-        whole = bool(np.isfinite(total).all())
-        self.means.append(total / values.shape[-1] if whole else _mean(values))
-        self.of_record = self.of_record + values.sum(axis=0)
-        self.quantiles.sample(values if whole else values[np.isfinite(values)])
+    def first(self, values: np.ndarray, rows: slice, times: slice) -> None:
+        """Read some records of some members, shape (members, records), for the first time."""
+        self.of_record[times] += values.sum(axis=0)
+        sums, counts = values.sum(axis=-1), values.shape[-1]
+        if not np.isfinite(sums).all():
+            known = np.isfinite(values)
+            sums, counts, values = np.sum(values, axis=-1, where=known), known.sum(axis=-1), values[known]
+        self.sums[rows] += sums
+        self.counts[rows] += counts
+        self.quantiles.sample(values)
+
+    @functools.cached_property
+    def means(self) -> np.ndarray:
+        """Of each member in time."""
+        with np.errstate(invalid="ignore"):  # nan is the mean of nothing
+            return self.sums / self.counts
 
     @functools.cached_property
     def mean(self) -> float:
-        return float(_mean(np.concatenate(self.means)))
+        return float(_mean(self.means))
 
     @functools.cached_property
     def rough(self) -> np.ndarray:
         """The quantiles, as far as the first reading gives them."""
         return self.quantiles.at(_LEVELS)
 
-    @property
+    @functools.cached_property
     def whole(self) -> bool:
         """Whether there is a value everywhere."""
         return bool(np.all(np.isfinite(self.of_record)))
 
-    def second(self, values: np.ndarray) -> None:
-        """Read a block for the second time, after the first reading of all."""
-        known = None if self.whole else np.isfinite(values)
-        deviations = values - self.mean if known is None else values[known] - self.mean
+    def second(self, values: np.ndarray, rows: slice, times: slice) -> None:
+        """Read some for the second time, in the order of the first, after the first reading of all."""
+        deviations = (values if self.whole else values[np.isfinite(values)]) - self.mean
         squares = deviations * deviations
         self.moments += [deviations.size, squares.sum(), (squares * deviations).sum()]
-        del deviations, squares
-        for_each = (values <= level for level in self.rough)
-        flags = [flag if known is None else np.where(known, flag, np.nan) for flag in for_each]
-        self.under.append([flag.mean(axis=-1) if known is None else _mean(flag) for flag in flags])
+        several = self.members > 1
+        for k, level in enumerate(self.rough):
+            flags = values <= level
+            self.under[k, rows] += np.count_nonzero(flags, axis=-1)
+            if self.flags and self.whole:
+                self.flags[k].add(flags - (flags.mean(axis=0) if several else _LEVELS[k]))
         self.quantiles.gather(values)
-        if self.whole and self.members < _MANY:
-            self.inflated = [inflation(autocovariance(flag.astype(float)), self.members) for flag in flags]
-        rows = values[: max(0, max(_MANY, _TRANSFORMED // values.shape[-1]) - self.transformed)]
-        if self.whole and len(rows):
-            mean = self.of_record / self.members if self.members > 1 else np.full(1, self.mean)
-            self.covariance = self.covariance + autocovariance(rows, mean) * self.members / max(self.members - 1, 1)
-            self.transformed += len(rows)
+        some = values[: max(0, self.seen - rows.start)]
+        if self.whole and len(some):
+            self.covariance.add(some - (self.of_record[times] / self.members if several else self.mean))
+        if times.stop == self.records:
+            for one in (self.covariance, *self.flags):
+                one.end()
 
     def found(self, differ: bool = True) -> dict[str, Any]:
         """The statistics, by name; see ``over_time``. What does not ``differ`` between members has no error."""
@@ -97,26 +104,29 @@ class Series:
             count, squares, cubes = self.moments
             spread = float(np.sqrt(squares / count))
             spreads = [spread, *np.sqrt(_LEVELS * (1.0 - _LEVELS))]
-            means = [np.concatenate(self.means), *np.concatenate(self.under, axis=1)]
-            covariance, own = self.covariance / max(self.transformed, 1), (np.nan, np.nan)
-            if self.whole and self.members < _MANY:
-                own = inflation(covariance, self.members)
-            of = zip(means, spreads, [own, *self.inflated], strict=True)
+            means = [self.means, *self.under / self.counts]
+            free = max(self.members - 1, 1)
+            covariance = self.covariance.over(self.seen * free / self.members)
+            inflated = [(np.nan, np.nan)] * len(means)
+            if self.flags and self.whole:
+                aside = self.under[:, 0] / self.records - _LEVELS if self.members == 1 else np.zeros(len(_LEVELS))
+                shares = [one.over(free) - off**2 for one, off in zip(self.flags, aside, strict=True)]
+                inflated = [inflation(one, self.members, self.records) for one in (covariance, *shares)]
+            of = zip(means, spreads, inflated, strict=True)
             errors, freedoms = np.transpose([_error(*one, float(count)) for one in of])
             low, high = interval(self.name, np.array(self.mean), errors[0], freedoms[0] + 1.0)
             skewness = cubes / count / spread**3 if spread > 1e-12 * abs(self.mean) else np.nan
             several = (spread / errors[0]) ** 2 if errors[0] > 1e-12 * abs(self.mean) else np.nan
         ends = {"": _LEVELS, "_low": _LEVELS, "_high": _LEVELS}
         if differ:
-            ends["_low"], ends["_high"] = _shares(
-                np.array(spreads), errors, freedoms, 1.0 if self.members >= _MANY else 0.5
-            )
+            surely = 1.0 if self.members >= _MANY else 0.5
+            ends["_low"], ends["_high"] = _shares(np.array(spreads), errors, freedoms, surely)
         else:
             errors[0], low, high = 0.0, np.array(self.mean), np.array(self.mean)
         found = {"mean": self.mean, "std": spread, "sem": errors[0], "low": float(low), "high": float(high)}
         found |= {"skewness": skewness, "effective_samples": several}
         if self.whole:
-            time = time_of(covariance, self.transformed, self.step, self.quantiles.largest)
+            time = time_of(covariance, self.seen, self.records, self.step, self.quantiles.largest)
             found |= {"correlation_time": time.time, "correlation_time_sem": time.sem}
         return found | {f"quantile{end}": self.quantiles.at(levels) for end, levels in ends.items()}
 
@@ -239,20 +249,23 @@ def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str
     >>> print(50 < found["effective_samples"] < 200, found["low"] < 0.0 < found["high"])
     True True
     """
-    series = Series(len(values), name, step)
-    series.first(values)
-    series.second(values)
+    members, records = values.shape
+    series, whole = Series(members, records, name, step), (slice(0, members), slice(0, records))
+    series.first(values, *whole)
+    series.second(values, *whole)
     return series.found()
 
 
 @of_dataset
-def distribution(dataset: xr.Dataset) -> xr.Dataset:
-    """Statistics of every observable over the members and the second half of the run, at each point of the sweep.
+def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+    """Statistics of observables over the members and the second half of the run, at each point of the sweep.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As ``sim run`` writes it, with each member; of a stationary run (see ``is_stationary``).
+    names : collection of str, optional
+        The observables, all by default.
 
     Returns
     -------
@@ -261,39 +274,63 @@ def distribution(dataset: xr.Dataset) -> xr.Dataset:
         and with the dimension ``quantile`` ``…_quantile``, ``…_quantile_low``, ``…_quantile_high``; see ``over_time``.
         Of what is the same for all members there is no error.
     """
-    late, dims = dataset.isel(t=slice(dataset.sizes["t"] // 2, None)), sweep_dims(dataset)
-    step = float(dataset["t"][-1] - dataset["t"][-2]) if dataset.sizes["t"] > 1 else 0.0
+    dims, step = sweep_dims(dataset), 0.0
+    if dataset.sizes["t"] > 1:
+        step = float(dataset["t"][-1] - dataset["t"][-2])
     found: dict[str, xr.DataArray] = {}
-    for some, observed in readings(late):
-        before = set(found)
+    for some, observed in readings(dataset, names):
+        done = {name.removesuffix("_mean") for name in found}
         for points in blocks(some, dims):
-            for name, (variable, each) in _series(some.isel(points), observed, step, dims).items():
-                for at in np.ndindex(each.shape) if f"{name}_mean" not in before else ():
+            group = some.isel(points)
+            for name, (about, differ, each) in _series(group, observed, step, dims, names, done).items():
+                for at in np.ndindex(each.shape):
                     place = tuple(points[dim].start + k for dim, k in zip(dims, at, strict=True))
-                    for kind, value in each[at].found(MEMBERS in variable.dims).items():
+                    for kind, value in each[at].found(differ).items():
                         key = f"{name}_{kind}"
-                        found.setdefault(key, _empty(dataset, kind, variable))[place] = value
+                        if key not in found:
+                            found[key] = _empty(dataset, kind, about)
+                        found[key].values[place] = value
     return xr.Dataset(found)
 
 
+def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+    """The ``distribution`` of observables; of a dataset of statistics alone, those of their means over that time."""
+    if "contact_radius" in dataset:
+        return distribution(dataset, names)
+    return summary(settled(all_observables(dataset)), quantiles=False)
+
+
 def _series(
-    group: xr.Dataset, observed: Callable[[xr.Dataset], xr.Dataset], step: float, dims: tuple[str, ...]
-) -> dict[str, tuple[xr.DataArray, Any]]:
-    """Each observable of some points of the sweep, with its series at each of them, read twice in blocks of members."""
-    members = group.sizes.get(MEMBERS, 1)
-    pieces = list(blocks(group, (MEMBERS,))) if members >= _MANY else [{}]
-    found: dict[str, tuple[xr.DataArray, Any]] = {}
+    group: xr.Dataset, observed: Callable[[xr.Dataset], xr.Dataset], step: float, dims: tuple[str, ...],
+    names: Collection[str] | None, done: set[str],
+) -> dict[str, tuple[xr.DataArray, bool, Any]]:  # fmt: skip
+    """Each observable of some points of the sweep, whether members differ in it, and its series at each point.
+
+    The second half of the run is read twice, in blocks of members and records.
+    """
+    members, records = group.sizes.get(MEMBERS, 1), group.sizes["t"]
+    late, pieces = records // 2, []
+    for block in blocks(group, (MEMBERS, "t") if members >= _MANY else ("t",)):
+        times = slice(max(block["t"].start, late), min(block["t"].stop, records))
+        if times.start < times.stop:
+            pieces.append((block.get(MEMBERS, slice(0, members)), times))
+    found: dict[str, tuple[xr.DataArray, bool, Any]] = {}
+    parts: dict[str, tuple[xr.DataArray, np.ndarray]] = {}
     for reading in (Series.first, Series.second):
-        for piece in pieces:
-            for key, variable in observed(group.isel(piece)).items():
-                name, values = str(key), _rows(variable, dims)
+        for rows, times in pieces:
+            if len(pieces) > 1 or not found:
+                part = observed(group.isel({MEMBERS: rows, "t": times}, missing_dims="ignore"))
+                wanted = (set(part) if names is None else set(part) & set(names)) - done
+                chosen = {str(key): one for key, one in part.items() if key in wanted}
+                parts = {k: (v, _rows(v, dims)) for k, v in chosen.items() if rows.start == 0 or MEMBERS in v.dims}
+            for name, (variable, values) in parts.items():
                 if name not in found:
-                    each = np.empty(values.shape[:-2], object)
+                    differ, each = MEMBERS in variable.dims, np.empty(values.shape[:-2], object)
                     for at in np.ndindex(each.shape):
-                        each[at] = Series(members if MEMBERS in variable.dims else 1, name, step)
-                    found[name] = variable, each
+                        each[at] = Series(members if differ else 1, records - late, name, step)
+                    found[name] = xr.DataArray(0.0, attrs=variable.attrs, name=name), differ, each
                 for at in np.ndindex(values.shape[:-2]):
-                    reading(found[name][1][at], values[at])
+                    reading(found[name][2][at], values[at], rows, slice(times.start - late, times.stop - late))
     return found
 
 

@@ -1,6 +1,6 @@
 """Statistics over the members of an ensemble, at each time and sweep value."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ from scipy import special
 from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import KEPT, charges, observables, pure, readings, reference_radii, share_observables
+from sim.analysis.observables import KEPT, charges, pure, readings, reference_radii, share_observables
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
@@ -287,12 +287,18 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
         ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
         has stopped is left out from there on; ``fraction_detached`` counts it.
     """
-    found, dims = xr.Dataset(), ("t", *sweep_dims(dataset))
-    for some, observed in readings(dataset):
-        if observed is observables:  # shares are asked for by themselves
-            part = in_blocks(some, dims, lambda block: summary(observables(block)))
-            found = found.merge(part[[name for name in part if name not in found]])
+    found = over_members(dataset)
     return found.merge(summary(events(dataset).assign_attrs(dataset.attrs))).merge(correlation_time(dataset))
+
+
+def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
+    """The ``summary`` of observables at each sweep value and time, by default of all but shares, read in blocks."""
+    found, dims = xr.Dataset(), ("t", *sweep_dims(dataset))
+    for some, observed in readings(dataset, names):
+        if names is not None or observed is not charges:
+            part = in_blocks(some, dims, lambda block, of=observed: summary(of(block), quantiles))  # type: ignore[misc]
+            found = found.merge(part[[name for name in part if name not in found]])
+    return found
 
 
 @of_dataset

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
+from sim.analysis.blocks import in_blocks, keep
 from sim.analysis.observables import ordered
 from sim.analysis.scene import MEMBERS, is_stationary, sweep_dims
 
@@ -136,10 +137,17 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     """
     if "stage_speed" not in dataset and {"runaway_time", "spring_force"} <= set(dataset):
         return runaways(dataset)
-    if "stage_speed" not in dataset or not {*_READ, "drive_work", "stage_position"} <= set(dataset.variables):
+    read = {*_READ, "drive_work", "stage_position"}
+    if "stage_speed" not in dataset or not read <= set(dataset.variables):
         return xr.Dataset()
+    half = float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
+    return in_blocks(keep(dataset, *read), (*sweep_dims(dataset), MEMBERS), lambda some: _means(some, half))
+
+
+def _means(dataset: xr.Dataset, half: float) -> xr.Dataset:
+    """What ``stick_slip`` gives, of slips that begin after a time [s]."""
     found = slips(dataset).pad(slip=(0, 1))  # where there is none, too, a mean is over something
-    begins, half = found["slip_time"], float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
+    begins = found["slip_time"]
     counted = begins >= half
     means = found.where(counted).mean("slip", keep_attrs=True)
     counts = counted.sum("slip").astype(float).assign_attrs(units="1", long_name="number of slips")

@@ -1,5 +1,6 @@
 """Statistics as rows: a dozen for the terminal, all of them as CSV."""
 
+import contextlib
 import math
 import re
 from collections.abc import Iterable, Mapping
@@ -8,14 +9,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from sim.analysis.blocks import READ, at_records
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.lifetimes import half_lives
-from sim.analysis.observables import KEPT, all_observables, settled
+from sim.analysis.observables import KEPT, all_observables
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.scene import MEMBERS, is_stationary, of_dataset, resolved, stays_held, sweep_dims, word
-from sim.analysis.stationary import distribution
-from sim.analysis.statistics import QUANTILES, WIDE, averaging, summary
+from sim.analysis.stationary import distribution, of_second_half
+from sim.analysis.statistics import QUANTILES, WIDE, averaging, over_members, summary
 from sim.units.notation import concise, scaled
 
 #: Cells of columns by heading.
@@ -60,6 +62,8 @@ _EVENTS = (
     _Column("first_detachment", "first\ndetached", meaning="mean of those that did"),
     _Column("half_detached", "half\ndetached", math.nan, meaning="time by which half of the members did"),
     _Column("detached_rate", "rate of\ndetaching", meaning="detached, per time in contact of all members"),
+    _Column("first_masked", "first\nmasked", meaning="mean of those that were"),
+    _Column("half_masked", "half\nmasked", math.nan, meaning="time by which half of the members were"),
     _Column("loop_energy", "∮P dΔ,\nper cycle", meaning="work put in over a cycle"),
     _Column("loop_dissipation", "dissipated,\nper cycle"),
     _Column("total_dissipated", "dissipated,\nin all"),
@@ -152,8 +156,8 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
         if 0 < len(shown) < total:
             lines.append(f"{len(shown)} of {total} rows shown; all: --all, or --csv FILE; chosen: --where KEY=VALUE")
     headings = {re.sub(r"[ \n]\([^()]*\)$", "", heading) for row in (*rows[:1], *once[:1]) for heading in row}
-    if (names := resolved(dataset, "record.quantities")) is not None:
-        kept = ", ".join(names) or "contact_radius alone"
+    with contextlib.suppress(KeyError, TypeError):  # not of every dataset; none where all was recorded
+        kept = ", ".join(resolved(dataset, "record.quantities")) or "contact_radius alone"
         lines.append(f"columns of what was not recorded are left out; record.quantities keeps {kept}")
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
     if _spreads(dataset):
@@ -187,7 +191,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     cells = _places(dataset, points)
     for heading, texts in shown.items():
         cells[heading] = texts
-        if heading.startswith("first\n") and "first_detachment_quantile" in found:
+        if heading.startswith("first\ndetached") and "first_detachment_quantile" in found:
             cells |= _range(found["first_detachment_quantile"], points)
     return _rows(cells) if shown else []
 
@@ -254,18 +258,20 @@ def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
     memory, counts = correlation_time(dataset), _thinned(dataset, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
     whole = is_stationary(dataset) and bool(sweep_dims(dataset))
-    if not whole:  # of the records only those that are shown
-        dataset = dataset.isel(t=_spread(dataset.sizes["t"], counts["t"]))
-    if whole and "contact_radius" in dataset:
-        found = distribution(dataset)
+    if whole:
+        found = of_second_half(dataset, {column.name for column in _COLUMNS if not column.changing})
     else:
-        trajectories = all_observables(dataset)
-        shown = {f"{column.name}{kind}" for column in _COLUMNS for kind in ("", *(f"_{kind}" for kind in KEPT))}
-        trajectories = trajectories[[name for name in trajectories if name in shown]]
-        found = summary(settled(trajectories) if whole else trajectories, quantiles=False)
-    if "applied_load" in dataset:  # it is known of open contacts too
-        for kind in ("mean", "low", "high"):
-            found[f"normal_load_{kind}"] = dataset["applied_load"].fillna(found[f"normal_load_{kind}"])
+        if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown
+            dataset = at_records(dataset, _spread(dataset.sizes["t"], counts["t"]))
+        if dataset.nbytes < READ:
+            trajectories = all_observables(dataset)
+            shown = {f"{column.name}{kind}" for column in _COLUMNS for kind in ("", *(f"_{kind}" for kind in KEPT))}
+            found = summary(trajectories[[name for name in trajectories if name in shown]], quantiles=False)
+        else:
+            found = over_members(dataset, [column.name for column in _COLUMNS], quantiles=False)
+        if "applied_load" in dataset:  # it is known of open contacts too
+            for kind in ("mean", "low", "high"):
+                found[f"normal_load_{kind}"] = dataset["applied_load"].fillna(found[f"normal_load_{kind}"])
     return found.merge(memory), _points({**found.sizes, "t": found.sizes.get("t", 1)}, counts)
 
 
@@ -305,8 +311,9 @@ def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
     """How each quantity is spread over members and stationary time, a row each; none of a sweep or of what changes."""
     if not _spreads(dataset):
         return []
-    found = distribution(dataset).isel(dict.fromkeys(sweep_dims(dataset), 0))
-    fixed = [column for column in _COLUMNS if not column.changing and f"{column.name}_std" in found]
+    fixed = [column for column in _COLUMNS if not column.changing]
+    found = distribution(dataset, [column.name for column in fixed]).isel(dict.fromkeys(sweep_dims(dataset), 0))
+    fixed = [column for column in fixed if f"{column.name}_std" in found]
     rough = [_ROUNDING * abs(float(found[f"{column.name}_mean"])) for column in fixed]
     spreads = zip(fixed, rough, strict=True)
     return [_spread_of(found, column) for column, least in spreads if float(found[f"{column.name}_std"]) > least]

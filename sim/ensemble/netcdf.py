@@ -19,10 +19,8 @@ import numpy as np
 from sim.ensemble.part_files import Parts
 from sim.ensemble.workers import in_process
 from sim.numerics.files import HDF5
-from sim.numerics.hdf5 import Refused, opened
+from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened
 
-#: What HDF5 keeps of a variable in memory [byte]; its own 64 MiB hold every variable of a usual run whole.
-_CHUNK_CACHE = 4 * 2**20
 #: How netCDF packs a variable, by ``record.compression``; six digits are within 5e-7, 20 bits and
 #: the leading one, rounded to nearest, so that flags stay flags and what was equal stays so.
 _ZLIB: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
@@ -110,7 +108,7 @@ def _variable(file: netCDF4.Dataset, name: str, one: Described) -> netCDF4.Varia
     packed = _PACKED[one.compression] if one.dimensions and one.kind is not str else {}
     variable = file.createVariable(name, one.kind, one.dimensions, chunksizes=one.chunks, fill_value=False, **packed)
     if one.chunks:
-        variable.set_var_chunk_cache(_CHUNK_CACHE)
+        variable.set_var_chunk_cache(CHUNK_CACHE)
     variable.setncatts(one.attributes)
     if one.values is not None:
         variable[...] = one.values

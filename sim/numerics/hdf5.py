@@ -34,6 +34,8 @@ class Refused(ValueError):
 BROKEN = "is not a netCDF file, or is cut short or damaged"
 
 _SIGNATURE, _CLASSIC = b"\x89HDF\r\n\x1a\n", (b"CDF\x01", b"CDF\x02", b"CDF\x05")
+#: What HDF5 keeps of a variable in memory [byte]; its own 64 MiB hold every variable of a usual run whole.
+CHUNK_CACHE = 4 * 2**20
 #: Most variables of a file, and most attributes of each.
 _MOST = 1000
 #: Most bytes of an attribute, of what a scenario is kept in, and of all other attributes of a file.
@@ -117,7 +119,12 @@ def opened(path: str | os.PathLike[str]) -> netCDF4.Dataset:
         if begins == _SIGNATURE:
             _refuse_endless(path)
         found = _look_through(path, size) if begins == _SIGNATURE else set()
-        file = netCDF4.Dataset(path)
+        whole = netCDF4.get_chunk_cache()
+        netCDF4.set_chunk_cache(CHUNK_CACHE)
+        try:
+            file = netCDF4.Dataset(path)
+        finally:
+            netCDF4.set_chunk_cache(*whole)
         try:
             for name, one in file.variables.items():
                 if not (name in found if begins == _SIGNATURE else one.size * one.dtype.itemsize <= size):

@@ -9,7 +9,9 @@ from helpers import lens
 from helpers.lens import scene
 
 from sim import analysis
+from sim.analysis import blocks
 from sim.ensemble.simulate import run
+from sim.parts.contact import Equilibrium
 from sim.scenario.clock import Record
 
 
@@ -104,6 +106,21 @@ def test_a_file_gives_the_same_statistics_as_memory(ramp, tmp_path):
     path = run(scene(), to=tmp_path / "out.nc")
     with xr.open_dataset(path) as opened:
         xr.testing.assert_identical(analysis.statistics(opened).load(), analysis.statistics(ramp))
+
+
+def test_blocks_of_a_few_numbers_give_the_statistics_of_all_at_once(ramp, tmp_path, monkeypatch):
+    path = run(scene(record=Record(quantities=["friction_force", "masked"])), to=tmp_path / "out.nc")
+    with xr.open_dataset(path) as opened:
+        whole = analysis.statistics(opened).load(), analysis.table(opened, 5)
+    cycles = run(scene(contact=Equilibrium(load={"from": 4e-3, "to": 1e-3, "cycles": 2})))
+    loops = analysis.loop_energy(cycles)
+    monkeypatch.setattr(blocks, "ROOM", 1000)
+    monkeypatch.setattr(blocks, "READ", 2000)
+    assert len(list(blocks.blocks(blocks.keep(ramp, "contact_area"), ("member",)))) > 2
+    with xr.open_dataset(path) as opened:
+        xr.testing.assert_identical(analysis.statistics(opened).load(), whole[0])
+        assert analysis.table(opened, 5) == whole[1]
+    xr.testing.assert_identical(analysis.loop_energy(cycles), loops)
 
 
 def test_averaging_the_second_half_keeps_the_members_error(ramp):

@@ -67,6 +67,18 @@ def test_time_masked_is_the_share_of_the_records_after_the_first(ramp):
     np.testing.assert_allclose(found[1], 5.0 / 15.0, rtol=1e-14)
 
 
+def test_the_first_masking_is_told_of_those_members_that_were_masked(ramp):
+    masked = np.zeros((6, 21))
+    masked[1, 11:], masked[2, 4], masked[2, 7:] = 1.0, 1.0, 1.0
+    dataset, t = per_member(ramp, masked=masked, in_contact=1), ramp["t"].to_numpy()
+    np.testing.assert_array_equal(analysis.events(dataset)["first_masked"], [NAN, t[11], t[4], NAN, NAN, NAN])
+    (row,) = analysis.highlights(dataset)
+    assert row["first\nmasked (ms)"] == "200(500)" and "half\nmasked (ms)" not in row
+    masked[3:, 9] = 1.0
+    (row,) = analysis.highlights(per_member(ramp, masked=masked, in_contact=1))
+    assert row["half\nmasked (ms)"] == "180"
+
+
 def test_times_of_a_pulled_ensemble_are_within_its_run():
     """Fluctuations open a lifted contact at random times; the file and the statistics agree."""
     lifted = Equilibrium(indentation=-0.4e-6)

@@ -85,6 +85,32 @@ def test_speeds_of_bonds_that_break_are_those_of_the_law(swept):
     assert found[NAMES[0]].attrs["units"] == "m/s"
 
 
+@pytest.mark.parametrize("swept", [True, False], ids=["sweep", "ramp"])
+def test_curves_over_the_speed_are_those_of_the_law(swept):
+    """Steady bonds: the stress is 0.3 MPa/(1 + V/V_c), and friction is stress times area."""
+    quiet = {"bonds": bonds.Steady(critical_speed=1e-2, stress=3e5), "clock": Clock(duration=0.4, step=0.01)}
+    if swept:
+        moved = {"drive": drive.Steady(speed=1e-2), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}}
+    else:
+        moved = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "sweep": {"contact.load": [LOAD, 2.0 * LOAD]}}
+    found = analysis.speed_curves(run(scene(**moved, **quiet)))
+    assert found["contact_area_mean"].dims == (("speed",) if swept else ("contact_load", "speed"))
+    assert found["speed"].attrs["units"] == "m/s" and float(found["speed"][-1]) == 1e-2
+    law = 3e5 / (1.0 + found["speed"] / 1e-2)
+    np.testing.assert_allclose(found["shear_stress_mean"], law.broadcast_like(found["shear_stress_mean"]), rtol=1e-12)
+    np.testing.assert_allclose(found["friction_force_mean"], found["contact_area_mean"] * law, rtol=1e-12)
+    assert float(found["contact_area_sem"].max()) > 0.0 and bool((found["friction_force_low"] > 0.0).all())
+
+
+def test_curves_over_a_speed_that_stays_are_refused_and_those_of_what_is_missing_named():
+    with pytest.raises(ValueError, match="nor is swept"):
+        analysis.speed_curves(run(scene(drive=drive.Steady(speed=1e-2))))
+    with pytest.raises(ValueError, match='add "friction_force" to record'):
+        analysis.speed_curves(run(scene(record=Record(quantities=["speed", "contact_area"]))))
+    (share,) = analysis.speed_curves(lens.ramp(), "lost_to_bonds")[["lost_to_bonds_mean"]].values()
+    assert share.dims == ("speed",) and 0.0 < float(share[-1]) < 1.0
+
+
 def test_speeds_of_fluctuating_members_have_an_error_and_statistics_alone_none():
     found = analysis.loss_speeds(lens.ramp())
     low, at, high = (float(found[NAMES[0] + end]) for end in ("_low", "", "_high"))

@@ -1,6 +1,7 @@
 """Rows for the terminal and the CSV: what tells something, and nothing else."""
 
 import itertools
+import json
 import math
 import re
 
@@ -223,6 +224,13 @@ def test_notes_say_what_is_averaged_how_many_rows_are_shown_and_what_symbols_mea
     assert said[1].startswith("12 of 21 rows shown") and "--where" in said[1] and "A/A_JKR: " in said[2]
     whole = analysis.table(ramp, rows=10**9)
     assert len(whole) == 21 and not any("shown" in line for line in analysis.notes(ramp, whole, []))
+
+
+def test_a_dataset_that_does_not_say_what_it_recorded_has_its_notes(ramp):
+    scenario = json.loads(ramp.attrs["scenario_resolved"])
+    del scenario["record"]["quantities"]
+    older = ramp.assign_attrs(scenario_resolved=json.dumps(scenario))
+    assert analysis.notes(older, analysis.table(older), []) == analysis.notes(ramp, analysis.table(ramp), [])
 
 
 def test_steady_sweeps_say_that_the_second_half_counts_and_show_their_speed_once():
