@@ -101,7 +101,8 @@ def advance(scenario: Scenario, state: State, dice: Dice, steps: range) -> tuple
     if drive.feeds_back:
         around = _around(scenario, state.contact, state.shear.energy, steps)
         before = state.drive, state.bonds
-        passed, motions, bonds, bonding = coupling.advance(scenario.parts, before, around, scenario.times, steps)
+        given = scenario.parts, before, around, scenario.times, steps, dice.bonds
+        passed, motions, bonds, bonding = coupling.advance(*given)
         slider, driven = passed.at(-1), drive.readings(passed)
     else:
         slider, motions = drive.advance(state.drive, scenario.times, steps)

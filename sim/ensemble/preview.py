@@ -19,7 +19,7 @@ from sim.ensemble.progress import duration
 from sim.laws import jkr
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
-from sim.parts.bonds import FirstMoment
+from sim.parts.bonds import Cohort, FirstMoment, Rate
 from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
@@ -215,26 +215,29 @@ def _slider(points: Sequence[Scenario]) -> Rows:
         if drive.mass > 0.0:
             own = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
             rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(own)
-        if not point.population.stretched:
-            continue
-        bonds, bodies = cast(FirstMoment, point.population), (point.sphere.radius, point.solid.contact_modulus)
+        bonds, bodies = point.population, (point.sphere.radius, point.solid.contact_modulus)
         works = (point.adhesion.work_of_bonds(bonds.steady(speeds).fraction * share) for share in (0.9999, 1.0, 1.0001))
         less, area, more = (np.pi * point.contact.equilibrium_radius(work, *bodies) ** 2 for work in works)
         contact = area, (more - less) / 2e-4 / area
-        alone, behind = (bonds.onset(speeds, *contact, *rest) for rest in ((), (drive.mass, firm)))
+        sticking, stretching = cast(Rate, bonds), cast(Cohort | FirstMoment, bonds)
+        if bonds.stretched:
+            alone, behind = (stretching.onset(speeds, *contact, *rest) for rest in ((), (drive.mass, firm)))
+        else:
+            alone = sticking.onset(speeds, *contact, drive.mass, drive.damping + drive.viscosity * area)
         if np.isnan(alone.stiffness).all():
             continue
         worst = int(np.nanargmax(alone.stiffness))
         at = f", at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
         rows.setdefault(("oscillates below", f"N/m of the spring{at}"), []).append(float(alone.stiffness[worst]))
+        if not bonds.stretched:
+            continue
         if drive.mass > 0.0 or firm < math.inf:
             stiffest = float(np.nanmax(behind.stiffness))
             rows.setdefault(("with mass and k_t", "N/m of the spring, without damping"), []).append(stiffest)
-        if drive.mass == 0.0:
-            grows = float(bonds.amplitude(speeds)[worst])
+        if drive.mass == 0.0 and (grows := stretching.amplitude(speeds)) is not None:
             said = "suddenly, with large slips; on the way back they last to a stiffer spring"
-            if grows > 0.0:
-                said = f"gradually: friction swings by {grows:.3g} √(1 − K/K_c) of itself"
+            if grows[worst] > 0.0:
+                said = f"gradually: friction swings by {grows[worst]:.3g} √(1 − K/K_c) of itself"
             rows.setdefault(("sets in there", f"{said} (mean field, constant area)"), [])
         soft = 4.0 * math.pi * point.solid.effective[0] * float(area[worst] / alone.stiffness[worst])
         if 0.5 * soft < 2.0 * radius:

@@ -11,10 +11,11 @@ from typing import NamedTuple, cast
 import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
+from sim.numerics.noise import Noise
 from sim.parts import coupling_equations as columns
 from sim.parts.bonds.cohorts import Cohorts, numbers_of
 from sim.parts.bonds.stretched import Ages, Cohort, FirstMoment, Stretches
-from sim.parts.bonds.two_state import Population, Steady, Unbroken
+from sim.parts.bonds.two_state import Counted, Population, Rate, Steady, Unbroken
 from sim.parts.coupling_cohorts import advance_cohorts
 from sim.parts.coupling_equations import Law, Resting, Slider
 from sim.parts.coupling_rows import advance_rows
@@ -92,14 +93,15 @@ class Around(NamedTuple):
 
 
 #: Bonds that are solved together with a slider; those with a stretch.
-_Driven = FirstMoment | Cohort | Unbroken | Steady
+_Driven = FirstMoment | Cohort | Unbroken | Steady | Rate | Counted
 _WITH_STRETCH = FirstMoment | Cohort
 
 
 class _Units(NamedTuple):
     """Units in which a step is made: a stretch b [m], and a force over the area at rest [N].
 
-    That of all sites at the stretch b, n κ b A0; of bonds without a stretch their strength, τ A0.
+    That of all sites at the stretch b, n κ b A0; of bonds without a stretch their strength, τ A0, b being the way on
+    which it loads the spring or on which sliding renews the bonds.
     """
 
     stretch: float
@@ -110,10 +112,9 @@ def _units(drive: Force | Spring, bonds: _Driven, around: Around, step: float) -
     most = max(map(abs, drive.course.extremes))
     if not isinstance(bonds, _WITH_STRETCH):
         force = bonds.stress * around.area
-        if drive.spring:
-            return _Units(force / drive.spring, force)
         slow = drive.mass / step + drive.damping + drive.viscosity * around.area
-        return _Units(max(most, force) * step / slow, force)
+        way = force / drive.spring if drive.spring else max(most, force) * step / slow
+        return _Units(min(way, _renewing(bonds)), force)
     law, bears = bonds.law, bonds.site_density * bonds.bond_stiffness * around.area
     if law.softness > 0.0:
         stretch = 1.0 / law.softness
@@ -122,6 +123,11 @@ def _units(drive: Force | Spring, bonds: _Driven, around: Around, step: float) -
     else:
         stretch = most / (law.rate if drive.spring else bears * bonds.bound_at_rest) or _STRETCH
     return _Units(stretch, bears * stretch)
+
+
+def _renewing(bonds: _Driven) -> float:
+    """Way on which sliding renews bonds of a linear rate equation, V_c/h [m], infinite for others."""
+    return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, Rate) else math.inf
 
 
 def load(parts: Parts, slider: Sliding, bonding: Bonding, around: Around, duration: float) -> Driven:
@@ -148,11 +154,12 @@ def felt(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
 
 
 def advance(
-    parts: Parts, state: tuple[Sliding, tuple[object, ...]], around: Around, times: Times, steps: range
+    parts: Parts, state: tuple[Sliding, tuple[object, ...]], around: Around, times: Times, steps: range, noise: Noise
 ) -> tuple[Driven, Motions, tuple[object, ...], Bonding]:
     """Slider at the end of each of some clock steps, its motion, the bonds after the last and their readings at each.
 
-    The contact is that at the start, but for its equilibrium with the bonds: ``agreed`` counts the steps that stand.
+    The contact is that at the start, but for its equilibrium with the bonds: ``agreed`` counts the steps that stand. So
+    is the number of ``counted`` bonds, drawn anew at the end of a step with the way that the slider has gone in it.
     """
     drive, bonds = cast(Force | Spring, parts.drive), cast(_Driven, parts.bonds)
     slider, population = cast(Driven, state[0]), state[1]
@@ -198,6 +205,10 @@ def advance(
     unsteady = np.maximum(passed[columns.SQUARE] - path**2 / spans, 0.0)  # what slips at once is spread over the step
     slid = slid, path, first, after.speed, after.position, unsteady
     motions = Motions(steps.start, ends[1:, np.newaxis], spans, *slid)
+    if isinstance(bonds, Counted):
+        population, drawn = bonds.advance(cast(Population, state[1]), motions, around.radius, noise)
+        stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)
+        bonding = Bonding(drawn.fraction, stress, stress)
     return after, motions, population, felt(parts, bonding, after.speed)
 
 
@@ -227,7 +238,9 @@ def _advanced(
         share, seen = bonds.kept(stretches.seen, radius)
         rows[:, columns.BOUND], rows[:, columns.MOMENT] = stretches.bound * share, stretches.stretch * share
     else:
-        rows[:, columns.BOUND], seen = cast(Population, population).bound, cast(Population, population).seen
+        before = cast(Population, population)
+        share, seen = bonds.kept(before.seen, radius)
+        rows[:, columns.BOUND] = bonds.bonding(before).fraction * share
     advance_rows(*at, *numbers, *passed)
     bound, moment = passed[0][columns.BOUND], passed[0][columns.MOMENT]
     if isinstance(bonds, FirstMoment):
@@ -261,7 +274,8 @@ def _numbers(drive: Force | Spring, bonds: _Driven, around: Around, units: _Unit
         breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, stretch / law.limit, bonds.rebinding_rate, 1.0)
     else:
         slows = stretch / bonds.critical_speed if isinstance(bonds, Steady) else 0.0
-        breaking, of_rest = Law(0.0, 0.0, 0.0, 0.0, 1.0, 1.0, slows), 1.0
+        binding = bonds.rebinding_rate if isinstance(bonds, Rate) else 0.0
+        breaking, of_rest = Law(0.0, 0.0, stretch / _renewing(bonds), binding, 1.0, 1.0, slows), 1.0
     taken = 0.0
     if around.reversible:
         stress = density * stretch

@@ -6,10 +6,11 @@ as it is, body X (mass m, damping c) and interface X_s = X − u obey
     m Ẍ = S − c Ẋ − F,   F = A (M + η Ẋ_s),   u = F/k_t,   Ṡ = K (V − Ẋ) or S = Q(t),
     Ṅ = k_on (1 − N) − N (k + |Ẋ_s|/l),   Ṁ = N Ẋ_s − M (k + 2|Ẋ_s|/l),   k = k0 exp(|M/N|),
 
-and the area A is that of the equilibrium contact with the work of adhesion that these bonds leave. Slip, u, N and M
-at the three nodes are the unknowns, found by Newton's method; speeds and accelerations follow from the positions by
-the method itself. So the equations are solved as they stand, whether mass, damping, viscosity and 1/k_t are zero
-(then they are of index 2) or not, and a stiff spring costs no steps.
+where bonds without a stretch have M = ±N instead, with the sense of the sliding, and N = 1/(1 + |Ẋ_s|/V_c) if they
+follow the speed at once. The area A is that of the equilibrium contact with the work of adhesion that these bonds
+leave. Slip, u, N and M at the three nodes are the unknowns, found by Newton's method; speeds and accelerations follow
+from the positions by the method itself. So the equations are solved as they stand, whether mass, damping, viscosity
+and 1/k_t are zero (then they are of index 2) or not, and a stiff spring costs no steps.
 """
 
 import math
@@ -75,7 +76,8 @@ class Slider(NamedTuple):
 class Law(NamedTuple):
     """Numbers of the bonds: k0, its growth with the stretch (1 or 0), 1/cut-off stretch, k_on, scale of a stretch.
 
-    Bonds without a stretch have the ``sense`` of the sliding, 1 or -1, else 0, and a share 1/(1 + ``slows`` speed).
+    Bonds without a stretch have the ``sense`` of the sliding, 1 or -1, else 0; those that follow the speed at once a
+    share 1/(1 + ``slows`` speed).
     """
 
     rate: float
@@ -172,11 +174,13 @@ def compliance(radius, slider):
 @device
 def kinetics(bound, moment, speed, law):
     """Ṅ and its slopes over N and M; Ṁ and its slope over N; that over M, and over the speed; Ṅ's; k, \\|speed\\|/l."""
-    rate, softness, cuts, binding, _, _, _ = law
+    rate, softness, cuts, binding, _, sense, _ = law
     stretch = moment / bound if bound > 0.0 else 0.0
     k = rate * math.exp(min(softness * math.fabs(stretch), 690.0))
     steeper = math.copysign(k * softness, stretch)
     travel, turn = math.fabs(speed) * cuts, math.copysign(cuts, speed)
+    if sense != 0.0:  # smoothly through a speed of zero, where the sliding ends
+        travel, turn = sense * speed * cuts, sense * cuts
     to_bound = binding * (1.0 - bound) - (k + travel) * bound, -binding - k - travel + steeper * stretch, -steeper
     to_moment = bound * speed - (k + 2.0 * travel) * moment, speed + steeper * stretch * stretch
     moment_turn = -(k + 2.0 * travel) - steeper * stretch, bound - 2.0 * turn * moment
@@ -187,6 +191,12 @@ def kinetics(bound, moment, speed, law):
 def share_left(speed, law):
     """Bonds over those of rest of bonds without a stretch, continued smoothly through a speed of zero."""
     return 1.0 / (1.0 + law[6] * law[5] * speed)
+
+
+@device
+def rested(bound, time, law):
+    """Bonds over those of rest after some time at rest: all of them, if they follow the speed at once."""
+    return 1.0 if law[6] != 0.0 else bound - (1.0 - bound) * math.expm1(-law[3] * time)
 
 
 @device
@@ -245,17 +255,20 @@ def equations(row, room, start, step, bare, slider, law, held):
             bend = (_sum(BENDS, i, room, 0) + _sum(BENDS, i, room, 1)) * over - _OFF[i] * row[BODY]
             room[RIGHT, i] += mass * bend * over
         room[RIGHT + 1, i] = row[SHEARED] + room[1, i] - yields * area * stress
-        if law[5] != 0.0:  # bonds without a stretch follow the speed at once
+        of_bound, of_moment, on, turn, _, _ = kinetics(bound, moment, speed, law)
+        room[RIGHT + 2, i] = _sum(RATES, i, room, 2) * over - of_bound[0]
+        room[RIGHT + 3, i] = _sum(RATES, i, room, 3) * over - of_moment[0]
+        if i == 1:
+            of_bonds = of_bound[1], of_bound[2], turn, of_moment[1], on[0], on[1]
+        if law[5] != 0.0:
+            room[RIGHT + 3, i] = moment - law[5] * bound
+            if i == 1:
+                of_bonds = of_bound[1], 0.0, turn, law[5], -1.0, 0.0
+        if law[6] != 0.0:
             left = share_left(speed, law)
-            room[RIGHT + 2, i], room[RIGHT + 3, i] = bound - left, moment - law[5] * bound
+            room[RIGHT + 2, i] = bound - left
             if i == 1:
                 of_bonds = -1.0, 0.0, -law[6] * law[5] * left * left, law[5], -1.0, 0.0
-        else:
-            of_bound, of_moment, on, turn, _, _ = kinetics(bound, moment, speed, law)
-            room[RIGHT + 2, i] = _sum(RATES, i, room, 2) * over - of_bound[0]
-            room[RIGHT + 3, i] = _sum(RATES, i, room, 3) * over - of_moment[0]
-            if i == 1:
-                of_bonds = of_bound[1], of_bound[2], turn, of_moment[1], on[0], on[1]
         if i == 1:
             of_balance = by_bound * stress, area + by_moment * stress, area * viscosity
             if yields > 0.0:
@@ -282,8 +295,8 @@ def _resolved(rate, slopes, slider, law):
     """
     to_bound, to_moment, thick, u_bound, u_moment, u_speed = slopes[:6]
     n_bound, n_moment, n_speed, m_bound, m_moment, m_speed = slopes[6:]
-    own = rate if law[5] == 0.0 else 0.0 * rate
-    n, m = own - n_bound, own - m_moment
+    n = (rate if law[6] == 0.0 else 0.0 * rate) - n_bound
+    m = (rate if law[5] == 0.0 else 0.0 * rate) - m_moment
     scale = _over(n * m - n_moment * m_bound)
     nn, nm, mn, mm = m * scale, n_moment * scale, m_bound * scale, n * scale
     n_slip, m_slip = rate * (nn * n_speed + nm * m_speed), rate * (mn * n_speed + mm * m_speed)

@@ -28,6 +28,7 @@ from sim.parts.coupling_equations import (
     contact_area,
     driven,
     pull_on,
+    rested,
     share_left,
 )  # fmt: skip
 from sim.parts.coupling_step import book, newton, tried
@@ -135,24 +136,28 @@ def _piece(row, bare, slider, law, held, piece, room, energy):
 
 
 @device
-def _slips(time, start, row, bare, slider, held, piece):
-    """Pull beyond what the bonds of rest bear at a time while nothing moves, over the unit of force."""
-    _, area, _, _ = contact_area(1.0, 1.0, time, row[RADIUS], bare, held)
-    return math.fabs(pull_on(time, start, 0.0, row, slider, piece)) - area
+def _slips(time, start, row, bare, slider, law, held, piece):
+    """Pull beyond what the bonds bear at a time if nothing has moved since the start, over the unit of force."""
+    share = rested(row[BOUND], time - start, law)
+    _, area, _, _ = contact_area(share, share, time, row[RADIUS], bare, held)
+    return math.fabs(pull_on(time, start, 0.0, row, slider, piece)) - area * share
 
 
 @device
-def _rest(row, start, bare, slider, held, piece, energy):
-    """Stay at rest until the pull is more than bonds bear; the time at which it is, or the end of the piece."""
+def _rest(row, start, settles, bare, slider, law, held, piece, energy):
+    """Stay at rest until the pull is more than bonds bear; the time at which it is, or the end of the piece.
+
+    A slip that ``settles`` has come to rest where pull and strength are equal, and the strength grows faster.
+    """
     length = piece[0]
     end, before = length, start
-    for k in range(_PLACES + 1):
+    for k in range(1 if settles else 0, _PLACES + 1):
         time = start + (length - start) * (k / _PLACES)
-        if _slips(time, start, row, bare, slider, held, piece) > 0.0:
+        if _slips(time, start, row, bare, slider, law, held, piece) > 0.0:
             low, end = before, time
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + end)
-                if _slips(middle, start, row, bare, slider, held, piece) > 0.0:
+                if _slips(middle, start, row, bare, slider, law, held, piece) > 0.0:
                     end = middle
                 else:
                     low = middle
@@ -161,11 +166,11 @@ def _rest(row, start, bare, slider, held, piece, energy):
     first, last = row[FORCE], pull_on(end, start, 0.0, row, slider, piece)
     if slider[4] == 0.0:
         energy[WORK] += 0.5 * (last - first) * (last + first) / slider[0]
-    moment = 0.0
+    moment, share = 0.0, rested(row[BOUND], end - start, law)
     for _ in range(_FEW_TURNS):  # the stress takes a little of the area, if adhesion pays for it
-        radius, area, _, _ = contact_area(1.0, moment, end, row[RADIUS], bare, held)
+        radius, area, _, _ = contact_area(share, moment, end, row[RADIUS], bare, held)
         moment = last / area if area > 0.0 else 0.0
-    row[FORCE], row[BOUND], row[RADIUS], row[MOMENT] = last, 1.0, radius, moment
+    row[FORCE], row[BOUND], row[RADIUS], row[MOMENT] = last, share, radius, moment
     row[SPEED], row[BODY] = 0.0, 0.0
     return end
 
@@ -183,7 +188,7 @@ def _jump(row, time, bare, slider, law, held):
         return 0.0
     speed = pull / (damping + area * viscosity)
     for _ in range(100):
-        share = share_left(law[5] * speed, law)
+        share = row[BOUND] * share_left(law[5] * speed, law)
         _, area, by_bound, by_moment = contact_area(share, share, time, row[RADIUS], bare, held)
         bears = damping + area * viscosity
         slope = bears - law[6] * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
@@ -195,10 +200,9 @@ def _jump(row, time, bare, slider, law, held):
 
 
 @device
-def _slide(row, start, sense, bare, slider, law, held, piece, room, energy):
+def _slide(row, start, bare, slider, along, held, piece, room, energy):
     """Slip until the speed comes to zero or the piece ends; the time reached, negative where there is no way on."""
-    length = piece[0]
-    along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
+    length, sense = piece[0], along[5]
     for _ in range(MOST_STEPS):
         left = length - start
         step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
@@ -252,25 +256,26 @@ def _last_speed(room, step):
 def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
     """Go through one piece with bonds that bear any pull up to their strength at rest; the time reached."""
     start, length = 0.0, piece[0]
-    stuck = 0
+    stuck, sense = 0, 0.0
     while start < length:
-        if row[SPEED] == 0.0:
+        rests = row[SPEED] == 0.0
+        if rests:
             before = start
-            start = _rest(row, start, bare, slider, held, piece, energy)
+            settles = law[3] > 0.0 and sense * row[FORCE] > 0.0
+            start = _rest(row, start, settles, bare, slider, law, held, piece, energy)
             if start >= length:
                 return length
             stuck = stuck + 1 if start == before else 0
             if stuck > 100:
                 return start
-            sense = math.copysign(1.0, row[FORCE])
-            along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
+        sense = math.copysign(1.0, row[FORCE] if rests else row[SPEED])
+        along = law[0], law[1], law[2], law[3], law[4], sense, law[6]
+        if rests:
             speed = sense * _jump(row, start, bare, slider, along, held) if slider[1] == 0.0 else 0.0
             row[SPEED] = row[BODY] = speed
-            row[BOUND] = share_left(speed, along)
+            row[BOUND] *= share_left(speed, along)
             row[MOMENT] = sense * row[BOUND]
-        else:
-            sense = math.copysign(1.0, row[SPEED])
-        start = _slide(row, start, sense, bare, slider, law, held, piece, room, energy)
+        start = _slide(row, start, bare, slider, along, held, piece, room, energy)
         if start < 0.0:
             return 0.0
         if start < length:

@@ -90,8 +90,9 @@ def _ahead(row, room, step, law):
         else:
             time = NODES[i] * step
             room[0, i], room[1, i], room[2, i], room[3, i] = row[SPEED] * time, 0.0, 0.0, 0.0
-            if law[5] == 0.0:
-                room[2, i], room[3, i] = of_bound[0] * time, of_moment[0] * time
+            if law[6] == 0.0:
+                room[2, i] = of_bound[0] * time
+                room[3, i] = of_moment[0] * time if law[5] == 0.0 else law[5] * room[2, i]
         room[2, i] = max(room[2, i], -0.5 * row[BOUND])
 
 
@@ -174,7 +175,9 @@ def error_of(row, start, step, bare, slider, law, held, piece, room):
     bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
     scale = law[4] * (bound + _FEW) + math.fabs(moment)
     if law[5] != 0.0:
-        to_bound, to_moment = step * of_bound[0] + bound - share_left(speed, law), step * of_moment[0]
+        to_moment = step * of_moment[0]
+    if law[6] != 0.0:
+        to_bound = step * of_bound[0] + bound - share_left(speed, law)
     found = max(
         math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + _FEW),
         math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,

@@ -139,11 +139,15 @@ def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
-    """Stiffness below which steady sliding is unstable in mean field [N/m]; nan where none is known."""
+    """Stiffness below which steady sliding is unstable [N/m], for ``rate`` bonds in mean field; nan where unknown."""
     at, bonds = dict.fromkeys(sweep_dims(dataset), 0), population_of(dataset, dict.fromkeys(sweep_dims(dataset), 0))
-    if bonds is None or not bonds.pathway:
+    if bonds is None:
         return np.full(speed.shape, np.nan)
-    bound = np.asarray(schallamach.first_moment_fraction(speed, *bonds.pathway, bonds.rebinding))
+    mean_field = bool(bonds.pathway) and str(word(dataset, "bonds.model", "").item()) == "rate"
+    onset = bonds.rupture.first_moment_onset if mean_field else bonds.rupture.resolved_onset
+    bound = bonds.rupture.closed_form(speed, bonds.stiffness, bonds.rebinding).bound / bonds.at_rest
+    if mean_field:
+        bound = np.asarray(schallamach.first_moment_fraction(speed, *bonds.pathway, bonds.rebinding))
     less, area, more = (_area(dataset, at, bound * share) for share in (1.0 - _LITTLE, 1.0, 1.0 + _LITTLE))
     growth, firm = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf)
     if str(word(dataset, "drive.contact_stiffness", "half_space").item()) == "half_space":
@@ -152,8 +156,8 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
     with contextlib.suppress(KeyError):
         firm = np.full(speed.shape, style.number_at(setting(dataset, "drive.contact_stiffness"), at))
     mass = style.number_at(setting(dataset, "drive.mass"), at)
-    numbers = *bonds.pathway, bonds.rebinding, bonds.density, area, growth, mass, firm
-    return np.asarray(schallamach.first_moment_onset(speed, *numbers).stiffness)
+    numbers = bonds.stiffness, bonds.rebinding, bonds.density, area, growth, mass, firm
+    return np.asarray(onset(speed, *numbers).stiffness)
 
 
 _SOLID = ("shear_modulus", "poisson_ratio")

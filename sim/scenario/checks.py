@@ -67,9 +67,9 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
 def _reversible_under_a_drive(drive: Drive, bonds: BondModel, contact: Contact) -> Faults:
     if not drive.feeds_back or contact.reversible == 0.0:
         return
-    if bonds.model != "rate" or not bonds.stretched:
-        said = f'is solved with a "{drive.model}" drive for bonds.model = "rate" with a rupture law alone: leave it out'
-        yield ("contact", "reversible"), f"{said}, or prescribe the speed"
+    if bonds.model in ("cohort", "tracked"):
+        said = f'is not solved with a "{drive.model}" drive for "{bonds.model}" bonds: leave it out, take bonds.model ='
+        yield ("contact", "reversible"), f'{said} "rate", or prescribe the speed'
     elif drive.at_once:
         said = "makes friction fall as the contact shrinks, which nothing delays: give drive.mass, damping or viscosity"
         yield ("contact", "reversible"), said
@@ -79,8 +79,8 @@ def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
     if not drive.feeds_back:
         return
     if not bonds.driven:
-        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use "none", "steady", "cohort", or'
-        said += ' "rate" with a rupture'
+        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use "none", "steady",'
+        said += ' "rate", "counted" or "cohort"'
         yield ("bonds", "model"), said
     elif not bonds.stretched:
         if drive.contact_stiffness != "rigid":

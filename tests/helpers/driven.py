@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.testing import assert_allclose
 
-from sim.engine import march, pack, unpack
+from sim.engine import Dice, follow, march, pack, unpack
 from sim.laws import jkr
 from sim.parts.bonds import FirstMoment
 from sim.parts.bonds.rupture import Bell
@@ -61,6 +61,9 @@ AREA = math.pi * jkr.radius_at_load(LOAD, WORK, R, MODULUS) ** 2
 #: Force over displacement of all sites of the contact at rest; force at the unit of stretch; energy.
 STIFF = DENSITY * KAPPA * AREA
 UNIT, ENERGY = STIFF * STRETCH, STIFF * STRETCH**2
+#: Stress of bonds without a stretch at rest [Pa], and strength of the contact with them [N].
+COULOMB = 1e5
+HELD = COULOMB * AREA
 
 
 def spring(stiffness, speed=10.0, mass=0.0, damping=0.0, contact=math.inf, viscosity=0.0, **keys):
@@ -127,10 +130,13 @@ def check_pulled_off(states, read):
     assert np.isfinite(read["energy_residual"]).all()
 
 
-def check_members(scene, straight):
-    """Taken up in the middle of its fastest slip, and a member alone, a march ends as that of all, bit for bit."""
+def check_members(scene, straight, speed=10.0):
+    """Taken up in the middle of its fastest slip, and a member alone, a march ends as that of all, bit for bit.
+
+    That is three times as fast as the ``speed`` of the stage.
+    """
     slip = max(range(len(straight) - 1), key=lambda k: straight[k].drive.speed[0])
-    assert straight[slip].drive.speed[0] > 3.0 * 10.0 * STRETCH
+    assert straight[slip].drive.speed[0] > 3.0 * speed * STRETCH
     again = list(march(scene, np.arange(3), unpack(scene, pack(straight[slip]))))
     alone = list(march(scene, np.array([1])))
     one, other, single = (pack(states[-1]) for states in (straight, again, alone))
@@ -138,3 +144,28 @@ def check_members(scene, straight):
     for key, values in single.items():
         whole = one[key][1:2] if one[key].ndim and len(one[key]) == 3 else one[key]
         assert np.array_equal(whole, values, equal_nan=True), key
+
+
+def check_blocks(scene, states, every=1):
+    """Blocks of steps give what a march gave of all members, bit for bit."""
+    assert not scene.by_steps
+    members = np.arange(len(states[0].drive.speed))
+    end, passed = follow(scene, Dice.of(scene.seed, members), None, range(0, scene.times.steps + 1, every))
+    readings = [scene.parts.drive.readings(state.drive) for state in states[::every]]
+    assert np.array_equal(passed.driven, readings, equal_nan=True)
+    assert np.array_equal(passed.radius, [state.contact.radius for state in states[::every]], equal_nan=True)
+    one, other = pack(end), pack(states[-1])
+    assert [name for name in one if not np.array_equal(one[name], other[name], equal_nan=True)] == []
+
+
+def stuck(duration, steps, bonds, drive, share=0.0, members=1, **contact):
+    """A lens whose bonds have no stretch; their strength and the unit of length make the unit of stiffness."""
+    scene = scenario(duration, steps, spring(1.0, mass=1.0), share=share, members=members, **contact)
+    return Scenario(**{**fields(scene), "bonds": bonds, "drive": drive})
+
+
+def pulled(stiffness=1.0, speed=1.0, mass=0.0, damping=0.0, **keys):
+    stiff = HELD / STRETCH
+    stage = speed * STRETCH if isinstance(speed, float) else speed
+    given = {"stage": stage, "stiffness": stiffness * stiff, "mass": mass * stiff, "damping": damping * stiff}
+    return Spring(**given, contact_stiffness="rigid", **keys)

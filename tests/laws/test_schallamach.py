@@ -19,6 +19,7 @@ from sim.laws.schallamach import (
     bell_rupture_force,
     bell_rupture_force_density,
     bell_stress,
+    catch_moments,
     cluster_lifetime,
     constant_moments,
     cut_off_fraction,
@@ -33,6 +34,7 @@ from sim.laws.schallamach import (
     fraction_rate,
     relax_fraction,
     renewal,
+    resolved_onset,
     rest_share,
     start_up_force,
     start_up_peak,
@@ -637,6 +639,42 @@ def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues(speed, be
     found = first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, 1.0)
     assert_allclose(found, (stiffness, frequency), rtol=2e-6)
     assert np.isnan(first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, 1.0)).all()
+
+
+@pytest.mark.parametrize(
+    ("beta", "speed", "stiffness", "frequency"),
+    [(0.1, 5.0, 0.00320497, 2.00008), (0.1, 20.0, 0.00436311, 8.59175), (1.0, 5.0, 0.00559440, 1.08232),
+     (1.0, 10.0, 0.0295565, 4.25784), (1.0, 20.0, 0.0352161, 8.66919), (1.0, 100.0, 0.0205200, 36.2893),
+     (10.0, 20.0, 0.00714525, 2.71580), (10.0, 100.0, 0.127572, 39.1448), (10.0, 1000.0, 0.0408748, 281.987)],
+)  # fmt: skip
+def test_the_onset_of_bonds_resolved_by_stretch_is_that_of_the_characteristic_equation(
+    beta, speed, stiffness, frequency
+):
+    found = resolved_onset([speed, -speed], [(1.0, 1.0)], 1.0, beta, 1.0, 1.0)
+    assert_allclose(found, np.transpose([(stiffness, frequency)] * 2), rtol=5e-6)
+    # of rates, forces and sites only ratios count
+    assert_allclose(
+        resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, 0.2).stiffness, stiffness, rtol=5e-6
+    )
+
+
+def test_oscillations_of_bonds_resolved_by_stretch_set_in_beyond_the_maximum_of_friction_alone():
+    bell = bell_peak(1.0, 1.0, 1.0, 1.0, 1.0).speed
+    assert np.array_equal(
+        np.isnan(resolved_onset(bell * np.array([0.0, 0.5, 0.999, 1.001, 2.0]), [(1.0, 1.0)], 1.0, 1.0, 1.0, 1.0)),
+        [[True, True, True, False, False]] * 2,
+    )
+    catch = 1.0, 1.0, 1e-2, 1.0
+    speed = np.geomspace(0.1, 100.0, 200)
+    falls = np.gradient(catch_moments(speed, *catch, 1.0, 1.0).force, speed) < 0.0
+    onset = resolved_onset(speed, [(1.0, -1.0), (1e-2, 1.0)], 1.0, 1.0, 1.0, 1.0).stiffness
+    assert np.sum(falls != np.isfinite(onset)) <= 1
+    assert 10 < np.sum(falls) < 190
+    behind = resolved_onset(10.0, [(1.0, 1.0)], 1.0, 1.0, 1.0, 1.0, 0.0, 1e-3, [math.inf, 0.05, 0.02])
+    alone = resolved_onset(10.0, [(1.0, 1.0)], 1.0, 1.0, 1.0, 1.0)
+    swings = 1e-3 * alone.frequency**2
+    series = alone.stiffness / (1.0 - alone.stiffness / 0.05)
+    assert_allclose(behind.stiffness, (swings + alone.stiffness, swings + series, math.inf), rtol=1e-12)
 
 
 def test_oscillations_set_in_gradually_at_high_speeds_and_suddenly_at_low_ones():

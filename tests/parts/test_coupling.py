@@ -7,8 +7,10 @@ import pytest
 from helpers.driven import (
     AREA,
     BELL,
+    COULOMB,
     DENSITY,
     ENERGY,
+    HELD,
     KAPPA,
     LOAD,
     MODULUS,
@@ -18,23 +20,25 @@ from helpers.driven import (
     UNIT,
     WORK,
     R,
+    check_blocks,
     check_members,
     check_pulled_off,
     check_turned,
-    fields,
     force,
     marched,
+    pulled,
     reached,
     residual,
     scenario,
     spring,
+    stuck,
     turning,
 )  # fmt: skip
 from numpy.testing import assert_allclose
 
 import sim
 from sim.analysis.tables import notes
-from sim.engine import Dice, follow, march, pack
+from sim.engine import Dice, follow, march
 from sim.laws import jkr
 from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
@@ -242,18 +246,6 @@ def test_the_half_space_yields_with_its_stiffness_in_series_with_the_bonds():
     assert_allclose(read["stored_energy"][-1], 0.5 * 0.01 * UNIT * states[-1].drive.position[0], rtol=1e-6)
 
 
-def check_blocks(scene, states, every=1):
-    """Blocks of steps give what a march gave of all members, bit for bit."""
-    assert not scene.by_steps
-    members = np.arange(len(states[0].drive.speed))
-    end, passed = follow(scene, Dice.of(scene.seed, members), None, range(0, scene.times.steps + 1, every))
-    readings = [scene.parts.drive.readings(state.drive) for state in states[::every]]
-    assert np.array_equal(passed.driven, readings, equal_nan=True)
-    assert np.array_equal(passed.radius, [state.contact.radius for state in states[::every]], equal_nan=True)
-    one, other = pack(end), pack(states[-1])
-    assert [name for name in one if not np.array_equal(one[name], other[name], equal_nan=True)] == []
-
-
 @pytest.mark.parametrize("keys", [{}, {"mass": 1e-3, "damping": 1e-3}, {"contact": 0.2},
                                   {"contact": 0.2, "mass": 1e-4, "viscosity": 1e-3}])  # fmt: skip
 def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys):
@@ -371,23 +363,6 @@ def test_a_force_is_a_soft_spring_that_is_pulled_from_afar():
         last = list(march(scenario(1.0, 10, drive), np.arange(1)))[-1]
         errors.append(abs(last.drive.position[0] / given.drive.position[0] - 1.0))
     assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.02)
-
-
-#: Strength of the contact at rest [N], and speeds in stretches a second, of bonds without a stretch.
-COULOMB = 1e5
-HELD = COULOMB * AREA
-
-
-def stuck(duration, steps, bonds, drive, members=1):
-    """A lens whose bonds have no stretch; their strength and the unit of length make the unit of stiffness."""
-    scene = scenario(duration, steps, spring(1.0), members=members)
-    return Scenario(**{**fields(scene), "bonds": bonds, "drive": drive})
-
-
-def pulled(stiffness=1.0, speed=1.0, mass=0.0, damping=0.0, **keys):
-    stiff = HELD / STRETCH
-    given = {"stage": speed * STRETCH, "stiffness": stiffness * stiff, "mass": mass * stiff, "damping": damping * stiff}
-    return Spring(**given, contact_stiffness="rigid", **keys)
 
 
 @pytest.mark.parametrize(

@@ -7,13 +7,19 @@ import numpy as np
 import pytest
 from helpers.driven import (
     AREA,
+    DENSITY,
     ENERGY,
+    KAPPA,
+    MODULUS,
     PULLED_OFF,
+    STIFF,
     STRETCH,
     UNIT,
+    R,
     check_members,
     check_pulled_off,
     check_turned,
+    fields,
     force,
     marched,
     residual,
@@ -28,6 +34,9 @@ from sim.engine import Dice, follow, march
 from sim.parts.bonds import Cohort
 from sim.parts.bonds.rupture import Catch, Constant, CutOff
 from sim.parts.drive import Steady as AtSpeed
+from sim.parts.shear import Mean
+from sim.scenario.scenario import Scenario
+from sim.spectrum.bond_made import BondMade
 
 #: Way, share bound and force a site of a massless slider, from a collocation that agrees with itself to 5e-14.
 MASSLESS = {
@@ -130,16 +139,32 @@ def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(x0, tim
         assert_allclose(found[2] / (2e-13 * found[1]), stretch, rtol=1e-7)
 
 
+def test_the_field_that_bonds_make_needs_no_law_of_its_size_under_drives_that_feel_the_friction():
+    # n E[f²]/(π² G b): 0.36312074 n (κ b)² in steady sliding at ten stretches a life; under a force n N κ² x², N x = Q
+    unit = DENSITY * (KAPPA * STRETCH) ** 2 / (math.pi**2 * 0.25 * MODULUS * 1e-9)
+    field = Mean(spectrum=BondMade(footprint=1e-9), paid_by_adhesion=0.0)
+    sliding = driven(0.2, 2, spring(1.0, start="steady", damping=1e-3), 1e-6, start="steady")
+    states, _ = marched(Scenario(**fields(sliding), shear=field))
+    assert_allclose(states[-1].shear.energy, 0.36312074 * unit, rtol=1e-5)
+    creeping = driven(0.559773594776, 20, force(0.25, tolerance=1e-9), 1e-6, rebinding=1e-13)
+    creeping = Scenario(**fields(creeping), shear=field)
+    first = next(march(creeping, np.arange(1)))
+    first.bonds.cohorts.weight[0, 0] = 0.5
+    states = list(march(creeping, np.arange(1), first))
+    for place, stretch in ((10, 0.858292500361), (18, 1.90289022829)):
+        assert_allclose(states[place - 1].shear.energy, 0.25 * stretch * unit, rtol=1e-7)
+
+
 #: Speed, stiffness of the spring at the onset of oscillations of bonds resolved by stretch at k_on = k0, frequency.
 ONSETS = ((10.0, 0.0295565, 4.25784), (20.0, 0.0352161, 8.66919), (100.0, 0.02052, 36.2893))
 
 
-def growth(speed, stiffness, frequency, steps=240):
+def growth(speed, stiffness, frequency, steps=240, share=0.0):
     """Growth rate and frequency of the mode of that frequency, over it, after a small jump of the speed."""
     step = 2.0 * math.pi / frequency / 25.0
     rises = {"time": (0.0, step, step, 1e3), "value": tuple(speed * STRETCH * v for v in (1.0, 1.0, 1.0001, 1.0001))}
     drive = spring(stiffness, rises, start="steady", tolerance=1e-8)
-    states, _ = marched(driven(steps * step, steps, drive, 1e-5, start="steady"))
+    states, _ = marched(driven(steps * step, steps, drive, 1e-5, start="steady", share=share))
     changes = np.diff(reached(states)[steps // 3 :, 2])
     shifted = np.stack([changes[3 - k : -1 - k] for k in range(4)], axis=1)
     modes = np.log(np.roots([1.0, *-np.linalg.lstsq(shifted, changes[4:])[0]]).astype(complex)) / step / frequency
@@ -156,6 +181,19 @@ def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_within_a_hund
     assert_allclose(turns, 1.0, rtol=1e-3)
     assert growth(speed, 0.99 * stiffness, frequency)[0] > 2e-3
     assert growth(speed, 1.01 * stiffness, frequency)[0] < -2e-3
+
+
+def test_an_area_that_follows_the_bonds_raises_the_onset_as_linear_stability_has_it():
+    scene = driven(1.0, 4, spring(1.0), 1e-9, share=0.5)
+    bound = scene.bonds.steady(np.full(1, 10.0 * STRETCH)).fraction[0]
+    works = scene.adhesion.work_of_bonds(bound * np.array([0.999, 1.0, 1.001]))
+    less, area, more = np.pi * scene.contact.equilibrium_radius(works, R, MODULUS) ** 2
+    onset = scene.bonds.onset(np.full(1, 10.0 * STRETCH), area, (more - less) / 2e-3 / area)
+    stiffness, frequency = onset.stiffness[0] / STIFF, onset.frequency[0]
+    assert stiffness > 1.2 * 0.0295565 * area / AREA
+    rate, turns = growth(10.0, stiffness, frequency, share=0.5)
+    assert abs(rate) < 1e-4
+    assert_allclose(turns, 1.0, rtol=1e-3)
 
 
 def test_a_force_makes_creep_at_the_speed_of_steady_sliding_under_it():
@@ -249,7 +287,11 @@ def test_catch_bonds_feel_a_drive():
     assert np.all(np.diff(reached(states)[:4, 2]) > 0.0)
 
 
-def test_what_would_run_shows_the_slider_of_bonds_whose_onset_is_not_known_in_closed_form():
-    text = sim.check(driven(1.0, 4, spring(1.0, mass=1e-3), 1e-4))
-    assert "natural frequency" in text.partition("\nslider\n")[2]
-    assert "oscillates below" not in text
+def test_what_would_run_shows_where_a_slider_of_bonds_resolved_by_stretch_oscillates():
+    shown = sim.check(driven(1.0, 4, spring(1.0), 1e-4)).partition("\nslider\n")[2]
+    (row,) = (line for line in shown.splitlines() if line.startswith("  oscillates below"))
+    assert f"{0.0295565 * STIFF:.4g} N/m" in row
+    assert f"{4.25784 / (2.0 * math.pi):.3g} Hz" in row
+    never = sim.check(driven(1.0, 4, spring(1.0, mass=1e-3), 1e-4, rupture=Constant(rate=1.0)))
+    assert "natural frequency" in never
+    assert "oscillates below" not in never

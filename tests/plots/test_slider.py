@@ -1,6 +1,7 @@
 """Figures of a slider that feels its friction: what they show is what the dataset and the theory have."""
 
 import functools
+import math
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
 import sim
-from sim.laws.schallamach import first_moment_onset, first_moment_peak
-from sim.parts.bonds import FirstMoment
+from sim.laws.schallamach import first_moment_onset, first_moment_peak, resolved_onset
+from sim.parts.bonds import Cohort, FirstMoment
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import Force, Spring
@@ -72,6 +73,18 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():
     slow = first_moment_peak(*NUMBERS).speed
     edges = np.geomspace(1e-3, 3e-2, swings.shape[1] + 1)
     assert np.nanmax(up.collections[0].get_array().reshape(2, -1)[:, edges[1:] < slow]) < 0.1
+
+
+def test_the_boundary_of_a_map_of_cohorts_is_that_of_bonds_resolved_by_stretch():
+    bonds = Cohort(BONDS.rupture, BONDS.bond_stiffness, BONDS.rebinding_rate, BONDS.site_density, tolerance=1e-2)
+    drive = Spring(stage={"from": 1e-3, "to": 3e-2, "scale": "log"}, stiffness=1e4, damping=1.0, start="steady")
+    parts = {"bonds": bonds, "drive": drive, "sweep": {"drive.stiffness": [5e3, 1e4]}, "clock": Clock(2.0, 0.05)}
+    panel = rendered(draw(sim.run(scene(1, adhesion=Adhesion(work=42e-3, bond_share=0.0), **parts)))).axes[0]
+    ((speed, stiffness),) = lines_of(panel)
+    firm = 0.5 * np.pi**2 * 1.6e6 * math.sqrt(scene(1).contact_area / np.pi)
+    numbers = [(25.0, 4e-12)], *NUMBERS[2:], scene(1).contact_area
+    exact = resolved_onset(1e-3 * speed, *numbers, contact_stiffness=firm).stiffness
+    assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
 
 
 def test_the_area_on_the_way_to_sliding_lies_beside_the_law_fitted_to_its_beginning():

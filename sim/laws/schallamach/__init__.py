@@ -9,7 +9,8 @@ From the law of Menga, Carbone & Dini to fuller ones, each with its own assumpti
 - ``cut_off``: bonds that break at a stretch, whose limit without thermal rupture is ``linear``;
 - ``catch``: bonds that force first holds and then breaks;
 - ``loading``: a Bell bond pulled once: rupture forces and the static peak;
-- ``cluster``: a finite number of bonds under a shared force.
+- ``cluster``: a finite number of bonds under a shared force;
+- ``stability``: where bonds of a density over their stretch make a slider behind a spring oscillate.
 
 ``linear`` counts bonds relative to rest throughout. The others start from sites: ``bound`` is a share of
 the sites, ``*_fraction`` the number of bonds relative to rest.
@@ -27,7 +28,6 @@ from sim.laws.schallamach.catch import catch_lives, catch_moments
 from sim.laws.schallamach.cluster import cluster_lifetime
 from sim.laws.schallamach.cut_off import cut_off_fraction, cut_off_moments, cut_off_stress
 from sim.laws.schallamach.first_moment import (
-    Onset,
     first_moment_amplitude,
     first_moment_fraction,
     first_moment_onset,
@@ -35,7 +35,13 @@ from sim.laws.schallamach.first_moment import (
     first_moment_stress,
     first_moment_stretch,
 )
-from sim.laws.schallamach.linear import fraction_rate, relax_fraction, steady_fraction, transition_probabilities
+from sim.laws.schallamach.linear import (
+    fraction_rate,
+    linear_onset,
+    relax_fraction,
+    steady_fraction,
+    transition_probabilities,
+)
 from sim.laws.schallamach.loading import (
     StartUpPeak,
     bell_rupture_force,
@@ -44,3 +50,4 @@ from sim.laws.schallamach.loading import (
     start_up_peak,
 )
 from sim.laws.schallamach.renewal import Lives, Peak, SiteMoments, constant_moments, renewal, rest_share
+from sim.laws.schallamach.stability import Onset, resolved_onset

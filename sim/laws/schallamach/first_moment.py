@@ -10,12 +10,11 @@ states of that closure, not of bonds; for those see ``bell_moments``.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.laws.schallamach.renewal import Peak
+from sim.laws.schallamach.stability import behind
 from sim.numerics.jit import device, law
 from sim.numerics.special import lambert
 
@@ -157,13 +156,6 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
     return Peak(_peak_speed(*given), np.multiply(site_density, _peak_force(*given)))
 
 
-class Onset(NamedTuple):
-    """Onset of oscillations behind a spring: its stiffness [N/m] and their frequency [rad/s], nan where none is."""
-
-    stiffness: NDArray[np.float64]
-    frequency: NDArray[np.float64]
-
-
 def first_moment_onset(
     speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, area, area_growth=0.0, mass=0.0,
     contact_stiffness=math.inf,
@@ -195,8 +187,7 @@ def first_moment_onset(
 
         ``K_0 = n kappa A N d/(k_on + 2k)``,  ``omega^2 = (k_on + k)(1 + x) d/(1 + (1 + s) x)``,
 
-    from the eigenvalues of the closure; a mass and k_t make it ``K = m omega^2 + K_0 k_t/(k_t - K_0)``. Mass raises
-    the stiffness that is needed, and so does a contact that yields; where k_t <= K_0 the contact itself oscillates.
+    from the eigenvalues of the closure; a mass and k_t make it ``K = m omega^2 + K_0 k_t/(k_t - K_0)``.
 
     Examples
     --------
@@ -213,10 +204,7 @@ def first_moment_onset(
     bound = rebinding_rate / (rebinding_rate + rate)
     square = (rebinding_rate + rate) * (1.0 + tilt) * surplus / (1.0 + (1.0 + area_growth) * tilt)
     alone = site_density * bond_stiffness * area * bound * surplus / (rebinding_rate + 2.0 * rate)
-    yields = alone / np.asarray(contact_stiffness, dtype=float)
-    behind = np.divide(alone, 1.0 - yields, out=np.full(np.shape(yields), np.inf), where=yields < 1.0)
-    stiffness = np.where(np.isnan(alone), np.nan, np.multiply(mass, square) + behind)
-    return Onset(stiffness[()], np.sqrt(square)[()])
+    return behind(alone, square, mass, contact_stiffness)
 
 
 def first_moment_amplitude(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):

@@ -17,6 +17,9 @@ any length at a mean speed is exact, for the mean and for the probabilities of a
 
 import math
 
+import numpy as np
+
+from sim.laws.schallamach.stability import Onset
 from sim.numerics.jit import device, law
 
 
@@ -44,6 +47,44 @@ def steady_fraction(speed, critical_speed):
     0.909 0.500
     """
     return 1.0 / (1.0 + math.fabs(speed) / critical_speed)
+
+
+def linear_onset(speed, critical_speed, rebinding_rate, strength, damping, mass=0.0, area_growth=0.0):
+    """Stiffness of a spring below which a slider on bonds of the linear rate equation oscillates at a speed.
+
+    Parameters
+    ----------
+    speed, critical_speed, rebinding_rate : float or array
+        V [m/s], either sign; Vc [m/s], above 0; h [1/s].
+    strength : float or array
+        F_s, the friction with all bonds of rest bound over the area at this speed [N].
+    damping, mass : float or array
+        c [N s/m] and m [kg] of the body; one of them above 0.
+    area_growth : float or array
+        d ln A/d ln phi of a contact whose area follows the bonds [1].
+
+    Returns
+    -------
+    Onset
+        Stiffness [N/m], infinite for a mass that nothing damps, and frequency [rad/s]; nan where every spring holds.
+
+    Notes
+    -----
+    With ``H = h (1 + V/Vc)`` and ``B = (1 + s) F_s h phi/Vc``, s the growth of the area,
+
+        ``K_c = (c + m H) (B - c H)/c``,  ``omega^2 = K_c H/(c + m H) = H (B - c H)/c``.
+
+    Examples
+    --------
+    >>> print("%.4f %.4f" % linear_onset(1.0, 0.5, 2.0, 1.0, 0.05, 0.01))
+    2.2733 11.1355
+    """
+    pace = rebinding_rate * (1.0 + np.abs(speed) / critical_speed)
+    falls = (1.0 + area_growth) * strength * rebinding_rate / critical_speed * steady_fraction(speed, critical_speed)
+    with np.errstate(divide="ignore"):
+        over = np.divide(falls - damping * pace, damping)
+    over = np.where(over > 0.0, over, np.nan)
+    return Onset(((damping + mass * pace) * over)[()], np.sqrt(pace * over)[()])
 
 
 @law

@@ -60,6 +60,10 @@ class Common:
     def feeds_back(self) -> bool:
         return False
 
+    def kept(self, seen: Array, radius: Array) -> tuple[Array, Array]:
+        """Share of bound sites left over a contact of ``radius`` [m], nan where it is open, and that of the area."""
+        return _ALL, seen
+
     def chosen(self, area: float, forces: bool) -> Self:
         """The model for a contact of this ``area`` [m²] whose field reads the bonds' ``forces`` or not: this one."""
         return self
@@ -93,7 +97,7 @@ class OverArea(Common):
         return np.ones(len(noise.members) if self.per_member else 1)
 
     def kept(self, seen: Array, radius: Array) -> tuple[Array, Array]:
-        """Share of bound sites left over a contact of this ``radius`` [m], nan where it is open, and the area's radius.
+        """Share of bound sites left over a contact of ``radius`` [m], nan where it is open, and that of the area.
 
         The area of a step is that at its start, so dilution follows the contact by one clock step and no
         bond is lost in between. With an equilibrium contact and fluctuating ΔΓ the total outward motion grows without
@@ -101,6 +105,6 @@ class OverArea(Common):
         With a ``rate_dependent`` edge it does.
         """
         if self.area == "present":
-            return _ALL, seen
+            return super().kept(seen, radius)
         now = np.where(np.isnan(radius), 0.0, radius)
         return np.where(now > 0.0, share_kept(seen, now), 0.0), now  # an open contact has no bonds to fill

@@ -22,6 +22,7 @@ from sim.laws.schallamach import (
     first_moment_amplitude,
     first_moment_onset,
     first_moment_peak,
+    resolved_onset,
 )
 from sim.numerics.jit import device
 from sim.numerics.special import exp
@@ -95,6 +96,19 @@ class _Law:
         """Growth of the oscillations beyond their onset at speeds [m/s], as of the law ``first_moment_amplitude``."""
         return np.full(speed.shape, np.nan)
 
+    @property
+    def pathways(self) -> list[tuple[float, float]]:
+        """Pathways of rupture as of the law ``resolved_onset``; none where force opens nothing."""
+        return []
+
+    def resolved_onset(
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, *contact: Array | float
+    ) -> Onset:
+        """Onset of oscillations behind a spring of bonds resolved by stretch, as of the law ``resolved_onset``."""
+        if not self.pathways:
+            return Onset(*np.full((2, *speed.shape), np.nan))
+        return resolved_onset(speed, self.pathways, bond_stiffness, rebinding_rate, site_density, *contact)
+
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Constant(_Law):
@@ -123,6 +137,10 @@ class Bell(_Law):
         float, Quantity("N", "force that multiplies the rupture rate by e", "f_b", above=0, typical="4 pN")
     ]
     model: Literal["bell"] = "bell"
+
+    @property
+    def pathways(self) -> list[tuple[float, float]]:
+        return [(self.zero_force_rate, self.bell_force)]
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         return RuptureRate(self.zero_force_rate, bond_stiffness / self.bell_force, math.inf)
@@ -179,6 +197,10 @@ class Catch(_Law):
         float, Quantity("N", "force that multiplies the slip rate by e", "f_s", above=0, typical="8 pN")
     ]
     model: Literal["catch"] = "catch"
+
+    @property
+    def pathways(self) -> list[tuple[float, float]]:
+        return [(self.catch_rate, -self.catch_force), (self.slip_rate, self.slip_force)]
 
     def law(self, bond_stiffness: float) -> RuptureRate:
         slip, catch = bond_stiffness / self.slip_force, bond_stiffness / self.catch_force

@@ -58,8 +58,13 @@ class _Stretched(Common):
         return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
 
     def onset(self, speed: Array, *contact: Array | float) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s], nan where it is not known."""
-        return Onset(*np.full((2, *speed.shape), np.nan))
+        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known; the rest as of its law."""
+        recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
+        return self.rupture.resolved_onset(speed, *recipe, *contact)
+
+    def amplitude(self, speed: Array) -> Array | None:
+        """Growth of the oscillations beyond their onset at speeds [m/s], where a law is known of it."""
+        return None
 
     def _bonding(self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array) -> Bonding:
         """Readings of a population of these moments per site.
@@ -138,12 +143,10 @@ class FirstMoment(OverArea, _Separable):
         return Stretches(bound[-1], stretch[-1], seen), self.bonding(Stretches(bound, stretch))
 
     def onset(self, speed: Array, *contact: Array | float) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s]; the rest as of the law ``first_moment_onset``."""
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
         return self.rupture.first_moment_onset(speed, *recipe, *contact)
 
     def amplitude(self, speed: Array) -> Array:
-        """Growth of the oscillations beyond their onset at speeds [m/s], as of the law ``first_moment_amplitude``."""
         return self.rupture.first_moment_amplitude(speed, self.bond_stiffness, self.rebinding_rate)
 
     def remarks(self, setting: Setting) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.laws.schallamach import steady_fraction, transition_probabilities
+from sim.laws.schallamach import Onset, linear_onset, steady_fraction, transition_probabilities
 from sim.laws.schallamach.linear import relaxed
 from sim.numerics.binomial import binomial
 from sim.numerics.jit import kernel
@@ -63,7 +63,7 @@ class _WithoutStretch(Common):
     def advance(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Population, Bonding]:
         bound, seen = self._bound(state, motions, radius, noise)
         sense = np.empty(motions.slip.shape)
-        _last_signs(motions.speed[:, 0], motions.slip[:, 0], state.sense[0], sense[:, 0])
+        _last_signs(motions.speed, motions.slip, state.sense, sense)
         return Population(bound[-1], sense[-1], seen), self.bonding(Population(bound, sense))
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
@@ -73,6 +73,10 @@ class _WithoutStretch(Common):
     def bonding(self, state: Population) -> Bonding:
         strength = self.stress * state.bound
         return Bonding(state.bound, state.sense * strength, strength)
+
+    def onset(self, speed: Array, area: Array, growth: Array, mass: float, damping: Array) -> Onset:
+        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known; the rest as of its law."""
+        return Onset(*np.full((2, *speed.shape), np.nan))
 
     def steady(self, speed: Array) -> Bonding:
         fraction = self._steady_fraction(speed)
@@ -87,12 +91,14 @@ class _WithoutStretch(Common):
         return np.full(1, 1.0 if start == "bonded" else 0.0)
 
 
-@kernel("void(float64[:], float64[:], float64, float64[:])")
-def _last_signs(speed, slip, last, sense):
+@kernel("void(float64[:, :], float64[:, :], float64[:], float64[:, ::1])")
+def _last_signs(speed, slip, first, sense):
     """Sign of the last slip at the end of each step: that of the speed, of the step's slip once it has stopped."""
-    for k in range(len(sense)):
-        last = speed[k] if speed[k] != 0.0 else slip[k] if slip[k] != 0.0 else last
-        sense[k] = last = np.sign(last)
+    for m in range(sense.shape[1]):
+        last = first[m]
+        for k in range(len(sense)):
+            last = speed[k, m] if speed[k, m] != 0.0 else slip[k, m] if slip[k, m] != 0.0 else last
+            sense[k, m] = last = np.sign(last)
 
 
 @kernel("void(float64[::1], float64[:], float64[:], float64, float64, float64[:, ::1])")
@@ -151,9 +157,17 @@ class Rate(OverArea, _WithoutStretch):
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
+    driven: ClassVar[bool] = True
+    in_blocks: ClassVar[bool] = True
+
     def start(self, motion: Motion, noise: Noise) -> Population:
-        first = self.rows(noise) * self._first_fraction(self.start_from, motion)
+        rows = self.rows(noise) + 0.0 * motion.speed  # a drive that feels the friction has its members
+        first = rows * self._first_fraction(self.start_from, motion)
         return Population(first, np.sign(motion.speed))
+
+    def onset(self, speed: Array, area: Array, growth: Array, mass: float, damping: Array) -> Onset:
+        recipe = self.critical_speed, self.rebinding_rate, self.stress * area
+        return linear_onset(speed, *recipe, damping, mass, growth)
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
         share, seen = self.kept(state.seen, radius)
@@ -184,6 +198,8 @@ class Counted(_WithoutStretch):
     start_from: Start = "steady"
     model: Literal["counted"] = "counted"
 
+    driven: ClassVar[bool] = True
+
     @property
     def per_member(self) -> bool:
         return True
@@ -193,28 +209,31 @@ class Counted(_WithoutStretch):
 
     def start(self, motion: Motion, noise: Noise) -> Population:
         bound = np.zeros(len(noise.members))
-        first = self._first_fraction(self.start_from, motion)
+        first = self._first_fraction(self.start_from, motion)[np.newaxis]
         return Population(self._counted(bound, first, first, motion.step, noise)[0], np.sign(motion.speed))
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
-        over = motions.path[:, 0], motions.duration[:, 0]
+        over = motions.path, motions.duration
         stay, bind = transition_probabilities(*over, self.critical_speed, self.rebinding_rate)
         return self._counted(state.bound, stay, bind, motions.step, noise), state.seen
 
     def _counted(self, bound: Array, stay: Array, bind: Array, step: int, noise: Noise) -> Array:
-        """Bound sites at the end of each step, in which each bound and free one is bound with given probabilities."""
+        """Bound sites at the end of each step, in which each bound and free one is bound with given probabilities.
+
+        These have the shape (steps, 1) or (steps, members).
+        """
         counted = np.empty((len(stay), len(bound)))
         _count(bound, stay, bind, self.sites, *noise.at(step), counted)
         return counted
 
 
-@kernel("void(float64[:], float64[:], float64[:], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])")
+@kernel("void(float64[:], float64[:, :], float64[:, :], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])")
 def _count(bound, stay, bind, sites, seed, part, members, step, counted):
     """Bound sites of all members at the end of each step."""
     for m in range(members.size):
-        before = bound[m]
-        for k in range(stay.size):
+        before, own = bound[m], m % stay.shape[1]
+        for k in range(len(stay)):
             numbers = stream(seed, part, members[m], step + k, 0)
-            kept, numbers = binomial(before, stay[k], numbers)
-            new, numbers = binomial(sites - before, bind[k], numbers)
+            kept, numbers = binomial(before, stay[k, own], numbers)
+            new, numbers = binomial(sites - before, bind[k, own], numbers)
             counted[k, m] = before = kept + new

@@ -1,0 +1,250 @@
+"""Sliders on bonds without a stretch that take time: a linear rate equation, and a finite number of them."""
+
+import math
+
+import numpy as np
+import pytest
+from helpers.driven import (
+    AREA,
+    COULOMB,
+    HELD,
+    LOAD,
+    MODULUS,
+    STRETCH,
+    WORK,
+    R,
+    check_blocks,
+    check_members,
+    marched,
+    pulled,
+    residual,
+    stuck,
+)  # fmt: skip
+from numpy.testing import assert_allclose
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import sim
+from sim.engine import Dice, follow, march
+from sim.laws.reversible import radius_at_load_reversible
+from sim.laws.schallamach import linear_onset
+from sim.parts.bonds import Counted, Rate, Steady, Unbroken
+from sim.parts.drive import Force
+
+#: Rate at which free sites bind, and critical speed in stretches a second.
+BINDING, CRITICAL = 2.0, 0.5
+
+
+def renewed(start="bonded", **keys):
+    """Bonds of the linear rate equation."""
+    recipe = {"critical_speed": CRITICAL * STRETCH, "rebinding_rate": BINDING, "stress": COULOMB}
+    return Rate(**recipe, start_from=start, **keys)
+
+
+def reached(states):
+    """Way of the slider, share of bonds and speed in the units of the bonds, one row a state."""
+    return np.array([
+        (state.drive.position[0] / STRETCH, state.bonds.bound[0], state.drive.speed[0] / STRETCH) for state in states
+    ])  # fmt: skip
+
+
+def reference(times, stiffness, speed, mass, damping):
+    """Way, share and speed from rest with all bonds, by a general integrator between stops and starts."""
+    way, share, now, found = 0.0, 1.0, 0.0, []
+
+    def pull(t):
+        return stiffness * (speed * t - way)
+
+    while now < times[-1]:
+        since, before = now, share
+
+        def healed(t, since=since, before=before):
+            return 1.0 - (1.0 - before) * math.exp(-BINDING * (t - since))
+
+        first = now + 1e-9 if now > 0.0 else 0.0
+        now = brentq(lambda t, healed=healed: pull(t) - healed(t), first, times[-1] + 10.0, xtol=1e-15)
+        found += [(t, way, healed(t), 0.0) for t in times if since <= t < now]
+
+        def slides(t, y):
+            rate = (stiffness * (speed * t - y[0]) - y[1] - damping * y[2]) / mass if mass else 0.0
+            v = y[2] if mass else (stiffness * (speed * t - y[0]) - y[1]) / damping
+            return v, BINDING * (1.0 - y[1]) - BINDING * v / CRITICAL * y[1], rate
+
+        def stops(t, y):
+            return slides(t, y)[0]
+
+        stops.terminal, stops.direction = True, -1.0
+        keys = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13, "events": stops, "dense_output": True}
+        slid = solve_ivp(slides, (now, times[-1] + 10.0), (way, healed(now), 0.0), **keys)
+        found += [(t, *slid.sol(t)[:2], slides(t, slid.sol(t))[0]) for t in times if now <= t < slid.t[-1]]
+        now, (way, share, _) = slid.t[-1], slid.y[:, -1]
+    return np.array(found)[:, 1:]
+
+
+@pytest.mark.parametrize("mass", [0.0, 0.01])
+def test_bonds_that_heal_at_rest_stick_and_slip_as_a_general_integrator_has_it(mass):
+    times, off = np.linspace(0.0, 12.0, 241), []
+    exact = reference(times, 1.0, 0.3, mass, 0.05)
+    assert np.sum(np.diff(exact[:, 2] > 0.0)) > 3  # several slips
+    for tolerance in (1e-9, 1e-11):
+        states, read = marched(stuck(12.0, 240, renewed(), pulled(1.0, 0.3, mass, 0.05, tolerance=tolerance)))
+        off.append(np.max(np.abs(reached(states)[:, :2] - exact[:, :2])))
+    assert off[1] < 0.1 * off[0] < 1e-7
+    assert_allclose(read["spring_force"] / HELD, 0.3 * times - exact[:, 0], atol=1e-7)
+
+
+def growth(stiffness, frequency, mass, damping, steps=200):
+    """Growth rate and frequency of the slowest mode after a small jump of the speed of steady sliding."""
+    step = 2.0 * math.pi / frequency / 25.0
+    rises = {"time": (0.0, step, step, 1e3), "value": tuple(STRETCH * v for v in (1.0, 1.0, 1.00001, 1.00001))}
+    drive = pulled(stiffness, rises, mass, damping, start="steady", tolerance=1e-11)
+    scene = stuck(steps * step, steps, renewed("steady"), drive)
+    passed = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
+    changes = np.diff(passed.fraction[steps // 3 :, 0])
+    modes = 3 if mass else 2
+    shifted = np.stack([changes[modes - 1 - k : -1 - k] for k in range(modes)], axis=1)
+    found = np.roots([1.0, *-np.linalg.lstsq(shifted, changes[modes:])[0]]).astype(complex)
+    slowest = min(np.log(found[found.imag > 0.0]) / step, key=lambda root: abs(root.imag - frequency))
+    return slowest.real, slowest.imag
+
+
+@pytest.mark.parametrize(("mass", "damping", "onset", "frequency"),
+                         [(0.01, 0.05, 2.2733333, 11.1355287), (0.1, 0.1, 5.1333333, 6.6332496),
+                          (0.0, 0.1, 0.7333333, 6.6332496)])  # fmt: skip
+def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_on_its_sides(mass, damping, onset, frequency):
+    # K_c = (c + m H)(B - c H)/c, w_c^2 = K_c H/(c + m H), H = h (1 + V/V_c), B = F_s h N/V_c
+    law = linear_onset([1.0, -1.0, 1e9], CRITICAL, BINDING, 1.0, damping, mass)
+    assert_allclose(law, ([onset, onset, math.nan], [frequency, frequency, math.nan]), rtol=1e-7)
+    rate, turns = growth(onset, frequency, mass, damping)
+    assert abs(rate) < 1e-4 * frequency
+    assert_allclose(turns, frequency, rtol=1e-4)
+    assert growth(0.99 * onset, frequency, mass, damping)[0] > 1e-3
+    assert growth(1.01 * onset, frequency, mass, damping)[0] < -1e-3
+
+
+def test_what_would_run_shows_below_which_spring_the_slider_oscillates():
+    drive = pulled(1.0, 1.0, 0.01, 0.05)
+    shown = sim.check(stuck(1.0, 4, renewed(), drive)).partition("\nslider\n")[2]
+    (row,) = (line for line in shown.splitlines() if line.startswith("  oscillates below"))
+    assert f"{2.2733333 * HELD / STRETCH:.4g} N/m" in row
+    assert f"{11.1355287 / (2.0 * math.pi):.3g} Hz" in row
+    for bonds in (renewed(), Steady(critical_speed=STRETCH, stress=COULOMB)):
+        held = sim.check(stuck(1.0, 4, bonds, pulled(1.0, 1.0, damping=10.0)))
+        assert "oscillates below" not in held
+
+
+@pytest.mark.parametrize("keys", [{"mass": 0.01}, {"damping": 0.01}])
+def test_a_force_moves_a_body_after_a_rest_where_it_exceeds_the_strength_that_has_healed(keys):
+    heavy = {name: value * HELD / STRETCH for name, value in keys.items()}
+    for wait in (0.1, 1.0, 3.0):
+        for above in (-1e-9, 1e-9):
+            load = HELD * (-math.expm1(-BINDING * wait) + above)
+            table = {"time": (0.0, wait, wait, 10.0), "value": (0.0, 0.0, load, load)}
+            drive = Force(force=table, contact_stiffness="rigid", **heavy)
+            states, _ = marched(stuck(1.1 * wait, 11, renewed("empty"), drive))
+            moved = states[-1].drive.position[0]
+            assert moved == 0.0 if above < 0.0 else moved > 0.0
+
+
+@pytest.mark.parametrize("keys", [{"damping": 0.05}, {"mass": 0.01, "damping": 0.05}, {"mass": 0.02}])
+def test_the_missing_energy_falls_with_the_tolerance_while_the_area_follows_the_bonds(keys):
+    missing = []
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        _, read = marched(stuck(12.0, 24, renewed(), pulled(1.0, 0.3, tolerance=tolerance, **keys), share=0.5))
+        missing.append(residual(read))
+        assert missing[-1] < 10.0 * tolerance
+    assert missing[2] < 0.1 * missing[1] < 0.1 * missing[0]
+
+
+@pytest.mark.parametrize("keys", [{"damping": 0.05}, {"mass": 0.01, "damping": 0.05}])
+@pytest.mark.parametrize("area", ["present", "carried"])
+def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys, area):
+    scene = stuck(12.0, 240, renewed(area=area), pulled(1.0, 0.3, **keys), share=0.5)
+    straight = list(march(scene, np.arange(3)))
+    check_members(scene, straight, 0.3)
+    if area == "present":
+        check_blocks(scene, straight, 4)
+
+
+def test_a_stage_that_turns_pulls_the_body_both_ways_and_leaves_it_at_rest():
+    turns = {"time": (0.0, 4.0, 4.0, 8.0, 8.0, 99.0), "value": tuple(v * STRETCH for v in (1.0, 1.0, -2.0, -2.0, 0, 0))}
+    scene = stuck(12.0, 48, renewed(), pulled(1.0, turns, damping=0.1))
+    states, read = marched(scene)
+    ways = reached(states)
+    assert ways[16, 2] > 0.0 > ways[32, 2]
+    assert np.all(ways[40:, 2] == 0.0)
+    assert_allclose(states[-1].bonds.bound, 1.0, atol=1e-3)
+    assert np.max(np.abs(read["spring_force"])) <= HELD * (1.0 + 1e-9) + 0.1 * HELD * 2.0
+    assert residual(read) < 1e-5
+
+
+@pytest.mark.parametrize("keys", [{"damping": 0.05}, {"mass": 0.01, "damping": 0.05}])
+@pytest.mark.parametrize("bonds", [renewed(), Steady(critical_speed=STRETCH, stress=COULOMB), Unbroken(stress=COULOMB)])
+def test_a_contact_that_pays_for_its_mean_stress_follows_it_within_the_sub_steps(bonds, keys):
+    # at rest with all its strength the stress takes this of the work of adhesion
+    share = 6.0 * COULOMB**2 * math.sqrt(AREA / math.pi) / (math.pi * MODULUS) / WORK
+    missing = []
+    for tolerance in (1e-5, 1e-8):
+        drive = pulled(1.0, 0.3, tolerance=tolerance, **keys)
+        scene = stuck(12.0, 240, bonds, drive, reversible=0.3 / share)
+        states, read = marched(scene)
+        radii = np.array([state.contact.radius[0] for state in states[1:]])
+        assert_allclose([state.drive.radius[0] for state in states[1:]], radii, rtol=1e-9)
+        missing.append(residual(read))
+        assert missing[-1] < tolerance
+    stress = np.abs([state.bonding.stress[0] for state in states[1:]])
+    exact = radius_at_load_reversible(LOAD, WORK, stress, 0.3 / share, R, MODULUS)
+    assert_allclose(radii, exact, rtol=1e-9)
+    assert np.min(radii) < 0.97 * np.max(radii)
+    assert missing[1] < missing[0]
+    check_blocks(scene, states)
+
+
+def counted(sites, start="bonded"):
+    """A finite number of bonds with the rates of the linear equation."""
+    recipe = {"critical_speed": CRITICAL * STRETCH, "rebinding_rate": BINDING, "stress": COULOMB}
+    return Counted(**recipe, sites=sites, start_from=start)
+
+
+@pytest.mark.parametrize("keys", [{"damping": 0.3}, {"mass": 0.05, "damping": 0.3}])
+def test_very_many_counted_bonds_move_as_the_rate_equation_to_first_order_in_the_clock_step(keys):
+    def force(bonds, steps):
+        return marched(stuck(4.0, steps, bonds, pulled(1.0, 0.5, **keys)))[1]["spring_force"][:: steps // 40] / HELD
+
+    exact = force(renewed(), 40)
+    off = [np.max(np.abs(force(counted(10**9), steps) - exact)) for steps in (320, 640, 1280)]
+    assert off[0] < 0.03
+    assert_allclose(np.divide(off[:-1], off[1:]), 2.0, rtol=0.15)
+
+
+def test_counted_bonds_of_a_slider_fluctuate_as_independent_sites_in_steady_sliding():
+    # held by a stiff spring and much damping the speed is that of the stage; each site is bound with 1/(1 + V/V_c)
+    sites, members = 50, 400
+    scene = stuck(20.0, 200, counted(sites, "steady"), pulled(50.0, 1.0, damping=50.0, start="steady"))
+    passed = follow(scene, Dice.of(scene.seed, np.arange(members)), None, range(201))[1]
+    share, bound = 1.0 / 3.0, passed.fraction[100:]
+    error = math.sqrt(share * (1.0 - share) / sites / members)
+    assert abs(np.mean(bound[-1]) - share) < 4.0 * error
+    assert_allclose(np.var(bound[-1]), share * (1.0 - share) / sites, rtol=4.0 * math.sqrt(2.0 / members))
+
+
+def test_counted_bonds_at_rest_carry_the_pull_up_to_their_strength_and_are_the_same_in_any_batch():
+    scene = stuck(6.0, 240, counted(40), pulled(1.0, 0.5, damping=0.05), share=0.5, members=3)
+    straight = list(march(scene, np.arange(3)))
+    check_members(scene, straight, 0.5)
+    force, bound, rest = (
+        np.array(values)
+        for values in zip(
+            *((state.drive.spring_force, state.bonding.fraction, state.drive.speed == 0.0) for state in straight[1:]),
+            strict=True,
+        )
+    )
+    assert 0.3 < np.mean(rest) < 1.0
+    areas = np.array([np.pi * state.contact.radius**2 for state in straight[1:]])
+    stress = np.array([state.bonding.stress for state in straight[1:]])
+    assert_allclose(stress[~rest], COULOMB * bound[~rest], rtol=1e-12)
+    # within a step that begins and ends at rest nothing has moved, and bonds of its start bear the pull
+    still = rest[1:] & rest[:-1]
+    assert np.all(force[1:][still] <= (COULOMB * bound * areas)[:-1][still] * (1.0 + 1e-9))
+    residuals = scene.parts.drive.readings(straight[-1].drive)
+    assert np.all(np.abs(residuals[:, 10]) < 1e-5 * residuals[:, 3])
