@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.cases import some
 from helpers.driven import (
     AREA,
     BELL,
@@ -143,10 +144,7 @@ def check_onset(onset, frequency, keys, share=0.0):
     assert growth(1.02 * onset, keys, share=share)[0] < -1e-3
 
 
-LONG = [pytest.param(name, marks=pytest.mark.verify) for name in ONSETS if name != "contact, mass, damping"]
-
-
-@pytest.mark.parametrize("name", ["contact, mass, damping", *LONG])
+@pytest.mark.parametrize("name", some(ONSETS, "contact, mass, damping"))
 def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_on_its_sides(name):
     keys, onset, frequency = ONSETS[name]
     check_onset(onset, frequency, keys)
