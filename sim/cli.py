@@ -212,9 +212,9 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, 
     with _opened(output, chosen) as dataset:
         if csv is not None:
             analysis.scene.claim(dataset, output, csv, force)
+            analysis.to_csv(dataset, csv)  # before any printing, as nobody may read it to its end
         _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
         if csv is not None:
-            analysis.to_csv(dataset, csv)
             say(str(csv))
 
 

@@ -211,7 +211,7 @@ def steady_points(dataset: xr.Dataset) -> xr.DataArray:
     if speed_name(dataset) not in dataset:
         return word(dataset, "drive.model", "") == "steady"
     speed = speed_of(dataset)
-    return (speed == speed.isel(t=0)).all("t")
+    return ((speed == speed.isel(t=0)) | speed.isnull()).all("t")  # unknown after a runaway
 
 
 def is_steady(dataset: xr.Dataset) -> bool:

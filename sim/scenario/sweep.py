@@ -1,6 +1,7 @@
 """Sweeps: which keys of a scenario take which values, as an outer product of axes."""
 
 import math
+from collections import Counter
 from dataclasses import dataclass
 from typing import Any
 
@@ -77,6 +78,9 @@ def sweep_axes(sweep: Any) -> tuple[tuple[Axis, ...], list[Fault]]:
     unfit = {key: said for key in keys if (said := _unfit(key, keys))}
     faults += [((key,), said) for key, said in unfit.items()]
     axes = [axis for axis in axes if not unfit.keys() & set(axis.keys)]
+    for axis in axes:
+        rows = Counter(", ".join(map(str, row)) for row in axis.values)
+        faults += [((axis.keys[0],), f"has {row} twice; take it out once") for row, n in rows.items() if n > 1][:1]
     if math.prod(len(axis.values) for axis in axes) > _MOST_POINTS:
         return (), [*faults, ((), f"has more than {_MOST_POINTS:,} points; take fewer values, or several runs")]
     return tuple(axes), faults

@@ -294,10 +294,11 @@ class Quantity:
         return scale
 
     def _near(self, given: str) -> str | None:
-        """The unit that was probably meant: the same letters in another case, else a similar one."""
+        """The unit that was probably meant: the same letters in another case, the example's, else a similar one."""
         if self.unit == "1" or self.unit[0].isdigit():
             return None
-        known = [prefix + self.unit for prefix in ("", "M", "m", "k", "G", "u", "n")]
+        usual = self.example.strip('"').partition(" ")[2]
+        known = [usual, *(prefix + self.unit for prefix in ("", "M", "m", "k", "G", "u", "n"))]
         same = [unit for unit in known if unit.casefold() == given.casefold()]
         return next(iter(same or difflib.get_close_matches(given, known, 1, 0.7)), None)
 

@@ -44,6 +44,9 @@ def test_a_table_that_is_swept_whole_is_known_by_its_models():
 def test_a_run_is_stationary_where_neither_speed_nor_control_changes():
     steady = {"drive": drive.Steady(speed=1e-3), "shear": shear.Uniform()}
     assert analysis.is_stationary(run(scene(**steady)))
+    ended = run(scene(**steady))
+    ended["speed"] = ended["speed"].where(ended["t"] < ended["t"][2])  # as after a runaway
+    assert analysis.is_steady(ended)
     assert not analysis.is_stationary(run(scene(shear=shear.Uniform())))
     moved = run(scene(contact=Equilibrium(load={"from": 1e-3, "to": 2e-3}), **steady))
     assert analysis.is_steady(moved) and not analysis.is_stationary(moved)

@@ -625,6 +625,7 @@ LOAD = 'sweep."contact.load"'
         ('"contact.lod" = ["1 mN"]', 'sweep."contact.lod"', 'did you mean "contact.load"'),
         ('"contcat.load" = ["1 mN"]', 'sweep."contcat.load"', 'did you mean "contact.load"'),
         ('contact.lod = ["1 mN"]', 'sweep."contact.lod"', 'did you mean "contact.load"'),
+        ('"contact.load" = ["1 mN", "2 mN", "1 mN"]', LOAD, "1 mN twice...once"),
         ('"contact.load" = []', LOAD, 'empty list...["1 mN", "4 mN"]'),
         ('"contact.load" = "1 mN"', LOAD, 'list of values...["1 mN", "4 mN"]'),
         ('"contact.load" = { from = "1 mN", to = "2 um", count = 3 }', LOAD, '"mN" to "um"...one dimension'),

@@ -116,6 +116,11 @@ def test_a_misspelt_unit_is_told_with_the_one_meant(given_, meant):
     assert refusal(STRESS, f"1 {given_}") == f'has the unknown unit "{given_}"; did you mean "{meant}"?'
 
 
+def test_of_letters_with_two_meanings_the_one_of_the_example_is_meant():
+    load = Quantity("N", "load", typical="4 mN")
+    assert refusal(load, "4 mn") == 'has the unknown unit "mn"; did you mean "mN"?'
+
+
 def test_a_decimal_comma_is_told():
     assert refusal(LENGTH, "1,5 mm") == (
         'cannot be read: "1,5 mm"; write decimals with a point and a unit, such as "2 mm"'
