@@ -15,7 +15,7 @@ with an underscore for each dot (`contact_load`); a run without a sweep has none
 """
 SECTIONS = {
     "Coordinates": """`speed` is an auxiliary coordinate, too, where it is the same for all members, as it is if a drive
-prescribes it: `dataset.contact_area.mean("member").plot(x="speed")`.
+prescribes it: `dataset.contact_area.mean("member").plot(x="speed")`, without the mean where members do not differ.
 """,
     "Recorded at each time": """A variable that differs between members has the dimension `member`, too. With
 `per_member = false` it becomes `<name>_mean`, `<name>_std` and `<name>_sem` instead: mean, standard deviation and

@@ -64,6 +64,14 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
         yield ("drive",), _TOO_SHORT.format(drive.end, clock.duration)
 
 
+def _wider_than_the_sphere(radius: float, sphere: Sphere, contact: Contact) -> Faults:
+    if radius > sphere.radius:
+        said = (
+            f"makes a contact of {radius:.3g} m on a sphere of {sphere.radius:.3g} m radius, for which no theory holds;"
+        )
+        yield ("contact", contact.kind), f"{said} check its unit, and those of sphere, adhesion and solid"
+
+
 def _reversible_under_a_drive(drive: Drive, bonds: BondModel, contact: Contact) -> Faults:
     if not drive.feeds_back or contact.reversible == 0.0:
         return
@@ -184,7 +192,8 @@ def _shear_faults(
 _CHECKS: dict[Callable[..., Faults], list[str]] = {
     check: list(inspect.signature(check).parameters)
     for check in (_table_too_short, _control_too_short, _cannot_be_driven, _no_stress, _no_forces, _no_adhesion)
-    + (_reversible_under_a_drive, _no_maps, _unrecorded_maps, _too_many_map_members, _shear_faults, _off_the_map)
+    + (_wider_than_the_sphere, _reversible_under_a_drive, _no_maps, _unrecorded_maps, _too_many_map_members)
+    + (_shear_faults, _off_the_map)
 }
 #: The parts that the checks read.
 CHECKED = sorted({name for reads in _CHECKS.values() for name in reads} - {"radius", "built"})

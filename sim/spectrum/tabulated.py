@@ -28,6 +28,8 @@ _Normalization = Annotated[Literal["in_integral", "in_density"], Field(descripti
 NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
 #: How near 2π the ratio of two rms is taken for that of the normalizations.
 _NEAR = 0.05
+#: Exponent of q below which a table is flat at its first row, and the part of the mean energy that matters.
+_FLAT, _PART = 0.5, 0.01
 
 
 _COLUMNS = {"q": _WAVENUMBER, "C": _DENSITY}
@@ -152,7 +154,11 @@ class Tabulated(FromFile):
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What is to be known of the normalization."""
+        """What is to be known of the normalization and of the first row."""
+        return self._normalized() + self._cut_plateau()
+
+    def _normalized(self) -> tuple[str, ...]:
+        """What the other normalization would make of the table."""
         own = {where: self._chain(factor) for where, factor in NORMALIZATIONS.items()}
         rms = {where: math.sqrt(float(chain.cumulative(chain.q[-1]))) for where, chain in own.items()}
         other = next(where for where in NORMALIZATIONS if where != self.normalization)
@@ -166,3 +172,13 @@ class Tabulated(FromFile):
             more = "large" if rms[other] > rms[self.normalization] else "small"
             return (f"{said} {more}: shear.spectrum.normalization chooses, rms fixes it",)
         return ()
+
+    def _cut_plateau(self) -> tuple[str, ...]:
+        """What a density that is flat at its first row leaves out by ending there; the mean energy goes as ∫ C dq."""
+        (q, *_), (density, *_) = self.rows.q, self.rows.density
+        flat = density > 0.0 and abs(math.log(self.rows.density[1] / density)) < _FLAT * math.log(self.rows.q[1] / q)
+        if not (flat and self.file) or q * density < _PART * self.rows.line_integral:
+            return ()
+        more = f"{q * density / self.rows.line_integral:.0%}"
+        said = f"the table is flat at its first row and zero before: below {q:.3g} rad/m a plateau down to 0 would add"
+        return (f"{said} {more} to the mean energy; add a row where it ends",)

@@ -101,6 +101,8 @@ def told(problem, line, key, words):
 
 GOLDEN = [
     ('rms = "150 kPa"', 'rsm = "150 kPa"', 'shear.spectrum.rsm: is not a key; did you mean "rms"?'),
+    ('load = "4 mN"', 'load = "4 MN"', "contact.load: makes a contact of 0.0979 m on a sphere of 0.002 m radius, for "
+     "which no theory holds; check its unit, and those of sphere, adhesion and solid"),
     ('step = "5 ms"', 'step = "5 ms"\nload = 1', 'clock.load: is not a key here; did you mean "contact.load"?'),
     ("members = 4", "members = 4\nxyz = 1", "ensemble.xyz: is not a key; known: members"),
     ('rebinding_rate = "500 1/s"', 'healing = "500 1/s"', 'bonds.healing: is now called "rebinding_rate"'),

@@ -271,17 +271,20 @@ def test_what_numpy_saves_as_text_is_read_by_a_header_that_is_given(files):
     assert_allclose(found.densities, density * 1e-6, rtol=1e-15, atol=0)
 
 
-def test_a_table_of_a_file_says_what_the_other_normalization_would_make_of_it(files):
+def test_a_table_of_a_file_says_what_the_other_normalization_and_a_plateau_would_make_of_it(files):
     (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 2\n")
     given = {"model": "tabulated", "file": "psd.csv"}
-    (said,) = read(files, **given).remarks
+    said, cut = read(files, **given).remarks
     assert "rms 1.13e+05 Pa" in said and "7.09e+05 Pa" in said and "39.5 times as large" in said
-    (said,) = read(files, **given, normalization="in_density").remarks
+    assert "below 1e+05 rad/m a plateau down to 0 would add 50%" in cut  # of ∫ C dq
+    said, _ = read(files, **given, normalization="in_density").remarks
     assert "rms 7.09e+05 Pa" in said and "1.13e+05 Pa" in said and "39.5 times as small" in said
-    assert read(files, **given, rms="113 kPa").remarks == ()  # as it is
-    assert read(files, **given, rms="400 kPa").remarks == ()  # a shape
-    (said,) = read(files, **given, rms="0.7 MPa").remarks
+    assert read(files, **given, rms="113 kPa").remarks == (cut,)  # as it is
+    assert read(files, **given, rms="400 kPa").remarks == (cut,)  # a shape
+    said, _ = read(files, **given, rms="0.7 MPa").remarks
     assert 'normalization = "in_density" may be meant' in said
+    (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 1\n")  # falls as q^-0.63
+    assert read(files, **given, rms="400 kPa").remarks == ()
     assert Tabulated((1.0, 2.0), (1.0, 1.0)).remarks == ()
 
 

@@ -187,7 +187,8 @@ class Spring(_Driven):
     stiffness: _Stiffness
     start_after: _After = 0.0
     start: Annotated[
-        Literal["rest", "steady"], Field(description='"steady": moving with the stage, the spring preloaded')
+        Literal["rest", "steady"],
+        Field(description='"steady": moving with the stage, preloaded; until disturbed it stays so, stable or not'),
     ] = "rest"
     model: Literal["spring"] = "spring"
 
