@@ -1,5 +1,6 @@
 """Exponential integrals against thirty digits, Lambert's W against fifty."""
 
+import functools
 import math
 
 import mpmath as mp
@@ -20,11 +21,19 @@ from sim.numerics.special import (
 ORDERS = [0, 1, 2]
 
 
+@functools.cache
+def gamma_at_one(most):
+    """Taylor coefficients of Gamma(1 + s) around s = 0."""
+    with mp.workdps(60):
+        return mp.taylor(mp.gamma, 1, most)
+
+
 def by_residues(z, order):
     """e^z E(z) from the poles of Gamma(s)/s^(j + 1) z^-s: z up to 20, where 17 of 60 digits are lost."""
     with mp.workdps(60):
         z = mp.mpf(z)
-        at_zero = mp.taylor(lambda s: mp.gamma(1 + s) * z**-s, 0, order + 1)[order + 1]
+        powers = ((-mp.log(z)) ** n / mp.factorial(n) for n in range(order + 1, -1, -1))  # of z^-s
+        at_zero = mp.fdot(gamma_at_one(order + 1), powers)
         poles = (z**n * (-1) ** n / mp.factorial(n) / mp.mpf(-n) ** (order + 1) for n in range(1, 150))
         return mp.exp(z) * (at_zero + mp.fsum(poles))
 

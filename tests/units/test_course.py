@@ -1,5 +1,6 @@
 """Prescribed courses: values, cuts where they turn or jump, exact integrals between."""
 
+import functools
 import itertools
 import math
 
@@ -25,6 +26,7 @@ COURSES = {
 TURNS = sorted({turn for _, turns in COURSES.values() for turn in turns})
 
 
+@functools.cache  # which an integrand evaluates thousands of times
 def course(name):
     kind = held(Quantity("N", "load", "P"), "load")
     return prescribed(TypeAdapter(kind).validate_python(COURSES[name][0]))
