@@ -25,6 +25,7 @@ import numpy as np
 from llvmlite.binding import add_symbol
 from numba.core.compiler import CompileResult
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.extending import intrinsic
 from numba.core.registry import CPUDispatcher, cpu_target
 from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
 from numba.core.serialize import dumps
@@ -56,6 +57,24 @@ def device(function: Callable, inline: str = "never") -> Callable:
 
 
 inlined = functools.partial(device, inline="always")
+
+
+@intrinsic
+def float_of(typing: Any, bits: Any) -> Any:
+    """The float that has the bits of a whole number of 64."""
+    return numba.float64(bits), _cast
+
+
+@intrinsic
+def bits_of(typing: Any, number: Any) -> Any:
+    """The bits of a float as a whole number."""
+    return numba.int64(numba.float64), _cast
+
+
+def _cast(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+    return builder.bitcast(arguments[0], context.get_value_type(signature.return_type))
+
+
 #: Every kernel and law that was imported, by its name in the cache; calling one compiles or loads it.
 compiled: dict[str, Callable[[], Callable]] = {}
 #: Called with the name of each kernel or law that is about to be compiled, as it is not in the cache.

@@ -18,7 +18,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sim.numerics.jit import device, inlined, kernel
+from sim.numerics.jit import bits_of, device, float_of, inlined, kernel
 
 #: Fixed integer of each part that draws; part of the address, so never renumbered.
 PARTS = {"bonds": 1, "shear": 2, "drive": 3, "contact": 4}
@@ -121,7 +121,7 @@ def word(numbers):
 @device
 def _unit(word):
     """A float in [1, 2) from the upper 52 bits of a word."""
-    return _U((word >> _U(12)) | _U(0x3FF0000000000000)).view(np.float64)
+    return float_of((word >> _U(12)) | _U(0x3FF0000000000000))
 
 
 @device
@@ -140,11 +140,11 @@ def uniform(numbers):
 @device
 def logarithm(x):
     """ln x for normal x > 0, to one unit in the last place; the minimax polynomial of fdlibm's ``log``."""
-    bits = np.float64(x).view(np.int64)
+    bits = bits_of(x)
     exponent = (bits - np.int64(0x3FE6A09E00000000)) >> np.int64(52)
-    f = np.int64(bits - (exponent << np.int64(52))).view(np.float64) - 1.0
+    f = float_of(bits - (exponent << np.int64(52))) - 1.0
     # the integer exponent as a float, by its bits
-    k = np.int64((exponent + np.int64(1024)) | np.int64(0x4330000000000000)).view(np.float64) - 4503599627371520.0
+    k = float_of((exponent + np.int64(1024)) | np.int64(0x4330000000000000)) - 4503599627371520.0
     s = f / (2.0 + f)
     z = s * s
     w = z * z

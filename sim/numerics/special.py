@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from sim.numerics.jit import device, law
+from sim.numerics.jit import bits_of, device, float_of, law
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 #: The integrand is dropped where its exponential has fallen to e^-44: 1e-16 of the integral at order 2.
@@ -124,8 +124,7 @@ def exp(x):
     odd = 6.61375632143793436117e-05 + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08)
     c = r - t * (1.66666666666666019037e-01 + t * (-2.77777777770155933842e-03 + t * odd))
     near = 1.0 - ((low - r * c / (2.0 - c)) - high)
-    bits = np.float64(near).view(np.int64) + (np.float64(shifted).view(np.int64) << np.int64(52))
-    found = np.int64(bits).view(np.float64)
+    found = float_of(bits_of(near) + (bits_of(shifted) << np.int64(52)))
     found = math.inf if x > 709.0 else found
     return 0.0 if x < -708.0 else found
 
@@ -133,8 +132,8 @@ def exp(x):
 @device
 def rough_cube_root(x):
     """Cube root of a normal x > 0 to 2e-4: a third of the exponent, good to 6 %, and one of Halley's steps."""
-    exponent = np.uint64(np.float64(x).view(np.int64)) >> _HALF
-    root = np.uint64(((exponent * _THIRD) & _HIGH_HALF) + _OFFSET).view(np.float64)
+    exponent = np.uint64(bits_of(x)) >> _HALF
+    root = float_of(((exponent * _THIRD) & _HIGH_HALF) + _OFFSET)
     cube = root * root * root
     return root * ((cube + 2.0 * x) / (2.0 * cube + x))
 

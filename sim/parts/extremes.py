@@ -81,7 +81,7 @@ def _with_start(before: Array, values: Array, steps: int) -> Array:
 @device
 def _of(values, k, i):
     """The value of a member at a time, where all may share one."""
-    return values[k, i] if values.shape[1] > 1 else values[k, 0]
+    return values[k, i if values.shape[1] > 1 else 0]
 
 
 @device
@@ -117,9 +117,10 @@ def _keep(now, rise, slope, time, step, kept):
     if now > largest:
         largest, when = now, time
     peak, back = -math.inf, 0.0
-    if rise > 0.0 > slope and step * max(rise, -slope) < _RESOLVED * max(last, now):
+    steepest, larger = rise if rise > -slope else -slope, last if last > now else now  # max compiles for long
+    if rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
         peak, back = _top(last, now, step * rise, step * slope)
-    elif math.isnan(rise + slope) and last >= before and last > now and min(before, now) > 0.5 * last:
+    elif math.isnan(rise + slope) and last >= before and last > now and before > 0.5 * last and now > 0.5 * last:
         back = 1.0 - 0.5 * (before - now) / (before - 2.0 * last + now)
         peak = last - 0.25 * (before - now) * (1.0 - back)
     if peak > largest:
@@ -134,5 +135,6 @@ def _top(last, now, rise, slope):
     The derivative ``rise + 2 b s + c s²`` has one zero between the ends, since it changes its sign there.
     """
     b, c = 3.0 * (now - last) - 2.0 * rise - slope, 3.0 * (rise + slope) - 6.0 * (now - last)
-    s = rise / (math.sqrt(max(b * b - rise * c, 0.0)) - b)
+    square = b * b - rise * c
+    s = rise / (math.sqrt(0.0 if square < 0.0 else square) - b)
     return last + s * (rise + s * (b + s * c / 3.0)), 1.0 - s

@@ -170,10 +170,10 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, r
     """
     many = keep.shape[2] > 1
     for m in range(members.size):
-        own = m % keep.shape[1]
+        own = m if keep.shape[1] > 1 else 0
         for s in range(len(keep)):
             numbers = stream(seed, part, members[m], step + s, row)
-            total, unit = 0.0, size[s, m % size.shape[1]]
+            total, unit = 0.0, size[s, m if size.shape[1] > 1 else 0]
             for k in range(weights.size):
                 one, numbers = normal(numbers)
                 other, numbers = normal(numbers)
