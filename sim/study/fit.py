@@ -3,7 +3,7 @@
 The curves are fitted by steady sliding, which is quick (``sim.study.predicted``). Then the scenario's own models run
 once with what was found; what they add to steady sliding is added to it, with the error that their members leave, and
 the fit is made anew, until it stays. The same noise is drawn each time. Where steady sliding does not depend on a key
-that is free, such as the speed of an edge that lags, every prediction is a run.
+that is free, such as the speed of an edge that lags, or what slides feels its friction, every prediction is a run.
 """
 
 import contextlib
@@ -104,7 +104,11 @@ def fit(
         raise BadInput(["--free: a key is there twice; give each once"])
     tables = [read(path, base) for path in data]
     problem = problem_of(tables, [groups(base, table) for table in tables], chosen, common or {})
-    if not steady and idle(problem):
+    if steady and base.drive.feeds_back:
+        raise BadInput(
+            [f'--steady: drive.model = "{base.drive.model}" is answered by its own runs alone; leave it out']
+        )
+    if base.drive.feeds_back or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     _refuse_entangled(problem)
     problem, best = with_errors(problem, problem.start)

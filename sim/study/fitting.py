@@ -6,7 +6,7 @@ known to be 0 within its size.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -30,16 +30,16 @@ Array = NDArray[np.float64]
 LEVEL = 0.95
 #: Residual of a row at which the contact is open, in standard errors.
 _OPEN = 1e6
-#: Step of derivatives, in logarithms or shares of the range; relative size of a direction that changes nothing.
+#: Step of derivatives, in logarithms or shares of the range, and relative size of a direction that changes nothing.
 _STEP, _NOTHING = 1e-4, 1e-5
+#: The same, and the precision of a minimum, where each prediction is a run, known to the tolerance of its steps alone.
+_RUN_STEP, _RUN_NOTHING, _RUN_PRECISION = 1e-3, 1e-2, 1e-6
 #: Change of all rows, in standard errors and over an e-fold, that is none.
 _NO_EFFECT = 1e-6
-#: Square of the relative step of derivatives of runs, which are integrated to 1e-8.
-_RUN_STEP = 1e-8
 #: Speeds of a line that is drawn.
 _DRAWN = 200
-#: Precision of the ends of an interval, over its half width, and most steps towards one.
-_END, _MOST = 1e-3, 30
+#: Precision of the ends of an interval, over its half width, that of the sums of squares there, and most steps to one.
+_END, _END_SQUARES, _MOST = 1e-3, 1e-5, 30
 #: Rounds in which errors that nobody gave are found.
 _ROUNDS = 4
 #: Most evaluations of a minimum, for each number and one more.
@@ -214,6 +214,9 @@ def minimum(
         x = numbers(parameters)
         return Minimum(x, float(np.sum(problem.residuals(x) ** 2)), None, True)
     how: dict[str, Any] = {"calc_covar": errors, "scale_covar": False, "max_nfev": _EVALUATIONS * (len(parameters) + 1)}
+    if problem.by_run:  # steps of the minimizer's own would be lost in the rounding of a run
+        moved, precision = [k for k in range(len(parameters)) if k not in held], _RUN_PRECISION
+        how["Dfun"] = lambda given: _derivatives(problem, numbers(given), moved)
     found = lmfit.Minimizer(lambda given: problem.residuals(numbers(given)), parameters, **how).leastsq(
         ftol=precision, xtol=precision
     )
@@ -239,9 +242,9 @@ def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
 
 def idle(problem: Problem) -> list[str]:
     """Free keys that have no effect on the curves."""
-    sizes = np.sqrt(np.sum(_derivatives(problem, problem.start) ** 2, axis=0))
+    sizes = np.sqrt(np.sum(_derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0))
     least = _NO_EFFECT * math.sqrt(len(problem.values))
-    return [one.key for one, size in zip(problem.free, sizes, strict=False) if size < least]
+    return [one.key for one, size in zip(problem.free, sizes, strict=True) if size < least]
 
 
 def entangled(problem: Problem) -> list[list[str]]:
@@ -250,19 +253,21 @@ def entangled(problem: Problem) -> list[list[str]]:
     for share in (0.05, 0.16):  # off the bounds, and what holds at two places is no accident of one
         inside = [x + share * (0.5 * (low + high) - x) if math.isfinite(high - low) else x
                   for x, (low, high) in zip(problem.start, problem.bounds, strict=True)]  # fmt: skip
-        columns = _derivatives(problem, np.array(inside))[:, :count]
+        columns = _derivatives(problem, np.array(inside), range(count))
         _, sizes, rows = np.linalg.svd(columns / np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300))
-        spaces.append([rows[k] for k in range(count) if k >= len(sizes) or sizes[k] < _NOTHING * sizes[0]])
+        nothing = (_RUN_NOTHING if problem.by_run else _NOTHING) * sizes[0]
+        spaces.append([rows[k] for k in range(count) if k >= len(sizes) or sizes[k] < nothing])
     if not all(spaces):
         return []
     return [[problem.free[k].key for k in range(count) if abs(row[k]) > 0.1] for row in spaces[0]]
 
 
-def _derivatives(problem: Problem, x: Array) -> Array:
-    """Derivatives of the residuals over what is free."""
-    columns = []
-    for k, (low, high) in enumerate(problem.bounds):
-        step = _STEP * (1.0 if k >= len(problem.free) or problem.free[k].logarithmic else max(high - low, 1e-300))
+def _derivatives(problem: Problem, x: Array, places: Iterable[int]) -> Array:
+    """Derivatives of the residuals over what is free, a column for each place in it."""
+    columns, share = [], _RUN_STEP if problem.by_run else _STEP
+    for k in places:
+        low, high = problem.bounds[k]
+        step = share * (1.0 if k >= len(problem.free) or problem.free[k].logarithmic else max(high - low, 1e-300))
         up, down = x.copy(), x.copy()
         up[k], down[k] = min(x[k] + step, high), max(x[k] - step, low)
         columns.append((problem.residuals(up) - problem.residuals(down)) / (up[k] - down[k]))
@@ -298,7 +303,7 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         at = best.x[k] + sign * step
         held = min(max(at, bound), math.inf) if sign < 0.0 else min(at, bound)
         guess = start if start is not best.x else best.x + along * (held - best.x[k]) / spread
-        found = minimum(problem, guess, {k: held})
+        found = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
         root = math.sqrt(max(found.chi_square - best.chi_square, 0.0))
         start = found.x
         if abs(root / rise - 1.0) < _END or far - near < _END * near:

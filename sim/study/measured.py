@@ -18,8 +18,9 @@ Array = NDArray[np.float64]
 
 #: Column of what holds the sphere, by the key of the contact that prescribes it.
 HELD = {"load": "normal_load", "indentation": "indentation", "displacement": "displacement"}
-#: What is recorded of a history, or is no measured number.
-_NOT_MEASURED = ("in_contact", "masked", "detachment_time", "dissipated_energy", "slider_position", "applied_load")
+#: What is recorded of a history, or is no measured number; and what is measured of a slider that feels its friction.
+_NOT_MEASURED = ("in_contact", "masked", "detachment_time", "dissipated_energy", "applied_load")
+_OF_SLIDER = ("speed", "slider_position", "spring_force")
 
 
 class Curve(NamedTuple):
@@ -62,7 +63,8 @@ def read(path: Path, scenario: Scenario) -> Measured:
         CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``: conditions,
         variables of a dataset, and beside these their standard errors, in the same dimension or in ``[%]``.
         Conditions are ``t``, ``speed``, what holds the sphere (``normal_load``, ``indentation`` or ``displacement``),
-        or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``.
+        or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. Of a slider behind a
+        spring or under a force the speed is no condition but a curve; ``stage_speed`` is that of a steady stage.
     scenario : Scenario
         What the curves are compared with.
 
@@ -88,7 +90,10 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
     kind = scenario.contact.kind
     units = {one.name: one.unit for one in VARIABLES}
     found = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
-    found |= dict.fromkeys(("speed", "drive_speed"), ("speed", Quantity("m/s", "sliding speed")))
+    if not scenario.drive.feeds_back:
+        found |= dict.fromkeys(("speed", "drive_speed"), ("speed", Quantity("m/s", "sliding speed")))
+    elif "drive_stage" in found:
+        found["stage_speed"] = found["drive_stage"]
     held = ("held", Quantity(units[HELD[kind]], f"what holds the sphere, contact.{kind}"))
     found |= dict.fromkeys((HELD[kind], f"contact_{kind}"), held)
     return found | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
@@ -96,23 +101,24 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
 
 def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
     """Declaration of each variable that can be measured."""
-    there = (one for one in VARIABLES if one.part != "drive" and one.there(scenario))
+    of_slider = _OF_SLIDER if scenario.drive.feeds_back else ()
+    there = (one for one in VARIABLES if (one.part != "drive" or one.name in of_slider) and one.there(scenario))
     return {one.name: Quantity(one.unit, one.long_name) for one in there if one.name not in _NOT_MEASURED}
 
 
 def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
     """What a table lacks to say at which speed, or under which load, its rows were measured; "" for nothing."""
-    if scenario.drive.feeds_back:
-        said = f'drive.model is "{scenario.drive.model}", under which the speed is no condition'
-        return f'{said}; fit a scenario with [drive] model = "steady"'
+    drive, contact = scenario.drive, scenario.contact
     if "t" in conditions:
         both = [name for name in ("speed", "held") if name in conditions]
         said = "times already say the speed and the load, by the scenario; leave out t, or these columns"
         return said if both else ""
-    if "speed" not in conditions and scenario.drive.model != "steady":
-        said = f'the speed changes during the run (drive.model = "{scenario.drive.model}")'
+    if drive.feeds_back and not {"drive.stage", "drive.force"} & quantities(scenario).keys():
+        return f'what drives the slider changes during the run (drive.model = "{drive.model}"); add a column "t [s]"'
+    if "speed" not in conditions and drive.model != "steady" and not drive.feeds_back:
+        said = f'the speed changes during the run (drive.model = "{drive.model}")'
         return f'{said}; add a column "speed [mm/s]", or "t [s]"'
-    if "held" not in conditions and scenario.contact.changes:
-        name = HELD[scenario.contact.kind]
-        return f'contact.{scenario.contact.kind} changes during the run; add a column "{name}", or "t [s]"'
-    return "" if conditions else 'no column says where the points were taken; add for example "speed [mm/s]"'
+    if "held" not in conditions and contact.changes:
+        return f'contact.{contact.kind} changes during the run; add a column "{HELD[contact.kind]}", or "t [s]"'
+    column = "t [s]" if drive.feeds_back else "speed [mm/s]"
+    return "" if conditions else f'no column says where the points were taken; add for example "{column}"'

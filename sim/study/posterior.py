@@ -16,8 +16,9 @@ except ModuleNotFoundError:
 
 Array = NDArray[np.float64]
 
-#: Walkers for each number, steps of each, and autocorrelation times by which the beginning is left out.
-_WALKERS, _STEPS, _LEFT_OUT = 8, 2000, 5.0
+#: Walkers for each number, autocorrelation times by which the beginning is left out, steps between looks at them, and
+#: the most steps.
+_WALKERS, _LEFT_OUT, _LOOK, _MOST = 8, 5.0, 500, 10_000
 #: Autocorrelation times that a chain must be long for its quantiles to be trusted.
 _LONG = 50.0
 
@@ -45,8 +46,11 @@ class Posterior(NamedTuple):
         return {"numbers": numbers, "autocorrelation_times": self.length, "converged": self.converged}
 
 
-def posterior(problem: Problem, best: Minimum, seed: int, steps: int = _STEPS) -> Posterior:
-    """Sample what is free, flat in the logarithm of what is above zero and in the rest, within the bounds."""
+def posterior(problem: Problem, best: Minimum, seed: int, most: int = _MOST) -> Posterior:
+    """Sample what is free, flat in the logarithm of what is above zero and in the rest, within the bounds.
+
+    The chains grow until they are long in their own autocorrelation times, or have the most steps.
+    """
     low, high = np.array(problem.bounds).T
     rng, count = np.random.default_rng(seed), len(best.x)
     spread = np.ones(count) if best.covariance is None else np.sqrt(np.diag(best.covariance))
@@ -60,8 +64,10 @@ def posterior(problem: Problem, best: Minimum, seed: int, steps: int = _STEPS) -
     start = np.clip(best.x + 0.1 * spread * rng.standard_normal((walkers, count)), low, high)
     sampler = emcee.EnsembleSampler(walkers, count, logarithm)
     sampler.random_state = np.random.RandomState(rng.integers(2**32)).get_state()
-    sampler.run_mcmc(start, steps, progress=False)
-    time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+    steps, time = 0, math.inf
+    while steps < min(_LONG * time, most):
+        sampler.run_mcmc(None if steps else start, min(_LOOK, most - steps), progress=False)
+        steps, time = sampler.iteration, float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
     chain = sampler.get_chain(discard=int(min(_LEFT_OUT * time, 0.5 * steps)), flat=True)
     samples = [[one.outer(x) for x in chain[:, k]] for k, one in enumerate(problem.free)]
     return Posterior(tuple(one.key for one in problem.free), np.array(samples).T, steps / time)

@@ -7,9 +7,9 @@ scenario's own run (``asked``) has everything else: members, clock steps, histor
 
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import fields
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,14 +46,21 @@ def changed(scenario: Scenario, values: Values) -> Scenario:
 
 def _changed(part: Any, tree: dict[str, Any]) -> Any:
     """A part with numbers changed, and tables in it."""
-    kept = {item.name: getattr(part, item.name) for item in fields(part)}
-    names = {field.alias: name for name, field in getattr(type(part), "__pydantic_fields__", {}).items() if field.alias}
+    own, names = _keys(cast(Hashable, type(part)))
+    kept = {name: getattr(part, name) for name in own}
     for key, value in tree.items():
         name = names.get(key, key)
         kept[name] = _changed(kept[name], value) if isinstance(value, dict) else value
     made = object.__new__(type(part))
     made.__dict__.update(kept)
     return made
+
+
+@functools.cache
+def _keys(table: type) -> tuple[list[str], dict[str, str]]:
+    """Names of a table's values, and by the key of a file where that is another one."""
+    declared = getattr(table, "__pydantic_fields__", {})
+    return [item.name for item in fields(table)], {one.alias: name for name, one in declared.items() if one.alias}
 
 
 class Group(NamedTuple):
@@ -161,7 +168,7 @@ def asked(found: list[Group], values: Values, names: list[str], by_time: bool) -
     """What the scenario's own models give at the rows of a table, with the noise of its seed.
 
     Where rows have times, or only speeds and the drive passes through these, they are read along the scenario's run;
-    else each row is a run of its own at a steady speed, of which the second half counts.
+    else each row is a run of its own at a steady speed, of the stage if there is one, of which the second half counts.
 
     Raises
     ------
@@ -173,7 +180,8 @@ def asked(found: list[Group], values: Values, names: list[str], by_time: bool) -
     for group in found:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
         runs: list[tuple[NDArray[np.int64], Scenario, Weights]] = []
-        if by_time or (scenario.drive.model != "steady" and not scenario.contact.changes):
+        driven = scenario.drive.feeds_back
+        if by_time or not (driven or scenario.drive.model == "steady" or scenario.contact.changes):
             runs.append((group.rows, scenario, functools.partial(_places, group, by_time)))
         else:
             runs += [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
@@ -187,10 +195,11 @@ def asked(found: list[Group], values: Values, names: list[str], by_time: bool) -
 
 
 def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
-    """The scenario at the steady speed of a row, and held as it was there."""
+    """The scenario at the steady speed of a row, or under its own steady stage or force, and held as it was there."""
     held = scenario.contact.course.at(group.time[row], scenario.clock.duration)
-    steady = {"model": "steady", "speed": float(group.speed[row, 0])}
-    return scenario.with_values({"drive": steady, f"contact.{scenario.contact.kind}": float(held[0])})
+    steady = {"drive": {"model": "steady", "speed": float(group.speed[row, 0])}}
+    drive = {} if scenario.drive.feeds_back else steady
+    return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(held[0])})
 
 
 #: Weights of the records of a run that make the rows, shape (rows, records).

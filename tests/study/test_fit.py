@@ -14,7 +14,7 @@ from sim.cli import cli
 from sim.scenario.declared import quantities
 from sim.scenario.reader import load
 from sim.scenario.toml_text import written
-from sim.study import fit as calibration, mechanisms, predicted
+from sim.study import fit as calibration, fitted, mechanisms, predicted
 from sim.study.fit import fit
 from sim.study.fit_figure import figure
 from sim.study.fitting import minimum, problem_of
@@ -40,7 +40,8 @@ LENS = {
 SPEEDS = np.geomspace(1e-5, 5e-2, 10)
 #: What the curves of the lens are fitted for, and its true values.
 KEYS = {"bonds.critical_speed": 0.01, "bonds.stress": 3e5, "shear.spectrum.rms": 1.5e5}
-UNITS = {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "contact_radius": ("um", 1e6)}
+UNITS = {"contact_area": ("mm^2", 1e6), "friction_force": ("mN", 1e3), "contact_radius": ("um", 1e6),
+         "spring_force": ("mN", 1e3)}  # fmt: skip
 
 
 @pytest.fixture(scope="module")
@@ -259,6 +260,57 @@ def test_times_are_read_along_the_run(tmp_path):
         fit(start, [far], ["bonds.critical_speed"])
 
 
+#: A body behind a spring on bonds whose stress is constant, and a stage that is suddenly faster.
+BEHIND = LENS | {
+    "clock": {"duration": "0.05 s", "step": "1 ms"}, "shear": {"model": "uniform"},
+    "bonds": {"model": "none", "stress": "0.3 MPa"},
+    "drive": {"model": "spring", "stiffness": "100 N/m", "mass": "1 g", "damping": "50 mN s/m", "start": "steady",
+              "contact_stiffness": "rigid",
+              "stage": {"time": [0.0, 0.01, 0.01, 0.2], "value": [2e-3, 2e-3, 3e-3, 3e-3]}},
+}  # fmt: skip
+
+
+def test_spring_and_mass_are_found_from_a_force_that_rings(tmp_path):
+    """Beyond a step of the speed V - v is a damped oscillation that starts at its amplitude, m s" + c s' + K s = 0."""
+    stiffness, mass, damping, step = 100.0, 1e-3, 0.05, 1e-3
+    scene, after = load(BEHIND), np.linspace(0.0, 0.04, 41)
+    decay = damping / (2.0 * mass)
+    rate = math.sqrt(stiffness / mass - decay**2)
+    slower = step * np.exp(-decay * after) * (np.cos(rate * after) + decay / rate * np.sin(rate * after))
+    growth = -step * stiffness / (mass * rate) * np.exp(-decay * after) * np.sin(rate * after)
+    force = 0.3e6 * math.pi * scene.rest_radius**2 + damping * 3e-3 - mass * growth - damping * slower
+    path = table(tmp_path / "ring.csv", {"t [s]": 0.01 + after}, {"spring_force": force}, 0.001)
+    start = scene.with_values({"drive.stiffness": 110.0, "drive.mass": 0.9e-3})
+    found = fit(start, [path], ["drive.stiffness", "drive.mass"])
+    assert found.problem.by_run and found.converged
+    # steps in time have a tolerance of 1e-6
+    assert_allclose([*found.values.values()], [stiffness, mass], rtol=1e-4)
+
+
+def test_a_steady_stage_stands_for_the_speed(tmp_path):
+    scene = load(BEHIND).with_values({
+        "bonds": {"model": "steady", "critical_speed": 0.01, "stress": 3e5}, "drive.stage": 1e-3, "drive.damping": 5.0,
+        "adhesion.bond_share": 0.0, "clock.duration": 0.02,  # damped: steady sliding is stable
+    })  # fmt: skip
+    speeds = np.array([0.5e-3, 1e-3, 2e-3])
+    force = 3e5 * math.pi * scene.rest_radius**2 / (1.0 + speeds / 0.01)
+    path = table(tmp_path / "steady.csv", {"stage_speed [m/s]": speeds}, {"friction_force": force}, 0.001)
+    found = fit(scene.with_values({"bonds.critical_speed": 0.02}), [path], ["bonds.critical_speed"])
+    assert_allclose(found.values["bonds.critical_speed"], 0.01, rtol=1e-4)
+
+
+def test_what_a_driven_slider_cannot_be_fitted_to_is_refused(tmp_path):
+    scene = load(BEHIND)
+    for column, steady, said in (
+        ("contact_load [mN]", False, 'add a column "t \\[s\\]"'),
+        ("speed [mm/s]", False, "where the points were taken|changes during the run"),
+        ("t [s]", True, "--steady: drive.model"),
+    ):
+        path = table(tmp_path / "one.csv", {column: np.array([0.02, 0.03])}, {"spring_force": np.ones(2)})
+        with pytest.raises(BadInput, match=said):
+            fit(scene, [path], ["drive.mass"], steady=steady)
+
+
 def test_members_shift_the_fit_and_their_error_joins_the_datas(tmp_path, truth):
     shear = LENS["shear"] | {"model": "banded", "cell": "0.12 mm", "correlation": {"model": "slip", "length": "5 um"}}
     scene = load(LENS | {"shear": shear, "ensemble": {"members": 64}, "clock": {"duration": "2 s", "step": "0.1 s"}})
@@ -400,12 +452,25 @@ def test_the_right_mechanism_is_preferred_in_95_of_100(truth):
 def test_a_posterior_of_a_short_chain_lies_where_the_profile_does_and_says_that_it_is_short(curves):
     found = fit(load(LENS), [curves], ["bonds.critical_speed"], steady=True)
     (one,) = found.numbers
-    sampled = posterior(found.problem, found.best, 1, steps=120)
+    sampled = posterior(found.problem, found.best, 1, most=120)
     assert not sampled.converged and sampled.document()["converged"] is False
     low, middle, high = sampled.quantiles()[:, 0]
     # some tens of independent samples: half a standard deviation is three of the median's standard errors
     assert low < middle < high and abs(middle - one.value) < 0.5 * one.error
     assert 0.5 < (high - low) / (one.interval.high - one.interval.low) < 2.0
+
+
+@pytest.mark.verify
+def test_a_posterior_is_sampled_until_it_agrees_with_the_profile(curves):
+    found = fit(load(LENS), [curves], KEYS, steady=True)
+    sampled = posterior(found.problem, found.best, 1)
+    assert sampled.converged
+    independent = 24 * (sampled.length - 5.0)  # walkers, and autocorrelation times that are kept
+    for one, (low, middle, high) in zip(found.numbers, sampled.quantiles().T, strict=True):
+        # errors of half a percent leave nearly a normal distribution, whose quantiles have these standard errors
+        ends, median = (5.0 * factor * one.error / math.sqrt(independent) for factor in (2.67, 1.25))
+        assert_allclose([low, high], one.interval[:2], rtol=0, atol=ends)
+        assert_allclose(middle, one.value, rtol=0, atol=median)
 
 
 # -- tables that are refused ----------------------------------------------------------------------
@@ -494,6 +559,7 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
 def test_a_fit_that_does_not_converge_exits_1(scenario, curves, monkeypatch):
     monkeypatch.setattr(calibration, "with_errors", lambda problem, start: (
         problem, minimum(problem, start, errors=True)._replace(converged=False)))  # fmt: skip
+    monkeypatch.setattr(fitted, "save", lambda *given: None)
     done = command(scenario, curves, "--free", "bonds.stress", "--steady")
     assert done.exit_code == 1 and "has not converged" in done.output
 
