@@ -19,9 +19,9 @@ BATCH = 250
 @pytest.mark.parametrize("kind", ["table", "map", "dataset"])  # tests/scenario/test_fuzz.py has the scenarios
 def test_some_damaged_files_are_used_or_refused_in_plain_words(tmp_path, monkeypatch, kind):
     monkeypatch.chdir(tmp_path)
-    # seeds beyond those of the thousands; every dataset of them is for `sim stats` alone
-    for _, seed, codes, _, wrong in hostile.answers(kind, range(10_001, 10_007), tmp_path):
-        assert (set(codes) <= {0, 2}, wrong) == (True, ""), seed
+    # seeds beyond those of the thousands; of the datasets one has a page, the others `sim stats` alone
+    for _, seed, _, _, wrong in hostile.answers(kind, range(10_001, 10_007), tmp_path):
+        assert wrong == "", seed
 
 
 @pytest.mark.verify

@@ -82,7 +82,7 @@ def test_no_bytes_of_another_file_come_out_of_a_dataset(here, leak):
         made = leak(file, "shear_stress", (3, 5))
         for place, name in enumerate(("member", "t") if made else ()):
             made.dims[place].attach_scale(file[name])
-    for arguments in (["stats", "out.nc", "--csv", "all.csv"], ["plot", "out.nc"], ["plot", "out.nc", "time"]):
+    for arguments in (["stats", "out.nc", "--csv", "all.csv"], ["plot", "out.nc", "time"], ["report", "out.nc"]):
         done = sim(*arguments)
         assert (done.exit_code, done.stdout) == (2, "")
         assert done.stderr.startswith("out.nc: ") and len(done.stderr.splitlines()) == 1
@@ -90,7 +90,7 @@ def test_no_bytes_of_another_file_come_out_of_a_dataset(here, leak):
         package.open("out.nc")
     resumed = sim("run", "scene.toml", "-o", "out.nc", "--resume")
     assert resumed.exit_code == 2 and "271828" not in resumed.output
-    assert not Path("all.csv").exists() and not list(here.glob("*.png"))
+    assert not Path("all.csv").exists() and not list(here.glob("*.png")) and not Path("out.html").exists()
 
 
 @pytest.mark.parametrize("leak", LEAKS)
@@ -216,7 +216,13 @@ def test_a_changed_dataset_is_refused_in_one_line(here, change):
 def test_a_changed_dataset_ends_every_command_with_2(here):
     with netCDF4.Dataset("out.nc", "a") as file:
         file.scenario_resolved = NESTED
-    for arguments in (["stats", "out.nc"], ["plot", "out.nc"], ["run", "scene.toml", "-o", "out.nc", "--resume"]):
+    commands = (
+        ["stats", "out.nc"],
+        ["plot", "out.nc"],
+        ["report", "out.nc"],
+        ["run", "scene.toml", "-o", "out.nc", "--resume"],
+    )
+    for arguments in commands:
         done = sim(*arguments)
         assert (done.exit_code, done.stdout) == (2, "")
         assert "out.nc" in done.stderr.splitlines()[-1] and len(done.stderr) < 1000
@@ -230,7 +236,8 @@ def test_a_dataset_lacks_any_variable_and_every_command_has_an_answer(here, soun
         shutil.copy(sound, "less.nc")
         with netCDF4.Dataset("less.nc", "a") as file:
             file.renameVariable(name, "other")
-        for arguments in (["stats"], ["stats", "--all"], ["plot", "time", "--force"], ["plot", "curve", "--force"]):
+        drawn = [["plot", kind, "--force"] for kind in ("time", "curve")]
+        for arguments in (["stats"], ["stats", "--all"], *drawn, ["report", "--force"]):
             done = sim(arguments[0], "less.nc", *arguments[1:])
             assert done.exit_code in (0, 2), (name, arguments, done.exception)
             assert done.exit_code == 0 or done.stderr.count("\n") == 1

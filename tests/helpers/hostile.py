@@ -22,7 +22,17 @@ import xarray as xr
 from helpers.commands import sim
 
 import sim as package
-from tests.scenario.test_fuzz import BESIDE, FILES, damaged, flip, insert_mark, remove_line, scale_number, truncate
+from tests.scenario.test_fuzz import (
+    BESIDE,
+    FILES,
+    FOLDER,
+    damaged,
+    flip,
+    insert_mark,
+    remove_line,
+    scale_number,
+    truncate,
+)
 
 #: Longest answer [s], and what it may take of memory and of addresses [byte].
 LONGEST, MEMORY, ADDRESSES = 20, 2**30, 4 * 2**30
@@ -70,6 +80,13 @@ SIZES = [0, 1, 255, 2**16, 2**31, 2**32 - 1, 2**40, 2**63, 2**64 - 1]
 #: What netCDF does not write.
 UNWRITTEN = (RuntimeError, IndexError, ValueError, TypeError, AttributeError, OverflowError, OSError)
 KINDS = ("scenario", "table", "map", "dataset")
+#: Tables of the scenarios of the same names, and the command that reads each, with its options.
+READ = {
+    "jkr_test.csv": ["check"],
+    "measured_lens.csv": ["fit", "measured_lens.csv", "--free", "bonds.critical_speed", "--steady", "--force"],
+    "own_map.csv": ["check"],
+    "own_psd.csv": ["check"],
+}
 
 
 def stretch(content, draw):
@@ -135,6 +152,8 @@ class Folder:
         for name, content in BESIDE.items():
             Path(name).write_text(content)
         Path("tables.toml").write_bytes(FILES)
+        for name in READ:
+            shutil.copy(FOLDER / f"{Path(name).stem}.toml", ".")
         Path("mapped.toml").write_text(LENS + MAP)
         package.run(tomllib.loads(LENS + RUN), "sound.nc")
         field = np.random.Generator(np.random.Philox(key=1)).standard_normal((2, 16, 16))
@@ -156,7 +175,8 @@ class Folder:
             name = sorted(BESIDE)[draw.integers(len(BESIDE))]
             damages = (flip, insert_mark, truncate, remove_line, scale_number, blank, moved)
             Path(name).write_bytes(mangled(BESIDE[name].encode(), draw, damages))
-            return [["check", "tables.toml"]]
+            command, *options = READ.get(name, ["check"])
+            return [[command, f"{Path(name).stem}.toml" if name in READ else "tables.toml", *options]]
         source, target = (f"map{draw.integers(4)}.nc", "map.nc") if kind == "map" else ("sound.nc", "out.nc")
         shutil.copy(source, target)
         if draw.integers(3):
@@ -168,7 +188,8 @@ class Folder:
         if kind == "map":
             return [["check", "mapped.toml"]]
         drawn = [["plot", "out.nc", *(["time"], ["sweep"], ["curve"], [])[seed // 25 % 4], "--force"]]
-        return [["stats", "out.nc", "--all"], *(drawn if seed % 25 == 0 else [])]
+        page = [["report", "out.nc", "--force"]]
+        return [["stats", "out.nc", "--all"], *(drawn if seed % 25 == 0 else page if seed % 25 == 3 else [])]
 
     def restore(self):
         for name, content in BESIDE.items():
@@ -189,10 +210,12 @@ def answers(kind, seeds, folder):
                 wrong = f"{command[0]}: {longest:.0f} s"
             elif not isinstance(done.exception, SystemExit | None):
                 wrong = f"{command[0]}: {type(done.exception).__name__}: {str(done.exception)[:200]}"
-            elif done.exit_code not in (0, 2) or not done.output:
+            elif done.exit_code not in (0, 2, *([1] if command[0] == "fit" else [])) or not done.output:
                 wrong = f"{command[0]}: {done.exit_code}: {done.stderr[:200]}"
             elif not done.output.replace("\n", "").isprintable():
                 wrong = f"{command[0]}: what is printed is not printable"
+            elif command[0] == "report" and done.exit_code == 0 and "<script" in Path("out.html").read_text():
+                wrong = "report: the page has a script"
         place.restore()
         yield kind, seed, codes, round(longest, 3), wrong
 
