@@ -16,12 +16,13 @@ from sim.analysis import (
     loss_speeds,
     setting,
     settled,
+    slips,
     summary,
     sweep_dims,
 )
 from sim.analysis.observables import all_observables
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.scene import answered, speed_name
+from sim.analysis.scene import answered, speed_name, speed_of
 from sim.plots import kinds
 from sim.units.notation import scaled
 
@@ -100,7 +101,8 @@ def answers(dataset: xr.Dataset) -> list[str]:
     """
     kind = kinds.default(dataset)
     said: list[str] = []
-    for answer in (*_ANSWERS.get(kind, ()), *_ALWAYS):
+    sliding = speed_name(dataset) == "stage_speed" and kind != "stability"
+    for answer in (*_ANSWERS.get(kind, ()), *([_SLIPS] if sliding else [])):
         with contextlib.suppress(ValueError, KeyError), answered():
             said += answer(dataset)
     return said
@@ -138,27 +140,21 @@ def _at_the_end(dataset: xr.Dataset) -> xr.Dataset:
     return summary(all_observables(dataset.isel(t=[-1])), quantiles=False).isel(t=-1)
 
 
-def _range(places: list[Found], name: str) -> tuple[Found, Mean, Found, Mean] | None:
-    """Where an observable is least and where it is largest; None where it is known nowhere."""
-    known = [(place, mean) for place in places if (mean := place.mean(name)) is not None]
-    if not known:
-        return None
-    low, high = (pick(known, key=lambda one: one[1].value) for pick in (min, max))
-    return *low, *high
-
-
 def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
     """A sentence on an observable over the sweep: what it is, or its least and largest values and where they are.
 
     None where it is zero throughout.
     """
-    if (found := _range(places, name)) is None:
+    known = [(place, mean) for place in places if (mean := place.mean(name)) is not None]
+    if not known:
         return
-    low, least, high, most = found
+    (low, least), (high, most) = (pick(known, key=lambda one: one[1].value) for pick in (min, max))
     if least.value == most.value == 0.0:
         return
-    if len(places) == 1 or least.equals(most) or least.beside(most) == str(most):
-        yield f"{what} is {most}{' everywhere in the sweep' if len(places) > 1 else ''}."
+    if len(known) == 1:
+        yield f"{what} is {most}{f' ({high.words})' if high.words else ''}."
+    elif least.equals(most) or least.beside(most) == str(most):
+        yield f"{what} is {most} everywhere in the sweep."
     else:
         yield f"{what} goes from {least.beside(most)} ({low.words}) to {most} ({high.words})."
 
@@ -256,6 +252,39 @@ def _friction(dataset: xr.Dataset) -> Iterator[str]:
         yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", what)
 
 
+def _creep(dataset: xr.Dataset) -> Iterator[str]:
+    """How fast what bears its force to the end creeps there, and when what does not gives way."""
+    found = _places(dataset, summary(events(dataset), quantiles=False))
+    late = _places(dataset, summary(all_observables(dataset.isel(t=[-1])), quantiles=False).isel(t=-1))
+    shares = [share.value if (share := place.mean("ran_away")) else 0.0 for place in found]
+    borne = [place for place, share in zip(late, shares, strict=True) if share == 0.0]
+    gone = [place for place, share in zip(found, shares, strict=True) if share > 0.0]
+    force = dataset["spring_force"]
+    if bool((force.max("t") > force.min("t")).any()):
+        yield from _ranged(gone, "static_friction", "The force at which the contact gives way")
+    yield from _ranged(borne, "speed", "Where the force is borne to the end of the run, the speed there")
+    yield from _ranged(gone, "runaway_after", "The time after which the contact gives way")
+    if any(share not in (0.0, 1.0) for share in shares):
+        yield from _ranged(found, "ran_away", "The share of the members whose contact gives way")
+
+
+def _stability(dataset: xr.Dataset) -> Iterator[str]:
+    """Speeds at which slips begin to follow each other as the stage gets faster, and cease to as it gets slower.
+
+    A slip that follows no other is the fall of friction beyond its maximum.
+    """
+    found, turn = slips(dataset), speed_of(dataset).idxmax("t")
+    speed = found["slip_speed"].where(found["recurrence_time"].shift(slip=1).notnull())
+    kept = {"begins": found["slip_time"] <= turn, "ends": found["slip_time"] > turn}
+    ends = {name: speed.where(which).min("slip", keep_attrs=True) for name, which in kept.items()}
+    places = _places(dataset, summary(xr.Dataset(ends), quantiles=False))
+    yield from _ranged(places, "begins", "The speed from which on the slider sticks and slips as the stage gets faster")
+    yield from _ranged(places, "ends", "The speed down to which it does as the stage gets slower")
+    calm = [place.words for place in places if place.mean("begins") is place.mean("ends") is None]
+    if 0 < len(calm) < len(places):
+        yield f"It never does with {', '.join(calm) if len(calm) <= _FEW else f'{len(calm)} of these springs'}."
+
+
 _OPENINGS = _of_the_run(("ever_detached", "The share of the members that come off"))
 
 #: What answers the question of a scene, by the kind of figure that fits it.
@@ -273,18 +302,17 @@ _ANSWERS: dict[str, tuple[Callable[[xr.Dataset], Iterator[str]], ...]] = {
             ("peak_time", "The time from the start to that peak"),
         ),
     ),
+    "stability": (_stability,),
+    "creep": (_creep,),
     "friction": (_friction,),
     "curve": (_area_over_speed, _of_the_run(("peak_stress", "The maximum of the shear stress on the ramp")), _OPENINGS),
     "sweep": (_area_over_sweep, _OPENINGS),
     "time": (_area_over_sweep, _OPENINGS),
 }
-#: What answers it whatever the figure is, where there is such a thing.
-_ALWAYS = (
-    _of_the_run(
-        ("slip_count", "The number of slips of the slider behind its spring"),
-        ("static_friction", "The force at which a slip or sliding begins"),
-        ("force_drop", "The fall of the force in a slip"),
-        ("recurrence_time", "The time from slip to slip"),
-        ("kinetic_friction", "The work of the stage over its way, the kinetic friction,"),
-    ),
+_SLIPS = _of_the_run(
+    ("slip_count", "The number of slips of the slider behind its spring"),
+    ("static_friction", "The force at which a slip or sliding begins"),
+    ("force_drop", "The fall of the force in a slip"),
+    ("recurrence_time", "The time from slip to slip"),
+    ("kinetic_friction", "The work of the stage over its way, the kinetic friction,"),
 )

@@ -1,5 +1,6 @@
 """The page of a run: whole, harmless, and in numbers what the statistics are."""
 
+import contextlib
 import re
 import shutil
 import subprocess
@@ -13,6 +14,7 @@ from helpers.commands import SCENE, sim
 from helpers.pictured import STEADY, drawn, field, mapped, simulated
 
 from sim import analysis
+from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
@@ -21,6 +23,7 @@ from sim.plots import kinds
 from sim.plots.style import BOTH
 from sim.report import answers, document, figures, html
 from sim.scenario.clock import Clock, Ensemble, Record
+from sim.scenario.reader import load
 from sim.spectrum.families import Band
 from tests.analysis.test_stick_slip import cycles
 
@@ -96,12 +99,21 @@ def curve(ramp):
     return figure, figures.svg_of(figure, "x-")
 
 
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A folder with a scenario, its dataset and the log of its run."""
+    folder = tmp_path_factory.mktemp("made")
+    with contextlib.chdir(folder):
+        Path("scene.toml").write_text(f"# Does it stick?\n#\n# Nobody\n# knows.\n\n{SCENE}")
+        assert sim("run", "scene.toml", "-o", "x.nc", "--quiet", "--no-table").exit_code == 0
+    return folder
+
+
 @pytest.fixture
-def here(tmp_path, monkeypatch):
-    """An empty folder to work in, with one dataset."""
+def here(made, tmp_path, monkeypatch):
+    """A folder to work in, with one dataset."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
     monkeypatch.chdir(tmp_path)
-    Path("scene.toml").write_text(f"# Does it stick?\n#\n# Nobody\n# knows.\n\n{SCENE}")
-    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet", "--no-table").exit_code == 0
     return tmp_path
 
 
@@ -265,9 +277,35 @@ def test_a_slider_behind_a_spring_is_said_to_stick_and_slip():
     assert f"The number of slips of the slider behind its spring is {int(found['slip_count'].mean())}." in said
 
 
+def shipped(name, **changes):
+    """A scenario of the project with some changes, run."""
+    return run(load(Path(__file__).parents[2] / "scenarios" / f"{name}.toml", changes))
+
+
+def test_creep_says_what_is_borne_and_when_more_gives_way():
+    dataset = shipped(
+        "creep", clock={"duration": "0.1 s", "step": "2 ms"}, sweep={"drive.force": [4e-3, 8e-3, 16e-3, 24e-3]}
+    )
+    speed, gone = (dataset[name].isel(t=-1, member=0).to_numpy() for name in ("speed", "runaway_time"))
+    shown = [analysis.engineering(number, "m/s") for number in speed[:2]] + [analysis.engineering(gone[2], "s")]
+    crept, late = plainly(answers.answers(dataset))
+    assert crept.startswith("Where the force is borne") and crept.endswith(f"to {shown[1]} (drive force 8 mN).")
+    assert late.startswith("The time after which the contact gives way goes from")
+    assert late.endswith(f"(drive force 24 mN) to {shown[2]} (drive force 16 mN).")
+
+
+def test_a_map_of_stability_says_where_slips_follow_each_other_and_behind_which_spring_none_do():
+    dataset = shipped("stability_map", sweep={"drive.stiffness": [50.0, 1600.0]})
+    begins, ends, never = plainly(answers.answers(dataset))
+    soft = analysis.slips(dataset).isel(member=0, drive_stiffness=0)
+    up, along = soft["slip_time"] < 4.0, soft["slip_speed"]
+    assert f" is {analysis.engineering(float(along.where(up)[1]), 'm/s')} (drive stiffness 50 N/m)." in begins
+    assert f" is {analysis.engineering(float(along.where(~up).min()), 'm/s')} (drive stiffness 50 N/m)." in ends
+    assert never == "It never does with drive stiffness 1.6 kN/m."
+
+
 def test_where_no_kind_of_scene_fits_nothing_is_claimed(monkeypatch, ramp):
     monkeypatch.setattr(answers, "_ANSWERS", {})
-    monkeypatch.setattr(answers, "_ALWAYS", ())
     assert answers.answers(ramp) == []
     monkeypatch.setattr(document, "drawings", lambda dataset: [])
     assert "No sentence of this page fits" in " ".join(Page(html(ramp)).words("p"))
