@@ -436,10 +436,11 @@ def test_ten_million_random_states_are_never_on_a_wrong_branch(at_load, law):
 STRANGE = [0.0, -0.0, 5e-324, 1e-300, 1e-20, 1.0, 3.0, 1e20, 1e300, math.inf, -1.0, -1e300, -math.inf, math.nan]
 
 
-def test_no_input_raises_or_hangs_and_no_contact_is_narrower_than_hertz():
+@pytest.mark.parametrize("count", some([20_000, 100_000], 20_000))
+def test_no_input_raises_or_hangs_and_no_contact_is_narrower_than_hertz(count):
     rng = np.random.default_rng(45)
-    level, work, shear, other, spare = rng.choice(STRANGE, (5, 100_000))
-    rest = rng.choice([x for x in STRANGE if not math.copysign(1.0, x) < 0.0], (2, 100_000))
+    level, work, shear, other, spare = rng.choice(STRANGE, (5, count))
+    rest = rng.choice([x for x in STRANGE if not math.copysign(1.0, x) < 0.0], (2, count))
     hertz = jkr.hertz_radius_at_load(level, *rest), jkr.hertz_radius_at_indentation(level, rest[0])
     for law, first in [
         (reversible.radius_at_load_reversible, (level, work, shear, other)),
