@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from helpers import scenes
-from helpers.scenes import CELL, LOADS_AND_SHARES, SPECTRUM
+from helpers.scenes import CELL, LOADS, LOADS_AND_SHARES, SPECTRUM
 
 import sim
 from sim.cli import cli
@@ -90,7 +90,7 @@ def test_any_part_of_a_variable_is_read_alone(tmp_path, monkeypatch):
 
 def test_tables_and_figures_of_an_unfinished_run_say_so(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    ensemble.run(sample(), "out.nc", shard=(1, 2))
+    ensemble.run(sample(members=4, sweep=LOADS), "out.nc", shard=(1, 2))
     for words in (["stats", "out.nc"], ["plot", "out.nc"]):
         done = CliRunner().invoke(cli, words, catch_exceptions=False)
         assert done.exit_code == 0
