@@ -471,10 +471,10 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     fallen = int(np.argmax(force < 0.5 * np.maximum.accumulate(force)))
     peak = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names))
     slips, found = analysis.slips(dataset).isel(member=0), analysis.stick_slip(dataset).isel(member=0)
-    later = slips.isel(slip=slice(1, None)).mean("slip")
+    mean = slips.mean("slip")
     return {"onset": 1e3 * float(stage[fallen]), "peak": 1e3 * float(peak.speed),
-            "drop": 1e3 * float(later["force_drop"]), "slip": 1e6 * float(later["slip_amplitude"]),
-            "static": 1e3 * float(later["static_friction"]),
+            "drop": 1e3 * float(mean["force_drop"]), "slip": 1e6 * float(mean["slip_amplitude"]),
+            "static": 1e3 * float(mean["static_friction"]),
             "kinetic": 1e3 * float(found["kinetic_friction"])}  # fmt: skip
 
 
@@ -491,9 +491,8 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     slips, stiffness = analysis.slips(dataset).isel(member=0), dataset["drive_stiffness"].to_numpy()
     slid = slips["slip_amplitude"] > 0.0
     many = slid.sum("slip") > 10
-    first, last = slips.isel(drive_stiffness=0)["slip_speed"].to_numpy()[
-        [1, int(slid.isel(drive_stiffness=0).sum()) - 1]
-    ]
+    speeds = slips.isel(drive_stiffness=0)["slip_speed"].to_numpy()
+    first, last = speeds[0], speeds[int(slid.isel(drive_stiffness=0).sum()) - 1]
     return {"soft": float(stiffness[0]), "up": 1e3 * float(first), "down": 1e3 * float(last),
             "stiff": float(stiffness[int(many.sum())])}  # fmt: skip
 

@@ -1,6 +1,7 @@
 """Stick and slip of a slider behind a spring: its slips one by one, and what each member has of them in a run."""
 
 import itertools
+import math
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from sim.analysis.scene import MEMBERS, is_stationary, sweep_dims
 #: Fall of the spring's force over its largest in the run that makes a slip.
 LEAST = 0.02
 
+#: Displacement of the slider over that of the stage above which a fall of the force is a slip.
+_FASTER = 1.0 + 2.0 / math.pi
 #: What is known of each slip: unit and meaning.
 _SLIPS = {
     "slip_time": ("s", "time at which a slip begins"),
@@ -53,8 +56,10 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
     Notes
     -----
     In a slip the slider is faster than the stage, so that the spring's force falls: from a maximum to the lowest value
-    before the next. Forces and displacements are taken in the sense in which the stage moves, and what its
-    reversal unloads is no slip. All times are those of records: let a slip last several.
+    before the next. It goes more than 1 + 2/π times as far as the stage, as half a cycle does of a sine that just comes
+    to rest, and the stress falls, too, which it does not where the body rings upon an interface that sticks. Forces and
+    displacements are taken in the sense in which the stage moves, and what its reversal unloads is no slip. All times
+    are those of records: let a slip last several.
     """
     if "stage_speed_mean" in dataset:
         raise ValueError("slips need each member; record them: [record] per_member = true")
@@ -90,6 +95,7 @@ def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stres
     turns = np.flatnonzero(np.diff(sense)) + 1
     ends = np.unique([0, *turns[turns < there.sum()], there.sum()])
     fall = least * np.max(np.abs(force[there]))
+    pulled = np.concatenate([[0.0], np.cumsum(0.5 * (stage[1:] + stage[:-1]) * np.diff(time))])
     found = []
     for start, stop in itertools.pairwise(ends):
         along = sense[start] * force[start:stop]
@@ -100,12 +106,14 @@ def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stres
         if pairs and pairs[-1][1] == stop - start - 1:  # the last one has not ended
             pairs.pop()
         top, low = start + np.array(pairs, int).reshape(-1, 2).T
+        ahead, bears = sense[start] * (position[low] - position[top]), sense[start] * stress
+        falls = np.maximum(bears[top], bears[top - 1]) - bears[low]  # as it slips at once, or in the record before
+        slipped = (ahead > _FASTER * sense[start] * (pulled[low] - pulled[top])) & (falls > 0.0)
+        top, low, ahead, falls = top[slipped], low[slipped], ahead[slipped], falls[slipped]
         after = np.append(time[top], np.nan)[1:]  # when the next one begins
         found.append(np.stack([
             time[top], time[low] - time[top], after - time[low], after - time[top],
-            sense[start] * (position[low] - position[top]),
-            np.abs(stage[top]), sense[start] * force[top], sense[start] * (force[top] - force[low]),
-            sense[start] * (stress[top] - stress[low]),
+            ahead, np.abs(stage[top]), sense[start] * force[top], sense[start] * (force[top] - force[low]), falls,
         ], axis=1))  # fmt: skip
     return np.concatenate(found)
 

@@ -111,11 +111,20 @@ def test_slips_follow_the_sense_of_the_stage_and_reversals_are_none():
 
 def test_what_falls_by_less_than_the_least_is_no_slip():
     saw = np.array([0.0, 2.0, 4.0, 3.95, 4.0, 3.0, 4.0, 3.5, 4.2])
-    assert analysis.slips(made(saw)).sizes["slip"] == 2
-    assert analysis.slips(made(saw), least=0.01).sizes["slip"] == 3
-    assert analysis.slips(made(saw), least=0.2).sizes["slip"] == 1
+    assert analysis.slips(made(saw, 0.01)).sizes["slip"] == 2
+    assert analysis.slips(made(saw, 0.01), least=0.01).sizes["slip"] == 3
+    assert analysis.slips(made(saw, 0.01), least=0.2).sizes["slip"] == 1
     # a slip that lasts beyond the end of the run is not counted
     assert analysis.slips(made([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
+
+
+def test_a_body_that_rings_or_slows_down_does_not_slip():
+    saw = np.array([0.0, 2.0, 4.0, 3.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0])
+    assert analysis.slips(made(saw)).sizes["slip"] == 2  # the slider goes twice as far as the stage
+    assert analysis.slips(made(saw, 1.6)).sizes["slip"] == 0  # 1.625 times, less than 1 + 2/pi
+    # upon an interface that sticks the force falls while the body's swing loads the bonds
+    rings = made(saw).assign(shear_stress=(("member", "t"), -saw[np.newaxis]))
+    assert analysis.slips(rings).sizes["slip"] == 0
 
 
 def test_a_runaway_has_its_time_and_the_force_of_that_time():
