@@ -27,6 +27,38 @@ standard error of the mean over the members.
 `sim plot OUT.nc map` does.
 """,
 }
+OTHERS = """
+## Other programs
+
+**xarray.** Runs that differ in a key are joined along it, as a sweep of that key would be, and runs of different seeds
+along `member`; `sim.stats`, `sim.plot` and `sim.analysis` take what is joined:
+
+```python
+runs = xarray.open_mfdataset(
+    paths, combine="nested", concat_dim="contact_load", preprocess=lambda run: run.set_coords("contact_load")
+)
+seeds = xarray.open_mfdataset(
+    paths, combine="nested", concat_dim="member", data_vars="minimal", coords="minimal", compat="override"
+)
+```
+
+Attributes are those of the first run. `t` counts seconds and is no date: `dataset.resample` needs
+`dataset.assign_coords(t=(1e9 * dataset.t).round().astype("timedelta64[ns]"))`.
+
+**NCO.** `ncwa -a t out.nc mean.nc` and `ncwa -a member out.nc mean.nc` average over time and members, `nces a.nc b.nc
+mean.nc` over runs. `ncra` averages over a record dimension, which comes first, and a dataset has none:
+
+    ncpdq -a t,member out.nc a.nc && ncks --mk_rec_dmn t a.nc b.nc
+    ncra b.nc mean.nc
+
+**CDO** takes for time only what has a calendar; without, `cdo timmean` averages nothing:
+
+    ncatted -a units,t,o,c,"seconds since 2000-01-01" -a calendar,t,o,c,standard b.nc c.nc
+    cdo timmean c.nc mean.nc
+
+with `b.nc` as above. It reads up to two dimensions beside time: of a sweep choose a point first, by
+`ncwa -a contact_load -d contact_load,0`.
+"""
 MAPS = "record.maps"
 COORDINATES = (
     ("t", "s", "t", "time since the start", ""),
@@ -66,7 +98,7 @@ def text() -> str:
             "| --- " * 5 + "|",
         ]
         lines += [f"| `{name}` | {unit} | {dims} | {meaning} | {there} |" for name, unit, dims, meaning, there in rows]
-    return "\n".join(lines) + "\n"
+    return "\n".join(lines) + "\n" + OTHERS
 
 
 if __name__ == "__main__":

@@ -49,8 +49,8 @@ def _packed(variables: list[xr.Variable], name: str) -> int:
 
 
 def _chunk(variable: xr.Variable, name: str) -> int:
-    chunks = variable.encoding.get("chunksizes") or (1,) * variable.ndim
-    return int(chunks[variable.dims.index(name)])
+    chunks = variable.encoding.get("chunksizes") or ()
+    return int(chunks[variable.dims.index(name)]) if len(chunks) == variable.ndim else 1  # of joined runs not all
 
 
 def in_blocks(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dataset], xr.Dataset]) -> xr.Dataset:

@@ -16,7 +16,7 @@ _FEWEST = 2.0
 #: How many of its standard errors the correlation of neighbouring records is below that of ``_FEWEST``.
 _SURELY = 4.0
 #: Numbers that are transformed at once, values that a correlation time is taken from, and records apart at most.
-_AT_ONCE, _VALUES, _LAGS = 2**21, 2**23, 2**16
+_AT_ONCE, _VALUES, _LAGS = 2**19, 2**22, 2**16
 
 
 class IntegralTime(NamedTuple):
@@ -137,10 +137,11 @@ class Covariance:
         rows = max(1, _AT_ONCE // size)
         for start in range(0, len(values), rows):
             some = values[start : start + rows]
-            of_all = new = scipy.fft.rfft(some, size)
-            if self.before:
-                new = of_all - scipy.fft.rfft(some[:, : self.before], size)
-            power = power + (new * of_all.conj()).sum(axis=0)
+            of_all = scipy.fft.rfft(some, size)
+            each = of_all.real**2 + of_all.imag**2
+            if self.before:  # only products with what is new
+                each = each - scipy.fft.rfft(some[:, : self.before], size) * of_all.conj()
+            power = power + each.sum(axis=0)
         self.sums += scipy.fft.irfft(power, size)[:lags]
         self.pieces, self.before = [values[:, -lags:]], min(lags, values.shape[1])
 

@@ -4,7 +4,7 @@ Everything is read in blocks, twice: first for means and a sample, then for what
 """
 
 import functools
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quant
 _MANY = 16
 #: Values that a sample keeps at least, and how far from its level in it an exact quantile may lie.
 _SAMPLE, _NEAR = 2**17, 0.01
+#: Values that fit into the processor's cache.
+_STRIP = 2**16
 _LEVELS = np.array(QUANTILES)
 
 
@@ -81,19 +83,22 @@ class Series:
 
     def second(self, values: np.ndarray, rows: slice, times: slice) -> None:
         """Read some for the second time, in the order of the first, after the first reading of all."""
-        deviations = (values if self.whole else values[np.isfinite(values)]) - self.mean
-        squares = deviations * deviations
-        self.moments += [deviations.size, squares.sum(), (squares * deviations).sum()]
         several = self.members > 1
-        for k, level in enumerate(self.rough):
-            flags = values <= level
-            self.under[k, rows] += np.count_nonzero(flags, axis=-1)
-            if self.flags and self.whole:
-                self.flags[k].add(flags - (flags.mean(axis=0) if several else _LEVELS[k]))
-        self.quantiles.gather(values)
         some = values[: max(0, self.seen - rows.start)]
         if self.whole and len(some):
             self.covariance.add(some - (self.of_record[times] / self.members if several else self.mean))
+        for first, strip in _strips(values, bool(self.flags)):
+            known = strip if self.whole else strip[np.isfinite(strip)]
+            deviations = known - self.mean
+            squares = deviations * deviations
+            self.moments += [known.size, squares.sum(), (squares * deviations).sum()]
+            at = rows.start + first
+            for k, level in enumerate(self.rough):
+                flags = strip <= level
+                self.under[k, at : at + len(strip)] += flags.sum(axis=-1)
+                if self.flags and self.whole:
+                    self.flags[k].add(flags - (flags.mean(axis=0) if several else _LEVELS[k]))
+            self.quantiles.gather(known)
         if times.stop == self.records:
             for one in (self.covariance, *self.flags):
                 one.end()
@@ -129,6 +134,16 @@ class Series:
             time = time_of(covariance, self.seen, self.records, self.step, self.quantiles.largest)
             found |= {"correlation_time": time.time, "correlation_time_sem": time.sem}
         return found | {f"quantile{end}": self.quantiles.at(levels) for end, levels in ends.items()}
+
+
+def _strips(values: np.ndarray, few: bool) -> Iterator[tuple[int, np.ndarray]]:
+    """Values in pieces that fit into the processor's cache: of few members of some records, else some members."""
+    if few:
+        length = max(1, _STRIP // len(values))
+        yield from ((0, values[:, start : start + length]) for start in range(0, values.shape[1], length))
+    else:
+        rows = max(1, _STRIP // values.shape[1])
+        yield from ((start, values[start : start + rows]) for start in range(0, len(values), rows))
 
 
 def _shares(
@@ -206,7 +221,9 @@ class _Quantiles:
             values = np.sort(np.concatenate([*near, ()]))
             places = levels * (self.total - 1) - below
             held = (places >= 0.0) & (places <= values.size - 1.0)
-            found[held] = np.interp(places[held], np.arange(values.size), values) if held.any() else ()
+            low = places[held].astype(int)
+            high = np.minimum(low + 1, values.size - 1)
+            found[held] = values[low] + (places[held] - low) * (values[high] - values[low])
         return np.where((levels >= 0.0) & (levels <= 1.0), found, np.nan)
 
 

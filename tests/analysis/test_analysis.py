@@ -12,6 +12,7 @@ from sim import analysis
 from sim.analysis import blocks
 from sim.ensemble.simulate import run
 from sim.parts.contact import Equilibrium
+from sim.parts.drive.prescribed import Steady
 from sim.scenario.clock import Record
 
 
@@ -121,6 +122,21 @@ def test_blocks_of_a_few_numbers_give_the_statistics_of_all_at_once(ramp, tmp_pa
         xr.testing.assert_identical(analysis.statistics(opened).load(), whole[0])
         assert analysis.table(opened, 5) == whole[1]
     xr.testing.assert_identical(analysis.loop_energy(cycles), loops)
+
+
+def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep_and_of_more_members(tmp_path):
+    pytest.importorskip("dask")
+    kept = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}
+    loads = [run(scene(contact=Equilibrium(load=load), **kept), to=tmp_path / f"{load}.nc") for load in (2e-3, 4e-3)]
+    with xr.open_mfdataset(
+        loads, combine="nested", concat_dim="contact_load", preprocess=lambda one: one.set_coords("contact_load")
+    ) as runs:
+        swept = run(scene(sweep={"contact.load": [2e-3, 4e-3]}, **kept))
+        assert analysis.table(runs) == analysis.table(swept)
+    how = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
+    with xr.open_mfdataset(loads, combine="nested", concat_dim="member", **how) as runs:
+        assert runs["contact_area"].sizes["member"] == 12 and runs["contact_modulus"].ndim == 0
+        assert analysis.notes(runs, analysis.table(runs), [])[0].startswith("mean over the 12 members")
 
 
 def test_averaging_the_second_half_keeps_the_members_error(ramp):
