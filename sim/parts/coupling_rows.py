@@ -31,11 +31,13 @@ from sim.parts.coupling_equations import (
     rested,
     share_left,
 )  # fmt: skip
-from sim.parts.coupling_step import book, newton, tried
+from sim.parts.coupling_step import NEAR, book, newton, snap, stored_in, tried
 from sim.parts.drive.driven import AREA, STORED, WORK
 
 #: Share of a clock step below which a sub-step means that there is no solution to go on with.
 LEAST = 1e-13
+#: Share of a piece below which a rejected sub-step means that an avalanche may have begun.
+_BRIEF = 1e-9
 MOST_STEPS = 2_000_000
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
@@ -83,22 +85,6 @@ def elastic(row, time, bare, slider, held, piece, energy):
 
 
 @device
-def _stored(row, bare, time, slider, law, held):
-    """Elastic and kinetic energy of spring, body, contact and bonds."""
-    _, area, _, _ = contact_area(row[BOUND], row[MOMENT], time, row[RADIUS], bare, held)
-    if not area >= 0.0:  # equilibrium was lost on the way
-        area = math.pi * row[RADIUS] * row[RADIUS] / held[10]
-    stiffness, mass, _, viscosity, _, _, _, _ = slider
-    energy = 0.5 * mass * row[BODY] * row[BODY]
-    energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])
-    if stiffness > 0.0:
-        energy += 0.5 * row[FORCE] * row[FORCE] / stiffness
-    if row[BOUND] > 0.0 and law[5] == 0.0:
-        energy += 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
-    return energy
-
-
-@device
 def later(held, time, stays):
     """The contact's numbers some time later, its radius as it is from there on if it ``stays``."""
     _, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area = held
@@ -113,6 +99,8 @@ def _piece(row, bare, slider, law, held, piece, room, energy):
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
     start, length = 0.0, piece[0]
+    yields, _ = compliance(row[RADIUS], slider)
+    brittle = law[2] > 0.0 and slider[3] == 0.0 and (slider[1] + slider[2] == 0.0 or yields > 0.0)
     for _ in range(MOST_STEPS):
         left = length - start
         step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
@@ -126,9 +114,13 @@ def _piece(row, bare, slider, law, held, piece, room, energy):
         grows, stands = tried(row, start, step, bare, slider, law, held, piece, room)
         if not stands:
             row[NEXT] = step * grows
+            if brittle and step < _BRIEF * length and snap(row, start, NEAR, bare, slider, law, held, energy):
+                row[NEXT], room[LAST, 0] = 1e-6 * length, 0.0
             continue
         book(row, start, step, bare, slider, law, held, piece, room, energy)
         row[NEXT] = max(row[NEXT], step * grows) if step == left else step * grows
+        if brittle and snap(row, start + step, 0.0, bare, slider, law, held, energy):
+            row[NEXT], room[LAST, 0] = 1e-6 * length, 0.0
         if step == left:
             return length
         start += step
@@ -297,7 +289,7 @@ def _clock_step(row, bare, slider, law, held, pieces, room, energy):
                 going = elastic(row, 0.0, bare, slider, now, piece, energy)
             elif slider[4] > 0.0:
                 row[FORCE] = driven(0.0, piece)[1]
-            energy[AREA] += energy[WORK] - worked - _stored(row, bare, 0.0, slider, law, now) + energy[STORED]
+            energy[AREA] += energy[WORK] - worked - stored_in(row, bare, 0.0, slider, law, now) + energy[STORED]
         ahead, reached = later(now, time, now[0]), 0.0
         if going and law[5] == 0.0:
             reached = _piece(row, bare, slider, law, ahead, piece, room, energy)
@@ -306,7 +298,7 @@ def _clock_step(row, bare, slider, law, held, pieces, room, energy):
         time += reached
         if not (going and reached == piece[0]):
             return time, False
-    energy[STORED] = _stored(row, bare, time, slider, law, now)
+    energy[STORED] = stored_in(row, bare, time, slider, law, now)
     return time, True
 
 

@@ -42,7 +42,7 @@ from sim.parts.coupling_equations import (
     resolved,
     share_left,
 )
-from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, VISCOSITY, WORK
+from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, SNAP, VISCOSITY, WORK
 from sim.parts.exchange import Array
 
 #: Share of a sub-step after which the defect of the equations is measured, between the first two nodes.
@@ -63,6 +63,8 @@ def _between() -> tuple[Array, Array]:
 _VALUES, _SLOPES = _between()
 #: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
 _FEW, _SOME = 1e-12, 0.1
+#: Way over the cut-off stretch on which bonds are tried, and that within which they may snap.
+_TRIED, NEAR = 1e-7, 1e-3
 #: Most turns of Newton's method.
 _TURNS = 12
 #: Slopes, and solutions of the modes, before the first ones are known.
@@ -271,3 +273,81 @@ def book(row, start, step, bare, slider, law, held, piece, room, energy):
         for i in range(3):
             room[PAST + k, i] = room[k, i]
     room[LAST, 0] = step
+
+
+@device
+def stored_in(row, bare, time, slider, law, held):
+    """Elastic and kinetic energy of spring, body, contact and bonds."""
+    _, area, _, _ = contact_area(row[BOUND], row[MOMENT], time, row[RADIUS], bare, held)
+    if not area >= 0.0:  # equilibrium was lost on the way
+        area = math.pi * row[RADIUS] * row[RADIUS] / held[10]
+    stiffness, mass, _, viscosity, _, _, _, _ = slider
+    energy = 0.5 * mass * row[BODY] * row[BODY]
+    energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])
+    if stiffness > 0.0:
+        energy += 0.5 * row[FORCE] * row[FORCE] / stiffness
+    if row[BOUND] > 0.0 and law[5] == 0.0:
+        energy += 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
+    return energy
+
+
+@device
+def _lacking(way, row, time, bare, slider, law, held):
+    """What the bonds lack along the pull once they have gone a way at once: force, or way where the body stays.
+
+    Also N, M, radius, area, u then, and the way of the body.
+    """
+    stiffness, mass, damping, _, _, _, _, _ = slider
+    left, sense = math.exp(-math.fabs(way) * law[2]), math.copysign(1.0, row[MOMENT])
+    bound, moment = row[BOUND] * left, (row[MOMENT] * left + sense * row[BOUND] * (1.0 - left) / law[2]) * left
+    radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
+    yields, _ = compliance(radius, slider)
+    sheared = yields * area * moment
+    body = way + sheared - row[SHEARED]
+    if mass + damping > 0.0:
+        return -sense * body, bound, moment, radius, area, sheared, 0.0
+    return sense * (row[FORCE] - stiffness * body - area * moment), bound, moment, radius, area, sheared, body
+
+
+@device
+def snap(row, time, reach, bare, slider, law, held, energy):
+    """Slip at once to where bonds bear the pull again, if slip breaks more than it stretches; whether it does.
+
+    That counts which does so within a ``reach`` in units of the cut-off stretch.
+
+    The force of such bonds over the way has one hump, so that there is one such place.
+    """
+    if not slider[0] + slider[1] + slider[2] > 0.0:
+        return False
+    sense, high, limit = math.copysign(1.0, row[MOMENT]), _TRIED / law[2], 1.0 / law[2]
+    here, _, _, _, first, _, _ = _lacking(0.0, row, time, bare, slider, law, held)
+    lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
+    while not lacks > max(here, 0.0):
+        if high > reach * limit:
+            return False
+        high *= 2.0
+        lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
+    while lacks > 0.0:
+        high *= 2.0
+        lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
+    low = 0.5 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        over = _lacking(sense * middle, row, time, bare, slider, law, held)[0] > 0.0
+        low, high = (middle, high) if over else (low, middle)
+    _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, bare, slider, law, held)
+    if not area >= 0.0:
+        return False
+    # on the way ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
+    left, mean = math.exp(-high * law[2]), sense * row[MOMENT]
+    later = mean * left + row[BOUND] * limit * (1.0 - left)
+    broken = 0.25 * (first + area) * (1.0 - left) * (mean * mean + mean * later + later * later) / row[BOUND]
+    before = stored_in(row, bare, time, slider, law, held)
+    row[BOUND], row[MOMENT], row[RADIUS], row[SHEARED] = bound, moment, radius, sheared
+    row[FORCE] -= slider[0] * body
+    row[POSITION] += body
+    row[SLIP] += sense * high
+    row[PATH] += high
+    energy[RUPTURE] += broken
+    energy[SNAP] += before - stored_in(row, bare, time, slider, law, held) - broken
+    return True

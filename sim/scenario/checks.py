@@ -99,9 +99,6 @@ def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
             yield ("drive",), f"{said}: give drive.damping, mass or viscosity, or bonds with a rupture"
         if not bonds.carries_stress:
             yield ("bonds", "stress"), "is 0 Pa, so that a drive would feel nothing; give the stress of the bonds"
-    elif drive.at_once and bonds.snaps:
-        said = "bonds with a cut-off stretch break in an avalanche, which nothing holds back: give drive.damping,"
-        yield ("drive",), f'{said} mass or viscosity, such as viscosity = "10 Pa s/m", or another rupture'
 
 
 def _off_the_map(

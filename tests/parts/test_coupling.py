@@ -36,6 +36,8 @@ from helpers.driven import (
     turning,
 )  # fmt: skip
 from numpy.testing import assert_allclose
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import sim
 from sim.analysis.tables import notes
@@ -44,7 +46,7 @@ from sim.laws import jkr
 from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.bodies import Adhesion
-from sim.parts.drive import Force, Spring, Steady as AtSpeed
+from sim.parts.drive import READINGS, Force, Spring, Steady as AtSpeed
 from sim.scenario.scenario import Scenario
 from sim.units.refusals import BadInput
 
@@ -297,7 +299,6 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
         (Unbroken(stress=1e5), {}, "drive", "mass"),
         (Unbroken(stress=1e5), {"mass": 1e-3, "contact": 1.0}, "drive.contact_stiffness", "rigid"),
         (Unbroken(), {"mass": 1e-3}, "bonds.stress", "stress"),
-        (FirstMoment(rupture=CutOff(stretch=STRETCH), **recipe), {}, "drive", "viscosity"),
     ):
         with pytest.raises(BadInput) as refused:
             Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=bonds, drive=spring(1.0, **keys))
@@ -306,10 +307,39 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
         scenario(1.0, 4, spring(1.0), reversible=0.01)
     with pytest.raises(BadInput, match=r"contact\.reversible.*rate"):
         scenario(1.0, 4, spring(1.0, mass=1e-3), make=Cohort, reversible=0.01)
-    damped = FirstMoment(rupture=CutOff(stretch=STRETCH), **recipe)
-    scene = Scenario(**lens, adhesion=Adhesion(work=WORK), bonds=damped, drive=spring(1.0, damping=1e-3))
-    _, read = marched(scene)
+
+
+def test_bonds_that_a_stretch_breaks_snap_at_the_fold_of_their_force():
+    # all bound, unstretched and never remade, z = e^(−s/ℓ) of them are left and bear n κ ℓ z (1 − z)
+    stiff = 0.05
+    left = (1.0 + math.sqrt(1.0 - 8.0 * stiff)) / 4.0  # where K + 2 z² − z = 0
+    before = -math.log(left)
+    stage = before + left * (1.0 - left) / stiff
+
+    def lacks(way, stage=stage):
+        return stiff * (stage - way) - math.exp(-way) * (1.0 - math.exp(-way))
+
+    after = brentq(lacks, before + 0.1, stage)
+    lost = quad(lacks, before, after)[0]
+    for share, snapped in ((1.0 - 1e-6, 0.0), (1.0 + 1e-6, lost), (2.0, lost)):
+        recipe = {"rupture": CutOff(stretch=STRETCH), "rebinding": 1e-9}
+        states, read = marched(scenario(share * stage, 7, spring(stiff, 1.0, tolerance=1e-8), **recipe))
+        assert_allclose(read["dissipated_by_snaps"][-1] / ENERGY, snapped, rtol=1e-6)
+        if snapped:
+            rests = brentq(lambda way, end=share * stage: lacks(way, end), after, 2.0 * stage)
+            assert_allclose(reached(states[-1:], "position")[0, 0], rests, rtol=1e-6)
+        assert residual(read) < 1e-7
+
+
+@pytest.mark.parametrize("keys", [{}, {"contact": 0.2}, {"contact": 0.05, "mass": 1e-3, "damping": 0.1}])
+def test_bonds_that_a_stretch_breaks_snap_again_and_again_behind_a_soft_spring(keys):
+    drive = spring(0.02, 3.0, **keys)
+    scene = scenario(25.0, 100, drive, share=0.3, rupture=CutOff(stretch=STRETCH), members=3)
+    straight = list(march(scene, np.arange(3)))
+    read = dict(zip(READINGS, np.array([scene.parts.drive.readings(s.drive)[0] for s in straight]).T, strict=True))
+    assert np.sum(np.diff(read["dissipated_by_snaps"]) > 0.0) > 2
     assert residual(read) < 1e-5
+    check_members(scene, straight, 0.0)
 
 
 def test_a_run_records_the_drive_of_each_member_and_ends_those_that_run_away():

@@ -42,8 +42,6 @@ class Common:
     driven: ClassVar[bool] = False
     #: Whether they are solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = False
-    #: Whether slip may break more than it stretches, so that nothing but the body's delay holds it.
-    snaps: ClassVar[bool] = False
     #: Rough time of a step of a batch where it is made alone, for estimates [s].
     step_seconds: ClassVar[float] = 0.0
 

@@ -5,7 +5,6 @@ breaks at a rate that depends on its stretch. Their mean force makes the shear s
 has a maximum, ages and starts with a peak; nothing of that is put in by hand.
 """
 
-import math
 from functools import cached_property
 from typing import Annotated, ClassVar, Literal, NamedTuple, Self
 
@@ -119,10 +118,6 @@ class FirstMoment(OverArea, _Separable):
     knows_forces: ClassVar[bool] = False
     driven: ClassVar[bool] = True
     in_blocks: ClassVar[bool] = True
-
-    @property
-    def snaps(self) -> bool:  # type: ignore[override]
-        return self.law.limit < math.inf
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
         if self.start_from == "steady":
