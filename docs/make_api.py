@@ -36,6 +36,10 @@ def text() -> str:
     for name in MODULES:
         module = importlib.import_module(name)
         lines += _section(name, module, _public(module))
+        if name == "sim.plots":
+            lines += ["\n### Figures\n", "Any takes `where`, `member` and `units`.\n"]
+            lines += ["| kind | shows | takes |", "| --- | --- | --- |"]
+            lines += [f"| `{k}` | {one.shows} | {', '.join(one.takes)} |" for k, one in sim.plots.KINDS.items()]
     lines += [
         "\n## A spectrum\n",
         "What each family of `sim.spectrum` has.\n",

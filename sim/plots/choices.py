@@ -1,6 +1,6 @@
 """What can be chosen for a figure: a member, a time, what it is drawn over, units, measured points, axes for it."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,8 +17,8 @@ class Choices(NamedTuple):
 
     Any kind takes ``member``, one of the ensemble, and ``units`` of axes, such as ``"mm/s"``. Kinds with these
     parameters take ``at``, the time [s] of the record or map that is drawn; ``x``, the variable or swept key that it is
-    drawn over; ``absolute``, areas in place of shares; ``data``, a CSV table of measured points; ``ax``, the matplotlib
-    axes that its first panel is drawn in.
+    drawn over; ``absolute``, areas in place of shares; ``data``, measured points in a CSV table or columns in SI by
+    name (``{"speed": [1e-3], "contact_area": [4e-8]}``); ``ax``, the matplotlib axes that its first panel is drawn in.
     """
 
     member: int | None = None
@@ -26,13 +26,14 @@ class Choices(NamedTuple):
     x: str = ""
     absolute: bool = False
     units: tuple[str, ...] = ()
-    data: Path | None = None
+    data: Path | str | Mapping[str, Any] | None = None
     ax: Axes | None = None
 
     @property
     def given(self) -> dict[str, Any]:
         """What has been chosen, by name."""
-        return {name: value for name, value in self._asdict().items() if value != self._field_defaults[name]}
+        unsaid = (value is None or value is False or (isinstance(value, str | tuple) and not value) for value in self)
+        return {name: value for (name, value), none in zip(self._asdict().items(), unsaid, strict=True) if not none}
 
     def options(self, kind: str, takes: Collection[str], dataset: xr.Dataset) -> dict[str, Any]:
         """Arguments for what draws a kind of figure.
@@ -51,7 +52,7 @@ class Choices(NamedTuple):
                 found["at"] = Quantity("s", "time").read(self.at)
             except ValueError as fault:
                 raise ValueError(f"at {self.at}: {fault}") from None
-        return found | ({"data": Measured(Path(self.data), dataset)} if self.data else {})
+        return found | ({"data": Measured(self.data, dataset)} if self.data is not None else {})
 
     def of_member(self, dataset: xr.Dataset) -> xr.Dataset:
         """The dataset of the member chosen, or of all.

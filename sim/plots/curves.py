@@ -30,8 +30,8 @@ _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
 #: Markers that stand for line styles where points are not joined.
 _MARKS = {"-": "o", "--": "s", "-.": "^"}
 
-#: Line width of a curve that a later one lies upon, where there are few: a bundle shows anyway.
-_UNDERNEATH, _FEW = 2.8, 3
+#: Line width that a curve gains by each later one that lies upon it, where there are few: a bundle shows anyway.
+_UNDERNEATH, _FEW = 1.0, 4
 
 #: Width that the curves of a category share.
 _CATEGORY = 0.6
@@ -177,13 +177,14 @@ class Scene(NamedTuple):
         """The speed that is prescribed along a curve [m/s], that of the stage where it pulls through a spring."""
         return self.values("stage_speed_mean" if "stage_speed_mean" in self.found else "speed_mean", line)
 
-    def covered(self, name: str, lines: list[Line]) -> list[bool]:
-        """Curves that a later one hides, nowhere farther from it than a hundredth of what all span."""
+    def covered(self, name: str, lines: list[Line]) -> list[int]:
+        """How many later curves hide each one, nowhere farther from it than a hundredth of what all span."""
         values = np.stack([self.values(f"{name}_mean", line) for line in lines])
         if len(lines) > _FEW or not np.any(np.isfinite(values)):
-            return [False] * len(lines)
+            return [0] * len(lines)
         near = 0.01 * (np.nanmax(values) - np.nanmin(values))
-        return [any(np.all(np.abs(later - own) <= near) for later in values[k + 1 :]) for k, own in enumerate(values)]
+        hidden = np.all(np.abs(values[:, None] - values) <= near, axis=-1)
+        return [int(np.sum(later)) for later in np.triu(hidden, 1)]
 
     def distinct(self, name: str) -> list[Line]:
         """Curves that do not lie on an earlier one."""
@@ -314,9 +315,9 @@ def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
 
 def curve(
     panel: Axes, scene: Scene, name: str, line: Line, factor: float, colour: str = "", style: Any = "-",
-    label: str = "", spread: str = "", wide: bool = False,
+    label: str = "", spread: str = "", hidden: int = 0,
 ) -> None:  # fmt: skip
-    """The mean with its standard error, and the band of the members; ``wide`` where a later curve lies upon it."""
+    """The mean with its standard error, and the band of the members; the wider, the more later curves lie upon it."""
     colour = colour or line.colour
     x, mean, sem, low, high = scene.parted(line, *(factor * values for values in scene.drawn(name, line)))
     shade: Any = {"color": colour, "alpha": 0.18, "label": spread}
@@ -326,7 +327,7 @@ def curve(
     elif spreads:
         panel.vlines(x, low, high, linewidth=5.0, **shade)
     dots: Any = {"marker": "o", "markersize": 2.6} if scene.marked else {}
-    width = {"linewidth": _UNDERNEATH} if wide and scene.joined else {}
+    width = {"linewidth": mpl.rcParams["lines.linewidth"] + hidden * _UNDERNEATH} if scene.joined else {}
     panel.plot(
         x, mean, color=colour, label=label if np.any(np.isfinite(mean)) else "", **(dots | scene.look(style) | width)
     )
@@ -338,8 +339,8 @@ def curve(
 
 def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
     """Curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
-    for line, wide in zip(scene.lines, scene.covered(name, scene.lines), strict=True):
-        curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread, wide=wide)
+    for line, hidden in zip(scene.lines, scene.covered(name, scene.lines), strict=True):
+        curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread, hidden=hidden)
         if name in _OF_CONTACT:
             mark_jumps(panel, scene, name, line, factor)
     beside(panel, scene, name, factor)

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 
 from sim.analysis import setting
-from sim.analysis.scene import resolved, word
+from sim.analysis.scene import resolved, where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.parts.shear.amplitude import Amplitude
@@ -61,6 +61,9 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
         panel.text(0.04, 0.05, arrow[float(np.sign(speed))], transform=panel.transAxes, fontsize=7, bbox=box)
     axes[0].set_ylabel(length.label("$y$"))
     then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}, $V$ = {style.text_of(speed, 'm/s')}"
+    with where_recorded():
+        mean = float(_then(dataset, "shear_stress", where, stress))
+        then += rf", beside the mean $\tau_0$ = {style.rounded(mean, 'Pa')}"
     axes[0].set_title(", ".join(filter(None, [point, then])))
     return figure
 
@@ -194,6 +197,7 @@ def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     panel.plot(q, expected, "o", label="discretised", **ring)
     panel.errorbar(q, measured, error, label=f"realised, {len(rings)} map{'s' * (len(rings) > 1)}", **dots)
     panel.set_ylabel("spectral density $C$ (Pa² m²)")
+    panel.set_ylim(bottom=0.1 * min(np.min(expected), np.min(measured)))  # not down to where a cut-off ends
     if np.max(measured) < 100.0 * np.min(measured):
         style.plain_ticks(panel.yaxis)
     then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}"

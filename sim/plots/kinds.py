@@ -163,7 +163,7 @@ def drawn(
     """
     try:
         target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}.png")
-        claim(dataset, source, target, replace, *filter(None, [choices.data]))
+        claim(dataset, source, target, replace, *([Path(choices.data)] if isinstance(choices.data, Path | str) else []))
         save(draw(dataset, kind, choices), target)
     except BadInput:
         raise

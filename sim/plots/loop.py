@@ -95,7 +95,8 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
         panel.set_ylim(bottom=0.0)
     loads.sharex(radii)
     cycled = "per cycle: dissipated $W$, and the loop enclosed, each jump a straight line between records"
-    style.legend(loads, "dissipated in all: $W$" if loop is None else cycled, columns=1)
+    lost = "dissipated in all: $W$" if loop is None else cycled
+    style.legend(loads, lost if bool((spent != 0.0).any()) else scene.title, columns=1)
     style.legend(radii)
     colour_bar(figure, panels, scene)
     return figure
@@ -180,7 +181,8 @@ def _named(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray | 
     named = []
     for line in scene.lines:
         known = {words: unit.factor * style.number_at(values, line.point) for words, values in energies.items()}
+        known = {words: value for words, value in known.items() if value != 0.0}
         parts = [f"{words} = {value:.3g} {unit.name}" for words, value in known.items() if np.isfinite(value)]
-        label = f"{line.label}: {', '.join(parts).replace('-', '−')}" if line.label else ""
+        label = ": ".join(filter(None, [line.label, ", ".join(parts).replace("-", "−")])) if line.label else ""
         named.append(line._replace(label=label))
     return named

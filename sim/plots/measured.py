@@ -1,6 +1,6 @@
 """Measured points over the curves of a dataset, from a CSV table, and how far the curves are from them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from sim.analysis import sweep_dims
 from sim.analysis.scene import plain
 from sim.plots.style import BOTH, GUIDE, HOLLOW, legend
-from sim.units.measured import Points, read
+from sim.units.measured import Points, given, read
 from sim.units.quantity import Quantity
 
 #: Names of what is prescribed and of what is recorded of it.
@@ -57,17 +57,18 @@ class Residuals(NamedTuple):
 
 
 class Measured:
-    """A table of measured points, and what of it a figure has drawn.
+    """A table of measured points, a CSV or columns in SI by name, and what of it a figure has drawn.
 
     Its columns are variables of a dataset with their units and errors, as those of ``sim fit``. A column that is a
     number of the scenario, such as ``contact_load``, says of which curve of a sweep a row is.
     """
 
-    def __init__(self, path: Path, dataset: xr.Dataset) -> None:
-        self.path, self.dataset = path, plain(dataset)
+    def __init__(self, data: Path | str | Mapping[str, Any], dataset: xr.Dataset) -> None:
+        self.dataset = plain(dataset)
         self.sweep = {*sweep_dims(dataset)}
         known = {name: Quantity(units, name) for name, units in self._units().items()}
-        self.table = read(path, known, known)
+        self.named = str(data) if isinstance(data, Path | str) else "data"
+        self.table = read(Path(data), known, known) if isinstance(data, Path | str) else given(data, known)
         self.shown: set[str] = set()
         self.residuals: list[Residuals] = []
 
@@ -108,9 +109,9 @@ class Measured:
         by, power, factor = _BY.get(name, ("", 1.0, 1.0))
         if by not in self.table:
             return None
-        given, errors = self.table[by]
-        values = factor * given**power
-        return Points(values, None if errors is None else power * np.abs(values / given) * errors)
+        source, errors = self.table[by]
+        values = factor * source**power
+        return Points(values, None if errors is None else power * np.abs(values / source) * errors)
 
     def draw(
         self, panel: Axes, over: tuple[str, float], shown: tuple[str, float], curves: Sequence[Compared], log: bool
@@ -119,7 +120,7 @@ class Measured:
         across, (name, factor) = self.column(over[0]), shown
         if across is None:
             return
-        x, wide = (None if given is None else over[1] * given for given in across)
+        x, wide = (None if values is None else over[1] * values for values in across)
         assert x is not None
         told = any(name in self.table for name in self.sweep)
         for curve in curves if told else curves[:1]:
@@ -164,8 +165,8 @@ class Measured:
             With what the figure has and the table lacks.
         """
         if self.column(over) is None:
-            raise ValueError(f'{self.path}: no column "{over}", which the figure is drawn over; add it, or choose --x')
+            raise ValueError(f'{self.named}: no column "{over}", which the figure is drawn over; add it, or choose --x')
         if not self.shown:
             columns = ", ".join(self.table)
             said = "no row is of what is drawn: its columns are no variables of this figure, or its conditions others"
-            raise ValueError(f"{self.path}: {said} (columns: {columns}); choose another kind, --x or --where")
+            raise ValueError(f"{self.named}: {said} (columns: {columns}); choose another kind, --x or --where")

@@ -101,9 +101,9 @@ def energy_panel(panel: Axes, scene: Scene) -> None:
     for name, text, own, dashes in drawn:
         lines = scene.distinct(name)
         placed = scene.middle() if len(lines) == 1 else scene
-        for line, wide in zip(lines, scene.covered(name, lines), strict=True):
+        for line, hidden in zip(lines, scene.covered(name, lines), strict=True):
             colour = own if scene.single else style.REFERENCE if len(lines) == 1 else line.colour
-            curve(panel, placed, name, line, factor, colour, dashes, wide=wide)
+            curve(panel, placed, name, line, factor, colour, dashes, hidden=hidden)
         panel.plot([], [], color=own if scene.single else style.REFERENCE, label=text, **scene.look(dashes))
     if np.any(values <= 0.0):
         panel.axhline(0.0, **style.GUIDE)

@@ -148,7 +148,7 @@ def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.U
     distance = reach * np.linspace(-1.0, 1.0, 801)
     bodies = shape.shear_modulus, shape.poisson_ratio
     found = profiles.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
-    factor = style.in_unit(panel.yaxis, "tangential displacement", np.concatenate(found), "m")
+    factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(found), "m")
     for values, line, words in zip(found, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
         panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
     for edge in (-shape.radius, shape.radius):
@@ -165,8 +165,9 @@ def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: 
     side = x[-1] + 0.5 * (x[1] - x[0])
     image = panel.imshow(moved, cmap="viridis", origin="lower", extent=(-side, side, -side, side))
     levels = np.linspace(np.min(moved), np.max(moved), 8)[1:-1]
-    panel.contour(x, x, moved, levels, colors="white", linewidths=0.4, linestyles="-")
-    figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$"))
+    lines = panel.contour(x, x, moved, levels, colors="white", linewidths=0.4, linestyles="-")
+    panel.clabel(lines, fmt="%.3g", fontsize=5)
+    figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$, $u_x$"))
     style.contact_circle(panel, length.factor * shape.radius)
     panel.set_xlabel(length.label("$x$"))
     panel.set_ylabel(length.label("$y$"))

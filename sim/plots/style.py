@@ -103,12 +103,14 @@ def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -
 
 
 def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
-    """A swept value with its symbol, in the unit of the whole axis: ``P = 4 mN``."""
+    """A swept value with its symbol, ``P = 4 mN``, in the unit of the whole axis unless it is small there."""
     coordinate = dataset[name]
     value = coordinate[at].item()
     if isinstance(value, str):
         return value
     unit = Unit.of(coordinate.to_numpy(), coordinate.attrs.get("units", "1"))
+    if 0.0 < abs(value) * unit.factor < 0.1:
+        unit = Unit.of(value, coordinate.attrs.get("units", "1"))
     number = f"{value * unit.factor:.4g} {unit.name}".strip().replace("-", "−")
     sign, key = symbol(coordinate), (name.partition("_")[2] or name).replace("_", " ")
     if not sign or coordinate.attrs.get("units") == "1":  # the letters of pure numbers are known to few

@@ -137,13 +137,16 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     fine = np.geomspace(low, high, _FINE)
     areas = {name: np.pi * radius**2 for name, radius in case.radii(fine).items()}
     figure, axes = style.pairs(3.3, shared=True)
-    full, look = areas["jkr"][0], style.HOLLOW | {"color": style.BOTH, "zorder": 4}
+    full, mark = areas["jkr"][0], style.HOLLOW | {"color": style.BOTH, "zorder": 4}
     factor = style.in_unit(axes[0].yaxis, "contact area $A$", areas["jkr"], "m^2")
     for panel, (words, si, power) in zip(axes, _AXES, strict=True):
         unit = style.Unit.of(full**power * fine, si, logarithmic=True)
         along = {name: unit.factor * values**power * fine for name, values in areas.items()}
         _panel(panel, case, along, areas, factor)
-        panel.plot(unit.factor * stress * area**power, factor * area, label="simulated", **look)
+        x = unit.factor * stress * area**power
+        panel.plot(x, factor * area, label="simulated", **mark)
+        if not is_steady(dataset) and area.size:
+            panel.plot(x[-1:], factor * area[-1:], label="simulated, the last record", **mark | {"mfc": style.BOTH})
         style.across(panel, unit.factor * np.array([low, high]) * full**power, unit.label(words), "log")
     # heights from Hertz's area, or none, to somewhat above JKR's: the uncorrected theory goes far beyond
     least = float(np.nan_to_num(areas["hertz"][0]))
@@ -152,9 +155,8 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     axes[0].set_ylim(factor * max(bottom, 0.0), factor * top)
     _, symbol, si = _CONTROLS[case.held]
     words = f"{symbol} = {style.text_of(case.value, si)}, $w$ = {style.text_of(case.work, 'J/m^2')}"
-    axes[1].set_title(words, loc="right")
-    handles, names = axes[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc="outside upper left", ncols=3, handletextpad=0.5, labelspacing=0.25)
+    look: Any = {"ncols": 3, "handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
+    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", title=words, **look)
     return figure
 
 

@@ -56,7 +56,7 @@ def figure(dataset: xr.Dataset) -> Figure:
         panel.plot([best.time], [max(best.off, floor)], "*", color="black", markersize=7.0, zorder=5)
         panel.axhline(float(dataset.attrs["tolerance"]), color=REFERENCE, linestyle="--", linewidth=0.8)
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error")
-        panel.set_ylim(0.4 * floor, 2.5 * height.max())
+        panel.set_ylim(0.4 * floor, 2.5 * max(height.max(), float(dataset.attrs["tolerance"])))
         panel.margins(x=0.15)
         panel.yaxis.set_major_formatter(lambda y, _: "exact" if y <= 1.5 * floor else f"$10^{{{round(np.log10(y))}}}$")
         if np.ptp(np.log10(panel.get_xlim())) < 1.5:

@@ -3,7 +3,7 @@
 import difflib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,23 @@ def read(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quant
         raise BadInput([f"{path}: cannot be read ({fault.strerror}); name a CSV file"]) from None
     except TableError as fault:
         raise BadInput([f"{path}: {fault}"]) from None
+
+
+def given(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:
+    """Columns of measured values [SI] by name, beside some their errors.
+
+    Raises
+    ------
+    ValueError
+        For a name that is not known, or columns of different lengths.
+    """
+    found = {str(name): np.asarray(values, float) for name, values in columns.items()}
+    for name in found:
+        if name not in known and not (name.endswith(ERROR) and name.removesuffix(ERROR) in found):
+            raise ValueError(_unknown(name, known))
+    if len({values.shape for values in found.values()}) != 1 or next(iter(found.values())).ndim != 1:
+        raise ValueError("measured columns need the same number of rows; give arrays of one length")
+    return {name: Points(values, found.get(name + ERROR)) for name, values in found.items() if name in known}
 
 
 def _columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:

@@ -190,6 +190,8 @@ def test_measured_points_lie_where_they_were_measured_with_residuals_below(table
     assert np.isnan(off[2])  # beyond the ramp
     assert any(name.startswith(r"measured, $\chi^2$ =") and name.endswith("of 2") for name in legend_of(area)[0])
     assert area.get_xlim()[1] > 500.0
+    columns = {"speed": [2e-3], "contact_area": [4e-8], "contact_area_error": [1e-9]}
+    assert_allclose(points_of(draw(dataset, "curve", data=columns).axes[0])[0], [[2.0], [0.04 / full]], rtol=1e-12)
     absolute = draw(dataset, "curve", data=path, absolute=True).axes[0]
     assert_allclose(points_of(absolute)[0][1], [0.04, 0.03, 0.03], rtol=1e-14)
     radius = draw(dataset, "time", x="speed", data=path).axes[0]
@@ -230,6 +232,19 @@ def test_a_loop_has_measured_points_in_every_panel(table):
 def test_a_table_of_which_nothing_can_be_drawn_is_refused(ramp, table, text, said):
     with pytest.raises(ValueError, match=said):
         draw(ramp, "curve", data=table(text))
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ({"speed": [1e-3], "contact_aera": [4e-8]}, 'did you mean "contact_area"'),
+        ({"speed": [1e-3, 2e-3], "contact_area": [4e-8]}, "the same number of rows"),
+        ({}, "the same number of rows"),
+    ],
+)
+def test_columns_that_are_no_table_are_refused(ramp, columns, said):
+    with pytest.raises(ValueError, match=said):
+        draw(ramp, "curve", data=columns)
 
 
 # -- in Python and by the command -------------------------------------------------------------

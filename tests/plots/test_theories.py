@@ -100,7 +100,7 @@ def test_of_swept_loads_one_must_be_chosen():
     with pytest.raises(ValueError, match=r"of one contact.*--where contact_load="):
         plots.draw(dataset, "theories")
     figure = plots.draw(where(dataset, {"load": "4 mN"}), "theories")
-    assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in [panel.get_title("right") for panel in figure.axes]
+    assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in figure.legends[0].get_title().get_text()
 
 
 def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
