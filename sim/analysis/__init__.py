@@ -15,7 +15,7 @@ from sim.analysis.over_speed import crossing, loss_speeds, speed_curves
 from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
 from sim.analysis.stationary import distribution, over_time
 from sim.analysis.statistics import QUANTILES, averaging, shares, skewness_error, statistics, summary, where
-from sim.analysis.stick_slip import slips, stick_slip
+from sim.analysis.stick_slip import slip_sizes, slips, stick_slip
 from sim.analysis.tables import highlights, losses, notes, spread, table
 from sim.units.notation import concise, engineering, scaled
 
@@ -24,8 +24,8 @@ __all__ = [
     "correlation_time", "crossing", "distribution", "engineering", "events", "first_passage", "highlights",
     "integral_time", "is_stationary", "is_steady", "lifetime", "loop_energy", "loss_speeds", "losses", "notes",
     "observables", "over_time", "peaks", "reference_radii", "scaled", "setting", "settled", "share_observables",
-    "shares", "skewness_error", "slips", "speed_curves", "spread", "statistics", "stick_slip", "summary", "sweep_dims",
-    "table", "tidy", "to_csv", "where",
+    "shares", "skewness_error", "slip_sizes", "slips", "speed_curves", "spread", "statistics", "stick_slip", "summary",
+    "sweep_dims", "table", "tidy", "to_csv", "where",
 ]  # fmt: skip
 
 

@@ -139,8 +139,9 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     -------
     xarray.Dataset
         Under a stage ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one
-        speed those that begin in the second half of the run. ``kinetic_friction`` [N] is the work of the stage over
-        its path, from the beginning of the first of these slips to that of the last, without slips over that time.
+        speed those that begin in the second half of the run. ``slip_spread`` [1]: the standard deviation of their
+        displacements over its mean, see ``slip_sizes``. ``kinetic_friction`` [N] is the work of the stage over its
+        path, from the beginning of the first of these slips to that of the last, without slips over that time.
         Under a prescribed force see ``runaways``. Empty for other drives, and where only statistics were recorded.
     """
     if "stage_speed" not in dataset and {"runaway_time", "spring_force"} <= set(dataset):
@@ -148,7 +149,7 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     read = {*_READ, "drive_work", "stage_position"}
     if "stage_speed" not in dataset or not read <= set(dataset.variables):
         return xr.Dataset()
-    half = float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
+    half = _beginning(dataset)
     return in_blocks(keep(dataset, *read), (*sweep_dims(dataset), MEMBERS), lambda some: _means(some, half))
 
 
@@ -158,6 +159,11 @@ def _means(dataset: xr.Dataset, half: float) -> xr.Dataset:
     begins = found["slip_time"]
     counted = begins >= half
     means = found.where(counted).mean("slip", keep_attrs=True)
+    apart = (found["slip_amplitude"] - means["slip_amplitude"]).where(counted)
+    beyond_one = (counted.sum("slip") - 1.0).clip(0.0)
+    spread = ((apart**2).sum("slip") / beyond_one.where(beyond_one > 0.0)) ** 0.5
+    text = "standard deviation of the displacements in slips over their mean"
+    means["slip_spread"] = (spread / means["slip_amplitude"]).assign_attrs(units="1", long_name=text)
     counts = counted.sum("slip").astype(float).assign_attrs(units="1", long_name="number of slips")
     first, last = begins.where(counted).min("slip"), begins.where(counted).max("slip")
     several = last > first
@@ -168,6 +174,41 @@ def _means(dataset: xr.Dataset, half: float) -> xr.Dataset:
     kinetic = (made / gone.where(gone != 0.0)).assign_attrs(units="N", long_name="work of the stage over its path")
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
     return every.map(ordered, keep_attrs=True)
+
+
+def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = LEAST) -> xr.Dataset:
+    """Distribution of the sizes of slips, those of all members together.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, of a drive ``spring`` with each member recorded.
+    of : str
+        What the size is, as ``slips`` names it: ``"slip_amplitude"``, ``"force_drop"``, ``"recurrence_time"``, ...
+    least : float
+        How much the force of the spring falls in a slip at least, over its largest in the run [1].
+
+    Returns
+    -------
+    xarray.Dataset
+        The sizes, under their name and from the smallest on, with the dimension ``rank`` last (nan beyond those there
+        are), and ``share_as_large`` [1], the share of slips that are as large or larger. Of a stage at one speed those
+        that begin in the second half of the run.
+    """
+    found = slips(dataset, least)
+    sizes = found[of].where(found["slip_time"] >= _beginning(dataset))
+    over = [name for name in (MEMBERS, "slip") if name in sizes.dims]
+    sizes = sizes.drop_vars(over, errors="ignore").stack(rank=over, create_index=False)
+    ascending = sizes.copy(data=np.sort(sizes.to_numpy(), axis=-1))
+    count, rank = ascending.count("rank"), xr.DataArray(np.arange(sizes.sizes["rank"]), dims="rank")
+    share = (1.0 - rank / count).where(ascending.notnull())
+    text = "share of the slips that are as large"
+    return xr.Dataset({of: ascending, "share_as_large": share.assign_attrs(units="1", long_name=text)})
+
+
+def _beginning(dataset: xr.Dataset) -> float:
+    """Time from which on slips count [s]: half of the run behind a stage at one speed."""
+    return float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
 
 
 def runaways(dataset: xr.Dataset) -> xr.Dataset:

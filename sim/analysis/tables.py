@@ -85,6 +85,7 @@ _EVENTS = (
     _Column("force_drop", "drop", math.nan),
     _Column("stress_drop", "drop of\nstress", math.nan),
     _Column("slip_amplitude", "slip", math.nan),
+    _Column("slip_spread", "spread\nof slips", math.nan, meaning="standard deviation of slips over their mean"),
     _Column("slip_duration", "slip\nlasts", math.nan),
     _Column("stick_duration", "stick\nlasts", math.nan),
     _Column("recurrence_time", "slip\nevery", math.nan),

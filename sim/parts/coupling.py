@@ -14,11 +14,13 @@ from sim.laws.reversible import mean_stress_energy
 from sim.numerics.noise import Noise
 from sim.parts import coupling_equations as columns
 from sim.parts.bonds.cohorts import Cohorts, numbers_of
-from sim.parts.bonds.stretched import Ages, Cohort, FirstMoment, Stretches
+from sim.parts.bonds.stretched import Ages, Cohort, FirstMoment, Stretches, Tracked
+from sim.parts.bonds.tracked import AGAIN, Tracks
 from sim.parts.bonds.two_state import Counted, Population, Rate, Steady, Unbroken
 from sim.parts.coupling_cohorts import advance_cohorts
 from sim.parts.coupling_equations import Law, Resting, Slider
 from sim.parts.coupling_rows import advance_rows
+from sim.parts.coupling_tracks import advance_tracks
 from sim.parts.drive.driven import FIRST, STORED, Driven, Force, Spring
 from sim.parts.exchange import Array, Bonding, Flags, Motions, Parts, Sliding, Times
 
@@ -93,8 +95,8 @@ class Around(NamedTuple):
 
 
 #: Bonds that are solved together with a slider; those with a stretch.
-_Driven = FirstMoment | Cohort | Unbroken | Steady | Rate | Counted
-_WITH_STRETCH = FirstMoment | Cohort
+_Driven = FirstMoment | Cohort | Tracked | Unbroken | Steady | Rate | Counted
+_WITH_STRETCH = FirstMoment | Cohort | Tracked
 
 
 class _Units(NamedTuple):
@@ -188,7 +190,7 @@ def advance(
     numbers = _numbers(drive, bonds, around, units)
     bare = around.bare + np.zeros(len(rows))
     at = rows, energies, bare, given, clock, scales, stretch * force
-    population, bonding = _advanced(bonds, population, around.radius, at, numbers, (passed, spent))
+    population, bonding = _advanced(bonds, population, around.radius, at, numbers, (passed, spent), noise)
     stage, stage_speed = np.zeros((2, *passed[0].shape))
     if drive.spring:
         whole = pieces.joined
@@ -219,6 +221,7 @@ def _advanced(
     at: _Rows,
     numbers: _Numbers,
     passed: tuple[Array, Array],
+    noise: Noise,
 ) -> tuple[tuple[object, ...], Bonding]:
     """Bonds after some clock steps, which the rows ``at`` their start go through, and their readings at each.
 
@@ -233,6 +236,14 @@ def _advanced(
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance, math.inf)
         advance_cohorts(*at, numbers[0], numbers[2], *passed, share, rules, *cohorts, sums)
         return Ages(cohorts, seen), bonds.read(sums)
+    if isinstance(bonds, Tracked):
+        tracks = cast(Tracks, population)
+        tracks = tracks._replace(frame=tracks.frame.copy())
+        frames = np.empty((*passed[0].shape[1:], tracks.frame.shape[1]))
+        lives = (*bonds.law[:3], bonds.rebinding_rate), noise.seed, np.asarray(noise.members, dtype=np.uint64)
+        if advance_tracks(*at, numbers[0], numbers[2], *passed, tuple(tracks), *lives, frames):
+            raise RuntimeError(AGAIN)
+        return tracks, bonds.read(frames)
     if isinstance(bonds, FirstMoment):
         stretches = cast(Stretches, population)
         share, seen = bonds.kept(stretches.seen, radius)

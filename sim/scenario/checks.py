@@ -86,11 +86,7 @@ def _reversible_under_a_drive(drive: Drive, bonds: BondModel, contact: Contact) 
 def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
     if not drive.feeds_back:
         return
-    if not bonds.driven:
-        said = f'"{bonds.model}" bonds cannot feel a "{drive.model}" drive yet; use "none", "steady",'
-        said += ' "rate", "counted" or "cohort"'
-        yield ("bonds", "model"), said
-    elif not bonds.stretched:
+    if not bonds.stretched:
         if drive.contact_stiffness != "rigid":
             said = "bonds without a stretch hold interface and body together as one"
             yield ("drive", "contact_stiffness"), f'{said}: take "rigid", or bonds with a rupture'

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
@@ -107,6 +108,21 @@ def test_slips_follow_the_sense_of_the_stage_and_reversals_are_none():
     # there and back: the force falls from 3 to -3 as the stage turns, and nothing slips
     there = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0])
     assert analysis.slips(made(there, np.where(np.arange(9) < 5, 1.0, -1.0))).sizes["slip"] == 0
+
+
+def test_sizes_of_slips_are_shared_out_over_all_members():
+    saw = np.array([0.0, 4.0, 1.0, 4.0, 2.0, 4.0, 3.0, 4.0, 1.0, 2.0])
+    one, two = (made(sense * saw, sense * np.linspace(1.0, 1.1, 10)) for sense in (1.0, -1.0))  # no slip is left out
+    both = xr.concat([one, two], "member", data_vars="minimal", coords="minimal", compat="override", join="override")
+    found = analysis.slip_sizes(both, "force_drop")
+    assert_allclose(found["force_drop"], np.repeat([1.0, 2.0, 3.0], [2, 2, 4]), rtol=1e-14)
+    assert_allclose(found["share_as_large"], 1.0 - np.arange(8) / 8.0, rtol=1e-14)
+    amplitude = analysis.slips(one)["slip_amplitude"][0]
+    spread = analysis.stick_slip(one)["slip_spread"]
+    assert_allclose(spread, np.std(amplitude, ddof=1) / np.mean(amplitude), rtol=1e-12)
+    assert math.isnan(analysis.stick_slip(made(saw[:4]))["slip_spread"].item())  # of one slip
+    cells = [cell for cell in analysis.highlights(cycles())[0] if cell.startswith("spread")]
+    assert len(cells) == 1
 
 
 def test_what_falls_by_less_than_the_least_is_no_slip():

@@ -130,13 +130,15 @@ def check_pulled_off(states, read):
     assert np.isfinite(read["energy_residual"]).all()
 
 
-def check_members(scene, straight, speed=10.0):
-    """Taken up in the middle of its fastest slip, and a member alone, a march ends as that of all, bit for bit.
-
-    That is three times as fast as the ``speed`` of the stage.
-    """
+def fastest(straight, speed=10.0):
+    """Number of the state in the middle of the fastest slip, three times as fast as the ``speed`` of the stage."""
     slip = max(range(len(straight) - 1), key=lambda k: straight[k].drive.speed[0])
     assert straight[slip].drive.speed[0] > 3.0 * speed * STRETCH
+    return slip
+
+
+def check_members(scene, straight, slip):
+    """Taken up at the state of this number, and a member alone, a march ends as that of all, bit for bit."""
     again = list(march(scene, np.arange(3), unpack(scene, pack(straight[slip]))))
     alone = list(march(scene, np.array([1])))
     one, other, single = (pack(states[-1]) for states in (straight, again, alone))

@@ -15,6 +15,7 @@ from helpers.driven import (
     R,
     check_blocks,
     check_members,
+    fastest,
     marched,
     pulled,
     residual,
@@ -161,7 +162,7 @@ def test_the_missing_energy_falls_with_the_tolerance_while_the_area_follows_the_
 def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys, area):
     scene = stuck(12.0, 240, renewed(area=area), pulled(1.0, 0.3, **keys), share=0.5)
     straight = list(march(scene, np.arange(3)))
-    check_members(scene, straight, 0.3)
+    check_members(scene, straight, fastest(straight, 0.3))
     if area == "present":
         check_blocks(scene, straight, 4)
 
@@ -231,7 +232,7 @@ def test_counted_bonds_of_a_slider_fluctuate_as_independent_sites_in_steady_slid
 def test_counted_bonds_at_rest_carry_the_pull_up_to_their_strength_and_are_the_same_in_any_batch():
     scene = stuck(6.0, 240, counted(40), pulled(1.0, 0.5, damping=0.05), share=0.5, members=3)
     straight = list(march(scene, np.arange(3)))
-    check_members(scene, straight, 0.5)
+    check_members(scene, straight, fastest(straight, 0.5))
     force, bound, rest = (
         np.array(values)
         for values in zip(

@@ -38,8 +38,6 @@ class Common:
     """Attributes of all models, as they are where all members share one population."""
 
     in_place: ClassVar[bool] = False
-    #: Whether a drive that feels the friction can be solved together with this model.
-    driven: ClassVar[bool] = False
     #: Whether they are solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = False
     #: Rough time of a step of a batch where it is made alone, for estimates [s].

@@ -116,7 +116,6 @@ class FirstMoment(OverArea, _Separable):
 
     state_class: ClassVar[type[Stretches]] = Stretches
     knows_forces: ClassVar[bool] = False
-    driven: ClassVar[bool] = True
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Stretches:
@@ -184,7 +183,6 @@ class Cohort(OverArea, _Stretched):
 
     state_class: ClassVar[type[Ages]] = Ages
     step_seconds: ClassVar[float] = 10e-6
-    driven: ClassVar[bool] = True
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Ages:
@@ -249,18 +247,20 @@ class Tracked(_Separable):
     def advance(self, state: Tracks, motions: Motions, radius: Array, noise: Noise) -> tuple[Tracks, Bonding]:
         laws, address = (self.law, self.rebinding_rate), (noise.seed, noise.members)
         state, frames = tracks.advance(state, motions.slip, motions.duration[:, 0], *laws, *address)
-        return state, self._read(frames)
+        return state, self.read(frames)
 
     def followed(self, speeds: Array, step: float) -> float:
         lives = step / (tracks.mean_life(speeds, self.law) + 1.0 / self.rebinding_rate)
         return float(self.sites * np.mean(np.minimum(lives, CYCLES)))
 
     def bonding(self, state: Tracks) -> Bonding:
-        return self._read(state.frame)
+        return self.read(state.frame)
 
-    def _read(self, frames: Array) -> Bonding:
-        # one bond after the other breaks, at a limit or by itself
-        return self._bonding(*tracks.moments(frames, self.sites), np.zeros(1), _UNKNOWN)
+    def read(self, frames: Array) -> Bonding:
+        """Readings of frames: one bond after the other breaks, at a limit or by itself."""
+        bound, stretch, square = tracks.moments(frames, self.sites)
+        stored = 0.5 * self.site_density * self.bond_stiffness * square
+        return self._bonding(bound, stretch, square, np.zeros(1), _UNKNOWN)._replace(stored=stored)
 
     def steady(self, speed: Array) -> Bonding:
         return Cohort(self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density).steady(speed)

@@ -19,6 +19,9 @@ from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER,
 from sim.parts.bonds.tracked_step import ENDLESS, SPENT, draw, live
 from sim.parts.exchange import Array
 
+#: What is said of a state that is spent.
+AGAIN = "these tracks have been advanced already: go on from the newest state, or from copies"
+
 
 class Tracks(NamedTuple):
     """State of the bonds of all members; plain arrays, so that it can be written and read back.
@@ -142,7 +145,7 @@ def advance(
     while done < len(duration):
         done = live(tuple(after), slip, duration, *rupture[:3], rebinding_rate, seed, members, done, frames)
         if done == SPENT:
-            raise RuntimeError("these tracks have been advanced already: go on from the newest state, or from copies")
+            raise RuntimeError(AGAIN)
         if done == ENDLESS:
             raise ValueError("slip and duration of a step must be finite, and its duration positive")
         left = after.frame[:, STEPS] < tracks.frame[:, STEPS] + done

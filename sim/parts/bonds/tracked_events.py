@@ -123,7 +123,7 @@ def look_up(count, space):
 
 
 @device
-def _moment(passed, rate, pace, cut, duration):
+def moment(passed, rate, pace, cut, duration):
     """Time within a step at which the clock has passed so much, or a bond is cut; of ``duration`` at most."""
     time = passed / rate
     u = 1.0 + pace * time  # ln u/(u - 1) takes back what the sum has rounded: log1p
@@ -179,7 +179,7 @@ def follow(bonds, soonest, count, law, address, space):
                     number += np.uint32(1)
                     one, two, _, _ = words_at(seed, PART, _U(i + 1), _U(number), member, _U(0))
                     end = (x + limit - steps[k, _X]) / speed if bounded and speed > 0.0 else math.inf
-                    passed = _moment(at - steps[k, _CLOCK], rate, pace, end, steps[k, _DURATION])
+                    passed = moment(at - steps[k, _CLOCK], rate, pace, end, steps[k, _DURATION])
                     x, wait = exponential(one), exponential(two) / rebinding
                     at = -max(steps[k, _T] + passed + wait, TINY) if rebinding > 0.0 else -math.inf
                 else:

@@ -135,7 +135,7 @@ def _set(bonds, soonest, row, law, singly, turn):
 
 
 #: Arrays of ``Tracks``.
-_TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1]))"
+TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1]))"
 
 
 @device
@@ -207,8 +207,15 @@ def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, sha
     return count
 
 
+@device
+def one_step(bonds, soonest, row, slip, duration, law, address, space, laid, frame):
+    """Take a row through one step, of arrays of length one; ``laid`` and ``frame`` are room for what it is not kept."""
+    laid[0] = math.nan
+    _advance(bonds, soonest, row, slip, duration, law, address, space, laid, False, frame)
+
+
 @kernel(
-    f"int64({_TRACKS}, float64[:,:], float64[:], float64, float64, float64, float64, uint64, uint64[:], int64,"
+    f"int64({TRACKS}, float64[:,:], float64[:], float64, float64, float64, float64, uint64, uint64[:], int64,"
     " float64[:,:,::1])"
 )
 def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members, first, frames):
@@ -249,7 +256,7 @@ def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members
 
 
 @kernel(
-    f"void({_TRACKS}, boolean[:], float64[:], float64[:], float64[:], float64, float64, float64, float64,"
+    f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], float64, float64, float64, float64,"
     " uint64, uint64[:])"
 )
 def draw(tracks, chosen, speed, share, age, rate, softness, limit, rebinding, seed, members):

@@ -113,7 +113,6 @@ def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound)
 class _AtOnce(_WithoutStretch):
     """Bonds that are steady at every speed."""
 
-    driven: ClassVar[bool] = True
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Population:
@@ -157,7 +156,6 @@ class Rate(OverArea, _WithoutStretch):
     area: Area = "present"
     model: Literal["rate"] = "rate"
 
-    driven: ClassVar[bool] = True
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Population:
@@ -197,8 +195,6 @@ class Counted(_WithoutStretch):
     stress: Stress = 0.0
     start_from: Start = "steady"
     model: Literal["counted"] = "counted"
-
-    driven: ClassVar[bool] = True
 
     @property
     def per_member(self) -> bool:
