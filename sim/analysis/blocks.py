@@ -34,7 +34,8 @@ def blocks(dataset: xr.Dataset, dims: Sequence[str], room: int | None = None) ->
             over *= lengths[name] / size
     ranges = [range(0, dataset.sizes[name], length) for name, length in lengths.items()]
     for starts in itertools.product(*ranges):
-        yield {n: slice(at, at + lengths[n]) for n, at in zip(lengths, starts, strict=True)}
+        ends = (min(at + lengths[n], dataset.sizes[n]) for n, at in zip(lengths, starts, strict=True))
+        yield {n: slice(at, end) for n, at, end in zip(lengths, starts, ends, strict=True)}
 
 
 def keep(dataset: xr.Dataset, *names: str) -> xr.Dataset:

@@ -124,6 +124,19 @@ def test_blocks_of_a_few_numbers_give_the_statistics_of_all_at_once(ramp, tmp_pa
     xr.testing.assert_identical(analysis.loop_energy(cycles), loops)
 
 
+@pytest.mark.parametrize("packed", [None, (2, 4)])
+@pytest.mark.parametrize(("read", "room"), [(10**6, 10**6), (1000, 400), (700, 100), (8, 8)])
+def test_blocks_within_what_is_read_at_once_cover_all_of_it(monkeypatch, read, room, packed):
+    monkeypatch.setattr(blocks, "READ", read)
+    monkeypatch.setattr(blocks, "ROOM", room)
+    numbers = xr.Dataset({"x": (("member", "t"), np.arange(7.0 * 23.0).reshape(7, 23))})
+    numbers["x"].encoding["chunksizes"] = packed
+    for dims in (("t",), ("member",), ("member", "t"), ("t", "member")):
+        xr.testing.assert_equal(blocks.in_blocks(numbers, dims, lambda some: 2.0 * some), 2.0 * numbers)
+    records = np.array([0, 3, 4, 11, 22])
+    xr.testing.assert_equal(blocks.at_records(numbers, records), numbers.isel(t=records))
+
+
 def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep_and_of_more_members(tmp_path):
     pytest.importorskip("dask")
     kept = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}
