@@ -232,8 +232,12 @@ def _slider(points: Sequence[Scenario]) -> Rows:
         if not bonds.stretched:
             continue
         if drive.mass > 0.0 or firm < math.inf:
-            stiffest = float(np.nanmax(behind.stiffness))
-            rows.setdefault(("with mass and k_t", "N/m of the spring, without damping"), []).append(stiffest)
+            stiffest, name = float(np.nanmax(behind.stiffness)), "with mass and k_t" if drive.mass > 0.0 else "with k_t"
+            if stiffest < math.inf:
+                rows.setdefault((name, "N/m of the spring, without damping"), []).append(stiffest)
+            else:
+                said = "behind any spring, without damping: k_t is so soft that the interface jumps by itself"
+                rows.setdefault((name, said), [])
         if drive.mass == 0.0 and (grows := stretching.amplitude(speeds)) is not None:
             said = "suddenly, with large slips; on the way back they last to a stiffer spring"
             if grows[worst] > 0.0:

@@ -311,6 +311,7 @@ def test_no_line_joins_speeds_before_and_after_a_jump():
 
 
 THERE_AND_BACK = drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.02, 0.0))
+WAVES = {"model": "band", "rms": "10 kPa", "longest": "60 um", "shortest": "16 um"}
 CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equilibrium", "indentation": 1e-6}]}
 
 
@@ -328,7 +329,8 @@ CONTACTS = {"contact": [{"model": "equilibrium", "load": 4e-3}, {"model": "equil
          "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=5e2, sites=9)},
         {"sweep": CONTACTS},
         {"sweep": {"contact.load": {"from": "0 mN", "to": "20 mN", "count": 12}}},
-        {"drive": STEADY, "sweep": {"shear": [{"model": "uniform"}] * 2, "contact.load": [0.0, 1e-3]}},
+        {"drive": STEADY, "sweep": {"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": WAVES}],
+                                    "contact.load": [0.0, 1e-3]}},
         {"shear": shear.Uniform(), "bonds": bonds.Unbroken()},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
     ],

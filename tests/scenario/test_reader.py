@@ -479,7 +479,7 @@ def test_of_a_long_sweep_the_fluctuations_are_built_at_both_ends_only(scene, mon
 def test_a_point_inside_a_long_sweep_that_cannot_be_built_is_bad_input(scene):
     band = {"model": "band", "rms": "1 kPa", "longest": "120 um", "shortest": "60 um"}
     mapped = {"model": "mapped", "points": 64, "correlation": {"model": "time", "time": 1}, "spectrum": band}
-    cells = [0.24e-3] * 33 + [1e-2] + [0.24e-3] * 33
+    cells = [*np.linspace(0.23e-3, 0.24e-3, 33), 1e-2, *np.linspace(0.25e-3, 0.26e-3, 33)]
     points = scene(overrides={"shear": mapped, "sweep": {"shear.cell": cells}}).points()
     assert points[0].process
     with pytest.raises(BadInput, match="shear: "):
