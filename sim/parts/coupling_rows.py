@@ -31,7 +31,7 @@ from sim.parts.coupling_equations import (
     rested,
     share_left,
 )  # fmt: skip
-from sim.parts.coupling_step import NEAR, book, newton, snap, stored_in, tried
+from sim.parts.coupling_step import NEAR, area_kept, book, newton, snap, stored_in, tried
 from sim.parts.drive.driven import AREA, STORED, WORK
 
 #: Share of a clock step below which a sub-step means that there is no solution to go on with.
@@ -41,6 +41,9 @@ _BRIEF = 1e-9
 MOST_STEPS = 2_000_000
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
+#: Shares of bonds and of a piece beyond which equilibrium is looked for where there is no way on, and most changes
+#: between stick and slip in a piece.
+_NEXT_TO, _CHANGES = 1e-6, 10_000
 #: Turns in which area and stress of a slider at rest settle.
 _FEW_TURNS = 20
 
@@ -131,7 +134,7 @@ def _piece(row, bare, slider, law, held, piece, room, energy):
 def _slips(time, start, row, bare, slider, law, held, piece):
     """Pull beyond what the bonds bear at a time if nothing has moved since the start, over the unit of force."""
     share = rested(row[BOUND], time - start, law)
-    _, area, _, _ = contact_area(share, share, time, row[RADIUS], bare, held)
+    _, area, _, _ = area_kept(share, share, time, row, bare, held)
     return math.fabs(pull_on(time, start, 0.0, row, slider, piece)) - area * share
 
 
@@ -160,7 +163,7 @@ def _rest(row, start, settles, bare, slider, law, held, piece, energy):
         energy[WORK] += 0.5 * (last - first) * (last + first) / slider[0]
     moment, share = 0.0, rested(row[BOUND], end - start, law)
     for _ in range(_FEW_TURNS):  # the stress takes a little of the area, if adhesion pays for it
-        radius, area, _, _ = contact_area(share, moment, end, row[RADIUS], bare, held)
+        radius, area, _, _ = area_kept(share, moment, end, row, bare, held)
         moment = last / area if area > 0.0 else 0.0
     row[FORCE], row[BOUND], row[RADIUS], row[MOMENT] = last, share, radius, moment
     row[SPEED], row[BODY] = 0.0, 0.0
@@ -175,13 +178,13 @@ def _jump(row, time, bare, slider, law, held):
     """
     _, _, damping, viscosity, _, _, _, _ = slider
     pull, speed = math.fabs(row[FORCE]), 0.0
-    _, area, _, _ = contact_area(0.0, 0.0, time, row[RADIUS], bare, held)
+    _, area, _, _ = area_kept(0.0, 0.0, time, row, bare, held)
     if not damping + area * viscosity > 0.0:  # an open contact
         return 0.0
     speed = pull / (damping + area * viscosity)
     for _ in range(100):
         share = row[BOUND] * share_left(law[5] * speed, law)
-        _, area, by_bound, by_moment = contact_area(share, share, time, row[RADIUS], bare, held)
+        _, area, by_bound, by_moment = area_kept(share, share, time, row, bare, held)
         bears = damping + area * viscosity
         slope = bears - law[6] * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
         change = (bears * speed + area * share - pull) / slope
@@ -201,6 +204,11 @@ def _slide(row, start, bare, slider, along, held, piece, room, energy):
         step = left if step > 0.999 * left else min(step, 0.5 * left)
         if not step > LEAST * length:
             row[NEXT] = 0.0
+            left = row[BOUND] * (1.0 - _NEXT_TO), start + _NEXT_TO * length
+            _, area, _, _ = contact_area(left[0], row[MOMENT], left[1], row[RADIUS], bare, held)
+            if not area >= 0.0:  # lost: the radius stays for the rest of the clock step
+                held = later(held, 0.0, 1.0)
+                continue
             return start if slider[1] == 0.0 or row[SPEED] == 0.0 else -1.0
         grows, stands = tried(row, start, step, bare, slider, along, held, piece, room)
         if not stands:
@@ -249,7 +257,9 @@ def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
     """Go through one piece with bonds that bear any pull up to their strength at rest; the time reached."""
     start, length = 0.0, piece[0]
     stuck, sense = 0, 0.0
-    while start < length:
+    for _ in range(_CHANGES):
+        if start >= length:
+            return length
         rests = row[SPEED] == 0.0
         if rests:
             before = start
@@ -272,7 +282,7 @@ def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
             return 0.0
         if start < length:
             row[SPEED] = row[BODY] = 0.0
-    return length
+    return start
 
 
 @device

@@ -276,11 +276,18 @@ def book(row, start, step, bare, slider, law, held, piece, room, energy):
 
 
 @device
+def area_kept(bound, moment, time, row, bare, held):
+    """What ``contact_area`` gives for such bonds, and the area of the row where equilibrium was lost on the way."""
+    radius, area, by_bound, by_moment = contact_area(bound, moment, time, row[RADIUS], bare, held)
+    if area >= 0.0:
+        return radius, area, by_bound, by_moment
+    return row[RADIUS], math.pi * row[RADIUS] * row[RADIUS] / held[10], 0.0, 0.0
+
+
+@device
 def stored_in(row, bare, time, slider, law, held):
     """Elastic and kinetic energy of spring, body, contact and bonds."""
-    _, area, _, _ = contact_area(row[BOUND], row[MOMENT], time, row[RADIUS], bare, held)
-    if not area >= 0.0:  # equilibrium was lost on the way
-        area = math.pi * row[RADIUS] * row[RADIUS] / held[10]
+    _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
     stiffness, mass, _, viscosity, _, _, _, _ = slider
     energy = 0.5 * mass * row[BODY] * row[BODY]
     energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])

@@ -10,6 +10,7 @@ from helpers.driven import (
     HELD,
     LOAD,
     MODULUS,
+    PULLED_OFF,
     STRETCH,
     WORK,
     R,
@@ -198,6 +199,19 @@ def test_a_contact_that_pays_for_its_mean_stress_follows_it_within_the_sub_steps
     assert_allclose(radii, exact, rtol=1e-9)
     assert np.min(radii) < 0.97 * np.max(radii)
     assert missing[1] < missing[0]
+    check_blocks(scene, states)
+
+
+@pytest.mark.parametrize("keys", [{"damping": 0.1}, {"mass": 0.05}])
+@pytest.mark.parametrize("bonds", [renewed(), Steady(critical_speed=STRETCH, stress=COULOMB)])
+def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_it_up_again(bonds, keys):
+    scene = stuck(3.0, 30, bonds, pulled(1.0, 1.0, **keys), share=0.5, **PULLED_OFF)
+    states, read = marched(scene)
+    open_ = np.isnan([state.contact.radius[0] for state in states])
+    assert open_[13:20].all()
+    assert not open_[:11].any() and not open_[21:].any()
+    assert np.isnan(read["runaway_time"]).all()
+    assert residual(read) < 1e-5
     check_blocks(scene, states)
 
 
