@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import is_steady, setting, sweep_dims
+from sim.analysis.scene import word
 from sim.plots import style
 from sim.plots.bond_laws import Steady, population_of, rest_of, steady_laws
 from sim.plots.curves import Line, Scene, contact_curves, over_speed, speed_dim
@@ -39,6 +40,8 @@ def needs_stress(dataset: xr.Dataset) -> None:
         raise ValueError("the run ends before the slider starts; make clock.duration longer than drive.rest")
     if not bool((style.recorded(dataset, "shear_stress") != 0.0).any()):
         raise ValueError('the bonds bear no shear stress; give them one, such as [bonds] stress = "0.3 MPa"')
+    if bool((word(dataset, "drive.model", "") == "force").any()):
+        raise ValueError("stress is drawn over the speed, and a force is prescribed; see the figure creep")
     if rest is None and is_steady(dataset) and speed_dim(dataset) is None:
         cure = 'ramp it: [drive] model = "ramp", or rest and start: [drive] model = "start"'
         raise ValueError(f"stress is drawn over the speed, which neither changes nor is swept; {cure}")

@@ -162,9 +162,15 @@ def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
 def _area_over_speed(dataset: xr.Dataset) -> Iterator[str]:
     """What the area loses from the lowest to the highest speed, to which mechanism, and at which speeds.
 
-    Nothing behind a spring, where the area at one speed of the stage is that of a moment between stick and slip.
+    Behind a spring the area at one speed of a steady stage is the mean over stick and slip, and under a ramp nothing,
+    where it is that of a moment.
     """
     if speed_name(dataset) != "speed":
+        if is_stationary(dataset):
+            places = _places(dataset, _at_the_end(dataset))
+            yield from _ranged(places, "area_ratio", "The contact area over JKR's")
+            for name, words in _TAKEN.items():
+                yield from _ranged(places, name, f"What is lost of JKR's area to {words}")
         return
     given = dataset
     if is_steady(dataset):
@@ -232,10 +238,7 @@ def _of_the_run(*asked: tuple[str, str]) -> Callable[[xr.Dataset], Iterator[str]
     """Sentences on what a whole run has once: names of events, and what each is in words."""
 
     def answer(dataset: xr.Dataset) -> Iterator[str]:
-        found = events(dataset)
-        for name in {name for name, _ in asked} & set(dataset.data_vars) - set(found):
-            found[name] = dataset[name].astype(float)
-        places = _places(dataset, summary(found, quantiles=False))
+        places = _places(dataset, summary(events(dataset), quantiles=False))
         for name, words in asked:
             yield from _ranged(places, name, words)
 

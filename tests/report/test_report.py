@@ -14,6 +14,7 @@ from helpers.commands import SCENE, sim
 from helpers.pictured import STEADY, drawn, field, mapped, simulated
 
 from sim import analysis
+from sim.analysis.observables import all_observables
 from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
@@ -288,6 +289,7 @@ def test_creep_says_what_is_borne_and_when_more_gives_way():
     )
     speed, gone = (dataset[name].isel(t=-1, member=0).to_numpy() for name in ("speed", "runaway_time"))
     shown = [analysis.engineering(number, "m/s") for number in speed[:2]] + [analysis.engineering(gone[2], "s")]
+    assert "stress" not in kinds.drawable(dataset)  # over a speed that nothing sets
     crept, late = plainly(answers.answers(dataset))
     assert crept.startswith("Where the force is borne") and crept.endswith(f"to {shown[1]} (drive force 8 mN).")
     assert late.startswith("The time after which the contact gives way goes from")
@@ -302,6 +304,17 @@ def test_a_map_of_stability_says_where_slips_follow_each_other_and_behind_which_
     assert f" is {analysis.engineering(float(along.where(up)[1]), 'm/s')} (drive stiffness 50 N/m)." in begins
     assert f" is {analysis.engineering(float(along.where(~up).min()), 'm/s')} (drive stiffness 50 N/m)." in ends
     assert never == "It never does with drive stiffness 1.6 kN/m."
+
+
+def test_steady_stages_say_what_the_mean_over_stick_and_slip_loses_and_to_what():
+    sweep = {"drive.stage": [1e-3, 1e-2]}
+    dataset = shipped("stick_slip", sweep=sweep, clock={"duration": "0.4 s", "step": "2 ms"})
+    found = analysis.summary(analysis.settled(all_observables(dataset)), quantiles=False).isel(t=-1)
+    area, lost = (100.0 * found[f"{name}_mean"].to_numpy() for name in ("area_ratio", "lost_to_bonds"))
+    said = plainly(answers.answers(dataset))
+    assert f"from {min(area):.4g} %" in said[0] and f"to {max(area):.4g} %" in said[0]
+    assert f"from {min(lost):.4g} %" in said[1] and said[1].startswith("What is lost of JKR's area to broken bonds")
+    assert not [one for one in said if "on the ramp" in one]
 
 
 def test_where_no_kind_of_scene_fits_nothing_is_claimed(monkeypatch, ramp):
