@@ -137,16 +137,14 @@ CONTACTS = {
 
 
 def go_together(case):
-    """Whether the bonds of a case, by the names of its depths, can feel its drive."""
-    part, population = DRIVES[case.get("drive", "steady")], BONDS[case.get("bonds", "rate, bell")]
+    """Whether contact and bonds of a case, by the names of its depths, can feel its drive."""
+    part, contact = DRIVES[case.get("drive", "steady")], CONTACTS[case.get("contact", "load")]
     if not part.feeds_back:
         return True
-    if CONTACTS[case.get("contact", "load")].reversible:
-        return population.model == "rate" and population.stretched and not part.at_once
-    if not getattr(population, "driven", False):
+    population = BONDS[case.get("bonds", "rate, bell")].chosen(1e-8, False)
+    if contact.reversible and (population.model in ("cohort", "tracked") or part.at_once):
         return False
-    bears = population.stretched or part.contact_stiffness == "rigid"
-    return bears and not (part.at_once and (population.snaps or not population.stretched))
+    return population.stretched or (part.contact_stiffness == "rigid" and not part.at_once)
 
 
 def scene(members=3, steps=8, **parts):
