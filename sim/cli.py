@@ -3,6 +3,7 @@
 import atexit
 import contextlib
 import gc
+import os
 import signal
 import sys
 import time
@@ -43,6 +44,7 @@ def main() -> None:
     """Run the command line; every foreseen trouble ends in one message and its exit code."""
     gc.set_threshold(500_000)  # imports make many objects that stay: looking through them is a tenth of a start,
     atexit.register(gc.freeze)  # and as much of the end
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else what all packages declare is looked through
     for order in (signal.SIGTERM, signal.SIGHUP):  # schedulers stop a run by these
         signal.signal(order, signal.default_int_handler)
     replace_unknown()
