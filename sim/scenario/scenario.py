@@ -357,7 +357,7 @@ _FIELDS = tuple(item.name for item in fields(Scenario))
 def table_adapter(name: str) -> TypeAdapter[Any]:
     """What checks a table of a scenario by itself."""
     declared = getattr(Scenario, "__pydantic_fields__", {})[name]
-    kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator)]
+    kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator), *declared.metadata]
     return TypeAdapter(kind)
 
 
