@@ -1,7 +1,6 @@
 """Times at which something first happens in a run, known although many a run ends before it does."""
 
-import warnings
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -9,7 +8,7 @@ from scipy import special
 
 from sim.analysis.observables import ordered
 from sim.analysis.scene import MEMBERS, is_stationary
-from sim.analysis.statistics import LEVEL
+from sim.analysis.statistics import LEVEL, WIDE
 
 
 class Lifetime(NamedTuple):
@@ -55,16 +54,7 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     watched = np.where(happened, times, ends)
     half = low = high = np.nan
     if np.any(happened) and np.all(np.isfinite(watched)):
-        from scipy import stats  # heavy: a second, for what few datasets have
-
-        sample = stats.CensoredData(uncensored=watched[happened], right=watched[~happened])
-        survival = stats.ecdf(sample).sf
-        half = _falls(survival)
-        if happened.sum() > 1:
-            with warnings.catch_warnings():  # there is none where the survival is 1 or 0
-                warnings.filterwarnings("ignore", "The confidence interval is undefined", RuntimeWarning)
-                interval = survival.confidence_interval(LEVEL, method="log-log")
-            low, high = _falls(interval.low), _falls(interval.high)
+        half, low, high = _halves(watched, happened)
     count, exposure, tail = float(happened.sum()), float(np.sum(watched)), 0.5 - 0.5 * LEVEL
     if not exposure > 0.0:
         return Lifetime(half, low, high, np.nan, np.nan, np.nan)
@@ -73,10 +63,22 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
 
 
-def _falls(survival: Any) -> float:
-    """When a survival first is one half or less; nan if it never is."""
-    below = np.flatnonzero(survival.probabilities <= 0.5)
-    return float(survival.quantiles[below[0]]) if below.size else np.nan
+def _halves(watched: np.ndarray, happened: np.ndarray) -> list[float]:
+    """When a survival, and the ends of its interval, first are one half or less; nan where they never are.
+
+    As by ``scipy.stats.ecdf``, whose import takes a second.
+    """
+    when, of, each = np.unique(watched, return_inverse=True, return_counts=True)
+    events, at_risk = np.bincount(of, happened), watched.size - np.cumsum(each) + each
+    left = at_risk - events
+    survival = left / watched.size if np.all(happened) else np.cumprod(left / at_risk)
+    with np.errstate(divide="ignore", invalid="ignore"):  # there is no interval where the survival is 1 or 0
+        logarithm = np.log(survival)
+        width = WIDE * np.sqrt(1.0 / logarithm**2 * np.cumsum(events / (at_risk * left)))
+        ends = [np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)]
+    several = happened.sum() > 1
+    below = [np.flatnonzero(values <= 0.5) for values in (survival, *(ends if several else 2 * [np.empty(0)]))]
+    return [float(when[places[0]]) if places.size else np.nan for places in below]
 
 
 def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
