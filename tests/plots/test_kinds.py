@@ -191,6 +191,18 @@ def test_a_curve_beneath_another_is_wide_enough_to_be_seen():
         {line.get_linewidth() for line in panel.lines if line.get_linestyle() == "-"} for panel in (area, friction)
     ]
     assert len(widths[0]) == 2 and len(widths[1]) == 1
+    dataset = simulated(shear=shear.Uniform(), sweep={"bonds.stress": [1e5, 2e5, 3e5, 4e5]})
+    lines = [line for line in plots.draw(dataset, "curve").axes[0].lines if line.get_linestyle() == "-"]
+    assert [round(line.get_linewidth(), 9) for line in lines] == [4.2, 3.2, 2.2, 1.2]
+
+
+def test_a_swept_value_has_the_unit_of_its_axis_unless_it_is_small_there_and_letters_have_words():
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": [4e-6, 1e-3, 4e-3]})
+    assert [pictures.swept_value(dataset, "contact_load", at) for at in range(3)] == [
+        "$P$ = 4 µN", "$P$ = 1 mN", "$P$ = 4 mN",
+    ]  # fmt: skip
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.reversible": [0.0, 0.1]})
+    assert pictures.swept_value(dataset, "contact_reversible", 1) == r"reversible $\alpha$ = 0.1"
 
 
 def test_a_fluctuation_energy_too_small_to_see_has_a_panel_of_its_own(ramp):

@@ -103,6 +103,14 @@ def test_of_swept_loads_one_must_be_chosen():
     assert "$P$ = 4 mN, $w$ = 42 mJ/m²" in figure.legends[0].get_title().get_text()
 
 
+def test_the_last_record_of_a_run_whose_speed_changes_is_filled():
+    dataset = simulated(shear=shear.Uniform())
+    panel = plots.draw(dataset, "theories").axes[0]
+    (last,) = (line for line in panel.lines if line.get_label() == "simulated, the last record")
+    at = [1e-3 * dataset["shear_stress"][-1], 1e6 * dataset["contact_area"][-1]]
+    assert_allclose(np.ravel(last.get_data()), at, rtol=1e-14)
+
+
 def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
     contact = Equilibrium(load=4e-3, reversible=0.02)
     dataset = plain(contact=contact, sweep={"contact.reversible": [0.0, 0.02, 1.0], "bonds.stress": [1e4, 3e4]})
