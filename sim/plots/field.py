@@ -63,7 +63,7 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     then = f"$t$ = {style.text_of(float(stress['map_time']), 's')}, $V$ = {style.text_of(speed, 'm/s')}"
     with where_recorded():
         mean = float(_then(dataset, "shear_stress", where, stress))
-        then += rf", beside the mean $\tau_0$ = {style.rounded(mean, 'Pa')}"
+        then += rf", mean $\tau_0$ = {style.rounded(mean, 'Pa')}"
     axes[0].set_title(", ".join(filter(None, [point, then])))
     return figure
 

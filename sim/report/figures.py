@@ -82,7 +82,7 @@ def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
         found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
         try:
             yield found._replace(svg=svg_of(kinds.draw(dataset, kind), f"f{number}-"))
-        except ValueError as fault:  # such as more curves than can be told apart
+        except ValueError as fault:  # such as what one kind alone finds out as it draws
             yield found._replace(lacks=str(fault))
 
 

@@ -65,7 +65,7 @@ def test_the_map_of_a_member_nearest_to_a_time_is_drawn_and_says_when():
         rounding = 1e-13 * np.max(np.abs(stress))
         assert_allclose(shown.T[np.ix_(at, at)], stress[:16, :16], rtol=0.0, atol=rounding)
         assert f"$t$ = {(200, 400)[place]} ms" in figure.axes[0].get_title()
-        assert r"beside the mean $\tau_0$ = " in figure.axes[0].get_title()
+        assert r"mean $\tau_0$ = " in figure.axes[0].get_title()
     with pytest.raises(ValueError, match="no stress maps"):
         draw(dataset, "map", member=3)
 
