@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 #: Bytes of trajectories that are worked on at once, and that are read at once where a file packs them together.
-ROOM, READ = 2**25, 2**28
+ROOM, READ = 2**25, 2**27
 
 
 def blocks(dataset: xr.Dataset, dims: Sequence[str], room: int | None = None) -> Iterator[dict[str, slice]]:
@@ -81,13 +81,12 @@ def at_records(dataset: xr.Dataset, records: np.ndarray) -> xr.Dataset:
     for name, variable in dataset.variables.items():
         if "t" in variable.dims and name != "t":
             values = np.empty((*variable.shape[:-1], len(records)), variable.dtype)
-            for block in blocks(dataset[[name]], [str(dim) for dim in variable.dims], READ):
-                *outer, times = block.values()
-                inside = (records >= times.start) & (records < times.stop)
-                if inside.any():
-                    wanted = records[inside]
-                    read = variable[(*outer, slice(wanted[0], wanted[-1] + 1))].to_numpy()
-                    values[(*outer, inside)] = read[..., wanted - wanted[0]]
+            pieces = records // _chunk(variable, "t")
+            for piece in np.unique(pieces):
+                inside = pieces == piece
+                wanted = records[inside]
+                read = variable[..., slice(wanted[0], wanted[-1] + 1)].to_numpy()
+                values[..., inside] = read[..., wanted - wanted[0]]
             found = found.assign({name: found[name].copy(data=values)})
     return found
 

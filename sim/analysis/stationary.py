@@ -192,7 +192,7 @@ class _Quantiles:
         self.some.append(known.ravel()[:: self.stride].copy())
         kept = sum(some.size for some in self.some)
         if kept > 2 * _SAMPLE:
-            self.some = [np.concatenate(self.some)[:: kept // _SAMPLE]]
+            self.some = [np.concatenate(self.some)[:: kept // _SAMPLE].copy()]
             self.stride *= kept // _SAMPLE
 
     @property
