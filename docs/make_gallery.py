@@ -520,6 +520,29 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 @asks(
+    "motor_clutch",
+    "On which substrate does a cell pull hardest: soft, stiff, or in between?",
+    """In between: on one of {best:g} pN/nm its clutches bear {most} of the {motors:g} pN that its motors can pull
+    with. On a softer one, of {soft:g} pN/nm, they bear {softly} pN: they load it for so long that they fail together.
+    On a stiff one, of {stiff:g} pN/nm, they bear {stiffly} pN, as each is torn off soon after it has bound, and the
+    filament glides at {glides} nm/s, hardly slower than free.""",
+    kind="sweep",
+)
+def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
+    found = analysis.summary(analysis.settled(dataset[["friction_force"]]), quantiles=False)
+    stiffness, best = (
+        dataset["drive_contact_stiffness"].to_numpy(),
+        int(np.argmax(found["friction_force_mean"].to_numpy())),
+    )
+    at = {"most": best, "softly": 0, "stiffly": -1}
+    numbers = {name: pair(found.isel(drive_contact_stiffness=k), "friction_force", 1e12) for name, k in at.items()}
+    borne = np.array(numbers["stiffly"])
+    numbers["glides"] = 120.0 - 1.2 * float(borne[0]), 1.2 * float(borne[1])
+    numbers["motors"] = 1e12 * float(dataset["drive_force"])
+    return numbers | {name: 1e3 * float(stiffness[k]) for name, k in (("best", best), ("soft", 0), ("stiff", -1))}
+
+
+@asks(
     "bond_noise",
     "Do the bonds themselves make fluctuations that matter?",
     """Hardly. They store at most {energy:.2f} mJ/m², {part:.2f} % of the work of adhesion, at a speed where

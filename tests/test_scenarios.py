@@ -34,6 +34,7 @@ SHORT = {
     },
     "pull_off": {"clock.step": "8 ms", "clock.record": "8 ms"},
     "peeling": {"clock.step": "20 ms"},
+    "motor_clutch": {"clock.duration": "120 s", "sweep": {"drive.contact_stiffness": ["0.1 pN/nm", "10 pN/nm"]}},
     "stability_map": {"clock.duration": "3.2 s", "sweep": {"drive.stiffness": ["100 N/m", "500 N/m", "1600 N/m"]}},
     "pdms_lens_spring": {"clock.duration": "0.4 s", "sweep": {"drive.stage": ["2 mm/s", "3 mm/s"]}},
 }
@@ -312,6 +313,46 @@ def test_at_the_onset_of_stick_slip_fluctuations_take_more_area_than_the_bonds_g
     assert -0.04 < bonds < -0.015 and 0.05 < noise < 0.075
     slips = analysis.stick_slip(four(name))["slip_count"]
     assert np.all(slips.sel(drive_stage=2e-3) == 0.0) and np.all(slips.sel(drive_stage=3e-3) > 1.0)
+
+
+#: Mean traction of 50 clutches [pN] on some substrates [pN/nm], and what it is off by: stepped from event to event with
+#: loads that stand still meanwhile, as published code does, and on the stiffest by short steps of time.
+STEPPED = {0.01: (28.81, 0.0), 0.1: (38.49, 0.01), 0.316: (31.26, 0.03), 1.0: (16.25, 0.08), 1000.0: (11.25, 0.01)}
+
+
+def traction(dataset):
+    """Mean traction of the clutches over the second half of the run [pN] and its standard error over the members."""
+    late = 1e12 * dataset["friction_force"].isel(t=slice(dataset.sizes["t"] // 2, None)).mean("t")
+    return late.mean("member"), late.std("member", ddof=1) / math.sqrt(late.sizes["member"])
+
+
+def test_clutches_pull_hardest_on_a_substrate_that_is_softer_than_they_are():
+    mean, error = traction(four("motor_clutch"))
+    soft, stiff = mean
+    assert soft - stiff > 5.0 * float(np.hypot(*error))
+
+
+@pytest.mark.verify
+def test_clutches_bear_what_programs_that_step_from_event_to_event_or_in_time_have():
+    mean, error = traction(at("motor_clutch"))
+    for stiffness, (exact, off) in STEPPED.items():
+        found, spread = (float(values.sel(drive_contact_stiffness=1e-3 * stiffness)) for values in (mean, error))
+        assert abs(found - exact) < 4.0 * spread + off * exact
+
+
+@pytest.mark.verify
+def test_many_clutches_on_a_rigid_substrate_settle_where_motors_and_bonds_agree():
+    # F = n F_1(V) with V = 120 nm/s (1 - F/100 pN), F_1 of bonds that are renewed at a constant speed
+    bonds = load(FOLDER / "motor_clutch.toml").bonds
+    assert_allclose(50.0 * bell_stress(109e-9, 0.1, 2e-12, 0.8e-3, 0.3, 1.0), 10.596e-12, rtol=1e-4)
+    many = {"model": "cohort", "start": "empty"} | {
+        name: getattr(bonds, name) for name in ("bond_stiffness", "rebinding_rate", "site_density")
+    }
+    many["rupture"] = {"model": "bell", "zero_force_rate": 0.1, "bell_force": 2e-12}
+    rigid = {"drive.contact_stiffness": "rigid", "sweep": {}, "ensemble.members": 1, "bonds": many}
+    last = at("motor_clutch", **rigid, **{"clock.duration": "60 s"}).isel(t=-1, member=0)
+    assert_allclose(1e12 * last["friction_force"], 10.7105709537, rtol=1e-4)
+    assert_allclose(1e9 * last["speed"], 107.147314856, rtol=1e-5)
 
 
 def test_a_measured_spectrum_is_scaled_to_each_rms():

@@ -22,6 +22,8 @@ from helpers.driven import (
 )  # fmt: skip
 from numpy.testing import assert_allclose
 
+from sim import run
+from sim.analysis import stick_slip
 from sim.engine import Dice, follow, march
 from sim.parts.bonds import Cohort, Tracked
 from sim.parts.bonds.rupture import Constant, CutOff
@@ -85,6 +87,40 @@ def test_many_bonds_above_the_onset_fluctuate_as_one_over_the_root_of_their_numb
     # a spread over M members has a relative error of 1/√(2M) at each of the times
     error = math.sqrt(sum(0.5 / members for _, members in cases))
     assert_allclose(spreads[0] / spreads[1], 4.0, rtol=3.0 * error)
+
+
+@pytest.mark.verify
+def test_above_the_onset_the_mean_force_of_few_bonds_is_off_by_one_over_their_number():
+    lens, drive = (2.0, 20), spring(0.3, start="steady")
+    make = functools.partial(Cohort, tolerance=1e-6)
+    mean = forces(list(march(scenario(*lens, drive, make=make, start="steady"), np.arange(1))))[10:].mean()
+    off, errors, spreads = [], [], []
+    for sites, members in ((25, 8000), (100, 4000)):
+        found = forces(list(march(driven(*lens, drive, sites, start="steady"), np.arange(members))))[10:]
+        own = found.mean(axis=0) - mean
+        off.append(sites * own.mean())
+        errors.append(sites * own.std(ddof=1) / math.sqrt(members))
+        spreads.append(math.sqrt(sites) * found.std(axis=1, ddof=1).mean())
+    assert off[0] > 3.0 * errors[0]
+    assert abs(off[1] - off[0]) < 3.0 * math.hypot(*errors)
+    assert_allclose(spreads[0], spreads[1], rtol=1.0 / 25)  # to the next order
+
+
+@pytest.mark.verify
+def test_below_the_onset_period_size_and_peak_of_slips_approach_those_of_the_cohorts():
+    def slips(make, members):
+        found = stick_slip(run(scenario(30.0, 1500, spring(0.015), make=make, members=members)))
+        return {name: found[name].to_numpy() for name in (*sizes, "slip_spread")}
+
+    sizes = "recurrence_time", "slip_amplitude", "force_drop", "static_friction"
+    exact = slips(functools.partial(Cohort, tolerance=1e-5), 1)
+    few, many = (slips(functools.partial(Tracked, sites=sites), members) for sites, members in ((100, 32), (400, 16)))
+    for name in sizes:
+        off = [np.mean(found[name]) - exact[name].item() for found in (few, many)]
+        errors = [np.std(found[name], ddof=1) / math.sqrt(len(found[name])) for found in (few, many)]
+        assert abs(off[1]) < abs(off[0]) / 4.0 + 3.0 * math.hypot(errors[0] / 4.0, errors[1]), name
+    # the sizes of slips spread by one over the root of the number at most
+    assert exact["slip_spread"].item() < 0.01 < np.mean(many["slip_spread"]) < 0.5 * np.mean(few["slip_spread"])
 
 
 def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip():
