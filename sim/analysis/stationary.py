@@ -210,15 +210,19 @@ class _Quantiles:
             sides = np.clip(_LEVELS[:, None] + _NEAR * np.array([-1.0, 1.0]), 0.0, 1.0)
             for k, (low, high) in enumerate(np.quantile(self.ordered, sides)):
                 self.below[k] += int(np.count_nonzero(values < low))
-                self.near[k].append(values[(values >= low) & (values <= high)])
+                inside = values[(values >= low) & (values <= high)]
+                self.near[k].append(inside if low < high else np.array([float(inside.size)]))
 
     def at(self, levels: np.ndarray) -> np.ndarray:
         """Quantiles of given levels, exact where what was kept holds them; nan beyond 0 and 1."""
         if not self.total:
             return np.full(len(levels), np.nan)
         found = np.quantile(self.ordered, np.clip(np.nan_to_num(levels), 0.0, 1.0))
-        for near, below in zip(self.near, self.below, strict=True):
+        for level, near, below in zip(_LEVELS, self.near, self.below, strict=True):
             values = np.sort(np.concatenate([*near, ()]))
+            same = np.quantile(self.ordered, np.clip([level - _NEAR, level + _NEAR], 0.0, 1.0))
+            if near and same[0] == same[1]:  # of equal values only their number was kept
+                values = np.broadcast_to(same[0], int(values.sum()))
             places = levels * (self.total - 1) - below
             held = (places >= 0.0) & (places <= values.size - 1.0)
             low = places[held].astype(int)
