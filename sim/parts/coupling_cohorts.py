@@ -48,7 +48,8 @@ from sim.parts.coupling_maps import (
     stored_energy,
     sums_at,
 )  # fmt: skip
-from sim.parts.coupling_rows import LEAST, MOST_STEPS, elastic, later, put_down, take_up
+from sim.parts.coupling_rows import LEAST, MOST_STEPS, later, put_down, take_up
+from sim.parts.coupling_snaps import elastic
 from sim.parts.drive.driven import AREA, RUPTURE, SNAP, STORED, WORK
 
 #: Share of a piece below which a sub-step that fails may be an avalanche; share of a limit by which one is tried.

@@ -20,7 +20,6 @@ from sim.parts.coupling_equations import (
     RADIUS,
     RATES,
     ROOM,
-    SHEARED,
     SLIP,
     SPEED,
     SQUARE,
@@ -31,7 +30,8 @@ from sim.parts.coupling_equations import (
     rested,
     share_left,
 )  # fmt: skip
-from sim.parts.coupling_step import NEAR, area_kept, book, newton, snap, stored_in, tried
+from sim.parts.coupling_snaps import NEAR, area_kept, elastic, let_go, snap, stored_in
+from sim.parts.coupling_step import book, newton, tried
 from sim.parts.drive.driven import AREA, STORED, WORK
 
 #: Share of a clock step below which a sub-step means that there is no solution to go on with.
@@ -46,45 +46,6 @@ _PLACES, _HALVINGS = 32, 60
 _NEXT_TO, _CHANGES = 1e-6, 10_000
 #: Turns in which area and stress of a slider at rest settle.
 _FEW_TURNS = 20
-
-
-@device
-def elastic(row, time, bare, slider, held, piece, energy):
-    """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
-
-    Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
-    back to the drive is booked to the area that has changed.
-    """
-    stiffness, mass, damping, viscosity, forced, _, _, _ = slider
-    held_back = mass + damping > 0.0
-    yields, _ = compliance(row[RADIUS], slider)
-    row[FORCE] = driven(time, piece)[1] if forced > 0.0 else row[FORCE]
-    if viscosity > 0.0 or (held_back and yields == 0.0):
-        return True
-    slip, bound, moment, way, radius, area = 0.0, row[BOUND], row[MOMENT], 0.0, row[RADIUS], 0.0
-    for _ in range(40):
-        radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, bare, held)
-        if not area >= 0.0:
-            return False
-        yields, _ = compliance(radius, slider)
-        force = area * (moment + bound * slip)
-        slope = (area + by_moment * (moment + bound * slip)) * bound
-        way = 0.0 if held_back else slip + yields * force - row[SHEARED]
-        over = slip + yields * force - row[SHEARED] if held_back else stiffness * way + force - row[FORCE]
-        slope = 1.0 + yields * slope if held_back else stiffness * (1.0 + yields * slope) + slope
-        if not slope > 0.0:
-            return over == 0.0
-        slip -= over / slope
-        if math.fabs(over / slope) <= 1e-14 * (math.fabs(slip) + math.fabs(moment)):
-            break
-    moment += bound * slip
-    row[MOMENT], row[SHEARED], row[RADIUS] = moment, yields * area * moment, radius
-    row[POSITION] += way
-    row[SLIP] += slip
-    row[PATH] += math.fabs(slip)
-    energy[WORK] += row[FORCE] * way if forced > 0.0 else 0.0
-    row[FORCE] -= 0.0 if forced > 0.0 else stiffness * way
-    return True
 
 
 @device
@@ -109,9 +70,10 @@ def _piece(row, bare, slider, law, held, piece, room, energy):
         step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
         step = left if step > 0.999 * left else min(step, 0.5 * left)
         if not step > LEAST * length:
-            if held[0] > 0.0:
+            gone = let_go(row, start, _BRIEF * length, bare, slider, law, held, energy)
+            if held[0] > 0.0 and not gone:
                 return start
-            held = later(held, 0.0, 1.0)
+            held, room[LAST, 0] = (held, 0.0) if gone else (later(held, 0.0, 1.0), room[LAST, 0])
             row[NEXT] = 0.0
             continue
         grows, stands = tried(row, start, step, bare, slider, law, held, piece, room)

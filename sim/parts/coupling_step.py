@@ -42,7 +42,7 @@ from sim.parts.coupling_equations import (
     resolved,
     share_left,
 )
-from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, SNAP, VISCOSITY, WORK
+from sim.parts.drive.driven import AREA, DAMPING, RUPTURE, VISCOSITY, WORK
 from sim.parts.exchange import Array
 
 #: Share of a sub-step after which the defect of the equations is measured, between the first two nodes.
@@ -62,9 +62,7 @@ def _between() -> tuple[Array, Array]:
 
 _VALUES, _SLOPES = _between()
 #: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
-_FEW, _SOME = 1e-12, 0.1
-#: Way over the cut-off stretch on which bonds are tried, and that within which they may snap.
-_TRIED, NEAR = 1e-7, 1e-3
+FEW, _SOME = 1e-12, 0.1
 #: Most turns of Newton's method.
 _TURNS = 12
 #: Slopes, and solutions of the modes, before the first ones are known.
@@ -108,7 +106,7 @@ def newton(row, start, step, bare, slider, law, held, piece, room):
     for i in range(3):
         room[RADII, i] = row[RADIUS]
         room[PULLS, i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider, piece)
-    bound = min(row[BOUND], row[BOUND] + room[2, 2]) + _FEW
+    bound = min(row[BOUND], row[BOUND] + room[2, 2]) + FEW
     moment = min(math.fabs(row[MOMENT]), math.fabs(row[MOMENT] + room[3, 2]))
     of_slip, of_bound, of_moment = 1.0 / (law[4] + math.fabs(room[0, 2])), 1.0 / bound, 1.0 / (law[4] * bound + moment)
     before, close = math.inf, min(1e-6, 0.1 * slider[7])
@@ -175,13 +173,13 @@ def error_of(row, start, step, bare, slider, law, held, piece, room):
     balance = area * (moment + viscosity * speed) + damping * pace + mass * bend
     balance -= pull_on(time, start, body, row, slider, piece)
     bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
-    scale = law[4] * (bound + _FEW) + math.fabs(moment)
+    scale = law[4] * (bound + FEW) + math.fabs(moment)
     if law[5] != 0.0:
         to_moment = step * of_moment[0]
     if law[6] != 0.0:
         to_bound = step * of_bound[0] + bound - share_left(speed, law)
     found = max(
-        math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + _FEW),
+        math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + FEW),
         math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,
     )
     # a mass between stiff springs rings within a small part of a stretch: as a force that is no small part
@@ -273,88 +271,3 @@ def book(row, start, step, bare, slider, law, held, piece, room, energy):
         for i in range(3):
             room[PAST + k, i] = room[k, i]
     room[LAST, 0] = step
-
-
-@device
-def area_kept(bound, moment, time, row, bare, held):
-    """What ``contact_area`` gives for such bonds, and the area of the row where equilibrium was lost on the way."""
-    radius, area, by_bound, by_moment = contact_area(bound, moment, time, row[RADIUS], bare, held)
-    if area >= 0.0:
-        return radius, area, by_bound, by_moment
-    return row[RADIUS], math.pi * row[RADIUS] * row[RADIUS] / held[10], 0.0, 0.0
-
-
-@device
-def stored_in(row, bare, time, slider, law, held):
-    """Elastic and kinetic energy of spring, body, contact and bonds."""
-    _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
-    stiffness, mass, _, viscosity, _, _, _, _ = slider
-    energy = 0.5 * mass * row[BODY] * row[BODY]
-    energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])
-    if stiffness > 0.0:
-        energy += 0.5 * row[FORCE] * row[FORCE] / stiffness
-    if row[BOUND] > 0.0 and law[5] == 0.0:
-        energy += 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
-    return energy
-
-
-@device
-def _lacking(way, row, time, bare, slider, law, held):
-    """What the bonds lack along the pull once they have gone a way at once: force, or way where the body stays.
-
-    Also N, M, radius, area, u then, and the way of the body.
-    """
-    stiffness, mass, damping, _, _, _, _, _ = slider
-    left, sense = math.exp(-math.fabs(way) * law[2]), math.copysign(1.0, row[MOMENT])
-    bound, moment = row[BOUND] * left, (row[MOMENT] * left + sense * row[BOUND] * (1.0 - left) / law[2]) * left
-    radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
-    yields, _ = compliance(radius, slider)
-    sheared = yields * area * moment
-    body = way + sheared - row[SHEARED]
-    if mass + damping > 0.0:
-        return -sense * body, bound, moment, radius, area, sheared, 0.0
-    return sense * (row[FORCE] - stiffness * body - area * moment), bound, moment, radius, area, sheared, body
-
-
-@device
-def snap(row, time, reach, bare, slider, law, held, energy):
-    """Slip at once to where bonds bear the pull again, if slip breaks more than it stretches; whether it does.
-
-    That counts which does so within a ``reach`` in units of the cut-off stretch.
-
-    The force of such bonds over the way has one hump, so that there is one such place.
-    """
-    if not slider[0] + slider[1] + slider[2] > 0.0:
-        return False
-    sense, high, limit = math.copysign(1.0, row[MOMENT]), _TRIED / law[2], 1.0 / law[2]
-    here, _, _, _, first, _, _ = _lacking(0.0, row, time, bare, slider, law, held)
-    lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
-    while not lacks > max(here, 0.0):
-        if high > reach * limit:
-            return False
-        high *= 2.0
-        lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
-    while lacks > 0.0:
-        high *= 2.0
-        lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
-    low = 0.5 * high
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        over = _lacking(sense * middle, row, time, bare, slider, law, held)[0] > 0.0
-        low, high = (middle, high) if over else (low, middle)
-    _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, bare, slider, law, held)
-    if not area >= 0.0:
-        return False
-    # on the way ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
-    left, mean = math.exp(-high * law[2]), sense * row[MOMENT]
-    later = mean * left + row[BOUND] * limit * (1.0 - left)
-    broken = 0.25 * (first + area) * (1.0 - left) * (mean * mean + mean * later + later * later) / row[BOUND]
-    before = stored_in(row, bare, time, slider, law, held)
-    row[BOUND], row[MOMENT], row[RADIUS], row[SHEARED] = bound, moment, radius, sheared
-    row[FORCE] -= slider[0] * body
-    row[POSITION] += body
-    row[SLIP] += sense * high
-    row[PATH] += high
-    energy[RUPTURE] += broken
-    energy[SNAP] += before - stored_in(row, bare, time, slider, law, held) - broken
-    return True

@@ -48,7 +48,8 @@ from sim.parts.coupling_maps import (
     start_of,
     stored_energy,
 )
-from sim.parts.coupling_rows import LEAST, MOST_STEPS, elastic, later, put_down, take_up
+from sim.parts.coupling_rows import LEAST, MOST_STEPS, later, put_down, take_up
+from sim.parts.coupling_snaps import elastic
 from sim.parts.drive.driven import AREA, RUPTURE, SNAP, STORED, WORK
 
 #: Sites of which every event ends a sub-step.

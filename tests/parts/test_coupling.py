@@ -337,7 +337,25 @@ def test_bonds_that_a_stretch_breaks_snap_again_and_again_behind_a_soft_spring(k
     read = dict(zip(READINGS, np.array([scene.parts.drive.readings(s.drive)[0] for s in straight]).T, strict=True))
     assert np.sum(np.diff(read["dissipated_by_snaps"]) > 0.0) > 2
     assert residual(read) < 1e-5
-    check_members(scene, straight, 0.0)
+    check_members(scene, straight, 50)
+
+
+@pytest.mark.parametrize(
+    ("share", "own"), [(0.0, {"viscosity": 1e-8}), (1.0, {"viscosity": 1e-8}), (0.5, {"damping": 1e-8})]
+)
+def test_bonds_that_break_ever_faster_let_go_at_once_which_is_the_limit_of_little_friction_of_others(share, own):
+    # a soft spring stretches the last bonds to thousands of their unit, and e to that power is their rate
+    keys = {"mass": 1e-6, "contact": 4e-3} if "viscosity" in own else {}
+    soft = 2.5e-4 if keys else 2e-4
+    found = []
+    for part in (0.0, 0.1, 1.0):
+        drive = spring(soft, 1000.0, **keys, **{name: part * value for name, value in own.items()})
+        states, read = marched(scenario(2.5, 5, drive, share=share))
+        assert np.isnan(read["runaway_time"]).all() and residual(read) < 1e-5
+        assert (read["dissipated_by_snaps"][-1] > 0.0) == (part == 0.0)
+        found.append(np.stack([read["spring_force"] / UNIT, reached(states, "bound")[:, 0]]))
+    near, far = (np.max(np.abs(one - found[0]), axis=1) for one in found[1:])
+    assert np.all(far < 0.01) and np.all(near < 0.3 * far)
 
 
 def test_a_run_records_the_drive_of_each_member_and_ends_those_that_run_away():
