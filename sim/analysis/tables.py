@@ -147,9 +147,10 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     points = math.prod(dataset.sizes[name] for name in sweep_dims(dataset))
     said = [words] if (words := averaging(dataset, whole)) else []
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
-        said.append(
-            f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: nothing held the body"
-        )
+        why = "nothing held the body"
+        if "stage_speed" in dataset:
+            why = 'the interface let go faster than it is followed; contact_stiffness = "rigid" ties it to the body'
+        said.append(f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: {why}")
     if any("(" in cell for row in rows for cell in row.values()):
         said.append("in brackets the standard error in the last digits, wider where members are few")
     lines = ["; ".join(said)] if said else []

@@ -10,7 +10,7 @@ import numpy as np
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohort_merging import settle
 from sim.parts.bonds.cohort_step import carry, inside, read_row, rules_of, sum_row, write_row
-from sim.parts.bonds.rupture import hazard_time
+from sim.parts.bonds.rupture import hazard_time, rate_at
 from sim.parts.coupling_equations import (
     BEND,
     BODY,
@@ -49,7 +49,7 @@ from sim.parts.coupling_maps import (
     sums_at,
 )  # fmt: skip
 from sim.parts.coupling_rows import LEAST, MOST_STEPS, later, put_down, take_up
-from sim.parts.coupling_snaps import elastic
+from sim.parts.coupling_snaps import area_kept, elastic, slip_free, slips_free
 from sim.parts.drive.driven import AREA, RUPTURE, SNAP, STORED, WORK
 
 #: Share of a piece below which a sub-step that fails may be an avalanche; share of a limit by which one is tried.
@@ -134,6 +134,24 @@ def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy)
 
 
 @device
+def _let_go(row, pool, time, brief, bare, slider, held, unit, rules, node, energy):
+    """Break all bonds at once and slip, where nothing delays body and interface, if they last less than ``brief``."""
+    k = rate_at(unit * node[AT_MOMENT] / node[AT_BOUND], rules.law) if node[AT_BOUND] > 0.0 else 0.0
+    if not (k * brief > 1.0 and slider[1] + slider[2] == 0.0 and slips_free(row, slider)):
+        return False
+    stored = stored_energy(row, node[AT_SQUARE], bare, time, slider, held)
+    _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
+    broken = 0.5 * area * node[AT_SQUARE]
+    slip_free(row, time, bare, slider, held)
+    pool[0, 0], pool[1, 0], pool[2, 0] = row[BOUND], 0.0, 0.0
+    sums_at(pool, 1, unit, rules, node)
+    row[BEND] = 0.0
+    energy[RUPTURE] += broken
+    energy[SNAP] += stored - stored_energy(row, 0.0, bare, time, slider, held) - broken
+    return True
+
+
+@device
 def _longest(row, count, unit, rules):
     """Sub-step beyond which births are not resolved [s]."""
     if rules.rebinding == 0.0:
@@ -166,10 +184,14 @@ def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
         if left <= LEAST * length:
             return length, count, travelled, settled
         if not step > LEAST * length:
-            if held[0] > 0.0:
+            slid, row[NEXT] = row[SLIP], 0.0
+            if _let_go(row, pool, start, _BRIEF * length, bare, slider, held, unit, rules, nodes[0], energy):
+                count = settled = 1
+                travelled += unit * (row[SLIP] - slid)
+            elif held[0] > 0.0:
                 return start, count, travelled, settled
-            held = later(held, 0.0, 1.0)
-            row[NEXT] = 0.0
+            else:
+                held = later(held, 0.0, 1.0)
             continue
         saved[:, :count] = pool[:3, :count]
         first = nodes[0]

@@ -154,29 +154,38 @@ def snap(row, time, reach, bare, slider, law, held, energy):
 
 
 @device
-def let_go(row, time, brief, bare, slider, law, held, energy):
-    """Break all bonds at once, and slip to where nothing pulls the interface, if they last less than a ``brief`` time.
-
-    Bonds that are stretched the more the fewer are left break ever faster, all of them in no time, where nothing
-    delays the slip; whether that is so. Without a spring or a body that lags there is no place to slip to.
-    """
-    stiffness, mass, damping, viscosity, _, _, _, _ = slider
-    _, _, _, _, k, _ = kinetics(row[BOUND], row[MOMENT], 0.0, law)
+def slips_free(row, slider):
+    """Whether a slip without bonds takes no time and has an end: behind a spring, or where a body stays behind."""
     yields, _ = compliance(row[RADIUS], slider)
-    lags = mass + damping > 0.0
-    if viscosity > 0.0 or not k * brief > 1.0 or not (yields > 0.0 if lags else stiffness > 0.0):
-        return False
-    before = stored_in(row, bare, time, slider, law, held)
-    radius, area, _, _ = contact_area(row[BOUND], row[MOMENT], time, row[RADIUS], bare, held)
-    broken = 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND] if area > 0.0 else 0.0
-    body = 0.0 if lags else row[FORCE] / stiffness
+    return slider[3] == 0.0 and (yields > 0.0 if slider[1] + slider[2] > 0.0 else slider[0] > 0.0)
+
+
+@device
+def slip_free(row, time, bare, slider, held):
+    """Slip at once, with next to no bonds, to where nothing pulls the interface."""
+    body = 0.0 if slider[1] + slider[2] > 0.0 else row[FORCE] / slider[0]
     slip = body + row[SHEARED]
-    radius, area, _, _ = contact_area(FEW, 0.0, time, radius, bare, held)
+    radius, area, _, _ = contact_area(FEW, 0.0, time, row[RADIUS], bare, held)
     row[BOUND], row[MOMENT], row[SHEARED], row[RADIUS] = FEW, 0.0, 0.0, radius if area >= 0.0 else row[RADIUS]
-    row[FORCE] -= stiffness * body
+    row[FORCE] -= slider[0] * body
     row[POSITION] += body
     row[SLIP] += slip
     row[PATH] += math.fabs(slip)
+
+
+@device
+def let_go(row, time, brief, bare, slider, law, held, energy):
+    """Break all bonds at once and slip, where nothing delays it, if they last less than a ``brief`` time.
+
+    Bonds that are stretched the more the fewer are left break ever faster, all of them in no time; whether that is so.
+    """
+    _, _, _, _, k, _ = kinetics(row[BOUND], row[MOMENT], 0.0, law)
+    if not (k * brief > 1.0 and slips_free(row, slider)):
+        return False
+    before = stored_in(row, bare, time, slider, law, held)
+    _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
+    broken = 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
+    slip_free(row, time, bare, slider, held)
     energy[RUPTURE] += broken
     energy[SNAP] += before - stored_in(row, bare, time, slider, law, held) - broken
     return True

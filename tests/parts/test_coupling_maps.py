@@ -296,3 +296,15 @@ def test_what_would_run_shows_where_a_slider_of_bonds_resolved_by_stretch_oscill
     never = sim.check(driven(1.0, 4, spring(1.0, mass=1e-3), 1e-4, rupture=Constant(rate=1.0)))
     assert "natural frequency" in never
     assert "oscillates below" not in never
+
+
+def test_cohorts_that_break_ever_faster_let_go_at_once_which_is_the_limit_of_little_damping():
+    found = []
+    for damping in (0.0, 1e-8, 1e-7):
+        drive = spring(2e-4, 1000.0, damping=damping)
+        states, read = marched(scenario(2.5, 5, drive, share=0.5, make=Cohort))
+        assert np.isnan(read["runaway_time"]).all() and residual(read) < 1e-5
+        assert (read["dissipated_by_snaps"][-1] > 0.0) == (damping == 0.0)
+        found.append(np.stack([read["spring_force"] / UNIT, [state.bonding.fraction[0] for state in states]]))
+    near, far = (np.max(np.abs(one - found[0]), axis=1) for one in found[1:])
+    assert np.all(far < 0.01) and np.all(near < 0.3 * far)
