@@ -22,6 +22,8 @@ from sim.spectrum.bond_made import BondMade
 _STEPS_A_CYCLE = 2
 #: Times between which the slip of a run is looked at.
 _MOST_SLIPS = 2**16
+#: Contact radius over that of the sphere above which some unit must be wrong.
+_WIDEST = 10.0
 _TOO_SHORT = "the table ends at {:g} s, before clock.duration ({:g} s); add rows or shorten the run"
 
 
@@ -65,7 +67,7 @@ def _table_too_short(drive: Drive, clock: Clock) -> Faults:
 
 
 def _wider_than_the_sphere(radius: float, sphere: Sphere, contact: Contact) -> Faults:
-    if radius > sphere.radius:
+    if radius > _WIDEST * sphere.radius:
         said = (
             f"makes a contact of {radius:.3g} m on a sphere of {sphere.radius:.3g} m radius, for which no theory holds;"
         )

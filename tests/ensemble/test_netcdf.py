@@ -226,9 +226,9 @@ def test_a_full_disk_is_told_with_its_reason(tmp_path, room, monkeypatch, capsys
 
 
 def test_a_swept_key_may_keep_one_value():
-    scenario = replace(sample(), sweep=read_sweep({"sphere.radius": [2e-3, 2e-3], "contact.load": [1e-3, 4e-3]}))
-    dataset = ensemble.run(scenario)
-    assert dataset["contact_radius"].dims == ("sphere_radius", "contact_load", "member", "t")
+    rows = [{"sphere.radius": 2e-3, "contact.load": load} for load in (1e-3, 4e-3)]
+    dataset = ensemble.run(replace(sample(), sweep=read_sweep(rows)))
+    assert dataset["contact_radius"].dims == ("sphere_radius", "member", "t")
     assert_allclose(dataset["sphere_radius"], [2e-3, 2e-3])
 
 
