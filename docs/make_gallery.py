@@ -20,7 +20,6 @@ from PIL import Image
 import sim
 from sim import analysis, laws
 from sim.analysis import concise, shares, statistics
-from sim.analysis.observables import all_observables
 from sim.study.fit import Fit
 from sim.study.fit_figure import figure as fitted
 from sim.study.fitting import LEVEL
@@ -508,8 +507,8 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     put in.""",
 )
 def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
-    late = analysis.settled(all_observables(dataset))
-    slow, fast = (analysis.summary(late, quantiles=False).sel(drive_stage=speed) for speed in (2e-3, 3e-3))
+    found_at = analysis.distribution(dataset)
+    slow, fast = (found_at.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
     names = {"before": slow, "after": fast}
     found: dict[str, Number] = {name: pair(one, "area_ratio", 100.0) for name, one in names.items()}
     return found | {"slow": 2.0, "fast": 3.0, "bonds": pair(fast, "lost_to_bonds", 100.0),
