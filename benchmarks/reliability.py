@@ -279,8 +279,8 @@ class Campaign:
         self.files = self._files()
         self._clear()
         begun = [subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=ROOT) for _ in range(count)]
-        for one in begun:
-            said = one.communicate()[1]
+        answers = [one.communicate()[1] for one in begun]  # of all, as parts of the usual size are no others' business
+        for one, said in zip(begun, answers, strict=True):
             self._look(Ended(one.returncode, said, 0, False), f"one of {count} at once: ")
         self._clear()
 
