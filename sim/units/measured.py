@@ -80,6 +80,10 @@ def _columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Qu
             wanted[name] = Quantity("1" if _relative(unit, outcomes[base]) else outcomes[base].unit, name, above=0)
         else:
             raise TableError(_unknown(name, known))
+    bare = [name for name, quantity in wanted.items() if not units[name] and quantity.unit != "1"]
+    if bare and any(units.values()):
+        said = f'column "{bare[0]}" has no unit where others have one; write "{bare[0]} [{wanted[bare[0]].unit}]"'
+        raise TableError(f"{said} if that is its unit")
     found = columns(text, wanted)
     points = {}
     for name in (name for name in found if name in known):

@@ -480,6 +480,7 @@ BAD = {
     "empty": ("", "the table is empty"),
     "no unit of an area": ("speed [mm/s],contact_area [mm]\n1,2\n3,4\n", "not a unit of m"),
     "unknown column": ("speed [mm/s],area [mm^2]\n1,2\n3,4\n", 'column "area" is neither'),
+    "one without a unit": ("speed [mm/s],contact_area\n1,2\n3,4\n", '"contact_area" has no unit where others have one'),
     "misspelt": ("speed [mm/s],contact_arae [mm^2]\n1,2\n3,4\n", 'did you mean "contact_area"'),
     "no curve": ("speed [mm/s]\n1\n3\n", "no column was measured"),
     "no condition": ("contact_area [mm^2]\n0.04\n0.05\n", "where the points were taken"),
