@@ -39,13 +39,31 @@ _OFF = np.array([sum(row) for row in RATES])
 def _modes() -> tuple[float, complex, Array, Array]:
     """Eigenvalues of ``RATES``, one real and one of the complex pair; matrices that lead back to nodes and from them.
 
-    The last two columns are the real part and minus the imaginary part of the vector of the complex one.
+    The last two columns are the real part and minus the imaginary part of the vector of the complex one. In closed form
+    (Hairer & Wanner 1996, IV.8), as numbers of a linear-algebra library depend on the machine.
     """
-    values, vectors = np.linalg.eig(RATES)
-    real, pair = int(np.argmin(np.abs(values.imag))), int(np.argmax(values.imag))
-    turning = vectors[:, pair]
-    forth = np.stack([vectors[:, real].real, turning.real, -turning.imag], axis=1)
-    return float(values[real].real), complex(values[pair]), forth, np.linalg.inv(forth)
+    root = 3.0 ** (1.0 / 3.0)
+    real, pair = (
+        3.0 + root * root - root,
+        3.0 + 0.5 * (root - root * root) + 0.5j * math.sqrt(3.0) * (root + root * root),
+    )
+    turning = _mode(pair)
+    forth = np.array([[one.real for one in _mode(real)], [x.real for x in turning], [-x.imag for x in turning]])
+    a, b, c = forth.tolist()
+    back = np.array([_cross(b, c), _cross(c, a), _cross(a, b)])
+    return real, pair, np.ascontiguousarray(forth.T), back / sum(x * y for x, y in zip(a, _cross(b, c), strict=True))
+
+
+def _mode(value: complex) -> list[complex]:
+    """The vector that ``RATES`` multiplies by a value."""
+    (a, b, c), (d, e, f), _ = RATES.tolist()
+    a, e = a - value, e - value
+    return [(b * f - c * e) / (a * e - b * d), (c * d - a * f) / (a * e - b * d), 1.0]
+
+
+def _cross(a: list[float], b: list[float]) -> list[float]:
+    """Cross product of two vectors."""
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 PACE, TURNING, FORTH, BACK = _modes()

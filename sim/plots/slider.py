@@ -69,7 +69,7 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     """Displacement and speed of the slider over time under a prescribed force; a cross ends a runaway."""
     later = dataset.isel(t=slice(1, None))
     scene = scene_along(later, "t")._replace(measured=data)
-    scene = scene.placed("t", later["t"].to_numpy(), "time since the force was applied $t$", "s", "log")
+    scene = scene.placed("t", later["t"].to_numpy(), "time under the force $t$", "s", "log")
     position, speed = _run("slider_position", "displacement $x$", "m"), _run("speed", "speed $V$", "m/s")
     return stacked(scene, [(1.8, position), (1.6, speed)])[0]
 
