@@ -43,10 +43,8 @@ def _modes() -> tuple[float, complex, Array, Array]:
     (Hairer & Wanner 1996, IV.8), as numbers of a linear-algebra library depend on the machine.
     """
     root = 3.0 ** (1.0 / 3.0)
-    real, pair = (
-        3.0 + root * root - root,
-        3.0 + 0.5 * (root - root * root) + 0.5j * math.sqrt(3.0) * (root + root * root),
-    )
+    real = 3.0 + root * root - root
+    pair = 3.0 + 0.5 * (root - root * root) + 0.5j * math.sqrt(3.0) * (root + root * root)
     turning = _mode(pair)
     forth = np.array([[one.real for one in _mode(real)], [x.real for x in turning], [-x.imag for x in turning]])
     a, b, c = forth.tolist()

@@ -137,8 +137,8 @@ def test_blocks_within_what_is_read_at_once_cover_all_of_it(monkeypatch, read, r
     xr.testing.assert_equal(blocks.at_records(numbers, records), numbers.isel(t=records))
 
 
+@pytest.mark.verify  # dask comes with its extra
 def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep_and_of_more_members(tmp_path):
-    pytest.importorskip("dask")
     kept = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}
     loads = [run(scene(contact=Equilibrium(load=load), **kept), to=tmp_path / f"{load}.nc") for load in (2e-3, 4e-3)]
     with xr.open_mfdataset(
