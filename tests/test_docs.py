@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 ROOT = Path(__file__).parent.parent
 PAGES = [
     "README.md",
-    *(f"docs/{n}.md" for n in ("choosing", "design", "gallery/README", "jkr_only", "paper", "theory")),
+    *(f"docs/{n}.md" for n in ("choosing", "design", "gallery/README", "jkr_only", "own_data", "paper", "theory")),
 ]
 
 
