@@ -15,7 +15,17 @@ from sim.analysis.events import events
 from sim.analysis.lifetimes import half_lives
 from sim.analysis.observables import KEPT, all_observables
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.scene import MEMBERS, is_stationary, of_dataset, resolved, stays_held, sweep_dims, word
+from sim.analysis.scene import (
+    MEMBERS,
+    is_stationary,
+    is_steady,
+    of_dataset,
+    resolved,
+    speed_name,
+    stays_held,
+    sweep_dims,
+    word,
+)
 from sim.analysis.stationary import distribution, of_second_half
 from sim.analysis.statistics import QUANTILES, WIDE, averaging, over_members, summary
 from sim.units.notation import concise, scaled
@@ -32,11 +42,12 @@ class _Column(NamedTuple):
     name: str
     heading: str
     dull: float = 0.0
-    changing: bool = False  # only in rows over time of a contact whose control changes
+    changing: bool = False  # only in rows over time, of a contact whose control or of a stage whose speed changes
     meaning: str = ""
 
 
 _COLUMNS = (
+    _Column("stage_speed", "stage", changing=True, meaning="speed of the stage"),
     _Column("speed", "V"),
     _Column("normal_load", "P", changing=True),
     _Column("displacement", "Δ", changing=True, meaning="displacement of the base, without one the indentation"),
@@ -92,9 +103,9 @@ _EVENTS = (
 )
 
 _LOSSES = (
-    _Column("speed_at_5_percent_lost", "5 % of area\nlost at V", math.nan),
-    _Column("speed_at_50_percent_lost", "50 % of area\nlost at V", math.nan),
-    _Column("speed_halfway_to_hertz", "halfway to\nHertz at V", math.nan),
+    _Column("speed_at_5_percent_lost", "5 % of area\nlost at {}", math.nan),
+    _Column("speed_at_50_percent_lost", "50 % of area\nlost at {}", math.nan),
+    _Column("speed_halfway_to_hertz", "halfway to\nHertz at {}", math.nan),
 )
 
 #: Heading and meaning of the correlation time.
@@ -128,11 +139,12 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """
     found, points = _tabulated(dataset, rows)
     whole = is_stationary(dataset) and bool(sweep_dims(dataset))
-    changing = not bool(stays_held(dataset).all())
+    held, steady = bool(stays_held(dataset).all()), is_steady(dataset)
     cells = _places(found, {name: index for name, index in points.items() if name != "t" or not whole})
     speeds = dataset.get("drive_speed", xr.DataArray())
     same = whole and any(name in points for name in speeds.dims)  # V is a column already
-    columns = [c for c in _COLUMNS if (changing or not c.changing) and not (same and c.name == "speed")]
+    stay = [c.name for c in _COLUMNS if c.changing and (steady if c.name == "stage_speed" else held)]
+    columns = [c for c in _COLUMNS if c.name not in stay and not (same and c.name == "speed")]
     cells |= _shown(found, points, columns)
     times, errors, below = (_at(found[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below"))
     if np.any(np.isfinite(times) | np.isfinite(below)):
@@ -354,7 +366,8 @@ def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     found = as_means(loss_speeds(dataset))
     sizes = {name: dataset.sizes[name] for name in sweep_dims(dataset) if name in found.dims}
     points = _points(sizes, _thinned(found[list(found)], rows, tuple(sizes)))
-    shown = _shown(found, points, _LOSSES)
+    whose = "stage" if speed_name(dataset) == "stage_speed" else "V"
+    shown = _shown(found, points, [column._replace(heading=column.heading.format(whose)) for column in _LOSSES])
     return _rows(_places(dataset, points) | shown) if shown else []
 
 

@@ -83,6 +83,14 @@ def test_statistics_and_the_table_show_stick_and_slip_behind_a_spring():
     assert cells["slips"].startswith("3") and cells["kinetic friction (mN)"].startswith("3.3")
 
 
+def test_the_table_has_the_speed_of_the_stage_beside_that_of_the_slider_where_it_changes():
+    faster = cycles().assign(stage_speed=cycles()["stage_speed"] * (1.0 + cycles()["t"]))
+    rows = analysis.table(faster)
+    (stage,) = (heading for heading in rows[0] if heading.startswith("stage"))
+    assert float(rows[-1][stage]) / float(rows[0][stage]) == pytest.approx(6.0)
+    assert not any(heading.startswith("stage") for heading in analysis.table(cycles())[0])
+
+
 def test_sliding_without_slips_has_a_kinetic_friction_alone():
     area = scene(1).contact_area
     drive = Spring(stage=LENGTH, stiffness=1e3, damping=1.0, contact_stiffness="rigid")
