@@ -184,6 +184,23 @@ def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_within_a_hund
     assert growth(speed, 1.01 * stiffness, frequency)[0] < -2e-3
 
 
+@pytest.mark.verify
+@pytest.mark.parametrize(("distance", "duration", "expected"), [(0.06, 300.0, 1.7165), (0.03, 500.0, 1.7672)])
+def test_oscillations_of_stretches_that_differ_set_in_gradually_where_those_of_the_mean_do_suddenly(
+    distance, duration, expected
+):
+    speed, stiffness, frequency = ONSETS[0]
+    step = 2.0 * math.pi / frequency / 40.0
+    jolt = {"time": (0.0, step, step, 2.0 * step, 2.0 * step, duration),
+            "value": tuple(speed * STRETCH * v for v in (1.0, 1.0, 10.0, 10.0, 1.0, 1.0))}  # fmt: skip
+    steps = int(duration / step)
+    drive = spring((1.0 - distance) * stiffness, jolt, start="steady", tolerance=1e-6)
+    found = reached(marched(driven(steps * step, steps, drive, 1e-4, start="steady"))[0])[:, 2]
+    swing = 0.5 * np.ptp(found[-steps // 4 :]) / found[0] / distance**0.5
+    # the records lie up to an eightieth of a period beside the extremes
+    assert_allclose(swing, expected, rtol=0.5 * (math.pi / 40.0) ** 2)
+
+
 def test_an_area_that_follows_the_bonds_raises_the_onset_as_linear_stability_has_it():
     scene = driven(1.0, 4, spring(1.0), 1e-9, share=0.5)
     bound = scene.bonds.steady(np.full(1, 10.0 * STRETCH)).fraction[0]
