@@ -1,5 +1,6 @@
 """Figures show the numbers they claim to show, for every shape of dataset."""
 
+import itertools
 import sys
 
 import matplotlib as mpl
@@ -281,6 +282,30 @@ def test_many_curves_along_one_number_have_a_colour_bar_in_place_of_names():
 def swept(**sweep):
     axes = {key.replace("_", "."): {"from": 1e-3, "to": 2e-3, "count": count} for key, count in sweep.items()}
     return simulated(drive=STEADY, shear=shear.Uniform(), sweep=axes, clock=Clock(duration=0.04, step=0.02))
+
+
+#: How those who lack one kind of cone see linear red, green and blue (Machado, Oliveira & Fernandes 2009).
+DICHROMATS = {
+    "long": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "middle": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.011820, 0.042940, 0.968881]],
+    "short": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.303900]],
+}
+
+
+def lab(linear):
+    """Lightness and hues of CIE 1976, in which 2.3 is a just noticeable difference, of linear sRGB."""
+    xyz = [[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]]
+    share = np.array(xyz) @ np.clip(linear, 0.0, 1.0) / np.sum(xyz, axis=1)
+    x, y, z = np.where(share > (6 / 29) ** 3, np.cbrt(share), share / (3.0 * (6 / 29) ** 2) + 4 / 29)
+    return np.array([116.0 * y - 16.0, 500.0 * (x - y), 200.0 * (y - z)])
+
+
+@pytest.mark.parametrize("lacking", DICHROMATS)
+def test_colours_are_told_apart_without_one_kind_of_cone(lacking):
+    coded = np.array([mpl.colors.to_rgb(name) for name in (*pictures.LINES, pictures.REFERENCE)])
+    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    seen = [lab(DICHROMATS[lacking] @ colour) for colour in linear]
+    assert min(np.linalg.norm(a - b) for a, b in itertools.combinations(seen, 2)) > 4.0 * 2.3
 
 
 def test_of_more_curves_than_can_be_told_apart_some_are_drawn_and_that_is_said():
