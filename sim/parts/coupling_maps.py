@@ -42,8 +42,8 @@ PLACES = (0.0, GAMMA, 1.0)
 PARTS = (0.5 + (GAMMA - 1.0) * _MIDDLE, _MIDDLE, 0.5 - GAMMA * _MIDDLE)
 #: Columns of a node: slip and displacement of the body since the start of the sub-step, area, shear displacement,
 #: radius, share bound, sum of the stretches, of their squares and of those times the rupture rate, share cut since
-#: the node before.
-AT_WAY, AT_BODY, AT_AREA, AT_SHEARED, AT_RADIUS, AT_BOUND, AT_MOMENT, AT_SQUARE, AT_LOST, AT_CUT = range(10)
+#: the node before, speed of a body with mass.
+AT_WAY, AT_BODY, AT_AREA, AT_SHEARED, AT_RADIUS, AT_BOUND, AT_MOMENT, AT_SQUARE, AT_LOST, AT_CUT, AT_SPEED = range(11)
 #: Turns of the secant method; share of the slope of a fresh elastic bond below which a sub-step is too long.
 _TURNS, _FALLING = 25, 0.02
 #: The same where slip alone breaks bonds: their force may hardly rise.
@@ -139,7 +139,7 @@ def before_node(place, nodes, at_start, start, step, row, slider):
         way = duration * (speed + 0.5 * row[BEND] * duration)
         return duration, time, rate, speed, body_speed, heavy, way
     before = nodes[1]
-    heavy = mass * (rate * body_speed + share * (rate * before[AT_BODY] - 2.0 * body_speed))
+    heavy = mass * (rate * body_speed + share * (before[AT_SPEED] - body_speed))
     way = duration * (before[AT_WAY] / (GAMMA * step) + 0.5 * row[BEND] * step)
     return duration, time, rate, share * before[AT_WAY], share * before[AT_BODY], heavy, way
 
@@ -164,9 +164,14 @@ def balance(way, bound, moment, before, after, numbers, start, row, bare, slider
     grows, loads = area * (bound + viscosity * rate), stiffness + rate * (damping + mass * rate)
     after[AT_WAY], after[AT_BODY], after[AT_AREA], after[AT_RADIUS] = slip, body, area, radius
     after[AT_SHEARED] = yields * force
+    if mass > 0.0:  # by its momentum: differences of positions are roundings in the shortest sub-steps
+        after[AT_SPEED] = (heavy + pull - force) / (damping + mass * rate)
     firm = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0) / (area * (bound + SOME)) if area > 0.0 else 1.0
-    none = max(1e-3 * tolerance / max(1.0, firm), 1e-15 * math.fabs(slip))
-    return over, grows + loads * (1.0 + yields * grows), none
+    none, slope = 1e-3 * tolerance / max(1.0, firm), grows + loads * (1.0 + yields * grows)
+    if mass + damping > 0.0:  # what is left of the forces is work on the body, whose way may be the longer
+        none = min(none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope)
+    roundings = math.fabs(slip) + yields * math.fabs(force) + math.fabs(row[SHEARED])
+    return over, slope, max(none, 1e-15 * roundings)
 
 
 @device
@@ -234,7 +239,8 @@ def book_nodes(row, nodes, start, step, slider, piece, limit, energy):
             row[PATH] += math.fabs(node[AT_WAY] - nodes[i - 1, AT_WAY])
     last = nodes[2]
     row[FORCE] = pull_on(start + step, start, last[AT_BODY], row, slider, piece)
-    row[SPEED], row[BODY], row[SHEARED], row[RADIUS] = speeds[2], bodies[2], last[AT_SHEARED], last[AT_RADIUS]
+    row[SPEED], row[SHEARED], row[RADIUS] = speeds[2], last[AT_SHEARED], last[AT_RADIUS]
+    row[BODY] = last[AT_SPEED] if slider[1] > 0.0 else bodies[2]
     row[BOUND], row[MOMENT] = last[AT_BOUND], last[AT_MOMENT]
     row[POSITION] += last[AT_BODY]
     row[SLIP] += last[AT_WAY]

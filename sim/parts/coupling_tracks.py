@@ -38,6 +38,7 @@ from sim.parts.coupling_maps import (
     AT_MOMENT,
     AT_RADIUS,
     AT_SHEARED,
+    AT_SPEED,
     AT_SQUARE,
     AT_WAY,
     balance,
@@ -284,8 +285,8 @@ def advance_tracks(
     for m in range(len(rows)):
         if stamp[m] != np.int64(frame[m, STEPS]):
             return SPENT
-    space, nodes = (room(), np.empty(1), np.empty(1), np.empty(FRAME + 1), np.empty((FRAME, 1))), np.zeros((3, 10))
-    row, energy = np.empty(COLUMNS), np.empty(energies.shape[1])
+    space = room(), np.empty(1), np.empty(1), np.empty(FRAME + 1), np.empty((FRAME, 1))
+    nodes, row, energy = np.zeros((3, AT_SPEED + 1)), np.empty(COLUMNS), np.empty(energies.shape[1])
     for m in range(len(rows)):
         stop, own = 0, ((birth[m], due[m], life[m]), soonest[m], frame[m])
         ground = units[SLIP], np.float64(due.shape[1]), law, (seed, members[m]), space
