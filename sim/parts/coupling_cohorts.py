@@ -32,11 +32,11 @@ from sim.parts.coupling_equations import (
 from sim.parts.coupling_maps import (
     AT_AREA,
     AT_BOUND,
-    AT_CUT,
     AT_LOST,
     AT_MOMENT,
     AT_RADIUS,
     AT_SHEARED,
+    AT_SPEED,
     AT_SQUARE,
     AT_WAY,
     SOME,
@@ -49,7 +49,7 @@ from sim.parts.coupling_maps import (
     sums_at,
 )  # fmt: skip
 from sim.parts.coupling_rows import LEAST, MOST_STEPS, later, put_down, take_up
-from sim.parts.coupling_snaps import area_kept, elastic, slip_free, slips_free
+from sim.parts.coupling_snaps import area_kept, elastic, free_ways, slip_free, slips_free
 from sim.parts.drive.driven import AREA, RUPTURE, SNAP, STORED, WORK
 
 #: Share of a piece below which a sub-step that fails may be an avalanche; share of a limit by which one is tried.
@@ -72,14 +72,19 @@ def _at_once(pool, count, way, unit, rules):
 
 @device
 def _lacking(way, pool, count, row, time, bare, slider, held, unit, rules):
-    """Force that bonds lack, along the pull, once all have gone a way at once; area, shear and way of the body."""
+    """Force that bonds lack, along the pull, once all have gone a way at once; area, shear and way of the body.
+
+    A body with mass or damping stays where it is.
+    """
     bound, moment = _at_once(pool, count, way, unit, rules)
     radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
     yields, _ = compliance(radius, slider)
     sheared = yields * area * moment
     body = way + sheared - row[SHEARED]
     lacks = row[FORCE] - slider[0] * body - area * moment
-    return lacks if row[FORCE] > 0.0 else -lacks, area, radius, sheared, body
+    if slider[1] + slider[2] > 0.0:
+        lacks, body = -body / yields, 0.0
+    return lacks if row[MOMENT] > 0.0 else -lacks, area, radius, sheared, body
 
 
 @device
@@ -88,10 +93,11 @@ def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy)
 
     The first such place is looked for in steps of at most half the width to which stretches are resolved.
     """
-    sense, step, limit = math.copysign(1.0, row[FORCE]), 0.5 * rules.cell / unit, rules.limit / unit
+    sense, step, limit = math.copysign(1.0, row[MOMENT]), 0.5 * rules.cell / unit, rules.limit / unit
     here, area, _, _, _ = _lacking(0.0, pool, count, row, time, bare, slider, held, unit, rules)
     near, _, _, _, _ = _lacking(sense * _TRIED * limit, pool, count, row, time, bare, slider, held, unit, rules)
-    if not (near > here or here > _TRIED * math.fabs(row[FORCE])):  # merged stretches reach a little beyond the limit
+    # merged stretches reach a little beyond the limit
+    if not (near > here or here > _TRIED * area * math.fabs(row[MOMENT])):
         return -1
     way, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
     while high < 2.0 * limit:
@@ -108,8 +114,8 @@ def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy)
             lacks, _, _, _, _ = _lacking(sense * middle, pool, count, row, time, bare, slider, held, unit, rules)
             low, high = (middle, high) if lacks > 0.0 else (low, middle)
         way = sense * high
-    elif slider[0] > 0.0:
-        way = row[FORCE] / slider[0] + row[SHEARED]
+    elif slips_free(row, slider):
+        way, _ = free_ways(row, slider)
     else:
         return -1
     _, after, radius, sheared, body = _lacking(way, pool, count, row, time, bare, slider, held, unit, rules)
@@ -135,9 +141,9 @@ def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy)
 
 @device
 def _let_go(row, pool, time, brief, bare, slider, held, unit, rules, node, energy):
-    """Break all bonds at once and slip, where nothing delays body and interface, if they last less than ``brief``."""
+    """Break all bonds at once and slip, where nothing delays the interface, if they last less than ``brief``."""
     k = rate_at(unit * node[AT_MOMENT] / node[AT_BOUND], rules.law) if node[AT_BOUND] > 0.0 else 0.0
-    if not (k * brief > 1.0 and slider[1] + slider[2] == 0.0 and slips_free(row, slider)):
+    if not (k * brief > 1.0 and slips_free(row, slider)):
         return False
     stored = stored_energy(row, node[AT_SQUARE], bare, time, slider, held)
     _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
@@ -172,8 +178,8 @@ def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
     """
     pool, saved, nodes = room
     count, travelled, settled = bonds
-    brittle = rules.limit < math.inf and slider[1] + slider[2] + slider[3] == 0.0
     start, length = 0.0, piece[0]
+    brittle = rules.limit < math.inf and (slips_free(row, slider) or slider[1] + slider[2] + slider[3] == 0.0)
     nodes[0, :] = 0.0
     sums_at(pool, count, unit, rules, nodes[0])
     for _ in range(MOST_STEPS):
@@ -300,7 +306,7 @@ def advance_cohorts(
     as in ``coupling_rows.advance_rows``.
     """
     rules, most, unit = rules_of(numbers), weight.shape[1] + 520, units[SLIP]
-    room = np.empty((9, most)), np.empty((3, most)), np.zeros((3, AT_CUT + 1))
+    room = np.empty((9, most)), np.empty((3, most)), np.zeros((3, AT_SPEED + 1))
     row, energy = np.empty(COLUMNS), np.empty(energies.shape[1])
     for m in range(len(rows)):
         stop, left = 0, share[m % share.size]

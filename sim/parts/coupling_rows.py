@@ -30,7 +30,7 @@ from sim.parts.coupling_equations import (
     rested,
     share_left,
 )  # fmt: skip
-from sim.parts.coupling_snaps import NEAR, area_kept, elastic, let_go, snap, stored_in
+from sim.parts.coupling_snaps import NEAR, area_kept, elastic, free_ways, let_go, snap, stored_in
 from sim.parts.coupling_step import book, newton, tried
 from sim.parts.drive.driven import AREA, STORED, WORK
 
@@ -248,6 +248,17 @@ def _sticking_piece(row, bare, slider, law, held, piece, room, energy):
 
 
 @device
+def _goes_along(row, slider, law, piece):
+    """Go to where the spring is free, and along with the stage, as nothing else holds an open contact."""
+    way, _ = free_ways(row, slider)
+    row[SPEED] = row[BODY] = driven(0.0, piece)[1]
+    row[FORCE], row[BOUND] = 0.0, row[BOUND] if law[6] == 0.0 else 1.0 / (1.0 + law[6] * math.fabs(row[SPEED]))
+    row[POSITION] += way
+    row[SLIP] += way
+    row[PATH] += math.fabs(way)
+
+
+@device
 def _clock_step(row, bare, slider, law, held, pieces, room, energy):
     """Go through the pieces of a clock step; the time reached, and whether something holds the body still."""
     is_open = not row[RADIUS] > 0.0
@@ -256,6 +267,8 @@ def _clock_step(row, bare, slider, law, held, pieces, room, energy):
     for p in range(len(pieces)):
         piece = pieces[p, 1], pieces[p, 2], pieces[p, 3], pieces[p, 4]
         room[LAST, 0] = 0.0
+        if is_open and law[5] != 0.0 and slider[1] + slider[2] + slider[4] == 0.0:
+            _goes_along(row, slider, law, piece)
         if p == 0:
             if law[5] == 0.0:
                 going = elastic(row, 0.0, bare, slider, now, piece, energy)

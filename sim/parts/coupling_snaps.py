@@ -63,7 +63,7 @@ def elastic(row, time, bare, slider, held, piece, energy):
     held_back = mass + damping > 0.0
     yields, _ = compliance(row[RADIUS], slider)
     row[FORCE] = driven(time, piece)[1] if forced > 0.0 else row[FORCE]
-    if viscosity > 0.0 or (held_back and yields == 0.0):
+    if (viscosity > 0.0 and row[RADIUS] > 0.0) or (held_back and yields == 0.0):
         return True
     slip, bound, moment, way, radius, area = 0.0, row[BOUND], row[MOMENT], 0.0, row[RADIUS], 0.0
     for _ in range(40):
@@ -161,10 +161,16 @@ def slips_free(row, slider):
 
 
 @device
+def free_ways(row, slider):
+    """Ways of an interface without bonds, and of its body, to where nothing pulls them."""
+    body = 0.0 if slider[1] + slider[2] > 0.0 else row[FORCE] / slider[0]
+    return body + row[SHEARED], body
+
+
+@device
 def slip_free(row, time, bare, slider, held):
     """Slip at once, with next to no bonds, to where nothing pulls the interface."""
-    body = 0.0 if slider[1] + slider[2] > 0.0 else row[FORCE] / slider[0]
-    slip = body + row[SHEARED]
+    slip, body = free_ways(row, slider)
     radius, area, _, _ = contact_area(FEW, 0.0, time, row[RADIUS], bare, held)
     row[BOUND], row[MOMENT], row[SHEARED], row[RADIUS] = FEW, 0.0, 0.0, radius if area >= 0.0 else row[RADIUS]
     row[FORCE] -= slider[0] * body

@@ -269,8 +269,9 @@ def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_
     check_blocks(scene, states)
 
 
-def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again():
-    scene = scenario(3.0, 30, spring(1.0), share=0.5, **PULLED_OFF)
+@pytest.mark.parametrize("viscosity", [0.0, 0.1])
+def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again(viscosity):
+    scene = scenario(3.0, 30, spring(1.0, viscosity=viscosity), share=0.5, **PULLED_OFF)
     states, read = marched(scene)
     check_pulled_off(states, read)
     check_blocks(scene, states)

@@ -34,7 +34,7 @@ import sim
 from sim.engine import Dice, follow, march
 from sim.parts.bonds import Cohort
 from sim.parts.bonds.rupture import Catch, Constant, CutOff
-from sim.parts.drive import Steady as AtSpeed
+from sim.parts.drive import READINGS, Steady as AtSpeed
 from sim.parts.shear import Mean
 from sim.scenario.scenario import Scenario
 from sim.spectrum.bond_made import BondMade
@@ -315,13 +315,42 @@ def test_what_would_run_shows_where_a_slider_of_bonds_resolved_by_stretch_oscill
     assert "oscillates below" not in never
 
 
-def test_cohorts_that_break_ever_faster_let_go_at_once_which_is_the_limit_of_little_damping():
+#: A body that lags behind a contact much softer than the bonds, of which the interface alone slips.
+LAGS = {"damping": 1e-3, "contact": 4e-3}
+
+
+@pytest.mark.parametrize(
+    ("delay", "duration", "keys", "bonds"),
+    [("damping", 2.5, {"stiffness": 2e-4, "speed": 1000.0}, {"share": 0.5}),
+     ("viscosity", 1.0, {"stiffness": 2e-3, "speed": 1000.0, **LAGS}, {}),
+     ("viscosity", 1.0, {"stiffness": 2e-3, "speed": 1000.0, "mass": 1e-4, **LAGS}, {"share": 0.5})],
+)  # fmt: skip
+def test_cohorts_that_break_ever_faster_slip_at_once_which_is_the_limit_of_little_damping_or_viscosity(
+    delay, duration, keys, bonds
+):
     found = []
-    for damping in (0.0, 1e-8, 1e-7):
-        drive = spring(2e-4, 1000.0, damping=damping)
-        states, read = marched(scenario(2.5, 5, drive, share=0.5, make=Cohort))
+    for held in (0.0, 1e-8, 1e-7):
+        states, read = marched(scenario(duration, 5, spring(**keys, **{delay: held}), make=Cohort, **bonds))
         assert np.isnan(read["runaway_time"]).all() and residual(read) < 1e-5
-        assert (read["dissipated_by_snaps"][-1] > 0.0) == (damping == 0.0)
+        assert (read["dissipated_by_snaps"][-1] > 0.0) == (held == 0.0)
         found.append(np.stack([read["spring_force"] / UNIT, [state.bonding.fraction[0] for state in states]]))
     near, far = (np.max(np.abs(one - found[0]), axis=1) for one in found[1:])
     assert np.all(far < 0.01) and np.all(near < 0.3 * far)
+
+
+def test_the_missing_energy_of_a_body_that_lags_falls_with_the_tolerance_through_fast_slips():
+    missing = []
+    for tolerance in (1e-4, 1e-6, 1e-8):
+        drive = spring(2.5e-4, 1000.0, mass=1e-6, contact=4e-3, viscosity=1e-6, tolerance=tolerance)
+        _, read = marched(driven(1.8, 5, drive, 1e-4))
+        assert read["dissipated_by_viscosity"][-1] > 0.1 * read["drive_work"][-1]
+        missing.append(residual(read))
+    assert np.all(np.array(missing) < 10.0 * np.array([1e-4, 1e-6, 1e-8]))
+    assert missing[2] < missing[1] < missing[0]
+
+
+def test_a_member_that_lets_go_while_its_body_stays_is_the_same_alone_and_restarted():
+    scene = driven(1.0, 20, spring(2e-3, 1000.0, mass=1e-4, **LAGS), 1e-4, share=0.5)
+    straight = list(march(scene, np.arange(3)))
+    snapped = [scene.parts.drive.readings(state.drive)[0, READINGS.index("dissipated_by_snaps")] for state in straight]
+    check_members(scene, straight, int(np.argmax(np.array(snapped) > 0.0)) - 1)
