@@ -14,13 +14,12 @@ import numpy as np
 
 from sim.ensemble import bounds
 from sim.ensemble.bounds import size, spread
+from sim.ensemble.oscillations import of_slider
 from sim.ensemble.plan import Block, Plan, seconds_a_step, work
 from sim.ensemble.progress import duration
 from sim.laws import jkr
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
-from sim.parts.bonds import Cohort, FirstMoment, Rate
-from sim.parts.drive import Spring
 from sim.parts.exchange import Parts
 from sim.parts.shear.modal import ModalProcess
 from sim.scenario.clock import Record
@@ -204,50 +203,7 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
 
 def _slider(points: Sequence[Scenario]) -> Rows:
     """Stiffness of the contact, and of the spring below which friction that falls with speed makes oscillations."""
-    rows: dict[tuple[str, str], list[float]] = {}
-    for point in points:
-        drive, (yields, slope) = cast(Spring, point.drive), cast(Spring, point.drive).yields(*point.solid.effective)
-        radius, speeds = math.sqrt(point.contact_area / math.pi), np.abs(point.speeds(41))
-        firm = 1.0 / (yields + slope / radius) if yields + slope > 0.0 else math.inf
-        rows.setdefault(("contact k_t", "N/m"), []).append(firm)
-        if not drive.spring:
-            continue
-        if drive.mass > 0.0:
-            own = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
-            rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(own)
-        bonds, bodies = point.population, (point.sphere.radius, point.solid.contact_modulus)
-        works = (point.adhesion.work_of_bonds(bonds.steady(speeds).fraction * share) for share in (0.9999, 1.0, 1.0001))
-        less, area, more = (np.pi * point.contact.equilibrium_radius(work, *bodies) ** 2 for work in works)
-        contact = area, (more - less) / 2e-4 / area
-        sticking, stretching = cast(Rate, bonds), cast(Cohort | FirstMoment, bonds)
-        if bonds.stretched:
-            alone, behind = (stretching.onset(speeds, *contact, *rest) for rest in ((), (drive.mass, firm)))
-        else:
-            alone = sticking.onset(speeds, *contact, drive.mass, drive.damping + drive.viscosity * area)
-        if np.isnan(alone.stiffness).all():
-            continue
-        worst = int(np.nanargmax(alone.stiffness))
-        at = f", at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
-        rows.setdefault(("oscillates below", f"N/m of the spring{at}"), []).append(float(alone.stiffness[worst]))
-        if not bonds.stretched:
-            continue
-        if drive.mass > 0.0 or firm < math.inf:
-            stiffest, name = float(np.nanmax(behind.stiffness)), "with mass and k_t" if drive.mass > 0.0 else "with k_t"
-            if stiffest < math.inf:
-                rows.setdefault((name, "N/m of the spring, without damping"), []).append(stiffest)
-            else:
-                said = "behind any spring, without damping: k_t is so soft that the interface jumps by itself"
-                rows.setdefault((name, said), [])
-        if drive.mass == 0.0 and (grows := stretching.amplitude(speeds)) is not None:
-            said = "suddenly, with large slips; on the way back they last to a stiffer spring"
-            if grows[worst] > 0.0:
-                said = f"gradually: friction swings by {grows[worst]:.3g} √(1 − K/K_c) of itself"
-            rows.setdefault(("sets in there", f"{said} (mean field, constant area)"), [])
-        soft = 4.0 * math.pi * point.solid.effective[0] * float(area[worst] / alone.stiffness[worst])
-        if 0.5 * soft < 2.0 * radius:
-            said = "m and longer: such waves along the sliding oscillate by themselves, across half as long ones"
-            rows.setdefault(("half-space", said), []).append(soft)
-    return [(name, f"{_span(values)} {said}" if values else said) for (name, said), values in rows.items()]
+    return [(name, f"{_span(values)} {said}" if values else said) for (name, said), values in of_slider(points).items()]
 
 
 def _power(point: Scenario) -> float:

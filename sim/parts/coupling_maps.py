@@ -152,16 +152,20 @@ def balance(way, bound, moment, before, after, numbers, start, row, bare, slider
     """
     stiffness, mass, damping, viscosity, _, _, _, tolerance = slider
     _, time, rate, gone, body_gone, heavy, _ = numbers
-    radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
+    radius, area, _, by_moment = contact_area(bound, moment, time, row[RADIUS], bare, held)
     if not area >= 0.0:
         return math.nan, math.nan, math.nan
     yields, _ = compliance(radius, slider)
     slip = before[AT_WAY] + way
-    force = area * (moment + viscosity * (rate * slip - gone))
+    stress = moment + viscosity * (rate * slip - gone)
+    force = area * stress
     body = slip + yields * force - row[SHEARED]
     pull = pull_on(time, start, body, row, slider, piece)
     over = force + (damping + mass * rate) * (rate * body - body_gone) - heavy - pull
-    grows, loads = area * (bound + viscosity * rate), stiffness + rate * (damping + mass * rate)
+    grows, loads = (
+        area * (bound + viscosity * rate) + by_moment * stress * bound,
+        stiffness + rate * (damping + mass * rate),
+    )
     after[AT_WAY], after[AT_BODY], after[AT_AREA], after[AT_RADIUS] = slip, body, area, radius
     after[AT_SHEARED] = yields * force
     if mass > 0.0:  # by its momentum: differences of positions are roundings in the shortest sub-steps

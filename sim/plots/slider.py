@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from sim.analysis import setting, sweep_dims
 from sim.analysis.scene import MEMBERS, word
 from sim.laws import jkr, schallamach
+from sim.laws.schallamach import Body
 from sim.plots import style
 from sim.plots.bond_laws import population_of
 from sim.plots.curves import Scene, choice, scene_along
@@ -19,7 +20,7 @@ from sim.plots.measured import Measured
 from sim.plots.panels import Panel, series, stacked
 
 #: Speeds of a map, and at which its boundary is drawn.
-_CELLS, _FINE = 28, 400
+_CELLS, _FINE = 28, 200
 #: Change of the bond fraction by which the growth of the area is found.
 _LITTLE = 1e-4
 #: Share of the largest force up to which the law of incipient shear is fitted.
@@ -149,17 +150,19 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
     if mean_field:
         bound = np.asarray(schallamach.first_moment_fraction(speed, *bonds.pathway, bonds.rebinding))
     less, area, more = (_area(dataset, at, bound * share) for share in (1.0 - _LITTLE, 1.0, 1.0 + _LITTLE))
-    growth, firm = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf)
+    growth, firm, own = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf), 0.0
     if str(word(dataset, "drive.contact_stiffness", "half_space").item()) == "half_space":
+        own = 0.5
         modulus, ratio = (float(dataset[f"effective_{name}"].isel(at, missing_dims="ignore")) for name in _SOLID)
         firm = 0.75 * math.pi**2 * modulus * np.sqrt(area / math.pi) / (2.0 - ratio)
     with contextlib.suppress(KeyError):
         firm = np.full(speed.shape, style.number_at(setting(dataset, "drive.contact_stiffness"), at))
-    mass = style.number_at(setting(dataset, "drive.mass"), at)
-    numbers = bonds.stiffness, bonds.rebinding, bonds.density, area, growth, mass, firm
-    return np.asarray(onset(speed, *numbers).stiffness)
+    mass, damping, viscosity = (style.number_at(setting(dataset, f"drive.{key}"), at) for key in _DELAYS)
+    body = Body(area, growth, 0.0, mass, damping, viscosity, firm, own)
+    return np.asarray(onset(speed, bonds.stiffness, bonds.rebinding, bonds.density, body).stiffness)
 
 
+_DELAYS = ("mass", "damping", "viscosity")
 _SOLID = ("shear_modulus", "poisson_ratio")
 
 

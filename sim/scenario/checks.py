@@ -74,13 +74,8 @@ def _wider_than_the_sphere(radius: float, sphere: Sphere, contact: Contact) -> F
         yield ("contact", contact.kind), f"{said} check its unit, and those of sphere, adhesion and solid"
 
 
-def _reversible_under_a_drive(drive: Drive, bonds: BondModel, contact: Contact) -> Faults:
-    if not drive.feeds_back or contact.reversible == 0.0:
-        return
-    if bonds.model in ("cohort", "tracked"):
-        said = f'is not solved with a "{drive.model}" drive for "{bonds.model}" bonds: leave it out, take bonds.model ='
-        yield ("contact", "reversible"), f'{said} "rate", or prescribe the speed'
-    elif drive.at_once:
+def _reversible_under_a_drive(drive: Drive, contact: Contact) -> Faults:
+    if drive.feeds_back and contact.reversible > 0.0 and drive.at_once:
         said = "makes friction fall as the contact shrinks, which nothing delays: give drive.mass, damping or viscosity"
         yield ("contact", "reversible"), said
 

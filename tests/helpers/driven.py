@@ -71,8 +71,13 @@ def spring(stiffness, speed=10.0, mass=0.0, damping=0.0, contact=math.inf, visco
     return Spring(
         stage=speed * STRETCH if isinstance(speed, float) else speed, stiffness=stiffness * STIFF, mass=mass * STIFF,
         damping=damping * STIFF, viscosity=viscosity * DENSITY * KAPPA,
-        contact_stiffness="rigid" if contact == math.inf else contact * STIFF, **keys,
+        contact_stiffness=_held_by(contact), **keys,
     )  # fmt: skip
+
+
+def _held_by(contact):
+    """k_t in units of all sites bound, rigid if infinite."""
+    return contact if isinstance(contact, str) else "rigid" if contact == math.inf else contact * STIFF
 
 
 def force(load, **keys):

@@ -141,9 +141,9 @@ def go_together(case):
     part, contact = DRIVES[case.get("drive", "steady")], CONTACTS[case.get("contact", "load")]
     if not part.feeds_back:
         return True
-    population = BONDS[case.get("bonds", "rate, bell")].chosen(1e-8, False)
-    if contact.reversible and (population.model in ("cohort", "tracked") or part.at_once):
+    if contact.reversible and part.at_once:
         return False
+    population = BONDS[case.get("bonds", "rate, bell")].chosen(1e-8, False)
     return population.stretched or (part.contact_stiffness == "rigid" and not part.at_once)
 
 

@@ -11,6 +11,7 @@ from scipy.integrate import quad, solve_ivp
 from scipy.optimize import minimize_scalar
 
 from sim.laws.schallamach import (
+    Body,
     bell_critical_speed,
     bell_fraction,
     bell_lives,
@@ -636,9 +637,9 @@ def test_arguments_broadcast():
      (100.0, 1.0, 0.0378665, 46.056227)],
 )  # fmt: skip
 def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues(speed, beta, stiffness, frequency):
-    found = first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, 1.0)
+    found = first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, Body(1.0))
     assert_allclose(found, (stiffness, frequency), rtol=2e-6)
-    assert np.isnan(first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, 1.0)).all()
+    assert np.isnan(first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, Body(1.0))).all()
 
 
 @pytest.mark.parametrize(
@@ -650,28 +651,30 @@ def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues(speed, be
 def test_the_onset_of_bonds_resolved_by_stretch_is_that_of_the_characteristic_equation(
     beta, speed, stiffness, frequency
 ):
-    found = resolved_onset([speed, -speed], [(1.0, 1.0)], 1.0, beta, 1.0, 1.0)
+    found = resolved_onset([speed, -speed], [(1.0, 1.0)], 1.0, beta, 1.0, Body(1.0))
     assert_allclose(found, np.transpose([(stiffness, frequency)] * 2), rtol=5e-6)
     # of rates, forces and sites only ratios count
     assert_allclose(
-        resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, 0.2).stiffness, stiffness, rtol=5e-6
+        resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, Body(0.2)).stiffness, stiffness, rtol=5e-6
     )
 
 
 def test_oscillations_of_bonds_resolved_by_stretch_set_in_beyond_the_maximum_of_friction_alone():
     bell = bell_peak(1.0, 1.0, 1.0, 1.0, 1.0).speed
     assert np.array_equal(
-        np.isnan(resolved_onset(bell * np.array([0.0, 0.5, 0.999, 1.001, 2.0]), [(1.0, 1.0)], 1.0, 1.0, 1.0, 1.0)),
+        np.isnan(
+            resolved_onset(bell * np.array([0.0, 0.5, 0.999, 1.001, 2.0]), [(1.0, 1.0)], 1.0, 1.0, 1.0, Body(1.0))
+        ),
         [[True, True, True, False, False]] * 2,
     )
     catch = 1.0, 1.0, 1e-2, 1.0
     speed = np.geomspace(0.1, 100.0, 200)
     falls = np.gradient(catch_moments(speed, *catch, 1.0, 1.0).force, speed) < 0.0
-    onset = resolved_onset(speed, [(1.0, -1.0), (1e-2, 1.0)], 1.0, 1.0, 1.0, 1.0).stiffness
+    onset = resolved_onset(speed, [(1.0, -1.0), (1e-2, 1.0)], 1.0, 1.0, 1.0, Body(1.0)).stiffness
     assert np.sum(falls != np.isfinite(onset)) <= 1
     assert 10 < np.sum(falls) < 190
-    behind = resolved_onset(10.0, [(1.0, 1.0)], 1.0, 1.0, 1.0, 1.0, 0.0, 1e-3, [math.inf, 0.05, 0.02])
-    alone = resolved_onset(10.0, [(1.0, 1.0)], 1.0, 1.0, 1.0, 1.0)
+    yielding = Body(1.0, mass=1e-3, contact_stiffness=[math.inf, 0.05, 0.02])
+    behind, alone = (resolved_onset(10.0, [(1.0, 1.0)], 1.0, 1.0, 1.0, body) for body in (yielding, Body(1.0)))
     swings = 1e-3 * alone.frequency**2
     series = alone.stiffness / (1.0 - alone.stiffness / 0.05)
     assert_allclose(behind.stiffness, (swings + alone.stiffness, swings + series, math.inf), rtol=1e-12)
@@ -692,10 +695,42 @@ def test_oscillations_set_in_gradually_at_high_speeds_and_suddenly_at_low_ones()
 
 
 def test_area_mass_and_a_contact_that_yields_raise_the_stiffness_at_the_onset():
-    unit = (10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0)
-    assert_allclose(first_moment_onset(*unit, 0.5), (0.0986672601, 6.4985274731), rtol=1e-9)
-    assert_allclose(first_moment_onset(*unit, 0.0, [1e-3, 1e-2]).stiffness, (0.0610321013, 0.2591294488), rtol=1e-8)
-    assert_allclose(
-        first_moment_onset(*unit, 0.0, [0.0, 1e-3], 0.05).stiffness, (0.1777133504, 0.1997241668), rtol=1e-8
-    )
-    assert first_moment_onset(*unit, 0.0, 0.0, 0.03).stiffness == math.inf
+    def onset(**body):
+        return first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, Body(1.0, **body))
+
+    massive, steps = [0.0, 1e-3], {"contact_stiffness": 0.05}
+    assert_allclose(onset(area_growth=0.5), (0.0986672601, 6.4985274731), rtol=1e-9)
+    assert_allclose(onset(mass=[1e-3, 1e-2]).stiffness, (0.0610321013, 0.2591294488), rtol=1e-8)
+    assert_allclose(onset(mass=massive, **steps).stiffness, (0.1777133504, 0.1997241668), rtol=1e-8)
+    assert_allclose(onset(mass=1e-2, contact_stiffness=0.2).stiffness, 0.2685882190, rtol=1e-8)
+    assert onset(contact_stiffness=0.03).stiffness == math.inf
+
+
+def test_damping_holds_softer_springs_and_so_does_a_viscous_interface_whose_contact_does_not_yield():
+    def onset(**body):
+        return first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, Body(**({"area": 1.0} | body)))
+
+    assert_allclose(onset(damping=1e-3), (0.0319311178, 4.1845576357), rtol=1e-8)
+    assert_allclose(onset(damping=2e-3), (0.0241019898, 3.5927135646), rtol=1e-8)
+    assert_allclose(onset(mass=1e-3, damping=1e-3), (0.0494416404, 4.1845576357), rtol=1e-8)
+    softer = onset(mass=1e-3, damping=1e-3, contact_stiffness=0.05)
+    assert_allclose(softer, (0.1924327975, 4.6670599625), rtol=1e-8)
+    assert_allclose(onset(area=2.0, viscosity=5e-4).stiffness, 2.0 * onset(damping=5e-4).stiffness, rtol=1e-12)
+    assert np.isnan(onset(damping=10.0)).all() and np.isnan(onset(viscosity=10.0, contact_stiffness=0.03)).all()
+
+
+def test_what_holds_a_spring_solves_the_characteristic_equation_with_all_its_terms():
+    body = Body(2.0, 0.5, -0.1, 1e-3, 1e-3, 1e-4, 0.5, 0.5)
+    stiffness, frequency = first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, body)
+    # bonds N and stretches x of a site, slip and body: small motions of the equations of the closure themselves
+    tilt = 1.7455280027406994  # x e^x = 10
+    rate, turns = 10.0 / tilt, 1j * frequency
+    bound = 1.0 / (1.0 + rate)
+    rows = [[turns + 1.0 + rate, bound * rate], [tilt * turns / bound, turns + rate * (1.0 + tilt)]]
+    more, stretched = np.linalg.solve(rows, [0.0, turns])
+    moment = bound * stretched + tilt * more
+    spread = 0.5 * more / bound - 0.1 * moment / (bound * tilt)
+    force = 2.0 * (bound * tilt + 1e-3)
+    pulls = 2.0 * (moment + 1e-4 * turns) + force * spread
+    way = 1.0 + (pulls - 0.5 * force * spread) / 0.5
+    assert abs((stiffness + 1e-3 * turns + 1e-3 * turns**2) * way + pulls) < 1e-12 * abs(pulls)

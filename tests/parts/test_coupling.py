@@ -1,5 +1,6 @@
 """Slider and bonds solved together, against closed forms, linear stability and trajectories of other integrators."""
 
+import functools
 import math
 
 import numpy as np
@@ -42,8 +43,9 @@ from scipy.optimize import brentq
 import sim
 from sim.analysis.tables import notes
 from sim.engine import Dice, follow, march
+from sim.ensemble.oscillations import slider_body
 from sim.laws import jkr
-from sim.parts.bonds import Cohort, FirstMoment, Steady, Unbroken
+from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import READINGS, Force, Spring, Steady as AtSpeed
@@ -124,11 +126,11 @@ ONSETS = {
 }
 
 
-def growth(stiffness, keys, steps=300, step=0.02, share=0.0):
+def growth(stiffness, keys, steps=300, step=0.02, **lens):
     """Growth rate and frequency of the slowest mode of the bonds after a small jump of the speed."""
     stage = {"time": (0.0, step, step, 1e3), "value": tuple(v * STRETCH for v in (10.0, 10.0, 10.0001, 10.0001))}
     drive = spring(stiffness, stage, start="steady", tolerance=1e-11, **keys)
-    scene = scenario(steps * step, steps, drive, share=share, start="steady")
+    scene = scenario(steps * step, steps, drive, start="steady", **lens)
     passed = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
     changes = np.diff(passed.fraction[steps // 2 :, 0])
     modes = 4 if {"contact", "mass"} <= keys.keys() else 2  # there the body rings for long
@@ -138,18 +140,33 @@ def growth(stiffness, keys, steps=300, step=0.02, share=0.0):
     return slowest.real, slowest.imag
 
 
-def check_onset(onset, frequency, keys, share=0.0):
-    rate, turns = growth(onset, keys, share=share)
+def check_onset(onset, frequency, keys, **lens):
+    rate, turns = growth(onset, keys, **lens)
     assert abs(rate) < 1e-4 * frequency
     assert_allclose(turns, frequency, rtol=1e-4)
-    assert growth(0.98 * onset, keys, share=share)[0] > 1e-3
-    assert growth(1.02 * onset, keys, share=share)[0] < -1e-3
+    assert growth(0.98 * onset, keys, **lens)[0] > 1e-3
+    assert growth(1.02 * onset, keys, **lens)[0] < -1e-3
 
 
 @pytest.mark.parametrize("name", some(ONSETS, "contact, mass, damping"))
 def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_on_its_sides(name):
     keys, onset, frequency = ONSETS[name]
     check_onset(onset, frequency, keys)
+
+
+@pytest.mark.parametrize(
+    ("keys", "sites", "lens"),
+    [({"viscosity": 1e-3, "contact": "half_space"}, 0.3, {"share": 0.5}),
+     ({"damping": 0.1}, 100.0, {"share": 0.5, "reversible": 0.1})],
+)  # fmt: skip
+def test_the_onset_that_is_shown_is_that_of_the_engine_with_all_that_delays_and_moves_the_slider(keys, sites, lens):
+    lens |= {"make": lambda **recipe: FirstMoment(**(recipe | {"site_density": sites * DENSITY}))}
+    scene, speed = scenario(1.0, 4, spring(1.0, **keys), **lens), np.full(1, 10.0 * STRETCH)
+    body = slider_body(scene, speed)
+    stiffness, frequency = (values[0] for values in scene.bonds.onset(speed, body))
+    check_onset(stiffness / STIFF, frequency, keys, **lens)
+    plain = scene.bonds.onset(speed, body._replace(contact_growth=0.0, stress_growth=0.0)).stiffness[0]
+    assert abs(plain / stiffness - 1.0) > 1e-3  # more than the engine is held to
 
 
 def test_an_area_that_follows_the_bonds_raises_the_onset_as_linear_stability_has_it():
@@ -277,10 +294,12 @@ def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_
     check_blocks(scene, states)
 
 
+@pytest.mark.parametrize("make", [FirstMoment, functools.partial(Cohort, tolerance=1e-6),
+                                  functools.partial(Tracked, sites=300)])  # fmt: skip
 @pytest.mark.parametrize("keys", [{"mass": 0.1, "damping": 0.1}, {"contact": 50.0, "viscosity": 1.0}])
-def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within_the_sub_steps(keys):
+def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within_the_sub_steps(keys, make):
     # strong bonds: at their peak the whole energy of the mean stress is more than adhesion can pay
-    strong = {"make": lambda **recipe: FirstMoment(**(recipe | {"site_density": 100.0 * DENSITY})), "share": 0.5}
+    strong = {"make": lambda **recipe: make(**(recipe | {"site_density": 100.0 * DENSITY})), "share": 0.5}
     scene = scenario(4.0, 80, spring(2.0, **keys), reversible=1.0, **strong)
     states, read = marched(scene)
     radii = np.array([state.contact.radius[0] for state in states[1:]])
@@ -288,8 +307,9 @@ def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within
     hertz = jkr.radius_at_load(LOAD, 0.0, R, MODULUS)
     assert_allclose(np.min(radii), hertz, rtol=1e-12)
     assert np.max(radii) > 1.5 * hertz
-    assert residual(read) < 1e-5
-    check_blocks(scene, states)
+    assert residual(read) < 3e-5  # of 300 bonds each breaks at a step's end
+    if not scene.by_steps:
+        check_blocks(scene, states)
 
 
 def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
@@ -304,8 +324,6 @@ def test_a_drive_is_refused_with_bonds_that_it_cannot_be_solved_with():
         assert any(place in said and cure in said for said in refused.value.problems)
     with pytest.raises(BadInput, match=r"contact\.reversible.*mass"):
         scenario(1.0, 4, spring(1.0), reversible=0.01)
-    with pytest.raises(BadInput, match=r"contact\.reversible.*rate"):
-        scenario(1.0, 4, spring(1.0, mass=1e-3), make=Cohort, reversible=0.01)
 
 
 def test_bonds_that_a_stretch_breaks_snap_at_the_fold_of_their_force():
@@ -375,7 +393,7 @@ def test_what_would_run_shows_where_the_slider_oscillates():
     text = sim.check(scenario(1.0, 4, spring(1.0, mass=1e-3, contact=0.05, damping=1e-3)))
     rows = {line.split("  ")[1]: line for line in text.partition("\nslider\n")[2].splitlines() if line.startswith("  ")}
     assert f"{0.0390213 * STIFF:.4g} N/m" in rows["oscillates below"]
-    assert f"{0.1997241668 * STIFF:.4g} N/m" in rows["with mass and k_t"]
+    assert f"{0.1924327975 * STIFF:.4g} N/m" in rows["with mass, damping and k_t"]
     assert f"{0.05 * STIFF:.4g} N/m" in rows["contact k_t"]
     assert f"{math.sqrt(1.0 / 1e-3) / (2.0 * math.pi):.4g} Hz" in rows["natural frequency"]
 

@@ -6,7 +6,7 @@ from helpers.driven import DENSITY, KAPPA, STRETCH, UNIT, scenario, spring
 from numpy.testing import assert_allclose
 
 from sim.engine import Dice, follow
-from sim.laws.schallamach import first_moment_amplitude, first_moment_onset, first_moment_stress
+from sim.laws.schallamach import Body, first_moment_amplitude, first_moment_onset, first_moment_stress
 from sim.parts.drive import READINGS, Table
 
 #: Bonds whose stretch, life at rest and stiffness are units and which are remade as fast, at a site of unit area.
@@ -83,7 +83,7 @@ def test_a_large_step_of_the_speed_overshoots_behind_a_stiff_spring_as_without_o
 
 def cycle(speed, share, duration, step, tolerance=1e-9):
     """Force of the spring, of a stiffness that is a share of the onset's, over that of steady sliding."""
-    drive = spring(share * first_moment_onset(speed, *UNITS).stiffness, speed, tolerance=tolerance)
+    drive = spring(share * first_moment_onset(speed, *UNITS[:5], Body(1.0)).stiffness, speed, tolerance=tolerance)
     read = passed(scenario(duration, round(duration / step), drive))[1]
     return read["spring_force"] / UNIT / first_moment_stress(speed, *UNITS[:5])
 

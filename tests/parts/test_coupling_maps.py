@@ -32,6 +32,7 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim.engine import Dice, follow, march
+from sim.laws.schallamach import Body
 from sim.parts.bonds import Cohort
 from sim.parts.bonds.rupture import Catch, Constant, CutOff
 from sim.parts.drive import READINGS, Steady as AtSpeed
@@ -206,7 +207,7 @@ def test_an_area_that_follows_the_bonds_raises_the_onset_as_linear_stability_has
     bound = scene.bonds.steady(np.full(1, 10.0 * STRETCH)).fraction[0]
     works = scene.adhesion.work_of_bonds(bound * np.array([0.999, 1.0, 1.001]))
     less, area, more = np.pi * scene.contact.equilibrium_radius(works, R, MODULUS) ** 2
-    onset = scene.bonds.onset(np.full(1, 10.0 * STRETCH), area, (more - less) / 2e-3 / area)
+    onset = scene.bonds.onset(np.full(1, 10.0 * STRETCH), Body(area, (more - less) / 2e-3 / area))
     stiffness, frequency = onset.stiffness[0] / STIFF, onset.frequency[0]
     assert stiffness > 1.2 * 0.0295565 * area / AREA
     rate, turns = growth(10.0, stiffness, frequency, share=0.5)

@@ -10,7 +10,7 @@ from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
 import sim
-from sim.laws.schallamach import first_moment_onset, first_moment_peak, resolved_onset
+from sim.laws.schallamach import Body, first_moment_onset, first_moment_peak, resolved_onset
 from sim.parts.bonds import Cohort, FirstMoment
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact.bodies import Adhesion
@@ -60,11 +60,12 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():
     dataset = driven("map")
     figure = rendered(draw(dataset))
     up, down = figure.axes[:2]
+    body = Body(scene(1).contact_area, damping=1e-2)
     for panel, words in ((up, "faster"), (down, "slower")):
         assert words in legend_of(panel)[1]
         ((speed, stiffness),) = lines_of(panel)
         firm = 0.5 * np.pi**2 * 1.6e6 * float(dataset["radius_at_rest"][0])
-        exact = first_moment_onset(1e-3 * speed, *NUMBERS, scene(1).contact_area, contact_stiffness=firm).stiffness
+        exact = first_moment_onset(1e-3 * speed, *NUMBERS, body._replace(contact_stiffness=firm)).stiffness
         assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
         swings = panel.collections[0].get_array().reshape(2, -1)
         # a soft spring sticks and slips at 30 mm/s, one stiffer than the boundary nowhere
@@ -82,8 +83,8 @@ def test_the_boundary_of_a_map_of_cohorts_is_that_of_bonds_resolved_by_stretch()
     panel = rendered(draw(sim.run(scene(1, adhesion=Adhesion(work=42e-3, bond_share=0.0), **parts)))).axes[0]
     ((speed, stiffness),) = lines_of(panel)
     firm = 0.5 * np.pi**2 * 1.6e6 * math.sqrt(scene(1).contact_area / np.pi)
-    numbers = [(25.0, 4e-12)], *NUMBERS[2:], scene(1).contact_area
-    exact = resolved_onset(1e-3 * speed, *numbers, contact_stiffness=firm).stiffness
+    body = Body(scene(1).contact_area, damping=1.0, contact_stiffness=firm)
+    exact = resolved_onset(1e-3 * speed, [(25.0, 4e-12)], *NUMBERS[2:], body).stiffness
     assert_allclose(stiffness, 1e-3 * exact, rtol=1e-6)
 
 

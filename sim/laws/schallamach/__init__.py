@@ -50,4 +50,4 @@ from sim.laws.schallamach.loading import (
     start_up_peak,
 )
 from sim.laws.schallamach.renewal import Lives, Peak, SiteMoments, constant_moments, renewal, rest_share
-from sim.laws.schallamach.stability import Onset, resolved_onset
+from sim.laws.schallamach.stability import Body, Onset, resolved_onset

@@ -14,9 +14,12 @@ import math
 import numpy as np
 
 from sim.laws.schallamach.renewal import Peak
-from sim.laws.schallamach.stability import behind
+from sim.laws.schallamach.stability import onset_behind
 from sim.numerics.jit import device, law
 from sim.numerics.special import lambert
+
+#: Frequencies over the sum of the rates among which oscillations are looked for.
+_SLOWEST, _FASTEST = 1e-4, 30.0
 
 
 @device
@@ -156,55 +159,53 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
     return Peak(_peak_speed(*given), np.multiply(site_density, _peak_force(*given)))
 
 
-def first_moment_onset(
-    speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, area, area_growth=0.0, mass=0.0,
-    contact_stiffness=math.inf,
-):  # fmt: skip
+def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, body):
     """Stiffness of a spring below which a mean-field Bell population oscillates at a speed.
 
     Parameters
     ----------
     speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density : float or array
         As in ``first_moment_stress``.
-    area : float or array
-        A [m^2], at this speed.
-    area_growth : float or array
-        d ln A/d ln phi of a contact whose area follows the bonds [1].
-    mass : float or array
-        m of the body behind the spring [kg], without damping.
-    contact_stiffness : float or array
-        k_t between body and interface [N/m].
+    body : Body
+        The body behind the spring, and its contact.
 
     Returns
     -------
     Onset
-        Stiffness [N/m], infinite where no spring is stiff enough, and frequency [rad/s]; nan where friction does not
-        fall with speed.
+        Stiffness [N/m], infinite where no spring is stiff enough, and frequency [rad/s]; nan where every spring is.
 
     Notes
     -----
-    With the share N bound, x the stretch over f_b/kappa, s the growth of the area and d = (1 + s) x k - k_on - k,
+    With the share N bound and x the stretch over x_b = f_b/kappa a slip answers
 
-        ``K_0 = n kappa A N d/(k_on + 2k)``,  ``omega^2 = (k_on + k)(1 + x) d/(1 + (1 + s) x)``,
+        ``d tau = n kappa N lambda (lambda + k_on + (1 - x) k)/D``,  ``d ln N = -k lambda/(D x_b)``,
+        ``D = lambda^2 + (k_on + 2k) lambda + k (k_on + k) (1 + x)``
 
-    from the eigenvalues of the closure; a mass and k_t make it ``K = m omega^2 + K_0 k_t/(k_t - K_0)``.
+    from the eigenvalues of the closure. Massless and undamped, with s the growth of the area over the bonds and
+    d = (1 + s) x k - k_on - k, the onset is ``K = n kappa A N d/(k_on + 2k)``, and a mass and k_t of their own make it
+    ``m omega^2 + K k_t/(k_t - K)``.
 
     Examples
     --------
     In units of all sites, at ten times the speed at which bonds begin to yield:
 
-    >>> print("%.7f %.6f" % first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0))
+    >>> print("%.7f %.6f" % first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, Body(1.0)))
     0.0390213 4.691569
     """
-    tilt = bond_stiffness * first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / bell_force
-    tilt = np.abs(tilt)
+    unit = np.divide(bell_force, bond_stiffness)
+    tilt = np.abs(first_moment_stretch(speed, zero_force_rate, bell_force, bond_stiffness) / unit)
     rate = zero_force_rate * np.exp(tilt)
-    surplus = (1.0 + area_growth) * tilt * rate - rebinding_rate - rate
-    surplus = np.where(surplus > 0.0, surplus, np.nan)
     bound = rebinding_rate / (rebinding_rate + rate)
-    square = (rebinding_rate + rate) * (1.0 + tilt) * surplus / (1.0 + (1.0 + area_growth) * tilt)
-    alone = site_density * bond_stiffness * area * bound * surplus / (rebinding_rate + 2.0 * rate)
-    return behind(alone, square, mass, contact_stiffness)
+    density = site_density * bond_stiffness * bound
+
+    def answer(frequency):
+        turns = 1j * frequency
+        own = turns * (turns + rebinding_rate + 2.0 * rate) + rate * (rebinding_rate + rate) * (1.0 + tilt)
+        stretched = density * turns * (turns + rebinding_rate + (1.0 - tilt) * rate) / own
+        return stretched, -rate * turns / own / unit
+
+    pace = rebinding_rate + (1.0 + tilt) * rate
+    return onset_behind(answer, speed, density * tilt * unit, (_SLOWEST * pace, _FASTEST * pace), body)
 
 
 def first_moment_amplitude(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):

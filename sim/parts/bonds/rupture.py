@@ -12,6 +12,7 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.laws.schallamach import (
+    Body,
     Onset,
     SiteMoments,
     bell_moments,
@@ -87,9 +88,9 @@ class _Law:
         return 0.0
 
     def first_moment_onset(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, *contact: Array | float
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
     ) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s]; the rest as of the law ``first_moment_onset``."""
+        """Onset of oscillations behind a spring at speeds [m/s], as of the law ``first_moment_onset``."""
         return Onset(*np.full((2, *speed.shape), np.nan))
 
     def first_moment_amplitude(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> Array:
@@ -102,12 +103,12 @@ class _Law:
         return []
 
     def resolved_onset(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, *contact: Array | float
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
     ) -> Onset:
         """Onset of oscillations behind a spring of bonds resolved by stretch, as of the law ``resolved_onset``."""
         if not self.pathways:
             return Onset(*np.full((2, *speed.shape), np.nan))
-        return resolved_onset(speed, self.pathways, bond_stiffness, rebinding_rate, site_density, *contact)
+        return resolved_onset(speed, self.pathways, bond_stiffness, rebinding_rate, site_density, body)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -153,10 +154,10 @@ class Bell(_Law):
         return float(first_moment_peak(*recipe, 1.0).stress / bell_peak(*recipe, 1.0).stress - 1.0)
 
     def first_moment_onset(
-        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, *contact: Array | float
+        self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
     ) -> Onset:
         law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate, site_density
-        return cast(Onset, first_moment_onset(speed, *law, *contact))
+        return cast(Onset, first_moment_onset(speed, *law, body))
 
     def first_moment_amplitude(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> Array:
         law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate

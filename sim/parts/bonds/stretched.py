@@ -16,7 +16,7 @@ from pydantic_core import PydanticCustomError
 import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.first_moment as first_moment
 import sim.parts.bonds.tracked as tracks
-from sim.laws.schallamach import Onset
+from sim.laws.schallamach import Body, Onset
 from sim.numerics.noise import Noise
 from sim.parts.bonds.area import UNSEEN, Area, Common, OverArea
 from sim.parts.bonds.cohorts import Cohorts
@@ -56,10 +56,10 @@ class _Stretched(Common):
         """Share of sites that are bound at rest [1]."""
         return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
 
-    def onset(self, speed: Array, *contact: Array | float) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known; the rest as of its law."""
+    def onset(self, speed: Array, body: Body) -> Onset:
+        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known."""
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
-        return self.rupture.resolved_onset(speed, *recipe, *contact)
+        return self.rupture.resolved_onset(speed, *recipe, body)
 
     def amplitude(self, speed: Array) -> Array | None:
         """Growth of the oscillations beyond their onset at speeds [m/s], where a law is known of it."""
@@ -136,9 +136,9 @@ class FirstMoment(OverArea, _Separable):
         bound, stretch = first_moment.follow(*before, *slid, self.law, self.rebinding_rate)
         return Stretches(bound[-1], stretch[-1], seen), self.bonding(Stretches(bound, stretch))
 
-    def onset(self, speed: Array, *contact: Array | float) -> Onset:
+    def onset(self, speed: Array, body: Body) -> Onset:
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
-        return self.rupture.first_moment_onset(speed, *recipe, *contact)
+        return self.rupture.first_moment_onset(speed, *recipe, body)
 
     def amplitude(self, speed: Array) -> Array:
         return self.rupture.first_moment_amplitude(speed, self.bond_stiffness, self.rebinding_rate)

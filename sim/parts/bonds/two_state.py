@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.laws.schallamach import Onset, linear_onset, steady_fraction, transition_probabilities
+from sim.laws.schallamach import Body, Onset, linear_onset, steady_fraction, transition_probabilities
 from sim.laws.schallamach.linear import relaxed
 from sim.numerics.binomial import binomial
 from sim.numerics.jit import kernel
@@ -74,8 +74,8 @@ class _WithoutStretch(Common):
         strength = self.stress * state.bound
         return Bonding(state.bound, state.sense * strength, strength)
 
-    def onset(self, speed: Array, area: Array, growth: Array, mass: float, damping: Array) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known; the rest as of its law."""
+    def onset(self, speed: Array, body: Body) -> Onset:
+        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known."""
         return Onset(*np.full((2, *speed.shape), np.nan))
 
     def steady(self, speed: Array) -> Bonding:
@@ -163,9 +163,12 @@ class Rate(OverArea, _WithoutStretch):
         first = rows * self._first_fraction(self.start_from, motion)
         return Population(first, np.sign(motion.speed))
 
-    def onset(self, speed: Array, area: Array, growth: Array, mass: float, damping: Array) -> Onset:
-        recipe = self.critical_speed, self.rebinding_rate, self.stress * area
-        return linear_onset(speed, *recipe, damping, mass, growth)
+    def onset(self, speed: Array, body: Body) -> Onset:
+        drag, strength = np.multiply(body.viscosity, body.area), self.stress * np.asarray(body.area)
+        viscous = drag * np.abs(speed) / (strength * self._steady_fraction(speed))  # grows with the area, too
+        recipe = self.critical_speed, self.rebinding_rate, strength, body.damping + drag
+        growth = np.add(body.area_growth, body.stress_growth) * (1.0 + viscous)
+        return linear_onset(speed, *recipe, body.mass, growth)
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
         share, seen = self.kept(state.seen, radius)
