@@ -348,7 +348,7 @@ def converge(
 @click.option("--free", "keys", multiple=True, required=True, metavar="KEY[=LOW:HIGH]", help="A number to be found.")
 @click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="An error that a column's points share, as 2 %.")
 @click.option("--steady", is_flag=True, help="Steady sliding is enough: do not run the scenario's own models.")
-@click.option("--compare", "judged", is_flag=True, help="Also which mechanism or theory the data prefer.")
+@click.option("--compare", "judged", is_flag=True, help="Also which mechanism or theory is sufficient for the data.")
 @click.option("--posterior", "sampled", is_flag=True, help="Also sample all free numbers together by Markov chains.")
 @click.option("-o", "--output", "stem", type=_PATH, help="STEM of STEM_fit.toml, .json, .png; default the scenario's.")
 @_SET

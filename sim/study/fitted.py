@@ -18,7 +18,7 @@ from sim.scenario.toml_text import parse, put, written
 from sim.study.fit import Fit, Found, fit
 from sim.study.fit_figure import figure
 from sim.study.fitting import LEVEL
-from sim.study.mechanisms import Verdict, compare
+from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.study.posterior import Posterior, posterior
 from sim.units.notation import concise, engineering, scaled
 from sim.units.options import quantity
@@ -118,13 +118,16 @@ def _explanation(fit: Fit) -> str:
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:
-    """One row for each mechanism, the best first."""
-    least = verdict.judged[0].aicc
-    return [
-        {"mechanism": one.name, "chi^2": f"{one.chi_square:.4g}", "AICc - least": f"{one.aicc - least:.3g}",
-         "p": "" if math.isnan(one.p_value) else f"{one.p_value:.3g}", "rejected": "yes" if one.rejected else ""}
-        for one in verdict.judged
-    ]  # fmt: skip
+    """One row for each mechanism, the best first; p and the rejection where there is one to compare with."""
+    least, rows = verdict.judged[0].aicc, []
+    for one in verdict.judged:
+        row = {"mechanism": one.name, "chi^2": f"{one.chi_square:.4g}", "AICc - least": f"{one.aicc - least:.3g}"}
+        if len(verdict.judged) > 1:
+            drawn = f"{one.p_value:.3g}" if math.isfinite(one.p_value) else "by AICc alone"
+            row["p"] = "compared with" if one.name == WHOLE else drawn
+            row["rejected"] = "yes" if one.rejected else ""
+        rows.append(row)
+    return rows
 
 
 def _sampled(fit: Fit, found: Posterior) -> Shown:
@@ -156,7 +159,7 @@ def document(fit: Fit, data: Sequence[Path], more: More) -> dict[str, Any]:
     }
     if more.verdict is not None:
         judged = [one._asdict() for one in more.verdict.judged]
-        found["mechanisms"] = {"preferred": more.verdict.preferred, "words": more.verdict.words, "judged": judged}
+        found["mechanisms"] = {"sufficient": more.verdict.sufficient, "words": more.verdict.words, "judged": judged}
     if more.posterior is not None:
         found["posterior"] = more.posterior.document()
     return _without_nan(found)

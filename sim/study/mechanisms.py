@@ -19,8 +19,9 @@ from sim.units.quantity import Quantity
 
 Array = NDArray[np.float64]
 
-#: Draws of a likelihood ratio; difference of AICc beyond which none is needed.
-DRAWS, _HOPELESS = 200, 30.0
+#: Most draws of a likelihood ratio; ratios as large as the measured one that are enough (Besag & Clifford 1991);
+#: difference of AICc beyond which none is needed.
+DRAWS, _ENOUGH, _HOPELESS = 200, 20, 30.0
 #: Relative precision of a sum of squares of drawn curves, whose ratios are of order 1.
 _FINE = 1e-4
 #: What rejects a mechanism: probability of a ratio at least as large, and difference of AICc.
@@ -41,6 +42,8 @@ _THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
     "scaled_tangent": ("mixed mode, scaled tangent", (_LAMBDA,)),
 }
 WHOLE = "the scenario as it is"
+#: Parts of it by their names, and what they leave out.
+_PARTS = {"bonds only": "fluctuations act", "fluctuations only": "bonds act"}
 
 
 class Judged(NamedTuple):
@@ -59,10 +62,14 @@ class Judged(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """The mechanisms in the order of AICc, and which one the data prefer, in words."""
+    """The mechanisms in the order of AICc, and what the data say of them, in words.
+
+    ``sufficient`` is the one that is left when the data reject all others, or all but the scenario as it is, of which
+    it is a part: that more acts than is sufficient they do not show, and do not exclude. "" where several are left.
+    """
 
     judged: tuple[Judged, ...]
-    preferred: str
+    sufficient: str
     words: str
 
 
@@ -95,19 +102,22 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
 
 
 def _verdict(judged: list[Judged]) -> tuple[str, str]:
-    """The mechanism preferred, "" if the data cannot tell, and that in words."""
-    if len(judged) == 1:
+    """The mechanism that is sufficient, "" if the data cannot tell, and that in words."""
+    whole, *others = judged
+    if not others:
         return "", "there is no other mechanism to compare with: no fluctuations, and no load or stress for a theory"
-    left = [one for one in judged[1:] if not one.rejected]
-    names = " and ".join(one.name for one in left)
+    left = [one for one in others if not one.rejected]
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
-    if len(left) > 1:
-        return "", f"the data cannot tell: {names} are not rejected"
-    if left[0].p_value <= _RARE:
-        said = f"though {WHOLE} fits better than by chance (p = {left[0].p_value:.2g})"
-        return names, f"the data prefer {names} to the others, {said}: measure more"
-    return names, f"the data prefer {names}: they do not ask for more, and reject the others"
+    first, ahead = left[0], whole.aicc - left[0].aicc
+    evidence = f"p = {first.p_value:.2g}, AICc {abs(ahead):.2g} {'lower' if ahead > 0.0 else 'higher'} than of {WHOLE}"
+    if len(left) > 1 or (first.name not in _PARTS and ahead < _WORSE):
+        names = " and ".join(one.name for one in left)
+        return "", f"the data cannot tell: {names} {'is' if len(left) == 1 else 'are'} not rejected, nor is {WHOLE}"
+    if first.name not in _PARTS:
+        return first.name, f"the data prefer {first.name} ({evidence}) and reject the others"
+    said = f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well ({evidence})"
+    return first.name, said + (": measure more" if first.p_value <= _RARE else "")
 
 
 def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
@@ -118,8 +128,8 @@ def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
     share = {"adhesion.bond_share": 0.0}
     if bonded and fluctuating:
-        yield "bonds only", _less(problem, still, "shear.")
-        yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
+        left_out = (still, "shear."), (share, "adhesion.bond_share")
+        yield from ((name, _less(problem, *without)) for name, without in zip(_PARTS, left_out, strict=True))
     if scene.contact.kind == "displacement" or not scene.population.carries_stress or problem.by_run:
         return  # theories are of a load or an indentation, of a stress, and of equilibrium
     for theory, (words, more) in _THEORIES.items():
@@ -156,16 +166,21 @@ def _least(problem: Problem, starts: list[Array], precision: float = 1e-8) -> Mi
 def _p_value(
     poorer: Problem, least: Minimum, whole: Problem, best: Minimum, rng: np.random.Generator, draws: int
 ) -> float:
-    """Share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one."""
+    """Share of curves made by the poorer mechanism whose likelihood ratio is at least the measured one.
+
+    Where the measured one is soon seen to be nothing rare, no more are drawn.
+    """
     measured, made, larger = least.chi_square - best.chi_square, poorer.predicted(least.x), 0
     shared = {one.key: x for one, x in zip(poorer.free, least.x, strict=False)}
     alike = np.array([shared.get(one.key, x) for one, x in zip(whole.free, best.x, strict=False)])
     alike = np.append(alike, best.x[len(whole.free) :])
-    for _ in range(draws):
+    for drawn_so_far in range(1, draws + 1):
         values = made + np.hypot(whole.sigma, whole.noise) * rng.standard_normal(len(made))
         for name, size in whole.common.items():
             values = np.where(whole.of(name), values * (1.0 + size * rng.standard_normal()), values)
         drawn, full = (replace(one, values=values) for one in (poorer, whole))
         ratio = _least(drawn, [least.x], _FINE).chi_square - _least(full, [best.x, alike], _FINE).chi_square
         larger += ratio >= measured
+        if larger == _ENOUGH:
+            return larger / drawn_so_far
     return (1 + larger) / (1 + draws)

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 from numpy.testing import assert_allclose
 
 import sim
@@ -22,8 +23,10 @@ from sim.study.measured import Curve, Measured, read
 from sim.study.posterior import posterior
 from sim.units.refusals import BadInput
 
-SPECTRUM = {"model": "self_affine", "rms": "150 kPa", "hurst": 0.8, "longest": "60 um", "shortest": "1 um",
-            "rolloff": "24 um"}  # fmt: skip
+SELF_AFFINE = {"model": "self_affine", "rms": "150 kPa", "hurst": 0.8, "longest": "60 um", "shortest": "1 um",
+               "rolloff": "24 um"}  # fmt: skip
+#: Waves of the same energy, in closed form: quicker.
+SPECTRUM = {"model": "gaussian", "rms": "150 kPa", "length": "4.075 um"}
 LENS = {
     "name": "lens",
     "seed": 11,
@@ -87,6 +90,7 @@ def rows_of(scene, **conditions):
 
 SCENES = {
     "lens": {},
+    "self-affine": {"shear.spectrum": SELF_AFFINE},
     "pulled": {"contact.load": -2e-5, "shear.spectrum.rms": 5e4},
     "indentation": {"contact": {"indentation": "2 um"}},
     "behind a spring": {"contact": {"displacement": "2 um", "stiffness": "100 N/m"}},
@@ -312,7 +316,12 @@ def test_what_a_driven_slider_cannot_be_fitted_to_is_refused(tmp_path):
 
 
 def test_members_shift_the_fit_and_their_error_joins_the_datas(tmp_path, truth):
-    shear = LENS["shear"] | {"model": "banded", "cell": "0.12 mm", "correlation": {"model": "slip", "length": "5 um"}}
+    shear = LENS["shear"] | {
+        "model": "banded",
+        "spectrum": SELF_AFFINE,
+        "cell": "0.12 mm",
+        "correlation": {"model": "slip", "length": "5 um"},
+    }
     scene = load(LENS | {"shear": shear, "ensemble": {"members": 64}, "clock": {"duration": "2 s", "step": "0.1 s"}})
     path = table(tmp_path / "lens.csv", {"speed [m/s]": SPEEDS}, noisy(truth, 0.002, 6), 0.002)
     found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
@@ -391,11 +400,11 @@ def judged(scene, made, keys, draws):
     return mechanisms.compare(problem, minimum(problem, problem.start, errors=True), scene.seed, draws)
 
 
-def drawn_of(scene, error, seed):
-    """Area and friction of a scene at the speeds, with errors."""
-    made, _ = rows_of(scene, speed=SPEEDS)
+def drawn_of(scene, error, seed, speeds=SPEEDS, names=("contact_area", "friction_force")):
+    """Curves of a scene at speeds, with errors."""
+    made, _ = rows_of(scene, speed=speeds)
     (group,) = predicted.groups(scene, made)
-    exact = predicted.by_steady_sliding(group, {}, ["contact_area", "friction_force"])
+    exact = predicted.by_steady_sliding(group, {}, list(names))
     curves = noisy(exact, error, seed)
     return made._replace(curves=tuple(Curve(n, v, error * np.abs(exact[n])) for n, v in curves.items()))
 
@@ -403,23 +412,51 @@ def drawn_of(scene, error, seed):
 #: A contact for which theories are not compared: bonds, fluctuations or both.
 SPRUNG = LENS | {"contact": {"model": "equilibrium", "displacement": "2 um", "stiffness": "1 kN/m"}}
 MECHANISM_KEYS = ["adhesion.bond_share", "bonds.critical_speed", "bonds.stress", "shear.spectrum.rms"]
+#: What leaves one of the two out.
+ONE_ALONE = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only": {"adhesion.bond_share": 0.0}}
 
 
 def test_data_that_can_tell_prefer_the_mechanism_that_made_them():
     verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.005, 8), MECHANISM_KEYS, 20)
-    assert verdict.preferred == verdict.judged[0].name == mechanisms.WHOLE
+    assert verdict.sufficient == verdict.judged[0].name == mechanisms.WHOLE
     assert {one.name for one in verdict.judged if one.rejected} == {"bonds only", "fluctuations only"}
 
 
 def test_data_that_cannot_tell_say_so():
-    verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.3, 9), ["adhesion.bond_share", "shear.spectrum.rms"], 20)
-    assert verdict.preferred == "" and verdict.words.startswith("the data cannot tell")
+    verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.3, 9), ["adhesion.bond_share", "shear.spectrum.rms"], 5)
+    assert verdict.sufficient == "" and verdict.words.startswith("the data cannot tell")
 
 
-def test_without_another_mechanism_nothing_is_preferred():
+def test_without_another_mechanism_nothing_is_compared():
     scene = load(SPRUNG | {"shear": {"model": "uniform"}})
     verdict = judged(scene, drawn_of(scene, 0.01, 12), ["bonds.critical_speed", "bonds.stress"], 2)
-    assert verdict.preferred == "" and "no other mechanism" in verdict.words and len(verdict.judged) == 1
+    assert verdict.sufficient == "" and "no other mechanism" in verdict.words and len(verdict.judged) == 1
+    assert list(fitted._comparison(verdict)[0]) == ["mechanism", "chi^2", "AICc - least"]
+
+
+def weighed(whole, *others):
+    """The verdict on the scenario as it is, by its AICc, and on others by name, AICc, p and rejection."""
+    found = [(mechanisms.WHOLE, whole, math.nan, False), *others]
+    return mechanisms._verdict([mechanisms.Judged(name, {}, 1.0, *rest) for name, *rest in found])
+
+
+def test_a_mechanism_that_is_sufficient_excludes_no_other():
+    others = ("fluctuations only", 40.0, 0.01, True), ("JKR, whatever the shear", 70.0, math.nan, True)
+    for aicc, p, more in ((8.0, 0.4, "AICc 2 lower"), (12.0, 0.2, "AICc 2 higher"), (12.0, 0.01, "measure more")):
+        name, words = weighed(10.0, ("bonds only", aicc, p, False), *others)
+        assert name == "bonds only" and "cannot tell whether fluctuations act as well" in words
+        assert f"p = {p:.2g}" in words and more in words and "prefer" not in words
+    assert weighed(10.0, *others)[0] == mechanisms.WHOLE
+
+
+def test_a_theory_is_preferred_only_where_the_scenario_fits_worse():
+    def theory(aicc):
+        return weighed(10.0, ("bonds only", 40.0, 0.01, True), ("JKR, whatever the shear", aicc, 0.7, False))
+
+    name, words = theory(4.0)
+    assert name == "JKR, whatever the shear" and words.startswith("the data prefer JKR")
+    name, words = theory(8.0)
+    assert name == "" and words.startswith("the data cannot tell: JKR") and mechanisms.WHOLE in words
 
 
 @pytest.mark.verify
@@ -438,15 +475,31 @@ def test_a_theory_is_preferred_by_its_own_data():
 
 @pytest.mark.verify
 @pytest.mark.parametrize("truth", ["both", "bonds only", "fluctuations only"])
-def test_the_right_mechanism_is_preferred_in_95_of_100(truth):
-    still = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only": {"adhesion.bond_share": 0.0}}
-    scene = load(SPRUNG).with_values(still.get(truth, {}))
+def test_the_right_mechanism_is_sufficient_in_95_of_100(truth):
+    scene = load(SPRUNG).with_values(ONE_ALONE.get(truth, {}))
     wanted = mechanisms.WHOLE if truth == "both" else truth
     right = 0
     for seed in range(100):
         verdict = judged(load(SPRUNG), drawn_of(scene, 0.005, seed), MECHANISM_KEYS, 40)
-        right += verdict.preferred == wanted
+        right += verdict.sufficient == wanted
+    print(f"{truth}: {right} of 100")
     assert right >= 95
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("truth", ["both", "bonds only", "fluctuations only"])
+def test_data_that_cannot_tell_reject_the_truth_in_at_most_5_of_100(truth, monkeypatch):
+    # the area alone, below the onset; of a test at the level of 5 % one in twenty is rejected by chance
+    scene, slow = load(SPRUNG).with_values(ONE_ALONE.get(truth, {})), np.geomspace(1e-5, 9e-4, 8)
+    keys, answers, rejected = [key for key in MECHANISM_KEYS if key != "bonds.stress"], {}, 0
+    monkeypatch.setattr(mechanisms, "_ENOUGH", 2)  # as good a level, with fewer draws
+    for seed in range(100):
+        verdict = judged(load(SPRUNG), drawn_of(scene, 0.03, seed, slow, ["contact_area"]), keys, 60)
+        answers[verdict.sufficient] = answers.get(verdict.sufficient, 0) + 1
+        rejected += truth in {one.name for one in verdict.judged if one.rejected}
+    print(f"{truth}: {answers}, the truth rejected {rejected} times of 100")
+    assert rejected <= 5
+    assert truth == "both" or answers.get(mechanisms.WHOLE, 0) <= 5
 
 
 def test_a_posterior_of_a_short_chain_lies_where_the_profile_does_and_says_that_it_is_short(curves):
@@ -529,7 +582,9 @@ def test_what_is_no_table_is_refused(scenario, tmp_path):
 # -- the command ----------------------------------------------------------------------------------
 
 
-def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unasked(scenario, curves, tmp_path):
+def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unasked(
+    scenario, curves, tmp_path, monkeypatch
+):
     free = [word for key in KEYS for word in ("--free", key)]
     done = command(scenario, curves, *free, "--steady", "--common", "contact_area=0.1 %")
     assert done.exit_code == 0, done.output
@@ -548,6 +603,7 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
         and "contact_area" in numbers["common_errors"]
     )
     before = [path.read_bytes() for path in made]
+    monkeypatch.setattr(fitted, "figure", lambda problem, best: Figure((1.0, 1.0)))  # quick
     again = command(scenario, curves, *free, "--steady")
     assert getattr(again.exception, "exit_code", 0) == 73
     assert command(scenario, curves, "--free", "bonds.stress", "--steady", "--force").exit_code == 0
