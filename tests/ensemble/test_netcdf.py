@@ -232,7 +232,7 @@ def test_a_swept_key_may_keep_one_value():
     assert_allclose(dataset["sphere_radius"], [2e-3, 2e-3])
 
 
-def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
+def test_threads_give_the_datasets_of_one_after_the_other(tmp_path, written_apart):
     scenarios = [sample(members=2, seed=seed) for seed in range(4)]
     alone = [ensemble.run(scenario) for scenario in scenarios]
 
