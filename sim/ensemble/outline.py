@@ -1,5 +1,6 @@
 """What a dataset holds: dimensions, coordinates, attributes and the variables of a plan, with units and names."""
 
+import functools
 import hashlib
 import importlib.metadata
 import json
@@ -19,6 +20,8 @@ from sim.scenario.scenario import Scenario
 from sim.scenario.sweep import Axis, written
 
 _FLAGS = "detached in_contact"
+#: Version of a package, which is looked up in its files.
+_version = functools.cache(importlib.metadata.version)
 #: The auxiliary coordinate of all that is recorded over time, where it is prescribed.
 SPEED = "speed"
 _STATISTICS = {
@@ -127,8 +130,8 @@ def attributes(plan: Plan) -> dict[str, Any]:
     scene, source = plan.scenario, plan.scenario.origin
     resolved = scenario_json(scene, plan.per_member)
     digest = hashlib.sha256(resolved.encode()).hexdigest()[:16]
-    versions = {name: importlib.metadata.version(name) for name in ("numpy", "scipy", "numba")}
-    sim_version = importlib.metadata.version("sliding-sim")
+    versions = {name: _version(name) for name in ("numpy", "scipy", "numba")}
+    sim_version = _version("sliding-sim")
     files = {n: {"sha256": hashlib.sha256(t.encode()).hexdigest(), "text": t} for n, t in source.files.items()}
     found = {
         "Conventions": "CF-1.11",
