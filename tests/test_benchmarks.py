@@ -16,7 +16,11 @@ from benchmarks.lines import code_lines
 RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
 
 
-@pytest.mark.parametrize("group", some(run.GROUPS, *run.GROUPS.keys() - {"workers"}))  # which starts many processes
+#: Groups that start many processes, or run many scenes.
+LONG = {"workers", "commands", "growth"}
+
+
+@pytest.mark.parametrize("group", some(run.GROUPS, *run.GROUPS.keys() - LONG))
 def test_every_row_runs_and_is_kept(group):
     rows = run.GROUPS[group](timing.Bench(quick=True))
     assert [row.ours for row in rows] == [row["ours"] for row in RESULTS[group]["rows"]]

@@ -56,24 +56,24 @@ def test_counted_bonds_become_the_rate_equation_as_their_number_grows():
 STARTED = drive.Start(rest=2e-3, speed=4e-3)
 
 
+@pytest.mark.parametrize("sites", [10**2, 10**3, pytest.param(10**4, marks=pytest.mark.verify)])
 @pytest.mark.parametrize("rupture", [BELL, CUT_OFF], ids=["bell", "cut-off"])
-def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture):
+def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture, sites):
     # sites are independent at all times: the spread of number and stress is that of one site over root N
     members, recipe = 400, {"rupture": rupture, **STRETCHED, "start_from": "bonded"}
     dense = bonds.Cohort(**recipe)
     exact = last(bonds=dense, drive=STARTED)
     share, stress = cohorts.bound(exact.bonds.cohorts)[0], exact.bonding.stress[0]
     varying = exact.bonding.varying[0]
-    for sites in (10**2, 10**3, 10**4):
-        few = bonds.Tracked(**recipe, sites=sites)
-        found = last(members, bonds=few, drive=STARTED)
-        for values, mean, spread in (
-            (tracks.moments(found.bonds.frame, sites)[0], share, math.sqrt(share * (1.0 - share) / sites)),
-            (found.bonding.stress, stress, math.sqrt(STRETCHED["site_density"] * varying / sites)),
-        ):
-            # cohorts are good to 1e-4 themselves; one site's excess kurtosis is below 10, that of N below 10/N
-            assert abs(values.mean() - mean) < 5.0 * spread / math.sqrt(members) + 1e-4 * abs(mean)
-            assert abs(values.std() / spread - 1.0) < 5.0 * math.sqrt((2.0 + 10.0 / sites) / (4.0 * members))
+    few = bonds.Tracked(**recipe, sites=sites)
+    found = last(members, bonds=few, drive=STARTED)
+    for values, mean, spread in (
+        (tracks.moments(found.bonds.frame, sites)[0], share, math.sqrt(share * (1.0 - share) / sites)),
+        (found.bonding.stress, stress, math.sqrt(STRETCHED["site_density"] * varying / sites)),
+    ):
+        # cohorts are good to 1e-4 themselves; one site's excess kurtosis is below 10, that of N below 10/N
+        assert abs(values.mean() - mean) < 5.0 * spread / math.sqrt(members) + 1e-4 * abs(mean)
+        assert abs(values.std() / spread - 1.0) < 5.0 * math.sqrt((2.0 + 10.0 / sites) / (4.0 * members))
 
 
 @pytest.mark.parametrize("depth", [bonds.Cohort, bonds.FirstMoment])

@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import functools
 import itertools
 import json
 import re
@@ -389,9 +390,15 @@ def fits(schema, node, value):
     return ("const" not in node or value == node["const"]) and ("enum" not in node or value in node["enum"])
 
 
+@functools.cache
+def read_schema():
+    """The schema as read from its text."""
+    return json.loads(json.dumps(scenario_schema()))
+
+
 @pytest.mark.parametrize("path", [*sorted(FOLDER.glob("*.toml")), STARTER], ids=lambda path: path.stem)
 def test_every_scenario_fits_the_schema(path):
-    schema = json.loads(json.dumps(scenario_schema()))
+    schema = read_schema()
     document = tomllib.loads(path.read_text(encoding="utf-8"))
     assert fits(schema, schema, document)
     assert not fits(schema, schema, {**document, "solid": {**document["solid"], "shear_modulos": 1}})

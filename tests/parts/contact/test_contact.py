@@ -1,6 +1,7 @@
 """The contact in scenes: what holds it in time, pull-off and return, dissipation, masking, discs, shares paid."""
 
 import functools
+import itertools
 import math
 from dataclasses import replace
 from fractions import Fraction
@@ -401,8 +402,9 @@ KNOTS = {
 }
 
 
-@pytest.mark.parametrize("name", KNOTS)
-@pytest.mark.parametrize("finer", [10, pytest.param(100, marks=pytest.mark.verify)])
+@pytest.mark.parametrize(
+    ("finer", "name"), some(list(itertools.product((10, 100), KNOTS)), (10, "turns of a displacement"), (10, "a jump"))
+)
 def test_an_edge_follows_turns_of_its_control_within_a_clock_step(finer, name):
     # the edge is good to some 1e-8 of the radius, whatever the step
     contact = RateDependent(**KNOTS[name], front_speed=5.0, heal_speed=2.0, heal_exponent=0.5)

@@ -290,8 +290,7 @@ COUNTED = {
 @pytest.mark.parametrize(
     ("name", "points"),
     some(
-        list(itertools.product(COUNTED, (704, 1500))), ("self-affine 0.8", 704), ("gaussian, beyond the grid", 704),
-        ("anisotropic, turned", 704), ("narrow high band", 704),
+        list(itertools.product(COUNTED, (704, 1500))), ("anisotropic, turned", 704), ("narrow high band", 704),
     ),
 )  # fmt: skip
 def test_counted_cells_have_the_mean_and_variance_of_all_modes(name, points):
@@ -311,6 +310,7 @@ def test_a_cliff_in_a_table_is_counted_to_a_few_parts_in_ten_thousand():
     assert np.all(np.abs(off[2:]) < 3e-3)
 
 
+@pytest.mark.verify
 def test_a_hundred_million_pairs_are_counted_in_bounded_memory():
     cell = 0.24e-3
     spectrum = SelfAffine(RMS, 0.8, longest=60e-6, rolloff=24e-6, shortest=cell / 8000)
