@@ -179,6 +179,9 @@ class Tabulated(FromFile):
         flat = density > 0.0 and abs(math.log(self.rows.density[1] / density)) < _FLAT * math.log(self.rows.q[1] / q)
         if not (flat and self.file) or q * density < _PART * self.rows.line_integral:
             return ()
-        more = f"{q * density / self.rows.line_integral:.0%}"
+        more, kept = q * density / self.rows.line_integral, ""
+        if self.rms is not None:  # the plateau takes its part of the variance from the rest
+            more = (1.0 + more) / (1.0 + density * q**2 / (4.0 * math.pi * self.rms**2)) - 1.0
+            kept = ", the rms kept"
         said = f"the table is flat at its first row and zero before: below {q:.3g} rad/m a plateau down to 0 would add"
-        return (f"{said} {more} to the mean energy; add a row where it ends",)
+        return (f"{said} {more:.0%} to the mean energy{kept}; add a row where it ends",)
