@@ -10,6 +10,7 @@ from sim.analysis.blocks import in_blocks, keep
 from sim.analysis.observables import masks, ordered, pure
 from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, sweep_dims, where_recorded, word
 from sim.analysis.stick_slip import stick_slip
+from sim.analysis.transients import speed_step, way_to_sliding
 
 #: A maximum is one if it stands above the ends of the run by more than rounding.
 _ROUNDING = 1e-9
@@ -43,6 +44,8 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
           ``peak_friction_time``, ``peak_friction_speed``: of a start or a ramp; see ``peaks``.
         - ``slip_count``, ``static_friction``, ``kinetic_friction`` [N], ``slip_amplitude`` [m] and more, of a slider
           behind a spring, ``ran_away`` and ``runaway_after`` [s] of one under a force; see ``stick_slip``.
+        - ``direct_effect`` [N], ``step_length`` [m] and more of a jump of the speed; see ``speed_step``.
+        - ``static_threshold`` [N], ``area_at_threshold`` and more of a pull from rest; see ``way_to_sliding``.
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
@@ -50,7 +53,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
     found = in_blocks(keep(dataset, "detachment_time"), dims, _openings)
     with where_recorded():
         found = found.merge(in_blocks(keep(dataset, "masked", "contact_area"), dims, _masks))
-    for part in (peaks, stick_slip):
+    for part in (peaks, stick_slip, speed_step, way_to_sliding):
         with where_recorded():
             found = found.merge(part(dataset))
     for suffix in ("", "_mean", "_std", "_sem"):

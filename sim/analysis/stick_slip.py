@@ -141,7 +141,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
         Under a stage ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one
         speed those that begin in the second half of the run. ``slip_spread`` [1]: the standard deviation of their
         displacements over its mean, see ``slip_sizes``. ``kinetic_friction`` [N] is the work of the stage over its
-        path, from the beginning of the first of these slips to that of the last, without slips over that time.
+        path, from the beginning of the first of these slips to that of the last, without slips over that time;
+        nan where the slider went less than half as far as the stage, stretching the spring.
         Under a prescribed force see ``runaways``. Empty for other drives, and where only statistics were recorded.
     """
     if "stage_speed" not in dataset and {"runaway_time", "spring_force"} <= set(dataset):
@@ -170,8 +171,11 @@ def _means(dataset: xr.Dataset, half: float) -> xr.Dataset:
     end = dataset["t"].where(dataset["spring_force"].notnull()).max("t")
     first, last = first.where(several, half), last.where(several, end)
     path = abs(dataset["stage_position"].diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
-    made, gone = (_between(dataset, values, first, last) for values in (dataset["drive_work"], path))
-    kinetic = (made / gone.where(gone != 0.0)).assign_attrs(units="N", long_name="work of the stage over its path")
+    slid = abs(dataset["slider_position"].astype(float).diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
+    made, gone, went = (_between(dataset, values, first, last) for values in (dataset["drive_work"], path, slid))
+    kinetic = (made / gone.where(went > 0.5 * gone)).assign_attrs(
+        units="N", long_name="work of the stage over its path"
+    )
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
     return every.map(ordered, keep_attrs=True)
 

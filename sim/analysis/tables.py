@@ -1,5 +1,6 @@
 """Statistics as rows: a dozen for the terminal, all of them as CSV."""
 
+import bisect
 import contextlib
 import math
 import re
@@ -60,7 +61,9 @@ _COLUMNS = (
     _Column("lost_to_fluctuations", "lost to\nfluct."),
     _Column("lost_to_fluctuations_first", "fluct.\nfirst", meaning="lost to fluctuations if charged before the bonds"),
     _Column("lost_to_mean_stress", "lost to\nstress"),
-    _Column("lost_to_lag", "lost to\nlag"),
+    _Column(
+        "lost_to_lag", "lost to\nlag", meaning="as the edge is behind equilibrium, below zero where it retreats late"
+    ),
     _Column("friction_force", "F"),
     _Column("fraction_detached", "open"),
     _Column("fraction_masked", "masked", meaning="closed contacts without any work of adhesion left"),
@@ -70,7 +73,7 @@ _COLUMNS = (
 _EVENTS = (
     _Column("time_masked", "masked,\nof the time"),
     _Column("ever_detached", "detached,\nof members"),
-    _Column("first_detachment", "first\ndetached", meaning="mean of those that did"),
+    _Column("first_detachment", "first\ndetached", meaning="mean of those that did, at ends of clock steps"),
     _Column("half_detached", "half\ndetached", math.nan, meaning="time by which half of the members did"),
     _Column("detached_rate", "rate of\ndetaching", meaning="detached, per time in contact of all members"),
     _Column("first_masked", "first\nmasked", meaning="mean of those that were"),
@@ -79,13 +82,22 @@ _EVENTS = (
     _Column("loop_dissipation", "dissipated,\nper cycle"),
     _Column("total_dissipated", "dissipated,\nin all"),
     _Column("pull_off_load", "pull-off\nload"),
-    _Column("pull_off_time", "pull-off\nafter", math.nan),
+    _Column("pull_off_time", "pull-off\nafter", math.nan, meaning="end of the clock step in which it comes off"),
     _Column("peak_stress", "peak of\nstress"),
     _Column("peak_speed", "at V", math.nan),
     _Column("peak_time", "after", math.nan),
     _Column("peak_friction", "peak of\nfriction"),
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
+    _Column(
+        "direct_effect", "direct\neffect", math.nan, meaning="rise of friction after the first jump of the speed up"
+    ),
+    _Column("step_overshoot", "over-\nshoot", math.nan, meaning="then, over the level at which friction settles"),
+    _Column("step_length", "settled\nwithin", math.nan, meaning="sliding distance until 1/e of the overshoot is left"),
+    _Column("static_threshold", "static\nthreshold", math.nan, meaning="largest force on the way to sliding"),
+    _Column("area_at_threshold", "A/A0\nthere", math.nan, meaning="contact area there over that at rest"),
+    _Column("area_by_law", "A0 − αQ²\nover A0", math.nan, meaning="there, by a fit up to half of the threshold"),
+    _Column("incipient_alpha", "α", math.nan),
     _Column(
         "slip_count", "slips", meaning="falls of the spring's force by 2 % or more, means over them; times of records"
     ),
@@ -138,7 +150,7 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         "lost to bonds" and "lost to fluct." are the shares of JKR's area that each mechanism takes.
     """
     found, points = _tabulated(dataset, rows)
-    whole = is_stationary(dataset) and bool(sweep_dims(dataset))
+    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     held, steady = bool(stays_held(dataset).all()), is_steady(dataset)
     cells = _places(found, {name: index for name, index in points.items() if name != "t" or not whole})
     speeds = dataset.get("drive_speed", xr.DataArray())
@@ -155,7 +167,7 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
 
 def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]]) -> list[str]:
     """What stands in the rows of ``table`` and ``highlights``: means over what, how many rows, and symbols in words."""
-    whole = is_stationary(dataset) and bool(sweep_dims(dataset))
+    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     points = math.prod(dataset.sizes[name] for name in sweep_dims(dataset))
     said = [words] if (words := averaging(dataset, whole)) else []
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
@@ -182,7 +194,7 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
 
 
 @of_dataset
-def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+def highlights(dataset: xr.Dataset, rows: int = 12, found: xr.Dataset | None = None) -> list[dict[str, str]]:
     """What each point of the sweep has once in its whole run, in a dozen rows at most; none where there is nothing.
 
     Parameters
@@ -191,6 +203,8 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         As ``sim run`` writes it.
     rows : int
         How many rows at most (at least one).
+    found : xarray.Dataset, optional
+        What ``once`` gives, if it is known already.
 
     Returns
     -------
@@ -199,7 +213,7 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
         how much it dissipated, and the friction peak of a start or a ramp.
     """
-    found = once(dataset)
+    found = once(dataset) if found is None else found
     points = _points(dataset.sizes, _thinned(dataset, rows))
     shown = _shown(found, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
     cells = _places(dataset, points)
@@ -271,11 +285,13 @@ def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
     """Statistics to tabulate, and the index of each row in every dimension of sweep and time."""
     memory, counts = correlation_time(dataset), _thinned(dataset, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
-    whole = is_stationary(dataset) and bool(sweep_dims(dataset))
+    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     if whole:
         found = of_second_half(dataset, {column.name for column in _COLUMNS if not column.changing})
     else:
-        if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown
+        if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
+            dataset = dataset.isel(t=slice(_last(dataset) + 1))
+            counts["t"] = min(counts["t"], dataset.sizes["t"])
             dataset = at_records(dataset, _spread(dataset.sizes["t"], counts["t"]))
         if dataset.nbytes < READ:
             trajectories = all_observables(dataset)
@@ -287,6 +303,20 @@ def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
             for kind in ("mean", "low", "high"):
                 found[f"normal_load_{kind}"] = dataset["applied_load"].fillna(found[f"normal_load_{kind}"])
     return found.merge(memory), _points({**found.sizes, "t": found.sizes.get("t", 1)}, counts)
+
+
+def _lasts(dataset: xr.Dataset) -> bool:
+    """Whether the second half of the run is stationary: speed and control are constant, and not all have stopped."""
+    return is_stationary(dataset) and _last(dataset) >= dataset.sizes["t"] // 2
+
+
+def _last(dataset: xr.Dataset) -> int:
+    """The last record of any trajectory: those that stopped are unknown from there on."""
+    radius = next((dataset[name] for name in ("contact_radius", "contact_radius_mean") if name in dataset), None)
+    last = dataset.sizes["t"] - 1
+    if radius is None or bool(radius.isel(t=last).notnull().any()):
+        return last
+    return bisect.bisect_left(range(1, last), True, key=lambda at: bool(radius.isel(t=at).isnull().all()))
 
 
 def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
@@ -336,7 +366,7 @@ def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
 def _spreads(dataset: xr.Dataset) -> bool:
     """Whether this is one stationary run of members that differ."""
     single = all(dataset.sizes[name] == 1 for name in sweep_dims(dataset))
-    return single and MEMBERS in dataset.sizes and is_stationary(dataset)
+    return single and MEMBERS in dataset.sizes and _lasts(dataset)
 
 
 def _spread_of(found: xr.Dataset, column: _Column) -> dict[str, str]:

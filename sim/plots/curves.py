@@ -13,8 +13,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
 from sim.analysis import averaging, bond_work, is_stationary, is_steady, settled, summary, sweep_dims
-from sim.analysis.observables import all_observables
+from sim.analysis.observables import KEPT, charged_in_turn, observables, share_observables
 from sim.analysis.over_speed import speed_dim
+from sim.analysis.scene import answered
+from sim.analysis.transients import jumps
 from sim.plots.measured import Compared, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
 
@@ -36,9 +38,6 @@ _UNDERNEATH, _FEW = 1.0, 4
 #: Width that the curves of a category share.
 _CATEGORY = 0.6
 
-#: A speed jumps between two records if it changes by more than this many times what it does before and after.
-_JUMP = 4.0
-
 _CROSS: Any = {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3}
 _RING: Any = HOLLOW | {"mew": 0.8, "zorder": 3}
 
@@ -52,6 +51,54 @@ class Line(NamedTuple):
     colour: str
 
 
+class Statistics:
+    """Statistics over the members of a dataset, each made when it is first read.
+
+    Along time (``"t"``), or along a dimension of the sweep: then of the means over the second half of the run where
+    neither speed nor control change, else of the last record.
+    """
+
+    def __init__(self, dataset: xr.Dataset, along: str) -> None:
+        self.dataset, self.over_time = dataset, along == "t"
+        self.late = not self.over_time and is_stationary(dataset)
+        self.stated = self._at(observables(dataset))
+        self._found: dict[str, xr.DataArray | None] = {}
+        self._dearer = [share_observables, charged_in_turn]
+        with contextlib.suppress(KeyError):
+            self.stated["bond_work"] = self._at(xr.Dataset({"bond_work": bond_work(dataset)}))["bond_work"]
+
+    def _at(self, some: xr.Dataset) -> xr.Dataset:
+        if self.over_time:
+            return some
+        return (settled(some) if self.late else some.isel(t=slice(-1, None))).isel(t=0, drop=True)
+
+    def get(self, name: str) -> xr.DataArray | None:
+        """A statistic by its name, such as ``contact_radius_mean``; None where it is not known."""
+        if name not in self._found:
+            stem = name.rpartition("_")[0]
+            while not (own := self._own(stem)) and self._dearer and stem.startswith(("lost_to", "order_of")):
+                self._charge()
+            self._found[name] = None
+            self._found |= {str(key): one for key, one in summary(self.stated[own]).items()}
+        return self._found[name]
+
+    def _own(self, stem: str) -> list[str]:
+        """An observable, or the statistics of it that were recorded."""
+        return [name for name in (stem, *(f"{stem}_{kind}" for kind in KEPT)) if name in self.stated]
+
+    def _charge(self) -> None:
+        """Add shares of the lost area in the next order of charging, as far as they are known."""
+        with contextlib.suppress(ValueError), answered():
+            self.stated.update(self._at(self._dearer.pop(0)(self.dataset)))
+
+    def names(self) -> list[str]:
+        """All observables."""
+        while self._dearer:
+            self._charge()
+        parted = (str(name).rpartition("_") for name in self.stated)
+        return sorted({stem if kind in KEPT else f"{stem}{line}{kind}" for stem, line, kind in parted})
+
+
 class Scene(NamedTuple):
     """Statistics laid out for panels: along time or a swept key, one curve for each other point of the sweep.
 
@@ -61,7 +108,7 @@ class Scene(NamedTuple):
     ``columns`` the curves of each column of panels, by what they have in common.
     """
 
-    found: xr.Dataset
+    found: Statistics
     along: str
     lines: list[Line]
     averaged: str
@@ -98,7 +145,7 @@ class Scene(NamedTuple):
     ) -> "Scene":
         """With values [SI] of a variable along x, (points,) for all curves or (curves, points), and the axis' words."""
         unit = Unit.of(x, si, scale == "log")
-        x = np.broadcast_to(unit.factor * x, (len(self.lines), self.found.sizes[self.along]))
+        x = np.broadcast_to(unit.factor * x, (len(self.lines), self.found.dataset.sizes[self.along]))
         return self._replace(over=over, x=x, unit=unit, words=unit.label(words), scale=scale, broken=broken)
 
     def apart(self) -> "Scene":
@@ -142,10 +189,10 @@ class Scene(NamedTuple):
 
     def values(self, name: str, line: Line) -> np.ndarray:
         """A statistic along the x axis; nan where it is not known."""
-        points = self.found.sizes[self.along]
-        if name not in self.found:
+        points, known = self.found.dataset.sizes[self.along], self.found.get(name)
+        if known is None:
             return np.full(points, np.nan)
-        return np.broadcast_to(self.found[name].isel(line.point, missing_dims="ignore").to_numpy(), points)
+        return np.broadcast_to(known.isel(line.point, missing_dims="ignore").to_numpy(), points)
 
     def all(self, *names: str) -> np.ndarray:
         """Statistics of all curves, shape (statistics * curves, points)."""
@@ -163,8 +210,8 @@ class Scene(NamedTuple):
         """
         mean, error, spread = (self.values(f"{name}_{kind}", line) for kind in ("mean", "sem", "std"))
         low, high = mean - spread, mean + spread
-        if f"{name}_quantile" in self.found:
-            low, _, high = self.found[f"{name}_quantile"].isel(line.point).to_numpy()
+        if (quantiles := self.found.get(f"{name}_quantile")) is not None:
+            low, _, high = quantiles.isel(line.point).to_numpy()
         gone = self.opened(line) if name in _OF_CONTACT else False
         return [np.where(gone, np.nan, values) for values in (mean, error, low, high)]
 
@@ -175,7 +222,8 @@ class Scene(NamedTuple):
 
     def speeds(self, line: Line) -> np.ndarray:
         """The speed that is prescribed along a curve [m/s], that of the stage where it pulls through a spring."""
-        return self.values("stage_speed_mean" if "stage_speed_mean" in self.found else "speed_mean", line)
+        staged = self.found.get("stage_speed_mean") is not None
+        return self.values("stage_speed_mean" if staged else "speed_mean", line)
 
     def covered(self, name: str, lines: list[Line]) -> list[int]:
         """How many later curves hide each one, nowhere farther from it than a hundredth of what all span."""
@@ -205,41 +253,15 @@ def _changes(values: np.ndarray) -> bool:
     return known.size > 0 and bool(np.ptp(known) > 1e-12 * np.max(np.abs(known)))
 
 
-def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
-    """Records before which the speed has jumped: its change stands out from those before and after.
-
-    With ``turns`` also those before which it has changed its sign.
-
-    >>> jumps(np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0]))
-    array([3])
-    >>> jumps(np.array([2.0, 1.0, -1.0, -2.0])), jumps(np.array([2.0, 1.0, -1.0, -2.0]), turns=True)
-    (array([], dtype=int64), array([2]))
-    """
-    change = np.abs(np.diff(speed))
-    jumped = np.append(False, change[1:-1] > _JUMP * np.maximum(change[:-2], change[2:]))
-    turned = (speed[1:] * speed[:-1] < 0.0) & turns
-    return np.flatnonzero(np.pad(jumped, (0, change.size - jumped.size)) | turned) + 1
-
-
 def scene_along(dataset: xr.Dataset, along: str) -> Scene:
-    """Statistics along time (``"t"``), or along a dimension of the sweep.
-
-    Along the sweep they are of the means over the second half of the run where neither speed nor control change,
-    else of the last record.
-    """
+    """``Statistics`` along time (``"t"``), or along a dimension of the sweep, as curves."""
     columns, bar, some = _columns_of(dataset, [name for name in sweep_dims(dataset) if name != along])
-    lines = [line for _, own in columns for line in own]
-    late, stated = along != "t" and is_stationary(dataset), all_observables(dataset)
-    with contextlib.suppress(KeyError):
-        stated["bond_work"] = bond_work(dataset)
-    if along != "t":
-        stated = (settled(stated) if late else stated.isel(t=slice(-1, None))).isel(t=0, drop=True)
-    found = summary(stated)
-    words = "; ".join(filter(None, [averaging(dataset, late), some]))
+    lines, found = [line for _, own in columns for line in own], Statistics(dataset, along)
+    words = "; ".join(filter(None, [averaging(dataset, found.late), some]))
     if len(lines) == 1:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
-    spread = "5–95 % of members" if "contact_radius_quantile" in found else "± 1 std. dev. of members"
-    return Scene(found, along, lines, words, f"{spread}' means" if late else spread, bar, columns[1:] and columns)
+    spread = "± 1 std. dev. of members" if "contact_radius_std" in dataset else "5–95 % of members"
+    return Scene(found, along, lines, words, f"{spread}' means" if found.late else spread, bar, columns[1:] and columns)
 
 
 def _columns_of(
@@ -411,15 +433,16 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
     if name == "t":
         return over_time(dataset)
     scene = scene_along(dataset, "t")
-    known = [key.removesuffix("_mean") for key in map(str, scene.found) if key.endswith("_mean")]
-    if name not in known:
+    about, mean = (scene.found.get(f"{name}_{kind}") for kind in ("std", "mean"))
+    if about is None or mean is None:
+        known = scene.found.names()
         near = difflib.get_close_matches(name, [*known, *swept], 1, 0.6)
-        cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *sorted(known)])}"
+        cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *known])}"
         raise ValueError(f'nothing can be drawn over "{name[:40]}"; {cure}')
-    about = scene.found[f"{name}_std"].attrs
-    words = about.get("long_name", name).partition(" of ")[2].partition(",")[0]
-    words = f"{words} {symbol(scene.found[f'{name}_mean'])}".strip()
-    return scene.placed(name, scene.all(f"{name}_mean"), words, about["units"], broken=True)
+    words = about.attrs.get("long_name", name).partition(" of ")[2].partition(",")[0]
+    return scene.placed(
+        name, scene.all(f"{name}_mean"), f"{words} {symbol(mean)}".strip(), about.attrs["units"], broken=True
+    )
 
 
 #: Other words for variables that figures are drawn over.

@@ -94,7 +94,10 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     for panel in (radii, loaded):
         panel.set_ylim(bottom=0.0)
     loads.sharex(radii)
-    cycled = "per cycle: dissipated $W$, and the loop enclosed, each jump a straight line between records"
+    put_in = (
+        rf"$\oint\,P\,\mathrm{{d}}{symbol}$ put in, the area of the loop with each jump a straight line between records"
+    )
+    cycled = f"per cycle: $W$ dissipated by opening and closing; {put_in}"
     lost = "dissipated in all: $W$" if loop is None else cycled
     style.legend(loads, lost if bool((spent != 0.0).any()) else scene.title, columns=1)
     style.legend(radii)

@@ -1,5 +1,6 @@
 """Panels of one observable each, and the figures made of them: over speed, time or a swept key, and friction loops."""
 
+import contextlib
 from collections.abc import Callable
 from typing import Any, cast
 
@@ -8,7 +9,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sim.analysis import is_stationary, is_steady, speed_of
+from sim.analysis import is_stationary, is_steady, setting, slips, speed_of
 from sim.analysis.scene import stays_held
 from sim.plots import style
 from sim.plots.bond_laws import rest_of
@@ -19,6 +20,9 @@ Panel = Callable[[Axes, Scene], None]
 
 #: Share of the largest energy below which the fluctuations' own has a panel of its own.
 _SMALL = 0.02
+
+#: Records that show a slip.
+_FINE = 3
 
 #: Opacity of the shades that show what a mechanism takes.
 _SHADE = 0.35
@@ -122,8 +126,9 @@ def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
     """Fluctuation energy where it is small."""
     energies = scene.extent("fluctuation_energy_mean")
     factor = style.in_unit(panel.yaxis, r"fluctuations $\Delta\Gamma$", energies, "J/m^2")
-    for line in scene.distinct("fluctuation_energy"):
-        colour = style.FLUCTUATIONS if scene.single else line.colour
+    lines = scene.distinct("fluctuation_energy")
+    for line in lines:
+        colour = style.FLUCTUATIONS if scene.single else style.REFERENCE if len(lines) == 1 else line.colour
         curve(panel, scene, "fluctuation_energy", line, factor, colour, "--")
     panel.set_ylim(bottom=0.0)
 
@@ -229,11 +234,22 @@ def time_figure(
 ) -> Figure:
     """Contact radius, energies, friction, and speed, load and displacement that change, over time."""
     scene = (over(dataset, x) if x else over_time(dataset))._replace(measured=data)
+    scene = scene._replace(heading="; ".join(filter(None, [scene.title, coarse_slips(dataset)])))
     moved = not bool(stays_held(dataset).all())
     shown = [name for name in _DRIVEN if scene.moves(name) and (name != "displacement" or moved) and name != scene.over]
     driven = [(0.8, series(name, *_DRIVEN[name])) for name in shown]
     first = area_panel if absolute else radius_panel
     return stacked(scene, [(1.6, first), *further_panels(scene), *driven], ax=ax)[0]
+
+
+def coarse_slips(dataset: xr.Dataset) -> str:
+    """Remark where slips last hardly longer than the time between records, with the cure; "" elsewhere."""
+    with contextlib.suppress(ValueError, KeyError):
+        lasting, apart = slips(dataset)["slip_duration"].median(), float(dataset["t"][1] - dataset["t"][0])
+        if float(lasting) < _FINE * apart:
+            key = "step" if apart < 1.5 * float(setting(dataset, "clock.step")) else "record"
+            return f"slips last less than {_FINE} records, which miss part of them: a shorter clock.{key} shows them"
+    return ""
 
 
 def turns(dataset: xr.Dataset) -> bool:

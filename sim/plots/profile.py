@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from sim.analysis import setting
 from sim.laws import jkr, profiles
@@ -164,9 +165,9 @@ def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: 
     x, moved = length.factor * x, unit.factor * moved.T
     side = x[-1] + 0.5 * (x[1] - x[0])
     image = panel.imshow(moved, cmap="viridis", origin="lower", extent=(-side, side, -side, side))
-    levels = np.linspace(np.min(moved), np.max(moved), 8)[1:-1]
+    levels = MaxNLocator(7).tick_values(np.min(moved), np.max(moved))
     lines = panel.contour(x, x, moved, levels, colors="white", linewidths=0.4, linestyles="-")
-    panel.clabel(lines, fmt="%.3g", fontsize=5)
+    panel.clabel(lines, fmt="%g", fontsize=5)
     figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$, $u_x$"))
     style.contact_circle(panel, length.factor * shape.radius)
     panel.set_xlabel(length.label("$x$"))

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from sim.analysis import setting, sweep_dims
 from sim.analysis.scene import MEMBERS, word
+from sim.analysis.transients import incipient_law
 from sim.laws import jkr, schallamach
 from sim.laws.schallamach import Body
 from sim.plots import style
@@ -23,8 +24,6 @@ from sim.plots.panels import Panel, series, stacked
 _CELLS, _FINE = 28, 200
 #: Change of the bond fraction by which the growth of the area is found.
 _LITTLE = 1e-4
-#: Share of the largest force up to which the law of incipient shear is fitted.
-_FITTED = 0.5
 _FRAME: Any = {"color": style.BONDS, "linewidth": 1.4}
 
 
@@ -194,7 +193,8 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     """
     scene = scene_along(dataset, "t")
     force, area = np.abs(scene.all("spring_force_mean")), scene.all("contact_area_mean")
-    rises = np.arange(force.shape[1]) <= np.nanargmax(force, axis=1)[:, np.newaxis]
+    tops = [incipient_law(*own)[0] for own in zip(force, area, strict=True)]
+    rises = np.arange(force.shape[1]) <= np.array(tops)[:, np.newaxis]
     unit = style.Unit.of(force, "N")
     figure, axes = style.rows([2.0, 1.8], shared=False)
     axes[0].set_ylabel("contact area $A/A_0$")
@@ -202,8 +202,7 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     for line in scene.lines:
         up = rises[line.number]
         pulled, own = force[line.number, up], area[line.number, up]
-        small = pulled <= _FITTED * pulled[-1]
-        alpha = np.sum(pulled[small] ** 2 * (own[0] - own[small])) / np.sum(pulled[small] ** 4)
+        _, alpha = incipient_law(pulled, own)
         law = alpha * pulled**2 / own[0]
         words = rf"$\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
         name = f"{line.label}: {words}" if not scene.single else words

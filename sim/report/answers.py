@@ -10,7 +10,6 @@ import xarray as xr
 from sim.analysis import (
     concise,
     engineering,
-    events,
     is_stationary,
     is_steady,
     loss_speeds,
@@ -23,6 +22,8 @@ from sim.analysis import (
 from sim.analysis.observables import all_observables
 from sim.analysis.over_speed import speed_dim
 from sim.analysis.scene import answered, speed_name, speed_of
+from sim.analysis.statistics import over_members
+from sim.analysis.tables import once
 from sim.plots import kinds
 from sim.units.notation import scaled
 
@@ -86,13 +87,19 @@ class Found(NamedTuple):
         return Mean(value, float(error), unit) if np.isfinite(value) else None
 
 
-def answers(dataset: xr.Dataset) -> list[str]:
+#: What a whole run has once, and sentences that a dataset and these statistics of it give.
+Answer = Callable[[xr.Dataset, xr.Dataset], Iterator[str]]
+
+
+def answers(dataset: xr.Dataset, found: xr.Dataset | None = None) -> list[str]:
     """Sentences with numbers that answer the question of a scene; none where no kind of scene fits.
 
     Parameters
     ----------
     dataset : xarray.Dataset
         As ``sim run`` writes it.
+    found : xarray.Dataset, optional
+        Statistics of what it has once in a whole run, as ``sim.analysis.tables.once`` gives them, if they are known.
 
     Returns
     -------
@@ -101,10 +108,11 @@ def answers(dataset: xr.Dataset) -> list[str]:
     """
     kind = kinds.default(dataset)
     said: list[str] = []
+    found = once(dataset) if found is None else found
     sliding = speed_name(dataset) == "stage_speed" and kind != "stability"
-    for answer in (*_ANSWERS.get(kind, ()), *([_SLIPS] if sliding else [])):
+    for answer in (_TRANSIENTS, *_ANSWERS.get(kind, ()), *([_SLIPS] if sliding else [])):
         with contextlib.suppress(ValueError, KeyError), answered():
-            said += answer(dataset)
+            said += answer(dataset, found)
     return said
 
 
@@ -159,7 +167,7 @@ def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
         yield f"{what} goes from {least.beside(most)} ({low.words}) to {most} ({high.words})."
 
 
-def _area_over_speed(dataset: xr.Dataset) -> Iterator[str]:
+def _area_over_speed(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
     """What the area loses from the lowest to the highest speed, to which mechanism, and at which speeds.
 
     Behind a spring the area at one speed of a steady stage is the mean over stick and slip, and under a ramp nothing,
@@ -217,7 +225,7 @@ def _taken(place: Found) -> str:
     return f"; of JKR's area there is lost {', '.join(taken)}{order}" if taken else ""
 
 
-def _area_over_sweep(dataset: xr.Dataset) -> Iterator[str]:
+def _area_over_sweep(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
     """The range of the area over a sweep or of a single run, over JKR's."""
     when = "" if is_stationary(dataset) else " at the end of the run"
     places = _places(dataset, _at_the_end(dataset))
@@ -226,28 +234,28 @@ def _area_over_sweep(dataset: xr.Dataset) -> Iterator[str]:
         yield f"Of{taken.removeprefix('; of')}."
 
 
-def _area_over_theories(dataset: xr.Dataset) -> Iterator[str]:
+def _area_over_theories(dataset: xr.Dataset, found: xr.Dataset) -> Iterator[str]:
     """The range of the area at each share of the stress's energy that adhesion pays for."""
     (dim,) = setting(dataset, "contact.reversible").dims
     for number in range(dataset.sizes[dim] if dataset.sizes[dim] <= _FEW else 0):
-        for said in _area_over_sweep(dataset.isel({dim: [number]})):
+        for said in _area_over_sweep(dataset.isel({dim: [number]}), found):
             yield _led(_swept(dataset["contact_reversible"][number]), said)
 
 
-def _of_the_run(*asked: tuple[str, str]) -> Callable[[xr.Dataset], Iterator[str]]:
+def _of_the_run(*asked: tuple[str, str]) -> Answer:
     """Sentences on what a whole run has once: names of events, and what each is in words."""
 
-    def answer(dataset: xr.Dataset) -> Iterator[str]:
-        places = _places(dataset, summary(events(dataset), quantiles=False))
+    def answer(dataset: xr.Dataset, found: xr.Dataset) -> Iterator[str]:
+        places = _places(dataset, found)
         for name, words in asked:
             yield from _ranged(places, name, words)
 
     return answer
 
 
-def _friction(dataset: xr.Dataset) -> Iterator[str]:
+def _friction(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
     """The largest friction in both directions, or the largest and the least; of the means over the members."""
-    found = summary(all_observables(dataset), quantiles=False)
+    found = over_members(dataset, ["friction_force"], quantiles=False)
     mean = found["friction_force_mean"].fillna(0.0)
     both = bool((mean.min() < 0.0) & (mean.max() > 0.0))
     words = ("Friction in one direction", "Friction in the other") if both else ("The largest friction", "The least")
@@ -255,9 +263,9 @@ def _friction(dataset: xr.Dataset) -> Iterator[str]:
         yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", what)
 
 
-def _creep(dataset: xr.Dataset) -> Iterator[str]:
+def _creep(dataset: xr.Dataset, whole: xr.Dataset) -> Iterator[str]:
     """How fast what bears its force to the end creeps there, and when what does not gives way."""
-    found = _places(dataset, summary(events(dataset), quantiles=False))
+    found = _places(dataset, whole)
     late = _places(dataset, summary(all_observables(dataset.isel(t=[-1])), quantiles=False).isel(t=-1))
     shares = [share.value if (share := place.mean("ran_away")) else 0.0 for place in found]
     borne = [place for place, share in zip(late, shares, strict=True) if share == 0.0]
@@ -271,7 +279,7 @@ def _creep(dataset: xr.Dataset) -> Iterator[str]:
         yield from _ranged(found, "ran_away", "The share of the members whose contact gives way")
 
 
-def _stability(dataset: xr.Dataset) -> Iterator[str]:
+def _stability(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
     """Speeds at which slips begin to follow each other as the stage gets faster, and cease to as it gets slower.
 
     A slip that follows no other is the fall of friction beyond its maximum.
@@ -291,7 +299,7 @@ def _stability(dataset: xr.Dataset) -> Iterator[str]:
 _OPENINGS = _of_the_run(("ever_detached", "The share of the members that come off"))
 
 #: What answers the question of a scene, by the kind of figure that fits it.
-_ANSWERS: dict[str, tuple[Callable[[xr.Dataset], Iterator[str]], ...]] = {
+_ANSWERS: dict[str, tuple[Answer, ...]] = {
     "loop": (
         _of_the_run(
             ("loop_dissipation", "The energy dissipated in a cycle there and back"),
@@ -318,4 +326,14 @@ _SLIPS = _of_the_run(
     ("force_drop", "The fall of the force in a slip"),
     ("recurrence_time", "The time from slip to slip"),
     ("kinetic_friction", "The work of the stage over its way, the kinetic friction,"),
+)
+#: Answers to a jump of the speed, and to a pull from rest.
+_TRANSIENTS = _of_the_run(
+    ("direct_effect", "The direct effect, the rise of friction after the first jump of the speed to a higher one,"),
+    ("step_overshoot", "Its overshoot over the level at which friction settles"),
+    ("step_length", "The sliding distance after which friction stays within 1/e of that overshoot of its level"),
+    ("static_threshold", "The static threshold, the largest force on the way to sliding,"),
+    ("area_at_threshold", "The contact area at the threshold over that at rest"),
+    ("area_by_law", "By the law A₀ − αQ², fitted up to half of the threshold, it"),
+    ("incipient_alpha", "The coefficient α of that law"),
 )

@@ -10,9 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.analysis import averaging, concise, highlights, is_stationary, notes, summary, sweep_dims, table
-from sim.analysis.observables import observables
+from sim.analysis import averaging, concise, highlights, is_stationary, notes, sweep_dims, table
 from sim.analysis.scene import claim
+from sim.analysis.statistics import over_members
+from sim.analysis.tables import once
 from sim.numerics import hdf5
 from sim.numerics.files import output, read_whole
 from sim.report.answers import TIE, answers
@@ -25,6 +26,8 @@ from sim.units.terminal import plain
 _ROWS = 24
 #: Longest log that is read [byte], and longest text of a scenario that is shown.
 _LOG, _TEXT = 2**20, 200_000
+#: Size of a dataset that is held in memory [byte].
+_WHOLE = 2**29
 #: A share below it is nothing.
 _ROUNDING = 1e-12
 #: Attributes on where a dataset comes from, in the page's words.
@@ -90,7 +93,10 @@ def html(dataset: xr.Dataset, source: Path | str = "OUT.nc") -> str:
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy: for this command alone
 
-    rows, once = table(dataset, _ROWS), highlights(dataset, _ROWS)
+    if dataset.nbytes < _WHOLE:  # what several figures and tables read is read once
+        dataset = dataset.load()
+    found = once(dataset)
+    rows, whole = table(dataset, _ROWS), highlights(dataset, _ROWS, found)
     stem = Path(source).stem
     page = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, finalize=_cleaned,
@@ -98,11 +104,11 @@ def html(dataset: xr.Dataset, source: Path | str = "OUT.nc") -> str:
     )  # fmt: skip
     return page.get_template("page.html").render(
         question=question(dataset),
-        answers=answers(dataset),
+        answers=answers(dataset, found),
         averaged=f"{averaged.capitalize()}. " if (averaged := averaging(dataset, is_stationary(dataset))) else "",
         drawings=list(drawings(dataset)),
-        tables=[shown for shown in (rows, once) if shown],
-        notes=notes(dataset, rows, once),
+        tables=[shown for shown in (rows, whole) if shown],
+        notes=notes(dataset, rows, whole),
         known=list(known(dataset)),
         scenario=scenario(dataset),
         changes=changes(dataset),
@@ -190,7 +196,7 @@ def known(dataset: xr.Dataset) -> Iterator[Known]:
             if np.isfinite(most):
                 yield Known(str(variable.attrs.get("long_name", name)), _percent(most))
     times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
-    found = summary(observables(dataset.isel(t=times)), quantiles=False)
+    found = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
     if "area_ratio_sem" in found and (error := float(found["area_ratio_sem"].max())) > _ROUNDING:
         yield Known(f"largest standard error of the mean area over JKR's, of {times.size} times", "–", _percent(error))
 

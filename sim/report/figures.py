@@ -10,6 +10,7 @@ from xml.etree import ElementTree as Tree
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -93,6 +94,11 @@ def svg_of(figure: Figure, prefix: str) -> str:
     white are the page's ink and paper, and points of curves carry their values as a ``<title>``.
     """
     content = io.BytesIO()
+    figure.dpi = 72.0  # that of SVG
+    FigureCanvasSVG(figure)
+    if layout := figure.get_layout_engine():  # here, as saving would draw the figure twice
+        layout.execute(figure)
+        figure.set_layout_engine(None)
     figure.savefig(content, format="svg", transparent=True)
     root = Tree.fromstring(content.getvalue())
     for parent in list(root.iter()):

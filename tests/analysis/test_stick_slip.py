@@ -142,6 +142,11 @@ def test_what_falls_by_less_than_the_least_is_no_slip():
     assert analysis.slips(made([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
 
 
+def test_a_slider_that_only_stretches_its_spring_has_no_kinetic_friction():
+    assert np.isnan(analysis.stick_slip(made(np.arange(10.0)))["kinetic_friction"]).all()
+    assert np.all(analysis.stick_slip(made(np.ones(10)))["kinetic_friction"] == 0.0)  # at no work of the stage
+
+
 def test_a_body_that_rings_or_slows_down_does_not_slip():
     saw = np.array([0.0, 2.0, 4.0, 3.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0])
     assert analysis.slips(made(saw)).sizes["slip"] == 2  # the slider goes twice as far as the stage
@@ -166,6 +171,7 @@ def test_a_runaway_has_its_time_and_the_force_of_that_time():
     assert np.all(when > 1.0) and np.all(found["ran_away"] == 1.0)
     assert_allclose(found["runaway_after"], when, rtol=1e-14)
     assert_allclose(found["static_friction"], force * (0.2 + 1.8 * (when - 1.0) / 19.0), rtol=1e-9)
+    assert all("–" not in row.values() for row in analysis.table(dataset)[-3:])  # none after its end
     held = run(scene(1, clock=Clock(duration=0.5, step=0.1), drive=drive, bonds=bonds))
     calm = analysis.stick_slip(held)
     assert calm["ran_away"].item() == 0.0 and np.isnan(calm["static_friction"]).all()

@@ -10,12 +10,13 @@ from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
 import sim
+from sim.analysis import slips
 from sim.laws.schallamach import Body, first_moment_onset, first_moment_peak, resolved_onset
 from sim.parts.bonds import Cohort, FirstMoment
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import Force, Spring
-from sim.plots import draw
+from sim.plots import draw, panels
 from sim.scenario.clock import Clock
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
@@ -54,6 +55,16 @@ def test_creep_is_drawn_from_the_first_step_on_and_a_cross_ends_a_runaway():
     crosses = [line for line in speed.lines if line.get_marker() == "x"]
     assert len(crosses) == 1 and crosses[0].get_xydata().tolist() == [[fast[0][last], fast[1][last]]]
     assert "runaway" in legend_of(position)[0]
+
+
+def test_slips_that_last_few_records_are_remarked_on_with_the_key_that_shows_them():
+    dataset = driven("map").isel(drive_stiffness=[0])
+    lasting = float(slips(dataset)["slip_duration"].median() / (dataset["t"][1] - dataset["t"][0]))
+    assert lasting < 3.0
+    title = draw(dataset, "time").axes[0].get_legend().get_title().get_text()
+    assert "clock.step" in title
+    assert "clock.record" in panels.coarse_slips(dataset.isel(t=slice(None, None, 2)))
+    assert panels.coarse_slips(driven("pull")) == ""
 
 
 def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():

@@ -301,6 +301,18 @@ def test_creep_says_what_is_borne_and_when_more_gives_way():
     assert late.endswith(f"(drive force 24 mN) to {shown[2]} (drive force 16 mN).")
 
 
+def test_a_jump_of_the_speed_and_a_pull_from_rest_have_their_sentences():
+    pulled = shipped("incipient_shear", sweep={"contact.load": [4e-3]}, clock={"duration": "60 ms", "step": "1 ms"})
+    found = analysis.events(pulled).isel(member=0, contact_load=0)
+    said = plainly(answers.answers(pulled))
+    assert said[0].endswith(f" is {analysis.engineering(float(found['static_threshold']), 'N')}.")
+    assert said[1].endswith(f" is {100.0 * float(found['area_at_threshold']):.4g} %.")
+    course = {"time": [0.0, 0.02, 0.02, 0.06], "value": [2e-4, 2e-4, 2e-3, 2e-3]}
+    jumped = shipped("velocity_step", **{"drive.stage": course}, clock={"duration": "60 ms", "step": "1 ms"})
+    rise = analysis.engineering(analysis.events(jumped)["direct_effect"].item(), "N")
+    assert plainly(answers.answers(jumped))[0].endswith(f"to a higher one, is {rise}.")
+
+
 def test_a_map_of_stability_says_where_slips_follow_each_other_and_behind_which_spring_none_do():
     dataset = shipped("stability_map", sweep={"drive.stiffness": [50.0, 1600.0]})
     begins, ends, never = plainly(answers.answers(dataset))
