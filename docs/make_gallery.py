@@ -52,9 +52,9 @@ class _Certain(float):
 class Entry(NamedTuple):
     """A question to a scenario: ``numbers`` reads them from its dataset, ``answer`` has a place for each.
 
-    ``changes`` are overrides of the scenario, ``kind`` is that of the figure and ``where`` the values of swept keys
-    that it shows; ``name`` is that of the picture. With ``free`` keys the scenario is fitted to the table of its name,
-    and ``numbers`` reads the fit.
+    ``changes`` are overrides of the scenario, ``kind`` is that of the figure, ``where`` the values of swept keys that
+    it shows and ``units`` some of its axes; ``name`` is that of the picture. With ``free`` keys the scenario is fitted
+    to the table of its name, and ``numbers`` reads the fit.
     """
 
     name: str
@@ -65,6 +65,7 @@ class Entry(NamedTuple):
     kind: str | None = None
     changes: Mapping[str, Any] = MappingProxyType({})
     where: Mapping[str, str] = MappingProxyType({})
+    units: tuple[str, ...] = ()
     free: tuple[str, ...] = ()
 
     @property
@@ -77,6 +78,7 @@ class Entry(NamedTuple):
         options = "".join(f" --set '{key}={_toml(value)}'" for key, value in self.changes.items())
         output = f" -o outputs/{self.name}.nc" if self.changes else ""
         chosen = "".join(f" --where '{key}={value}'" for key, value in self.where.items())
+        chosen += "".join(f" --units {unit}" for unit in self.units)
         dataset = self.name if self.changes else self.scenario
         shown = " ".join(filter(None, ["sim plot", f"outputs/{dataset}.nc", self.kind]))
         return [f"sim run {path}.toml{options}{output}", f"{shown}{chosen}"]
@@ -90,7 +92,8 @@ class Entry(NamedTuple):
 
     def draw(self, found: Any) -> None:
         """Make the picture, of few colours and as many pixels as its size allows."""
-        figure = fitted(found.problem, found.best) if self.free else sim.plot(found, self.kind, where=dict(self.where))
+        chosen: Any = {"where": dict(self.where), "units": self.units}
+        figure = fitted(found.problem, found.best) if self.free else sim.plot(found, self.kind, **chosen)
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
@@ -237,6 +240,7 @@ def masking(dataset: xr.Dataset) -> dict[str, Number]:
     to {narrow:.1f} % of JKR's.""",
     changes={"shear.spectrum.amplitude": "300 kPa",
              "sweep": {"shear.spectrum.angle": {"from": "0 deg", "to": "90 deg", "count": 19}}},
+    units=("deg",),
 )  # fmt: skip
 def direction(dataset: xr.Dataset) -> dict[str, Number]:
     energy = 1e3 * dataset["fluctuation_energy"].isel(t=-1)
@@ -385,8 +389,8 @@ def static_peak(dataset: xr.Dataset) -> dict[str, Number]:
     "How does friction answer a sudden change of the speed?",
     """It overshoots. When the stage goes from {slow:g} to {fast:g} mm/s at once the force rises from
     {before:.2f} mN to {peak:.2f} mN within {after:.1f} ms, as the bonds are stretched further before more of
-    them break, and settles at {settled:.2f} mN. Back at the old speed the force is {last:.2f} mN once more, and
-    never below.""",
+    them break, and settles at {settled:.2f} mN: {length:.1f} µm of sliding on, an e-th of the overshoot is left.
+    Back at the old speed the force is {last:.2f} mN once more, and never below.""",
     kind="time",
 )
 def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
@@ -396,6 +400,7 @@ def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
     return {"slow": 1e3 * float(stage[0]), "fast": 1e3 * float(stage[up]), "before": 1e3 * float(force[0]),
             "peak": 1e3 * float(force[top]), "settled": 1e3 * float(force[down - 1]),
             "after": 1e3 * float(dataset["t"][top] - dataset["t"][up - 1]),
+            "length": 1e6 * analysis.events(dataset)["step_length"].item(),
             "last": 1e3 * float(force[down:].min())}  # fmt: skip
 
 
@@ -419,7 +424,7 @@ def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
     "Which tangential force does a contact bear for ever, and how long a larger one?",
     """Up to {most:.2f} mN, where Bell's cluster of bonds comes apart. Under {held:g} mN it creeps at
     {creep:.2f} mm/s for good; under {more:g} mN it gives way after {late:.0f} ms, under {much:g} mN after
-    {soon:.1f} ms.""",
+    {soon:.1f} ms, before the first record, so that the figure has no curve of it.""",
 )
 def creep(dataset: xr.Dataset) -> dict[str, Number]:
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
@@ -443,17 +448,11 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
     kind="incipient",
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
-    one = dataset.isel(member=0)
-    load, lost, area, alpha = 1e3 * one["contact_load"].to_numpy(), [], [], []
-    for place in range(load.size):
-        force, own = (one[name].isel(contact_load=place).to_numpy() for name in ("spring_force", "contact_area"))
-        top = int(np.argmax(force))
-        half = slice(0, int(np.searchsorted(force[:top], 0.5 * force[top])))
-        lost.append(100.0 * (1.0 - own[top] / own[0]))
-        area.append(own[0])
-        alpha.append(np.sum(force[half] ** 2 * (own[0] - own[half])) / np.sum(force[half] ** 4))
-    return {"small": lost[0], "least": float(load[0]), "large": lost[-1], "load": float(load[-1]),
-            "power": float(np.polyfit(np.log(area), np.log(alpha), 1)[0])}  # fmt: skip
+    found, load = analysis.events(dataset).isel(member=0), 1e3 * dataset["contact_load"].to_numpy()
+    lost, area = 100.0 * (1.0 - found["area_at_threshold"].to_numpy()), dataset["contact_area"].isel(member=0, t=0)
+    power = np.polyfit(np.log(area), np.log(found["incipient_alpha"]), 1)[0]
+    return {"small": float(lost[0]), "least": float(load[0]), "large": float(lost[-1]), "load": float(load[-1]),
+            "power": float(power)}  # fmt: skip
 
 
 @asks(
@@ -524,7 +523,8 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     """In between: on one of {best:g} pN/nm its clutches bear {most} of the {motors:g} pN that its motors can pull
     with. On a softer one, of {soft:g} pN/nm, they bear {softly} pN: they load it for so long that they fail together.
     On a stiff one, of {stiff:g} pN/nm, they bear {stiffly} pN, as each is torn off soon after it has bound, and the
-    filament glides at {glides} nm/s, hardly slower than free.""",
+    filament glides at {glides} nm/s, hardly slower than free. These are means over the second half of the run, of
+    smaller errors than those of its last record, which the figure has.""",
     kind="sweep",
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
