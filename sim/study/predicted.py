@@ -115,15 +115,16 @@ def _course(time: Array, values: Array) -> Any:
 def steady_course(scenario: Scenario, time: Array, speed: Array) -> Course:
     """Contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s]; shapes (rows, 1)."""
     found = scenario.population.steady(speed[:, 0])
-    bonding = type(found)(*(np.broadcast_to(values, len(speed))[:, np.newaxis] for values in found))
-    motion = Motion(0, time, 0.0 * time, *(0.0 * speed,) * 2, speed, speed)  # type: ignore[arg-type]
+    still = 0.0 * speed
+    bonding = type(found)(*(np.reshape(values, (-1, 1)) + still for values in found))
+    motion = Motion(0, time, 0.0 * time, still, still, speed, speed)  # type: ignore[arg-type]
     shear = scenario.fluctuations
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
     size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
     energy = size * _plane_energy(shear.spectrum, *scenario.solid.effective)
-    terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), 0.0 * speed)
+    terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), still)
     touch = scenario.contact.start(motion, scenario.clock.duration, terms)
-    moving = time, 0.0 * speed, speed, bonding.fraction, bonding.stress, bonding.strength, energy
+    moving = time, still, speed, bonding.fraction, bonding.stress, bonding.strength, energy
     return Course(*moving, np.empty((len(speed), 1, 0)), *touch)
 
 

@@ -174,6 +174,7 @@ def test_intervals_hold_the_truth_in_twenty_fits(truth):
 @pytest.mark.verify
 def test_intervals_hold_the_truth_in_95_of_100_fits(truth):
     held = np.mean([inside(truth, seed, KEYS) for seed in range(500)], axis=0)
+    print(f"intervals hold {held}")
     # a binomial standard error of 1 %, three of them
     assert np.all((held > 0.92) & (held < 0.98)), held
 
