@@ -106,6 +106,8 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     whole, *others = judged
     if not others:
         return "", "there is no other mechanism to compare with: no fluctuations, and no load or stress for a theory"
+    if math.isinf(whole.aicc):
+        return "", f"the data cannot tell: AICc of {WHOLE} needs two points more than free numbers; measure more"
     left = [one for one in others if not one.rejected]
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"

@@ -460,6 +460,11 @@ def test_a_theory_is_preferred_only_where_the_scenario_fits_worse():
     assert name == "" and words.startswith("the data cannot tell: JKR") and mechanisms.WHOLE in words
 
 
+def test_fewer_points_than_the_criterion_needs_tell_nothing():
+    name, words = weighed(math.inf, ("bonds only", 8.0, 0.4, False), ("fluctuations only", 40.0, 0.01, True))
+    assert name == "" and "measure more" in words
+
+
 @pytest.mark.verify
 def test_a_theory_is_preferred_by_its_own_data():
     scene = load(LENS).with_values({"bonds.stress": 6e4})
