@@ -173,7 +173,7 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
         why = "nothing held the body"
         if "stage_speed" in dataset:
-            why = 'the interface let go faster than it is followed; drive.viscosity delays it, or contact_stiffness = "rigid"'
+            why = 'the interface let go faster than it is followed; give drive.viscosity or contact_stiffness = "rigid"'
         said.append(f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: {why}")
     if any("(" in cell for row in rows for cell in row.values()):
         said.append("in brackets the standard error in the last digits, wider where members are few")
