@@ -14,13 +14,15 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 @pytest.fixture(scope="session", autouse=True)
 def _written_at_once(request):
-    """Datasets of tests are written by the process that tests, but by ``make verify``.
+    """Datasets of tests are written by the process that tests, and need not be on the disk: but in ``make verify``.
 
-    Beside the threads of pytest-xdist no copy of a process is safe, and a new one loads for half a second.
+    Beside the threads of pytest-xdist no copy of a process is safe, and a new one loads for half a second; a run waits
+    ten times for the disk.
     """
     with pytest.MonkeyPatch.context() as patched:
         if request.config.getoption("markexpr") == "not verify":
             patched.setattr("sim.ensemble.netcdf.in_process", lambda work, *arguments: work(*arguments))
+            patched.setattr("os.fsync", lambda descriptor: None)
         yield
 
 
