@@ -34,6 +34,8 @@ _WIDE = 1e4
 _RUNS, _STAYS = 3, 0.1
 #: Correlation beyond which the data hardly tell two numbers apart.
 _ALIKE = 0.95
+#: Start of another search, over an e-fold or the range of a number; and most rows that are named.
+_BESIDE, _NAMED = 0.5, 3
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed")
 
@@ -111,7 +113,7 @@ def fit(
     if base.drive.feeds_back or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     _refuse_entangled(problem)
-    problem, best = with_errors(problem, problem.start)
+    problem, best = _searched(problem)
     alone, converged = best, best.converged
     for _ in range(0 if steady or problem.by_run else _RUNS):
         before = best.x
@@ -121,6 +123,32 @@ def fit(
     else:
         converged = (steady or problem.by_run) and converged
     return _assembled(scenario, problem, best, alone, converged and best.converged)
+
+
+def _searched(problem: Problem) -> tuple[Problem, Minimum]:
+    """The minimum near the scenario's own values; a poor one is sought from both sides of it, by each free number, too.
+
+    A contact that is open has no slope that would lead out of there.
+    """
+    found = [with_errors(problem, problem.start)]
+    if not problem.by_run and (_poor(*found[0]) or _open(*found[0]).size):
+        for k, one in enumerate(problem.free):
+            for sign in (-1.0, 1.0):
+                beside = found[0][1].x.copy()
+                beside[k] += sign * _BESIDE * one.width
+                found.append(with_errors(problem, beside))
+    return min(found, key=lambda one: one[0].criterion(one[1].chi_square))
+
+
+def _poor(problem: Problem, best: Minimum) -> bool:
+    """Whether the curves lie further off than their errors."""
+    freedom = problem.freedom
+    return bool(freedom > 0 and best.chi_square > freedom + 4.0 * math.sqrt(2.0 * freedom))
+
+
+def _open(problem: Problem, best: Minimum) -> NDArray[np.int64]:
+    """Measured numbers at which the contact is open by the fit, and was not."""
+    return np.flatnonzero((problem.predicted(best.x) == 0.0) & (np.abs(problem.values) > 3.0 * problem.sigma))
 
 
 def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minimum, converged: bool) -> Fit:
@@ -150,16 +178,18 @@ def _remarks(problem: Problem, best: Minimum, found: list[Found], alike: Array) 
             if abs(alike[i, j]) > _ALIKE:
                 both = f"{found[j].free.key} and {one.free.key}"
                 said.append(f"the data hardly tell {both} apart (correlation {alike[i, j]:.3f})")
-        if one.interval.low_open or one.interval.high_open:
-            ends = [word for word, is_open in zip(("below", "above"), one.interval[2:], strict=True) if is_open]
-            said.append(f"{one.free.key}: the data do not bound it {' or '.join(ends)}; its bound is given instead")
-    if problem.freedom > 0 and not problem.estimated.any():
+        ends = [*zip(("below", "above"), one.interval[:2], one.interval[2:], strict=True)]
+        if bound := [word for word, end, is_open in ends if is_open and not math.isnan(end)]:
+            said.append(f"{one.free.key}: the data do not bound it {' or '.join(bound)}; its bound is given instead")
+        if lost := [word for word, end, _ in ends if math.isnan(end)]:
+            said.append(f"{one.free.key}: the end of its interval was not found {' or '.join(lost)}")
+    if _poor(problem, best) and not problem.estimated.any():
         ratio = best.chi_square / problem.freedom
-        if ratio > 1.0 + 4.0 * math.sqrt(2.0 / problem.freedom):
-            said.append(
-                f"the curves lie further off than their errors (chi^2 {ratio:.3g} a degree of freedom): the model"
-            )
-            said[-1] += " lacks something, or the errors are too small; the intervals hold for neither"
+        said.append(f"the curves lie further off than their errors (chi^2 {ratio:.3g} a degree of freedom): the model")
+        said[-1] += " lacks something, or the errors are too small; the intervals hold for neither"
+    if (open_there := _open(problem, best)).size:
+        rows = ", ".join(map(problem.place, open_there[:_NAMED]))
+        said.append(f"the contact is open by the fit where it was measured: {rows}")
     if problem.estimated.any():
         said.append("curves without errors: their scatter around the fit stands for them")
     return said

@@ -46,7 +46,8 @@ def figure(problem: Problem, best: Minimum) -> Figure:
                 line, over = values[here][order], along[order]
                 if fine.size:  # what is added to steady sliding is known at the rows
                     line, over = smooth + np.interp(fine, over, line - alone[here][order]), fine
-                upper.plot(x.factor * over, y.factor * line, color=colour, linewidth=0.9, label=label, zorder=2)
+                upper.plot(x.factor * over, y.factor * line, color=colour, linewidth=0.9, label=label,
+                           zorder=2 if colour == BOTH else 1.8)  # fmt: skip
             upper.set_ylabel(y.label(f"{name.partition(',')[0]} ${symbol}$"))
             upper.tick_params(labelbottom=False)
             lower.plot(x.factor * along, off[here], color=BOTH, **HOLLOW)

@@ -2,6 +2,7 @@
 
 import copy
 import io
+import itertools
 import json
 import math
 import os
@@ -23,7 +24,7 @@ from sim.study.posterior import Posterior, posterior
 from sim.units.notation import concise, engineering, scaled
 from sim.units.options import quantity
 
-#: First words of the scenarios that are written here, by which they may be replaced.
+#: First words of a line of the scenarios that are written here, by which they may be replaced.
 _MADE = "# Made by sim fit"
 
 
@@ -88,24 +89,32 @@ def _made_here(path: Path, read: Sequence[Path]) -> bool:
     if not path.is_file() or any(one.exists() and path.samefile(one) for one in read):
         return False
     with path.open("rb") as file:
-        return file.read(len(_MADE)) == _MADE.encode()
+        return any(line.startswith(_MADE.encode()) for line in file)
 
 
 def _table(fit: Fit) -> list[dict[str, str]]:
     """One row for each number found, in units that suit it."""
     rows = []
     for one in fit.numbers:
-        factor, unit = scaled(one.value, one.free.quantity.unit)
-        row = {"key": one.free.key, "value": f"{concise(factor * one.value, factor * one.error)} {unit}".rstrip()}
+        nothing = one.interval.low_open and not one.interval.high_open and one.error > abs(one.value)
+        factor, unit = scaled(one.interval.high if nothing else one.value, one.free.quantity.unit)
+        shown = concise(factor * one.value, factor * one.error)
+        shown = f"below {factor * one.interval.high:.3g}" if nothing else shown
+        row = {"key": one.free.key, "value": f"{shown} {unit}".rstrip()}
         ends = zip(one.interval[:2], one.interval[2:], strict=True)
-        low, high = (f"{factor * end:.4g}" + (" (bound)" if is_open else "") for end, is_open in ends)
+        low, high = (_end(factor * end, is_open) for end, is_open in ends)
         row[f"{LEVEL:.0%} interval"] = f"{low} to {high}"
         row["start"] = engineering(one.free.start, one.free.quantity.unit)
         shift = (one.value - one.steady) / one.error if one.error > 0.0 else math.nan
         alone = engineering(one.steady, one.free.quantity.unit)
-        row["steady sliding alone"] = f"{alone} ({-shift:+.1f} errors)" if one.steady != one.value else alone
+        row["steady sliding alone"] = f"{alone} ({-shift:+.1f} errors)" if abs(shift) > 0.05 else alone
         rows.append(row)
     return rows
+
+
+def _end(end: float, is_open: bool) -> str:
+    """One end of an interval, which the data, a bound or nothing sets."""
+    return "unknown" if math.isnan(end) else f"{end:.4g}" + (" (bound)" if is_open else "")
 
 
 def _explanation(fit: Fit) -> str:
@@ -187,7 +196,7 @@ def _without_nan(value: Any) -> Any:
 
 
 def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
-    """The scenario as it was given, with the values found, for a file in a folder."""
+    """The scenario as it was given, its question first, with the values found, for a file in a folder."""
     source = scenario.origin
     text = source.text or written(_plain(json.loads(scenario_json(scenario))))
     tables = copy.deepcopy(parse(text, source.path))
@@ -200,7 +209,10 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
     if source.path and above.resolve() != folder.resolve():
         _move(tables, above, folder)
     keys = ", ".join(one.free.key for one in fit.numbers)
-    return f"{_MADE}: {keys} are calibrated to measured curves.\n{written(tables)}"
+    comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    asked = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
+    opening = f"{asked}#\n" if asked else ""
+    return f"{opening}{_MADE}: {keys} are calibrated to measured curves.\n{written(tables)}"
 
 
 def _plain(value: Any) -> Any:

@@ -59,6 +59,13 @@ class Free(NamedTuple):
     def logarithmic(self) -> bool:
         return self.low > 0.0
 
+    @property
+    def width(self) -> float:
+        """Change of the number as it is fitted that is a large one: an e-fold, its range, or its size without one."""
+        if self.logarithmic:
+            return 1.0
+        return max(self.high - self.low if math.isfinite(self.high - self.low) else abs(self.start), 1e-300)
+
     def inner(self, value: float) -> float:
         """The number as it is fitted."""
         return math.log(value) if self.logarithmic else value
@@ -159,6 +166,11 @@ class Problem:
         names = [curve.name for table in self.tables for curve in table.curves]
         return np.array([one == name for one in names])[self.curve]
 
+    def place(self, number: int) -> str:
+        """Variable and row of one of all numbers."""
+        name = [curve.name for table in self.tables for curve in table.curves][self.curve[number]]
+        return f"{name}: row {number - int(np.argmax(self.curve == self.curve[number])) + 1}"
+
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
         off = (self.values - self.predicted(x)) / np.hypot(self.sigma, self.noise)
@@ -180,10 +192,8 @@ class Problem:
         """This problem with the shift from steady sliding at x to what the scenario's own models give there."""
         mean, noise = self._joined(self.sampled(x))
         if not np.all(np.isfinite(mean)):
-            place = int(np.flatnonzero(~np.isfinite(mean))[0])
-            name = [curve.name for table in self.tables for curve in table.curves][self.curve[place]]
             said = "has no value in the run with what was found: is the contact open there?"
-            raise BadInput([f"{name}: row {place - int(np.argmax(self.curve == self.curve[place])) + 1} {said}"])
+            raise BadInput([f"{self.place(int(np.flatnonzero(~np.isfinite(mean))[0]))} {said}"])
         return replace(self, shift=mean - self.steady(x), noise=noise)
 
 
@@ -267,7 +277,7 @@ def _derivatives(problem: Problem, x: Array, places: Iterable[int]) -> Array:
     columns, share = [], _RUN_STEP if problem.by_run else _STEP
     for k in places:
         low, high = problem.bounds[k]
-        step = share * (1.0 if k >= len(problem.free) or problem.free[k].logarithmic else max(high - low, 1e-300))
+        step = share * (1.0 if k >= len(problem.free) else problem.free[k].width)
         up, down = x.copy(), x.copy()
         up[k], down[k] = min(x[k] + step, high), max(x[k] - step, low)
         columns.append((problem.residuals(up) - problem.residuals(down)) / (up[k] - down[k]))
@@ -301,8 +311,8 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
     near, far, step, start = 0.0, math.inf, rise * spread, best.x
     for _ in range(_MOST):
         at = best.x[k] + sign * step
-        held = min(max(at, bound), math.inf) if sign < 0.0 else min(at, bound)
-        guess = start if start is not best.x else best.x + along * (held - best.x[k]) / spread
+        held = max(at, bound) if sign < 0.0 else min(at, bound)
+        guess = _nearest(problem, (start, best.x + along * (held - best.x[k]) / spread), k, held)
         found = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
         root = math.sqrt(max(found.chi_square - best.chi_square, 0.0))
         start = found.x
@@ -316,7 +326,17 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         if not near < step < far:
             step = 0.5 * (near + far) if math.isfinite(far) else 2.0 * near
         step = min(step, 3.0 * here)
-    return held, True
+    return math.nan, True
+
+
+def _nearest(problem: Problem, starts: Iterable[Array], k: int, held: float) -> Array:
+    """The start, within all bounds and with one number held, at which the curves are nearest already.
+
+    Where the data do not bound a number, the straight way to it leads out of all that can be.
+    """
+    low, high = np.transpose(problem.bounds)
+    within = [np.clip(np.where(np.arange(len(low)) == k, held, start), low, high) for start in starts]
+    return min(within, key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
 
 
 def problem_of(

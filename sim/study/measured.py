@@ -78,11 +78,20 @@ def read(path: Path, scenario: Scenario) -> Measured:
     conditions = {at[name][0]: points.values for name, points in found.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in found.items() if name not in at)
     unclear = _unclear(scenario, conditions)
+    unclear = unclear or _against(conditions, curves)
     if not curves:
         unclear = 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
     if unclear:
         raise BadInput([f"{path}: {unclear}"])
     return Measured(path, scenario.contact.kind, conditions, curves)
+
+
+def _against(conditions: dict[str, Array], curves: tuple[Curve, ...]) -> str:
+    """What is wrong with the signs of forces and speeds; "" for nothing."""
+    for name, values, _ in curves:
+        if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
+            return f"{name} has the sign of the speed; turn the sign of one of them"
+    return ""
 
 
 def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:

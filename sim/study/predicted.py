@@ -92,7 +92,7 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
 
 
 def _group(scenario: Scenario, table: Measured, rows: NDArray[np.int64]) -> Group:
-    time = np.arange(float(len(rows)))
+    time = np.linspace(0.0, scenario.clock.duration, len(rows))  # a course of the rows, as long as the run
     if "t" in table.conditions:
         time = table.conditions["t"][rows]
     if "held" in table.conditions:
@@ -223,10 +223,11 @@ def _places(group: Group, by_time: bool, course: Course) -> Array:
         along, at = -along, -at
     rising, near = bool(np.all(np.diff(along) > 0.0)), 1e-9 * max(1.0, float(np.ptp(along)))
     if not rising or at.min() < along[0] - near or at.max() > along[-1] + near:
-        low, high = np.min(np.abs(course.speed)), np.max(np.abs(course.speed))
-        said = (
-            "the run must pass each measured speed once" if not rising else f"it goes from {low:.3g} to {high:.3g} m/s"
-        )
+        said = "the run must pass each measured speed once"
+        if rising:
+            ends = (np.abs(course.speed), np.abs(group.speed))
+            run, data = (f"{values.min():.3g} to {values.max():.3g}" for values in ends)
+            said = f"the run goes from {run} m/s, the data from {data}"
         raise BadInput([f'drive.speed: {said}; fit with a wider drive, or with [drive] model = "steady"'])
     place = np.clip(np.searchsorted(along, at) - 1, 0, len(along) - 2)
     part = np.clip((at - along[place]) / (along[place + 1] - along[place]), 0.0, 1.0)

@@ -263,9 +263,12 @@ def _number(at: int, name: str, cell: str, unit: str, quantity: Quantity, gaps: 
         number = float(cell)
     except ValueError:
         said, cure = "" if cell else " an empty cell,", ", decimals with a point" if "," in cell else ""
+        cure = cure if cell else ", or leave the row out"
         raise TableError(f"line {at}: {name} is{said} not a number; write a plain number{cure}") from None
-    if gaps and number != number:
-        return number
+    if number != number:
+        if gaps:
+            return number
+        raise TableError(f"line {at}: {name} is nan; write a plain number, or leave the row out")
     try:
         return quantity.read(f"{number!r} {unit}" if unit else number)
     except ValueError as fault:

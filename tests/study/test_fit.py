@@ -223,10 +223,32 @@ def test_loads_fit_work_and_modulus_of_jkr(tmp_path):
     loads = np.linspace(-2e-4, 8e-3, 12)
     exact = sim.laws.jkr.radius_at_load(loads, 42e-3, 2e-3, 6.4e6)
     path = table(tmp_path / "jkr.csv", {"normal_load [N]": loads}, {"contact_radius": exact}, 0.001)
-    scene = load(LENS | {"drive": {"model": "steady"}, "shear": {"model": "uniform"}, "bonds": {"model": "none"}})
-    start = scene.with_values({"adhesion.work": 30e-3, "solid.shear_modulus": 1e6})
+    start = still().with_values({"adhesion.work": 30e-3, "solid.shear_modulus": 1e6, "clock.duration": 60.0})
     found = fit(start, [path], ["adhesion.work", "solid.shear_modulus"])
     assert_allclose([*found.values.values()], [42e-3, 1.6e6], rtol=1e-7)
+
+
+def still():
+    """A lens that sticks to nothing sideways."""
+    return load(LENS | {"drive": {"model": "steady"}, "shear": {"model": "uniform"}, "bonds": {"model": "none"}})
+
+
+def test_a_minimum_at_which_the_contact_is_open_is_left_for_a_lower_one(tmp_path):
+    """Loading and unloading by two works of adhesion: one work fits neither, and a small one opens the last contact."""
+    loads, works = np.array([0.0, 1e-3, 2e-3, 2e-3, 1e-3, 0.0, -4e-4]), np.repeat([30e-3, 60e-3], [3, 4])
+    measured = sim.laws.jkr.radius_at_load(loads, works, 2e-3, 6.4e6)
+    path = table(tmp_path / "both.csv", {"normal_load [N]": loads}, {"contact_radius": measured}, 0.01)
+    found = fit(still().with_values({"adhesion.work": 33e-3}), [path], ["adhesion.work"], steady=True)
+    tried = np.linspace(42.5e-3, 60e-3, 1000)[:, np.newaxis]  # closed at the lowest load
+    radii = sim.laws.jkr.radius_at_load(loads, tried, 2e-3, 6.4e6)
+    least = np.min(np.sum(((radii - measured) / (0.01 * measured)) ** 2, axis=1))
+    assert found.best.chi_square < least and not any("open" in said for said in found.remarks)
+
+
+def test_a_number_without_bounds_of_its_own_is_found(tmp_path, truth):
+    path = table(tmp_path / "exact.csv", {"speed [m/s]": SPEEDS}, truth, 0.01)
+    found = fit(load(LENS).with_values({"contact.load": 3e-3}), [path], ["contact.load"], steady=True)
+    assert_allclose(found.values["contact.load"], 4e-3, rtol=1e-6)
 
 
 def test_an_edge_that_lags_is_found_from_loading_and_unloading(tmp_path):
@@ -261,7 +283,7 @@ def test_times_are_read_along_the_run(tmp_path):
                   {"contact_area": run.contact_area[::20].to_numpy()}, 0.001)  # fmt: skip
     assert_allclose(fit(start, [again], ["bonds.critical_speed"]).values["bonds.critical_speed"], 0.01, rtol=1e-6)
     far = table(tmp_path / "far.csv", {"speed [m/s]": [1e-4, 1.0]}, {"contact_area": np.full(2, 4e-8)}, 0.001)
-    with pytest.raises(BadInput, match=r"drive.speed: it goes from 1e-05 to 0.05 m/s"):
+    with pytest.raises(BadInput, match=r"drive.speed: the run goes from 1e-05 to 0.05 m/s, the data from 0.0001 to 1"):
         fit(start, [far], ["bonds.critical_speed"])
 
 
@@ -366,6 +388,21 @@ def test_keys_that_the_data_hardly_tell_apart_are_named(curves):
     found = fit(load(LENS), [curves], ["adhesion.bond_share", "shear.spectrum.rms", "bonds.stress"], steady=True)
     assert abs(found.correlations[0, 1]) > 0.95
     assert [said for said in found.remarks if "adhesion.bond_share and shear.spectrum.rms apart" in said]
+
+
+def test_a_number_that_the_data_do_not_need_never_narrows_the_intervals_of_others(tmp_path):
+    bare = load(LENS).with_values({"shear.spectrum.rms": 1.0})
+    runs = [sim.run(bare.with_values({"drive.speed": float(speed)})).isel(t=-1) for speed in SPEEDS]
+    exact = {name: np.array([float(run[name].item()) for run in runs]) for name in ("contact_area", "friction_force")}
+    path = table(tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, noisy(exact, 0.02, 0), 0.02)
+    keys = ["bonds.critical_speed", "bonds.stress"]
+    alone = fit(bare, [path], keys, steady=True).numbers
+    beside = fit(load(LENS), [path], [*keys, "shear.spectrum.rms"], steady=True).numbers
+    for narrow, wide in zip(alone, beside, strict=False):
+        assert wide.interval.low < narrow.interval.low * (1.0 + 2e-3)
+        assert wide.interval.high > narrow.interval.high * (1.0 - 2e-3)
+        assert not (wide.interval.low_open or wide.interval.high_open)
+    assert beside[2].interval.low_open and not beside[2].interval.high_open
 
 
 def test_a_number_that_the_data_do_not_bound_ends_at_its_bound(tmp_path, truth):
@@ -543,7 +580,7 @@ BAD = {
     "misspelt": ("speed [mm/s],contact_arae [mm^2]\n1,2\n3,4\n", 'did you mean "contact_area"'),
     "no curve": ("speed [mm/s]\n1\n3\n", "no column was measured"),
     "no condition": ("contact_area [mm^2]\n0.04\n0.05\n", "where the points were taken"),
-    "nan": (f"{HEADER}\n1,0.04\n2,nan\n", "line 3: contact_area must be finite"),
+    "nan": (f"{HEADER}\n1,0.04\n2,nan\n", "line 3: contact_area is nan"),
     "empty cell": (f"{HEADER}\n1,0.04\n2,\n", "line 3: contact_area is an empty cell"),
     "ragged": (f"{HEADER}\n1,0.04\n2\n", "line 3: 1 cells"),
     "one point": (f"{HEADER}\n1,0.04\n", "1 measured number cannot tell 1 free"),
@@ -551,6 +588,7 @@ BAD = {
     "error of nothing": (f"{HEADER},friction_force_error [mN]\n1,2,3\n2,3,4\n", "is the error of"),
     "time and speed": ("t [s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n", "leave out t"),
     "twice": ("speed [mm/s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n", "each once"),
+    "against the speed": ("speed [mm/s],friction_force [mN]\n-1,2\n-2,3\n", "has the sign of the speed"),
     "of another solid": ("solid_poisson_ratio,contact_area [mm^2]\n0.5,2\n0.7,3\n", "at most 0.5"),
 }  # fmt: skip
 
@@ -558,7 +596,7 @@ BAD = {
 @pytest.fixture
 def scenario(tmp_path):
     path = tmp_path / "lens.toml"
-    path.write_text(written(LENS))
+    path.write_text(f"# How fast are its bonds?\n#\n# Made up.\n\n{written(LENS)}")
     return path
 
 
@@ -602,6 +640,8 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
         one = numbers["numbers"][key]
         assert one["low"] < value < one["high"] and one["start"] == value
         assert_allclose(quantities(found)[key][1], one["value"], rtol=1e-11)
+    asked = [line for line in scenario.read_text().splitlines() if line.startswith("#")]
+    assert asked and made[0].read_text().startswith("\n".join(asked))
     assert {**dict(quantities(found)), **dict.fromkeys(KEYS)} == {**quantities(load(scenario)), **dict.fromkeys(KEYS)}
     assert (
         made[2].read_bytes().startswith(b"\x89PNG")
