@@ -44,6 +44,12 @@ def keep(dataset: xr.Dataset, *names: str) -> xr.Dataset:
     return dataset.drop_vars([name for name in timed if name not in names])
 
 
+def alone(dataset: xr.Dataset, *names: str) -> xr.Dataset:
+    """The dataset without trajectories but those named, those that all members have in common left out, too."""
+    timed = [str(name) for name, variable in dataset.data_vars.items() if "t" in variable.dims]
+    return dataset.drop_vars([name for name in timed if name not in names])
+
+
 def _packed(variables: list[xr.Variable], name: str) -> int:
     """Length along a dimension of what the file packs together."""
     return max((_chunk(variable, name) for variable in variables if name in variable.dims), default=1)

@@ -6,9 +6,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sim.analysis.blocks import in_blocks, keep
-from sim.analysis.observables import masks, ordered, pure
-from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, sweep_dims, where_recorded, word
+from sim.analysis.blocks import alone, in_blocks
+from sim.analysis.observables import KEPT, masks, ordered, pure
+from sim.analysis.scene import (
+    MEMBERS,
+    answered,
+    control,
+    may_stop,
+    of_dataset,
+    setting,
+    sweep_dims,
+    where_recorded,
+    word,
+)
 from sim.analysis.stick_slip import stick_slip
 from sim.analysis.transients import speed_step, way_to_sliding
 
@@ -49,10 +59,14 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
-    dims = (*sweep_dims(dataset), MEMBERS)
-    found = in_blocks(keep(dataset, "detachment_time"), dims, _openings)
+    dims, latest = (*sweep_dims(dataset), MEMBERS), alone(dataset, "detachment_time")
+    if "detachment_time" in latest and bool(latest["detachment_time"].isel(t=-1).isnull().all()):
+        latest = latest.isel(t=[-1])  # none was open before either
+    found = in_blocks(latest, dims, _openings)
+    read = ["masked", "in_contact_mean", *(f"masked_{kind}" for kind in KEPT)]
+    read += ["contact_area"] if may_stop(dataset) else []
     with where_recorded():
-        found = found.merge(in_blocks(keep(dataset, "masked", "contact_area"), dims, _masks))
+        found = found.merge(in_blocks(alone(dataset, *read), dims, _masks))
     for part in (peaks, stick_slip, speed_step, way_to_sliding):
         with where_recorded():
             found = found.merge(part(dataset))
@@ -83,8 +97,9 @@ def _masks(dataset: xr.Dataset) -> xr.Dataset:
     """Each record stands for the time since the one before; a trajectory that stopped counts up to its end."""
     suffix, found = "" if "masked" in dataset else "_mean", masks(dataset)
     masked = found[f"fraction_masked{suffix}"]
-    masked = masked if suffix else masked.where(dataset["contact_area"].notnull())
-    share = masked.isel(t=slice(min(1, dataset.sizes["t"] - 1), None)).mean("t", skipna=not suffix)
+    if stops := not suffix and may_stop(dataset):
+        masked = masked.where(dataset["contact_area"].notnull())
+    share = masked.isel(t=slice(min(1, dataset.sizes["t"] - 1), None)).mean("t", skipna=stops)
     found = {f"time_masked{suffix}": pure(share, "share of the time in which adhesion was masked")}
     if not suffix:
         ever = masked == 1.0
@@ -238,7 +253,7 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     suffix = "" if "normal_load" in dataset else "_mean"
     read = (f"{name}{suffix}" for name in ("contact_radius", "normal_load", "displacement", "dissipated_energy"))
     dims = (*sweep_dims(dataset), MEMBERS)
-    return in_blocks(keep(dataset, *read), dims, lambda some: _loops(some, suffix, count))
+    return in_blocks(alone(dataset, *read), dims, lambda some: _loops(some, suffix, count))
 
 
 def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:

@@ -5,6 +5,7 @@ recorded contact is at that time.
 """
 
 import contextlib
+import functools
 import itertools
 from collections.abc import Callable, Collection, Iterator
 
@@ -12,7 +13,17 @@ import numpy as np
 import xarray as xr
 
 from sim.analysis.blocks import keep
-from sim.analysis.scene import MEMBERS, answered, control, of_dataset, setting, stays_held, where_recorded, word
+from sim.analysis.scene import (
+    MEMBERS,
+    answered,
+    control,
+    may_stop,
+    of_dataset,
+    setting,
+    stays_held,
+    where_recorded,
+    word,
+)
 from sim.laws import jkr
 
 KEPT = ("mean", "std", "sem")
@@ -23,6 +34,8 @@ _LOSSES = {
     "lost_to_mean_stress": ("fluctuations_radius", "the mean stress, after bonds and fluctuations"),
     "lost_to_lag": ("equilibrium_radius", "the edge's lag behind equilibrium, after all else"),
 }
+#: What follows from both orders of charging.
+_DIFFERENCES = frozenset(("lost_to_bonds_last", "order_of_charging"))
 #: Trajectories that observables of other names follow from.
 _FROM = {"area_ratio": "contact_area", "fraction_detached": "in_contact", "fraction_masked": "masked"}
 
@@ -81,7 +94,7 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         ``lost_to_bonds`` and ``lost_to_fluctuations``; with ``contact.reversible`` above zero also
         ``lost_to_mean_stress``, and with a rate-dependent contact ``lost_to_lag``. With ``area_ratio`` they
-        add up to one.
+        add up to one. What members have in common has no dimension ``member``.
 
     Raises
     ------
@@ -101,7 +114,9 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     if any(radius not in dataset for radius, _ in charged.values()):
         raise ValueError("shares need each member; record them: [record] per_member = true")
     left = [np.pi * dataset[radius].astype(float) ** 2 for radius, _ in charged.values()]
-    levels = [full, *(level.where(area.notnull()) for level in left), area]
+    if may_stop(dataset):
+        left = [level.where(area.notnull()) for level in left]
+    levels = [full, *left, area]
     texts = {"lost_to_bonds": "broken bonds, which are charged first"}
     texts |= {name + suffix: text for name, (_, text) in charged.items()}
     lost = [(before - after) / full for before, after in itertools.pairwise(levels)]
@@ -134,6 +149,11 @@ def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
     Fluctuations alone leave w = Δγ(1) - χ ΔΓ. Where no equilibrium with that exists, the area is 0.
     """
     charged = share_observables(dataset)
+    return xr.Dataset(_in_turn(charged, _charged_first(dataset)), attrs=dataset.attrs)
+
+
+def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
+    """The share that fluctuations take if they are charged first; see ``charged_in_turn``."""
     if "fluctuation_energy" not in dataset or bool((word(dataset, "shear.contact", "plane") != "plane").any()):
         raise ValueError("the other order of charging needs the fluctuation energy of each member, on a plane")
     try:
@@ -149,14 +169,18 @@ def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
         radius = xr.apply_ufunc(jkr.radius_at_indentation, dataset["indentation"], *sphere)
     else:
         radius = xr.apply_ufunc(jkr.radius_at_displacement, dataset["displacement"], held.stiffness, *sphere)
-    area, full = dataset["contact_area"].astype(float), full_area(dataset)
-    alone = (np.pi * radius.fillna(0.0) ** 2).where(area.notnull())
-    first = pure((full - alone) / full, "share of JKR's area lost to fluctuations, which are charged first")
+    full, alone = full_area(dataset), np.pi * radius.fillna(0.0) ** 2
+    if may_stop(dataset):
+        alone = alone.where(dataset["contact_area"].notnull())
+    return pure((full - alone) / full, "share of JKR's area lost to fluctuations, which are charged first")
+
+
+def _in_turn(charged: xr.Dataset, first: xr.DataArray) -> dict[str, xr.DataArray]:
+    """The shares of ``charged_in_turn``, of those in the other order."""
     both = charged["lost_to_bonds"] + charged["lost_to_fluctuations"]
     last = pure(both - first, "share of JKR's area lost to broken bonds, after the fluctuations")
     more = pure(first - charged["lost_to_fluctuations"], "what fluctuations take more if they are charged first")
-    found = {"lost_to_fluctuations_first": first, "lost_to_bonds_last": last, "order_of_charging": more}
-    return xr.Dataset(found, attrs=dataset.attrs)
+    return {"lost_to_fluctuations_first": first, "lost_to_bonds_last": last, "order_of_charging": more}
 
 
 @of_dataset
@@ -187,12 +211,15 @@ def all_observables(dataset: xr.Dataset) -> xr.Dataset:
     return observables(dataset).merge(charges(dataset))
 
 
-def charges(dataset: xr.Dataset) -> xr.Dataset:
-    """Shares of the lost area in both orders of charging, as far as they are known."""
+def charges(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+    """Shares of the lost area in both orders of charging, as far as they are known and, given ``names``, wanted."""
     found = xr.Dataset()
-    for shares in (share_observables, charged_in_turn):
-        with contextlib.suppress(ValueError), answered():
-            found = found.merge(shares(dataset))
+    with contextlib.suppress(ValueError), answered():
+        found = share_observables(dataset)
+        first = _charged_first(dataset)
+        if names is None or not _DIFFERENCES.isdisjoint(names):
+            return found.assign(_in_turn(found, first))
+        found = found.assign(lost_to_fluctuations_first=first)
     return found
 
 
@@ -209,8 +236,10 @@ def readings(
     for name in each or [""]:
         yield keep(dataset, name), observables
     if names is None or any(name.startswith(("lost_to", "order_of")) for name in names):
-        areas = ("contact_area", *(radius for radius, _ in _LOSSES.values()))
-        yield keep(dataset, *areas, "fluctuation_energy", "indentation", "displacement"), charges
+        areas, held = ("contact_area", *(radius for radius, _ in _LOSSES.values())), ""
+        with contextlib.suppress(KeyError):  # the dataset does not say
+            held = control(dataset).kind
+        yield keep(dataset, *areas, "fluctuation_energy", held), functools.partial(charges, names=names)
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:

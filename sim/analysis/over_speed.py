@@ -107,18 +107,20 @@ def crossing(speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: n
     interval is Student's, symmetric in the logarithm, with the error of the jackknife that leaves each group out of
     the whole curve: so noise that members have in common at different speeds counts as in common.
     """
-    above, weights, several = groups - level, sizes[:, None] / sizes.sum(), len(groups) > 1
-    mean = np.sum(weights * above, axis=0)
-    below = np.flatnonzero(mean <= 0.0)
-    if not (mean[0] > 0.0 and below.size):
+    weights, several = sizes / sizes.sum(), len(groups) > 1
+    mean = sum(weight * group for weight, group in zip(weights, groups, strict=True)) - level
+    first = int(np.argmax(mean <= 0.0))
+    if not mean[0] > 0.0 >= mean[first]:
         return Crossing(math.nan, math.nan, math.nan)
-    error = float(above[:, below[0]].std(ddof=1)) / math.sqrt(len(groups)) if several else 0.0
-    window = _about(int(below[0]), np.abs(mean) <= _NEAR * error)
-    x = np.log(speeds[window])
-    at = float(_zero(x, mean[window]))
+    error = float(groups[:, first].std(ddof=1)) / math.sqrt(len(groups)) if several else 0.0
+    window = _about(first, np.abs(mean) <= _NEAR * error)
+    x, mean = np.log(speeds[window]), mean[window]
+    at = float(_zero(x, mean))
     if not several:
         return Crossing(math.exp(at), math.nan, math.nan)
-    without = _zero(x, ((mean - weights * above) / (1.0 - weights))[:, window])
+    each = weights[:, None]
+    above = groups[:, window] - np.broadcast_to(level, speeds.shape)[window]
+    without = _zero(x, (mean - each * above) / (1.0 - each))
     half = special.stdtrit(len(groups) - 1.0, 0.5 + 0.5 * LEVEL) * math.sqrt(
         (len(groups) - 1.0) * float(np.var(without))
     )
@@ -200,11 +202,11 @@ def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.Data
     count = min(members, _GROUPS, max(2, ROOM // (8 * math.prod(kept.values()))))
     of = np.arange(members) % count
     sums = np.zeros((count, *kept.values()))
-    for block in blocks(read, (*sweep, MEMBERS)):
-        ratio = observables(read.isel(block))["area_ratio"]
+    for block in blocks(read, (*sweep, MEMBERS, *(["t"] if along == "t" else []))):
+        ratio = observables(read.isel(block).load())["area_ratio"]
         ratio = ratio if along == "t" else ratio.mean("t")
         ratio = ratio if MEMBERS in ratio.dims else ratio.expand_dims(MEMBERS)
-        at: Any = of[block.get(MEMBERS, slice(None))], *(block[name] for name in sweep)
+        at: Any = of[block.get(MEMBERS, slice(None))], *(block[name] for name in kept)
         np.add.at(sums, at, ratio.transpose(MEMBERS, *kept).to_numpy())
     sizes = np.bincount(of).astype(float)
     means = sums / sizes.reshape(-1, *[1] * len(kept))

@@ -21,6 +21,8 @@ from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quant
 _MANY = 16
 #: Values that a sample keeps at least, and how far from its level in it an exact quantile may lie.
 _SAMPLE, _NEAR = 2**17, 0.01
+#: Bytes of trajectories that are kept in memory from the first reading to the second.
+_KEPT = 3 * 2**27
 #: Values that fit into the processor's cache.
 _STRIP = 2**16
 _LEVELS = np.array(QUANTILES)
@@ -189,11 +191,11 @@ class _Quantiles:
 
     def sample(self, known: np.ndarray) -> None:
         self.total += known.size
-        self.some.append(known.ravel()[:: self.stride].copy())
-        kept = sum(some.size for some in self.some)
-        if kept > 2 * _SAMPLE:
-            self.some = [np.concatenate(self.some)[:: kept // _SAMPLE].copy()]
-            self.stride *= kept // _SAMPLE
+        kept = sum(some.size for some in self.some) + known.size // self.stride
+        if (thinner := -(-kept // (2 * _SAMPLE))) > 1:
+            self.some = [some[::thinner].copy() for some in self.some]
+            self.stride *= thinner
+        self.some.append(known[np.unravel_index(np.arange(0, known.size, self.stride), known.shape)])
 
     @property
     def largest(self) -> float:
@@ -204,11 +206,15 @@ class _Quantiles:
         """The sample in order."""
         return np.sort(np.concatenate(self.some))
 
+    @functools.cached_property
+    def sides(self) -> np.ndarray:
+        """Between which values each quantile surely is."""
+        return np.quantile(self.ordered, np.clip(_LEVELS[:, None] + _NEAR * np.array([-1.0, 1.0]), 0.0, 1.0))
+
     def gather(self, values: np.ndarray) -> None:
         """Keep what lies near each quantile of the sample, where that is not all there is."""
         if self.stride > 1:
-            sides = np.clip(_LEVELS[:, None] + _NEAR * np.array([-1.0, 1.0]), 0.0, 1.0)
-            for k, (low, high) in enumerate(np.quantile(self.ordered, sides)):
+            for k, (low, high) in enumerate(self.sides):
                 self.below[k] += int(np.count_nonzero(values < low))
                 inside = values[(values >= low) & (values <= high)]
                 self.near[k].append(inside if low < high else np.array([float(inside.size)]))
@@ -218,11 +224,10 @@ class _Quantiles:
         if not self.total:
             return np.full(len(levels), np.nan)
         found = np.quantile(self.ordered, np.clip(np.nan_to_num(levels), 0.0, 1.0))
-        for level, near, below in zip(_LEVELS, self.near, self.below, strict=True):
+        for (least, most), near, below in zip(self.sides, self.near, self.below, strict=True):
             values = np.sort(np.concatenate([*near, ()]))
-            same = np.quantile(self.ordered, np.clip([level - _NEAR, level + _NEAR], 0.0, 1.0))
-            if near and same[0] == same[1]:  # of equal values only their number was kept
-                values = np.broadcast_to(same[0], int(values.sum()))
+            if near and least == most:  # of equal values only their number was kept
+                values = np.broadcast_to(least, int(values.sum()))
             places = levels * (self.total - 1) - below
             held = (places >= 0.0) & (places <= values.size - 1.0)
             low = places[held].astype(int)
@@ -334,13 +339,16 @@ def _series(
     for block in blocks(group, (MEMBERS, "t") if members >= _MANY else ("t",)):
         times = slice(max(block["t"].start, late), min(block["t"].stop, records))
         if times.start < times.stop:
-            pieces.append((block.get(MEMBERS, slice(0, members)), times))
+            pieces.append((block.get(MEMBERS, slice(0, members)), slice(times.start - late, times.stop - late)))
+    half = group.isel(t=slice(late, None))
+    if half.nbytes < _KEPT:  # the second reading is of memory
+        half.load()
     found: dict[str, tuple[xr.DataArray, bool, Any]] = {}
     parts: dict[str, tuple[xr.DataArray, np.ndarray]] = {}
     for reading in (Series.first, Series.second):
         for rows, times in pieces:
             if len(pieces) > 1 or not found:
-                part = observed(group.isel({MEMBERS: rows, "t": times}, missing_dims="ignore"))
+                part = observed(half.isel({MEMBERS: rows, "t": times}, missing_dims="ignore").load())
                 wanted = (set(part) if names is None else set(part) & set(names)) - done
                 chosen = {str(key): one for key, one in part.items() if key in wanted}
                 parts = {k: (v, _rows(v, dims)) for k, v in chosen.items() if rows.start == 0 or MEMBERS in v.dims}
@@ -351,7 +359,7 @@ def _series(
                         each[at] = Series(members if differ else 1, records - late, name, step)
                     found[name] = xr.DataArray(0.0, attrs=variable.attrs, name=name), differ, each
                 for at in np.ndindex(values.shape[:-2]):
-                    reading(found[name][2][at], values[at], rows, slice(times.start - late, times.stop - late))
+                    reading(found[name][2][at], values[at], rows, times)
     return found
 
 

@@ -10,7 +10,7 @@ from scipy import special
 from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import KEPT, charges, pure, readings, reference_radii, share_observables
+from sim.analysis.observables import KEPT, charges, observables, pure, readings, reference_radii, share_observables
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
@@ -295,7 +295,7 @@ def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quan
     """The ``summary`` of observables at each sweep value and time, by default of all but shares, read in blocks."""
     found, dims = xr.Dataset(), ("t", *sweep_dims(dataset))
     for some, observed in readings(dataset, names):
-        if names is not None or observed is not charges:
+        if names is not None or observed is observables:
             part = in_blocks(some, dims, lambda block, of=observed: summary(of(block), quantiles))  # type: ignore[misc]
             found = found.merge(part[[name for name in part if name not in found]])
     return found

@@ -14,7 +14,7 @@ from sim.analysis.blocks import READ, at_records
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.lifetimes import half_lives
-from sim.analysis.observables import KEPT, all_observables
+from sim.analysis.observables import KEPT, all_observables, readings
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.scene import (
     MEMBERS,
@@ -149,15 +149,15 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         digits; columns that are zero or constant throughout (no friction, no open contacts) are left out.
         "lost to bonds" and "lost to fluct." are the shares of JKR's area that each mechanism takes.
     """
-    found, points = _tabulated(dataset, rows)
-    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     held, steady = bool(stays_held(dataset).all()), is_steady(dataset)
+    stay = [c.name for c in _COLUMNS if c.changing and (steady if c.name == "stage_speed" else held)]
+    columns = [column for column in _COLUMNS if column.name not in stay]
+    found, points = _tabulated(dataset, rows, [column.name for column in columns])
+    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     cells = _places(found, {name: index for name, index in points.items() if name != "t" or not whole})
     speeds = dataset.get("drive_speed", xr.DataArray())
     same = whole and any(name in points for name in speeds.dims)  # V is a column already
-    stay = [c.name for c in _COLUMNS if c.changing and (steady if c.name == "stage_speed" else held)]
-    columns = [c for c in _COLUMNS if c.name not in stay and not (same and c.name == "speed")]
-    cells |= _shown(found, points, columns)
+    cells |= _shown(found, points, [column for column in columns if not (same and column.name == "speed")])
     times, errors, below = (_at(found[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below"))
     if np.any(np.isfinite(times) | np.isfinite(below)):
         ((heading, texts),) = _cells(_MEMORY.heading, "s", np.where(np.isnan(times), below, times), errors).items()
@@ -281,25 +281,27 @@ def _rows(cells: Columns) -> list[dict[str, str]]:
     return [dict(zip(cells, row, strict=True)) for row in zip(*cells.values(), strict=True)]
 
 
-def _tabulated(dataset: xr.Dataset, rows: int) -> tuple[xr.Dataset, Points]:
-    """Statistics to tabulate, and the index of each row in every dimension of sweep and time."""
+def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dataset, Points]:
+    """Statistics of observables to tabulate, and the index of each row in every dimension of sweep and time."""
     memory, counts = correlation_time(dataset), _thinned(dataset, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
     whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     if whole:
-        found = of_second_half(dataset, {column.name for column in _COLUMNS if not column.changing})
+        found = of_second_half(dataset, names)
     else:
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
             dataset = dataset.isel(t=slice(_last(dataset) + 1))
             counts["t"] = min(counts["t"], dataset.sizes["t"])
-            dataset = at_records(dataset, _spread(dataset.sizes["t"], counts["t"]))
+            needed = {name for some, _ in readings(dataset, names) for name in some}
+            records = _spread(dataset.sizes["t"], counts["t"])
+            dataset = at_records(dataset[[name for name in dataset if name in needed]], records)
         if dataset.nbytes < READ:
             trajectories = all_observables(dataset)
-            shown = {f"{column.name}{kind}" for column in _COLUMNS for kind in ("", *(f"_{kind}" for kind in KEPT))}
+            shown = {f"{name}{kind}" for name in names for kind in ("", *(f"_{kind}" for kind in KEPT))}
             found = summary(trajectories[[name for name in trajectories if name in shown]], quantiles=False)
         else:
-            found = over_members(dataset, [column.name for column in _COLUMNS], quantiles=False)
-        if "applied_load" in dataset:  # it is known of open contacts too
+            found = over_members(dataset, names, quantiles=False)
+        if "applied_load" in dataset and "normal_load_mean" in found:  # it is known of open contacts too
             for kind in ("mean", "low", "high"):
                 found[f"normal_load_{kind}"] = dataset["applied_load"].fillna(found[f"normal_load_{kind}"])
     return found.merge(memory), _points({**found.sizes, "t": found.sizes.get("t", 1)}, counts)

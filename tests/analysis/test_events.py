@@ -1,5 +1,6 @@
 """What is told once of a run: detachment, masking, loops and friction peaks."""
 
+import json
 import math
 
 import numpy as np
@@ -63,7 +64,10 @@ def test_time_masked_is_the_share_of_the_records_after_the_first(ramp):
     np.testing.assert_allclose(found, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0], rtol=1e-14)
     area = ramp["contact_area"].copy()
     area[1, 16:] = NAN
-    found = analysis.events(per_member(ramp, masked=masked, in_contact=1).assign(contact_area=area))["time_masked"]
+    scenario = json.loads(ramp.attrs["scenario_resolved"])
+    scenario["contact"]["after_pull_off"] = "stop"
+    stopped = per_member(ramp, masked=masked, in_contact=1).assign(contact_area=area)
+    found = analysis.events(stopped.assign_attrs(scenario_resolved=json.dumps(scenario)))["time_masked"]
     np.testing.assert_allclose(found[1], 5.0 / 15.0, rtol=1e-14)
 
 

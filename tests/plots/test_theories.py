@@ -50,11 +50,13 @@ def curve_of(panel, name):
 )
 def test_every_theory_is_drawn_as_far_as_adhesion_holds(contact, law, value):
     stresses, forces = plots.draw(plain(contact=contact), "theories").axes
+    factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
+    drawn, _ = curve_of(stresses, "uncorrected")
+    radii = law(factor * drawn, value, *NUMBERS)
     names = ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction")
     for name in (*names, "scaled_angle", "shear_share", "scaled_tangent"):
         stress, area = curve_of(stresses, name)
-        factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
-        radii = law(factor * stress, value, *NUMBERS)
+        assert np.array_equal(stress, drawn)
         held = np.isfinite(area)
         assert held[0] and np.all(radii[name][held] > np.nan_to_num(radii["hertz"][held]))
         per_area = {"mm²": 1e6, "µm²": 1e12}[stresses.get_ylabel()[-4:-1].strip("(")]
