@@ -1,13 +1,12 @@
 """All kernels and laws compiled at once, in parallel processes: the first job of a cluster."""
 
 import importlib
-import multiprocessing
 import os
 import time
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 
 from sim.ensemble.progress import progress_bar
+from sim.ensemble.workers import share_out
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
 
@@ -32,25 +31,22 @@ def compile_missing(jobs: int | None) -> str:
     began, lacking = time.monotonic(), missing()
     if lacking:
         with progress_bar(len(lacking), "kernels") as shown:
-            for _ in compile_all(lacking, jobs):
-                shown.advance(1)
+            compile_all(lacking, jobs, shown.advance)
     if left := sum(not jit.cached(name) for name in lacking):
         raise StoreTrouble(f"{left} kernels could not be stored; set SIM_CACHE_DIR to a folder that can be written")
     took = f" in {time.monotonic() - began:.0f} s" if lacking else ""
     return f"{len(lacking)} of {len(jit.compiled)} kernels and laws compiled{took}; the others were there"
 
 
-def compile_all(names: list[str], jobs: int | None = None) -> Iterator[str]:
-    """Compile kernels and laws into the cache in some processes, one a core, and give the name of each."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs or os.cpu_count() or 1, len(names)), context) as pool:
-        yield from pool.map(_compile, names)
+def compile_all(names: list[str], jobs: int | None, progress: Callable[[int], None]) -> None:
+    """Compile kernels and laws into the cache in some processes, by default one a core."""
+    share_out(_compile, names, jobs or os.cpu_count() or 1, progress, lambda: False)
 
 
-def _compile(name: str) -> str:
+def _compile(name: str, progress: Callable[[int], None], stop: Callable[[], bool]) -> None:
     importlib.import_module(_module(name))
     jit.compiled[name]()
-    return name
+    progress(1)
 
 
 def _module(name: str) -> str:
