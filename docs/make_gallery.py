@@ -490,7 +490,7 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     slid = slips["slip_amplitude"] > 0.0
     many = slid.sum("slip") > 10
     speeds = slips.isel(drive_stiffness=0)["slip_speed"].to_numpy()
-    first, last = speeds[0], speeds[int(slid.isel(drive_stiffness=0).sum()) - 1]
+    first, last = speeds[1], speeds[int(slid.isel(drive_stiffness=0).sum()) - 1]  # the first one follows no other
     return {"soft": float(stiffness[0]), "up": 1e3 * float(first), "down": 1e3 * float(last),
             "stiff": float(stiffness[int(many.sum())])}  # fmt: skip
 

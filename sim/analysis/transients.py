@@ -111,17 +111,19 @@ def way_to_sliding(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         ``static_threshold`` [N], the force of the spring before it first falls; ``area_at_threshold`` [1], the contact
         area there over that at rest; ``area_by_law`` [1], what A0 - alpha Q^2 gives there; ``incipient_alpha``
-        [m^2/N^2], see ``incipient_law``. nan where the force does not fall, or the area does not. Empty where no stage
-        pulls.
+        [m^2/N^2], see ``incipient_law``. nan where the force does not fall while the stage is not slowed down, or the
+        area does not. Empty where no stage pulls.
     """
     if "stage_speed" not in dataset:
         return xr.Dataset()
-    return _of_each(dataset, _PULL, _pulled, "spring_force", "contact_area")
+    return _of_each(dataset, _PULL, _pulled, "stage_speed", "spring_force", "contact_area")
 
 
-def _pulled(force: np.ndarray, area: np.ndarray) -> tuple[float, ...]:
+def _pulled(speed: np.ndarray, force: np.ndarray, area: np.ndarray) -> tuple[float, ...]:
     """What ``way_to_sliding`` gives of one trajectory."""
-    force = np.abs(force)
+    slowed = np.flatnonzero(np.diff(np.abs(speed)) < 0.0) + 1
+    turned = np.flatnonzero(speed[1:] * speed[:-1] < 0.0) + 1
+    force = np.abs(force[: min([*slowed[:1], *turned[:1], len(force)])])
     top, alpha = incipient_law(force, area)
     known = force[0] <= _REST * force[top] and np.nanmin(force[top:]) < (1.0 - _ROUNDING) * force[top]
     if not (known and area[top] < (1.0 - _ROUNDING) * area[0]):

@@ -353,9 +353,11 @@ def curve(
     panel.plot(
         x, mean, color=colour, label=label if np.any(np.isfinite(mean)) else "", **(dots | scene.look(style) | width)
     )
+    if not np.any(sem > 0.0):
+        return
     if scene.along == "t":
         fill(panel, x, mean - sem, mean + sem, color=colour, alpha=0.45)
-    elif np.any(sem > 0.0):
+    else:
         panel.errorbar(x, mean, np.nan_to_num(sem), fmt="none", ecolor=colour, elinewidth=0.8, capsize=1.5)
 
 

@@ -41,6 +41,8 @@ _LOSSES = {
     "speed_at_5_percent_lost": f"5{TIE}% of JKR's", "speed_at_50_percent_lost": f"50{TIE}% of JKR's",
     "speed_halfway_to_hertz": "half of what lies between JKR's and Hertz's",
 }  # fmt: skip
+#: Share of a force in which friction and what is prescribed differ where something else bears it, too.
+_APART = 1e-3
 #: Points of a sweep that each have a sentence, at most.
 _FEW = 4
 
@@ -109,11 +111,17 @@ def answers(dataset: xr.Dataset, found: xr.Dataset | None = None) -> list[str]:
     kind = kinds.default(dataset)
     said: list[str] = []
     found = once(dataset) if found is None else found
-    sliding = speed_name(dataset) == "stage_speed" and kind != "stability"
-    for answer in (_TRANSIENTS, *_ANSWERS.get(kind, ()), *([_SLIPS] if sliding else [])):
+    for answer in (_TRANSIENTS, *_ANSWERS.get(kind, ()), *_sliding(dataset, kind)):
         with contextlib.suppress(ValueError, KeyError), answered():
             said += answer(dataset, found)
     return said
+
+
+def _sliding(dataset: xr.Dataset, kind: str) -> list[Answer]:
+    """What is said of a slider behind a spring; its work over its way is kinetic friction at one speed alone."""
+    if speed_name(dataset) != "stage_speed" or kind == "stability":
+        return []
+    return [_SLIPS, _KINETIC] if is_stationary(dataset) else [_SLIPS]
 
 
 def _places(dataset: xr.Dataset, found: xr.Dataset) -> list[Found]:
@@ -274,6 +282,8 @@ def _creep(dataset: xr.Dataset, whole: xr.Dataset) -> Iterator[str]:
     if bool((force.max("t") > force.min("t")).any()):
         yield from _ranged(gone, "static_friction", "The force at which the contact gives way")
     yield from _ranged(borne, "speed", "Where the force is borne to the end of the run, the speed there")
+    if "friction_force" in dataset and bool((abs(1.0 - dataset["friction_force"] / force).isel(t=-1) > _APART).any()):
+        yield from _ranged(borne, "friction_force", "The part of the force that the bonds bear there, friction,")
     yield from _ranged(gone, "runaway_after", "The time after which the contact gives way")
     if any(share not in (0.0, 1.0) for share in shares):
         yield from _ranged(found, "ran_away", "The share of the members whose contact gives way")
@@ -325,13 +335,13 @@ _SLIPS = _of_the_run(
     ("static_friction", "The force at which a slip or sliding begins"),
     ("force_drop", "The fall of the force in a slip"),
     ("recurrence_time", "The time from slip to slip"),
-    ("kinetic_friction", "The work of the stage over its way, the kinetic friction,"),
 )
+_KINETIC = _of_the_run(("kinetic_friction", "The work of the stage over its way, the kinetic friction,"))
 #: Answers to a jump of the speed, and to a pull from rest.
 _TRANSIENTS = _of_the_run(
-    ("direct_effect", "The direct effect, the rise of friction after the first jump of the speed to a higher one,"),
-    ("step_overshoot", "Its overshoot over the level at which friction settles"),
-    ("step_length", "The sliding distance after which friction stays within 1/e of that overshoot of its level"),
+    ("direct_effect", "The direct effect, the rise of friction after the first jump to a higher speed,"),
+    ("step_overshoot", "The overshoot of friction over the level at which it then settles"),
+    ("step_length", "The sliding distance from the jump until 1/e of that overshoot is left"),
     ("static_threshold", "The static threshold, the largest force on the way to sliding,"),
     ("area_at_threshold", "The contact area at the threshold over that at rest"),
     ("area_by_law", "By the law A₀ − αQ², fitted up to half of the threshold, it"),

@@ -7,15 +7,19 @@ from collections.abc import Iterator
 from typing import NamedTuple
 from xml.etree import ElementTree as Tree
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 
 from sim.analysis import is_stationary
 from sim.plots import kinds
+from sim.plots.style import STYLE
 from sim.units.terminal import one_line
 
 #: What to look at in a figure of each kind.
@@ -48,6 +52,8 @@ SEE = {
 _ALSO = ("stress", "phase", "incipient", "map", "spectrum")
 #: Points of a curve that show their values, and of a figure.
 _POINTS, _MOST = 40, 800
+#: Corners of a shaded band from which on some are left out.
+_CORNERS = 300
 #: Inks of figures that follow the page from light to dark.
 _INKS = {"#000000": "currentColor", "#ffffff": "var(--paper)"}
 #: Letters of mathematics in plain text.
@@ -97,8 +103,11 @@ def svg_of(figure: Figure, prefix: str) -> str:
     figure.dpi = 72.0  # that of SVG
     FigureCanvasSVG(figure)
     if layout := figure.get_layout_engine():  # here, as saving would draw the figure twice
-        layout.execute(figure)
+        with mpl.rc_context(STYLE):
+            layout.execute(figure)
         figure.set_layout_engine(None)
+    for panel in figure.axes:
+        _thin(panel)
     figure.savefig(content, format="svg", transparent=True)
     root = Tree.fromstring(content.getvalue())
     for parent in list(root.iter()):
@@ -129,6 +138,23 @@ def svg_of(figure: Figure, prefix: str) -> str:
         point = Tree.SubElement(points, "circle", {"cx": f"{x:.1f}", "cy": f"{height - y:.1f}", "r": "3"})
         Tree.SubElement(point, "title").text = words
     return Tree.tostring(root, encoding="unicode")
+
+
+def _thin(panel: Axes) -> None:
+    """Leave out corners of shaded bands that no eye can tell apart, as matplotlib does of lines alone."""
+    for band in panel.collections:
+        if isinstance(band, PolyCollection):
+            band.set_verts([_thinned(np.asarray(path.vertices), panel) for path in band.get_paths()])
+
+
+def _thinned(corners: np.ndarray, panel: Axes) -> np.ndarray:
+    """Corners of a polygon, of many fewer that look the same."""
+    placed = panel.transData.transform(corners)
+    if len(corners) < _CORNERS or not np.all(np.isfinite(placed)):
+        return corners
+    fewer = Path(placed).cleaned(simplify=True)
+    drawn = np.isin(np.asarray(fewer.codes), (Path.MOVETO, Path.LINETO))
+    return panel.transData.inverted().transform(np.asarray(fewer.vertices)[drawn])
 
 
 def _values(figure: Figure) -> Iterator[tuple[float, float, str]]:

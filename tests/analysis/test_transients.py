@@ -67,6 +67,13 @@ def test_a_force_that_does_not_fall_or_begins_above_zero_has_no_threshold():
     assert bool(way_to_sliding(pulled().isel(t=slice(20, None))).to_dataarray().isnull().all())
 
 
+@pytest.mark.parametrize("then", [-1.0, 0.5, 0.0])
+def test_a_fall_of_the_force_as_the_stage_turns_or_slows_down_is_no_threshold(then):
+    dataset = pulled()
+    dataset["stage_speed"] = dataset["stage_speed"] * np.where(np.arange(151) > 100, then, 1.0)
+    assert bool(way_to_sliding(dataset).to_dataarray().isnull().all())
+
+
 def test_the_threshold_is_before_the_first_fall_though_later_forces_are_larger():
     force = np.array([0.0, 1.0, 2.0, 1.5, 3.0])
     assert incipient_law(force, 1.0 - 0.01 * force**2)[0] == 2

@@ -1,12 +1,14 @@
 """The page of a run: whole, harmless, and in numbers what the statistics are."""
 
 import contextlib
+import io
 import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
+import matplotlib as mpl
 import netCDF4
 import numpy as np
 import pytest
@@ -21,7 +23,7 @@ from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import kinds
-from sim.plots.style import BOTH
+from sim.plots.style import BOTH, STYLE, fill, rows
 from sim.report import answers, document, figures, html
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.reader import load
@@ -192,6 +194,36 @@ def test_points_of_curves_lie_on_them_and_carry_their_values(curve):
         assert np.min(np.hypot(*(drawn_at - place).T)) < 0.08  # places have one decimal, paths two
 
 
+def test_a_band_of_many_records_is_drawn_by_few_corners_that_reach_as_far():
+    count = 20_000
+    with mpl.rc_context(STYLE):
+        figure, (panel,) = rows([2.0])
+        x, noise = np.linspace(0.0, 1.0, count), 0.1 * np.random.default_rng(5).random((2, count))
+        fill(panel, x, noise[0] - 1.0, 1.0 - noise[1], color=BOTH)
+    picture = Page(figures.svg_of(figure, "x-"))
+    paths = [given["d"] for tag, given in picture.elements if tag == "path" and len(given.get("d", "")) > 2000]
+    (corners,) = (np.array(re.findall(r"[ML] ([-\d.]+) ([-\d.]+)", path), float) for path in paths)
+    place = panel.transData.transform(np.column_stack([x[[0, -1]], [noise[0].min() - 1.0, 1.0 - noise[1].min()]]))
+    ends = [corners.min(axis=0), corners.max(axis=0)]
+    wanted = np.array([[place[0, 0], -place[1, 1]], [place[1, 0], -place[0, 1]]])  # from the lower edge down
+    assert len(corners) < 0.6 * count  # of twice that
+    np.testing.assert_allclose(
+        ends, wanted, rtol=0, atol=1 / 9 + 0.01
+    )  # matplotlib's share of a pixel, and two decimals
+
+
+def test_a_figure_is_laid_out_in_the_style_in_which_it_is_saved():
+    panels = [rows([1.7, 2.1], shared=False) for _ in range(2)]
+    for _, axes in panels:
+        for panel in axes:
+            panel.set(ylim=(-0.8, 16.3), ylabel="friction")  # ticks 5 or 2.5 apart, as the style has their font
+    (figure, _), (saved, _) = panels
+    figures.svg_of(figure, "x-")
+    saved.savefig(io.BytesIO(), format="svg")
+    for one, other in zip(figure.axes, saved.axes, strict=True):
+        assert one.get_position().bounds == other.get_position().bounds
+
+
 def test_ink_and_paper_of_figures_are_those_of_the_page(curve):
     assert "currentColor" in curve[1] and "#000000" not in curve[1] and "#ffffff" not in curve[1]
     assert "#0072b2" in curve[1]
@@ -310,7 +342,7 @@ def test_a_jump_of_the_speed_and_a_pull_from_rest_have_their_sentences():
     course = {"time": [0.0, 0.02, 0.02, 0.06], "value": [2e-4, 2e-4, 2e-3, 2e-3]}
     jumped = shipped("velocity_step", **{"drive.stage": course}, clock={"duration": "60 ms", "step": "1 ms"})
     rise = analysis.engineering(analysis.events(jumped)["direct_effect"].item(), "N")
-    assert plainly(answers.answers(jumped))[0].endswith(f"to a higher one, is {rise}.")
+    assert plainly(answers.answers(jumped))[0].endswith(f" is {rise}.")
 
 
 def test_a_map_of_stability_says_where_slips_follow_each_other_and_behind_which_spring_none_do():
