@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import optimize, stats
 
 from sim.study.measured import Measured
 from sim.study.predicted import Group, Sampled, Values, asked, by_steady_sliding
@@ -308,24 +308,29 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
     bound = problem.bounds[k][0 if sign < 0.0 else 1]
     spread = math.sqrt(best.covariance[k, k])
     along = best.covariance[:, k] / spread  # where the rest goes with this number
-    near, far, step, start = 0.0, math.inf, rise * spread, best.x
+    room, near, far, start = abs(bound - best.x[k]), 0.0, rise * spread, best.x
+    known = {0.0: -rise}
+
+    def above(distance: float) -> float:
+        """Root of what the sum of squares has risen there, over the end's; 0 where it is near enough."""
+        nonlocal start
+        if distance not in known:
+            held = bound if distance == room else best.x[k] + sign * distance
+            guess = _nearest(problem, (start, best.x + along * (held - best.x[k]) / spread), k, held)
+            found = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
+            root, start = math.sqrt(max(found.chi_square - best.chi_square, 0.0)), found.x
+            known[distance] = 0.0 if abs(root / rise - 1.0) < _END else root - rise
+        return known[distance]
+
     for _ in range(_MOST):
-        at = best.x[k] + sign * step
-        held = max(at, bound) if sign < 0.0 else min(at, bound)
-        guess = _nearest(problem, (start, best.x + along * (held - best.x[k]) / spread), k, held)
-        found = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
-        root = math.sqrt(max(found.chi_square - best.chi_square, 0.0))
-        start = found.x
-        if abs(root / rise - 1.0) < _END or far - near < _END * near:
-            return held, False
-        if root < rise and held == bound:
+        far = min(far, room)
+        if above(far) >= 0.0:
+            near = optimize.brentq(above, near, far, rtol=_END, maxiter=_MOST, disp=False)
+            return best.x[k] + sign * near, False
+        if far == room:
             return bound, True
-        here = abs(held - best.x[k])
-        near, far = (here, far) if root < rise else (near, here)
-        step = here * rise / root if root > 0.0 else 2.0 * here  # the root of a parabola is a line
-        if not near < step < far:
-            step = 0.5 * (near + far) if math.isfinite(far) else 2.0 * near
-        step = min(step, 3.0 * here)
+        # the root of a parabola is a line
+        near, far = far, far * min(1.1 * rise / max(rise + above(far), 1e-300), 3.0)
     return math.nan, True
 
 

@@ -394,7 +394,7 @@ def test_a_number_that_the_data_do_not_need_never_narrows_the_intervals_of_other
     bare = load(LENS).with_values({"shear.spectrum.rms": 1.0})
     runs = [sim.run(bare.with_values({"drive.speed": float(speed)})).isel(t=-1) for speed in SPEEDS]
     exact = {name: np.array([float(run[name].item()) for run in runs]) for name in ("contact_area", "friction_force")}
-    path = table(tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, noisy(exact, 0.02, 0), 0.02)
+    path = table(tmp_path / "bare.csv", {"speed [m/s]": SPEEDS}, noisy(exact, 0.02, 5), 0.02)
     keys = ["bonds.critical_speed", "bonds.stress"]
     alone = fit(bare, [path], keys, steady=True).numbers
     beside = fit(load(LENS), [path], [*keys, "shear.spectrum.rms"], steady=True).numbers
