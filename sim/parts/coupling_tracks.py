@@ -2,9 +2,8 @@
 
 Between two events the number of bonds stays and their force is linear in the slip, so that a sub-step of the scheme in
 ``coupling_maps`` is tried on sums alone; the bonds, whose arrays are spent, then go its way once. It ends at the next
-event, with more than ``_EACH`` sites at one that is so many times as far. What does not hold the slider back is set
-right at once after an event: it slips as far as the bonds that are left have it, and bond after bond where slip itself
-breaks them.
+event. What does not hold the slider back is set right at once after an event: it slips as far as the bonds that are
+left have it, and bond after bond where slip itself breaks them.
 """
 
 import math
@@ -53,8 +52,8 @@ from sim.parts.coupling_rows import LEAST, MOST_STEPS, later, put_down, take_up
 from sim.parts.coupling_snaps import elastic
 from sim.parts.drive.driven import AREA, RUPTURE, SNAP, STORED, WORK
 
-#: Sites of which every event ends a sub-step.
-_EACH = 10_000.0
+#: Slip over that to which bonds are stretched below which it is a rounding: back and forth it would have them turn.
+_ROUNDING = 1e-13
 #: Length over a clock step's in which bonds go a way at once.
 _AT_ONCE = 1e-18
 #: Turns in which a node or an event is found, and trials of a sub-step.
@@ -101,7 +100,7 @@ def _set_right(row, time, tracks, bare, slider, held, piece, ground, energy, nod
         if not elastic(trial, time, bare, slider, held, piece, energy):
             return False
         slip, square = trial[SLIP] - row[SLIP], node[AT_SQUARE]
-        if not math.fabs(slip) > 1e-15 * (math.fabs(node[AT_MOMENT]) + 1e-300):
+        if not math.fabs(slip) > _ROUNDING * (math.fabs(node[AT_MOMENT]) + node[AT_BOUND]):
             row[:] = trial
             return True
         nearest = next_cut(tracks, slip, limit) / unit if limit < math.inf else math.inf
@@ -182,8 +181,8 @@ def _piece(row, tracks, bare, slider, held, piece, ground, nodes, energy):
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
-    start, length, (unit, sites, law, _, _) = 0.0, piece[0], ground
-    first, last, each = nodes[0], nodes[2], max(1.0, sites / _EACH)
+    start, length, (unit, _, law, _, _) = 0.0, piece[0], ground
+    first, last = nodes[0], nodes[2]
     for _ in range(MOST_STEPS):
         left = length - start
         if left <= LEAST * length:
@@ -212,7 +211,7 @@ def _piece(row, tracks, bare, slider, held, piece, ground, nodes, energy):
                 step, cut = step * grows, False
                 continue
             whole = step if not cut else whole
-            soon = each * next_event(tracks, last[AT_WAY] * unit / step, whole, law)
+            soon = next_event(tracks, last[AT_WAY] * unit / step, whole, law)
             if turns < _TURNS and (soon < (1.0 - _NEAR) * step or (cut and soon > step)):
                 cut, turns = soon < whole, turns + 1
                 step = min(max(soon * (1.0 + 0.5 * _NEAR), 2.0 * LEAST * length), whole)

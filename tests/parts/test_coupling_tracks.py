@@ -89,6 +89,17 @@ def test_many_bonds_above_the_onset_fluctuate_as_one_over_the_root_of_their_numb
     assert_allclose(spreads[0] / spreads[1], 4.0, rtol=3.0 * error)
 
 
+@pytest.mark.parametrize("sites", [20_000, pytest.param(100_000, marks=pytest.mark.verify)])
+def test_very_many_bonds_load_the_spring_as_the_cohorts_do_to_one_over_the_root_of_their_number(sites):
+    lens = 2.0, 10, spring(0.015)  # up to shortly before the first slip
+    few = forces(list(march(driven(*lens, 500), np.arange(16))))
+    spread = np.std(few, axis=1, ddof=1) * math.sqrt(500 / sites)
+    make = functools.partial(Cohort, tolerance=1e-6)
+    mean = forces(list(march(scenario(*lens, make=make), np.arange(1))))
+    found = forces(list(march(driven(*lens, sites), np.arange(1), keep=False)))
+    assert np.all(np.abs(found - mean)[1:, 0] < 5.0 * spread[1:])
+
+
 @pytest.mark.verify
 def test_above_the_onset_the_mean_force_of_few_bonds_is_off_by_one_over_their_number():
     lens, drive = (2.0, 20), spring(0.3, start="steady")
