@@ -118,13 +118,16 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
     boundary = _boundary(dataset, fine)
     for panel, (words, leg) in zip(axes, legs.items(), strict=True):
         swing = _swings(force.to_numpy()[:, leg], speed[leg], edges)
-        mesh = panel.pcolormesh(pace.factor * edges, hard.factor * rows, swing, vmin=0.0, vmax=1.0, cmap="Greys")
+        grey: Any = {"vmin": 0.0, "vmax": 1.0, "cmap": "Greys", "rasterized": True}  # greys that no page turns over
+        mesh = panel.pcolormesh(pace.factor * edges, hard.factor * rows, swing, **grey)
         panel.plot(pace.factor * fine, hard.factor * boundary, label="theory: unstable below", **_FRAME)
         panel.set(yscale="log", ylim=hard.factor * rows[[0, -1]])
         style.across(panel, pace.factor * edges, pace.label("speed of the stage $V$"), "log")
         style.legend(panel, words)
     axes[0].set_ylabel(hard.label("stiffness of the spring $K$"))
-    figure.colorbar(mesh, ax=axes, label="swing of the force over its largest", pad=0.02)
+    bar = figure.colorbar(mesh, ax=axes, label="swing of the force over its largest", pad=0.02)
+    if bar.solids is not None:
+        bar.solids.set_rasterized(True)
     return figure
 
 

@@ -36,7 +36,7 @@ SEE = {
     "friction": "Above, friction over time; below, over the slider's position, where the area of the loop is the work"
     " that friction takes.",
     "curve": "From JKR's line at 1 down: blue is what broken bonds take of the area, vermilion what fluctuations take,"
-    " black what is left. Where black meets the dotted line of Hertz, adhesion is masked.",
+    " the full line what is left. Where it meets the dotted line of Hertz, adhesion is masked.",
     "sweep": "Each point is a run of its own. The contact lies between JKR's radius, with all adhesion, and Hertz's,"
     " with none.",
     "time": "The contact between JKR's radius, with all adhesion, and Hertz's, with none, and below what moves it.",
@@ -99,7 +99,7 @@ def svg_of(figure: Figure, prefix: str) -> str:
     ``prefix`` begins all its ids. It has neither script nor namespaces, nor any address outside of itself; black and
     white are the page's ink and paper, and points of curves carry their values as a ``<title>``.
     """
-    content = io.BytesIO()
+    content, fineness = io.BytesIO(), figure.dpi
     figure.dpi = 72.0  # that of SVG
     FigureCanvasSVG(figure)
     if layout := figure.get_layout_engine():  # here, as saving would draw the figure twice
@@ -108,7 +108,7 @@ def svg_of(figure: Figure, prefix: str) -> str:
         figure.set_layout_engine(None)
     for panel in figure.axes:
         _thin(panel)
-    figure.savefig(content, format="svg", transparent=True)
+    figure.savefig(content, format="svg", transparent=True, dpi=fineness)  # of images within it
     root = Tree.fromstring(content.getvalue())
     for parent in list(root.iter()):
         for child in [child for child in parent if child.tag.endswith(("}metadata", "}style"))]:

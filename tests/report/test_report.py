@@ -345,6 +345,12 @@ def test_a_jump_of_the_speed_and_a_pull_from_rest_have_their_sentences():
     assert plainly(answers.answers(jumped))[0].endswith(f" is {rise}.")
 
 
+def test_greys_of_a_map_of_stability_are_an_image_that_a_dark_page_does_not_turn_over():
+    dataset = shipped("stability_map", sweep={"drive.stiffness": [50.0, 1600.0]})
+    picture = Page(figures.svg_of(kinds.draw(dataset, "stability"), "x-"))
+    assert [tag for tag, _ in picture.elements].count("image") == 3  # both ways, and the bar
+
+
 def test_a_map_of_stability_says_where_slips_follow_each_other_and_behind_which_spring_none_do():
     dataset = shipped("stability_map", sweep={"drive.stiffness": [50.0, 1600.0]})
     begins, ends, never = plainly(answers.answers(dataset))
