@@ -50,7 +50,8 @@ class Judged(NamedTuple):
     """A mechanism fitted: its numbers by name, and how it compares.
 
     ``p_value`` is the probability of a likelihood ratio to the whole scenario of at least this size if the mechanism
-    were true; nan where AICc says enough. ``rejected`` is whether both speak against it.
+    were true; nan where AICc says enough. ``rejected`` is whether both speak against it, AICc of a part of the scenario
+    by comparison with the whole, of a theory with the best.
     """
 
     name: str
@@ -92,11 +93,11 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
     worst = min(criteria) + _HOPELESS
     judged = []
     for place, ((name, one, least), aicc) in enumerate(zip(found, criteria, strict=True)):
-        p_value = math.nan
+        p_value, rejected = math.nan, place > 0
         if place and aicc < worst:
             rng = np.random.default_rng([seed, place])
             p_value = _p_value(one, least, problem, best, rng, draws)
-        rejected = place > 0 and aicc - min(criteria) >= _WORSE and not p_value > _RARE
+            rejected = p_value <= _RARE and aicc - (criteria[0] if name in _PARTS else min(criteria)) >= _WORSE
         judged.append(Judged(name, one.numbers(least.x), least.chi_square, aicc, p_value, rejected))
     return Verdict(tuple(sorted(judged, key=lambda one: one.aicc)), *_verdict(judged))
 
