@@ -10,7 +10,7 @@ import numpy as np
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohort_merging import settle
 from sim.parts.bonds.cohort_step import carry, inside, read_row, rules_of, sum_row, write_row
-from sim.parts.bonds.rupture import hazard_time, rate_at
+from sim.parts.bonds.rupture import rate_at
 from sim.parts.coupling_equations import (
     BEND,
     BODY,
@@ -39,23 +39,23 @@ from sim.parts.coupling_maps import (
     AT_SPEED,
     AT_SQUARE,
     AT_WAY,
-    SOME,
     bend_of,
     book_nodes,
     error_of_way,
     go_to_node,
+    longest,
     start_of,
     stored_energy,
     sums_at,
 )  # fmt: skip
 from sim.parts.coupling_rows import LEAST, MOST_STEPS, later, put_down, take_up
-from sim.parts.coupling_snaps import area_kept, elastic, free_ways, slip_free, slips_free
+from sim.parts.coupling_snaps import area_kept, elastic, slip_free, slips_free
 from sim.parts.drive.driven import AREA, RUPTURE, SNAP, STORED, WORK
 
 #: Share of a piece below which a sub-step that fails may be an avalanche; share of a limit by which one is tried.
 _BRIEF, _TRIED = 1e-9, 1e-7
-#: Births in a sub-step over the tolerance of the bonds below which its length is no matter to them.
-_FEW_BIRTHS = 0.1
+#: Sub-steps within which bonds break that none leads over.
+_AROUND = 8.0
 
 
 @device
@@ -72,19 +72,14 @@ def _at_once(pool, count, way, unit, rules):
 
 @device
 def _lacking(way, pool, count, row, time, bare, slider, held, unit, rules):
-    """Force that bonds lack, along the pull, once all have gone a way at once; area, shear and way of the body.
-
-    A body with mass or damping stays where it is.
-    """
+    """Force that bonds lack, along the pull, once all have gone a way at once; area, shear and way of the body."""
     bound, moment = _at_once(pool, count, way, unit, rules)
     radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
     yields, _ = compliance(radius, slider)
     sheared = yields * area * moment
     body = way + sheared - row[SHEARED]
     lacks = row[FORCE] - slider[0] * body - area * moment
-    if slider[1] + slider[2] > 0.0:
-        lacks, body = -body / yields, 0.0
-    return lacks if row[MOMENT] > 0.0 else -lacks, area, radius, sheared, body
+    return lacks if row[FORCE] > 0.0 else -lacks, area, radius, sheared, body
 
 
 @device
@@ -93,11 +88,10 @@ def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy)
 
     The first such place is looked for in steps of at most half the width to which stretches are resolved.
     """
-    sense, step, limit = math.copysign(1.0, row[MOMENT]), 0.5 * rules.cell / unit, rules.limit / unit
+    sense, step, limit = math.copysign(1.0, row[FORCE]), 0.5 * rules.cell / unit, rules.limit / unit
     here, area, _, _, _ = _lacking(0.0, pool, count, row, time, bare, slider, held, unit, rules)
     near, _, _, _, _ = _lacking(sense * _TRIED * limit, pool, count, row, time, bare, slider, held, unit, rules)
-    # merged stretches reach a little beyond the limit
-    if not (near > here or here > _TRIED * area * math.fabs(row[MOMENT])):
+    if not (near > here or here > _TRIED * math.fabs(row[FORCE])):  # merged stretches reach a little beyond the limit
         return -1
     way, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
     while high < 2.0 * limit:
@@ -114,8 +108,8 @@ def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy)
             lacks, _, _, _, _ = _lacking(sense * middle, pool, count, row, time, bare, slider, held, unit, rules)
             low, high = (middle, high) if lacks > 0.0 else (low, middle)
         way = sense * high
-    elif slips_free(row, slider):
-        way, _ = free_ways(row, slider)
+    elif slider[0] > 0.0:
+        way = row[FORCE] / slider[0] + row[SHEARED]
     else:
         return -1
     _, after, radius, sheared, body = _lacking(way, pool, count, row, time, bare, slider, held, unit, rules)
@@ -140,6 +134,34 @@ def _snap(row, pool, count, time, bare, slider, held, unit, rules, node, energy)
 
 
 @device
+def _shed(row, pool, count, time, reach, bare, slider, held, unit, rules, node, energy):
+    """Break bonds of one stretch that are within a ``reach`` of its limit; bonds left, below zero if there are none.
+
+    Their force falls in no time, so that no sub-step leads over it where something delays the slip.
+    """
+    left, gone, limit = 0, 0.0, rules.limit / unit
+    for i in range(count):
+        if math.fabs(pool[1, i]) / unit - 0.5 * pool[2, i] / unit >= limit - reach:
+            gone += pool[0, i]
+        else:
+            pool[:3, left] = pool[:3, i]
+            left += 1
+    if left == count:
+        return -1
+    stored = stored_energy(row, node[AT_SQUARE], bare, time, slider, held)
+    _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
+    sums_at(pool, left, unit, rules, node)
+    row[BOUND], row[MOMENT], row[BEND] = node[AT_BOUND], node[AT_MOMENT], 0.0
+    row[RADIUS], node[AT_AREA], _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
+    yields, _ = compliance(row[RADIUS], slider)
+    row[SPEED], row[BODY], _ = start_of(row, node, yields, slider)
+    broken = 0.5 * area * gone * limit * limit
+    energy[RUPTURE] += broken
+    energy[SNAP] += stored - stored_energy(row, node[AT_SQUARE], bare, time, slider, held) - broken
+    return left
+
+
+@device
 def _let_go(row, pool, time, brief, bare, slider, held, unit, rules, node, energy):
     """Break all bonds at once and slip, where nothing delays the interface, if they last less than ``brief``."""
     k = rate_at(unit * node[AT_MOMENT] / node[AT_BOUND], rules.law) if node[AT_BOUND] > 0.0 else 0.0
@@ -158,19 +180,6 @@ def _let_go(row, pool, time, brief, bare, slider, held, unit, rules, node, energ
 
 
 @device
-def _longest(row, count, unit, rules):
-    """Sub-step beyond which births are not resolved [s]."""
-    if rules.rebinding == 0.0:
-        return math.inf
-    speed = math.fabs(row[SPEED]) * unit
-    life = hazard_time(0.0, speed, 1.0, rules.law)
-    longest = life * (7.0 * rules.tolerance) ** (1.0 / 3.0)
-    longest = min(longest, 0.75 * rules.cell / speed) if speed > 0.0 else longest
-    few = _FEW_BIRTHS * rules.tolerance * (row[BOUND] + SOME) / rules.rebinding
-    return max(longest, few)
-
-
-@device
 def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
     """Go through one piece of a clock step; the time after which it ends or there is no way on, and the bonds.
 
@@ -179,13 +188,13 @@ def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
     pool, saved, nodes = room
     count, travelled, settled = bonds
     start, length = 0.0, piece[0]
-    brittle = rules.limit < math.inf and (slips_free(row, slider) or slider[1] + slider[2] + slider[3] == 0.0)
+    brittle = slider[1] + slider[2] + slider[3] == 0.0
     nodes[0, :] = 0.0
     sums_at(pool, count, unit, rules, nodes[0])
     for _ in range(MOST_STEPS):
         left = length - start
         step = row[NEXT] if row[NEXT] > 0.0 else 1e-3 * length
-        step = min(step, _longest(row, count, unit, rules))
+        step = min(step, longest(row, unit, rules))
         step = left if step > 0.999 * left else min(step, 0.5 * left)
         if left <= LEAST * length:
             return length, count, travelled, settled
@@ -223,9 +232,12 @@ def _piece(row, bonds, bare, slider, held, piece, unit, rules, room, energy):
         if not (error <= 1.0 and factor >= 1.0):
             pool[:3, :count] = saved[:, :count]
             row[NEXT] = step * (grows if error < math.inf else 0.25)
-            if brittle and step < _BRIEF * length:
-                slid = row[SLIP]
-                found = _snap(row, pool, count, start, bare, slider, held, unit, rules, first, energy)
+            if rules.limit < math.inf and step < _BRIEF * length:
+                slid, reach = row[SLIP], _AROUND * step * math.fabs(row[SPEED]) + _TRIED * rules.limit / unit
+                if brittle:
+                    found = _snap(row, pool, count, start, bare, slider, held, unit, rules, first, energy)
+                else:
+                    found = _shed(row, pool, count, start, reach, bare, slider, held, unit, rules, first, energy)
                 if found >= 0:
                     count, row[NEXT] = found, 1e-6 * length
                     travelled += unit * (row[SLIP] - slid)

@@ -13,7 +13,7 @@ import numpy as np
 
 from sim.numerics.jit import device
 from sim.parts.bonds.cohort_step import carry, steepen, try_step
-from sim.parts.bonds.rupture import hazard_integral, rate_at
+from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
 from sim.parts.coupling_equations import (
     BEND,
     BODY,
@@ -50,6 +50,8 @@ _TURNS, _FALLING = 25, 0.02
 _FLAT = 1e-7
 #: Shares of sites bound below which their forces are those of so many; largest mean bend of a way [stretch].
 SOME, _MOST_BENT = 0.1, 0.2
+#: Births in a sub-step over the tolerance of the bonds below which its length is no matter to them.
+_FEW_BIRTHS = 0.1
 
 
 @device
@@ -249,6 +251,19 @@ def book_nodes(row, nodes, start, step, slider, piece, limit, energy):
     row[POSITION] += last[AT_BODY]
     row[SLIP] += last[AT_WAY]
     row[COUNT] += 1.0
+
+
+@device
+def longest(row, unit, rules):
+    """Sub-step beyond which births are not resolved [s]."""
+    if rules.rebinding == 0.0:
+        return math.inf
+    speed = math.fabs(row[SPEED]) * unit
+    life = hazard_time(0.0, speed, 1.0, rules.law)
+    most = life * (7.0 * rules.tolerance) ** (1.0 / 3.0)
+    most = min(most, 0.75 * rules.cell / speed) if speed > 0.0 else most
+    few = _FEW_BIRTHS * rules.tolerance * (row[BOUND] + SOME) / rules.rebinding
+    return max(most, few)
 
 
 @device

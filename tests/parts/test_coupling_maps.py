@@ -290,6 +290,23 @@ def test_bonds_that_only_a_stretch_breaks_snap_where_nothing_delays_them():
     assert residual(read) < 1e-9
 
 
+@pytest.mark.parametrize("delay", ["damping", "viscosity"])
+def test_bonds_that_a_stretch_breaks_together_do_so_where_something_delays_the_slip(delay):
+    # (K + 1) X + c X' = K V t until X is the stretch at which they break; then the spring relaxes to c V
+    stiffness, speed, slow, most = 0.02, 10.0, 0.1, 3.0
+    drive = spring(stiffness, speed, tolerance=1e-8, **{delay: slow})
+    _, read = marched(driven(20.0, 40, drive, 1e-4, rupture=CutOff(stretch=most * STRETCH), rebinding=1e-9))
+    times, rate = np.linspace(0.0, 20.0, 41), (stiffness + 1.0) / slow
+    way = stiffness * speed / (stiffness + 1.0) * (times + np.expm1(-rate * times) / rate)
+    broken = most * (stiffness + 1.0) / stiffness / speed + 1.0 / rate
+    fades = np.exp(-stiffness / slow * (times - broken))
+    relaxed = slow * speed + (stiffness * (speed * broken - most) - slow * speed) * fades
+    force = np.where(times < broken, stiffness * (speed * times - way), relaxed)
+    assert_allclose(read["spring_force"] / UNIT, force, rtol=1e-6, atol=1e-9)
+    assert_allclose(read["dissipated_by_rupture"][-1] / ENERGY, 0.5 * most**2, rtol=1e-6)
+    assert residual(read) < 1e-7
+
+
 def test_bonds_of_many_stretches_snap_again_and_again_behind_a_soft_spring_and_never_behind_a_stiff_one():
     cut = CutOff(stretch=STRETCH)
     for stiffness, speed, often in ((0.05, 1.0, True), (0.05, 2.0, True), (20.0, 1.0, False)):
