@@ -1,5 +1,7 @@
 """Accuracy of slider and bonds over many steps, its order, and the motions that theory gives beyond the onset."""
 
+import functools
+
 import numpy as np
 import pytest
 from helpers.driven import DENSITY, KAPPA, STRETCH, UNIT, scenario, spring
@@ -7,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from sim.engine import Dice, follow
 from sim.laws.schallamach import Body, first_moment_amplitude, first_moment_onset, first_moment_stress
+from sim.parts.bonds import Cohort, Tracked
 from sim.parts.drive import READINGS, Table
 
 #: Bonds whose stretch, life at rest and stiffness are units and which are remade as fast, at a site of unit area.
@@ -26,6 +29,20 @@ def test_the_energies_stay_balanced_over_many_steps(steps, keys):
     _, read = passed(scenario(4e-3 * steps, steps, spring(0.02, tolerance=tolerance, **keys), share=0.5), every=100)
     assert read["substeps"][-1] > steps
     assert np.all(np.abs(read["energy_residual"]) <= 10.0 * tolerance * read["drive_work"][-1])
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize(
+    ("make", "keys"),
+    [(Cohort, {}), (Cohort, {"mass": 1e-3, "damping": 1e-3}), (Cohort, {"mass": 1e-3, "contact": 0.1}),
+     (functools.partial(Tracked, sites=100), {})],
+)  # fmt: skip
+def test_the_energies_stay_balanced_over_many_steps_where_stretches_are_resolved(make, keys):
+    steps = 10**5
+    for tolerance in (1e-5, 1e-7):
+        drive = spring(0.02, tolerance=tolerance, **keys)
+        _, read = passed(scenario(4e-3 * steps, steps, drive, share=0.5, make=make), every=100)
+        assert np.all(np.abs(read["energy_residual"]) <= 10.0 * tolerance * read["drive_work"][-1])
 
 
 @pytest.mark.parametrize("keys", [{}, {"damping": 0.05}, {"mass": 0.05, "damping": 0.05}])
