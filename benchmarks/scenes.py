@@ -2,7 +2,9 @@
 
 import tomllib
 from collections.abc import Callable
+from pathlib import Path
 
+import netCDF4
 import numpy as np
 
 import sim
@@ -46,3 +48,30 @@ def steady(speed: float, step: float, steps: int, drive: Callable) -> tuple[Moti
     times = Times(step, steps, step * steps)
     slider, first = drive(speed=speed).begin(times, 1)
     return first, drive(speed=speed).advance(slider, times, range(1, steps + 1))[1]
+
+
+def tiled(source: Path, target: Path, times: int) -> None:
+    """A dataset whose records come again and again, made of the chunks of another one, each of all its records."""
+    import h5py  # of the tests: it copies chunks as they are packed
+
+    with netCDF4.Dataset(source) as given, netCDF4.Dataset(target, "w") as made:
+        made.setncatts({name: given.getncattr(name) for name in given.ncattrs()})
+        for name, size in given.dimensions.items():
+            made.createDimension(name, size.size * (times if name == "t" else 1))
+        for name, one in given.variables.items():
+            chunks = one.chunking()
+            packed = {} if chunks == "contiguous" else {"chunksizes": chunks, "zlib": True, "complevel": 1}
+            copy = made.createVariable(name, one.dtype, one.dimensions, fill_value=False, **packed)
+            copy.setncatts({key: one.getncattr(key) for key in one.ncattrs()})
+            if "t" not in one.dimensions:
+                copy[...] = one[...]
+            elif name == "t":
+                copy[:] = np.arange(len(copy)) * float(one[1] - one[0])
+    with h5py.File(source) as given, h5py.File(target, "r+") as made:
+        for name in given.keys() - {"t"}:
+            one = given[name]
+            for place in range(one.id.get_num_chunks() if one.shape != made[name].shape else 0):
+                *rows, first = one.id.get_chunk_info(place).chunk_offset
+                _, packed = one.id.read_direct_chunk((*rows, first))
+                for k in range(times):
+                    made[name].id.write_direct_chunk((*rows, first + k * one.shape[-1]), packed)

@@ -293,11 +293,17 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
 
 def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
     """The ``summary`` of observables at each sweep value and time, by default of all but shares, read in blocks."""
-    found, dims = xr.Dataset(), ("t", *sweep_dims(dataset))
+    found, dims, known = xr.Dataset(), ("t", *sweep_dims(dataset)), frozenset[Any]()
+
+    def reduce(block: xr.Dataset) -> xr.Dataset:
+        made = observed(block)
+        new.update(set(made) - known)
+        return summary(made[[name for name in made if name not in known]], quantiles)
+
     for some, observed in readings(dataset, names):
         if names is not None or observed is observables:
-            part = in_blocks(some, dims, lambda block, of=observed: summary(of(block), quantiles))  # type: ignore[misc]
-            found = found.merge(part[[name for name in part if name not in found]])
+            new = set[Any]()  # what members have in common comes with each reading
+            found, known = found.merge(in_blocks(some, dims, reduce)), known | new
     return found
 
 
