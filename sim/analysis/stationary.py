@@ -11,11 +11,11 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.analysis.blocks import blocks
+from sim.analysis.blocks import at_records, blocks, keep
 from sim.analysis.correlation import Covariance, inflation, seen, time_of
 from sim.analysis.observables import all_observables, readings, settled
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
-from sim.analysis.statistics import LEVEL, QUANTILES, described, interval, quantile_ranks, summary
+from sim.analysis.statistics import LEVEL, QUANTILES, WIDE, described, interval, quantile_ranks, summary
 
 #: From so many members on the spread of their means gives the error, whatever the correlation in time.
 _MANY = 16
@@ -23,6 +23,8 @@ _MANY = 16
 _SAMPLE, _NEAR = 2**17, 0.01
 #: Bytes of trajectories that are kept in memory from the first reading to the second.
 _KEPT = 3 * 2**27
+#: Records of the second half at which a slider's way is read.
+_PLACES = 256
 #: Values that fit into the processor's cache.
 _STRIP = 2**16
 _LEVELS = np.array(QUANTILES)
@@ -316,7 +318,30 @@ def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> x
                         if key not in found:
                             found[key] = _empty(dataset, kind, about)
                         found[key].values[place] = value
+    if "speed_mean" in found and {"slider_position", "spring_force"} <= set(dataset):  # a slider that may slip
+        for at, known in _of_the_way(dataset, dims):
+            for kind, value in known.items():
+                found[f"speed_{kind}"].values[at] = value
     return xr.Dataset(found)
+
+
+def _of_the_way(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], dict[str, float]]]:
+    """Mean speed of a slider [m/s] with its error, by place in the sweep: slips come and go between two records.
+
+    It is the way over the time, whose ends are anywhere in stick and slip: the way's spread about a steady one gives
+    the error.
+    """
+    last, late = dataset.sizes["t"] - 1, dataset.sizes["t"] // 2
+    records = np.unique(np.linspace(late, last, _PLACES).astype(int))
+    way = at_records(keep(dataset, "slider_position"), records)["slider_position"]
+    time, ways = way["t"].to_numpy() - float(way["t"][0]), _rows(way, dims)
+    for at in np.ndindex(ways.shape[:-2]):
+        if np.isnan(ways[at]).any():  # after a runaway there is none
+            continue
+        speeds = (ways[at][:, -1] - ways[at][:, 0]) / time[-1]
+        off = np.std(ways[at] - speeds[:, np.newaxis] * time, axis=-1)
+        mean, error = float(np.mean(speeds)), float(np.sqrt(2.0 * np.mean(off**2) / len(speeds)) / time[-1])
+        yield at, {"mean": mean, "sem": error, "low": mean - WIDE * error, "high": mean + WIDE * error}
 
 
 def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:

@@ -91,6 +91,16 @@ def test_the_table_has_the_speed_of_the_stage_beside_that_of_the_slider_where_it
     assert not any(heading.startswith("stage") for heading in analysis.table(cycles())[0])
 
 
+def test_the_mean_speed_is_that_of_the_way_as_slips_come_and_go_between_records():
+    dataset = cycles().isel(t=slice(0, None, 20))
+    found = analysis.distribution(dataset)
+    way, t = dataset["slider_position"], dataset["t"]
+    late = t.size // 2
+    exact = ((way[:, -1] - way[:, late]) / (t[-1] - t[late])).mean()
+    assert_allclose(found["speed_mean"], exact, rtol=1e-12)
+    assert found["speed_low"] < LENGTH < found["speed_high"]
+
+
 def test_sliding_without_slips_has_a_kinetic_friction_alone():
     area = scene(1).contact_area
     drive = Spring(stage=LENGTH, stiffness=1e3, damping=1.0, contact_stiffness="rigid")
