@@ -30,7 +30,7 @@ GROUPS: dict[str, Callable[[Bench], list[Row]]] = {
     for group in (
         fields.banded, whole.large, fields.modal, fields.mapped, fields.energy, bonds.counted, bonds.tracked,
         bonds.cohorts, spring.spring, contact.radii, contact.disc, whole.memory, whole.commands, whole.first,
-        whole.gallery, whole.files, whole.workers, whole.parts, whole.estimates, growth.growth,
+        whole.gallery, whole.files, whole.statistics, whole.workers, whole.parts, whole.estimates, growth.growth,
     )
 }  # fmt: skip
 

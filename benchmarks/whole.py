@@ -1,16 +1,18 @@
 """Rows of whole commands, as processes of their own: their start, a first run, the gallery, a large run; and files."""
 
+import itertools
 import subprocess
 import sys
 import tempfile
 import time
 from pathlib import Path
 
+import netCDF4
 import numpy as np
 
 import sim
-from benchmarks.compare import BANDED, LOAD, RAMP, RATE
-from benchmarks.scenes import field, loaded, scene
+from benchmarks.compare import BANDED, LOAD, RAMP, RATE, STEADY
+from benchmarks.scenes import field, loaded, scene, tiled
 from benchmarks.timing import Bench, Beside, Row, absolute, middle, spent, told
 from sim.ensemble import bounds, simulate
 from sim.ensemble.part_files import MemoryParts, PartFiles
@@ -90,6 +92,36 @@ def large(bench: Bench) -> list[Row]:
         absolute(f"{name}: time", list(seconds), "s", 10.0),
         absolute(f"{name}: peak memory", list(megabytes), "MB", 500.0),
     ]
+
+
+def statistics(bench: Bench) -> list[Row]:
+    """The statistics of a dataset of 4 GB beside the time of reading it."""
+    members, records, times = bench.of((1024, 468, 92), (2, 20, 2))
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "long.nc"
+        short = sim.run(loaded(scene(members, records - 1, 1, STEADY, RATE, BANDED, LOAD)), to=path.with_stem("short"))
+        tiled(short, path, times)
+        turns = [(*bench.command("stats", str(path)), spent(lambda: _read(path))) for _ in range(bench.of(3, 1))]
+    ours, megabytes, plain = np.transpose(turns)
+    medians = [float(np.median(ours)), float(np.median(plain))]
+    name = "`sim stats` of 4 GB, 1024 members × 43,056 records"
+    return [
+        Row(f"{name}: time", "netCDF4 reads all of it once", "as long", 2.0, middle(ours / plain), medians),
+        absolute(f"{name}: peak memory", list(megabytes), "MB", 1000.0),
+    ]
+
+
+def _read(path: Path) -> None:
+    """Read all numbers of a dataset, some of its chunks at a time."""
+    with netCDF4.Dataset(path) as file:
+        file.set_auto_mask(False)
+        for one in file.variables.values():
+            lengths = one.chunking() if one.chunking() != "contiguous" else one.shape
+            if lengths:
+                lengths = [*lengths[:-1], lengths[-1] * max(1, 2**22 // int(np.prod(lengths)))]
+            starts = (range(0, size, length) for size, length in zip(one.shape, lengths, strict=True))
+            for at in itertools.product(*starts):
+                one[tuple(slice(start, start + length) for start, length in zip(at, lengths, strict=True))]
 
 
 def workers(bench: Bench) -> list[Row]:

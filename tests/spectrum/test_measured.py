@@ -110,7 +110,7 @@ def test_a_table_is_read_from_csv_with_its_units(files):
         ("q [rad/m], C [m^3]\n1, 1\n2, 1\n", "it is a spectrum of heights"),
         ("q [rad/m], C [kPa^2 um]\n1, 1\n2, 1\n", "it is the spectrum of a line; give that of the plane"),
         ("1 1\n2 1\n", r'psd.csv: line 1: the columns have no header; .* header = "q \[rad/m\], C \[Pa\^2 m\^2\]"'),
-        ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C must be finite"),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C is nan"),
         ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
         ("q [rad/m], C [Pa^2 m^2]\n1, -1\n2, 0\n", "line 2: C must be at least 0"),
         ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", 'line 1: column "C" has a unit that is not a unit of'),

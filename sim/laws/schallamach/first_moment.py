@@ -189,6 +189,7 @@ def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebin
     --------
     In units of all sites, at ten times the speed at which bonds begin to yield:
 
+    >>> from sim.laws.schallamach import Body
     >>> print("%.7f %.6f" % first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, Body(1.0)))
     0.0390213 4.691569
     """
