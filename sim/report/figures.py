@@ -35,8 +35,8 @@ SEE = {
     "creep": "A straight line of slope one is sliding at a constant speed; what bends up runs away.",
     "friction": "Above, friction over time; below, over the slider's position, where the area of the loop is the work"
     " that friction takes.",
-    "curve": "From JKR's line at 1 down: blue is what broken bonds take of the area, vermilion what fluctuations take,"
-    " the full line what is left. Where it meets the dotted line of Hertz, adhesion is masked.",
+    "curve": "From JKR's line at 1 down is the area that is lost, of a single curve blue to broken bonds and vermilion"
+    " to fluctuations; the full line is what is left. Where it meets the dotted line of Hertz, adhesion is masked.",
     "sweep": "Each point is a run of its own. The contact lies between JKR's radius, with all adhesion, and Hertz's,"
     " with none.",
     "time": "The contact between JKR's radius, with all adhesion, and Hertz's, with none, and below what moves it.",
