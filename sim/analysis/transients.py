@@ -73,7 +73,7 @@ def speed_step(dataset: xr.Dataset) -> xr.Dataset:
 def _rise(speed: np.ndarray) -> tuple[int, int] | None:
     """The record at which the speed has first jumped to a higher one, and that of the next jump."""
     places = [*jumps(speed), len(speed)]
-    rises = [n for n, at in enumerate(places[:-1]) if 0.0 < speed[at - 1] / speed[at] < 1.0]
+    rises = [n for n, at in enumerate(places[:-1]) if 0.0 < speed[at - 1] * np.sign(speed[at]) < abs(speed[at])]
     return (places[rises[0]], places[rises[0] + 1]) if rises else None
 
 

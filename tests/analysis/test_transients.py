@@ -53,6 +53,12 @@ def pulled(threshold=5e-3, fall=0.7):
     return recorded(stage_speed=np.full(151, 1e-3), spring_force=force, contact_area=area)
 
 
+@pytest.mark.parametrize("then", [0.0, -4e-3])
+def test_a_stage_that_stops_or_turns_is_not_faster(then):
+    speed, ones = np.where(np.arange(40.0) < 20.0, 2e-3, then), np.ones(40)
+    assert not speed_step(recorded(stage_speed=speed, friction_force=ones, slider_position=ones))
+
+
 def test_the_way_to_sliding_has_the_threshold_the_area_there_and_what_the_law_of_the_square_gives():
     found = way_to_sliding(pulled())
     np.testing.assert_allclose(found["static_threshold"], [5e-3, 10e-3], rtol=1e-12)
