@@ -63,7 +63,7 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
     found = dataset[["jkr_radius", "hertz_radius"]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
     if bool(stays_held(dataset).all()):
         found = found.isel(t=0, drop=True)
-    found = found.astype(float).map(ordered)
+    found = found.astype(float, copy=False).map(ordered)
     return found.assign(radius_jkr=found["radius_jkr"].where(found["radius_jkr"] > 0.0))
 
 
@@ -108,12 +108,12 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     as recorded.
     """
     suffix = "" if "contact_area" in dataset else "_mean"
-    area, full = dataset[f"contact_area{suffix}"].astype(float), full_area(dataset)
+    area, full = dataset[f"contact_area{suffix}"].astype(float, copy=False), full_area(dataset)
     there = {str(name).removesuffix("_mean") for name in dataset}
     charged = {name: loss for name, loss in _LOSSES.items() if loss[0] in there}
     if any(radius not in dataset for radius, _ in charged.values()):
         raise ValueError("shares need each member; record them: [record] per_member = true")
-    left = [np.pi * dataset[radius].astype(float) ** 2 for radius, _ in charged.values()]
+    left = [np.pi * dataset[radius].astype(float, copy=False) ** 2 for radius, _ in charged.values()]
     if may_stop(dataset):
         left = [level.where(area.notnull()) for level in left]
     levels = [full, *left, area]
@@ -161,7 +161,7 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
         given = dataset["applied_load"] if "applied_load" in dataset else dataset.get("contact_load")
     except KeyError as fault:
         raise ValueError(f"the other order of charging is not known: {fault.args[0]}") from None
-    work = setting(dataset, "adhesion.work") - share * dataset["fluctuation_energy"].astype(float)
+    work = setting(dataset, "adhesion.work") - share * dataset["fluctuation_energy"].astype(float, copy=False)
     sphere = work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]
     if held.kind == "load":
         radius = xr.apply_ufunc(jkr.radius_at_load, given, *sphere)
@@ -194,10 +194,10 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     found = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
     for suffix in ("", *(f"_{kind}" for kind in KEPT)):
         if f"contact_area{suffix}" in found and {"jkr_radius", "hertz_radius"} <= set(found):
-            ratio = found[f"contact_area{suffix}"].astype(float) / full_area(dataset)
+            ratio = found[f"contact_area{suffix}"].astype(float, copy=False) / full_area(dataset)
             found[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
         if f"in_contact{suffix}" in found:
-            closed = found[f"in_contact{suffix}"].astype(float)
+            closed = found[f"in_contact{suffix}"].astype(float, copy=False)
             opened = closed if suffix in ("_std", "_sem") else 1.0 - closed
             found[f"fraction_detached{suffix}"] = pure(opened, "open contacts")
     with where_recorded():
@@ -208,7 +208,7 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
 @of_dataset
 def all_observables(dataset: xr.Dataset) -> xr.Dataset:
     """``observables``, with the shares of the lost area where they are known, in both orders of charging."""
-    return observables(dataset).merge(charges(dataset))
+    return _with_charges(dataset, None)
 
 
 def charges(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
@@ -228,25 +228,32 @@ def readings(
 ) -> Iterator[tuple[xr.Dataset, Callable[[xr.Dataset], xr.Dataset]]]:
     """A dataset with one trajectory of the members at a time, and what makes observables of it: those of all in turn.
 
-    What one trajectory takes of memory is then all that is taken. Of ``names`` only those that they follow from.
+    What one trajectory takes of memory is then all that is taken; those that shares follow from come together and last.
+    Of ``names`` only those that they follow from.
     """
     each = [str(name) for name, variable in dataset.data_vars.items() if {MEMBERS, "t"} <= set(variable.dims)]
     if names is not None:
         each = [name for name in each if name in {_FROM.get(one, one) for one in names}]
-    for name in each or [""]:
-        yield keep(dataset, name), observables
+    of_shares = list[str]()
     if names is None or any(name.startswith(("lost_to", "order_of")) for name in names):
-        areas, held = ("contact_area", *(radius for radius, _ in _LOSSES.values())), ""
+        of_shares = ["contact_area", *(radius for radius, _ in _LOSSES.values()), "fluctuation_energy"]
         with contextlib.suppress(KeyError):  # the dataset does not say
-            held = control(dataset).kind
-        yield keep(dataset, *areas, "fluctuation_energy", held), functools.partial(charges, names=names)
+            of_shares.append(control(dataset).kind)
+    for name in [name for name in each if name not in of_shares] or [""] * (not of_shares):
+        yield keep(dataset, name), observables
+    if of_shares:
+        yield keep(dataset, *of_shares), functools.partial(_with_charges, names=names)
+
+
+def _with_charges(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
+    return observables(dataset).merge(charges(dataset, names))
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     """``fraction_masked``; of statistics alone it is known where all contacts are closed, else nan."""
     text = "closed contacts without work of adhesion"
     if "masked" in dataset:
-        return {"fraction_masked": pure(dataset["masked"].astype(float), text)}
+        return {"fraction_masked": pure(dataset["masked"].astype(float, copy=False), text)}
     closed = dataset["in_contact_mean"] == 1.0
     return {f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text) for kind in KEPT}
 

@@ -16,6 +16,7 @@ from sim.analysis.correlation import Covariance, inflation, seen, time_of
 from sim.analysis.observables import all_observables, readings, settled
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.analysis.statistics import LEVEL, QUANTILES, WIDE, described, interval, quantile_ranks, summary
+from sim.numerics.tally import tally
 
 #: From so many members on the spread of their means gives the error, whatever the correlation in time.
 _MANY = 16
@@ -92,17 +93,11 @@ class Series:
         if self.whole and len(some):
             self.covariance.add(some - (self.of_record[times] / self.members if several else self.mean))
         for first, strip in _strips(values, bool(self.flags)):
-            known = strip if self.whole else strip[np.isfinite(strip)]
-            deviations = known - self.mean
-            squares = deviations * deviations
-            self.moments += [known.size, squares.sum(), (squares * deviations).sum()]
             at = rows.start + first
-            for k, level in enumerate(self.rough):
+            self.quantiles.gather(strip, self.mean, self.rough, self.moments, self.under[:, at : at + len(strip)])
+            for one, level, share in zip(self.flags if self.whole else (), self.rough, _LEVELS, strict=False):
                 flags = strip <= level
-                self.under[k, at : at + len(strip)] += flags.sum(axis=-1)
-                if self.flags and self.whole:
-                    self.flags[k].add(flags - (flags.mean(axis=0) if several else _LEVELS[k]))
-            self.quantiles.gather(known)
+                one.add(flags - (flags.mean(axis=0) if several else share))
         if times.stop == self.records:
             for one in (self.covariance, *self.flags):
                 one.end()
@@ -126,10 +121,10 @@ class Series:
             low, high = interval(self.name, np.array(self.mean), errors[0], freedoms[0] + 1.0)
             skewness = cubes / count / spread**3 if spread > 1e-12 * abs(self.mean) else np.nan
             several = (spread / errors[0]) ** 2 if errors[0] > 1e-12 * abs(self.mean) else np.nan
-        ends = {"": _LEVELS, "_low": _LEVELS, "_high": _LEVELS}
+        ends = np.tile(_LEVELS, (3, 1))
         if differ:
             surely = 1.0 if self.members >= _MANY else 0.5
-            ends["_low"], ends["_high"] = _shares(np.array(spreads), errors, freedoms, surely)
+            ends[1:] = _shares(np.array(spreads), errors, freedoms, surely)
         else:
             errors[0], low, high = 0.0, np.array(self.mean), np.array(self.mean)
         found = {"mean": self.mean, "std": spread, "sem": errors[0], "low": float(low), "high": float(high)}
@@ -137,7 +132,8 @@ class Series:
         if self.whole:
             time = time_of(covariance, self.seen, self.records, self.step, self.quantiles.largest)
             found |= {"correlation_time": time.time, "correlation_time_sem": time.sem}
-        return found | {f"quantile{end}": self.quantiles.at(levels) for end, levels in ends.items()}
+        at_ends = self.quantiles.at(ends.ravel()).reshape(ends.shape)
+        return found | dict(zip(("quantile", "quantile_low", "quantile_high"), at_ends, strict=True))
 
 
 def _strips(values: np.ndarray, few: bool) -> Iterator[tuple[int, np.ndarray]]:
@@ -189,7 +185,7 @@ class _Quantiles:
     def __init__(self) -> None:
         self.some: list[np.ndarray] = []
         self.near: list[list[np.ndarray]] = [[] for _ in _LEVELS]
-        self.below, self.stride, self.total = [0] * len(_LEVELS), 1, 0
+        self.below, self.stride, self.total = np.zeros(len(_LEVELS), int), 1, 0
 
     def sample(self, known: np.ndarray) -> None:
         self.total += known.size
@@ -213,13 +209,15 @@ class _Quantiles:
         """Between which values each quantile surely is."""
         return np.quantile(self.ordered, np.clip(_LEVELS[:, None] + _NEAR * np.array([-1.0, 1.0]), 0.0, 1.0))
 
-    def gather(self, values: np.ndarray) -> None:
-        """Keep what lies near each quantile of the sample, where that is not all there is."""
-        if self.stride > 1:
-            for k, (low, high) in enumerate(self.sides):
-                self.below[k] += int(np.count_nonzero(values < low))
-                inside = values[(values >= low) & (values <= high)]
-                self.near[k].append(inside if low < high else np.array([float(inside.size)]))
+    def gather(
+        self, values: np.ndarray, mean: float, rough: np.ndarray, moments: np.ndarray, under: np.ndarray
+    ) -> None:
+        """Keep what lies near each quantile of the sample, where that is not all there is, and ``tally`` the rest."""
+        sides = self.sides if self.stride > 1 else np.empty((0, 2))
+        inside, near = np.zeros(len(sides), int), np.empty((len(sides), values.size))
+        tally(values, mean, rough, sides, moments, under, self.below, inside, near)
+        for k, (low, high) in enumerate(sides):
+            self.near[k].append(near[k, : inside[k]].copy() if low < high else np.array([float(inside[k])]))
 
     def at(self, levels: np.ndarray) -> np.ndarray:
         """Quantiles of given levels, exact where what was kept holds them; nan beyond 0 and 1."""

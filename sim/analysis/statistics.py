@@ -1,6 +1,7 @@
 """Statistics over the members of an ensemble, at each time and sweep value."""
 
-from collections.abc import Collection, Mapping
+import functools
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ from scipy import special
 from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import KEPT, charges, observables, pure, readings, reference_radii, share_observables
+from sim.analysis.observables import KEPT, charges, pure, readings, reference_radii, share_observables
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
@@ -293,17 +294,15 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
 
 def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
     """The ``summary`` of observables at each sweep value and time, by default of all but shares, read in blocks."""
-    found, dims, known = xr.Dataset(), ("t", *sweep_dims(dataset)), frozenset[Any]()
+    found, dims = xr.Dataset(), ("t", *sweep_dims(dataset))
 
-    def reduce(block: xr.Dataset) -> xr.Dataset:
+    def reduce(block: xr.Dataset, observed: Callable[[xr.Dataset], xr.Dataset], known: xr.Dataset) -> xr.Dataset:
         made = observed(block)
-        new.update(set(made) - known)
-        return summary(made[[name for name in made if name not in known]], quantiles)
+        return summary(made[[name for name in made if f"{name}_mean" not in known]], quantiles)
 
-    for some, observed in readings(dataset, names):
-        if names is not None or observed is observables:
-            new = set[Any]()  # what members have in common comes with each reading
-            found, known = found.merge(in_blocks(some, dims, reduce)), known | new
+    for some, observed in readings(dataset, set(map(str, dataset)) if names is None else names):
+        # what members have in common comes with each reading
+        found = found.merge(in_blocks(some, dims, functools.partial(reduce, observed=observed, known=found)))
     return found
 
 
