@@ -465,12 +465,10 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
-    force, stage = (dataset[name].isel(member=0).to_numpy() for name in ("spring_force", "stage_speed"))
-    fallen = int(np.argmax(force < 0.5 * np.maximum.accumulate(force)))
     peak = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names))
     slips, found = analysis.slips(dataset).isel(member=0), analysis.stick_slip(dataset).isel(member=0)
     mean = slips.mean("slip")
-    return {"onset": 1e3 * float(stage[fallen]), "peak": 1e3 * float(peak.speed),
+    return {"onset": 1e3 * float(found["slips_from"]), "peak": 1e3 * float(peak.speed),
             "drop": 1e3 * float(mean["force_drop"]), "slip": 1e6 * float(mean["slip_amplitude"]),
             "static": 1e3 * float(mean["static_friction"]),
             "kinetic": 1e3 * float(found["kinetic_friction"])}  # fmt: skip
@@ -486,13 +484,10 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     kind="stability",
 )
 def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
-    slips, stiffness = analysis.slips(dataset).isel(member=0), dataset["drive_stiffness"].to_numpy()
-    slid = slips["slip_amplitude"] > 0.0
-    many = slid.sum("slip") > 10
-    speeds = slips.isel(drive_stiffness=0)["slip_speed"].to_numpy()
-    first, last = speeds[1], speeds[int(slid.isel(drive_stiffness=0).sum()) - 1]  # the first one follows no other
-    return {"soft": float(stiffness[0]), "up": 1e3 * float(first), "down": 1e3 * float(last),
-            "stiff": float(stiffness[int(many.sum())])}  # fmt: skip
+    found, stiffness = analysis.stick_slip(dataset).isel(member=0), dataset["drive_stiffness"].to_numpy()
+    up, down = (1e3 * float(found[name][0]) for name in ("slips_from", "slips_down_to"))
+    calm = found["slips_down_to"].isnull().to_numpy()
+    return {"soft": float(stiffness[0]), "up": up, "down": down, "stiff": float(stiffness[np.argmax(calm)])}
 
 
 @asks(

@@ -16,6 +16,11 @@ LEAST = 0.02
 
 #: Displacement of the slider over that of the stage above which a fall of the force is a slip.
 _FASTER = 1.0 + 2.0 / math.pi
+#: Speeds of a stage that gets faster or slower between which slips follow each other.
+_ENDS = {
+    "slips_from": "lowest speed of the stage, as it gets faster, at which a slip begins that another one follows",
+    "slips_down_to": "lowest speed of the stage, as it gets slower, at which a slip begins that follows another one",
+}
 #: What is known of each slip: unit and meaning.
 _SLIPS = {
     "slip_time": ("s", "time at which a slip begins"),
@@ -28,6 +33,7 @@ _SLIPS = {
     "force_drop": ("N", "fall of the spring's force in a slip"),
     "stress_drop": ("Pa", "fall of the shear stress in a slip"),
 }
+_ROUNDING = 1e-9
 _READ = ("spring_force", "slider_position", "stage_speed", "shear_stress")
 
 
@@ -58,8 +64,9 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
     In a slip the slider is faster than the stage, so that the spring's force falls: from a maximum to the lowest value
     before the next. It goes more than 1 + 2/π times as far as the stage, as half a cycle does of a sine that just comes
     to rest, and the stress falls, too, which it does not where the body rings upon an interface that sticks. Forces and
-    displacements are taken in the sense in which the stage moves, and what its reversal unloads is no slip. All times
-    are those of records: let a slip last several.
+    displacements are taken in the sense in which the stage moves, and what its reversal unloads is no slip. Where the
+    force has fallen slowly before, as beyond the maximum of friction, a slip begins at its last maximum. All times are
+    those of records: let a slip last several.
     """
     if "stage_speed_mean" in dataset:
         raise ValueError("slips need each member; record them: [record] per_member = true")
@@ -99,16 +106,18 @@ def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stres
     found = []
     for start, stop in itertools.pairwise(ends):
         along = sense[start] * force[start:stop]
+        moved = sense[start] * (position - _FASTER * pulled)[start:stop]
         tops = find_peaks(along, prominence=fall)[0] if fall > 0.0 else np.empty(0, int)
         until = np.append(tops, stop - start)[1:]
         lows = [top + int(np.argmin(along[top:end])) for top, end in zip(tops, until, strict=True)]
         pairs = [(top, low) for top, low in zip(tops, lows, strict=True) if along[top] - along[low] >= fall]
         if pairs and pairs[-1][1] == stop - start - 1:  # the last one has not ended
             pairs.pop()
+        pairs = [(_begin(along, moved, top, low, fall), low) for top, low in pairs]
         top, low = start + np.array(pairs, int).reshape(-1, 2).T
         ahead, bears = sense[start] * (position[low] - position[top]), sense[start] * stress
         falls = np.maximum(bears[top], bears[top - 1]) - bears[low]  # as it slips at once, or in the record before
-        slipped = (ahead > _FASTER * sense[start] * (pulled[low] - pulled[top])) & (falls > 0.0)
+        slipped = (moved[low - start] > moved[top - start]) & (falls > 0.0)
         top, low, ahead, falls = top[slipped], low[slipped], ahead[slipped], falls[slipped]
         after = np.append(time[top], np.nan)[1:]  # when the next one begins
         found.append(np.stack([
@@ -116,6 +125,20 @@ def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stres
             ahead, np.abs(stage[top]), sense[start] * force[top], sense[start] * (force[top] - force[low]), falls,
         ], axis=1))  # fmt: skip
     return np.concatenate(found)
+
+
+def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float) -> int:
+    """The record at which a slip begins: at the top, or where the force falls slowly from there at its last maximum.
+
+    ``moved`` grows where the slider is as fast as in a slip.
+    """
+    if moved[low] > moved[top]:
+        return top
+    from scipy.signal import find_peaks  # heavy: for sliders behind a spring alone
+
+    later = top + find_peaks(force[top:low])[0]
+    later = later[force[later] - force[low] >= fall]
+    return int(later[-1]) if later.size else top
 
 
 def _sense(stage: np.ndarray) -> np.ndarray:
@@ -140,7 +163,10 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     xarray.Dataset
         Under a stage ``slip_count``, and the means over the slips of what ``slips`` has of each; of a stage at one
         speed those that begin in the second half of the run. ``slip_spread`` [1]: the standard deviation of their
-        displacements over its mean, see ``slip_sizes``. ``kinetic_friction`` [N] is the work of the stage over its
+        displacements over its mean, see ``slip_sizes``. Of a stage at several speeds ``slips_from`` and
+        ``slips_down_to`` [m/s], its lowest speed on the way up at which a slip begins that another one follows, and on
+        the way down at which one begins that follows another: a single one is the fall of friction beyond its maximum.
+        ``kinetic_friction`` [N] is the work of the stage over its
         path, from the beginning of the first of these slips to that of the last, without slips over that time;
         nan where the slider went less than half as far as the stage, stretching the spring.
         Under a prescribed force see ``runaways``. Empty for other drives, and where only statistics were recorded.
@@ -150,11 +176,11 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     read = {*_READ, "drive_work", "stage_position"}
     if "stage_speed" not in dataset or not read <= set(dataset.variables):
         return xr.Dataset()
-    half = _beginning(dataset)
-    return in_blocks(keep(dataset, *read), (*sweep_dims(dataset), MEMBERS), lambda some: _means(some, half))
+    half, several = _beginning(dataset), varies(dataset)
+    return in_blocks(keep(dataset, *read), (*sweep_dims(dataset), MEMBERS), lambda some: _means(some, half, several))
 
 
-def _means(dataset: xr.Dataset, half: float) -> xr.Dataset:
+def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset:
     """What ``stick_slip`` gives, of slips that begin after a time [s]."""
     found = slips(dataset).pad(slip=(0, 1))  # where there is none, too, a mean is over something
     begins = found["slip_time"]
@@ -177,7 +203,22 @@ def _means(dataset: xr.Dataset, half: float) -> xr.Dataset:
         units="N", long_name="work of the stage over its path"
     )
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
-    return every.map(ordered, keep_attrs=True)
+    return every.assign(_between_speeds(dataset, found) if several_speeds else {}).map(ordered, keep_attrs=True)
+
+
+def _between_speeds(dataset: xr.Dataset, found: xr.Dataset) -> dict[str, xr.DataArray]:
+    """Speeds of a stage between which slips follow each other."""
+    turn, later = abs(dataset["stage_speed"]).idxmax("t"), found["recurrence_time"].notnull()
+    kept = later & (found["slip_time"] <= turn), later.shift(slip=1, fill_value=False) & (found["slip_time"] > turn)
+    speeds = (found["slip_speed"].where(which).min("slip") for which in kept)
+    ends = zip(_ENDS.items(), speeds, strict=True)
+    return {name: speed.assign_attrs(units="m/s", long_name=text) for (name, text), speed in ends}
+
+
+def varies(dataset: xr.Dataset) -> bool:
+    """Whether the stage has several speeds in the course of a run, there and back not told apart, or rests."""
+    stage = abs(dataset["stage_speed"]).where(dataset["stage_speed"] != 0.0)
+    return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
 
 
 def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = LEAST) -> xr.Dataset:

@@ -29,6 +29,7 @@ from sim.analysis.scene import (
 )
 from sim.analysis.stationary import distribution, of_second_half
 from sim.analysis.statistics import QUANTILES, WIDE, averaging, over_members, summary
+from sim.analysis.stick_slip import varies
 from sim.units.notation import concise, scaled
 
 #: Cells of columns by heading.
@@ -101,6 +102,8 @@ _EVENTS = (
     _Column(
         "slip_count", "slips", meaning="falls of the spring's force by 2 % or more, means over them; times of records"
     ),
+    _Column("slips_from", "slips\nfrom", math.nan, meaning="speed of the stage at the first slip that another follows"),
+    _Column("slips_down_to", "slips\ndown to", math.nan, meaning="as it gets slower, at the last that follows another"),
     _Column("ran_away", "ran away,\nof members"),
     _Column("runaway_after", "ran away\nafter", math.nan),
     _Column("static_friction", "static\nfriction", math.nan, meaning="force at which a slip or a runaway begins"),
@@ -225,7 +228,12 @@ def highlights(dataset: xr.Dataset, rows: int = 12, found: xr.Dataset | None = N
 
 
 def _of_drive(dataset: xr.Dataset, name: str) -> bool:
-    """Whether an event is shown under this drive: the speed of a peak on a ramp, its time after a start."""
+    """Whether an event is shown under this drive: the speed of a peak on a ramp, its time after a start.
+
+    And kinetic friction of a stage at one speed, else it is a mean over speeds.
+    """
+    if name == "kinetic_friction" and "stage_speed" in dataset:
+        return not varies(dataset)
     drives = {"speed": "ramp", "time": "start"}
     wanted = drives.get(name.rpartition("_")[2]) if name.startswith("peak_") else None
     return wanted is None or bool((word(dataset, "drive.model", "") == wanted).any())

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from sim.analysis import is_steady, setting, sweep_dims
 from sim.analysis.scene import word
+from sim.analysis.transients import jumps
 from sim.plots import style
 from sim.plots.bond_laws import Steady, population_of, rest_of, steady_laws
 from sim.plots.curves import Line, Scene, contact_curves, over_speed, speed_dim
@@ -106,11 +107,12 @@ def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
 
 
 def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
-    """The curves, each with its maximum in its name; a ring marks it."""
+    """The curves, each with its maximum in its name; a ring marks it. Where the speed jumps there is none."""
     named = []
     for line in scene.lines:
         speed, stress = scene.speeds(line), scene.values("shear_stress_mean", line)
-        at = maximum_of(speed, stress)
+        steps = scene.broken and jumps(speed, True).size  # their transients have no maximum over the speed
+        at = None if steps else maximum_of(speed, stress)
         words = line.label
         if at is not None:
             panel.plot(scene.x[line.number][at], factor * stress[at], color=line.colour, **_RING)

@@ -15,13 +15,12 @@ from sim.analysis import (
     loss_speeds,
     setting,
     settled,
-    slips,
     summary,
     sweep_dims,
 )
 from sim.analysis.observables import all_observables
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.scene import answered, speed_name, speed_of
+from sim.analysis.scene import answered, speed_name
 from sim.analysis.statistics import over_members
 from sim.analysis.tables import once
 from sim.plots import kinds
@@ -119,9 +118,10 @@ def answers(dataset: xr.Dataset, found: xr.Dataset | None = None) -> list[str]:
 
 def _sliding(dataset: xr.Dataset, kind: str) -> list[Answer]:
     """What is said of a slider behind a spring; its work over its way is kinetic friction at one speed alone."""
-    if speed_name(dataset) != "stage_speed" or kind == "stability":
+    if speed_name(dataset) != "stage_speed":
         return []
-    return [_SLIPS, _KINETIC] if is_stationary(dataset) else [_SLIPS]
+    counted = [] if kind == "stability" else [_COUNTED]
+    return [_stick_and_slip, *counted, *([_KINETIC] if is_stationary(dataset) else [])]
 
 
 def _places(dataset: xr.Dataset, found: xr.Dataset) -> list[Found]:
@@ -266,7 +266,8 @@ def _friction(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
     found = over_members(dataset, ["friction_force"], quantiles=False)
     mean = found["friction_force_mean"].fillna(0.0)
     both = bool((mean.min() < 0.0) & (mean.max() > 0.0))
-    words = ("Friction in one direction", "Friction in the other") if both else ("The largest friction", "The least")
+    named = ("The largest friction", "The least friction")
+    words = ("Friction in one direction", "Friction in the other") if both else named
     for end, what in zip((mean.argmax("t"), mean.argmin("t")), words, strict=True):
         yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", what)
 
@@ -289,21 +290,17 @@ def _creep(dataset: xr.Dataset, whole: xr.Dataset) -> Iterator[str]:
         yield from _ranged(found, "ran_away", "The share of the members whose contact gives way")
 
 
-def _stability(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
-    """Speeds at which slips begin to follow each other as the stage gets faster, and cease to as it gets slower.
-
-    A slip that follows no other is the fall of friction beyond its maximum.
-    """
-    found, turn = slips(dataset), speed_of(dataset).idxmax("t")
-    speed = found["slip_speed"].where(found["recurrence_time"].shift(slip=1).notnull())
-    kept = {"begins": found["slip_time"] <= turn, "ends": found["slip_time"] > turn}
-    ends = {name: speed.where(which).min("slip", keep_attrs=True) for name, which in kept.items()}
-    places = _places(dataset, summary(xr.Dataset(ends), quantiles=False))
-    yield from _ranged(places, "begins", "The speed from which on the slider sticks and slips as the stage gets faster")
-    yield from _ranged(places, "ends", "The speed down to which it does as the stage gets slower")
-    calm = [place.words for place in places if place.mean("begins") is place.mean("ends") is None]
+def _stick_and_slip(dataset: xr.Dataset, whole: xr.Dataset) -> Iterator[str]:
+    """Speeds of a stage between which slips follow each other, and behind which springs they never do."""
+    places = _places(dataset, whole)
+    onset = "The onset of stick-slip, the speed of the stage at the first slip that another one follows,"
+    yield from _ranged(places, "slips_from", onset)
+    end = "The end of stick-slip as the stage gets slower, its speed at the last slip that follows another,"
+    yield from _ranged(places, "slips_down_to", end)
+    ends = ("slips_from", "slips_down_to")
+    calm = [place.words for place in places if not any(place.mean(name) for name in ends)]
     if 0 < len(calm) < len(places):
-        yield f"It never does with {', '.join(calm) if len(calm) <= _FEW else f'{len(calm)} of these springs'}."
+        yield f"Slips never follow each other with {', '.join(calm) if len(calm) <= _FEW else f'{len(calm)} of these'}."
 
 
 _OPENINGS = _of_the_run(("ever_detached", "The share of the members that come off"))
@@ -323,14 +320,14 @@ _ANSWERS: dict[str, tuple[Answer, ...]] = {
             ("peak_time", "The time from the start to that peak"),
         ),
     ),
-    "stability": (_stability,),
+    "stability": (),
     "creep": (_creep,),
     "friction": (_friction,),
     "curve": (_area_over_speed, _of_the_run(("peak_stress", "The maximum of the shear stress on the ramp")), _OPENINGS),
     "sweep": (_area_over_sweep, _OPENINGS),
     "time": (_area_over_sweep, _OPENINGS),
 }
-_SLIPS = _of_the_run(
+_COUNTED = _of_the_run(
     ("slip_count", "The number of slips of the slider behind its spring"),
     ("static_friction", "The force at which a slip or sliding begins"),
     ("force_drop", "The fall of the force in a slip"),

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
 
-from sim.analysis import is_stationary
+from sim.analysis import is_stationary, is_steady, speed_of
 from sim.plots import kinds
 from sim.plots.style import STYLE
 from sim.units.terminal import one_line
@@ -50,6 +50,8 @@ SEE = {
 }
 #: Kinds that are drawn wherever they can be, beside those that fit.
 _ALSO = ("stress", "phase", "incipient", "map", "spectrum")
+#: Different speeds at which a run that changes between them has transients rather than a curve over speed, at most.
+_SPEEDS = 4
 #: Points of a curve that show their values, and of a figure.
 _POINTS, _MOST = 40, 800
 #: Corners of a shaded band from which on some are left out.
@@ -81,9 +83,10 @@ def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
     best = kinds.default(dataset)
     others = [kind for kind in kinds.drawable(dataset) if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
     # theories have an axis of their own; the end of a run that is on its way says little; time is no more than another
-    # axis for a speed that rises; and only bonds with a rupture law have a maximum of the stress
+    # axis for a speed that rises; and only bonds with a rupture law have a maximum of the stress, which transients
+    # after steps between few speeds do not show
     less = {"sweep": best == "theories" or not is_stationary(dataset), "time": best == "curve"}
-    less["stress"] = not any(str(name).startswith("bonds_rupture") for name in dataset.variables)
+    less["stress"] = best != "stress" and (_steps(dataset) or not _rupture(dataset))
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
     for number, kind in enumerate(dict.fromkeys(shown)):
         found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
@@ -91,6 +94,15 @@ def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
             yield found._replace(svg=svg_of(kinds.draw(dataset, kind), f"f{number}-"))
         except ValueError as fault:  # such as what one kind alone finds out as it draws
             yield found._replace(lacks=str(fault))
+
+
+def _rupture(dataset: xr.Dataset) -> bool:
+    return any(str(name).startswith("bonds_rupture") for name in dataset.variables)
+
+
+def _steps(dataset: xr.Dataset) -> bool:
+    """Whether the speed is one of a few in the course of a run."""
+    return not is_steady(dataset) and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
 
 
 def svg_of(figure: Figure, prefix: str) -> str:

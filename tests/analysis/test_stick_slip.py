@@ -152,6 +152,30 @@ def test_what_falls_by_less_than_the_least_is_no_slip():
     assert analysis.slips(made([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
 
 
+def test_a_slip_after_a_slow_fall_begins_at_the_last_maximum_and_onset_and_end_need_two():
+    slow = [0.0, 2.0, *np.linspace(4.0, 3.6, 9), 3.7]
+    up = np.array([*slow, 1.0, 2.0, 4.0, 1.0, 2.0])
+    first = analysis.slips(made(up)).isel(member=0, slip=0)
+    assert (float(first["slip_time"]), float(first["static_friction"]), float(first["force_drop"])) == (11.0, 3.7, 2.7)
+    speed = np.linspace(1.0, 1.1, len(up))
+    back = slice(-2, None, -1)
+    both = made(np.append(up, [*up[[14, 15, 13, 14, 15, 16]], 2.1]), np.append(speed, speed[back][:7]))
+    found, slips = analysis.stick_slip(both), analysis.slips(both).isel(member=0)
+    assert slips.sizes["slip"] == 4
+    assert_allclose(found["slips_from"], speed[11], rtol=1e-14)
+    assert_allclose(found["slips_down_to"], slips["slip_speed"][-1], rtol=1e-14)
+    lone = analysis.stick_slip(made(up[:14], speed[:14]))
+    assert lone["slip_count"].item() == 1.0 and np.isnan(lone["slips_from"]).all()  # friction beyond its maximum
+    assert "slips_from" not in analysis.stick_slip(made(up))
+
+
+def test_the_table_has_no_kinetic_friction_of_a_stage_that_gets_faster():
+    ramped = cycles().assign(stage_speed=cycles()["stage_speed"] * (1.0 + cycles()["t"]))
+    for dataset, wanted in ((cycles(), True), (ramped, False)):
+        headings = [heading for row in analysis.highlights(dataset) for heading in row]
+        assert any(heading.startswith("kinetic") for heading in headings) is wanted
+
+
 def test_a_slider_that_only_stretches_its_spring_has_no_kinetic_friction():
     assert np.isnan(analysis.stick_slip(made(np.arange(10.0)))["kinetic_friction"]).all()
     assert np.all(analysis.stick_slip(made(np.ones(10)))["kinetic_friction"] == 0.0)  # at no work of the stage

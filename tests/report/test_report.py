@@ -343,6 +343,9 @@ def test_a_jump_of_the_speed_and_a_pull_from_rest_have_their_sentences():
     jumped = shipped("velocity_step", **{"drive.stage": course}, clock={"duration": "60 ms", "step": "1 ms"})
     rise = analysis.engineering(analysis.events(jumped)["direct_effect"].item(), "N")
     assert plainly(answers.answers(jumped))[0].endswith(f" is {rise}.")
+    # over few speeds transients are no curve: no maximum is marked, and the page leaves the figure out
+    assert not [line for line in kinds.draw(jumped, "stress").axes[0].lines if line.get_marker() not in ("None", "")]
+    assert "stress" not in {one.kind for one in figures.drawings(jumped)}
 
 
 def test_greys_of_a_map_of_stability_are_an_image_that_a_dark_page_does_not_turn_over():
@@ -355,10 +358,10 @@ def test_a_map_of_stability_says_where_slips_follow_each_other_and_behind_which_
     dataset = shipped("stability_map", sweep={"drive.stiffness": [50.0, 1600.0]})
     begins, ends, never = plainly(answers.answers(dataset))
     soft = analysis.slips(dataset).isel(member=0, drive_stiffness=0)
-    up, along = soft["slip_time"] < 4.0, soft["slip_speed"]
-    assert f" is {analysis.engineering(float(along.where(up)[1]), 'm/s')} (drive stiffness 50 N/m)." in begins
-    assert f" is {analysis.engineering(float(along.where(~up).min()), 'm/s')} (drive stiffness 50 N/m)." in ends
-    assert never == "It never does with drive stiffness 1.6 kN/m."
+    along, down = soft["slip_speed"], soft["slip_time"] > 4.0
+    assert f" is {analysis.engineering(float(along[0]), 'm/s')} (drive stiffness 50 N/m)." in begins
+    assert f" is {analysis.engineering(float(along.where(down).min()), 'm/s')} (drive stiffness 50 N/m)." in ends
+    assert never == "Slips never follow each other with drive stiffness 1.6 kN/m."
 
 
 def test_steady_stages_say_what_the_mean_over_stick_and_slip_loses_and_to_what():
@@ -369,7 +372,7 @@ def test_steady_stages_say_what_the_mean_over_stick_and_slip_loses_and_to_what()
     said = plainly(answers.answers(dataset))
     assert f"from {min(area):.4g} %" in said[0] and f"to {max(area):.4g} %" in said[0]
     assert f"from {min(lost):.4g} %" in said[1] and said[1].startswith("What is lost of JKR's area to broken bonds")
-    assert not [one for one in said if "on the ramp" in one]
+    assert not [one for one in said if "on the ramp" in one or "onset" in one]
 
 
 def test_where_no_kind_of_scene_fits_nothing_is_claimed(monkeypatch, ramp):
