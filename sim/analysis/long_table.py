@@ -43,11 +43,13 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         The file: a header, then one row for each quantity, sweep value and time. A file is there whole or, in trouble,
         as it was before.
     """
-    long = tidy(dataset)
+    columns, frames = _frames(dataset)
     units = {str(name): each.attrs.get("units", "1") for name, each in dataset.coords.items()} | {"speed": "m/s"}
-    header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in map(str, long)]
+    header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in columns]
     with output(Path(path)) as beside, beside.open("w", encoding="utf-8", newline="") as file:
-        long.to_csv(file, header=header, index=False, na_rep="nan", lineterminator="\n")
+        for names in (header, *[False] * (len(frames) - 1)):
+            one = frames.pop(0).reindex(columns=columns)
+            one.to_csv(file, header=names, index=False, na_rep="nan", lineterminator="\n")
 
 
 @of_dataset
@@ -62,20 +64,26 @@ def tidy(dataset: xr.Dataset) -> pd.DataFrame:
         ``low`` and ``high`` (95 % interval) of the mean; ``sd``; ``skewness``; quantiles ``q05``, ``q50``, ``q95`` with
         the ends of their intervals; ``effective_samples``, ``correlation_time`` and ``correlation_time_error`` [s].
     """
+    columns, frames = _frames(dataset)
+    return pd.concat(frames, ignore_index=True)[columns]
+
+
+def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
+    """Columns of all statistics, and those of each quantity."""
     members, half = (averaging(dataset, late).removeprefix("mean over the ") or "one run" for late in (False, True))
+    late = is_stationary(dataset) and "contact_radius" in dataset
+    spread = distribution(dataset) if late else xr.Dataset()  # first, as it keeps trajectories until it ends
     timed = statistics(dataset)
     found = [(timed[[name for name in timed if "t" in timed[name].dims]], members), (once(dataset), members)]
     found.append((as_means(loss_speeds(dataset)), members))
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         found.append((shares(dataset), members))
-    if is_stationary(dataset) and "contact_radius" in dataset:
-        found.append((distribution(dataset), half))
+    found.append((spread, half))
     frames = [
         _long(dataset, each, str(key), over) for each, over in found for key in each if str(key).endswith("_mean")
     ]
     columns = [*map(str, dataset["contact_modulus"].coords), "t", "speed", "quantity", "unit", "over", *_ENDINGS]
-    table = pd.concat(frames, ignore_index=True)
-    return table[[name for name in columns if name in table]]
+    return [name for name in columns if any(name in frame for frame in frames)], frames
 
 
 def _long(dataset: xr.Dataset, found: xr.Dataset, key: str, over: str) -> pd.DataFrame:
