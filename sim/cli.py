@@ -24,9 +24,7 @@ _SET = click.option("--set", "changes", multiple=True, metavar="TABLE.KEY=VALUE"
 _SEED = click.option("--seed", type=click.IntRange(0, 2**64 - 1), help="Replace the seed.")
 _MEMBERS = click.option("--members", type=click.IntRange(1, 10**7), help="Replace the number of ensemble members.")
 _FORCE = click.option("--force", is_flag=True, help="Replace files that exist.")
-_WHERE = click.option(
-    "--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Only this value of a swept key, as load='4 mN'."
-)
+_WHERE = click.option("--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Of a swept key this value alone.")
 
 _KEPT = "stopped; what was computed is kept: the same command with --resume goes on"
 _CODES = (
@@ -281,13 +279,17 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
 @click.argument("output", type=_PATH)
 @click.option("-o", "--page", type=_PATH, help="The page; default beside the dataset.")
 @_WHERE
+@click.option(
+    "--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`: whether they and the run agree."
+)
+@click.option("--fit", type=_PATH, help="What `sim fit` has found, STEM_fit.json.")
 @_FORCE
-def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool) -> None:
+def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool, **beside: Any) -> None:
     """One page of a run as HTML: question, answer, figures, tables, errors, cost, and how to repeat it."""
     from sim.report import written
 
     with _opened(output, chosen) as dataset:
-        say(str(written(dataset, output, page, force)))
+        say(str(written(dataset, output, page, force, **beside)))
 
 
 @contextlib.contextmanager

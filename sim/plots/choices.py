@@ -26,7 +26,7 @@ class Choices(NamedTuple):
     x: str = ""
     absolute: bool = False
     units: tuple[str, ...] = ()
-    data: Path | str | Mapping[str, Any] | None = None
+    data: Path | str | Mapping[str, Any] | Measured | None = None
     ax: Axes | None = None
 
     @property
@@ -52,7 +52,9 @@ class Choices(NamedTuple):
                 found["at"] = Quantity("s", "time").read(self.at)
             except ValueError as fault:
                 raise ValueError(f"at {self.at}: {fault}") from None
-        return found | ({"data": Measured(self.data, dataset)} if self.data is not None else {})
+        if self.data is None:
+            return found
+        return found | {"data": self.data if isinstance(self.data, Measured) else Measured(self.data, dataset)}
 
     def of_member(self, dataset: xr.Dataset) -> xr.Dataset:
         """The dataset of the member chosen, or of all.

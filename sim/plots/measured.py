@@ -47,13 +47,14 @@ class Compared(NamedTuple):
 
 
 class Residuals(NamedTuple):
-    """How far points are from a curve, in standard errors of both: variable, number and colour of the curve."""
+    """How far points are from a curve, in standard errors of both: variable, number, colour and point of the curve."""
 
     name: str
     number: int
     colour: str
     x: np.ndarray
     values: np.ndarray
+    point: dict[str, int]
 
 
 class Measured:
@@ -137,7 +138,7 @@ class Measured:
                 known = np.isfinite(off)
                 if np.any(known):
                     colour = curve.colour if told else BOTH
-                    self.residuals.append(Residuals(name, curve.number, colour, x[rows], off))
+                    self.residuals.append(Residuals(name, curve.number, colour, x[rows], off, curve.point))
                     words.append(rf"$\chi^2$ = {np.sum(off[known] ** 2):.4g} of {np.sum(known)}")
             look: Any = HOLLOW | {"color": curve.colour if told else BOTH, "elinewidth": 0.7, "zorder": 3}
             side = None if wide is None else wide[rows]

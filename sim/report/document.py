@@ -17,7 +17,8 @@ from sim.analysis.tables import once
 from sim.numerics import hdf5
 from sim.numerics.files import output, read_whole
 from sim.report.answers import TIE, answers
-from sim.report.figures import drawings
+from sim.report.figures import Data, drawings
+from sim.report.measured import agreement, fit_of
 from sim.scenario.toml_text import toml
 from sim.units.refusals import BadInput
 from sim.units.terminal import plain
@@ -53,7 +54,10 @@ class Question(NamedTuple):
     more: list[str]
 
 
-def written(dataset: xr.Dataset, source: Path, path: Path | None, replace: bool) -> Path:
+def written(
+    dataset: xr.Dataset, source: Path, path: Path | None, replace: bool,
+    data: Path | None = None, fit: Path | None = None,
+) -> Path:  # fmt: skip
     """Write the page of the dataset of a file, by default beside it; the page's path.
 
     Raises
@@ -64,9 +68,9 @@ def written(dataset: xr.Dataset, source: Path, path: Path | None, replace: bool)
         If there is a file that is not to be replaced.
     """
     target = path or source.with_suffix(".html")
-    claim(dataset, source, target, replace)
+    claim(dataset, source, target, replace, *filter(None, (data, fit)))
     try:
-        text = html(dataset, source)
+        text = html(dataset, source, data, fit)
     except BadInput:
         raise
     except ValueError as fault:
@@ -76,7 +80,9 @@ def written(dataset: xr.Dataset, source: Path, path: Path | None, replace: bool)
     return target
 
 
-def html(dataset: xr.Dataset, source: Path | str = "OUT.nc") -> str:
+def html(
+    dataset: xr.Dataset, source: Path | str = "OUT.nc", data: Data | None = None, fit: Path | str | None = None
+) -> str:
     """The page of a run as one text of HTML.
 
     Parameters
@@ -85,6 +91,10 @@ def html(dataset: xr.Dataset, source: Path | str = "OUT.nc") -> str:
         As ``sim run`` writes it; ``sim.analysis.where`` chooses values of its sweep.
     source : path
         The file that it is of: its name is in the commands that repeat the run, and ``<source>.log`` says what it cost.
+    data : path or dict of str to array, optional
+        Measured points, a CSV table or columns in SI by name, as ``sim plot --data`` takes them.
+    fit : path, optional
+        What ``sim fit`` has found of this scenario, ``<stem>_fit.json``.
 
     Returns
     -------
@@ -95,6 +105,10 @@ def html(dataset: xr.Dataset, source: Path | str = "OUT.nc") -> str:
 
     if dataset.nbytes < _WHOLE:  # what several figures and tables read is read once
         dataset = dataset.load()
+    fitted = None if fit is None else fit_of(Path(fit), dataset)
+    shown = drawings(dataset, data)
+    points = [one.measured for one in shown if one.measured]
+    compared = agreement(dataset, points, fitted) if points else None
     found = once(dataset)
     rows, whole = table(dataset, _ROWS), highlights(dataset, _ROWS, found)
     stem = Path(source).stem
@@ -105,9 +119,12 @@ def html(dataset: xr.Dataset, source: Path | str = "OUT.nc") -> str:
     return page.get_template("page.html").render(
         question=question(dataset),
         answers=answers(dataset, found),
+        compared=compared,
+        fitted=fitted,
+        measured=str(data) if isinstance(data, Path | str) else "the columns given",
         averaged=f"{averaged.capitalize()}. " if (averaged := averaging(dataset, is_stationary(dataset))) else "",
-        drawings=list(drawings(dataset)),
-        tables=[shown for shown in (rows, whole) if shown],
+        drawings=shown,
+        tables=[some for some in (rows, whole) if some],
         notes=notes(dataset, rows, whole),
         known=list(known(dataset)),
         scenario=scenario(dataset),

@@ -1,10 +1,12 @@
 """Figures as SVG within a page: without names that clash, in the page's colours, with values that show on hover."""
 
+import contextlib
 import io
 import itertools
 import re
-from collections.abc import Iterator
-from typing import NamedTuple
+from collections.abc import Iterator, Mapping
+from pathlib import Path as FilePath
+from typing import Any, NamedTuple
 from xml.etree import ElementTree as Tree
 
 import matplotlib as mpl
@@ -19,8 +21,13 @@ from matplotlib.path import Path
 
 from sim.analysis import is_stationary, is_steady, speed_of
 from sim.plots import kinds
+from sim.plots.choices import Choices
+from sim.plots.measured import Measured
 from sim.plots.style import STYLE
 from sim.units.terminal import one_line
+
+#: Measured points: a CSV table, or columns in SI by name.
+Data = FilePath | str | Mapping[str, Any]
 
 #: What to look at in a figure of each kind.
 SEE = {
@@ -48,6 +55,12 @@ SEE = {
     "spectrum": "The spectrum of the maps beside the one that the scenario asks for.",
     "profile": "The gap beyond the contact's edge: the neck is what adhesion pulls up.",
 }
+#: What to look at where there are measured points, with errors and without.
+_BARE_POINTS = "Rings are measured points."
+_POINTS_SEEN = (
+    "Rings are measured points with their standard errors; the lowest panel has their distances from the curve, in"
+    " standard errors σ of both."
+)
 #: Kinds that are drawn wherever they can be, beside those that fit.
 _ALSO = ("stress", "phase", "incipient", "map", "spectrum")
 #: Different speeds at which a run that changes between them has transients rather than a curve over speed, at most.
@@ -69,31 +82,70 @@ _REFERENCE = re.compile(r"url\(#([^)]+)\)")
 
 
 class Drawing(NamedTuple):
-    """A figure of a page: its kind, what it shows and what to see in it, and its SVG; without one what it lacks."""
+    """A figure of a page: its kind, what it shows and what to see in it, and its SVG; without one what it lacks.
+
+    ``measured`` is what of measured points it has drawn.
+    """
 
     kind: str
     shows: str
     see: str
     svg: str = ""
     lacks: str = ""
+    measured: Measured | None = None
 
 
-def drawings(dataset: xr.Dataset) -> Iterator[Drawing]:
-    """The figures of a dataset: the one that fits it best, then others that show more of it."""
+def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
+    """The figures of a dataset: the one that fits it best, then others that show more of it.
+
+    Measured points are in those that have their variables; if there is none, in another that has.
+
+    Raises
+    ------
+    ValueError
+        If measured points cannot be drawn in any figure.
+    """
     best = kinds.default(dataset)
-    others = [kind for kind in kinds.drawable(dataset) if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
+    could = kinds.drawable(dataset)
+    others = [kind for kind in could if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
     # theories have an axis of their own; the end of a run that is on its way says little; time is no more than another
     # axis for a speed that rises; and only bonds with a rupture law have a maximum of the stress, which transients
     # after steps between few speeds do not show
     less = {"sweep": best == "theories" or not is_stationary(dataset), "time": best == "curve"}
     less["stress"] = best != "stress" and (_steps(dataset) or not _rupture(dataset))
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
-    for number, kind in enumerate(dict.fromkeys(shown)):
-        found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
+    found = [_drawing(dataset, kind, f"f{number}-", data) for number, kind in enumerate(dict.fromkeys(shown))]
+    if data is None or any(one.measured for one in found):
+        return found
+    refusals = []
+    for kind in (kind for kind in could if kind not in shown and "data" in kinds.KINDS[kind].takes):
         try:
-            yield found._replace(svg=svg_of(kinds.draw(dataset, kind), f"f{number}-"))
-        except ValueError as fault:  # such as what one kind alone finds out as it draws
-            yield found._replace(lacks=str(fault))
+            return [_with_data(dataset, kind, "f-data-", data), *found]
+        except ValueError as fault:
+            refusals.append(str(fault))
+    for kind in (kind for kind in shown if "data" in kinds.KINDS[kind].takes):
+        _with_data(dataset, kind, "", data)  # refuses it
+    raise ValueError(refusals[0] if refusals else "no figure of this run can have measured points")
+
+
+def _drawing(dataset: xr.Dataset, kind: str, prefix: str, data: Data | None) -> Drawing:
+    """A figure, with measured points where it can have them."""
+    if data is not None and "data" in kinds.KINDS[kind].takes:
+        with contextlib.suppress(ValueError):
+            return _with_data(dataset, kind, prefix, data)
+    found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
+    try:
+        return found._replace(svg=svg_of(kinds.draw(dataset, kind), prefix))
+    except ValueError as fault:  # such as what one kind alone finds out as it draws
+        return found._replace(lacks=str(fault))
+
+
+def _with_data(dataset: xr.Dataset, kind: str, prefix: str, data: Data) -> Drawing:
+    """A figure with measured points; errors as of those that cannot be drawn in it."""
+    measured = Measured(data, dataset)
+    svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
+    see = f"{SEE.get(kind, '')} {_POINTS_SEEN if measured.has_errors else _BARE_POINTS}".strip()
+    return Drawing(kind, kinds.KINDS[kind].shows, see, svg, measured=measured)
 
 
 def _rupture(dataset: xr.Dataset) -> bool:

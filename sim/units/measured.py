@@ -106,6 +106,6 @@ def _unknown(name: str, known: Iterable[str]) -> str:
     shown = name[:40]
     if name.endswith(ERROR) and name.removesuffix(ERROR) in known:
         return f'column "{shown}" is the error of a column that is missing; add it, or leave the error out'
-    near = difflib.get_close_matches(name, [*known], 1, 0.6)
+    near = difflib.get_close_matches(shown, [*known], 1, 0.6)
     cure = f'did you mean "{near[0]}"?' if near else "leave it out, or give it the name of one (docs/dataset.md)"
     return f'column "{shown}" is neither a variable of a dataset nor a number of the scenario; {cure}'

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import json
 import re
 import shutil
 import subprocess
@@ -14,9 +15,10 @@ import numpy as np
 import pytest
 from helpers.commands import SCENE, sim
 from helpers.pictured import STEADY, drawn, field, mapped, simulated
+from scipy import special
 
 from sim import analysis
-from sim.analysis.observables import all_observables
+from sim.analysis.observables import all_observables, full_area
 from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
@@ -25,6 +27,7 @@ from sim.parts.shear import models as shear
 from sim.plots import kinds
 from sim.plots.style import BOTH, STYLE, fill, rows
 from sim.report import answers, document, figures, html
+from sim.report.measured import agreement, fit_of
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.reader import load
 from sim.spectrum.families import Band
@@ -123,7 +126,13 @@ def here(made, tmp_path, monkeypatch):
 @pytest.fixture
 def bare(monkeypatch):
     """Pages without figures, which take most of the time."""
-    monkeypatch.setattr(document, "drawings", lambda dataset: [])
+    monkeypatch.setattr(document, "drawings", lambda *_: [])
+
+
+@pytest.fixture
+def unwritten(monkeypatch):
+    """Figures that are drawn, but not written as SVG, which takes most of their time."""
+    monkeypatch.setattr(figures, "svg_of", lambda figure, prefix: "<svg></svg>")
 
 
 # -- the page ---------------------------------------------------------------------------------
@@ -378,8 +387,127 @@ def test_steady_stages_say_what_the_mean_over_stick_and_slip_loses_and_to_what()
 def test_where_no_kind_of_scene_fits_nothing_is_claimed(monkeypatch, ramp):
     monkeypatch.setattr(answers, "_ANSWERS", {})
     assert answers.answers(ramp) == []
-    monkeypatch.setattr(document, "drawings", lambda dataset: [])
+    monkeypatch.setattr(document, "drawings", lambda *_: [])
     assert "No sentence of this page fits" in " ".join(Page(html(ramp)).words("p"))
+
+
+# -- measured points, and a fit ---------------------------------------------------------------
+
+
+def measured_about(dataset, *distances):
+    """Points of the area over the speed, so many standard errors of theirs off the curve of a dataset."""
+    at = np.linspace(5, dataset.sizes["t"] - 5, len(distances)).astype(int)
+    some = dataset.isel(t=at)
+    area = some["contact_area"].to_numpy() / float(full_area(some).mean())
+    error = np.full(len(distances), 0.01)
+    return {"speed": some["speed"].to_numpy().reshape(-1, len(at))[0], "area_ratio": area + error * distances} | {
+        "area_ratio_error": error
+    }
+
+
+@pytest.fixture(scope="module")
+def smooth():
+    """A ramp whose members are alike."""
+    return simulated(shear=shear.Uniform())
+
+
+@pytest.mark.usefixtures("unwritten")
+@pytest.mark.parametrize(
+    ("distances", "said"),
+    [((0.5, -1.0, 1.5, 0.2), "agree within"), ((0.5, -4.0, 1.5, 0.2), "do not agree"), ((0, 0, 0, 1e-3), "nearer")],
+)
+def test_data_and_run_agree_where_chi_square_is_as_likely_as_their_errors_make_it(smooth, distances, said):
+    (drawing,) = figures.drawings(smooth, measured_about(smooth, *distances))
+    found = agreement(smooth, [drawing.measured])
+    square, (row,) = float(np.sum(np.square(distances))), found.rows
+    p = special.gammaincc(2.0, 0.5 * square)  # of four degrees of freedom
+    assert said in found.said and f"χ² is {square:.4g} for 4 degrees of freedom, p = {p:.2g}" in found.said
+    assert row == {"measured": "area ratio", "χ²": f"{square:.4g}", "degrees of\nfreedom": "4", "p": f"{p:.2g}"}
+    assert "Rings are measured points with" in drawing.see
+
+
+@pytest.mark.usefixtures("unwritten")
+def test_points_beyond_the_curve_are_counted_and_those_without_errors_not_judged(smooth):
+    points = measured_about(smooth, 1.0, 1.0)
+    beyond = points | {"speed": points["speed"] * [1.0, 1e3]}
+    (drawing,) = figures.drawings(smooth, beyond)
+    said = agreement(smooth, [drawing.measured]).said
+    assert "χ² is 1 for 1 degrees of freedom" in said and said.endswith("; 1 further values lie beyond the curves.")
+    del points["area_ratio_error"]
+    (drawing,) = figures.drawings(smooth, points)
+    found = agreement(smooth, [drawing.measured])
+    assert not found.rows and "cannot be told: they have no errors" in found.said and "Rings" in drawing.see
+
+
+@pytest.mark.usefixtures("unwritten")
+def test_each_curve_of_a_sweep_is_judged_by_its_own_points():
+    dataset = simulated(shear=shear.Uniform(), sweep={"contact.load": [1e-3, 4e-3]})
+    (one, two) = (measured_about(dataset.isel(contact_load=k), 1.0, 2.0, d) for k, d in ((0, 1.0), (1, 9.0)))
+    points = {name: np.concatenate([one[name], two[name]]) for name in one}
+    points["contact_load"] = np.repeat([1e-3, 4e-3], 3)
+    shown = [drawing.measured for drawing in figures.drawings(dataset, points) if drawing.measured]
+    found = agreement(dataset, shown)
+    assert [row["measured"] for row in found.rows] == ["area ratio (P = 1 mN)", "area ratio (P = 4 mN)", "all"]
+    assert [row["χ²"] for row in found.rows] == ["6", "86", "92"]
+    assert found.said.endswith("; farthest from it is area ratio (P = 4 mN).")
+
+
+@pytest.mark.usefixtures("unwritten")
+def test_points_that_the_best_figure_lacks_make_another_and_those_of_none_are_refused(ramp):
+    time = {"t": ramp["t"].to_numpy()[[5, 9]], "friction_force": [1e-3, 1e-3]}
+    first, second = figures.drawings(ramp, time)
+    assert (first.kind, second.kind, second.measured) == ("friction", "curve", None)
+    with pytest.raises(ValueError, match="no column"):
+        figures.drawings(ramp, {"bond_fraction": [0.5]})
+
+
+FIT = {
+    "data": ["d.csv"], "level": 0.95, "chi_square": 3.0, "degrees_of_freedom": 3, "converged": True, "remarks": ["odd"],
+    "numbers": {"bonds.critical_speed": {
+        "value": 2e-2, "unit": "m/s", "standard_error": 2e-4, "low": 19.6e-3, "high": None, "low_open": False,
+        "high_open": True, "start": 3e-2}},
+    "correlations": {"keys": ["bonds.critical_speed"], "matrix": [[1.0]]},
+}  # fmt: skip
+
+
+def fit(path, **changes):
+    path.write_text(json.dumps(FIT | changes))
+    return path
+
+
+@pytest.mark.usefixtures("unwritten")
+def test_a_fit_stands_beside_the_run_and_costs_a_degree_of_freedom_where_it_is_of_these_points(smooth, tmp_path):
+    found = fit_of(fit(tmp_path / "m_fit.json"), smooth)
+    (row,) = found.rows
+    own = float(smooth["bonds_critical_speed"])
+    assert found.said == f"The fit gives bonds.critical_speed = 20.0(2){answers.TIE}mm/s."
+    assert list(row.values()) == [
+        "bonds.critical_speed", "20.0(2) mm/s", "19.6 to unknown", "30 mm/s", analysis.engineering(own, "m/s")
+    ]  # fmt: skip
+    assert "this run has other numbers" in found.notes[1] and found.notes[-1] == "odd" and not found.here
+    (drawing,) = figures.drawings(smooth, measured_about(smooth, 1.0, 1.0, 1.0, 0.0))
+    same = fit_of(
+        fit(
+            tmp_path / "m_fit.json",
+            numbers={"bonds.critical_speed": FIT["numbers"]["bonds.critical_speed"] | {"value": own}},
+        ),
+        smooth,
+    )
+    for fitted, count, freedom in ((found, 1, 4), (same, 2, 3), (same._replace(freedom=9), 1, 4)):
+        judged = agreement(smooth, [drawing.measured], fitted)
+        assert len(judged.rows) == count and f"χ² is 3 for {freedom} degrees" in judged.said
+
+
+@pytest.mark.usefixtures("bare")
+@pytest.mark.parametrize(
+    "text", ["", "{}", "[1]", '{"numbers": {}}', "[" * 10**5, "\xff", json.dumps(FIT | {"numbers": {"a": 1}}),
+             json.dumps(FIT | {"chi_square": None}), json.dumps(FIT | {"correlations": {"keys": ["a"], "matrix": []}})],
+)  # fmt: skip
+def test_what_is_no_result_of_a_fit_is_refused_in_one_line(here, text):
+    Path("m_fit.json").write_bytes(text.encode("latin-1"))
+    done = sim("report", "x.nc", "--fit", "m_fit.json")
+    assert (done.exit_code, len(done.stderr.splitlines())) == (2, 1) and "no result of `sim fit`" in done.stderr
+    assert not Path("x.html").exists()
 
 
 # -- errors, cost, question, repetition -------------------------------------------------------
@@ -448,6 +576,37 @@ def test_markup_in_a_file_is_shown_and_does_nothing(here):
     assert [words for words in found.words("pre") if MARKUP in words and r"\x1b]0;x\x07\u202e" in words]
     assert "49" not in found.words("h1")[0] and "\x1b" not in text
     assert [given for tag, given in found.elements if tag == "style"] == [{}]
+
+
+def test_markup_in_measured_data_and_a_fit_is_shown_and_does_nothing(here):
+    name = "<img src=x onerror=alert(1)>\x1b[31m\u202e{{ 7 * 7 }}.csv"
+    Path(name).write_text("speed [mm/s], area_ratio, area_ratio_error\n1, 0.9, 0.1\n9, 0.8, 0.1\n")
+    key = MARKUP[:60]
+    numbers = {key: FIT["numbers"]["bonds.critical_speed"]}
+    told = fit(Path("m_fit.json"), numbers=numbers, data=[MARKUP], remarks=[MARKUP],
+               correlations={"keys": [key, "<b>"], "matrix": [[1.0, 0.5], [0.5, 1.0]]})  # fmt: skip
+    assert sim("report", "x.nc", "--data", name, "--fit", told).exit_code == 0
+    text = Path("x.html").read_text(encoding="utf-8")
+    found = harmless(Page(text))
+    assert (
+        "\x1b" not in text
+        and "\u202e" not in text
+        and any(r"onerror=alert(1)>\x1b[31m" in one for one in found.words("p"))
+    )
+    assert {key, "<b>"} <= set(found.words("th")) and MARKUP in found.words("p") and "49" not in found.words("p")
+
+
+@pytest.mark.parametrize(
+    "header",
+    ["speed [mm/s], <script>alert(1)</script>", f"speed [mm/s], {'x' * 10**6}", "speed [mm/s], area_ratio [<b>]",
+     "speed [mm/s], area\x1b[31m_ratio", "speed [mm/s], $\\frac{1}{0}$"],
+    ids=["markup", "long", "unit", "control", "mathematics"],
+)  # fmt: skip
+def test_hostile_headings_of_measured_data_are_refused_in_one_short_line(here, header):
+    Path("d.csv").write_text(f"{header}\n1, 0.9\n")
+    done = sim("report", "x.nc", "--data", "d.csv")
+    assert (done.exit_code, len(done.stderr.splitlines())) == (2, 1) and len(done.stderr) < 400
+    assert done.stderr.startswith("d.csv: ") and "\x1b" not in done.stderr and not Path("x.html").exists()
 
 
 @pytest.mark.parametrize(
