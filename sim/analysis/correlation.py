@@ -115,39 +115,46 @@ class Covariance:
     """
 
     def __init__(self, records: int) -> None:
-        self.records, self.sums = records, np.zeros(min(records, _LAGS))
+        self.records, self.lags = records, min(records, _LAGS)
+        self.length = scipy.fft.next_fast_len(self.lags, real=True)
+        self.power = np.zeros((2, self.length + 1), complex)
         self.pieces: list[np.ndarray] = []
-        self.before = 0
+        self.before: list[np.ndarray] = []
 
     def add(self, deviations: np.ndarray) -> None:
         """Go on with the next records of some series, shape (series, records), as deviations from their means."""
         self.pieces.append(deviations)
-        if sum(piece.shape[1] for piece in self.pieces) - self.before >= len(self.sums):
-            self._sum()
+        if sum(piece.shape[1] for piece in self.pieces) >= self.length:
+            self._sum(end=False)
 
     def end(self) -> None:
         """End these series, so that others may follow."""
-        if sum(piece.shape[1] for piece in self.pieces) > self.before:
-            self._sum()
-        self.pieces, self.before = [], 0
+        self._sum(end=True)
+        self.before = []
 
-    def _sum(self) -> None:
-        values, lags, power = np.concatenate(self.pieces, axis=1), len(self.sums), 0.0
-        size = scipy.fft.next_fast_len(values.shape[1] + lags - self.before, real=True)
-        rows = max(1, _AT_ONCE // size)
-        for start in range(0, len(values), rows):
-            some = values[start : start + rows]
-            of_all = scipy.fft.rfft(some, size)
-            each = of_all.real**2 + of_all.imag**2
-            if self.before:  # only products with what is new
-                each = each - scipy.fft.rfft(some[:, : self.before], size) * of_all.conj()
-            power = power + each.sum(axis=0)
-        self.sums += scipy.fft.irfft(power, size)[:lags]
-        self.pieces, self.before = [values[:, -lags:]], min(lags, values.shape[1])
+    def _sum(self, end: bool) -> None:
+        """Add the power of each stretch of ``length`` records, and its product with the stretch before."""
+        values = np.concatenate(self.pieces, axis=1) if self.pieces else np.empty((0, 0))
+        whole = values.shape[1] if end else values.shape[1] // self.length * self.length
+        self.pieces = [values[:, whole:].copy()] if whole < values.shape[1] else []
+        rows = max(1, _AT_ONCE // (2 * self.length))
+        for at in range(0, whole, self.length):
+            before, self.before = self.before, []
+            if not values[:, at : at + self.length].any():
+                continue
+            for k, first in enumerate(range(0, len(values), rows)):
+                found = scipy.fft.rfft(values[first : first + rows, at : at + self.length], 2 * self.length)
+                self.power[0] += np.sum(found.real**2 + found.imag**2, axis=0)
+                if before:
+                    self.power[1] += np.sum(found * before[k].conj(), axis=0)
+                if self.records > self.length:
+                    self.before.append(found)
 
     def over(self, free: float) -> np.ndarray:
         """The covariance, of so many free series."""
-        return self.sums / (free * np.arange(self.records, self.records - len(self.sums), -1))
+        power = self.power[0] + (-1.0) ** np.arange(self.length + 1) * self.power[1]  # one is half the length later
+        sums = scipy.fft.irfft(power, 2 * self.length)[: self.lags]
+        return sums / (free * np.arange(self.records, self.records - self.lags, -1))
 
 
 def autocovariance(values: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator
 import numpy as np
 import xarray as xr
 
-from sim.analysis.blocks import keep
+from sim.analysis.blocks import alone, keep
 from sim.analysis.scene import (
     MEMBERS,
     answered,
@@ -36,6 +36,8 @@ _LOSSES = {
 }
 #: What follows from both orders of charging.
 _DIFFERENCES = frozenset(("lost_to_bonds_last", "order_of_charging"))
+#: Radii that others are compared with.
+_REFERENCES = ("jkr_radius", "hertz_radius")
 #: Trajectories that observables of other names follow from.
 _FROM = {"area_ratio": "contact_area", "fraction_detached": "in_contact", "fraction_masked": "masked"}
 
@@ -60,7 +62,7 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
         ``radius_jkr`` and ``radius_hertz`` [m], without the dimension ``t`` where what holds the sphere stays at all
         points of the sweep. The former is nan where that contact is open, the latter 0.
     """
-    found = dataset[["jkr_radius", "hertz_radius"]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
+    found = dataset[[*_REFERENCES]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
     if bool(stays_held(dataset).all()):
         found = found.isel(t=0, drop=True)
     found = found.astype(float, copy=False).map(ordered)
@@ -193,7 +195,7 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     """
     found = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
     for suffix in ("", *(f"_{kind}" for kind in KEPT)):
-        if f"contact_area{suffix}" in found and {"jkr_radius", "hertz_radius"} <= set(found):
+        if f"contact_area{suffix}" in found and set(_REFERENCES) <= set(found):
             ratio = found[f"contact_area{suffix}"].astype(float, copy=False) / full_area(dataset)
             found[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
         if f"in_contact{suffix}" in found:
@@ -228,21 +230,23 @@ def readings(
 ) -> Iterator[tuple[xr.Dataset, Callable[[xr.Dataset], xr.Dataset]]]:
     """A dataset with one trajectory of the members at a time, and what makes observables of it: those of all in turn.
 
-    What one trajectory takes of memory is then all that is taken; those that shares follow from come together and last.
-    Of ``names`` only those that they follow from.
+    What members have in common comes first; then what one trajectory takes of memory is all that is taken; those that
+    shares follow from come together and last. Of ``names`` only those that they follow from.
     """
     each = [str(name) for name, variable in dataset.data_vars.items() if {MEMBERS, "t"} <= set(variable.dims)]
-    if names is not None:
-        each = [name for name in each if name in {_FROM.get(one, one) for one in names}]
+    wanted = each if names is None else [name for name in each if name in {_FROM.get(one, one) for one in names}]
     of_shares = list[str]()
     if names is None or any(name.startswith(("lost_to", "order_of")) for name in names):
-        of_shares = ["contact_area", *(radius for radius, _ in _LOSSES.values()), "fluctuation_energy"]
+        of_shares = ["contact_area", *(radius for radius, _ in _LOSSES.values()), "fluctuation_energy", "applied_load"]
         with contextlib.suppress(KeyError):  # the dataset does not say
             of_shares.append(control(dataset).kind)
-    for name in [name for name in each if name not in of_shares] or [""] * (not of_shares):
-        yield keep(dataset, name), observables
+    yield keep(dataset), observables
+    for name in wanted:
+        if name not in of_shares:
+            yield alone(dataset, name, *_REFERENCES), observables
     if of_shares:
-        yield keep(dataset, *of_shares), functools.partial(_with_charges, names=names)
+        chosen = alone(dataset, *of_shares, *_REFERENCES) if each else dataset  # statistics alone are small
+        yield chosen, functools.partial(_with_charges, names=names)
 
 
 def _with_charges(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:

@@ -48,7 +48,7 @@ class Series:
         self.members, self.records, self.name, self.step = members, records, name, step
         self.quantiles = _Quantiles()
         self.sums, self.counts = np.zeros(members), np.zeros(members)
-        self.of_record = np.zeros(records)
+        self.of_record = np.zeros(records if members > 1 else 0)
         self.under = np.zeros((len(_LEVELS), members))
         self.moments = np.zeros(3)
         few = members < _MANY
@@ -57,7 +57,8 @@ class Series:
 
     def first(self, values: np.ndarray, rows: slice, times: slice) -> None:
         """Read some records of some members, shape (members, records), for the first time."""
-        self.of_record[times] += values.sum(axis=0)
+        if self.members > 1:
+            self.of_record[times] += values.sum(axis=0)
         sums, counts = values.sum(axis=-1), values.shape[-1]
         if not np.isfinite(sums).all():
             known = np.isfinite(values)
@@ -84,7 +85,7 @@ class Series:
     @functools.cached_property
     def whole(self) -> bool:
         """Whether there is a value everywhere."""
-        return bool(np.all(np.isfinite(self.of_record)))
+        return bool(self.counts.sum() == self.members * self.records)
 
     def second(self, values: np.ndarray, rows: slice, times: slice) -> None:
         """Read some for the second time, in the order of the first, after the first reading of all."""
@@ -364,7 +365,7 @@ def _series(
         if times.start < times.stop:
             pieces.append((block.get(MEMBERS, slice(0, members)), slice(times.start - late, times.stop - late)))
     half = group.isel(t=slice(late, None))
-    if half.nbytes < _KEPT:  # the second reading is of memory
+    if half.nbytes + 64 * half.sizes["t"] < _KEPT:  # the second reading is of memory; series keep records, too
         half.load()
     found: dict[str, tuple[xr.DataArray, bool, Any]] = {}
     parts: dict[str, tuple[xr.DataArray, np.ndarray]] = {}
