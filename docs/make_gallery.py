@@ -518,8 +518,7 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     """In between: on one of {best:g} pN/nm its clutches bear {most} of the {motors:g} pN that its motors can pull
     with. On a softer one, of {soft:g} pN/nm, they bear {softly} pN: they load it for so long that they fail together.
     On a stiff one, of {stiff:g} pN/nm, they bear {stiffly} pN, as each is torn off soon after it has bound, and the
-    filament glides at {glides} nm/s, hardly slower than free. These are means over the second half of the run, of
-    smaller errors than those of its last record, which the figure has.""",
+    filament glides at {glides} nm/s, hardly slower than free. These are means over the second half of the run.""",
     kind="sweep",
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:

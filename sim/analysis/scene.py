@@ -220,8 +220,18 @@ def is_steady(dataset: xr.Dataset) -> bool:
 
 
 def is_stationary(dataset: xr.Dataset) -> bool:
-    """True if speed and control of the contact are constant in time at every point of the sweep."""
-    return is_steady(dataset) and bool(stays_held(dataset).all())
+    """True if the speed, or the force that pulls, and the contact's control are constant in time all over the sweep.
+
+    Under a force from which any trajectory runs away nothing is.
+    """
+    return (is_steady(dataset) or _is_borne(dataset)) and bool(stays_held(dataset).all())
+
+
+def _is_borne(dataset: xr.Dataset) -> bool:
+    """Whether one force pulls all the time, and no trajectory ends in a runaway."""
+    if "drive_force" not in dataset or "runaway_time" not in dataset:
+        return False
+    return bool((word(dataset, "drive.model", "") == "force").all() & dataset["runaway_time"].isel(t=-1).isnull().all())
 
 
 def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:

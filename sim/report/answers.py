@@ -2,34 +2,20 @@
 
 import contextlib
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from sim.analysis import (
-    concise,
-    engineering,
-    is_stationary,
-    is_steady,
-    loss_speeds,
-    setting,
-    settled,
-    summary,
-    sweep_dims,
-)
+from sim.analysis import is_stationary, is_steady, loss_speeds, setting, settled, summary
 from sim.analysis.observables import all_observables
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.scene import answered, speed_name
+from sim.analysis.scene import MEMBERS, answered, control, speed_name, speed_of
 from sim.analysis.statistics import over_members
 from sim.analysis.tables import once
+from sim.laws import jkr
 from sim.plots import kinds
-from sim.units.notation import scaled
+from sim.report.sentences import ROUNDING, TIE, Found, Mean, from_on, led, points_of, ranged, swept
 
-#: The space between a number and its unit, where no line breaks.
-TIE = "\u00a0"
-#: Two means are the same within this many standard errors of their difference, or this part of them.
-_ERRORS, _ROUNDING = 3.0, 1e-9
 #: Mechanisms that take area, in the order in which they are charged.
 _TAKEN = {
     "lost_to_bonds": "broken bonds", "lost_to_fluctuations": "fluctuations",
@@ -42,50 +28,10 @@ _LOSSES = {
 }  # fmt: skip
 #: Share of a force in which friction and what is prescribed differ where something else bears it, too.
 _APART = 1e-3
+#: Members from which on their spread is told.
+_MANY = 16
 #: Points of a sweep that each have a sentence, at most.
 _FEW = 4
-
-
-class Mean(NamedTuple):
-    """A mean with its standard error [SI unit], nan where that is not known."""
-
-    value: float
-    error: float
-    unit: str  # "1" for a share, "" for a count
-
-    def __str__(self) -> str:
-        return self.beside(self)
-
-    def beside(self, other: "Mean") -> str:
-        """The number with its error, in the unit that suits another one."""
-        if self.unit == "":  # a count
-            return concise(self.value, self.error)
-        if self.unit == "1":
-            return f"{concise(100.0 * self.value, 100.0 * self.error)}{TIE}%"
-        factor, shown = scaled(other.value, self.unit)
-        return f"{concise(factor * self.value, factor * self.error)}{TIE}{shown}".replace("-", "−")
-
-    def equals(self, other: "Mean") -> bool:
-        """Whether the two are the same within their errors."""
-        apart = abs(self.value - other.value)
-        errors = np.nan_to_num([self.error, other.error])
-        return bool(apart <= max(_ERRORS * float(np.hypot(*errors)), _ROUNDING * abs(self.value)))
-
-
-class Found(NamedTuple):
-    """Statistics at one place: a point of the sweep, at one time or of a whole run, in words."""
-
-    statistics: xr.Dataset
-    words: str
-
-    def mean(self, name: str) -> Mean | None:
-        """The mean of an observable there; None where it is not known."""
-        if f"{name}_mean" not in self.statistics:
-            return None
-        mean, error = (self.statistics.get(f"{name}_{kind}", xr.DataArray(np.nan)) for kind in ("mean", "sem"))
-        value = float(mean)
-        unit = "" if name == "slip_count" else str(mean.attrs.get("units", "1"))
-        return Mean(value, float(error), unit) if np.isfinite(value) else None
 
 
 #: What a whole run has once, and sentences that a dataset and these statistics of it give.
@@ -124,55 +70,21 @@ def _sliding(dataset: xr.Dataset, kind: str) -> list[Answer]:
     return [_stick_and_slip, *counted, *([_KINETIC] if is_stationary(dataset) else [])]
 
 
-def _places(dataset: xr.Dataset, found: xr.Dataset) -> list[Found]:
-    """Each point of the sweep, with the swept values in words."""
-    several = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
-    shape = [dataset.sizes[name] for name in sweep_dims(dataset)]
-    places = []
-    for at in np.ndindex(*shape):
-        point = dict(zip(sweep_dims(dataset), at, strict=True))
-        words = ", ".join(_swept(dataset[name][point[name]]) for name in several)
-        places.append(Found(found.isel(point, missing_dims="ignore"), words))
-    return places
-
-
-def _swept(value: xr.DataArray) -> str:
-    """A swept value with its key: ``contact load 4 mN``."""
-    number = value.item()
-    if value.dtype.kind in "fi":
-        number = engineering(number, value.attrs.get("units", "1")).replace("-", "−").replace(" ", TIE)
-    return f"{str(value.name).replace('_', ' ')} {number}"
-
-
-def _led(words: str, sentence: str) -> str:
-    """A sentence with the place that it is of, if that has words."""
-    return f"With {words}, {sentence[0].lower()}{sentence[1:]}" if words else sentence
-
-
 def _at_the_end(dataset: xr.Dataset) -> xr.Dataset:
-    """Statistics over the members at the last record; of steady runs those of the means over the second half."""
-    if is_stationary(dataset):
-        return summary(settled(all_observables(dataset)), quantiles=False).isel(t=-1)
-    return summary(all_observables(dataset.isel(t=[-1])), quantiles=False).isel(t=-1)
+    """Statistics over the members at the last record; of steady runs those of the means over the second half.
 
-
-def _ranged(places: list[Found], name: str, what: str) -> Iterator[str]:
-    """A sentence on an observable over the sweep: what it is, or its least and largest values and where they are.
-
-    None where it is zero throughout.
+    Beside them the standard deviation of the area between members at one time, with its standard error.
     """
-    known = [(place, mean) for place in places if (mean := place.mean(name)) is not None]
-    if not known:
-        return
-    (low, least), (high, most) = (pick(known, key=lambda one: one[1].value) for pick in (min, max))
-    if least.value == most.value == 0.0:
-        return
-    if len(known) == 1:
-        yield f"{what} is {most}{f' ({high.words})' if high.words else ''}."
-    elif least.equals(most) or least.beside(most) == str(most):
-        yield f"{what} is {most} everywhere in the sweep."
-    else:
-        yield f"{what} goes from {least.beside(most)} ({low.words}) to {most} ({high.words})."
+    late, last = is_stationary(dataset), all_observables(dataset.isel(t=[-1]))
+    found = summary(settled(all_observables(dataset)) if late else last, quantiles=False).isel(t=-1)
+    if "area_ratio" in last and last.sizes.get(MEMBERS, 1) >= _MANY:
+        apart = last["area_ratio"].isel(t=0)
+        apart = apart - apart.mean(MEMBERS)
+        spread = apart.std(MEMBERS, ddof=1)
+        peaked = (apart**4).mean(MEMBERS) / spread.where(spread > 0.0) ** 4
+        error = 0.5 * spread * ((peaked - 1.0) / apart.sizes[MEMBERS]) ** 0.5
+        found = found.assign(area_spread_mean=spread.assign_attrs(units="1"), area_spread_sem=error)
+    return found
 
 
 def _area_over_speed(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
@@ -183,10 +95,10 @@ def _area_over_speed(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
     """
     if speed_name(dataset) != "speed":
         if is_stationary(dataset):
-            places = _places(dataset, _at_the_end(dataset))
-            yield from _ranged(places, "area_ratio", "The contact area over JKR's")
+            places = points_of(dataset, _at_the_end(dataset))
+            yield from ranged(places, "area_ratio", "The contact area over JKR's")
             for name, words in _TAKEN.items():
-                yield from _ranged(places, name, f"What is lost of JKR's area to {words}")
+                yield from ranged(places, name, f"What is lost of JKR's area to {words}")
         return
     given = dataset
     if is_steady(dataset):
@@ -196,11 +108,11 @@ def _area_over_speed(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
         axis, found = "t", summary(all_observables(dataset.isel(t=[0, -1])), quantiles=False)
     sizes = abs(found["speed_mean"]).max([name for name in found["speed_mean"].dims if name != axis])
     ends = int(np.argmin(sizes.to_numpy())), int(np.argmax(sizes.to_numpy()))
-    slow, fast = (_places(dataset, found.isel({axis: end})) for end in ends)
+    slow, fast = (points_of(dataset, found.isel({axis: end})) for end in ends)
     if len(fast) > _FEW:
-        yield from _ranged(fast, "area_ratio", "The contact area over JKR's at the highest speed")
+        yield from ranged(fast, "area_ratio", "The contact area over JKR's at the highest speed")
         return
-    losses = _places(dataset, loss_speeds(given))
+    losses = points_of(dataset, loss_speeds(given))
     for before, after, lost in zip(slow, fast, losses, strict=True):
         area, left = before.mean("area_ratio"), after.mean("area_ratio")
         speeds = [place.mean("speed") for place in (before, after)]
@@ -208,12 +120,12 @@ def _area_over_speed(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
             continue
         way = f"from {speeds[0]} to {speeds[1]}"
         if area.equals(left):
-            yield _led(after.words, f"The contact area does not change {way}: it is {left} of JKR's.")
+            yield led(after.words, f"The contact area does not change {way}: it is {left} of JKR's.")
             continue
         verb = "falls" if left.value < area.value else "grows"
         said = f"The contact area {verb} from {area} to {left} of JKR's, {way}{_taken(after)}."
         known = list(filter(None, (_speed(lost.statistics, name, words) for name, words in _LOSSES.items())))
-        yield _led(after.words, f"{said} It has lost {', '.join(known)}." if known else said)
+        yield led(after.words, f"{said} It has lost {', '.join(known)}." if known else said)
 
 
 def _speed(found: xr.Dataset, name: str, words: str) -> str:
@@ -221,25 +133,43 @@ def _speed(found: xr.Dataset, name: str, words: str) -> str:
     speed, low, high = (Mean(float(found.get(f"{name}{end}", np.nan)), 0.0, "m/s") for end in ("", "_low", "_high"))
     if not np.isfinite(speed.value):
         return ""
-    spans = np.isfinite(low.value) and high.value - low.value > _ROUNDING * speed.value
+    spans = np.isfinite(low.value) and high.value - low.value > ROUNDING * speed.value
     return f"{words} at {speed}{f' (95{TIE}%: {low.beside(speed)} to {high.beside(speed)})' if spans else ''}"
 
 
 def _taken(place: Found) -> str:
     """What each mechanism takes of JKR's area at a place, in words."""
     shares = {words: place.mean(name) for name, words in _TAKEN.items()}
-    taken = [f"to {words} {mean}" for words, mean in shares.items() if mean is not None and abs(mean.value) > _ROUNDING]
+    taken = [f"to {words} {mean}" for words, mean in shares.items() if mean is not None and abs(mean.value) > ROUNDING]
     order = ", charged in this order" if len(taken) > 1 else ""
     return f"; of JKR's area there is lost {', '.join(taken)}{order}" if taken else ""
 
 
 def _area_over_sweep(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
-    """The range of the area over a sweep or of a single run, over JKR's."""
+    """The range of the area over a sweep or of a single run, over JKR's, from where on adhesion is masked, friction."""
     when = "" if is_stationary(dataset) else " at the end of the run"
-    places = _places(dataset, _at_the_end(dataset))
-    yield from _ranged(places, "area_ratio", f"The contact area over JKR's{when}")
+    found = _at_the_end(dataset)
+    places = points_of(dataset, found)
+    closed = [place for place in places if (opened := place.mean("fraction_detached")) is None or opened.value < 1.0]
+    yield from ranged(closed, "area_ratio", f"The contact area over JKR's{when}")
+    if 0 < len(places) - len(closed) <= _FEW:
+        yield f"The contact is open with {', '.join(place.words for place in places if place not in closed)}."
     if len(places) == 1 and (taken := _taken(places[0])):
         yield f"Of{taken.removeprefix('; of')}."
+    yield from ranged(closed, "area_spread", "Its standard deviation between the members at the end of the run")
+    yield from from_on(dataset, places, [place.mean("fraction_masked") for place in places], "Adhesion is masked")
+
+
+def _friction_over_sweep(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
+    """The range of friction over a sweep of steady runs, and whether it is in proportion to the area."""
+    if not is_stationary(dataset) or speed_name(dataset) == "stage_speed":
+        return
+    places = points_of(dataset, _at_the_end(dataset))
+    closed = [place for place in places if (opened := place.mean("fraction_detached")) is None or opened.value < 1.0]
+    yield from ranged(closed, "friction_force", "Friction")
+    stresses = [stress for place in closed if (stress := place.mean("shear_stress"))]
+    if stresses and all(stress.equals(stresses[0]) for stress in stresses):
+        yield from ranged(closed, "shear_stress", "The mean shear stress, friction over contact area,")
 
 
 def _area_over_theories(dataset: xr.Dataset, found: xr.Dataset) -> Iterator[str]:
@@ -247,16 +177,16 @@ def _area_over_theories(dataset: xr.Dataset, found: xr.Dataset) -> Iterator[str]
     (dim,) = setting(dataset, "contact.reversible").dims
     for number in range(dataset.sizes[dim] if dataset.sizes[dim] <= _FEW else 0):
         for said in _area_over_sweep(dataset.isel({dim: [number]}), found):
-            yield _led(_swept(dataset["contact_reversible"][number]), said)
+            yield led(swept(dataset["contact_reversible"][number]), said)
 
 
 def _of_the_run(*asked: tuple[str, str]) -> Answer:
     """Sentences on what a whole run has once: names of events, and what each is in words."""
 
     def answer(dataset: xr.Dataset, found: xr.Dataset) -> Iterator[str]:
-        places = _places(dataset, found)
+        places = points_of(dataset, found)
         for name, words in asked:
-            yield from _ranged(places, name, words)
+            yield from ranged(places, name, words)
 
     return answer
 
@@ -269,49 +199,102 @@ def _friction(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
     named = ("The largest friction", "The least friction")
     words = ("Friction in one direction", "Friction in the other") if both else named
     for end, what in zip((mean.argmax("t"), mean.argmin("t")), words, strict=True):
-        yield from _ranged(_places(dataset, found.isel(t=end)), "friction_force", what)
+        yield from ranged(points_of(dataset, found.isel(t=end)), "friction_force", what)
+
+
+def _stroke(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
+    """How far stage and slider go in the last whole stroke of a stage that goes there and back, and its work."""
+    words = {
+        "stage_position": "The way of the stage in a stroke", "slider_position": "The way of the slider in it",
+        "drive_work": "The work of the stage in it",
+    }  # fmt: skip
+    stage = speed_of(dataset).to_numpy()
+    if not {*words} <= {*dataset.data_vars} or stage.ndim > 1:  # points of a sweep may turn at different times
+        return
+    moving = np.flatnonzero(stage)
+    turns = moving[np.flatnonzero(np.diff(np.sign(stage[moving])))]
+    if turns.size > 1:
+        ends = dataset[[*words]].isel(t=turns[-2:]).astype(float)
+        gone = {name: abs(one.diff("t").isel(t=0)).assign_attrs(one.attrs) for name, one in ends.items()}
+        found = summary(xr.Dataset(gone), quantiles=False)
+        for name, what in words.items():
+            yield from ranged(points_of(dataset, found), name, what)
+
+
+def _read_work(dataset: xr.Dataset, _: xr.Dataset) -> Iterator[str]:
+    """What a JKR test reads: the energy release rate of load and radius, on the way to the largest load and back."""
+    if control(dataset).kind != "load" or "normal_load" not in dataset:
+        return
+    load, radius = dataset["normal_load"].astype(float), dataset["contact_radius"].astype(float)
+    sphere = setting(dataset, "sphere.radius"), dataset["contact_modulus"]
+    read = xr.apply_ufunc(jkr.energy_release_rate, radius.where(radius > 0.0), load, *sphere)
+    loading = dataset["t"] <= load.idxmax("t")
+    ways = {"loading": read.where(loading).mean("t"), "unloading": read.where(~loading).mean("t")}
+    found = summary(xr.Dataset({way: one.assign_attrs(units="J/m^2") for way, one in ways.items()}), quantiles=False)
+    for way in ways:
+        what = f"The work of adhesion that JKR's theory reads off load and radius, on average while {way},"
+        yield from ranged(points_of(dataset, found), way, what)
+
+
+def _pull_off(dataset: xr.Dataset, whole: xr.Dataset) -> Iterator[str]:
+    """The largest pull that the contacts bear that come off."""
+    gone = [
+        place for place in points_of(dataset, whole) if (share := place.mean("ever_detached")) and share.value > 0.0
+    ]
+    yield from ranged(gone, "pull_off_load", "The pull-off load, the lowest that the contact bears,")
 
 
 def _creep(dataset: xr.Dataset, whole: xr.Dataset) -> Iterator[str]:
     """How fast what bears its force to the end creeps there, and when what does not gives way."""
-    found = _places(dataset, whole)
-    late = _places(dataset, summary(all_observables(dataset.isel(t=[-1])), quantiles=False).isel(t=-1))
+    steady = is_stationary(dataset)
+    found, late = points_of(dataset, whole), points_of(dataset, _at_the_end(dataset))
     shares = [share.value if (share := place.mean("ran_away")) else 0.0 for place in found]
     borne = [place for place, share in zip(late, shares, strict=True) if share == 0.0]
     gone = [place for place, share in zip(found, shares, strict=True) if share > 0.0]
     force = dataset["spring_force"]
     if bool((force.max("t") > force.min("t")).any()):
-        yield from _ranged(gone, "static_friction", "The force at which the contact gives way")
-    yield from _ranged(borne, "speed", "Where the force is borne to the end of the run, the speed there")
+        yield from ranged(gone, "static_friction", "The force at which the contact gives way")
+    yield from from_on(dataset, found, [place.mean("ran_away") for place in found], "The contact gives way")
+    creeps = "The speed" if steady else "Where the force is borne to the end of the run, the speed there"
+    yield from ranged(borne, "speed", creeps)
     if "friction_force" in dataset and bool((abs(1.0 - dataset["friction_force"] / force).isel(t=-1) > _APART).any()):
-        yield from _ranged(borne, "friction_force", "The part of the force that the bonds bear there, friction,")
-    yield from _ranged(gone, "runaway_after", "The time after which the contact gives way")
+        part = (
+            "The part of the force that the bonds bear, friction," if steady else "Friction, what the bonds bear there,"
+        )
+        yield from ranged(borne, "friction_force", part)
+    yield from ranged(gone, "runaway_after", "The time after which the contact gives way")
     if any(share not in (0.0, 1.0) for share in shares):
-        yield from _ranged(found, "ran_away", "The share of the members whose contact gives way")
+        yield from ranged(found, "ran_away", "The share of the members whose contact gives way")
 
 
 def _stick_and_slip(dataset: xr.Dataset, whole: xr.Dataset) -> Iterator[str]:
     """Speeds of a stage between which slips follow each other, and behind which springs they never do."""
-    places = _places(dataset, whole)
+    places = points_of(dataset, whole)
     onset = "The onset of stick-slip, the speed of the stage at the first slip that another one follows,"
-    yield from _ranged(places, "slips_from", onset)
+    yield from ranged(places, "slips_from", onset)
     end = "The end of stick-slip as the stage gets slower, its speed at the last slip that follows another,"
-    yield from _ranged(places, "slips_down_to", end)
+    yield from ranged(places, "slips_down_to", end)
     ends = ("slips_from", "slips_down_to")
+    if is_stationary(dataset):
+        counts = [place.mean("slip_count") for place in places]
+        slipping = [count and count._replace(value=float(count.value > 0.0)) for count in counts]
+        yield from from_on(dataset, places, slipping, "It sticks and slips")
     calm = [place.words for place in places if not any(place.mean(name) for name in ends)]
     if 0 < len(calm) < len(places):
         yield f"Slips never follow each other with {', '.join(calm) if len(calm) <= _FEW else f'{len(calm)} of these'}."
 
 
+_PEAK = _of_the_run(
+    ("peak_stress", "The maximum of the shear stress on the ramp"), ("peak_speed", "The sliding speed at that maximum")
+)
 _OPENINGS = _of_the_run(("ever_detached", "The share of the members that come off"))
 
 #: What answers the question of a scene, by the kind of figure that fits it.
 _ANSWERS: dict[str, tuple[Answer, ...]] = {
     "loop": (
-        _of_the_run(
-            ("loop_dissipation", "The energy dissipated in a cycle there and back"),
-            ("pull_off_load", "The lowest load that the contact bears"),
-        ),
+        _read_work,
+        _of_the_run(("loop_dissipation", "The energy dissipated in a cycle there and back")),
+        _pull_off,
     ),
     "theories": (_area_over_theories,),
     "stress": (
@@ -322,9 +305,9 @@ _ANSWERS: dict[str, tuple[Answer, ...]] = {
     ),
     "stability": (),
     "creep": (_creep,),
-    "friction": (_friction,),
-    "curve": (_area_over_speed, _of_the_run(("peak_stress", "The maximum of the shear stress on the ramp")), _OPENINGS),
-    "sweep": (_area_over_sweep, _OPENINGS),
+    "friction": (_stroke, _friction),
+    "curve": (_area_over_speed, _PEAK, _OPENINGS),
+    "sweep": (_area_over_sweep, _friction_over_sweep, _OPENINGS),
     "time": (_area_over_sweep, _OPENINGS),
 }
 _COUNTED = _of_the_run(

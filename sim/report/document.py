@@ -16,9 +16,10 @@ from sim.analysis.statistics import over_members
 from sim.analysis.tables import once
 from sim.numerics import hdf5
 from sim.numerics.files import output, read_whole
-from sim.report.answers import TIE, answers
+from sim.report.answers import answers
 from sim.report.figures import Data, drawings
 from sim.report.measured import agreement, fit_of
+from sim.report.sentences import TIE
 from sim.scenario.toml_text import toml
 from sim.units.refusals import BadInput
 from sim.units.terminal import plain

@@ -21,6 +21,7 @@ from matplotlib.path import Path
 
 from sim.analysis import is_stationary, is_steady, speed_of
 from sim.plots import kinds
+from sim.plots.bond_laws import rest_of
 from sim.plots.choices import Choices
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE
@@ -55,6 +56,12 @@ SEE = {
     "spectrum": "The spectrum of the maps beside the one that the scenario asks for.",
     "profile": "The gap beyond the contact's edge: the neck is what adhesion pulls up.",
 }
+#: The figure of stresses after starts from rest, and what to look at in it.
+_STARTS = (
+    "Shear stress after the start of sliding, and its peak over speed or time at rest.",
+    "A dot is a peak that the stress falls from, a ring the largest stress where that is not resolved; thin lines are"
+    " closed forms: the peak if no bond rebinds, and steady sliding.",
+)
 #: What to look at where there are measured points, with errors and without.
 _BARE_POINTS = "Rings are measured points."
 _POINTS_SEEN = (
@@ -108,11 +115,15 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     best = kinds.default(dataset)
     could = kinds.drawable(dataset)
     others = [kind for kind in could if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
-    # theories have an axis of their own; the end of a run that is on its way says little; time is no more than another
-    # axis for a speed that rises; and only bonds with a rupture law have a maximum of the stress, which transients
-    # after steps between few speeds do not show
-    less = {"sweep": best == "theories" or not is_stationary(dataset), "time": best == "curve"}
-    less["stress"] = best != "stress" and (_steps(dataset) or not _rupture(dataset))
+    # theories have an axis of their own; the end of a run that is on its way says little, and over the speed a sweep
+    # is a curve already; only bonds with a rupture law have a maximum of the stress, which transients after steps
+    # between few speeds do not show, nor many springs upon each other
+    lasts = is_stationary(dataset)
+    less = {"sweep": best in ("theories", "curve") or not lasts, "friction": best in ("creep", "stability")}
+    less["curve"] = best == "creep"  # whose speed nothing sets
+    less["stress"] = best != "stress" and (best == "stability" or _steps(dataset) or not _rupture(dataset))
+    # time is no more than another axis for a speed that rises or for creep, and nothing happens in it where a run lasts
+    less["time"] = best in ("curve", "creep", "stability") or (best != "time" and lasts and "incipient" not in could)
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
     found = [_drawing(dataset, kind, f"f{number}-", data) for number, kind in enumerate(dict.fromkeys(shown))]
     if data is None or any(one.measured for one in found):
@@ -133,7 +144,7 @@ def _drawing(dataset: xr.Dataset, kind: str, prefix: str, data: Data | None) -> 
     if data is not None and "data" in kinds.KINDS[kind].takes:
         with contextlib.suppress(ValueError):
             return _with_data(dataset, kind, prefix, data)
-    found = Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
+    found = _captioned(dataset, kind)
     try:
         return found._replace(svg=svg_of(kinds.draw(dataset, kind), prefix))
     except ValueError as fault:  # such as what one kind alone finds out as it draws
@@ -144,8 +155,15 @@ def _with_data(dataset: xr.Dataset, kind: str, prefix: str, data: Data) -> Drawi
     """A figure with measured points; errors as of those that cannot be drawn in it."""
     measured = Measured(data, dataset)
     svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
-    see = f"{SEE.get(kind, '')} {_POINTS_SEEN if measured.has_errors else _BARE_POINTS}".strip()
-    return Drawing(kind, kinds.KINDS[kind].shows, see, svg, measured=measured)
+    found, points = _captioned(dataset, kind), _POINTS_SEEN if measured.has_errors else _BARE_POINTS
+    return found._replace(see=f"{found.see} {points}", svg=svg, measured=measured)
+
+
+def _captioned(dataset: xr.Dataset, kind: str) -> Drawing:
+    """A figure that is not drawn yet, with its caption."""
+    if kind == "stress" and rest_of(dataset) is not None:
+        return Drawing(kind, *_STARTS)
+    return Drawing(kind, kinds.KINDS[kind].shows, SEE.get(kind, ""))
 
 
 def _rupture(dataset: xr.Dataset) -> bool:

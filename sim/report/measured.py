@@ -12,8 +12,8 @@ from sim.analysis import concise, engineering, setting, sweep_dims
 from sim.numerics.files import read_whole
 from sim.plots.measured import Measured, Residuals
 from sim.plots.style import swept_value
-from sim.report.answers import TIE
 from sim.report.figures import plain_text
+from sim.report.sentences import TIE
 from sim.units.notation import scaled
 from sim.units.refusals import BadInput
 
@@ -80,7 +80,7 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fitted: Fitted | None 
         rows.append(_row(f"all, {less} numbers fitted" if less else "all", square, count - less))
     p = _probability(square, count - less)
     beyond = sum(one.values.size - _count(one) for one in found)
-    number = f"χ² is {square:.4g} for {count - less} degrees of freedom, p {_share(p, '= ')}"
+    number = f"χ² is {square:.4g} for {count - less} degrees of freedom, p{TIE}{_share(p, f'={TIE}')}"
     number += f"; {beyond} further values lie beyond the curves" if beyond else ""
     if p > _APART:
         near = ", nearer than such errors let expect: they may be too large" if p > _TOO_NEAR else ""
