@@ -28,8 +28,9 @@ from sim.units.terminal import plain
 _ROWS = 24
 #: Longest log that is read [byte], and longest text of a scenario that is shown.
 _LOG, _TEXT = 2**20, 200_000
-#: Size of a dataset that is held in memory [byte].
+#: Size of what is held in memory of a dataset [byte], and what is read most.
 _WHOLE = 2**29
+_OFTEN = ("contact_radius", "contact_area", "work_of_adhesion", "fluctuation_energy", "friction_force")
 #: A share below it is nothing.
 _ROUNDING = 1e-12
 #: Attributes on where a dataset comes from, in the page's words.
@@ -104,8 +105,7 @@ def html(
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy: for this command alone
 
-    if dataset.nbytes < _WHOLE:  # what several figures and tables read is read once
-        dataset = dataset.load()
+    dataset = _held(dataset)
     fitted = None if fit is None else fit_of(Path(fit), dataset)
     shown = drawings(dataset, data)
     points = [one.measured for one in shown if one.measured]
@@ -138,6 +138,17 @@ def html(
         source=str(source),
         saved=f"{stem}.toml" if dataset.attrs.get("scenario_toml") else f"{stem}.json",
     )
+
+
+def _held(dataset: xr.Dataset) -> xr.Dataset:
+    """A dataset of which what several figures and tables read is in memory, as far as there is room for it."""
+    room, found = _WHOLE, {}
+    for name in sorted(dataset.data_vars, key=lambda name: (dataset[name].nbytes, name not in _OFTEN)):
+        room -= dataset[name].nbytes
+        if room < 0:
+            break
+        found[name] = dataset[name].load()
+    return dataset.assign(found)
 
 
 def _cleaned(value: Any) -> Any:

@@ -574,6 +574,17 @@ def test_what_is_no_result_of_a_fit_is_refused_in_one_line(here, text):
     assert not Path("x.html").exists()
 
 
+def test_of_a_large_file_only_as_much_is_held_in_memory_as_there_is_room_for(here, monkeypatch):
+    with analysis.scene.open("x.nc") as dataset:
+        size = dataset["contact_radius"].nbytes
+        small = sum(one.nbytes for one in dataset.data_vars.values() if one.nbytes < size)
+        monkeypatch.setattr(document, "_WHOLE", small + 2 * size)
+        held = document._held(dataset)
+        large = [str(name) for name, one in held.data_vars.items() if one.nbytes == size]
+        inside = [name for name in large if isinstance(held[name].variable._data, np.ndarray)]
+    assert len(inside) == 2 and {*inside} <= {*document._OFTEN} and len(large) > 5
+
+
 # -- errors, cost, question, repetition -------------------------------------------------------
 
 
