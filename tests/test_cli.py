@@ -284,6 +284,10 @@ def test_an_output_that_can_only_fail_is_refused_before_the_first_step(here, mon
     with monkeypatch.context() as patched:
         patched.setattr("os.access", lambda path, how: Path(path) != here)
         assert sim("run", "scene.toml", "-o", "x.nc").stderr == "x.nc: Permission denied\n"
+    with monkeypatch.context() as patched:  # as in /proc, whose rights say nothing
+        patched.setattr("tempfile.TemporaryFile", lambda dir: Path("nowhere/x").touch())
+        done = sim("run", "scene.toml", "-o", "x.nc")
+        assert done.exit_code == 74 and f"x.nc: no file can be made in {here}" in done.stderr
     done = sim("run", "scene.toml", "-o", "loop.nc")
     assert (done.exit_code, done.stderr) == (74, "loop.nc: Too many levels of symbolic links\n")
     assert sorted(path.name for path in here.iterdir()) == ["loop.nc", "scene.toml"]

@@ -6,6 +6,7 @@ import fcntl
 import os
 import shutil
 import stat
+import tempfile
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
@@ -93,12 +94,14 @@ def claim(
         for folder in (folder for folder in path.absolute().parents if folder.exists()):
             for name in {*path.parts, *(one.name for one in names)}:
                 _is_there(folder / name)  # which refuses names that are too long
-            if not os.access(folder, os.W_OK | os.X_OK) and not path.is_relative_to("/dev"):
-                raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+            if not path.is_relative_to("/dev"):
+                _refuse_closed(path, folder)
             break
     except UnicodeEncodeError:
         shown = str(path).encode(errors="replace").decode()
         raise BadInput([f"{shown}: the name is not UTF-8 text; name another file"]) from None
+    except StoreTrouble:
+        raise
     except OSError as trouble:
         raise StoreTrouble(f"{path}: {trouble.strerror}") from trouble
     if any(one.exists() and each.exists() and one.samefile(each) for one in names for each in inputs):
@@ -109,6 +112,17 @@ def claim(
         if path.suffix == ".toml":
             raise BadInput([f"{path} is a scenario by its name, which is never replaced; name another file"])
         guard(path)
+
+
+def _refuse_closed(path: Path, folder: Path) -> None:
+    """Refuse a folder in which no file can be made: its rights say nothing of /proc, or of a disk without inodes."""
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as trouble:
+        said = f"{path}: no file can be made in {folder} ({trouble.strerror}); name a file in another folder"
+        raise StoreTrouble(said) from trouble
 
 
 def _is_there(path: Path) -> bool:

@@ -70,8 +70,9 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
     numbers = (work, size, dataset["contact_modulus"], stiffness)
     theories = [Theory(*(style.number_at(number, line.point) for number in numbers)) for line in scene.lines]
-    figure, panels = style.rows([2.1, 1.5, 1.8], shared=False)
-    loads, radii, loaded = panels
+    compared = data is not None and data.has_errors
+    figure, panels = style.rows([2.1, 1.5, 1.8] + [0.8] * compared, shared=False)
+    loads, radii, loaded, *below = panels
     force = style.in_unit(loads.yaxis, "normal load $P$", scene.all("normal_load_mean"), "N")
     length = style.in_unit(radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m")
     loaded.set_ylabel(radii.get_ylabel())
@@ -87,10 +88,15 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
             _cycle(panel, placed, name, line, factor, kind, style.number_at(cycles, line.point))
         beside(panel, placed, name, factor)
         style.across(panel, placed.reach, placed.words, room=0.03)
-    _equilibria(panels, scene, theories, (scene.unit.factor, force, length))
+    _equilibria(panels[:3], scene, theories, (scene.unit.factor, force, length))
     _levels(loads, theories, force)
     if data:
-        data.refuse_undrawn(over if data.column(over) else "normal_load")
+        along = scene if data.column(over) else of_load
+        data.refuse_undrawn(along.over)
+        for panel in below:
+            data.residual_panel(panel, {line.number for line in along.lines}, along.over)
+            style.across(panel, along.reach, along.words, room=0.03)
+        style.legend(loaded)
     for panel in (radii, loaded):
         panel.set_ylim(bottom=0.0)
     loads.sharex(radii)

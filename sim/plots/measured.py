@@ -1,5 +1,6 @@
 """Measured points over the curves of a dataset, from a CSV table, and how far the curves are from them."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -37,24 +38,36 @@ class Compared(NamedTuple):
     error: np.ndarray
     full: np.ndarray
 
-    def at(self, x: np.ndarray, values: np.ndarray) -> np.ndarray:
-        """Values along the curve at other places; nan beyond its ends, and where it turns back."""
-        step = np.diff(self.x)
-        if not (np.all(step > 0.0) or np.all(step < 0.0)):
-            return np.full(x.shape, np.nan)
-        order = np.argsort(self.x)
-        return np.interp(x, self.x[order], values[order], np.nan, np.nan)
+    def at(self, x: np.ndarray, *along: np.ndarray) -> list[np.ndarray]:
+        """Values along each branch of the curve at other places, shape (branches, places), nan beyond its ends.
+
+        A branch goes one way from turn to turn.
+        """
+        way = np.sign(np.diff(self.x))
+        ends = np.flatnonzero(np.diff(way)) + 1
+        branches = [slice(a, b + 1) for a, b in itertools.pairwise([0, *ends, len(way)]) if way[a] != 0.0]
+        found = [[np.full(x.shape, np.nan)] for _ in along]
+        for branch in branches:
+            order = np.argsort(self.x[branch])
+            for kept, values in zip(found, along, strict=True):
+                kept.append(np.interp(x, self.x[branch][order], values[branch][order], np.nan, np.nan))
+        return [np.array(kept[1:] or kept) for kept in found]
 
 
 class Residuals(NamedTuple):
-    """How far points are from a curve, in standard errors of both: variable, number, colour and point of the curve."""
+    """How far points are from a curve, in standard errors of both: variables over and of it, number, colour and point.
 
+    Of a curve of several ``branches``, there and back, it is the nearest of them: less than the errors would leave.
+    """
+
+    over: str
     name: str
     number: int
     colour: str
     x: np.ndarray
     values: np.ndarray
     point: dict[str, int]
+    branches: int
 
 
 class Measured:
@@ -105,7 +118,9 @@ class Measured:
         if (found := self.column(name)) is not None:
             return found
         if name == "area_ratio" and (area := self._values("contact_area", curve, x)) is not None:
-            full = curve.full[0] if np.ptp(curve.full) == 0.0 else curve.at(x, curve.full)
+            (branches,) = curve.at(x, curve.full)
+            several = np.full(x.shape, np.nan) if len(branches) > 1 else branches[0]
+            full = curve.full[0] if np.ptp(curve.full) == 0.0 else several
             return Points(area.values / full, None if area.errors is None else area.errors / full)
         by, power, factor = _BY.get(name, ("", 1.0, 1.0))
         if by not in self.table:
@@ -133,21 +148,25 @@ class Measured:
             if high is not None and (told or len(curves) == 1):
                 placed = curve._replace(x=np.log(curve.x)) if log else curve
                 at = np.log(x[rows]) if log else x[rows]
-                mean, error = placed.at(at, curve.mean), np.nan_to_num(placed.at(at, curve.error))
-                off = (y - mean) / np.hypot(high, error)
+                means, errors = placed.at(at, curve.mean, curve.error)
+                branches = (y - means) / np.hypot(high, np.nan_to_num(errors))
+                nearest = np.argmin(np.nan_to_num(np.abs(branches), nan=np.inf), axis=0)
+                off = np.take_along_axis(branches, nearest[np.newaxis], 0)[0]
                 known = np.isfinite(off)
                 if np.any(known):
                     colour = curve.colour if told else BOTH
-                    self.residuals.append(Residuals(name, curve.number, colour, x[rows], off, curve.point))
+                    own = over[0], name, curve.number, colour, x[rows], off, curve.point, len(branches)
+                    self.residuals.append(Residuals(*own))
                     words.append(rf"$\chi^2$ = {np.sum(off[known] ** 2):.4g} of {np.sum(known)}")
+                    words[-1] += " (nearest branch)" * (len(branches) > 1)
             look: Any = HOLLOW | {"color": curve.colour if told else BOTH, "elinewidth": 0.7, "zorder": 3}
             side = None if wide is None else wide[rows]
             panel.errorbar(x[rows], y, high, side, label=", ".join(words), **look)
             self.shown.add(name)
 
-    def residual_panel(self, panel: Axes, numbers: set[int]) -> None:
-        """How far the points are from curves of some numbers, in standard errors."""
-        own = [one for one in self.residuals if one.number in numbers]
+    def residual_panel(self, panel: Axes, numbers: set[int], over: str) -> None:
+        """How far the points are from curves of some numbers over a variable, in standard errors."""
+        own = [one for one in self.residuals if one.number in numbers and one.over == over]
         names = list(dict.fromkeys(one.name for one in own))
         for one in own:
             look = HOLLOW | {"marker": _MARKS[names.index(one.name) % len(_MARKS)], "color": one.colour}

@@ -183,7 +183,7 @@ def stacked(
         for panel, (_, drawing) in zip(axes[:, number], panels, strict=False):
             drawing(panel, part)
         if scene.measured and compared:
-            scene.measured.residual_panel(axes[-1, number], {line.number for line in lines})
+            scene.measured.residual_panel(axes[-1, number], {line.number for line in lines}, scene.over)
         edge = 0.03 if scene.marked or scene.measured else 0.0
         style.across(axes[-1, number], scene.reach, scene.words, scene.scale, edge if room is None else room)
         if words:

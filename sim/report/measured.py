@@ -69,7 +69,7 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fitted: Fitted | None 
     """
     found = max((_by_curve(measured) for measured in drawn), key=lambda curves: sum(map(_count, curves)))
     if not found:
-        why = "no curve of the run reaches them, or no condition says which of several curves a point is of"
+        why = "no curve of the run reaches them, it goes there and back, or no condition says of which curve a point is"
         if not drawn[0].has_errors:
             why = "they have no errors; give them in a column such as contact_area_error"
         return Agreement([], f"How far the measured points are from the run cannot be told: {why}.")
@@ -91,8 +91,8 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fitted: Fitted | None 
 
 
 def _by_curve(measured: Measured) -> list[Residuals]:
-    """The distances of points from each curve of each variable, once."""
-    found = {(one.name, one.number): one for one in reversed(measured.residuals)}
+    """The distances of points from each curve of each variable, once, where it is of one branch."""
+    found = {(one.name, one.number): one for one in reversed(measured.residuals) if one.branches == 1}
     return list(reversed(found.values()))
 
 

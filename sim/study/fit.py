@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
 _WIDE = 1e4
+#: The same of bounds that are given as an example.
+_USUAL = 100.0
 #: Most runs of the scenario's own models, and the change of every number, over its error, that ends them.
 _RUNS, _STAYS = 3, 0.1
 #: Correlation beyond which the data hardly tell two numbers apart.
@@ -208,7 +210,7 @@ def _free(scenario: Scenario, text: str) -> Free:
     quantity, start = known[key]
     low, high = max(quantity.at_least, quantity.above), min(quantity.at_most, quantity.below)
     if sign:
-        low, high = _span(key, span, quantity)
+        low, high = _span(key, span, quantity, start)
     elif low >= 0.0 and math.isinf(high):
         if not start > 0.0:
             raise BadInput([f"--free {key}: starts at 0; give it a value in the scenario, or bounds, KEY=LOW:HIGH"])
@@ -221,7 +223,7 @@ def _free(scenario: Scenario, text: str) -> Free:
     return Free(key, quantity, start, low, high)
 
 
-def _span(key: str, span: str, quantity: Quantity) -> tuple[float, float]:
+def _span(key: str, span: str, quantity: Quantity, start: float) -> tuple[float, float]:
     """Bounds in a text ``LOW:HIGH``."""
     ends = span.split(":")
     try:
@@ -229,7 +231,7 @@ def _span(key: str, span: str, quantity: Quantity) -> tuple[float, float]:
     except ValueError as fault:
         said = str(fault) if len(ends) == 2 else "takes two bounds"
         raise BadInput(
-            [f'--free {key}={span[:60]}: {said}; write KEY=LOW:HIGH, such as "{key}={_typical(quantity)}"']
+            [f'--free {key}={span[:60]}: {said}; write KEY=LOW:HIGH, such as "{key}={_typical(quantity, start)}"']
         ) from None
     if not low < high:
         raise BadInput([f"--free {key}={span[:60]}: the bounds are in the wrong order; write the lower one first"])
@@ -242,9 +244,11 @@ def _number(text: str) -> str | float:
     return text.strip()
 
 
-def _typical(quantity: Quantity) -> str:
-    unit = "" if quantity.unit == "1" else f" {quantity.unit}"
-    return f"0.1{unit}:0.9{unit}"
+def _typical(quantity: Quantity, start: float) -> str:
+    """Bounds a hundred times below and above a number, or those of the quantity where these are nearer."""
+    low, high = sorted((start / _USUAL, start * _USUAL)) if start else (-1.0, 1.0)
+    ends = max(low, quantity.at_least), min(high, quantity.at_most, quantity.below)
+    return ":".join(engineering(end, quantity.unit) for end in ends)
 
 
 def _refuse_entangled(problem: Problem) -> None:

@@ -1,5 +1,6 @@
 """The figure of ``sim fit``: measured curves with the fitted ones, and the residuals below."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -7,9 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from sim.plots.style import BOTH, GUIDE, HOLLOW, REFERENCE, STYLE, Unit, across, axis_scale, legend, rows
+from sim.plots.style import BOTH, GUIDE, HOLLOW, REFERENCE, STYLE, Unit, across, axis_scale, in_units, legend, rows
 from sim.study.fitting import Minimum, Problem
 from sim.study.measured import HELD, Measured
+from sim.units.refusals import BadInput
 
 Array = NDArray[np.float64]
 
@@ -59,6 +61,18 @@ def figure(problem: Problem, best: Minimum) -> Figure:
             if not number:
                 legend(upper)
     return drawn
+
+
+def refuse_units(tables: Sequence[Measured], units: Sequence[str]) -> None:
+    """Refuse a unit that no axis of the figure of some tables can have, before anything is fitted."""
+    try:
+        with in_units(units):
+            for table in tables:
+                _, si, along = _along(table)
+                for values, unit in ((along, si), *((curve.values, curve.described[0]) for curve in table.curves)):
+                    Unit.of(values, unit)
+    except ValueError as fault:
+        raise BadInput([f"--units: {fault}"]) from None
 
 
 def _along(table: Measured) -> tuple[str, str, Array]:

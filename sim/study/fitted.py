@@ -13,12 +13,14 @@ from typing import Any, NamedTuple
 from sim.ensemble.outline import scenario_json
 from sim.ensemble.progress import announce_compiling
 from sim.numerics import files
+from sim.plots.style import in_units
 from sim.scenario.declared import files_read
 from sim.scenario.scenario import Scenario
 from sim.scenario.toml_text import parse, put, written
 from sim.study.fit import Fit, Found, fit
-from sim.study.fit_figure import figure
+from sim.study.fit_figure import figure, refuse_units
 from sim.study.fitting import LEVEL
+from sim.study.measured import read
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.study.posterior import Posterior, posterior
 from sim.units.notation import concise, engineering, scaled
@@ -41,20 +43,22 @@ Shown = tuple[list[dict[str, str]], str]
 
 def carried_out(
     scenario: Scenario, data: Sequence[Path], free: Sequence[str], common: Sequence[str], stem: Path, replace: bool,
-    steady: bool, judged: bool, sampled: bool,
+    steady: bool, judged: bool, sampled: bool, units: Sequence[str] = (),
 ) -> tuple[Fit, list[Shown]]:  # fmt: skip
     """Fit, judge mechanisms and sample the posterior where wanted, and write the files.
 
-    Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, and of ``claim``.
+    Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, of ``claim`` and of the
+    figure.
     """
     announce_compiling()
     pairs = [pair.partition("=")[::2] for pair in common]
     sizes = {name: quantity(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
     outputs = claim(scenario, data, stem, replace)
+    refuse_units([read(path, scenario) for path in data] if units else [], units)
     found = fit(scenario, data, free, sizes, steady)
     how = found.problem, found.best, found.scenario.seed
     more = More(compare(*how) if judged else None, posterior(*how) if sampled else None)
-    save(scenario, found, data, outputs, more)
+    save(scenario, found, data, outputs, more, units)
     shown: list[Shown] = [(_table(found), f"\n{_explanation(found)}\n")]
     if more.verdict is not None:
         shown.append((_comparison(more.verdict), f"\n{more.verdict.words}\n"))
@@ -229,10 +233,14 @@ def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
             table[key] = os.path.relpath(above / value, folder)
 
 
-def save(scenario: Scenario, fit: Fit, data: Sequence[Path], outputs: Outputs, more: More) -> None:
+def save(
+    scenario: Scenario, fit: Fit, data: Sequence[Path], outputs: Outputs, more: More, units: Sequence[str] = ()
+) -> None:
     """Write scenario, numbers and figure, each whole."""
     picture = io.BytesIO()
-    figure(fit.problem, fit.best).savefig(picture, format="png")
+    with in_units(units):
+        drawn = figure(fit.problem, fit.best)
+    drawn.savefig(picture, format="png")
     numbers = json.dumps(document(fit, data, more), indent=2, allow_nan=False) + "\n"
     texts = scenario_text(scenario, fit, outputs.toml.parent).encode(), numbers.encode(), picture.getvalue()
     for path, content in zip(outputs, texts, strict=True):

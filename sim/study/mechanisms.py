@@ -45,6 +45,12 @@ WHOLE = "the scenario as it is"
 #: Parts of it by their names, and what they leave out.
 _PARTS = {"bonds only": "fluctuations act", "fluctuations only": "bonds act"}
 
+#: What acts on the work of adhesion, each with an example of its table.
+_TABLES = (
+    ("bonds", '[bonds] model = "steady", critical_speed = "10 mm/s", stress = "0.3 MPa"'),
+    ("fluctuations", '[shear] model = "mean", spectrum = { model = "gaussian", rms = "150 kPa", length = "4 um" }'),
+)
+
 
 class Judged(NamedTuple):
     """A mechanism fitted: its numbers by name, and how it compares.
@@ -99,14 +105,16 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
             p_value = _p_value(one, least, problem, best, rng, draws)
             rejected = p_value <= _RARE and aicc - (criteria[0] if name in _PARTS else min(criteria)) >= _WORSE
         judged.append(Judged(name, one.numbers(least.x), least.chi_square, aicc, p_value, rejected))
-    return Verdict(tuple(sorted(judged, key=lambda one: one.aicc)), *_verdict(judged))
+    sufficient, words = _verdict(judged)
+    words = "\n".join(filter(None, [words, _lacking(problem)]))
+    return Verdict(tuple(sorted(judged, key=lambda one: one.aicc)), sufficient, words)
 
 
 def _verdict(judged: list[Judged]) -> tuple[str, str]:
     """The mechanism that is sufficient, "" if the data cannot tell, and that in words."""
     whole, *others = judged
     if not others:
-        return "", "there is no other mechanism to compare with: no fluctuations, and no load or stress for a theory"
+        return "", "there is no other mechanism to compare with"
     if math.isinf(whole.aicc):
         return "", f"the data cannot tell: AICc of {WHOLE} needs two points more than free numbers; measure more"
     left = [one for one in others if not one.rejected]
@@ -126,11 +134,9 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
 def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     """Mechanisms beside the scenario as it is, each with the keys that it has."""
     scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
-    bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
-    fluctuating = "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0
     still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
     share = {"adhesion.bond_share": 0.0}
-    if bonded and fluctuating:
+    if all(_acting(problem)):
         left_out = (still, "shear."), (share, "adhesion.bond_share")
         yield from ((name, _less(problem, *without)) for name, without in zip(_PARTS, left_out, strict=True))
     if scene.contact.kind == "displacement" or not scene.population.carries_stress or problem.by_run:
@@ -138,6 +144,26 @@ def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     for theory, (words, more) in _THEORIES.items():
         other = _less(problem, still | share, "shear.", "adhesion.bond_share")
         yield words, replace(other, free=(*other.free, *more), theory=theory)
+
+
+def _acting(problem: Problem) -> tuple[bool, bool]:
+    """Whether bonds and fluctuations change the work of adhesion in the scenario as it is."""
+    scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
+    bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
+    return bonded, "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0
+
+
+def _lacking(problem: Problem) -> str:
+    """What the curves or the scenario lack for bonds, fluctuations and theories to be told apart; "" for nothing."""
+    several = [group for groups in problem.groups for group in groups]
+    if not any(group.scenario.drive.feeds_back or np.any(group.speed) for group in several):
+        said = "the curves were measured at rest, where every mechanism is JKR's contact: they tell its work of"
+        cure = 'measure while it slides, with a column "speed [mm/s]"'
+        return f"{said} adhesion and its modulus alone; to compare mechanisms, {cure}"
+    lacks = [one for one, acts in zip(_TABLES, _acting(problem), strict=True) if not acts]
+    return "\n".join(
+        f"no {name} act in the scenario; to compare with them, add for example {table}" for name, table in lacks
+    )
 
 
 def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:

@@ -29,12 +29,13 @@ _AT_ONCE, _LONGEST_LINE = 2**18, 2**23
 class TableError(ValueError):
     """A table that cannot be read; the message names the line and the cure, not the file nor what stands in it.
 
-    ``names`` are those that its header has in place of one that is wanted.
+    ``names`` are those that its header has in place of one that is wanted, ``cell`` the one at fault: to be shown only
+    of a file that the user has named, as a scenario of somebody else's may name any.
     """
 
-    def __init__(self, said: str, names: Iterable[str] = ()):
+    def __init__(self, said: str, names: Iterable[str] = (), cell: str = ""):
         super().__init__(said)
-        self.names = tuple(names)
+        self.names, self.cell = tuple(names), cell
 
 
 def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, NDArray[np.float64]]:
@@ -264,15 +265,15 @@ def _number(at: int, name: str, cell: str, unit: str, quantity: Quantity, gaps: 
     except ValueError:
         said, cure = "" if cell else " an empty cell,", ", decimals with a point" if "," in cell else ""
         cure = cure if cell else ", or leave the row out"
-        raise TableError(f"line {at}: {name} is{said} not a number; write a plain number{cure}") from None
+        raise TableError(f"line {at}: {name} is{said} not a number; write a plain number{cure}", cell=cell) from None
     if number != number:
         if gaps:
             return number
-        raise TableError(f"line {at}: {name} is nan; write a plain number, or leave the row out")
+        raise TableError(f"line {at}: {name} is nan; write a plain number, or leave the row out", cell=cell)
     try:
         return quantity.read(f"{number!r} {unit}" if unit else number)
     except ValueError as fault:
-        raise TableError(f"line {at}: {name} {_words(fault)}") from None
+        raise TableError(f"line {at}: {name} {_words(fault)}", cell=cell) from None
 
 
 def _words(fault: ValueError) -> str:

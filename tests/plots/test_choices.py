@@ -215,9 +215,18 @@ def test_a_loop_has_measured_points_in_every_panel(table):
     grips = Equilibrium(indentation={"from": 2e-6, "to": -4e-6, "cycles": 1})
     dataset = simulated(contact=grips, drive=STEADY, shear=shear.Uniform())
     path = table("normal_load [mN], contact_radius [um], contact_radius_error [um]\n0, 70, 2\n0.5, 80, 2\n")
-    loads, radii, loaded = draw(dataset, "loop", data=path).axes
+    loads, radii, loaded, below = draw(dataset, "loop", data=path).axes
     assert not points_of(loads) and not points_of(radii)
     assert_allclose(points_of(loaded)[0], [[0.0, 500.0], [70.0, 80.0]], rtol=1e-12)
+    load, radius = (dataset[name].to_numpy() for name in ("normal_load", "contact_radius"))
+    for off, (at, measured) in zip(below.lines[0].get_ydata(), ((0.0, 70e-6), (5e-4, 80e-6)), strict=True):
+        passed = np.flatnonzero(((load[:-1] - at) * (load[1:] - at) <= 0.0) & (np.diff(load) != 0.0))
+        share = (at - load[passed]) / (load[passed + 1] - load[passed])
+        crossings = radius[passed] + share * (radius[passed + 1] - radius[passed])
+        assert crossings.size
+        assert_allclose(off, min((measured - crossings) / 2e-6, key=abs), rtol=1e-9)
+    (label,) = (one for one in legend_of(loaded)[0] if one.startswith("measured, $"))
+    assert label.endswith(" of 2 (nearest branch)")
 
 
 @pytest.mark.parametrize(
