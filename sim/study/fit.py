@@ -38,6 +38,8 @@ _RUNS, _STAYS = 3, 0.1
 _ALIKE = 0.95
 #: Start of another search, over an e-fold or the range of a number; and most rows that are named.
 _BESIDE, _NAMED = 0.5, 3
+#: Ratio of measured and fitted values beyond which a unit is asked for.
+_OTHER_UNIT = 100.0
 #: Tables of keys that are not physical.
 _OTHER = ("clock", "record", "ensemble", "seed")
 
@@ -189,11 +191,24 @@ def _remarks(problem: Problem, best: Minimum, found: list[Found], alike: Array) 
         ratio = best.chi_square / problem.freedom
         said.append(f"the curves lie further off than their errors (chi^2 {ratio:.3g} a degree of freedom): the model")
         said[-1] += " lacks something, or the errors are too small; the intervals hold for neither"
+    said += _of_other_units(problem, best)
     if (open_there := _open(problem, best)).size:
         rows = ", ".join(map(problem.place, open_there[:_NAMED]))
         said.append(f"the contact is open by the fit where it was measured: {rows}")
     if problem.estimated.any():
         said.append("curves without errors: their scatter around the fit stands for them")
+    return said
+
+
+def _of_other_units(problem: Problem, best: Minimum) -> list[str]:
+    """What to say of curves of which measured and fitted values differ as if one had another unit."""
+    said, fitted = [], np.abs(problem.predicted(best.x))
+    for number in range(int(problem.curve[-1]) + 1):
+        here = problem.curve == number
+        size, least = float(np.median(np.abs(problem.values[here]))), float(np.median(fitted[here]))
+        if min(size, least) > 0.0 and not 1.0 / _OTHER_UNIT < size / least < _OTHER_UNIT:
+            name = problem.place(int(np.argmax(here))).partition(":")[0]
+            said.append(f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario")
     return said
 
 

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 HELD = {"load": "normal_load", "indentation": "indentation", "displacement": "displacement"}
 #: What is recorded of a history, or is no measured number; and what is measured of a slider that feels its friction.
 _NOT_MEASURED = ("in_contact", "masked", "detachment_time", "dissipated_energy", "applied_load")
+#: Sizes of the contact, which are never below 0, with their units.
+_SIZES = {"contact_radius": "m", "contact_area": "m^2"}
 _OF_SLIDER = ("speed", "slider_position", "spring_force")
 
 
@@ -81,6 +83,11 @@ def read(path: Path, scenario: Scenario) -> Measured:
     unclear = unclear or _against(conditions, curves)
     if not curves:
         unclear = 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
+    nothing = [name for name, values, errors in curves if errors is None and not np.any(values)]
+    if nothing:
+        unclear = (
+            unclear or f"{nothing[0]} is 0 in all rows, which has no scatter of its own; give errors, or leave it out"
+        )
     if unclear:
         raise BadInput([f"{path}: {unclear}"])
     return Measured(path, scenario.contact.kind, conditions, curves)
@@ -112,7 +119,9 @@ def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
     """Declaration of each variable that can be measured."""
     of_slider = _OF_SLIDER if scenario.drive.feeds_back else ()
     there = (one for one in VARIABLES if (one.part != "drive" or one.name in of_slider) and one.there(scenario))
-    return {one.name: Quantity(one.unit, one.long_name) for one in there if one.name not in _NOT_MEASURED}
+    sizes = {name: Quantity(unit, name, at_least=0) for name, unit in _SIZES.items()}
+    return {one.name: sizes.get(one.name, Quantity(one.unit, one.long_name))
+            for one in there if one.name not in _NOT_MEASURED}  # fmt: skip
 
 
 def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:

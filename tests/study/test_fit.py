@@ -392,6 +392,16 @@ def test_a_key_without_effect_is_refused(curves):
         fit(scene, [curves], ["bonds.rebinding_rate", "bonds.stress"])
 
 
+def test_a_curve_in_another_unit_is_asked_for_its_unit(tmp_path, truth):
+    areas = {"contact_area": 1e6 * truth["contact_area"]}
+    path = table(tmp_path / "um.csv", {"speed [m/s]": SPEEDS}, areas, 0.01)
+    found = fit(load(LENS), [path], ["bonds.critical_speed"], steady=True)
+    (said,) = (one for one in found.remarks if "unit" in one)
+    factor = float(said.removeprefix("contact_area is ").partition(" ")[0])
+    # fitted areas lie between the least and the largest of the true ones
+    assert np.ptp(truth["contact_area"]) / truth["contact_area"].max() > abs(factor / 1e6 - 1.0)
+
+
 def test_keys_that_the_data_hardly_tell_apart_are_named(curves):
     found = fit(load(LENS), [curves], ["adhesion.bond_share", "shear.spectrum.rms", "bonds.stress"], steady=True)
     assert abs(found.correlations[0, 1]) > 0.95
@@ -620,6 +630,10 @@ BAD = {
     "no curve": ("speed [mm/s]\n1\n3\n", "no column was measured"),
     "no condition": ("contact_area [mm^2]\n0.04\n0.05\n", "where the points were taken"),
     "nan": (f"{HEADER}\n1,0.04\n2,nan\n", "line 3: contact_area is nan"),
+    "area below 0": (f"{HEADER}\n1,0.04\n2,-0.04\n", 'contact_area must be at least 0 m^2 (the cell has "-0.04")'),
+    "nothing but 0": (f"{HEADER}\n1,0\n2,0\n3,0\n", "contact_area is 0 in all rows"),
+    "1e300": (f"{HEADER}\n1,1e300\n2,2\n", "is too large to be real"),
+    "units swapped": ("speed [mm^2],contact_area [mm/s]\n1,0.04\n2,0.03\n", 'write the column as "speed [m/s]"'),
     "no number": (f"{HEADER}\n1,0.04\n2,0.04mm\n", 'is not a number (the cell has "0.04mm")'),
     "negative error": (f"{HEADER},contact_area_error [%]\n1,2,-3\n2,3,4\n", 'must be above 0 (the cell has "-3")'),
     "empty cell": (f"{HEADER}\n1,0.04\n2,\n", "line 3: contact_area is an empty cell"),
