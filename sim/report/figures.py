@@ -20,6 +20,7 @@ from matplotlib.lines import Line2D
 from matplotlib.path import Path
 
 from sim.analysis import is_stationary, is_steady, speed_of
+from sim.analysis.scene import speed_name
 from sim.plots import kinds
 from sim.plots.bond_laws import rest_of
 from sim.plots.choices import Choices
@@ -172,7 +173,8 @@ def _rupture(dataset: xr.Dataset) -> bool:
 
 def _steps(dataset: xr.Dataset) -> bool:
     """Whether the speed is one of a few in the course of a run."""
-    return not is_steady(dataset) and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
+    recorded = speed_name(dataset) in dataset and not is_steady(dataset)
+    return recorded and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
 
 
 def svg_of(figure: Figure, prefix: str) -> str:
