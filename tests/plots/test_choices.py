@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim import analysis
-from sim.parts.contact import Equilibrium
+from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import Choices, kinds as plots, style as pictures
@@ -212,18 +212,18 @@ def test_rows_of_a_swept_value_have_the_colour_of_its_curve(loads, table):
 
 
 def test_a_loop_has_measured_points_in_every_panel(table):
-    grips = Equilibrium(indentation={"from": 2e-6, "to": -4e-6, "cycles": 1})
-    dataset = simulated(contact=grips, drive=STEADY, shear=shear.Uniform())
-    path = table("normal_load [mN], contact_radius [um], contact_radius_error [um]\n0, 70, 2\n0.5, 80, 2\n")
+    lagging = RateDependent(load={"from": 1e-4, "to": 1e-3, "cycles": 1}, front_speed=1e-5)
+    dataset = simulated(contact=lagging, drive=STEADY, shear=shear.Uniform())
+    path = table("normal_load [mN], contact_radius [um], contact_radius_error [um]\n0.3, 70, 2\n0.5, 90, 2\n")
     loads, radii, loaded, below = draw(dataset, "loop", data=path).axes
     assert not points_of(loads) and not points_of(radii)
-    assert_allclose(points_of(loaded)[0], [[0.0, 500.0], [70.0, 80.0]], rtol=1e-12)
+    assert_allclose(points_of(loaded)[0], [[0.3, 0.5], [70.0, 90.0]], rtol=1e-12)
     load, radius = (dataset[name].to_numpy() for name in ("normal_load", "contact_radius"))
-    for off, (at, measured) in zip(below.lines[0].get_ydata(), ((0.0, 70e-6), (5e-4, 80e-6)), strict=True):
+    for off, (at, measured) in zip(below.lines[0].get_ydata(), ((3e-4, 70e-6), (5e-4, 90e-6)), strict=True):
         passed = np.flatnonzero(((load[:-1] - at) * (load[1:] - at) <= 0.0) & (np.diff(load) != 0.0))
         share = (at - load[passed]) / (load[passed + 1] - load[passed])
         crossings = radius[passed] + share * (radius[passed + 1] - radius[passed])
-        assert crossings.size
+        assert crossings.size == 2
         assert_allclose(off, min((measured - crossings) / 2e-6, key=abs), rtol=1e-9)
     (label,) = (one for one in legend_of(loaded)[0] if one.startswith("measured, $"))
     assert label.endswith(" of 2 (nearest branch)")

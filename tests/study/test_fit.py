@@ -15,7 +15,7 @@ from scipy import stats
 
 import sim
 from sim.cli import cli
-from sim.plots.style import in_units
+from sim.plots.style import Unit, in_units
 from sim.scenario.declared import quantities
 from sim.scenario.reader import load
 from sim.scenario.toml_text import written
@@ -704,10 +704,12 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
         and "contact_area" in numbers["common_errors"]
     )
     before = [path.read_bytes() for path in made]
-    monkeypatch.setattr(fitted, "figure", lambda problem, best: Figure((1.0, 1.0)))  # quick
+    chosen = []
+    monkeypatch.setattr(fitted, "figure", lambda *_: chosen.append(Unit.of(1.0, "m/s").name) or Figure((1.0, 1.0)))
     again = command(scenario, curves, *free, "--steady")
     assert getattr(again.exception, "exit_code", 0) == 73
-    assert command(scenario, curves, "--free", "bonds.stress", "--steady", "--force").exit_code == 0
+    assert command(scenario, curves, "--free", "bonds.stress", "--steady", "--force", "--units", "um/s").exit_code == 0
+    assert chosen == ["µm/s"]
     assert all(path.read_bytes() != old for path, old in zip(made, before, strict=True))
     made[0].write_text("# my own\n")
     refused = command(scenario, curves, "--free", "bonds.stress", "--steady", "--force")
