@@ -63,12 +63,8 @@ _STARTS = (
     "A dot is a peak that the stress falls from, a ring the largest stress where that is not resolved; thin lines are"
     " closed forms: the peak if no bond rebinds, and steady sliding.",
 )
-#: What to look at where there are measured points, with errors and without.
-_BARE_POINTS = "Rings are measured points."
-_POINTS_SEEN = (
-    "Rings are measured points with their standard errors; the lowest panel has their distances from the curve, in"
-    " standard errors σ of both."
-)
+#: What to look at where there are measured points with errors.
+_RESIDUALS = " The lowest panel has their distances from the curve, in standard errors σ of both."
 #: Kinds that are drawn wherever they can be, beside those that fit.
 _ALSO = ("stress", "phase", "incipient", "map", "spectrum")
 #: Different speeds at which a run that changes between them has transients rather than a curve over speed, at most.
@@ -155,9 +151,10 @@ def _drawing(dataset: xr.Dataset, kind: str, prefix: str, data: Data | None) -> 
 def _with_data(dataset: xr.Dataset, kind: str, prefix: str, data: Data) -> Drawing:
     """A figure with measured points; errors as of those that cannot be drawn in it."""
     measured = Measured(data, dataset)
-    svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
-    found, points = _captioned(dataset, kind), _POINTS_SEEN if measured.has_errors else _BARE_POINTS
-    return found._replace(see=f"{found.see} {points}", svg=svg, measured=measured)
+    figure, found = kinds.draw(dataset, kind, Choices(data=measured)), _captioned(dataset, kind)
+    points = f"Rings are measured points{' with their standard errors' if measured.has_errors else ''}."
+    points += _RESIDUALS if measured.residuals and any("residual" in one.get_ylabel() for one in figure.axes) else ""
+    return found._replace(see=f"{found.see} {points}", svg=svg_of(figure, prefix), measured=measured)
 
 
 def _captioned(dataset: xr.Dataset, kind: str) -> Drawing:

@@ -69,7 +69,10 @@ def agreement(dataset: xr.Dataset, drawn: list[Measured], fitted: Fitted | None 
     """
     found = max((_by_curve(measured) for measured in drawn), key=lambda curves: sum(map(_count, curves)))
     if not found:
-        why = "no curve of the run reaches them, it goes there and back, or no condition says of which curve a point is"
+        several = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
+        why = "no curve of the run reaches them, or it goes there and back"
+        if not {*several} <= {*drawn[0].table}:
+            why = f"the run has several curves; give the points a column {several[0]}, or choose one curve by --where"
         if not drawn[0].has_errors:
             why = "they have no errors; give them in a column such as contact_area_error"
         return Agreement([], f"How far the measured points are from the run cannot be told: {why}.")

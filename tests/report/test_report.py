@@ -487,7 +487,7 @@ def test_data_and_run_agree_where_chi_square_is_as_likely_as_their_errors_make_i
         said in found.said and f"χ² is {square:.4g} for 4 degrees of freedom, p = {p:.2g}" in plainly([found.said])[0]
     )
     assert row == {"measured": "area ratio", "χ²": f"{square:.4g}", "degrees of\nfreedom": "4", "p": f"{p:.2g}"}
-    assert "Rings are measured points with" in drawing.see
+    assert "Rings are measured points with" in drawing.see and "The lowest panel" in drawing.see
 
 
 @pytest.mark.usefixtures("unwritten")
@@ -514,6 +514,10 @@ def test_each_curve_of_a_sweep_is_judged_by_its_own_points():
     assert [row["measured"] for row in found.rows] == ["area ratio (P = 1 mN)", "area ratio (P = 4 mN)", "all"]
     assert [row["χ²"] for row in found.rows] == ["6", "86", "92"]
     assert found.said.endswith("; farthest from it is area ratio (P = 4 mN).")
+    del points["contact_load"]
+    drawing, *_ = figures.drawings(dataset, points)
+    assert "give the points a column contact_load" in agreement(dataset, [drawing.measured]).said
+    assert "The lowest panel" not in drawing.see
 
 
 @pytest.mark.usefixtures("unwritten")
