@@ -124,7 +124,10 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     assert {part: part.stat().st_mtime_ns for part in parts.glob("*.part")} == kept
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["check", LENS], ["stats", "x.nc", "--csv", "x.csv"]])
+@pytest.mark.parametrize(
+    "arguments",
+    [pytest.param(["--help"], marks=pytest.mark.verify), ["check", LENS], ["stats", "x.nc", "--csv", "x.csv"]],
+)
 def test_a_reader_that_leaves_at_once_is_no_error(here, arguments):
     if arguments[0] == "stats":
         assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0

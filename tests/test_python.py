@@ -88,13 +88,15 @@ def test_a_prescribed_speed_is_a_coordinate_for_users_and_a_quantity_for_statist
     spring = {"model": "spring", "stage": "1 mm/s", "stiffness": "1 N/m", "damping": 10, "contact_stiffness": "rigid"}
     assert "speed" in sim.run(swapped(drive=spring)).data_vars
     with sim.open(file) as opened, xr.open_dataset(file, decode_times=False) as plainly:
+        variable, functions = dataset.reset_coords("speed"), ("observables", "statistics", "events", "shares")
+        expected = {name: getattr(analysis, name)(variable) for name in functions}
+        table = analysis.table(variable)
         for found in (dataset, opened, plainly):
             assert "speed" in found.contact_area.coords
             assert float(found.contact_area.swap_dims(t="speed").sel(speed=5e-3)) == dataset.contact_area[5]
-            variable = found.reset_coords("speed")
-            for function in (analysis.observables, analysis.statistics, analysis.events, analysis.shares):
-                xr.testing.assert_identical(function(found), function(variable))
-            assert analysis.table(found) == analysis.table(variable)
+            for name in functions:
+                xr.testing.assert_identical(getattr(analysis, name)(found), expected[name])
+            assert analysis.table(found) == table
         opened.to_netcdf(tmp_path / "again.nc")
     with netCDF4.Dataset(file, "a"):  # as nothing holds it any longer
         pass

@@ -91,7 +91,8 @@ def _long(dataset: xr.Dataset, found: xr.Dataset, key: str, over: str) -> pd.Dat
     name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "t") if n in found[key].dims]
     columns = {}
     for column, (ending, place) in _ENDINGS.items():
-        if (values := found.get(f"{name}_{ending}")) is not None:
+        if f"{name}_{ending}" in found:  # xarray's get looks for similar names where there is none: half of the time
+            values = found[f"{name}_{ending}"]
             columns[column] = values.isel(quantile=place, drop=True) if "quantile" in values.dims else values
     if speed_name(dataset) in dataset:
         speed = speed_of(dataset)
