@@ -136,7 +136,7 @@ def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float
         return top
     from scipy.signal import find_peaks  # heavy: for sliders behind a spring alone
 
-    later = top + find_peaks(force[top:low])[0]
+    later = top + find_peaks(force[top : low + 1])[0]
     later = later[force[later] - force[low] >= fall]
     return int(later[-1]) if later.size else top
 

@@ -153,10 +153,11 @@ def test_what_falls_by_less_than_the_least_is_no_slip():
 
 
 def test_a_slip_after_a_slow_fall_begins_at_the_last_maximum_and_onset_and_end_need_two():
-    slow = [0.0, 2.0, *np.linspace(4.0, 3.6, 9), 3.7]
+    slow = [0.0, 2.0, *np.linspace(4.0, 3.6, 9), 3.65]
     up = np.array([*slow, 1.0, 2.0, 4.0, 1.0, 2.0])
     first = analysis.slips(made(up)).isel(member=0, slip=0)
-    assert (float(first["slip_time"]), float(first["static_friction"]), float(first["force_drop"])) == (11.0, 3.7, 2.7)
+    begins = [float(first[name]) for name in ("slip_time", "static_friction", "force_drop")]
+    assert_allclose(begins, [11.0, 3.65, 2.65], rtol=1e-12)
     speed = np.linspace(1.0, 1.1, len(up))
     back = slice(-2, None, -1)
     both = made(np.append(up, [*up[[14, 15, 13, 14, 15, 16]], 2.1]), np.append(speed, speed[back][:7]))
