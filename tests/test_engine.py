@@ -120,6 +120,11 @@ def test_any_depth_runs_with_any_depth(case):
     check_case(case)
 
 
+@pytest.mark.timeout(120)
+def test_more_fronts_between_bonds_of_one_limit_than_there_is_room_for_are_given_up():
+    check_case({"drive": "spring", "contact": "machine", "bonds": "cohort, cut-off", "shear": "mapped, fixed, stress"})
+
+
 @pytest.mark.verify
 @pytest.mark.parametrize("bonds", BONDS)
 @pytest.mark.parametrize("shear", SHEARS)

@@ -13,17 +13,19 @@ from sim.numerics.jit import device
 def settle(weight, stretch, width, count, direction, travelled, rules):
     """Merge ``count`` cohorts in place until at most ``rules.most`` are left; the number left.
 
-    The lattice is made coarser only if that is not enough.
+    If that is not enough, sharp fronts within a cell are given up, and then the lattice is made coarser.
     """
     _sort(weight, stretch, width, count, direction)
-    finest, cell = 64, rules.cell
-    count = _merge(weight, stretch, width, count, travelled, cell, finest, rules)
+    finest, cell, fronts = 64, rules.cell, rules.limit < math.inf
+    count = _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules)
     while count > rules.most:
         if finest > 1:
             finest //= 2
+        elif fronts:
+            fronts = False
         else:
             cell *= 2.0
-        count = _merge(weight, stretch, width, count, travelled, cell, finest, rules)
+        count = _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules)
     return count
 
 
@@ -40,7 +42,7 @@ def _sort(weight, stretch, width, count, direction):
 
 
 @device
-def _merge(weight, stretch, width, count, travelled, cell, finest, rules):
+def _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules):
     """Merge sorted cohorts cell by cell; the number left.
 
     A cell of many bonds is halved until its width times its share is below ``rules.heavy``: a cell
@@ -59,19 +61,20 @@ def _merge(weight, stretch, width, count, travelled, cell, finest, rules):
         parts = 1
         while parts < finest and cell * rules.steepness * inside > rules.heavy * whole * parts * parts:
             parts *= 2
-        left = _merge_cell(weight, stretch, width, first, last, left, travelled, cell / parts, rules.limit < math.inf)
+        segments = rules.limit < math.inf
+        left = _merge_cell(weight, stretch, width, first, last, left, travelled, cell / parts, segments, fronts)
         first = last
     return left
 
 
 @device
-def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, segments):
+def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, segments, fronts):
     """Merge the cohorts ``first`` to ``last`` in cells of one width, writing from ``left`` on; where writing ends."""
     while first < last:
         place = math.floor((stretch[first] - travelled) / cell)
         end = first + 1
         while end < last and math.floor((stretch[end] - travelled) / cell) == place:
-            if segments and not _alike(weight, width, end - 1, end):
+            if fronts and not _alike(weight, width, end - 1, end):
                 break
             end += 1
         left += _gauss(weight, stretch, width, first, end, left, segments)
@@ -81,7 +84,7 @@ def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, segm
 
 @device
 def _alike(weight, width, one, other):
-    """True if two neighbouring segments have about the same density: a sharp front is not smeared."""
+    """True if two neighbouring segments have about the same density: a sharp front between others is not smeared."""
     here, there = weight[one] * width[other], weight[other] * width[one]
     return here <= 4.0 * there and there <= 4.0 * here
 
