@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
@@ -38,6 +39,8 @@ _RUNS, _STAYS = 3, 0.1
 _ALIKE = 0.95
 #: Start of another search, over an e-fold or the range of a number; and most rows that are named.
 _BESIDE, _NAMED = 0.5, 3
+#: Probability of a chi^2 as large below which a fit is doubted.
+POOR = 0.05
 #: Ratio of measured and fitted values beyond which a unit is asked for.
 _OTHER_UNIT = 100.0
 #: Tables of keys that are not physical.
@@ -73,6 +76,11 @@ class Fit(NamedTuple):
     def aicc(self) -> float:
         """Akaike's criterion for few points."""
         return self.problem.criterion(self.best.chi_square)
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a chi^2 as large or larger; nan where the errors were not measured."""
+        return _likely(self.problem, self.best)
 
     @property
     def values(self) -> dict[str, float]:
@@ -144,6 +152,11 @@ def _searched(problem: Problem) -> tuple[Problem, Minimum]:
     return min(found, key=lambda one: one[0].criterion(one[1].chi_square))
 
 
+def _likely(problem: Problem, best: Minimum) -> float:
+    known = problem.freedom > 0 and not problem.estimated.any()
+    return float(chdtrc(problem.freedom, best.chi_square)) if known else math.nan
+
+
 def _poor(problem: Problem, best: Minimum) -> bool:
     """Whether the curves lie further off than their errors."""
     freedom = problem.freedom
@@ -187,10 +200,11 @@ def _remarks(problem: Problem, best: Minimum, found: list[Found], alike: Array) 
             said.append(f"{one.free.key}: the data do not bound it {' or '.join(bound)}; its bound is given instead")
         if lost := [word for word, end, _ in ends if math.isnan(end)]:
             said.append(f"{one.free.key}: the end of its interval was not found {' or '.join(lost)}")
-    if _poor(problem, best) and not problem.estimated.any():
-        ratio = best.chi_square / problem.freedom
-        said.append(f"the curves lie further off than their errors (chi^2 {ratio:.3g} a degree of freedom): the model")
-        said[-1] += " lacks something, or the errors are too small; the intervals hold for neither"
+    if (p_value := _likely(problem, best)) <= POOR:
+        said.append(f"the curves lie further off than their errors (p = {p_value:.2g}): the model lacks something, a")
+        said[-1] += (
+            " number that is not free is wrong, or the errors are too small; the intervals hold for none of these"
+        )
     said += _of_other_units(problem, best)
     if (open_there := _open(problem, best)).size:
         rows = ", ".join(map(problem.place, open_there[:_NAMED]))

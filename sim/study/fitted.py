@@ -17,7 +17,7 @@ from sim.plots.style import in_units
 from sim.scenario.declared import files_read
 from sim.scenario.scenario import Scenario
 from sim.scenario.toml_text import parse, put, written
-from sim.study.fit import Fit, Found, fit
+from sim.study.fit import POOR, Fit, Found, fit
 from sim.study.fit_figure import figure, refuse_units
 from sim.study.fitting import LEVEL
 from sim.study.measured import read
@@ -61,7 +61,10 @@ def carried_out(
     save(scenario, found, data, outputs, more, units)
     shown: list[Shown] = [(_table(found), f"\n{_explanation(found)}\n")]
     if more.verdict is not None:
-        shown.append((_comparison(more.verdict), f"\n{more.verdict.words}\n"))
+        doubt = (
+            "; but even the scenario as it is lies off: perhaps none of these is true" if found.p_value <= POOR else ""
+        )
+        shown.append((_comparison(more.verdict), f"\n{more.verdict.words}{doubt}\n"))
     if more.posterior is not None:
         shown.append(_sampled(found, more.posterior))
     return found, [*shown, ([], "\n".join(map(str, outputs)))]
@@ -124,7 +127,8 @@ def _end(end: float, is_open: bool) -> str:
 def _explanation(fit: Fit) -> str:
     """How good the fit is, and what to know of its numbers."""
     problem, best = fit.problem, fit.best
-    lines = [f"chi^2 {best.chi_square:.4g} at {problem.freedom} degrees of freedom, AICc {_number(fit.aicc)}"]
+    likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
+    lines = [f"chi^2 {best.chi_square:.4g} at {problem.freedom} degrees of freedom{likely}, AICc {_number(fit.aicc)}"]
     if not fit.converged:
         lines.append("the fit has not converged: start nearer, give bounds, or free fewer keys")
     return "\n".join([*lines, *fit.remarks])
@@ -166,6 +170,7 @@ def document(fit: Fit, data: Sequence[Path], more: More) -> dict[str, Any]:
         "common_errors": _common(fit),
         "chi_square": fit.best.chi_square,
         "degrees_of_freedom": fit.problem.freedom,
+        "p_value": fit.p_value,
         "aicc": fit.aicc,
         "converged": fit.converged,
         "remarks": list(fit.remarks),

@@ -200,6 +200,8 @@ def _p_value(
     Where the measured one is soon seen to be nothing rare, no more are drawn.
     """
     measured, made, larger = least.chi_square - best.chi_square, poorer.predicted(least.x), 0
+    if measured <= _FINE * least.chi_square:  # what more acts explains nothing, as precisely as draws are fitted
+        return 1.0
     shared = {one.key: x for one, x in zip(poorer.free, least.x, strict=False)}
     alike = np.array([shared.get(one.key, x) for one, x in zip(whole.free, best.x, strict=False)])
     alike = np.append(alike, best.x[len(whole.free) :])

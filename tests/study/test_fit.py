@@ -474,6 +474,29 @@ MECHANISM_KEYS = ["adhesion.bond_share", "bonds.critical_speed", "bonds.stress",
 ONE_ALONE = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only": {"adhesion.bond_share": 0.0}}
 
 
+def test_a_mechanism_that_explains_as_much_is_not_rare():
+    scene = load(SPRUNG)
+    made = drawn_of(scene, 0.01, 3)
+    problem = problem_of([made], [predicted.groups(scene, made)], [calibration._free(scene, "bonds.stress")], {})
+    best = minimum(problem, problem.start, errors=True)
+    for less in (0.0, 1e-6, -1e-6):  # as precisely as a minimum is known
+        least = best._replace(chi_square=best.chi_square * (1.0 + less))
+        assert mechanisms._p_value(problem, least, problem, best, np.random.default_rng(1), 20) == 1.0
+
+
+def test_curves_beyond_their_errors_are_doubted_and_those_within_are_not(tmp_path, truth, curves):
+    found = fit(load(LENS), [curves], ["bonds.critical_speed", "bonds.stress"], steady=True)
+    square, freedom = found.best.chi_square, found.problem.freedom
+    tail = sum((0.5 * square) ** k / math.factorial(k) for k in range(freedom // 2)) * math.exp(-0.5 * square)
+    assert_allclose(found.p_value, tail, rtol=1e-10)  # of an even number of degrees of freedom
+    assert freedom % 2 == 0 and not any("further off" in said for said in found.remarks)
+    columns = {"speed [mm/s]": 1e3 * SPEEDS}
+    rash = table(tmp_path / "rash.csv", columns, noisy(truth, 0.01, 1), 0.005)
+    doubted = fit(load(LENS), [rash], ["bonds.critical_speed", "bonds.stress"], steady=True)
+    assert doubted.p_value < 0.05
+    assert any("further off" in said and f"p = {doubted.p_value:.2g}" in said for said in doubted.remarks)
+
+
 def test_data_that_can_tell_prefer_the_mechanism_that_made_them():
     verdict = judged(load(SPRUNG), drawn_of(load(SPRUNG), 0.005, 8), MECHANISM_KEYS, 20)
     assert verdict.sufficient == verdict.judged[0].name == mechanisms.WHOLE
