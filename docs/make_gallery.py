@@ -19,7 +19,7 @@ from PIL import Image
 
 import sim
 from sim import analysis, laws
-from sim.analysis import concise, shares, statistics
+from sim.analysis import concise, distribution, shares, statistics
 from sim.study.fit import Fit
 from sim.study.fit_figure import figure as fitted
 from sim.study.fitting import LEVEL
@@ -647,10 +647,10 @@ def jkr_test(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def own_psd(dataset: xr.Dataset) -> dict[str, Number]:
     rms, work = 100.0, 1e3 * float(dataset["adhesion_work"])
-    at = {"shear_spectrum_rms": 1e3 * rms, "t": float(dataset["t"][-1])}
-    energy = mean("fluctuation_energy", dataset, 1e3, **at)
+    at, late = {"shear_spectrum_rms": 1e3 * rms}, distribution(dataset, ("fluctuation_energy", "area_ratio"))
+    energy = pair(late, "fluctuation_energy", 1e3, **at)
     stored = energy[0] if isinstance(energy, tuple) else energy
-    return {"rms": rms, "work": work, "energy": energy, "share": mean("area_ratio", dataset, 100.0, **at),
+    return {"rms": rms, "work": work, "energy": energy, "share": pair(late, "area_ratio", 100.0, **at),
             "lost": rms * float(np.sqrt(work / stored))}  # fmt: skip
 
 

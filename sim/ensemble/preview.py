@@ -193,7 +193,10 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
             each = (f"{name.replace('_', ' ')} {_percent(values)}" for name, values in found.items())
             rows.append((title, ", ".join(each)))
     rows += [(name.replace("_", " "), _span(values, "", ",.0f")) for name, values in errors.items()]
-    rows += dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting)).items()
+    details = dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting))
+    rows = [
+        *({row[0]: row[1] for row in rows} | details).items()
+    ]  # a map that is the field has an rms and an energy of its own
     modes = [cast(ModalProcess, point.process).modes for point in points if point.fluctuations.keeps_modes]
     if modes:
         pairs, grid = _span([each.qx.size for each in modes], "", ","), _span([each.points for each in modes], "", ",")

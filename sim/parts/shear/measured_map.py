@@ -95,8 +95,9 @@ class Carried(ShearModel):
         size = f"{nx} × {ny} points of {along:.4g} m × {across:.4g} m along and across the sliding"
         less = f"{100.0 * abs(own / radial - 1.0):.2g} % {'more' if own > radial else 'less'}"
         mean = f"{found.mean:.4g} Pa, which is no part of the field; the bonds at rest bear {setting.strength:.4g} Pa"
-        rows = [("map", size), ("energy of the map", f"{own:.4g} J/m^2, {less} than that of its radial spectrum")]
-        rows.append(("mean of the map", mean))
+        rows = [("rms of the stress", f"{found.rms:.4g} Pa at amplitude 1"), ("map", size), ("mean of the map", mean)]
+        energy = f"{own:.4g} J/m^2 at amplitude 1 of the map itself, {less} than that of its radial spectrum"
+        rows.append(("stored energy", energy))
         if found.mask:
             rows.append(("inside of the contact", f"{found.inside:.1%} of the map"))
         if found.noise:

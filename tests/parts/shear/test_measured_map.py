@@ -286,7 +286,9 @@ def test_check_prints_the_energy_of_the_map_beside_that_of_its_spectrum(tmp_path
     assert answer.exit_code == 0
     own = surface_energy(field, (64 * 6e-6, 48 * 6e-6), G)
     radial = float(map_of(field).spectrum.surface_energy(G))
-    assert f"{own:.4g} J/m^2, {100 * abs(own / radial - 1):.2g} % {'more' if own > radial else 'less'}" in said
+    less = f"{100 * abs(own / radial - 1):.2g} % {'more' if own > radial else 'less'} than that of its radial spectrum"
+    assert said.count("  stored energy ") == 1 and f"{own:.4g} J/m^2 at amplitude 1 of the map itself, {less}" in said
+    assert f"{np.sqrt(np.mean(field**2)):.4g} Pa at amplitude 1" in said
     assert "64 × 48 points of 6e-06 m" in said and "5e+04 Pa" in said and "bear 3e+05 Pa" in said
     assert "noise of the map" in said
     assert "one member is enough" in said
