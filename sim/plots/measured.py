@@ -22,6 +22,8 @@ _SAME += (("normal_load", "contact_load"),)
 _BY = {"contact_radius": ("contact_area", 0.5, np.pi**-0.5), "contact_area": ("contact_radius", 2.0, np.pi)}
 #: How far a condition of a row may be from that of a curve, in parts of it.
 _NEAR = 5e-3
+#: Errors by which branches of a curve that goes there and back are apart at least.
+_ALIKE = 0.01
 _MARKS = "osD^v"
 
 
@@ -58,6 +60,7 @@ class Residuals(NamedTuple):
     """How far points are from a curve, in standard errors of both: variables over and of it, number, colour and point.
 
     Of a curve of several ``branches``, there and back, it is the nearest of them: less than the errors would leave.
+    Branches that are nowhere a hundredth of an error apart count as one.
     """
 
     over: str
@@ -154,11 +157,13 @@ class Measured:
                 off = np.take_along_axis(branches, nearest[np.newaxis], 0)[0]
                 known = np.isfinite(off)
                 if np.any(known):
+                    apart = np.nanmax(branches[:, known], axis=0) - np.nanmin(branches[:, known], axis=0)
+                    several = len(branches) if np.max(apart) > _ALIKE else 1
                     colour = curve.colour if told else BOTH
-                    own = over[0], name, curve.number, colour, x[rows], off, curve.point, len(branches)
+                    own = over[0], name, curve.number, colour, x[rows], off, curve.point, several
                     self.residuals.append(Residuals(*own))
                     words.append(rf"$\chi^2$ = {np.sum(off[known] ** 2):.4g} of {np.sum(known)}")
-                    words[-1] += " (nearest branch)" * (len(branches) > 1)
+                    words[-1] += " (nearest branch)" * (several > 1)
             look: Any = HOLLOW | {"color": curve.colour if told else BOTH, "elinewidth": 0.7, "zorder": 3}
             side = None if wide is None else wide[rows]
             panel.errorbar(x[rows], y, high, side, label=", ".join(words), **look)

@@ -231,6 +231,14 @@ def test_a_loop_has_measured_points_in_every_panel(table):
     assert label.endswith(" of 2 (nearest branch)")
 
 
+def test_a_contact_in_equilibrium_has_one_branch_of_radii_there_and_back(table):
+    there_and_back = Equilibrium(load={"from": 1e-4, "to": 1e-3, "cycles": 1})
+    dataset = simulated(contact=there_and_back, drive=STEADY, shear=shear.Uniform())
+    path = table("normal_load [mN], contact_radius [um], contact_radius_error [um]\n0.3, 70, 2\n0.5, 90, 2\n")
+    (label,) = (one for one in legend_of(draw(dataset, "loop", data=path).axes[2])[0] if one.startswith("measured, $"))
+    assert label.endswith(" of 2")
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
