@@ -148,7 +148,8 @@ def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
         def marched() -> None:
             members = np.arange(scene().ensemble.members)
             if hasattr(engine, "follow"):  # by blocks of steps where nothing feeds back, as a run does
-                engine.follow(scene(), engine.Dice.of(1, members), None, range(scene().clock.steps + 1))
+                noise = getattr(engine, "MemberNoise", None) or engine.Dice
+                engine.follow(scene(), noise.of(1, members), None, range(scene().clock.steps + 1))
             else:
                 deque(engine.march(scene(), members, keep=False), maxlen=0)
 

@@ -13,7 +13,7 @@ from benchmarks import plain
 from benchmarks.compare import LOAD, RAMP, RATE
 from benchmarks.scenes import field, followed, loaded, scene, shortest, steady
 from benchmarks.timing import Bench, Beside, Row
-from sim.engine import Dice, follow, start
+from sim.engine import MemberNoise, follow, start
 from sim.laws.halfspace import surface_energy
 from sim.numerics.noise import Noise
 from sim.parts.drive.prescribed import Steady
@@ -103,12 +103,12 @@ def mapped(bench: Bench) -> list[Row]:
     for points, goal in ((512, 2.0), (1024, 1.5)):
         size = bench.of(points, 32)
         one = loaded(scene(1, 1000, 1, RAMP, RATE, field("mapped", size), LOAD))
-        dice = Dice.of(1, np.arange(1))
-        states = [start(one, dice)]
+        noise = MemberNoise.of(1, np.arange(1))
+        states = [start(one, noise)]
 
-        def step(one=one, dice=dice, states=states) -> None:
-            before = states[0] if states[0].step < 1000 else start(one, dice)
-            states[0], _ = follow(one, dice, before, range(before.step + 1, before.step + 2))
+        def step(one=one, noise=noise, states=states) -> None:
+            before = states[0] if states[0].step < 1000 else start(one, noise)
+            states[0], _ = follow(one, noise, before, range(before.step + 1, before.step + 2))
             one.process.maps(states[0].shear, states[0].drive.position, 1)
 
         textbook = plain.TextbookModes(*known(size), SHEAR_MODULUS, 1)

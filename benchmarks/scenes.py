@@ -9,7 +9,7 @@ import numpy as np
 
 import sim
 from benchmarks.compare import FIELD, lens
-from sim.engine import Dice, follow
+from sim.engine import MemberNoise, follow
 from sim.parts.exchange import Motion, Motions, Times
 from sim.scenario.scenario import Scenario
 
@@ -40,7 +40,7 @@ def followed(text: str) -> Callable[[], object]:
     """A program that advances all members of a scene to its end, as a run does."""
     of = loaded(text)
     members, end = np.arange(of.ensemble.members), of.clock.steps
-    return lambda: follow(of, Dice.of(of.seed, members), None, range(0, end + 1, end))
+    return lambda: follow(of, MemberNoise.of(of.seed, members), None, range(0, end + 1, end))
 
 
 def steady(speed: float, step: float, steps: int, drive: Callable) -> tuple[Motion, Motions]:

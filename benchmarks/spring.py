@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks import bonds_plain
 from benchmarks.bonds import BELL
 from benchmarks.timing import Bench, Beside, Row, absolute, spent
-from sim.engine import Course, Dice, State, follow, march, pack, unpack
+from sim.engine import MemberNoise, State, Trajectory, follow, march, pack, unpack
 from sim.parts.bonds import FirstMoment
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
@@ -38,10 +38,10 @@ def scene(duration: float, steps: int, tolerance: float, members: int = 1, dampi
     return Scenario(**keys, drive=Spring(stage=SPEED, contact_stiffness="rigid", **body))
 
 
-def followed(of: Scenario, begun: State | None = None) -> Course:
+def followed(of: Scenario, begun: State | None = None) -> Trajectory:
     """What all members of a scene go through, at each clock step, from a state or from the start."""
     steps = range(1 if begun is None else begun.step + 1, of.clock.steps + 1)
-    return follow(of, Dice.of(of.seed, np.arange(of.ensemble.members)), begun, steps)[1]
+    return follow(of, MemberNoise.of(of.seed, np.arange(of.ensemble.members)), begun, steps)[1]
 
 
 def apart(found: np.ndarray, exact: np.ndarray) -> float:
@@ -58,7 +58,7 @@ def out_of_phase(members: int, duration: float) -> tuple[Scenario, State]:
     return of, unpack(of, arrays | {"step": np.array(1)})
 
 
-def substeps(course: Course) -> float:
+def substeps(course: Trajectory) -> float:
     """Sub-steps of all members up to the end of a course."""
     return float(np.sum(course.driven[-1, :, READINGS.index("substeps")]))
 

@@ -12,8 +12,8 @@ import numpy as np
 from sim.numerics.noise import Noise
 from sim.parts import coupling, extremes
 from sim.parts.contact.balance import Balance
-from sim.parts.coupling import Around, Held
-from sim.parts.exchange import Array, Bonding, Indices, Sliding, Storing, Touching, during
+from sim.parts.coupling import Around
+from sim.parts.exchange import Array, Bonding, ContactState, Indices, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, Array]
@@ -35,16 +35,16 @@ class State(NamedTuple):
     bonds: tuple[object, ...]
     bonding: Bonding
     shear: Storing
-    contact: Touching
+    contact: ContactState
     extremes: extremes.Extremes
 
 
-class Course(NamedTuple):
+class Trajectory(NamedTuple):
     """What a batch of members goes through, with the time as first axis and the member as second.
 
     ``time`` [s], ``position`` [m] and ``speed`` [m/s] of the slider; ``fraction``, ``stress`` and ``strength`` of the
     bonds as of ``Bonding``; ``energy`` ΔΓ [J/m²]; ``driven`` the readings of a drive that feels the friction, in
-    columns; ``work`` and the rest as of ``Touching``.
+    columns; ``work`` and the rest as of ``ContactState``.
     """
 
     time: Array
@@ -62,62 +62,62 @@ class Course(NamedTuple):
     phases: Array
 
 
-class Dice(NamedTuple):
+class MemberNoise(NamedTuple):
     """The addressed noise of each part for one batch of members."""
 
     bonds: Noise
     shear: Noise
 
     @classmethod
-    def of(cls, seed: int, members: Indices) -> "Dice":
+    def of(cls, seed: int, members: Indices) -> "MemberNoise":
         return cls(Noise(seed, "bonds", members), Noise(seed, "shear", members))
 
 
-def start(scenario: Scenario, dice: Dice) -> State:
+def start(scenario: Scenario, noise: MemberNoise) -> State:
     """The state at t = 0."""
     drive, population, process, contact = scenario.parts
-    slider, motion = drive.begin(scenario.times, len(dice.bonds.members))
-    bonds = population.start(motion, dice.bonds)
+    slider, motion = drive.begin(scenario.times, len(noise.bonds.members))
+    bonds = population.start(motion, noise.bonds)
     bonding = population.bonding(bonds)
-    if drive.feeds_back:
+    if drive.solves_motion:
         bonding = coupling.felt(scenario.parts, bonding, motion.speed)
-    shear = process.start(motion, bonding, dice.shear)
+    shear = process.start(motion, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy, slider.position)
     touch = contact.start(motion, scenario.times.duration, terms)
-    if drive.feeds_back:
+    if drive.solves_motion:
         around = _around(scenario, touch, shear.energy, range(1, 2))
         slider = coupling.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
 
 
-def advance(scenario: Scenario, state: State, dice: Dice, steps: range) -> tuple[State, Course]:
+def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) -> tuple[State, Trajectory]:
     """The state after a block of clock steps and what it went through.
 
     Where a drive feels the friction the block ends, perhaps earlier, where the contact opens or closes.
     """
     drive, population, process, contact = scenario.parts
     slider: Sliding
-    if drive.feeds_back:
+    if drive.solves_motion:
         around = _around(scenario, state.contact, state.shear.energy, steps)
         before = state.drive, state.bonds
-        given = scenario.parts, before, around, scenario.times, steps, dice.bonds
+        given = scenario.parts, before, around, scenario.times, steps, noise.bonds
         passed, motions, bonds, bonding = coupling.advance(*given)
         slider, driven = passed.at(-1), drive.readings(passed)
     else:
         slider, motions = drive.advance(state.drive, scenario.times, steps)
-        bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, dice.bonds)
+        bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, noise.bonds)
         driven = during(drive.readings(slider), len(steps))
-    shear, energy = process.advance(state.shear, motions, bonding, dice.shear)
+    shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, energy, motions.position)
     touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
-    if drive.feeds_back and (stand := coupling.agreed(passed, touch.radius)) < len(steps):
-        return advance(scenario, state, dice, steps[:stand])
+    if drive.solves_motion and (stand := coupling.agreed(passed, touch.radius)) < len(steps):
+        return advance(scenario, state, noise, steps[:stand])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
     largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions)
     end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
     of_bonds = bonding.fraction, bonding.stress, bonding.strength
-    return end, Course(motions.time, motions.position, motions.speed, *of_bonds, energy, driven, *touch)
+    return end, Trajectory(motions.time, motions.position, motions.speed, *of_bonds, energy, driven, *touch)
 
 
 def march(scenario: Scenario, members: Indices, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -140,47 +140,47 @@ def march(scenario: Scenario, members: Indices, state: State | None = None, keep
     State
         The same numbers, bit for bit, for any batch and after any restart.
     """
-    dice = Dice.of(scenario.seed, members)
+    noise = MemberNoise.of(scenario.seed, members)
     if state is None:
-        state = start(scenario, dice)
+        state = start(scenario, noise)
         yield state
     while state.step < scenario.times.steps:
         if keep and scenario.parts.bonds.in_place:
             state = state._replace(bonds=deepcopy(state.bonds))
-        state, _ = advance(scenario, state, dice, range(state.step + 1, state.step + 2))
+        state, _ = advance(scenario, state, noise, range(state.step + 1, state.step + 2))
         yield state
 
 
-def follow(scenario: Scenario, dice: Dice, state: State | None, steps: range) -> tuple[State, Course]:
+def follow(scenario: Scenario, noise: MemberNoise, state: State | None, steps: range) -> tuple[State, Trajectory]:
     """Advance a batch of members from a state, or from the start, to the last of some evenly spaced steps.
 
     Returns
     -------
     state : State
         That at the last of the ``steps``.
-    course : Course
+    course : Trajectory
         What was passed at each of them; the same numbers, bit for bit, as a march gives.
     """
     kept = []
     if state is None:
-        state = start(scenario, dice)
-        kept += [course_of(scenario, state)] if steps.start == 0 else []
-    rows, numbers = len(dice.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
+        state = start(scenario, noise)
+        kept += [trajectory_of(scenario, state)] if steps.start == 0 else []
+    rows, numbers = len(noise.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
     longest = 1 if scenario.by_steps else max(1, _BLOCK_NUMBERS // (rows * numbers))
     while state.step < steps[-1]:
         block = range(state.step + 1, min(state.step + longest, steps[-1]) + 1)
-        state, passed = advance(scenario, state, dice, block)
+        state, passed = advance(scenario, state, noise, block)
         wanted = slice((steps.start - block.start) % steps.step, None, steps.step)
-        kept.append(Course(*(values[wanted] for values in passed)))
-    return state, Course(*map(np.concatenate, zip(*kept, strict=True)))
+        kept.append(Trajectory(*(values[wanted] for values in passed)))
+    return state, Trajectory(*map(np.concatenate, zip(*kept, strict=True)))
 
 
-def course_of(scenario: Scenario, state: State) -> Course:
+def trajectory_of(scenario: Scenario, state: State) -> Trajectory:
     """What a march passes at one state, with a time axis of length 1."""
     time, drive, bonds = np.full(1, scenario.times.at(state.step)), state.drive, state.bonding
     moving = time, drive.position, drive.speed, bonds.fraction, bonds.stress, bonds.strength
     driven = scenario.parts.drive.readings(drive)
-    return Course(*(values[np.newaxis] for values in (*moving, state.shear.energy, driven, *state.contact)))
+    return Trajectory(*(values[np.newaxis] for values in (*moving, state.shear.energy, driven, *state.contact)))
 
 
 def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array, position: Array) -> Balance:
@@ -190,18 +190,17 @@ def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array,
     return Balance(bonded, fluctuating, strength, margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _around(scenario: Scenario, touch: Touching, energy: Array, steps: range) -> Around:
+def _around(scenario: Scenario, touch: ContactState, energy: Array, steps: range) -> Around:
     """Contact and half-space at the start of some clock steps, for a drive that feels the friction."""
     contact, bodies, times, adhesion = scenario.contact, scenario.bodies, scenario.times, scenario.adhesion
-    first, last = contact.held_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
+    first, last = contact.mount_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
     share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(touch.radius, nan=0.0))
     bare = adhesion.work_of_bonds(0.0) - scenario.fluctuations.paid_by_adhesion * share * energy
     bonded = adhesion.work_of_bonds(1.0) - adhesion.work_of_bonds(0.0)
     area = scenario.contact_area
-    held = cast(tuple[Held, Held], (first.held, last.held))
     stays = contact.lags or not (contact.changes or bonded or contact.reversible)
     solid = *bodies, scenario.solid.effective[0]
-    return Around(touch.radius, bare, bonded, contact.reversible, held, stays, *solid, area)
+    return Around(touch.radius, bare, bonded, contact.reversible, (first.mount, last.mount), stays, *solid, area)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

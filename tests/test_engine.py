@@ -9,7 +9,7 @@ import pytest
 from helpers.scenes import BONDS, CONTACTS, DRIVES, SHEARS, go_together, scene
 from numpy.testing import assert_allclose
 
-from sim.engine import Dice, course_of, follow, march, pack, unpack
+from sim.engine import MemberNoise, follow, march, pack, trajectory_of, unpack
 
 DEPTHS = {"drive": DRIVES, "bonds": BONDS, "shear": SHEARS, "contact": CONTACTS}
 
@@ -79,8 +79,8 @@ def check_case(case, members=3, steps=6):
 def check_blocks(scenario, states, members):
     """Blocks of steps pass what the march passes, and end where it ends, recorded always or at every second step."""
     for steps, some in ((range(len(states)), states), (range(0, len(states), 2), states[::2])):
-        end, passed = follow(scenario, Dice.of(scenario.seed, np.arange(members)), None, steps)
-        marched = map(np.concatenate, zip(*(course_of(scenario, state) for state in some), strict=True))
+        end, passed = follow(scenario, MemberNoise.of(scenario.seed, np.arange(members)), None, steps)
+        marched = map(np.concatenate, zip(*(trajectory_of(scenario, state) for state in some), strict=True))
         for name, one, other in zip(passed._fields, passed, marched, strict=True):
             assert np.array_equal(one, other, equal_nan=True), name
         assert same(end, some[-1])

@@ -384,7 +384,7 @@ def load_field(name):
 
 
 #: Scenarios whose slider feels its friction, solved to a tolerance: what they claim is tested, no last digits.
-DRIVEN = {name for name in NAMES if load(FOLDER / f"{name}.toml").drive.feeds_back}
+DRIVEN = {name for name in NAMES if load(FOLDER / f"{name}.toml").drive.solves_motion}
 #: Mean contact area [m^2] and friction [N] of four members, only to notice an unintended change of the numbers.
 GOLDEN = {
     "afm_tip": (3.935446625827423e-16, 3.541901963244681e-07),

@@ -60,7 +60,7 @@ def preview(scenario: Scenario) -> str:
         "quantities in SI": _quantities(plan.points),
         "contact at rest": _contact(plan.points),
         "fluctuations": _fluctuations(some),
-        "slider": _slider([point for point in some if point.drive.feeds_back]),
+        "slider": _slider([point for point in some if point.drive.solves_motion]),
         "notes": [(text,) for text in [*remarks(plan), *_lacking(plan)]],
         "the run": _run(plan),
     }

@@ -5,10 +5,10 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.engine import Course, State, balance
+from sim.engine import State, Trajectory, balance
 from sim.laws import jkr
 from sim.parts import extremes
-from sim.parts.contact.balance import BONDED, CLOSED, SETTLED, STRESSLESS, WHOLE, Balance, Shares
+from sim.parts.contact.balance import BONDS_ONLY, CLOSED, EQUILIBRIUM, JKR, NO_MEAN_STRESS, Balance, Shares
 from sim.parts.contact.control import Control, LoadControl
 from sim.parts.drive import READINGS
 from sim.scenario.scenario import Scenario
@@ -18,7 +18,7 @@ class Variable(NamedTuple):
     """One recorded quantity, or one number of a scene.
 
     ``part`` names the part whose class decides whether members differ, or their control; "" for a number of the scene.
-    ``read`` takes the scenario and what a batch went through, a ``Course``, and gives an array that broadcasts to
+    ``read`` takes the scenario and what a batch went through, a ``Trajectory``, and gives an array that broadcasts to
     shape (times, members); that of a quantity of the whole run takes the state at its end, that of a number the
     scenario alone.
     ``there`` says for which scenes it is recorded, with ``condition`` in words.
@@ -34,78 +34,78 @@ class Variable(NamedTuple):
     condition: str = ""
 
 
-def _until_stopped(read: Callable[[Scenario, Course], np.ndarray]) -> Callable[[Scenario, Course], np.ndarray]:
+def _until_stopped(read: Callable[[Scenario, Trajectory], np.ndarray]) -> Callable[[Scenario, Trajectory], np.ndarray]:
     """A reading that is nan once a member's trajectory has stopped at its pull-off."""
 
-    def running(scene: Scenario, course: Course) -> np.ndarray:
+    def running(scene: Scenario, course: Trajectory) -> np.ndarray:
         return np.where(scene.contact.stopped(course.radius, course.detached), np.nan, read(scene, course))
 
     return running
 
 
-def _radius(scene: Scenario, course: Course) -> np.ndarray:
+def _radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     return np.nan_to_num(course.radius, nan=0.0)
 
 
-def _area(scene: Scenario, course: Course) -> np.ndarray:
+def _area(scene: Scenario, course: Trajectory) -> np.ndarray:
     return np.pi * _radius(scene, course) ** 2
 
 
-def _control(scene: Scenario, course: Course) -> Control:
+def _control(scene: Scenario, course: Trajectory) -> Control:
     return scene.contact.control(course.time, scene.clock.duration)
 
 
-def _applied_load(scene: Scenario, course: Course) -> np.ndarray:
+def _applied_load(scene: Scenario, course: Trajectory) -> np.ndarray:
     if scene.contact.load is None:
         return np.full(course.time.shape, np.nan)
     return np.broadcast_to(cast(LoadControl, _control(scene, course)).load, course.time.shape)
 
 
-def _terms(scene: Scenario, course: Course) -> Balance:
+def _terms(scene: Scenario, course: Trajectory) -> Balance:
     return balance(scene, course.fraction, course.strength, course.energy, course.position)
 
 
-def _stored(scene: Scenario, course: Course) -> np.ndarray:
+def _stored(scene: Scenario, course: Trajectory) -> np.ndarray:
     """ΔΓ, of a measured map on a disc that on the contact, per area."""
     if not scene.fluctuations.passes:
         return course.energy
     return course.energy * cast(Shares, _terms(scene, course).margin).mean(_radius(scene, course))
 
 
-def _hertz_radius(scene: Scenario, course: Course) -> np.ndarray:
+def _hertz_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     return np.nan_to_num(_control(scene, course).radius(np.zeros(1), np.zeros(1), 0.0, scene.bodies))
 
 
-def _where_closed(course: Course, reference: int, radius: np.ndarray) -> np.ndarray:
+def _where_closed(course: Trajectory, reference: int, radius: np.ndarray) -> np.ndarray:
     """Radius of a reference contact [m], 0 where it is open."""
     return np.where(course.phases[:, : radius.shape[1], reference] == CLOSED, radius, 0.0)
 
 
-def _with_work(scene: Scenario, course: Course, reference: int, work: np.ndarray) -> np.ndarray:
+def _with_work(scene: Scenario, course: Trajectory, reference: int, work: np.ndarray) -> np.ndarray:
     """Radius of a reference contact in equilibrium with a work of adhesion [m]."""
     return _where_closed(course, reference, _control(scene, course).radius(work, np.zeros(1), 0.0, scene.bodies))
 
 
-def _jkr_radius(scene: Scenario, course: Course) -> np.ndarray:
-    return _with_work(scene, course, WHOLE, np.full(course.time.shape, scene.adhesion.work))
+def _jkr_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
+    return _with_work(scene, course, JKR, np.full(course.time.shape, scene.adhesion.work))
 
 
-def _bonds_radius(scene: Scenario, course: Course) -> np.ndarray:
-    return _with_work(scene, course, BONDED, _terms(scene, course).bonded)
+def _bonds_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
+    return _with_work(scene, course, BONDS_ONLY, _terms(scene, course).bonded)
 
 
-def _stressless_radius(scene: Scenario, course: Course) -> np.ndarray:
+def _stressless_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     if not scene.contact.reversible:
         return _equilibrium_radius(scene, course)
     terms = _terms(scene, course).without_stress()
-    return _where_closed(course, STRESSLESS, scene.contact.equilibrium(_control(scene, course), terms))
+    return _where_closed(course, NO_MEAN_STRESS, scene.contact.equilibrium(_control(scene, course), terms))
 
 
-def _equilibrium_radius(scene: Scenario, course: Course) -> np.ndarray:
+def _equilibrium_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     if not scene.contact.lags:
         return _radius(scene, course)
     terms = _terms(scene, course)
-    return _where_closed(course, SETTLED, scene.contact.equilibrium(_control(scene, course), terms))
+    return _where_closed(course, EQUILIBRIUM, scene.contact.equilibrium(_control(scene, course), terms))
 
 
 def _pulled(state: State, column: int, sign: float) -> np.ndarray:
@@ -184,7 +184,7 @@ def _driven(name: str, unit: str, long_name: str, symbol: str) -> Variable:
     found = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., column]
     if sprung:
         return Variable(*found, lambda scene: scene.drive.model == "spring", 'drive.model = "spring"')
-    return Variable(*found, lambda scene: scene.drive.feeds_back, 'drive.model = "spring" or "force"')
+    return Variable(*found, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"')
 
 
 VARIABLES += (

@@ -16,7 +16,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from sim.engine import Course, Dice, State, follow, pack, unpack
+from sim.engine import MemberNoise, State, Trajectory, follow, pack, unpack
 from sim.ensemble import cluster
 from sim.ensemble.bounds import fitting, refuse_full_disk, room_named
 from sim.ensemble.netcdf import attributes_of, in_memory, write
@@ -198,7 +198,7 @@ def _record(
     task: Task, point: Scenario, state: State | None, block: Block, progress: Progress
 ) -> tuple[State, dict[str, np.ndarray]]:
     """One part: every variable over a block and the maps in it; and the state at its end."""
-    clock, members, records, dice = point.clock, task.members, block.records, Dice.of(point.seed, task.members)
+    clock, members, records, noise = point.clock, task.members, block.records, MemberNoise.of(point.seed, task.members)
     variables = [one for one in VARIABLES if one.name in task.quantities]
     rows_of = {name: len(members) if name in task.each else 1 for name in task.quantities}
     rows = {one.name: np.empty((rows_of[one.name], len(records))) for one in variables}
@@ -206,7 +206,7 @@ def _record(
     drawn, drawn_at = int(np.sum(members < point.record.map_members)), snapshots(point)
     for steps in block.pieces(max(1, _STEPS // clock.stride), drawn_at):
         before = -1 if state is None else state.step
-        state, course = follow(point, dice, state, steps)
+        state, course = follow(point, noise, state, steps)
         if steps[-1] % clock.stride == 0:
             first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]
             for one in variables:
@@ -226,7 +226,7 @@ def _record(
     return end, rows | maps
 
 
-def _read(variable: Variable, point: Scenario, course: Course) -> np.ndarray:
+def _read(variable: Variable, point: Scenario, course: Trajectory) -> np.ndarray:
     """A recorded quantity, nan once nothing has held the body any longer; a flag or a count, without symbol, stays."""
     values = variable.read(point, course)
     ends = point.varies["drive"] and point.varies[variable.part] and variable.symbol

@@ -22,7 +22,7 @@ from sim.parts.coupling_equations import Law, Resting, Slider
 from sim.parts.coupling_rows import advance_rows
 from sim.parts.coupling_tracks import advance_tracks
 from sim.parts.drive.driven import FIRST, STORED, Driven, Force, Spring
-from sim.parts.exchange import Array, Bonding, Flags, Motions, Parts, Sliding, Times
+from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sliding, Times
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
@@ -48,14 +48,6 @@ _Rows = tuple[Array, Array, Array, Array, Array, Array, float]
 _Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 
 
-class Held(NamedTuple):
-    """What holds the sphere: load [N], displacement of the base [m], stiffness behind it [N/m]; 0 what does not."""
-
-    load: float | Array
-    base: float | Array
-    stiffness: float
-
-
 class Around(NamedTuple):
     """Contact and half-space around slider and bonds during some clock steps.
 
@@ -69,8 +61,8 @@ class Around(NamedTuple):
         Work of adhesion of the bonds of rest [J/m²].
     reversible : float
         Share of the mean stress's energy that adhesion pays [1].
-    held : tuple of Held
-        What holds the sphere at start and end of each step.
+    mounts : tuple of Mount
+        Mount of the sphere at the start and at the end of each step.
     stays : bool
         Whether the radius stays during a step.
     sphere_radius, modulus, poisson_ratio : float
@@ -85,7 +77,7 @@ class Around(NamedTuple):
     bare: Array
     bonded: float
     reversible: float
-    held: tuple[Held, Held]
+    mounts: tuple[Mount, Mount]
     stays: bool
     sphere_radius: float
     modulus: float
@@ -292,7 +284,7 @@ def _numbers(drive: Force | Spring, bonds: _Driven, around: Around, units: _Unit
         stress = density * stretch
         taken = around.reversible * float(mean_stress_energy(1.0, stress, around.modulus, around.poisson_ratio))
     held = Resting(
-        float(around.stays), around.bonded / of_rest, taken, 0.0, 0.0, 0.0, 0.0, around.held[0][2],
+        float(around.stays), around.bonded / of_rest, taken, 0.0, 0.0, 0.0, 0.0, around.mounts[0].stiffness,
         1.0 / around.sphere_radius, around.modulus, around.area,
     )  # fmt: skip
     return tuple(slider), tuple(breaking), tuple(held)
@@ -303,6 +295,6 @@ def _clock(around: Around, ends: Array) -> Array:
     duration = ends[1:] - ends[:-1]
     clock = np.zeros((len(duration), 5))
     clock[:, 0] = ends[:-1]
-    for column, (first, last) in enumerate(zip(*(held[:2] for held in around.held), strict=True)):
+    for column, (first, last) in enumerate(zip(*(mount[:2] for mount in around.mounts), strict=True)):
         clock[:, 2 * column + 1], clock[:, 2 * column + 2] = first, (last - first) / duration
     return clock

@@ -221,7 +221,15 @@ class Storing(Protocol):
         """Elastic energy of the fluctuations per area ΔΓ [J/m²]."""
 
 
-class Touching(NamedTuple):
+class Mount(NamedTuple):
+    """Load [N], displacement of the base [m] and stiffness behind it [N/m] that hold the sphere; 0 if absent."""
+
+    load: float | Array
+    base: float | Array
+    stiffness: float
+
+
+class ContactState(NamedTuple):
     """State of a contact; of a block of steps with the step as first axis.
 
     Attributes
@@ -247,9 +255,9 @@ class Touching(NamedTuple):
     dissipated: Array
     phases: Array
 
-    def at(self, k: int) -> "Touching":
+    def at(self, k: int) -> "ContactState":
         """The contact at the end of step k of a block."""
-        return Touching(*(values[k] for values in self))
+        return ContactState(*(values[k] for values in self))
 
 
 Own = TypeVar("Own")
@@ -263,20 +271,16 @@ class Part(Protocol):
     def per_member(self) -> bool:
         """True if members differ by this part: a matter of its model and keys, never of data."""
 
-    @property
-    def feeds_back(self) -> bool:
-        """True if a step of this part needs the state of later parts at the end of the step before.
-
-        The order is drive, bonds, shear, contact. Where no part of a scene feeds back, each can be advanced over a
-        whole block of steps before the next one.
-        """
-
     def remarks(self, setting: Setting) -> list[str]:
         """Sentences on what this part assumes or cannot hold in such a scene, for ``sim check``."""
 
 
 class Drive(Part, Protocol[Own]):
     """Motion of the slider."""
+
+    @property
+    def solves_motion(self) -> bool:
+        """True if the motion follows from the friction and is solved together with the bonds."""
 
     @property
     def state_class(self) -> type[Own]:
@@ -294,6 +298,13 @@ class Drive(Part, Protocol[Own]):
 
 class Bonds(Part, Protocol[Own]):
     """A population of bonds between slider and half-space."""
+
+    @property
+    def feeds_back(self) -> bool:
+        """True if a step needs the contact at the end of the step before.
+
+        If no part of a scene feeds back, each part is advanced over a whole block of steps before the next one.
+        """
 
     @property
     def state_class(self) -> type[Own]:
@@ -344,13 +355,13 @@ class Contact(Part, Protocol[Terms]):
     """Contact of sphere and half-space."""
 
     @property
-    def state_class(self) -> type[Touching]:
+    def state_class(self) -> type[ContactState]:
         """Class of the state."""
 
-    def start(self, motion: Motion, duration: float, balance: Terms) -> Touching:
+    def start(self, motion: Motion, duration: float, balance: Terms) -> ContactState:
         """Contact at the start of a run of ``duration`` [s], in equilibrium with the terms of the work of adhesion."""
 
-    def advance(self, state: Touching, motions: Motions, duration: float, balance: Terms) -> Touching:
+    def advance(self, state: ContactState, motions: Motions, duration: float, balance: Terms) -> ContactState:
         """Contact at the end of each step of a block, where the terms of the work of adhesion are ``balance``."""
 
 

@@ -75,13 +75,13 @@ def _wider_than_the_sphere(radius: float, sphere: Sphere, contact: Contact) -> F
 
 
 def _reversible_under_a_drive(drive: Drive, contact: Contact) -> Faults:
-    if drive.feeds_back and contact.reversible > 0.0 and drive.at_once:
+    if drive.solves_motion and contact.reversible > 0.0 and drive.at_once:
         said = "makes friction fall as the contact shrinks, which nothing delays: give drive.mass, damping or viscosity"
         yield ("contact", "reversible"), said
 
 
 def _cannot_be_driven(drive: Drive, bonds: BondModel) -> Faults:
-    if not drive.feeds_back:
+    if not drive.solves_motion:
         return
     if not bonds.stretched:
         if drive.contact_stiffness != "rigid":
@@ -99,7 +99,7 @@ def _off_the_map(
 ) -> Faults:
     if not shear.passes:
         return
-    if drive.feeds_back:
+    if drive.solves_motion:
         said = 'a measured map under a disc needs a slip that is known beforehand: prescribe the speed, or give "plane"'
         yield ("shear", "contact"), said
         return

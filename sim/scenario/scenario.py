@@ -242,7 +242,7 @@ class Scenario:
         """
         _, bonds, shear, contact = self.chosen
         alone = contact.lags or not (shear.paid_by_adhesion == 0.0 or shear.stays) or not bonds.in_blocks
-        return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.feeds_back and alone)
+        return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
 
     def remarks(self) -> list[str]:
         """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""

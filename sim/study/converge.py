@@ -74,7 +74,7 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     first order or better leave. Yardsticks are largest values over the run: of the mean for means and for the spread
     of bonds, of the spread for spreads, of the skewness for that of ΔΓ; that of the rest is not judged.
     """
-    if scenario.drive.feeds_back:
+    if scenario.drive.solves_motion:
         said = (
             f'drive.model is "{scenario.drive.model}", whose slider feels the noise: no law gives its truth; study the'
         )

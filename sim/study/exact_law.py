@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammainccinv, gammaincinv, ndtr
 
-from sim.engine import balance, course_of, march
+from sim.engine import balance, march, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding, Gammas, Motion, Motions
@@ -169,7 +169,7 @@ class Walk(NamedTuple):
             cumulants = np.outer(np.ones(len(sets)), [float(state.shear.energy[0]), 0.0, 0.0])
             if calm.fluctuations.per_member:
                 cumulants = process.cumulants(state.shear)
-            now = [np.ravel(READ[name](calm, course_of(calm, state)))[0] for name in QUANTITIES]
+            now = [np.ravel(READ[name](calm, trajectory_of(calm, state)))[0] for name in QUANTITIES]
             records.append((state.step, now, state.bonding.strength[0], state.bonding.varying[0], cumulants))
         steps, means, strength, varying, sums = (np.array(column) for column in zip(*records, strict=True))
         density, rest = (given["site_density"], bonds.bound_at_rest) if "rupture" in given else (math.nan, 1.0)

@@ -118,11 +118,11 @@ def fit(
         raise BadInput(["--free: a key is there twice; give each once"])
     tables = [read(path, base) for path in data]
     problem = problem_of(tables, [groups(base, table) for table in tables], chosen, common or {})
-    if steady and base.drive.feeds_back:
+    if steady and base.drive.solves_motion:
         raise BadInput(
             [f'--steady: drive.model = "{base.drive.model}" is answered by its own runs alone; leave it out']
         )
-    if base.drive.feeds_back or (not steady and idle(problem)):
+    if base.drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     _refuse_entangled(problem)
     problem, best = _searched(problem)

@@ -106,7 +106,7 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
     kind = scenario.contact.kind
     units = {one.name: one.unit for one in VARIABLES}
     found = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
-    if not scenario.drive.feeds_back:
+    if not scenario.drive.solves_motion:
         found |= dict.fromkeys(("speed", "drive_speed"), ("speed", Quantity("m/s", "sliding speed")))
     elif "drive_stage" in found:
         found["stage_speed"] = found["drive_stage"]
@@ -117,7 +117,7 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
 
 def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
     """Declaration of each variable that can be measured."""
-    of_slider = _OF_SLIDER if scenario.drive.feeds_back else ()
+    of_slider = _OF_SLIDER if scenario.drive.solves_motion else ()
     there = (one for one in VARIABLES if (one.part != "drive" or one.name in of_slider) and one.there(scenario))
     sizes = {name: Quantity(unit, name, at_least=0) for name, unit in _SIZES.items()}
     return {one.name: sizes.get(one.name, Quantity(one.unit, one.long_name))
@@ -131,12 +131,12 @@ def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
         both = [name for name in ("speed", "held") if name in conditions]
         said = "times already say the speed and the load, by the scenario; leave out t, or these columns"
         return said if both else ""
-    if drive.feeds_back and not {"drive.stage", "drive.force"} & quantities(scenario).keys():
+    if drive.solves_motion and not {"drive.stage", "drive.force"} & quantities(scenario).keys():
         return f'what drives the slider changes during the run (drive.model = "{drive.model}"); add a column "t [s]"'
-    if "speed" not in conditions and drive.model != "steady" and not drive.feeds_back:
+    if "speed" not in conditions and drive.model != "steady" and not drive.solves_motion:
         said = f'the speed changes during the run (drive.model = "{drive.model}")'
         return f'{said}; add a column "speed [mm/s]", or "t [s]"'
     if "held" not in conditions and contact.changes:
         return f'contact.{contact.kind} changes during the run; add a column "{HELD[contact.kind]}", or "t [s]"'
-    column = "t [s]" if drive.feeds_back else "speed [mm/s]"
+    column = "t [s]" if drive.solves_motion else "speed [mm/s]"
     return "" if conditions else f'no column says where the points were taken; add for example "{column}"'

@@ -156,7 +156,7 @@ def _acting(problem: Problem) -> tuple[bool, bool]:
 def _lacking(problem: Problem) -> str:
     """What the curves or the scenario lack for bonds, fluctuations and theories to be told apart; "" for nothing."""
     several = [group for groups in problem.groups for group in groups]
-    if not any(group.scenario.drive.feeds_back or np.any(group.speed) for group in several):
+    if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in several):
         said = "the curves were measured at rest, where every mechanism is JKR's contact: they tell its work of"
         cure = 'measure while it slides, with a column "speed [mm/s]"'
         return f"{said} adhesion and its modulus alone; to compare mechanisms, {cure}"

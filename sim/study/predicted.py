@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.engine import Course, Dice, balance, follow
+from sim.engine import MemberNoise, Trajectory, balance, follow
 from sim.ensemble.plan import together
 from sim.ensemble.recorded import VARIABLES
 from sim.laws.theories import compare_at_indentation, compare_at_load
@@ -112,7 +112,7 @@ def _course(time: Array, values: Array) -> Any:
     return float(values[0]) if np.all(values == values[0]) else {"time": time, "value": values}
 
 
-def steady_course(scenario: Scenario, time: Array, speed: Array) -> Course:
+def steady_course(scenario: Scenario, time: Array, speed: Array) -> Trajectory:
     """Contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s]; shapes (rows, 1)."""
     found = scenario.population.steady(speed[:, 0])
     still = 0.0 * speed
@@ -125,7 +125,7 @@ def steady_course(scenario: Scenario, time: Array, speed: Array) -> Course:
     terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), still)
     touch = scenario.contact.start(motion, scenario.clock.duration, terms)
     moving = time, still, speed, bonding.fraction, bonding.stress, bonding.strength, energy
-    return Course(*moving, np.empty((len(speed), 1, 0)), *touch)
+    return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch)
 
 
 @functools.lru_cache(maxsize=256)  # most numbers that are changed are none of the spectrum's
@@ -147,10 +147,10 @@ def by_steady_sliding(group: Group, values: Values, names: list[str], theory: st
     return {name: np.broadcast_to(_READ[name](scenario, course), group.speed.shape)[:, 0] for name in names}
 
 
-def _radius_by(theory: str, scenario: Scenario, course: Course, values: Values) -> Array:
+def _radius_by(theory: str, scenario: Scenario, course: Trajectory, values: Values) -> Array:
     """Contact radius by a theory, at the stress that the bonds bear and the full work of adhesion."""
     control = scenario.contact.control(course.time, scenario.clock.duration)
-    load, base, _ = control.held
+    load, base, _ = control.mount
     at_load = scenario.contact.kind == "load"
     compare: Callable[..., dict[str, Array]] = compare_at_load if at_load else compare_at_indentation
     numbers = {"reversible": values.get("alpha", 0.0), "mixity": values.get("lambda", 0.5)}
@@ -181,7 +181,7 @@ def asked(found: list[Group], values: Values, names: list[str], by_time: bool) -
     for group in found:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
         runs: list[tuple[NDArray[np.int64], Scenario, Weights]] = []
-        driven = scenario.drive.feeds_back
+        driven = scenario.drive.solves_motion
         if by_time or not (driven or scenario.drive.model == "steady" or scenario.contact.changes):
             runs.append((group.rows, scenario, functools.partial(_places, group, by_time)))
         else:
@@ -199,20 +199,20 @@ def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
     """The scenario at the steady speed of a row, or under its own steady stage or force, and held as it was there."""
     held = scenario.contact.course.at(group.time[row], scenario.clock.duration)
     steady = {"drive": {"model": "steady", "speed": float(group.speed[row, 0])}}
-    drive = {} if scenario.drive.feeds_back else steady
+    drive = {} if scenario.drive.solves_motion else steady
     return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(held[0])})
 
 
 #: Weights of the records of a run that make the rows, shape (rows, records).
-Weights = Callable[[Course], Array]
+Weights = Callable[[Trajectory], Array]
 
 
-def _second_half(course: Course) -> Array:
+def _second_half(course: Trajectory) -> Array:
     weights = (np.arange(len(course.time)) >= len(course.time) // 2).astype(float)
     return weights[np.newaxis] / weights.sum()
 
 
-def _places(group: Group, by_time: bool, course: Course) -> Array:
+def _places(group: Group, by_time: bool, course: Trajectory) -> Array:
     """Weights of the two records between which a row lies, by its time or by the logarithm of its speed."""
     if by_time:
         along, at = course.time[:, 0], group.time[:, 0]
@@ -244,7 +244,7 @@ def _members(point: Scenario, names: list[str], places: Weights) -> dict[str, Ar
     kept: dict[str, list[Array]] = {name: [] for name in names}
     for first in range(0, count, most):
         members = np.arange(first, min(first + most, count))
-        _, course = follow(point, Dice.of(point.seed, members), None, steps)
+        _, course = follow(point, MemberNoise.of(point.seed, members), None, steps)
         weights = places(course)
         for name in names:
             values = np.broadcast_to(_READ[name](point, course), (len(steps), len(members)))

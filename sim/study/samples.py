@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.engine import Dice, course_of, follow, march
+from sim.engine import MemberNoise, follow, march, trajectory_of
 from sim.ensemble.plan import together
 from sim.scenario.scenario import Scenario
 from sim.study.exact_law import QUANTITIES, READ
@@ -61,13 +61,13 @@ def affordable(scenario: Scenario, steps: int, seconds: float, times: int) -> in
 def _paces(scenario: Scenario, members: int, seconds: float, repeats: int) -> list[float]:
     """CPU times per step of a batch of members [s], each of whole runs or of a piece of one that takes long enough."""
     found, piece, state, last = [], 1, None, scenario.clock.steps
-    dice = Dice.of(scenario.seed, np.arange(members))
+    noise = MemberNoise.of(scenario.seed, np.arange(members))
     for _ in range(repeats + 1):
         steps, spent, began, whole = 0, 0.0, time.process_time(), False
         while spent < seconds or not (whole or steps >= _MANY or spent > _LONG * seconds):
             before = state.step if state is not None and state.step < last else 0
             stop = min(before + piece, last)
-            state, _ = follow(scenario, dice, state if before else None, range(before + 1, stop + 1))
+            state, _ = follow(scenario, noise, state if before else None, range(before + 1, stop + 1))
             spent, piece = time.process_time() - began, min(2 * piece, _PIECE)
             steps += stop - before
             whole = stop == last
@@ -113,7 +113,7 @@ def coupled(scenarios: Sequence[Scenario], members: int, steps: Sequence[int]) -
             if state.step in places:
                 for k, (scene, now) in enumerate(zip(scenarios, states, strict=True)):
                     for q, name in enumerate(QUANTITIES):
-                        kept[k, q, batch, places[state.step]] = READ[name](scene, course_of(scene, now))[0]
+                        kept[k, q, batch, places[state.step]] = READ[name](scene, trajectory_of(scene, now))[0]
             if state.step == steps[-1]:
                 break
     return kept

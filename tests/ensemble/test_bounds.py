@@ -155,10 +155,10 @@ def test_the_pace_is_that_of_the_steps_and_nothing_is_compiled_for_it(monkeypatc
     plan, clock = Plan.of(sample(20, 3000, clock=Clock(duration=3.0, step=1e-3, record=0.1))), [0.0]
     follow = simulate.follow
 
-    def slow(point, dice, state, steps):
+    def slow(point, noise, state, steps):
         before = -1 if state is None else state.step
-        clock[0] += 3.0 * bounds.counted_block(point, dice.shear.members, plans.Block(before, steps[-1], 100))
-        return follow(point, dice, state, steps)
+        clock[0] += 3.0 * bounds.counted_block(point, noise.shear.members, plans.Block(before, steps[-1], 100))
+        return follow(point, noise, state, steps)
 
     monkeypatch.setattr(simulate, "follow", slow)
     monkeypatch.setattr(time, "process_time", lambda: clock[0])

@@ -17,7 +17,7 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim import cli
-from sim.engine import course_of, march
+from sim.engine import march, trajectory_of
 from sim.ensemble import netcdf, plan as plans, simulate as ensemble
 from sim.ensemble.outline import variable_name
 from sim.ensemble.plan import Plan
@@ -46,7 +46,7 @@ def test_the_dataset_is_what_the_engine_marched():
         for variable in Plan.of(scenario).variables:
             found = dataset[variable.name].isel(t=record).values
             assert np.array_equal(
-                np.atleast_1d(found), np.ravel(variable.read(scenario, course_of(scenario, state))), equal_nan=True
+                np.atleast_1d(found), np.ravel(variable.read(scenario, trajectory_of(scenario, state))), equal_nan=True
             ), variable.name
 
 

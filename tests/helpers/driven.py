@@ -5,7 +5,7 @@ import math
 import numpy as np
 from numpy.testing import assert_allclose
 
-from sim.engine import Dice, follow, march, pack, unpack
+from sim.engine import MemberNoise, follow, march, pack, unpack
 from sim.laws import jkr
 from sim.parts.bonds import FirstMoment
 from sim.parts.bonds.rupture import Bell
@@ -157,7 +157,7 @@ def check_blocks(scene, states, every=1):
     """Blocks of steps give what a march gave of all members, bit for bit."""
     assert not scene.by_steps
     members = np.arange(len(states[0].drive.speed))
-    end, passed = follow(scene, Dice.of(scene.seed, members), None, range(0, scene.times.steps + 1, every))
+    end, passed = follow(scene, MemberNoise.of(scene.seed, members), None, range(0, scene.times.steps + 1, every))
     readings = [scene.parts.drive.readings(state.drive) for state in states[::every]]
     assert np.array_equal(passed.driven, readings, equal_nan=True)
     assert np.array_equal(passed.radius, [state.contact.radius for state in states[::every]], equal_nan=True)

@@ -139,7 +139,7 @@ CONTACTS = {
 def go_together(case):
     """Whether contact and bonds of a case, by the names of its depths, can feel its drive."""
     part, contact = DRIVES[case.get("drive", "steady")], CONTACTS[case.get("contact", "load")]
-    if not part.feeds_back:
+    if not part.solves_motion:
         return True
     if contact.reversible and part.at_once:
         return False

@@ -42,7 +42,7 @@ from scipy.optimize import brentq
 
 import sim
 from sim.analysis.tables import notes
-from sim.engine import Dice, follow, march
+from sim.engine import MemberNoise, follow, march
 from sim.ensemble.oscillations import slider_body
 from sim.laws import jkr
 from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
@@ -131,7 +131,7 @@ def growth(stiffness, keys, steps=300, step=0.02, **lens):
     stage = {"time": (0.0, step, step, 1e3), "value": tuple(v * STRETCH for v in (10.0, 10.0, 10.0001, 10.0001))}
     drive = spring(stiffness, stage, start="steady", tolerance=1e-11, **keys)
     scene = scenario(steps * step, steps, drive, start="steady", **lens)
-    passed = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
+    passed = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
     changes = np.diff(passed.fraction[steps // 2 :, 0])
     modes = 4 if {"contact", "mass"} <= keys.keys() else 2  # there the body rings for long
     shifted = np.stack([changes[modes - 1 - k : -1 - k] for k in range(modes)], axis=1)
@@ -486,7 +486,7 @@ def test_steady_sliding_on_falling_friction_is_stable_where_damping_outweighs_th
         keys = {"stage": stage, "stiffness": stiffness * HELD / STRETCH, "start": "steady", "tolerance": 1e-11}
         heavy = {"mass": mass * HELD / STRETCH, "damping": damping * HELD / STRETCH}
         scene = stuck(400 * step, 400, bonds, Spring(**keys, **heavy, contact_stiffness="rigid"))
-        passed = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(401))[1]
+        passed = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(401))[1]
         changes = np.diff(passed.speed[2:, 0] / STRETCH)
         found = np.roots([1.0, *-np.linalg.lstsq(np.stack([changes[1:-1], changes[:-2]], axis=1), changes[2:])[0]])
         rate = np.log(found[0]).real / step

@@ -7,7 +7,7 @@ import pytest
 from helpers.driven import DENSITY, KAPPA, STRETCH, UNIT, scenario, spring
 from numpy.testing import assert_allclose
 
-from sim.engine import Dice, follow
+from sim.engine import MemberNoise, follow
 from sim.laws.schallamach import Body, first_moment_amplitude, first_moment_onset, first_moment_stress
 from sim.parts.bonds import Cohort, Tracked
 from sim.parts.drive import READINGS, Table
@@ -18,7 +18,7 @@ UNITS = 1.0, 1.0, 1.0, 1.0, 1.0, 1.0
 
 def passed(scene, every=1):
     """What a single member goes through, at some of its clock steps, and the readings of its drive by name."""
-    course = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(0, scene.times.steps + 1, every))[1]
+    course = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(0, scene.times.steps + 1, every))[1]
     return course, dict(zip(READINGS, course.driven[:, 0].T, strict=True))
 
 
@@ -70,7 +70,7 @@ def stepped(before, after, steps, duration):
     """Stress after a jump of a prescribed speed out of steady sliding, in the unit of all sites at one stretch."""
     times, speeds = jump(before, after, duration / steps, duration)
     scene = scenario(times[-1], steps + 1, Table(time=times, speed=speeds), start="steady")
-    course = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(1, steps + 2))[1]
+    course = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(1, steps + 2))[1]
     return course.stress[:, 0] / (DENSITY * KAPPA * STRETCH)
 
 

@@ -27,7 +27,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import sim
-from sim.engine import Dice, follow, march
+from sim.engine import MemberNoise, follow, march
 from sim.laws.reversible import radius_at_load_reversible
 from sim.laws.schallamach import linear_onset
 from sim.parts.bonds import Counted, Rate, Steady, Unbroken
@@ -101,7 +101,7 @@ def growth(stiffness, frequency, mass, damping, steps=200):
     rises = {"time": (0.0, step, step, 1e3), "value": tuple(STRETCH * v for v in (1.0, 1.0, 1.00001, 1.00001))}
     drive = pulled(stiffness, rises, mass, damping, start="steady", tolerance=1e-11)
     scene = stuck(steps * step, steps, renewed("steady"), drive)
-    passed = follow(scene, Dice.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
+    passed = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
     changes = np.diff(passed.fraction[steps // 3 :, 0])
     modes = 3 if mass else 2
     shifted = np.stack([changes[modes - 1 - k : -1 - k] for k in range(modes)], axis=1)
@@ -240,7 +240,7 @@ def test_counted_bonds_of_a_slider_fluctuate_as_independent_sites_in_steady_slid
     # held by a stiff spring and much damping the speed is that of the stage; each site is bound with 1/(1 + V/V_c)
     sites, members = 50, 400
     scene = stuck(20.0, 200, counted(sites, "steady"), pulled(50.0, 1.0, damping=50.0, start="steady"))
-    passed = follow(scene, Dice.of(scene.seed, np.arange(members)), None, range(201))[1]
+    passed = follow(scene, MemberNoise.of(scene.seed, np.arange(members)), None, range(201))[1]
     share, bound = 1.0 / 3.0, passed.fraction[100:]
     error = math.sqrt(share * (1.0 - share) / sites / members)
     assert abs(np.mean(bound[-1]) - share) < 4.0 * error

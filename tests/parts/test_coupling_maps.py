@@ -31,7 +31,7 @@ from helpers.driven import (
 from numpy.testing import assert_allclose
 
 import sim
-from sim.engine import Dice, follow, march
+from sim.engine import MemberNoise, follow, march
 from sim.laws.schallamach import Body
 from sim.parts.bonds import Cohort
 from sim.parts.bonds.rupture import Catch, Constant, CutOff
@@ -253,7 +253,7 @@ def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(keys):
     scene = driven(4.0, 80, spring(0.02, **keys), 1e-4, share=0.5)
     straight = list(march(scene, np.arange(3)))
     check_members(scene, straight, fastest(straight))
-    _, passed = follow(scene, Dice.of(scene.seed, np.arange(3)), None, range(0, 81, 4))
+    _, passed = follow(scene, MemberNoise.of(scene.seed, np.arange(3)), None, range(0, 81, 4))
     assert np.array_equal(passed.driven[:, 0, 2], [state.drive.spring_force[0] for state in straight[::4]])
 
 

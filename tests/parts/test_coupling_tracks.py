@@ -24,7 +24,7 @@ from numpy.testing import assert_allclose
 
 from sim import run
 from sim.analysis import stick_slip
-from sim.engine import Dice, follow, march
+from sim.engine import MemberNoise, follow, march
 from sim.parts.bonds import Cohort, Tracked
 from sim.parts.bonds.rupture import Constant, CutOff
 
@@ -144,7 +144,7 @@ def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip():
         slip = int(np.argmax(least)) + 1
         assert least[slip - 1] > 3.0 * 10.0 * 4.0 / 200
         check_members(scene, straight, slip)
-        _, passed = follow(scene, Dice.of(scene.seed, np.arange(3)), None, range(0, 201, 10))
+        _, passed = follow(scene, MemberNoise.of(scene.seed, np.arange(3)), None, range(0, 201, 10))
         assert np.array_equal(passed.driven[:, 0, 2], [state.drive.spring_force[0] for state in straight[::10]])
 
 

@@ -10,7 +10,7 @@ from helpers.scenes import BELL, BONDS, CELL, CONTACTS, CUT_OFF, DRIVES, SHEARS,
 from numpy.testing import assert_allclose
 
 import sim.study.converge as converge_module
-from sim.engine import Dice, follow
+from sim.engine import MemberNoise, follow
 from sim.laws.schallamach import bell_stress, first_moment_stress
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant
@@ -222,9 +222,9 @@ def test_a_time_is_that_of_the_whole_run(monkeypatch):
     # by a clock that a step of a member moves on by 1 ms
     clock, follow = [0.0], samples.follow
 
-    def counted(scenario, dice, state, steps):
-        clock[0] += 1e-3 * len(dice.shear.members) * len(steps)
-        return follow(scenario, dice, state, steps)
+    def counted(scenario, noise, state, steps):
+        clock[0] += 1e-3 * len(noise.shear.members) * len(steps)
+        return follow(scenario, noise, state, steps)
 
     monkeypatch.setattr(samples, "follow", counted)
     monkeypatch.setattr(samples.time, "process_time", lambda: clock[0])
@@ -290,7 +290,7 @@ def test_a_clock_step_keeps_the_records():
 def run_of(scenario, members, every=1):
     """The quantities at the records of a scene, shape (4, members, records), by the engine alone."""
     steps = range(0, scenario.clock.steps + 1, scenario.clock.stride * every)
-    _, passed = follow(scenario, Dice.of(scenario.seed, np.arange(members)), None, steps)
+    _, passed = follow(scenario, MemberNoise.of(scenario.seed, np.arange(members)), None, steps)
     read = (np.broadcast_to(READ[name](scenario, passed), (len(steps), members)) for name in QUANTITIES)
     return np.array([values.T for values in read])
 

@@ -94,4 +94,4 @@ class Balance(NamedTuple):
 #: A contact before its first touch, in touch, and after a pull-off.
 AHEAD, CLOSED, OPEN = 0.0, 1.0, 2.0
 #: Columns of the phases of reference contacts.
-WHOLE, BONDED, STRESSLESS, SETTLED = range(4)
+JKR, BONDS_ONLY, NO_MEAN_STRESS, EQUILIBRIUM = range(4)

@@ -18,7 +18,7 @@ from sim.laws.reversible import (
     radius_at_indentation_reversible,
     radius_at_load_reversible,
 )
-from sim.parts.exchange import Array, Flags
+from sim.parts.exchange import Array, Flags, Mount
 
 
 class Bodies(NamedTuple):
@@ -47,9 +47,9 @@ class LoadControl:
     load: float | Array
 
     @property
-    def held(self) -> tuple[float | Array, float | Array, float]:
-        """Load [N], displacement of the base [m] and stiffness behind it [N/m]; 0 what is not."""
-        return self.load, 0.0, 0.0
+    def mount(self) -> Mount:
+        """Load and base that hold the sphere."""
+        return Mount(self.load, 0.0, 0.0)
 
     @property
     def closes(self) -> bool | Flags:
@@ -93,9 +93,9 @@ class DisplacementControl:
     stiffness: float = math.inf
 
     @property
-    def held(self) -> tuple[float | Array, float | Array, float]:
-        """Load [N], displacement of the base [m] and stiffness behind it [N/m]; 0 what is not."""
-        return 0.0, self.base, self.stiffness
+    def mount(self) -> Mount:
+        """Load and base that hold the sphere."""
+        return Mount(0.0, self.base, self.stiffness)
 
     @property
     def closes(self) -> bool | Flags:

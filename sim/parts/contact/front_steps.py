@@ -13,7 +13,7 @@ from sim.numerics.special import cube_root
 from sim.parts.contact.balance import Balance
 from sim.parts.contact.crack_front import Kinetics, moved_edge, scene_of
 from sim.parts.contact.edge_law import excess, hertz_radius
-from sim.parts.exchange import Array, Touching
+from sim.parts.exchange import Array, ContactState
 from sim.spectrum.finite_contact import share_of
 from sim.units.course import Pieces
 
@@ -103,14 +103,14 @@ def _follow(
 
 
 def follow(
-    state: Touching, durations: Array, pieces: Pieces, stiffness: float, balance: Balance, reversible: float,
+    state: ContactState, durations: Array, pieces: Pieces, stiffness: float, balance: Balance, reversible: float,
     kinetics: Kinetics, again: bool,
 ) -> Array:  # fmt: skip
-    """The first four quantities of ``Touching`` at the end of each step of a block, shape (4, steps, rows).
+    """The first four quantities of ``ContactState`` at the end of each step of a block, shape (4, steps, rows).
 
     Parameters
     ----------
-    state : Touching
+    state : ContactState
         The contact before the block.
     durations : array, shape (steps,)
         Lengths of the steps [s].

@@ -19,7 +19,7 @@ from sim.parts.contact.control import Bodies, Control, DisplacementControl, Load
 from sim.parts.contact.crack_front import Kinetics
 from sim.parts.contact.crossing import widest_crossings
 from sim.parts.contact.front_steps import follow as follow_front
-from sim.parts.exchange import Array, Flags, Motion, Motions, Setting, Touching, during
+from sim.parts.exchange import Array, ContactState, Flags, Motion, Motions, Setting, during
 from sim.units.course import Prescribed, held, prescribed
 from sim.units.quantity import Quantity
 
@@ -45,7 +45,7 @@ _Policy = Annotated[Literal["stay_open", "reattach", "stop"], Field(description=
 class _Controlled:
     """A contact under a load, an indentation, or a displacement with a stiffness."""
 
-    state_class: ClassVar[type[Touching]] = Touching
+    state_class: ClassVar[type[ContactState]] = ContactState
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
     #: Whether the edge takes time to reach equilibrium.
@@ -116,7 +116,7 @@ class _Controlled:
     def _control(self, value: float | Array) -> Control:
         return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
 
-    def held_between(self, ends: Array, duration: float) -> tuple[Control, Control]:
+    def mount_between(self, ends: Array, duration: float) -> tuple[Control, Control]:
         """The control at the two ends of each interval between some times of a run [s], before any jump at its end."""
         if not self.changes:
             return self._steady, self._steady
@@ -143,13 +143,13 @@ class _Controlled:
         radius = control.radius(np.array([work]), np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
         return float(np.nan_to_num(radius[0]))
 
-    def start(self, motion: Motion, duration: float, balance: Balance) -> Touching:
+    def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:
         """The contact at the start, in equilibrium."""
         control = self.control(motion.time, duration)
         radius = self.equilibrium(control, balance)
         phases = np.where(self._without_equilibrium(control, balance), AHEAD, CLOSED)
         work, unknown, none = self._left(radius, balance), np.full(radius.shape, np.nan), np.zeros(radius.shape)
-        return Touching(work, radius, unknown, none, phases)
+        return ContactState(work, radius, unknown, none, phases)
 
     def stopped(self, radius: Array, detached: Array) -> Flags:
         """True where a trajectory has ended, at the pull-off of a contact that stops there."""
@@ -168,7 +168,7 @@ class _Controlled:
             lost[..., column] = np.isnan(radius)
         return lost
 
-    def _phases(self, state: Touching, control: Control, balance: Balance) -> Array:
+    def _phases(self, state: ContactState, control: Control, balance: Balance) -> Array:
         """Phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
         if min(self.course.extremes) >= 0.0:
             return during(state.phases, len(balance.bonded))
@@ -189,12 +189,12 @@ class _Controlled:
         wide = control.radius(most, balance.stress, self.reversible, bodies)
         hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, bodies)
         taken = self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
-        terms = (wide, hertz, *control.held[:2], balance.bonded, balance.fluctuating, taken)
+        terms = (wide, hertz, *control.mount[:2], balance.bonded, balance.fluctuating, taken)
         each, sphere = balance.margin.each, (1.0 / bodies.sphere_radius, bodies.modulus)
         contacts = np.stack(np.broadcast_arrays(*terms)).reshape(len(terms), len(each), -1)
         radius = np.empty(contacts.shape[1:])
         for k, margin in enumerate(each):
-            widest_crossings(np.ascontiguousarray(contacts[:, k]), (*sphere, control.held[2]), *margin, radius[k])
+            widest_crossings(np.ascontiguousarray(contacts[:, k]), (*sphere, control.mount[2]), *margin, radius[k])
         return radius.reshape(wide.shape)
 
     def _left(self, radius: Array, balance: Balance) -> Array:
@@ -217,7 +217,7 @@ class Equilibrium(_Controlled):
 
     model: Literal["equilibrium"] = "equilibrium"
 
-    def advance(self, state: Touching, motions: Motions, duration: float, balance: Balance) -> Touching:
+    def advance(self, state: ContactState, motions: Motions, duration: float, balance: Balance) -> ContactState:
         control = self.control(motions.time, duration)
         radius = self.equilibrium(control, balance)
         detached, dissipated = during(state.detached, len(radius)), during(state.dissipated, len(radius))
@@ -236,7 +236,7 @@ class Equilibrium(_Controlled):
             dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
             gone = np.where(opens, motions.time, np.nan)
             detached = np.fmax.accumulate(np.concatenate([detached[:1], gone]))[1:]
-        return Touching(
+        return ContactState(
             self._left(radius, balance), radius, detached, dissipated, self._phases(state, control, balance)
         )
 
@@ -261,7 +261,7 @@ class RateDependent(_Controlled):
     heal_exponent: _HealingExponent | None = None
     model: Literal["rate_dependent"] = "rate_dependent"
 
-    def advance(self, state: Touching, motions: Motions, duration: float, balance: Balance) -> Touching:
+    def advance(self, state: ContactState, motions: Motions, duration: float, balance: Balance) -> ContactState:
         ends = np.append(motions.time[0] - motions.duration[0], motions.time)
         stiffness = 0.0 if self.load is not None else self.stiffness or math.inf
         speed, exponent = self.front_speed, self.front_exponent
@@ -271,7 +271,7 @@ class RateDependent(_Controlled):
             self.after_pull_off == "reattach",
         )  # fmt: skip
         phases = self._phases(state, self.control(motions.time, duration), balance)
-        return Touching(work, radius, detached, dissipated, phases)
+        return ContactState(work, radius, detached, dissipated, phases)
 
 
 @kernel("void(float64[:, :], boolean[:], boolean[:, :, :], boolean, float64[:, :, ::1])")

@@ -96,7 +96,7 @@ class _Driven:
 
     state_class: ClassVar[type[Driven]] = Driven
     per_member: ClassVar[bool] = True
-    feeds_back: ClassVar[bool] = True
+    solves_motion: ClassVar[bool] = True
 
     mass: _Mass = 0.0
     damping: _Damping = 0.0

@@ -36,7 +36,7 @@ class _Sliding:
 
     state_class: ClassVar[type[Slider]] = Slider
     per_member: ClassVar[bool] = False
-    feeds_back: ClassVar[bool] = False
+    solves_motion: ClassVar[bool] = False
     at_once: ClassVar[bool] = False
     contact_stiffness: ClassVar[str] = "rigid"
 

@@ -7,7 +7,7 @@ import pytest
 from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.engine import course_of, march
+from sim.engine import march, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
@@ -37,7 +37,7 @@ def mirrored(motion):
 def records(names, members=3, steps=16, **parts):
     scenario = scene(members, steps, **parts)
     states = list(march(scenario, np.arange(members)))
-    return [np.array([READ[name](scenario, course_of(scenario, state))[0] for state in states]) for name in names]
+    return [np.array([READ[name](scenario, trajectory_of(scenario, state))[0] for state in states]) for name in names]
 
 
 @pytest.mark.parametrize("motion", MOTIONS)

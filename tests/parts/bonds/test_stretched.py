@@ -8,7 +8,7 @@ import pytest
 from helpers.scenes import BELL, BONDS, CELL, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose
 
-from sim.engine import course_of, march
+from sim.engine import march, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
 from sim.numerics.noise import Noise
@@ -37,7 +37,7 @@ def marched(name, members=1, **parts):
     """One record of a scene, shape (steps + 1, members or 1)."""
     scenario = scene(members, **parts)
     return np.array(
-        [READ[name](scenario, course_of(scenario, state))[0] for state in march(scenario, np.arange(members))]
+        [READ[name](scenario, trajectory_of(scenario, state))[0] for state in march(scenario, np.arange(members))]
     )
 
 

@@ -12,7 +12,7 @@ from helpers.cases import some
 from helpers.scenes import SHEARS, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.engine import course_of, march, pack
+from sim.engine import march, pack, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
 from sim.parts.bonds import models as bonds
@@ -47,7 +47,7 @@ def course(scenario, *names):
     """Recorded quantities of the first member at every step."""
     states = list(march(scenario, np.arange(scenario.ensemble.members)))
     return [
-        np.array([np.ravel(GAUGE[name].read(scenario, course_of(scenario, state)))[0] for state in states])
+        np.array([np.ravel(GAUGE[name].read(scenario, trajectory_of(scenario, state)))[0] for state in states])
         for name in names
     ]
 

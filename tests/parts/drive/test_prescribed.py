@@ -12,7 +12,7 @@ from scipy.integrate import quad
 from sim.parts.drive import Ramp, Start, Steady, Table
 
 DURATION = 0.02
-PRESCRIBED = [name for name, drive in DRIVES.items() if not drive.feeds_back]
+PRESCRIBED = [name for name, drive in DRIVES.items() if not drive.solves_motion]
 
 
 def speed(drive, time):

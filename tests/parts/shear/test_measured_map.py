@@ -9,7 +9,7 @@ from helpers.scenes import scene
 from numpy.testing import assert_allclose
 
 import sim
-from sim.engine import Dice, follow, march
+from sim.engine import MemberNoise, follow, march
 from sim.laws import jkr
 from sim.laws.disc import ripple_energy, ripple_marginal_energy
 from sim.laws.halfspace import disc_tangential_energy, surface_energy
@@ -218,7 +218,7 @@ def test_batches_blocks_and_restarts_agree_under_a_measured_map():
         alone = list(march(scenario, np.array([2])))
         radii = np.array([state.contact.radius for state in states])
         assert np.array_equal(radii[:, 2], [state.contact.radius[0] for state in alone])
-        _, course = follow(scenario, Dice.of(scenario.seed, np.arange(3)), None, range(13))
+        _, course = follow(scenario, MemberNoise.of(scenario.seed, np.arange(3)), None, range(13))
         assert np.array_equal(course.radius, radii)
         again = list(march(scenario, np.arange(3), states[5]))
         assert np.array_equal([state.contact.radius for state in again], radii[6:])
