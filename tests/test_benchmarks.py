@@ -11,7 +11,7 @@ from helpers.cases import some
 
 from benchmarks import growth, page, run, timing
 from benchmarks.compare import interval, slower
-from benchmarks.lines import code_lines
+from benchmarks.lines import size
 
 RESULTS = json.loads(run.RESULTS.read_text(encoding="utf-8"))
 
@@ -123,4 +123,4 @@ lines"""
         math.pi * radius**2
     ), text
 '''
-    assert code_lines(text) == 7
+    assert size(text)[0] == 7
