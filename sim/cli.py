@@ -351,14 +351,13 @@ def converge(
 @click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="An error that a column's points share, as 2 %.")
 @click.option("--steady", is_flag=True, help="Steady sliding is enough: do not run the scenario's own models.")
 @click.option("--compare", "judged", is_flag=True, help="Also which mechanism or theory is sufficient for the data.")
-@click.option("--posterior", "sampled", is_flag=True, help="Also sample all free numbers together by Markov chains.")
 @click.option("-o", "--output", "stem", type=_PATH, help="STEM of STEM_fit.toml, .json, .png; default the scenario's.")
 @click.option("--units", multiple=True, metavar="UNIT", help="Unit of axes of its dimension in the figure, as um/s.")
 @_SET
 @_FORCE
 def fit(
     scenario: Path, data: tuple[Path, ...], keys: tuple[str, ...], common: tuple[str, ...], steady: bool, judged: bool,
-    sampled: bool, stem: Path | None, units: tuple[str, ...], changes: tuple[str, ...], force: bool,
+    stem: Path | None, units: tuple[str, ...], changes: tuple[str, ...], force: bool,
 ) -> None:  # fmt: skip
     """Calibrate numbers of a scenario to measured curves: CSV columns named as variables of a dataset, with units."""
     from sim.scenario.reader import load
@@ -366,7 +365,7 @@ def fit(
     scene, target = load(scenario, options.overrides(changes), option="--set"), stem or scenario.with_suffix("")
     from sim.study import fitted
 
-    found, shown = fitted.carried_out(scene, data, keys, common, target, force, steady, judged, sampled, units)
+    found, shown = fitted.carried_out(scene, data, keys, common, target, force, steady, judged, units)
     for rows, text in shown:
         print_table(rows, text)
     sys.exit(DONE if found.converged else FAILED)

@@ -22,19 +22,11 @@ from sim.study.fit_figure import figure, refuse_units
 from sim.study.fitting import LEVEL
 from sim.study.measured import read
 from sim.study.mechanisms import WHOLE, Verdict, compare
-from sim.study.posterior import Posterior, posterior
 from sim.units.notation import concise, engineering, scaled
 from sim.units.options import quantity
 
 #: First words of a line of the scenarios that are written here, by which they may be replaced.
 _MADE = "# Made by sim fit"
-
-
-class More(NamedTuple):
-    """What was asked for beside the numbers: a comparison of mechanisms, a posterior."""
-
-    verdict: Verdict | None = None
-    posterior: Posterior | None = None
 
 
 #: A table to print, with the text below it.
@@ -43,9 +35,9 @@ Shown = tuple[list[dict[str, str]], str]
 
 def carried_out(
     scenario: Scenario, data: Sequence[Path], free: Sequence[str], common: Sequence[str], stem: Path, replace: bool,
-    steady: bool, judged: bool, sampled: bool, units: Sequence[str] = (),
+    steady: bool, judged: bool, units: Sequence[str] = (),
 ) -> tuple[Fit, list[Shown]]:  # fmt: skip
-    """Fit, judge mechanisms and sample the posterior where wanted, and write the files.
+    """Fit, compare mechanisms if wanted, and write the files.
 
     Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, of ``claim`` and of the
     figure.
@@ -56,17 +48,14 @@ def carried_out(
     outputs = claim(scenario, data, stem, replace)
     refuse_units([read(path, scenario) for path in data] if units else [], units)
     found = fit(scenario, data, free, sizes, steady)
-    how = found.problem, found.best, found.scenario.seed
-    more = More(compare(*how) if judged else None, posterior(*how) if sampled else None)
-    save(scenario, found, data, outputs, more, units)
+    verdict = compare(found.problem, found.best, found.scenario.seed) if judged else None
+    save(scenario, found, data, outputs, verdict, units)
     shown: list[Shown] = [(_table(found), f"\n{_explanation(found)}\n")]
-    if more.verdict is not None:
+    if verdict is not None:
         doubt = (
             "; but even the scenario as it is lies off: perhaps none of these is true" if found.p_value <= POOR else ""
         )
-        shown.append((_comparison(more.verdict), f"\n{more.verdict.words}{doubt}\n"))
-    if more.posterior is not None:
-        shown.append(_sampled(found, more.posterior))
+        shown.append((_comparison(verdict), f"\n{verdict.words}{doubt}\n"))
     return found, [*shown, ([], "\n".join(map(str, outputs)))]
 
 
@@ -147,19 +136,7 @@ def _comparison(verdict: Verdict) -> list[dict[str, str]]:
     return rows
 
 
-def _sampled(fit: Fit, found: Posterior) -> Shown:
-    rows = []
-    for one, low, middle, high in zip(fit.numbers, *found.quantiles(), strict=True):
-        factor, unit = scaled(middle, one.free.quantity.unit)
-        span = f"{factor * low:.4g} to {factor * high:.4g}"
-        rows.append(
-            {"key": one.free.key, "median": f"{factor * middle:.4g} {unit}".rstrip(), f"{LEVEL:.0%} of it": span}
-        )
-    text = f"posterior of {len(found.samples)} samples, chains {found.length:.0f} autocorrelation times long"
-    return rows, f"\n{text}{'' if found.converged else ': too short to be trusted'}\n"
-
-
-def document(fit: Fit, data: Sequence[Path], more: More) -> dict[str, Any]:
+def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[str, Any]:
     """All numbers of a fit [SI]."""
     found: dict[str, Any] = {
         "scenario": fit.scenario.source.path,
@@ -175,11 +152,9 @@ def document(fit: Fit, data: Sequence[Path], more: More) -> dict[str, Any]:
         "converged": fit.converged,
         "remarks": list(fit.remarks),
     }
-    if more.verdict is not None:
-        judged = [one._asdict() for one in more.verdict.judged]
-        found["mechanisms"] = {"sufficient": more.verdict.sufficient, "words": more.verdict.words, "judged": judged}
-    if more.posterior is not None:
-        found["posterior"] = more.posterior.document()
+    if verdict is not None:
+        judged = [one._asdict() for one in verdict.judged]
+        found["mechanisms"] = {"sufficient": verdict.sufficient, "words": verdict.words, "judged": judged}
     return _without_nan(found)
 
 
@@ -239,14 +214,19 @@ def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
 
 
 def save(
-    scenario: Scenario, fit: Fit, data: Sequence[Path], outputs: Outputs, more: More, units: Sequence[str] = ()
+    scenario: Scenario,
+    fit: Fit,
+    data: Sequence[Path],
+    outputs: Outputs,
+    verdict: Verdict | None,
+    units: Sequence[str] = (),
 ) -> None:
     """Write scenario, numbers and figure, each whole."""
     picture = io.BytesIO()
     with in_units(units):
         drawn = figure(fit.problem, fit.best)
     drawn.savefig(picture, format="png")
-    numbers = json.dumps(document(fit, data, more), indent=2, allow_nan=False) + "\n"
+    numbers = json.dumps(document(fit, data, verdict), indent=2, allow_nan=False) + "\n"
     texts = scenario_text(scenario, fit, outputs.toml.parent).encode(), numbers.encode(), picture.getvalue()
     for path, content in zip(outputs, texts, strict=True):
         with files.output(path) as beside:
