@@ -14,9 +14,19 @@ from sim.laws.reversible import mean_stress_energy
 from sim.numerics.noise import Noise
 from sim.parts import coupling_equations as columns
 from sim.parts.bonds.cohorts import Cohorts, numbers_of
-from sim.parts.bonds.stretched import Ages, Cohort, FirstMoment, Stretches, Tracked
+from sim.parts.bonds.models import (
+    Ages,
+    Cohort,
+    Counted,
+    FirstMoment,
+    Population,
+    Rate,
+    Steady,
+    Stretches,
+    Tracked,
+    Unbroken,
+)
 from sim.parts.bonds.tracked import AGAIN, Tracks
-from sim.parts.bonds.two_state import Counted, Population, Rate, Steady, Unbroken
 from sim.parts.coupling_cohorts import advance_cohorts
 from sim.parts.coupling_equations import Law, Resting, Slider
 from sim.parts.coupling_rows import advance_rows

@@ -8,8 +8,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.bonds.cohort_merging import settle
-from sim.parts.bonds.cohort_step import carry, inside, read_row, rules_of, sum_row, write_row
+from sim.parts.bonds.cohorts import carry, inside, read_row, rules_of, settle, sum_row, write_row
 from sim.parts.bonds.rupture import rate_at
 from sim.parts.coupling_equations import (
     BEND,

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device
-from sim.parts.bonds.cohort_step import carry, steepen, try_step
+from sim.parts.bonds.cohorts import carry, steepen, try_step
 from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
 from sim.parts.coupling_equations import (
     BEND,

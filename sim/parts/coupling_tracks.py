@@ -11,9 +11,21 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.bonds.tracked_ahead import next_cut, next_event
-from sim.parts.bonds.tracked_events import BOUND as BONDS, COLUMNS as FRAME, SENSE, SLIDER, SQUARES, STEPS, SUM, room
-from sim.parts.bonds.tracked_step import SPENT, TRACKS, one_step
+from sim.parts.bonds.tracked import (
+    BOUND as BONDS,
+    COLUMNS as FRAME,
+    SENSE,
+    SLIDER,
+    SPENT,
+    SQUARES,
+    STEPS,
+    SUM,
+    TRACKS,
+    next_cut,
+    next_event,
+    one_step,
+    room,
+)
 from sim.parts.coupling_equations import (
     BEND,
     BODY,

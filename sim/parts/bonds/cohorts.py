@@ -1,9 +1,12 @@
 """A population of bonds resolved by stretch: cohorts of equal stretch, carried with the slider.
 
-A density n(x, t) per site of bonds stretched by x follows dn/dt + V dn/dx = −k(\\|x\\|) n + k_on F δ(x), F the share
-of free sites. A cohort moves with the slider and dies by its exact rupture integral, so there is no
-numerical diffusion and no limit to the step; only births and the merging of cohorts err, both within
-a tolerance.
+A density n(x, t) per site of bonds stretched by x follows dn/dt + V dn/dx = −k(\\|x\\|) n + k_on F δ(x), where F is the
+share of free sites. A cohort moves with the slider and dies by its exact rupture integral. So there is no numerical
+diffusion and no limit to the step. Only births and the merging of cohorts err, each within a tolerance.
+
+Merging makes few cohorts of many: groups of nearly equal stretch become two, with the same first four moments. The
+groups are cells of a lattice that is carried with the slider, so a cell keeps its bonds for life. Cohorts that are
+merged twice are merged within the same cell, and errors do not add up.
 """
 
 import functools
@@ -12,9 +15,484 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.parts.bonds.cohort_step import settle_steady, step_rows, sum_rows
-from sim.parts.bonds.rupture import RuptureRate
+from sim.numerics.jit import device, kernel
+from sim.numerics.special import exp
+from sim.parts.bonds.rupture import RuptureRate, fresh_integral, growth, hazard_integral, hazard_time, law_of, rate_at
 from sim.parts.exchange import Array
+
+
+@device
+def settle(weight, stretch, width, count, direction, travelled, rules):
+    """Merge ``count`` cohorts in place until at most ``rules.most`` are left; the number left.
+
+    If that is not enough, sharp fronts within a cell are given up, and then the lattice is made coarser.
+    """
+    _sort(weight, stretch, width, count, direction)
+    finest, cell, fronts = 64, rules.cell, rules.limit < math.inf
+    count = _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules)
+    while count > rules.most:
+        if finest > 1:
+            finest //= 2
+        elif fronts:
+            fronts = False
+        else:
+            cell *= 2.0
+        count = _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules)
+    return count
+
+
+@device
+def _sort(weight, stretch, width, count, direction):
+    """Farthest along ``direction`` first; cohorts come almost in that order, oldest first."""
+    for i in range(1, count):
+        w, x, b = weight[i], stretch[i], width[i]
+        j = i
+        while j > 0 and (x - stretch[j - 1]) * direction > 0.0:
+            weight[j], stretch[j], width[j] = weight[j - 1], stretch[j - 1], width[j - 1]
+            j -= 1
+        weight[j], stretch[j], width[j] = w, x, b
+
+
+@device
+def _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules):
+    """Merge sorted cohorts cell by cell; the number left.
+
+    A cell of many bonds is halved until its width times its share is below ``rules.heavy``: a cell
+    that comes back through zero, where the rupture has a kink, then errs by less than the tolerance.
+    """
+    whole = 0.0
+    for i in range(count):
+        whole += weight[i]
+    first, left = 0, 0
+    while first < count:
+        place = math.floor((stretch[first] - travelled) / cell)
+        last, inside = first, 0.0
+        while last < count and math.floor((stretch[last] - travelled) / cell) == place:
+            inside += weight[last]
+            last += 1
+        parts = 1
+        while parts < finest and cell * rules.steepness * inside > rules.heavy * whole * parts * parts:
+            parts *= 2
+        segments = rules.limit < math.inf
+        left = _merge_cell(weight, stretch, width, first, last, left, travelled, cell / parts, segments, fronts)
+        first = last
+    return left
+
+
+@device
+def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, segments, fronts):
+    """Merge the cohorts ``first`` to ``last`` in cells of one width, writing from ``left`` on; where writing ends."""
+    while first < last:
+        place = math.floor((stretch[first] - travelled) / cell)
+        end = first + 1
+        while end < last and math.floor((stretch[end] - travelled) / cell) == place:
+            if fronts and not _alike(weight, width, end - 1, end):
+                break
+            end += 1
+        left += _gauss(weight, stretch, width, first, end, left, segments)
+        first = end
+    return left
+
+
+@device
+def _alike(weight, width, one, other):
+    """True if two neighbouring segments have about the same density: a sharp front between others is not smeared."""
+    here, there = weight[one] * width[other], weight[other] * width[one]
+    return here <= 4.0 * there and there <= 4.0 * here
+
+
+@device
+def _gauss(weight, stretch, width, first, end, left, segments):
+    """Write the cohorts ``first`` to ``end`` as two points (or one segment) of equal moments; how many.
+
+    Two points are the Gauss rule of the group: positive weights, inside its hull, moments 0 to 3
+    exact. A segment keeps moments 0 to 2.
+    """
+    if end - first <= (1 if segments else 2):
+        for i in range(end - first):
+            weight[left + i], stretch[left + i], width[left + i] = (
+                weight[first + i],
+                stretch[first + i],
+                width[first + i],
+            )
+        return end - first
+    total, start, mean = 0.0, stretch[first], 0.0
+    for i in range(first, end):
+        total += weight[i]
+        mean += weight[i] * (stretch[i] - start)
+    mean = start + mean / total
+    square, cube = 0.0, 0.0
+    for i in range(first, end):
+        off = stretch[i] - mean
+        square += weight[i] * (off * off + width[i] * width[i] / 12.0)
+        cube += weight[i] * off * off * off
+    square /= total
+    if segments or square == 0.0:
+        weight[left], stretch[left], width[left] = total, mean, math.sqrt(12.0 * square)
+        return 1
+    lean = 0.5 * cube / total / square
+    reach = math.sqrt(lean * lean + square)
+    above = square / (reach + math.fabs(lean))  # the nearer node's distance from the mean, without cancellation
+    below = reach + math.fabs(lean)
+    if lean > 0.0:
+        above, below = below, above
+    weight[left], stretch[left], width[left] = total * (below / (above + below)), mean + above, 0.0
+    weight[left + 1], stretch[left + 1], width[left + 1] = total * (above / (above + below)), mean - below, 0.0
+    return 2
+
+
+class Rules(NamedTuple):
+    """Numbers that all rows of a population share."""
+
+    law: tuple[float, ...]  # RuptureRate
+    limit: float  # its limit [m]
+    steepness: float  # largest relative change of the rupture rate per stretch [1/m]
+    rebinding: float
+    tolerance: float
+    largest: float  # longest step of its own [s]
+    cell: float  # width of a merging cell [m]
+    heavy: float  # width × share of a cell allowed, in units of 1/steepness
+    most: float  # cohorts left by merging
+
+
+@device
+def rules_of(numbers):
+    own = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7]
+    return Rules(law_of(numbers[8:]), *own)
+
+
+@device
+def inside(stretch, width, limit):
+    """The part of a segment that lies between ± ``limit``."""
+    if width == 0.0:
+        return 1.0 if math.fabs(stretch) < limit else 0.0
+    over = max(0.0, stretch + 0.5 * width - limit) + max(0.0, -limit - stretch + 0.5 * width)
+    return max(0.0, 1.0 - over / width)
+
+
+@device
+def survive(pool, count, move, speed, step, off, rules):
+    """Bonds that outlive a third of a step and all of it; pool[4] gets what outlives it, cohort by cohort.
+
+    Their stretch is ``off`` by so much on average from that of a motion at constant speed.
+    """
+    weight, stretch, width, steepness, kept, kept_early = pool[0], pool[1], pool[2], pool[3], pool[4], pool[8]
+    early, short = step / 3.0, move / 3.0
+    soon, late = fresh_integral(early, speed, rules.law), fresh_integral(step, speed, rules.law)
+    for i in range(count):
+        kept_early[i] = weight[i] * exp(-steepness[i] * soon)
+        kept[i] = weight[i] * exp(-steepness[i] * late)
+    at_early, at_end = 0.0, 0.0
+    for i in range(count):
+        if steepness[i] == 0.0:
+            kept_early[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, short, early, rules.law))
+            kept[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, move, step, rules.law))
+        if rules.limit < math.inf:
+            kept_early[i] *= inside(stretch[i] + short, width[i], rules.limit)
+            kept[i] *= inside(stretch[i] + move, width[i], rules.limit)
+        at_early += kept_early[i]
+        at_end += kept[i]
+    return at_early, at_end
+
+
+@device
+def steepen(pool, count, slip, off, rules):
+    """pool[3]: ∫k dt of each bond over that of a fresh one, where such a factor exists; 0 marks the others."""
+    for i in range(count):
+        pool[3, i] = growth(pool[1, i] + off, slip, rules.law)
+
+
+@device
+def births(free, early, late, step, speed, rules):
+    """Births of a step by Radau IIA: weights at its third and at its end, free sites then, and the error.
+
+    F(t) = 1 − R(t) − ∫k_on F(s) S(t − s)ds at t = h/3 and h, R = ``early`` and ``late``, the integral by the
+    two-stage rule: third order, and stable for any k_on h. The error is the distance to the
+    trapezoidal rule.
+    """
+    z = rules.rebinding * step
+    before = math.exp(-fresh_integral(-2.0 / 3.0 * step, speed, rules.law))
+    after = math.exp(-fresh_integral(2.0 / 3.0 * step, speed, rules.law))
+    a, b, c, d = 1.0 + 5.0 / 12.0 * z, -z / 12.0 * before, 0.75 * z * after, 1.0 + 0.25 * z
+    p, q = max(0.0, 1.0 - early), max(0.0, 1.0 - late)
+    whole = a * d - b * c
+    first, last = (p * d - b * q) / whole, (a * q - c * p) / whole
+    other = 0.5 * z * free * math.exp(-fresh_integral(step, speed, rules.law))
+    error = math.fabs(other + 0.25 * z * last - c * first)
+    if min(first, last) >= 0.0:
+        return c * first, 0.25 * z * last, 0.0, error
+    made = min(max(q - last, 0.0), q)  # only roundings, or a step too short to refuse, end with these
+    return (made if first > 0.0 else 0.0), (0.0 if first > 0.0 else made), min(first, last), error
+
+
+@device
+def carry(pool, count, move, off, one, two, rules):
+    """Accept a step: keep what survived, move it, drop the negligible, add the births; the new count."""
+    weight, stretch, width, kept = pool[0], pool[1], pool[2], pool[4]
+    whole = one + two
+    for i in range(count):
+        whole += kept[i]
+    left = 0
+    for i in range(count):
+        if kept[i] > 1e-18 * whole:
+            weight[left], stretch[left], width[left] = kept[i], stretch[i] + move, width[i]
+            if rules.limit < math.inf:
+                low = max(stretch[left] - 0.5 * width[i], -rules.limit)
+                high = min(stretch[left] + 0.5 * width[i], rules.limit)
+                stretch[left], width[left] = 0.5 * (low + high), high - low
+            left += 1
+    if one + two <= 1e-18 * whole:
+        return left
+    far = 2.0 / 3.0 * move - 4.0 / 3.0 * off
+    if rules.limit < math.inf or far == 0.0:
+        share = one / (one + two)
+        weight[left], stretch[left], width[left] = one + two, share * far, 0.0
+        width[left] = math.sqrt(12.0 * share * (1.0 - share)) * math.fabs(far)
+        return left + 1
+    weight[left], stretch[left], width[left] = one, far, 0.0
+    weight[left + 1], stretch[left + 1], width[left + 1] = two, 0.0, 0.0
+    return left + (2 if two > 0.0 else 1)
+
+
+@device
+def try_step(pool, count, move, speed, step, off, free, rules):
+    """One step tried: births at its two stages, and the factor by which the step should change; < 1 refuses it."""
+    early, late = survive(pool, count, move, speed, step, off, rules)
+    if rules.rebinding == 0.0:
+        return 0.0, 0.0, 4.0
+    one, two, lowest, error = births(free, early, late, step, speed, rules)
+    if lowest < -1e-14:
+        return one, two, 0.2
+    allowed = rules.tolerance / 3.0 * (late + one + two + 1e-9 * (1.0 - free)) + 1e-15 * (1.0 + rules.rebinding * step)
+    factor = 4.0 if error <= 0.0 else (allowed / error) ** (1.0 / 3.0)
+    if factor < 1.0:
+        return one, two, max(0.02, 0.85 * factor)
+    return one, two, min(4.0, max(1.0, 0.9 * factor))
+
+
+@device
+def _forgets(pool, other, count, speed, duration, rules):
+    """Number of cohorts of the steady state in pool[5:] if a step is so long that nothing else is left, else 0."""
+    if rules.rebinding == 0.0:
+        return 0, 0.0
+    depth = math.log(100.0 / rules.tolerance)
+    typical = hazard_time(0.0, speed, 1.0, rules.law)
+    if not duration > depth * typical:
+        return 0, 0.0
+    found, life, square = fill_steady(other, speed, rules)
+    pause = 1.0 / rules.rebinding
+    cycle = life + pause
+    spread = max(0.0, 2.0 * square / life / life - 1.0) * (life / cycle) ** 2 + (pause / cycle) ** 2
+    lives = min(300.0, depth / min(1.0, 2.0 * math.pi**2 * spread))
+    rest = duration - lives * life
+    if rest <= 0.0:
+        return 0, 0.0
+    _, left = survive(pool, count, speed * rest, speed, rest, 0.0, rules)
+    return (found if left <= 1e-3 * rules.tolerance * (life / cycle) else 0), life
+
+
+@device
+def _step_row(pool, count, travelled, settled, slip, duration, rules):
+    """Advance one population by a clock step in steps of its own; cohorts, slider position and settled number."""
+    speed = min(max(slip / duration, -1e200), 1e200) if duration > 0.0 else 0.0
+    direction = -1.0 if slip < 0.0 else 1.0
+    steepen(pool, count, slip, 0.0, rules)
+    found, _ = _forgets(pool, pool[5:], count, speed, duration, rules)
+    if found > 0:
+        for k in range(3):
+            pool[k, :found] = pool[5 + k, :found]
+        left = settle(pool[0], pool[1], pool[2], found, direction, 0.0, rules)
+        return left, 0.0, left
+    typical = hazard_time(0.0, speed, 1.0, rules.law)
+    longest = min(rules.largest, typical * (7.0 * rules.tolerance) ** (1.0 / 3.0))
+    shortest = 1e-13 * duration
+    if speed != 0.0:
+        longest = min(longest, 0.75 * rules.cell / math.fabs(speed))
+        if rules.limit < math.inf:
+            shortest = max(shortest, 1e-15 * rules.limit / math.fabs(speed))
+    if rules.rebinding == 0.0:
+        longest = math.inf
+    done, step, going = 0.0, duration, True
+    while going:
+        step = min(step, longest)
+        remaining = duration - done
+        going = step < 0.999 * remaining
+        step = (step if step < 0.5 * remaining else 0.5 * remaining) if going else remaining
+        bound = 0.0
+        for i in range(count):
+            bound += pool[0, i]
+        move = speed * step if done > 0.0 or going else slip
+        one, two, factor = try_step(pool, count, move, speed, step, 0.0, max(0.0, 1.0 - bound), rules)
+        if factor < 1.0 and step > shortest:
+            step, going = max(step * factor, shortest), True
+            continue
+        count = carry(pool, count, move, 0.0, one, two, rules)
+        travelled += move
+        done += step
+        step *= max(factor, 1.0)
+        if count > 1.25 * settled + 16.0 or count + 2 > pool.shape[1]:
+            count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
+            settled = count
+        if going:
+            steepen(pool, count, slip, 0.0, rules)
+    return count, travelled, settled
+
+
+@device
+def read_row(pool, weight, stretch, width, share):
+    """Read a ``share`` of each cohort of a row into a pool, empty places left out; their number."""
+    count = 0
+    for i in range(weight.size):
+        if weight[i] * share > 0.0:
+            pool[0, count], pool[1, count] = weight[i] * share, stretch[i]
+            pool[2, count] = width[i] if width.size > 1 else 0.0
+            count += 1
+    return count
+
+
+@kernel(
+    "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:], float64[:,:], float64[:],"
+    " float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1])"
+)
+def step_rows(
+    weight,
+    stretch,
+    width,
+    lattice,
+    share,
+    slip,
+    duration,
+    numbers,
+    new_weight,
+    new_stretch,
+    new_width,
+    new_lattice,
+    sums,
+):
+    """Advance all rows by all steps, each row by itself from a ``share`` of its bonds; its sums after each step."""
+    rules = rules_of(numbers)
+    rows, capacity = new_weight.shape
+    pool = np.empty((9, capacity + 520))
+    for m in range(rows):
+        old = m % len(weight)
+        count = read_row(pool, weight[old], stretch[old], width[old], share[m % share.size])
+        travelled, settled = lattice[old, 0], lattice[old, 1]
+        for k in range(duration.size):
+            moved = slip[k, m % slip.shape[1]]
+            count, travelled, settled = _step_row(pool, count, travelled, settled, moved, duration[k], rules)
+            if count > capacity:
+                direction = -1.0 if moved < 0.0 else 1.0
+                count = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
+                settled = count
+            if rules.cell < math.inf:
+                travelled = travelled % (1048576.0 * rules.cell)
+            write_row(pool, count, new_weight[m], new_stretch[m], new_width[m])
+            sum_row(new_weight[m], new_stretch[m], new_width[m], rules, pool[4], sums[:, k, m])
+            count = read_row(pool, new_weight[m], new_stretch[m], new_width[m], 1.0)
+        new_lattice[m, 0], new_lattice[m, 1] = travelled, settled
+
+
+@device
+def write_row(pool, count, weight, stretch, width):
+    """Write the first ``count`` cohorts of a pool into a row, zeros behind them; a row of one width has none."""
+    weight[:count], stretch[:count] = pool[0, :count], pool[1, :count]
+    weight[count:], stretch[count:] = 0.0, 0.0
+    if width.size > 1:
+        width[:count], width[count:] = pool[2, :count], 0.0
+
+
+@device
+def sum_row(weight, stretch, width, rules, lost, sums):
+    """Sums over the cohorts of a row: as of ``cohorts.moments``; ``lost`` is room for a number of each."""
+    sums[:] = 0.0
+    for i in range(weight.size):
+        lost[i] = weight[i] * stretch[i] * rate_at(stretch[i], rules.law)
+    limit, cell = rules.limit, rules.cell
+    for i in range(weight.size):
+        w, x, d = weight[i], stretch[i], (width[i] if width.size > 1 else 0.0)
+        if not w > 0.0:
+            continue
+        sums[0] += w
+        sums[1] += w * x
+        sums[2] += w * (x * x + d * d / 12.0)
+        if d > 0.0 and limit < math.inf:
+            size, half = math.fabs(x), 0.5 * d
+            outermost = min(size + half, limit) - max(size - half, limit - cell)
+            sums[3] += limit / cell * w * (max(outermost, 0.0) / d)
+        sums[4] += lost[i]
+
+
+@kernel("void(float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])")
+def sum_rows(weight, stretch, width, numbers, sums):
+    """Sums over the cohorts of each row, shape (5, rows)."""
+    rules, lost = rules_of(numbers), np.empty(weight.shape[1])
+    for m in range(len(weight)):
+        sum_row(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
+
+
+@kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
+def settle_steady(speed, numbers, weight, stretch, width, lattice):
+    """The merged steady state of one row."""
+    rules = rules_of(numbers)
+    pool = np.empty((3, weight.shape[1] + 520))
+    count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
+    count = settle(pool[0], pool[1], pool[2], count, math.copysign(1.0, speed), 0.0, rules)
+    write_row(pool, count, weight[0], stretch[0], width[0])
+    lattice[0, 1] = count
+
+
+_POINTS = np.polynomial.legendre.leggauss(5)
+
+
+_NODES = tuple((0.5 + 0.5 * _POINTS[0]).tolist())
+
+
+_SHARES = tuple((0.5 * _POINTS[1]).tolist())
+
+
+@device
+def fill_steady(room, speed, rules):
+    """Write the steady state at ``speed`` into room[0:3] (weight, stretch, width): (cohorts, ⟨T⟩, ⟨T²⟩/2).
+
+    Notes
+    -----
+    Bonds of age a have survived with S(a) and are stretched by V a, so that weights are k_on F S(a)da, F = 1/(1 +
+    k_on⟨T⟩). Five Gauss nodes on panels in which neither ln S nor the rupture changes by much.
+    """
+    oldest = hazard_time(0.0, speed, 42.0, rules.law)
+    panel = 0.7 * hazard_time(0.0, speed, 1.0, rules.law)
+    pace = math.fabs(speed) * rules.steepness
+    segments = rules.limit < math.inf
+    if pace > 0.0:
+        panel = min(panel, 0.5 / pace)
+    if segments and speed != 0.0:
+        panel = min(panel, rules.cell / math.fabs(speed))
+    panels = min(math.ceil(oldest / panel), room.shape[1] // (1 if segments else 5))
+    panel = oldest / panels
+    count, life, square = 0, 0.0, 0.0
+    for k in range(panels):
+        mass, mean, spread = 0.0, 0.0, 0.0
+        for node, share in zip(_NODES, _SHARES):  # noqa: B905 - compiled
+            age = (k + node) * panel
+            survivors = share * panel * math.exp(-hazard_integral(0.0, speed * age, age, rules.law))
+            mass += survivors
+            mean += survivors * age
+            spread += survivors * age * age
+            if not segments and survivors > 0.0:
+                room[0, count], room[1, count], room[2, count] = survivors, speed * age, 0.0
+                count += 1
+        if segments and mass > 0.0:
+            centre = mean / mass
+            variance = max(0.0, spread / mass - centre * centre)
+            room[0, count], room[1, count] = mass, speed * centre
+            room[2, count] = math.fabs(speed) * math.sqrt(12.0 * variance)
+            count += 1
+        life += mass
+        square += mean
+    for i in range(count):
+        room[0, i] *= rules.rebinding / (1.0 + rules.rebinding * life)
+    return count, life, square
+
 
 #: Share of the bonds that stay where none are lost.
 _ALL = np.ones(1)

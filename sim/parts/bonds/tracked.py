@@ -1,11 +1,28 @@
 """Bonds followed one by one: a finite number of sites per member, every stretch, exact rupture times.
 
-Each site is free or bound. A bond is born unstretched, is stretched by the slider, and breaks when
-its integrated rupture reaches an exponential threshold; the site then waits an exponential time and
-binds again, at the slider's place of that very moment. Nothing of this depends on the clock step: steps
-only cut the motion into pieces of constant speed, so the same motion in other steps gives the same
-lives but for rounding. The numbers of each life have an address of their own (seed, site, life,
-member), so members do not depend on the batch, nor on where a run was taken up again.
+Each site is free or bound. A bond is born unstretched, is stretched by the slider, and breaks when its integrated
+rupture reaches an exponential threshold. The site then waits an exponential time and binds again, at the position of
+the slider at that moment. None of this depends on the clock step: steps only cut the motion into pieces of constant
+speed, so the same motion in other steps gives the same lives but for rounding. The numbers of each life have an address
+of their own (seed, site, life, member). So members depend neither on the batch nor on restarts.
+
+A row is one member. All its sites follow one slider, so Bell's rupture separates: ∫k dt of bond i is
+e^(−s x_i) times a clock common to all, Φ(t) = ∫ rate e^(s x) dt, with s the softness, x the position of
+the slider and x_i that at the bond's birth. Positions are counted along the motion from where the frame was
+last set. A bond therefore breaks when Φ passes a number fixed at its birth, its ``due``. The cost of a step is its
+events: blocks of sites without an event in all the steps are passed over by their least due.
+
+If all stretches of a row have the sign of the motion, its bonds are stepped together. If the motion turns, or a step
+spans too many Bell forces for the common clock, each bond is stepped by itself until all stretches have the sign of the
+motion again. Its ``due`` is then the rest of its threshold.
+
+One array holds two kinds of due: a bound site's, never negative, and minus the time at which a free
+site binds. Read as unsigned whole numbers, the bits of such floats have the first rupture as their
+least; read as signed ones, the first binding. Whole numbers are compared by vector instructions. A
+free site keeps the threshold of its next bond in its ``birth``.
+
+Site after site lives through all the steps and adds each event to the sums of its step. So the sums of a step are in
+the order of the sites, however many steps are made at once.
 """
 
 import math
@@ -13,11 +30,493 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.numerics.jit import device, kernel
+from sim.numerics.noise import PARTS, exponential, logarithm, unit_at, words_at
 from sim.numerics.special import reduced_exponential_integral, scaled_exponential_integral
-from sim.parts.bonds.rupture import RuptureRate
-from sim.parts.bonds.tracked_events import BLOCK, BOUND, COLUMNS, SENSE, SLIDER, SQUARES, STEPS, SUM
-from sim.parts.bonds.tracked_step import ENDLESS, SPENT, draw, live
+from sim.parts.bonds.rupture import RuptureRate, rupture_integral, time_to_rupture
 from sim.parts.exchange import Array
+
+#: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), whether bonds
+#: are stepped one by one, bound sites, sum of their births, of the births squared, steps done.
+SLIDER, TIME, CLOCK, SENSE, SINGLY, BOUND, SUM, SQUARES, STEPS = range(9)
+COLUMNS = 9
+
+#: Sites of one block.
+BLOCK = 16
+
+#: Steps made at once, at most.
+AT_ONCE = 1024
+
+_U = np.uint64
+PART = _U(PARTS["bonds"])
+LIVES = 4096  # of one site in one step: a stop for nonsense, since the rule for long steps comes first
+TINY = 2.2250738585072014e-308
+
+#: Columns of a step: slider, time and clock at its beginning, the rate of a bond born at the frame's origin then and
+#: its ratio to ``rate``, relative growth of that rate in unit time, length and speed.
+_X, _T, _CLOCK, _RATE, _GROWN, _PACE, _DURATION, _SPEED = range(8)
+_STEP_COLUMNS = 8
+#: Rows of what has an event by the end of a step: bonds of less due, free sites of less time, bonds of less birth.
+_RUPTURE, _BINDING, _CUT = range(3)
+#: Bits of a number that are left out where a step is looked up, 128 ranges for each power of two; most ranges.
+_LEFT_OUT, _RANGES = np.int64(45), 4096
+
+
+@device
+def room():
+    """Arrays to work in: columns of steps, their ends, changes of bound sites and their sums in each, an index of ends.
+
+    Beside the index stands the number of its first range.
+    """
+    steps, index = np.empty((AT_ONCE, _STEP_COLUMNS)), np.empty((2, _RANGES), np.int16)
+    return steps, np.empty((3, AT_ONCE)), np.empty((3, AT_ONCE)), index, np.empty(2, np.int64)
+
+
+@device
+def views(due, soonest):
+    """A row's due as signed and unsigned whole numbers, and the first binding, first rupture and rearmost of blocks."""
+    whole = soonest.view(np.int64)
+    return due.view(np.int64), due.view(np.uint64), whole[1], soonest.view(np.uint64)[0], soonest[2]
+
+
+@device
+def least(seen, birth, block, bounded):
+    """Take anew the first binding, the first rupture and the rearmost bond of a block."""
+    signed, unsigned, binding, rupture, rear = seen
+    first = _U(block) * _U(BLOCK)
+    size = min(BLOCK, np.int64(_U(signed.size) - first))
+    soonest, earliest = signed[first], unsigned[first]
+    if size == BLOCK:  # of known length, for vector instructions
+        for j in range(BLOCK):
+            soonest = min(soonest, signed[first + _U(j)])
+            earliest = min(earliest, unsigned[first + _U(j)])
+    else:
+        for j in range(size):
+            soonest = min(soonest, signed[first + _U(j)])
+            earliest = min(earliest, unsigned[first + _U(j)])
+    binding[block], rupture[block] = soonest, earliest
+    if bounded:
+        least = math.inf
+        for j in range(size):
+            i = first + _U(j)
+            least = birth[i] if signed[i] >= 0 and birth[i] < least else least
+        rear[block] = least
+
+
+@device
+def lay_out(step, slip, duration, x, time, clock, law, space):
+    """Write a step that begins with the slider at ``x`` and a ``time`` and ``clock``; clock at its end."""
+    (rate, softness, limit, _), (steps, ends, _, _, _) = law, space
+    grown, bell = math.exp(softness * x), softness * slip
+    first, speed = rate * grown, slip / duration
+    after = clock + first * duration * (math.expm1(bell) / bell if bell > 0.0 else 1.0)
+    column = steps[step]
+    column[_X], column[_T], column[_CLOCK], column[_RATE] = x, time, clock, first
+    column[_GROWN], column[_PACE], column[_DURATION], column[_SPEED] = grown, speed * softness, duration, speed
+    ends[_RUPTURE, step], ends[_BINDING, step], ends[_CUT, step] = after, time + duration, x + slip - limit
+    return after
+
+
+@device
+def _range(value):
+    """Number of the range that a positive number lies in, by its leading bits."""
+    return np.float64(value).view(np.int64) >> _LEFT_OUT
+
+
+@device
+def look_up(count, space):
+    """Index ``count`` steps by their ends: the first that ends in each range of numbers, or later."""
+    _, ends, _, index, lowest = space
+    for row in range(2):
+        lowest[row], filled = _range(ends[row, 0]), 0
+        for k in range(count):
+            last = min(_range(ends[row, k]) - lowest[row], _RANGES - 1)
+            while filled <= last:
+                index[row, filled] = k
+                filled += 1
+
+
+@device
+def moment(passed, rate, pace, cut, duration):
+    """Time within a step at which the clock has passed so much, or a bond is cut; of ``duration`` at most."""
+    time = passed / rate
+    u = 1.0 + pace * time  # ln u/(u - 1) takes back what the sum has rounded: log1p
+    moment = time * (1.0 if u == 1.0 else logarithm(u) / (u - 1.0))
+    moment = moment if moment < cut else cut
+    return min(moment, duration) if moment > 0.0 else 0.0
+
+
+@device
+def follow(bonds, soonest, count, law, address, space):
+    """Lives of a row whose bonds all have the sign of the motion over the first ``count`` steps of the ``space``.
+
+    ``bonds`` are its births, dues and lives, ``address`` seed and member of its draws. Arrays are not passed on from
+    the loop over events: counting their references takes as long as an event.
+    """
+    (birth, due, life), (steps, ends, changes, index, lowest), (_, _, limit, rebinding) = bonds, space, law
+    seen, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
+    signed, unsigned, binding, rupture, rear = seen
+    clock, time, cut = ends[_RUPTURE, count - 1], ends[_BINDING, count - 1], ends[_CUT, count - 1]
+    clock_bits, time_bits = np.float64(clock).view(np.uint64), np.float64(-time).view(np.int64)
+    changes[:, :count] = 0.0
+    for block in range(rear.size):
+        if not (rupture[block] <= clock_bits or binding[block] <= time_bits or rear[block] <= cut):
+            continue
+        for i in range(block * BLOCK, min((block + 1) * BLOCK, due.size)):
+            if not (unsigned[i] <= clock_bits or signed[i] <= time_bits or (bounded and birth[i] <= cut)):
+                continue
+            at, x, k, events, number = due[i], birth[i], 0, 0, life[i]
+            bound = signed[i] >= 0
+            while True:
+                row, value, next_ = (_RUPTURE if bound else _BINDING), math.fabs(at), count
+                if value <= ends[row, count - 1]:
+                    place = min(max(_range(value) - lowest[row], 0), _RANGES - 1)
+                    next_ = max(k, np.int64(index[row, place]))
+                    while ends[row, next_] < value:
+                        next_ += 1
+                if bound and x <= cut:
+                    by_cut = k
+                    while ends[_CUT, by_cut] < x:
+                        by_cut += 1
+                    next_ = min(next_, by_cut)
+                events = events + 1 if next_ == k else 1
+                if events > LIVES:
+                    next_, events = next_ + 1, 1
+                k = next_
+                if k >= count:
+                    break
+                rate, pace, speed = steps[k, _RATE], steps[k, _PACE], steps[k, _SPEED]
+                if bound:
+                    changes[0, k] -= 1.0
+                    changes[1, k] -= x
+                    changes[2, k] -= x * x
+                    number += np.uint32(1)
+                    one, two, _, _ = words_at(seed, PART, _U(i + 1), _U(number), member, _U(0))
+                    end = (x + limit - steps[k, _X]) / speed if bounded and speed > 0.0 else math.inf
+                    passed = moment(at - steps[k, _CLOCK], rate, pace, end, steps[k, _DURATION])
+                    x, wait = exponential(one), exponential(two) / rebinding
+                    at = -max(steps[k, _T] + passed + wait, TINY) if rebinding > 0.0 else -math.inf
+                else:
+                    passed = max(value - steps[k, _T], 0.0)
+                    bell = pace * passed
+                    more = math.expm1(bell)
+                    clock = steps[k, _CLOCK] + rate * passed * (more / bell if bell > 0.0 else 1.0)
+                    at, x = clock + x * steps[k, _GROWN] * (1.0 + more), steps[k, _X] + speed * passed
+                    changes[0, k] += 1.0
+                    changes[1, k] += x
+                    changes[2, k] += x * x
+                bound = not bound
+            due[i], birth[i], life[i] = at, x, number
+        least(seen, birth, block, bounded)
+
+
+#: What ``live`` returns instead of a number of steps: the state has been advanced already; a number is not finite.
+SPENT, ENDLESS = -1, -2
+
+#: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
+CYCLES = 300.0
+_FAR = 16.0  # Bell forces, cut-off stretches or natural lives after which a frame is set anew
+_LEAP = 24.0  # Bell forces within a step above which bonds are stepped one by one, lest the clock overflow
+
+
+@device
+def _cycle(speed, rate, softness, limit, rebinding):
+    """About the mean time from one birth to the next of a site: a fresh bond's life at ``speed`` and the wait.
+
+    Exact for constant rupture laws, with or without a limit; for Bell's within a sixth,
+    e^z E1(z) ~ ½ ln(1 + 2/z).
+    """
+    life = math.inf
+    if rate > 0.0:
+        amplitude = 2.0 * math.fabs(speed) * softness / rate
+        life = (math.log1p(amplitude) / amplitude if amplitude > 0.0 else 1.0) / rate
+    if speed != 0.0 and limit < math.inf:
+        longest = limit / math.fabs(speed)
+        life = longest if life == math.inf else -life * math.expm1(-longest / life)
+    return life + (1.0 / rebinding if rebinding > 0.0 else math.inf)
+
+
+@device
+def _one_by_one(bonds, row, slip, duration, law, address):
+    """One step of a row bond by bond, ``slip`` of any sign; True if all stretches then have the sign of the motion."""
+    (birth, due, life), (seed, member), (rate, softness, limit, rebinding) = bonds, address, law
+    x0, t0, speed = row[SLIDER], row[TIME], slip / duration
+    bound, total, squares, lowest, highest = 0.0, 0.0, 0.0, math.inf, -math.inf
+    for i in range(due.size):
+        time = 0.0
+        for _ in range(LIVES):
+            left = duration - time
+            if math.copysign(1.0, due[i]) > 0.0:
+                stretch = x0 + speed * time - birth[i]
+                spent = rupture_integral(stretch, speed * left, left, rate, softness)
+                if spent < due[i] and math.fabs(stretch + speed * left) < limit:
+                    due[i] -= spent
+                    break
+                lasts = time_to_rupture(stretch, speed, due[i], rate, softness, limit)
+                time += min(lasts, left) if lasts > 0.0 else 0.0
+                life[i] += np.uint32(1)
+                one, two, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
+                birth[i] = exponential(one)
+                due[i] = -max(t0 + time + exponential(two) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+            elif -due[i] > t0 + duration:
+                break
+            else:
+                time = max(-due[i] - t0, 0.0)
+                due[i], birth[i] = birth[i], x0 + speed * time
+        if math.copysign(1.0, due[i]) > 0.0:
+            bound += 1.0
+            total += birth[i]
+            squares += birth[i] * birth[i]
+            lowest, highest = min(lowest, birth[i]), max(highest, birth[i])
+    row[SLIDER], row[TIME] = x0 + slip, t0 + duration
+    row[BOUND], row[SUM], row[SQUARES] = bound, total, squares
+    return (slip > 0.0 and highest <= x0 + slip) or (slip < 0.0 and lowest >= x0 + slip)
+
+
+@device
+def _set(bonds, soonest, row, law, singly, turn):
+    """Put the origin of a row's frame at the slider and at the present time, in which the sense may turn.
+
+    Its bonds are then stepped one by one, ``singly``, or together. Sums and least dues are taken anew, so that
+    roundings do not gather.
+    """
+    (birth, due, _), (_, softness, limit, _) = bonds, law
+    x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
+    scale = math.exp(-softness * x0)
+    sign = -1.0 if turn else 1.0
+    was_single = row[SINGLY] > 0.0
+    bound, total, squares = 0.0, 0.0, 0.0
+    for i in range(due.size):
+        if math.copysign(1.0, due[i]) < 0.0:
+            due[i] = -max(-due[i] - t0, TINY)
+            continue
+        x = sign * (birth[i] - x0)
+        if not was_single:
+            due[i] = max(due[i] - clock, 0.0) * (math.exp(-softness * birth[i]) if singly else scale)
+        elif not singly:
+            due[i] *= math.exp(softness * x)
+        birth[i] = x
+        bound += 1.0
+        total += x
+        squares += x * x
+    if not singly:
+        soonest[2] = math.inf
+        seen = views(due, soonest)
+        for block in range(soonest.shape[1]):
+            least(seen, birth, block, limit < math.inf)
+    row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
+    row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = 1.0 if singly else 0.0, bound, total, squares
+
+
+#: Arrays of ``Tracks``.
+TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1], int64[::1], float64[:,::1]))"
+
+
+@device
+def _far(x, time, law):
+    """Whether a frame is to be set anew with the slider at ``x`` after a ``time``."""
+    rate, softness, limit, _ = law
+    gone = math.fabs(x)
+    return gone * softness > _FAR or gone > _FAR * limit or time * rate > _FAR
+
+
+@device
+def _together(row, slip, duration, law, space):
+    """Lay out the steps that a row's bonds can follow together, up to one after which its frame is set anew; how many.
+
+    ``slip`` and ``duration`` are those of the steps ahead.
+    """
+    x, time, clock, count = row[SLIDER], row[TIME], row[CLOCK], 0
+    while count < min(duration.size, AT_ONCE) and not (count > 0 and _far(x, time, law)):
+        along = row[SENSE] * slip[count]
+        if along < 0.0 or law[1] * along > _LEAP:
+            break
+        clock = lay_out(count, along, duration[count], x, time, clock, law, space)
+        x, time = x + along, time + duration[count]
+        count += 1
+    if count > 0:
+        look_up(count, space)
+    return count
+
+
+@device
+def _keep(row, slip, duration, count, space, frames):
+    """Write the frames of a row after each of ``count`` steps that were followed together."""
+    _, ends, changes, _, _ = space
+    for k in range(count):
+        row[SLIDER], row[TIME], row[CLOCK] = row[SLIDER] + row[SENSE] * slip[k], row[TIME] + duration[k], ends[0, k]
+        row[BOUND] += changes[0, k]
+        row[SUM] += changes[1, k]
+        row[SQUARES] += changes[2, k]
+        row[STEPS] += 1.0
+        frames[:, k] = row
+
+
+@device
+def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, shared, frames):
+    """Some of the steps ahead of a row, and its frame after each of them; how many.
+
+    ``laid`` is the frame of a row whose steps are laid out, and their number; these serve all rows of a ``shared`` slip
+    that stand there.
+    """
+    count = 0
+    if row[SINGLY] == 0.0:
+        here = shared and row[STEPS] == laid[STEPS] and np.all(row[:SINGLY] == laid[:SINGLY])
+        if not (here and laid[COLUMNS] <= duration.size):
+            laid[:COLUMNS], laid[COLUMNS] = row, _together(row, slip, duration, law, space)
+        count = np.int64(laid[COLUMNS])
+    if count > 0:
+        follow(bonds, soonest, count, law, address, space)
+        _keep(row, slip, duration, count, space, frames)
+    else:
+        if row[SINGLY] == 0.0:
+            _set(bonds, soonest, row, law, True, False)
+        along, count = row[SENSE] * slip[0], 1
+        if _one_by_one(bonds, row, along, duration[0], law, address):
+            _set(bonds, soonest, row, law, False, along < 0.0)
+        row[STEPS] += 1.0
+    if _far(row[SLIDER], row[TIME], law):
+        _set(bonds, soonest, row, law, row[SINGLY] > 0.0, False)
+    frames[:, count - 1] = row
+    return count
+
+
+@device
+def one_step(bonds, soonest, row, slip, duration, law, address, space, laid, frame):
+    """Take a row through one step, of arrays of length one; ``laid`` and ``frame`` are room for what it is not kept."""
+    laid[0] = math.nan
+    _advance(bonds, soonest, row, slip, duration, law, address, space, laid, False, frame)
+
+
+@kernel(
+    f"int64({TRACKS}, float64[:,:], float64[:], float64, float64, float64, float64, uint64, uint64[:], int64,"
+    " float64[:,:,::1])"
+)
+def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members, first, frames):
+    """Advance all rows from step ``first`` on, in place; how many steps are done, or why none is.
+
+    The frame is the new state's own copy; ``frames``, of shape (rows, columns, steps), get that after each step. A row
+    in which a step is longer than some 300 lives of a site is left as it is before that step, its count of steps, too,
+    and no row goes on beyond it. Nothing is touched when the state is spent or a number endless.
+    """
+    birth, due, life, soonest, stamp, frame = tracks
+    law, rows, end = (rate, softness, limit, rebinding), len(due), first
+    for m in range(rows):
+        if stamp[m] != np.int64(frame[m, STEPS]):
+            return SPENT
+    long = np.zeros(rows, np.bool_)
+    while end < duration.size and not long.any():
+        if not (0.0 < duration[end] < math.inf and np.all(np.abs(slip[end]) < math.inf)):
+            return ENDLESS
+        for m in range(rows):
+            speed = slip[end, m % slip.shape[1]] / duration[end]
+            long[m] = duration[end] > CYCLES * _cycle(speed, rate, softness, limit, rebinding)
+        end += 1
+    space, laid, shared, start = room(), np.full(COLUMNS + 1, math.nan), slip.shape[1] == 1, first
+    while start < end:
+        stop = end
+        for m in range(rows):
+            bonds, address, k = (birth[m], due[m], life[m]), (seed, members[m]), start
+            own = min(stop, end - 1 if long[m] else end)
+            while k < own:
+                ahead = slip[k:own, m % slip.shape[1]], duration[k:own]
+                row, after = frame[m], frames[m, :, k:own]
+                k += _advance(bonds, soonest[m], row, *ahead, law, address, space, laid, shared, after)
+                if m == 0:  # what is laid out serves the other rows
+                    own = stop = k
+            stamp[m] = np.int64(frame[m, STEPS])
+        start = stop
+    return end
+
+
+@kernel(
+    f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], float64, float64, float64, float64,"
+    " uint64, uint64[:])"
+)
+def draw(tracks, chosen, speed, share, age, rate, softness, limit, rebinding, seed, members):
+    """Draw chosen rows anew: a ``share`` of sites bound, their ages by the survival law of a bond of mean life ``age``.
+
+    The density of ages S(t)/⟨T⟩ is log-concave with its mode at 0: rejection under
+    min(1, e^(1 − t/⟨T⟩))/⟨T⟩ accepts every second proposal (Devroye, Non-Uniform Random Variate
+    Generation, 1986, VII.2). Whatever its age, a bond has still an exponential threshold before it.
+    """
+    birth, due, life, soonest, stamp, frame = tracks
+    for m in range(due.shape[0]):
+        if not chosen[m % chosen.size]:
+            continue
+        v, mean, bonded = speed[m % speed.size], age[m % age.size], share[m % share.size]
+        for i in range(due.shape[1]):
+            life[m, i] += np.uint32(1)
+            site, number = _U(i + 1), _U(life[m, i])
+            one, two, three, _ = words_at(seed, PART, site, number, members[m], _U(1))
+            birth[m, i] = exponential(two)
+            due[m, i] = -max(exponential(three) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+            if unit_at(one) >= bonded:
+                continue
+            due[m, i], passed = birth[m, i], 0.0
+            for lane in range(2, 256 if mean > 0.0 else 2):
+                one, two, three, _ = words_at(seed, PART, site, number, members[m], _U(lane))
+                tail = 1.0 + exponential(two) if unit_at(one) >= 0.5 else unit_at(two)
+                passed, bar = tail * mean, exponential(three) + max(tail - 1.0, 0.0)
+                spent = rupture_integral(0.0, v * passed, passed, rate, softness)
+                if spent <= bar and math.fabs(v) * passed < limit:
+                    break
+            birth[m, i] = -v * passed
+        row = frame[m]
+        row[:STEPS] = 0.0
+        row[SENSE], row[SINGLY] = 1.0, 1.0
+        _set((birth[m], due[m], life[m]), soonest[m], row, (rate, softness, limit, rebinding), False, v < 0.0)
+        row[STEPS] += 1.0
+        stamp[m] = np.int64(row[STEPS])
+
+
+@device
+def next_event(tracks, speed, most, law):
+    """Time to the next rupture or binding at a speed [m/s], at most ``most``."""
+    ((birth, due, _), soonest, frame), (rate, softness, limit, _) = tracks, law
+    along, x, clock, time = frame[SENSE] * speed, frame[SLIDER], frame[CLOCK], frame[TIME] + most
+    if frame[SINGLY] == 0.0 and along >= 0.0:
+        first, rearmost = math.inf, math.inf
+        for block in range(soonest.shape[1]):
+            rupture, binding = soonest[0, block], soonest[1, block]
+            if math.copysign(1.0, rupture) > 0.0:
+                first = min(first, rupture)
+            if math.copysign(1.0, binding) < 0.0:
+                time = min(time, -binding)
+            rearmost = min(rearmost, soonest[2, block])
+        soon = time - frame[TIME]
+        if first < math.inf and rate > 0.0:
+            grown = rate * math.exp(softness * x)
+            soon = min(soon, moment(first - clock, grown, along * softness, math.inf, most))
+        if along > 0.0 and rearmost < math.inf:
+            soon = min(soon, (rearmost + limit - x) / along)
+        return max(soon, 0.0)
+    soon = most
+    for i in range(due.size):
+        if math.copysign(1.0, due[i]) < 0.0:
+            soon = min(soon, -due[i] - frame[TIME])
+        else:
+            left = due[i] if frame[SINGLY] > 0.0 else (due[i] - clock) * math.exp(-softness * birth[i])
+            soon = min(soon, time_to_rupture(x - birth[i], along, max(left, 0.0), rate, softness, limit))
+    return max(soon, 0.0)
+
+
+@device
+def next_cut(tracks, way, limit):
+    """Slip along a ``way`` to where the next bond reaches the limit of its stretch [m]."""
+    (birth, due, _), soonest, frame = tracks
+    along, x = frame[SENSE] * way, frame[SLIDER]
+    nearest = math.inf
+    if frame[SINGLY] == 0.0 and along >= 0.0:
+        for block in range(soonest.shape[1]):
+            nearest = min(nearest, soonest[2, block] + limit - x)
+        return max(nearest, 0.0)
+    for i in range(due.size):
+        if math.copysign(1.0, due[i]) > 0.0:
+            stretch = x - birth[i] if along >= 0.0 else birth[i] - x
+            nearest = min(nearest, limit - stretch)
+    return max(nearest, 0.0)
+
 
 #: What is said of a state that is spent.
 AGAIN = "these tracks have been advanced already: go on from the newest state, or from copies"

@@ -12,8 +12,7 @@ from scipy.stats import kstwo
 from sim.numerics.noise import PARTS
 from sim.parts.bonds import tracked
 from sim.parts.bonds.rupture import RuptureRate
-from sim.parts.bonds.tracked import advance, mean_life, start
-from sim.parts.bonds.tracked_events import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS
+from sim.parts.bonds.tracked import BLOCK, BOUND, CLOCK, SENSE, SINGLY, SLIDER, STEPS, advance, mean_life, start
 
 BELL, CONSTANT, CUT = RuptureRate(1.0, 1.0, math.inf), RuptureRate(1.0, 0.0, math.inf), RuptureRate(0.3, 0.0, 2.0)
 BOTH = RuptureRate(1.0, 1.0, 3.0)

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
-from sim.parts.bonds.first_moment import LOCAL_ERROR, _rosenbrock, advance, resting, steady
+from sim.parts.bonds.mean_field import LOCAL_ERROR, _rosenbrock, advance, resting, steady
 from sim.parts.bonds.rupture import RuptureRate
 
 BELL = RuptureRate(1.0, 1.0, math.inf)
