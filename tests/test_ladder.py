@@ -14,8 +14,7 @@ from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Onset
-from sim.parts.shear.correlation import Slip, Wave
+from sim.parts.shear.process import Onset, Slip, Wave
 from sim.scenario.clock import Record
 from sim.spectrum.families import Gaussian
 

@@ -21,7 +21,7 @@ from sim.laws import jkr
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
 from sim.parts.exchange import Parts
-from sim.parts.shear.modal import ModalProcess
+from sim.parts.shear.modes import ModalProcess
 from sim.scenario.clock import Record
 from sim.scenario.declared import distinct, entries
 from sim.scenario.scenario import Scenario

@@ -30,8 +30,8 @@ from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, claim, explained
 from sim.numerics.hdf5 import located
 from sim.parts.drive import READINGS
-from sim.parts.shear.carried import CarriedProcess
-from sim.parts.shear.modal import ModalProcess
+from sim.parts.shear.maps import CarriedProcess
+from sim.parts.shear.modes import ModalProcess
 from sim.parts.shear.process import Fluctuation
 from sim.scenario.declared import files_read
 from sim.scenario.scenario import Scenario

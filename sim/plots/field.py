@@ -13,8 +13,8 @@ from sim.analysis import setting
 from sim.analysis.scene import resolved, where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
 from sim.numerics.grid import Grid, Rectangle, lattice_of
-from sim.parts.shear.amplitude import Amplitude
 from sim.parts.shear.modes import Modes, modes
+from sim.parts.shear.process import Amplitude
 from sim.plots import style
 from sim.spectrum.families import Spectrum
 from sim.spectrum.finite_contact import Waves

@@ -21,8 +21,8 @@ from sim.parts.contact.control import Bodies
 from sim.parts.drive import Drive, Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform
-from sim.parts.shear.carried import CarriedProcess
-from sim.parts.shear.modal import ModalProcess
+from sim.parts.shear.maps import CarriedProcess
+from sim.parts.shear.modes import ModalProcess
 from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.declared import as_html, entries, with_models

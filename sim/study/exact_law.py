@@ -17,10 +17,8 @@ from sim.engine import balance, march, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding, Gammas, Motion, Motions
-from sim.parts.shear.amplitude import Amplitude
-from sim.parts.shear.correlation import Correlation
-from sim.parts.shear.mode_pairs import cell_pairs
-from sim.parts.shear.process import Fluctuation, Renewing, renewed_size
+from sim.parts.shear.bands import cell_pairs
+from sim.parts.shear.process import Amplitude, Correlation, Fluctuation, Renewing, renewed_size
 from sim.scenario.scenario import Scenario
 from sim.study.settings import REFERENCE, table
 

@@ -13,7 +13,7 @@ from sim.analysis import correlation
 from sim.ensemble.simulate import run
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.correlation import Time
+from sim.parts.shear.process import Time
 from sim.scenario.clock import Clock, Ensemble
 
 

@@ -10,7 +10,7 @@ from helpers.scenes import BONDS, CELL, SPECTRUM, scene
 
 from sim.ensemble.simulate import run
 from sim.parts.shear import models as shear
-from sim.parts.shear.correlation import Slip
+from sim.parts.shear.process import Slip
 from sim.scenario.clock import Record
 from sim.scenario.reader import load
 from sim.scenario.scenario import read_sweep

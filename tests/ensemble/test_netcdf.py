@@ -25,7 +25,7 @@ from sim.ensemble.recorded import LARGEST, VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.drive import READINGS
 from sim.parts.shear import models as shear
-from sim.parts.shear.correlation import Slip
+from sim.parts.shear.process import Slip
 from sim.scenario.clock import Clock, Record
 from sim.scenario.declared import all_tables, keys, quantities, tables
 from sim.scenario.scenario import Scenario, read_sweep

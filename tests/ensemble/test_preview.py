@@ -229,7 +229,7 @@ def test_waves_longer_than_the_cell_are_told():
     from helpers.scenes import CELL, SHEARS, SPECTRUM, scene
 
     from sim.parts.shear import models as shear
-    from sim.parts.shear.correlation import Slip
+    from sim.parts.shear.process import Slip
 
     for cell, told_of in ((CELL, False), (0.4 * CELL, True)):
         part = shear.Banded(spectrum=SPECTRUM, cell=cell, correlation=Slip(length=1e-6))

@@ -18,7 +18,7 @@ from sim.ensemble import plan as plans, simulate as ensemble
 from sim.ensemble.part_files import PartFiles, Stopped
 from sim.ensemble.plan import Plan
 from sim.parts.shear import models as shear
-from sim.parts.shear.correlation import Slip
+from sim.parts.shear.process import Slip
 from sim.scenario.clock import Clock, Record
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))

@@ -8,8 +8,7 @@ from sim.parts.contact import Equilibrium
 from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Onset
-from sim.parts.shear.correlation import Time
+from sim.parts.shear.process import Onset, Time
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band

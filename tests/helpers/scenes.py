@@ -11,8 +11,7 @@ from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.drive import Force, Spring, prescribed as drive
 from sim.parts.exchange import Motions
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Constant as ConstantAmplitude, Onset, SlipRate, Stress
-from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
+from sim.parts.shear.process import Constant as ConstantAmplitude, Diffusion, Onset, Slip, SlipRate, Stress, Time, Wave
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario
 from sim.scenario.sweep import read_sweep

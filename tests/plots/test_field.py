@@ -11,8 +11,8 @@ from matplotlib.patches import Circle
 from sim.numerics.grid import Grid
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import Carried, models as shear
-from sim.parts.shear.amplitude import Onset, Stress
 from sim.parts.shear.modes import modes
+from sim.parts.shear.process import Onset, Stress
 from sim.plots import field as field_figures, kinds as plots
 from sim.scenario.clock import Ensemble, Record
 from sim.scenario.reader import load

@@ -17,9 +17,8 @@ from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Onset, Stress
-from sim.parts.shear.banded import BandedProcess
-from sim.parts.shear.correlation import Slip, Time, Wave
+from sim.parts.shear.bands import BandedProcess
+from sim.parts.shear.process import Onset, Slip, Stress, Time, Wave
 from sim.scenario.clock import Clock, Record
 from sim.spectrum.families import Gaussian, Ripple, SelfAffine
 from sim.study import samples

@@ -17,7 +17,7 @@ from sim.parts.bonds.models import share_kept
 from sim.parts.bonds.rupture import Constant
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.correlation import Time
+from sim.parts.shear.process import Time
 from sim.scenario.clock import Clock
 from sim.spectrum.bond_made import BondMade
 from sim.spectrum.families import Band

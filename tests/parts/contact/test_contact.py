@@ -21,7 +21,7 @@ from sim.parts.contact.bodies import Adhesion, Solid, Sphere
 from sim.parts.contact.control import elastic_energy
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Onset
+from sim.parts.shear.process import Onset
 from sim.scenario.clock import Clock
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman

@@ -22,12 +22,9 @@ from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
 from sim.parts.exchange import Bonding
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Constant, Onset, Stress
-from sim.parts.shear.banded import BandedProcess
-from sim.parts.shear.bands import Bands
-from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
+from sim.parts.shear.bands import BandedProcess, Bands
 from sim.parts.shear.modes import modes
-from sim.parts.shear.process import Fluctuation
+from sim.parts.shear.process import Constant, Diffusion, Fluctuation, Onset, Slip, Stress, Time, Wave
 from sim.scenario.clock import Clock
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 

@@ -16,10 +16,9 @@ from numpy.testing import assert_allclose
 from pydantic_core import PydanticCustomError
 
 from sim.parts.shear import models as shear
-from sim.parts.shear.bands import group
-from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
-from sim.parts.shear.mode_pairs import Pairs, cell_pairs
+from sim.parts.shear.bands import Pairs, cell_pairs, group
 from sim.parts.shear.modes import modes
+from sim.parts.shear.process import Diffusion, Slip, Time, Wave
 from sim.spectrum.families import (
     AnisotropicGaussian,
     Band,

@@ -11,10 +11,8 @@ from scipy.integrate import quad
 
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding, Motion
-from sim.parts.shear.amplitude import Constant
-from sim.parts.shear.bond_field import SiteMean, SiteModes
-from sim.parts.shear.correlation import Time
-from sim.parts.shear.modes import modes
+from sim.parts.shear.modes import SiteMean, SiteModes, modes
+from sim.parts.shear.process import Constant, Time
 from sim.spectrum.bond_made import BondMade
 
 B, G, CELL, POINTS = 1e-6, 1.6e6, 24e-6, 32

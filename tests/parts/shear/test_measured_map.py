@@ -18,9 +18,8 @@ from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import Carried, Mapped
-from sim.parts.shear.amplitude import Onset, Stress
-from sim.parts.shear.carried import Passing
-from sim.parts.shear.correlation import Slip
+from sim.parts.shear.maps import Passing
+from sim.parts.shear.process import Onset, Slip, Stress
 from sim.scenario.clock import Ensemble, Record
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band

@@ -12,8 +12,7 @@ from sim.laws import halfspace
 from sim.parts.bonds import models as bonds
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
-from sim.parts.shear.amplitude import Constant, Onset, Stress
-from sim.parts.shear.correlation import Diffusion, Slip, Time, Wave
+from sim.parts.shear.process import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.scenario.clock import Clock
 from sim.spectrum.families import Gaussian, Ripple, VonKarman
 

@@ -14,8 +14,7 @@ from sim.parts.contact.bodies import Adhesion
 from sim.parts.drive import Ramp, Spring, Steady, Table
 from sim.parts.exchange import Motion, Motions
 from sim.parts.shear import Banded, Mean
-from sim.parts.shear.amplitude import SlipRate
-from sim.parts.shear.correlation import Slip, Wave
+from sim.parts.shear.process import Slip, SlipRate, Wave
 from sim.scenario.clock import Clock
 from sim.spectrum import Gaussian
 from sim.units.refusals import BadInput
