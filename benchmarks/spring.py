@@ -11,7 +11,7 @@ from benchmarks.timing import Bench, Beside, Row, absolute, spent
 from sim.engine import MemberNoise, State, Trajectory, follow, march, pack, unpack
 from sim.parts.bonds import FirstMoment
 from sim.parts.contact import Equilibrium
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import READINGS, Spring
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario

@@ -8,8 +8,17 @@ import numpy as np
 from sim.engine import State, Trajectory, balance
 from sim.laws import jkr
 from sim.parts import extremes
-from sim.parts.contact.balance import BONDS_ONLY, CLOSED, EQUILIBRIUM, JKR, NO_MEAN_STRESS, Balance, Shares
-from sim.parts.contact.control import Control, LoadControl
+from sim.parts.contact.balance import (
+    BONDS_ONLY,
+    CLOSED,
+    EQUILIBRIUM,
+    JKR,
+    NO_MEAN_STRESS,
+    Balance,
+    Control,
+    LoadControl,
+    Shares,
+)
 from sim.parts.drive import READINGS
 from sim.scenario.scenario import Scenario
 

@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 from sim.laws import jkr
 from sim.parts.bonds import Cohort, Model as BondModel, Tracked
 from sim.parts.contact import Contact
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Drive
 from sim.parts.exchange import Setting
 from sim.parts.shear import Model

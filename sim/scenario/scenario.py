@@ -15,9 +15,8 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from sim.numerics.grid import Lattice
 from sim.parts.bonds import Bonds, Model as BondModel, Unbroken
 from sim.parts.contact import Contact
-from sim.parts.contact.balance import Shares
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.contact.control import Bodies
+from sim.parts.contact.balance import Bodies, Shares
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Drive, Steady as SteadyDrive
 from sim.parts.exchange import Parts, Setting, Times
 from sim.parts.shear import Model, Process, Shear, Uniform

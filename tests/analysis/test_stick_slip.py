@@ -13,7 +13,7 @@ from sim import analysis
 from sim.ensemble.simulate import run
 from sim.parts.bonds import FirstMoment, Steady, Unbroken
 from sim.parts.bonds.rupture import Bell
-from sim.parts.contact.bodies import Adhesion
+from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force, Spring
 from sim.scenario.clock import Clock
 

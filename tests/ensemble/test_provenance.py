@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 
 from sim.ensemble.outline import scenario_json
 from sim.ensemble.simulate import run
-from sim.parts.contact.bodies import Adhesion
+from sim.parts.contact.models import Adhesion
 from sim.scenario.reader import load
 from sim.scenario.scenario import Scenario, read_sweep
 

@@ -10,7 +10,7 @@ from sim.laws import jkr
 from sim.parts.bonds import FirstMoment
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import READINGS, Force, Spring
 from sim.scenario.clock import Clock, Ensemble
 from sim.scenario.scenario import Scenario

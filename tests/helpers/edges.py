@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import kernel
-from sim.parts.contact.crack_front import moved_edge
+from sim.parts.contact.front import moved_edge
 
 
 class Hold(NamedTuple):

@@ -3,7 +3,7 @@
 from sim.ensemble.simulate import run
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset, Time

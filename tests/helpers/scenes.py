@@ -7,7 +7,7 @@ import numpy as np
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium, RateDependent
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import Force, Spring, prescribed as drive
 from sim.parts.exchange import Motions
 from sim.parts.shear import models as shear

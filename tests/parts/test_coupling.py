@@ -47,7 +47,7 @@ from sim.ensemble.oscillations import slider_body
 from sim.laws import jkr
 from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff
-from sim.parts.contact.bodies import Adhesion
+from sim.parts.contact.models import Adhesion
 from sim.parts.drive import READINGS, Force, Spring, Steady as AtSpeed
 from sim.scenario.scenario import Scenario
 from sim.units.refusals import BadInput

@@ -14,7 +14,7 @@ from sim.analysis import slips
 from sim.laws.schallamach import Body, first_moment_onset, first_moment_peak, resolved_onset
 from sim.parts.bonds import Cohort, FirstMoment
 from sim.parts.bonds.rupture import Bell
-from sim.parts.contact.bodies import Adhesion
+from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force, Spring
 from sim.plots import draw, panels
 from sim.scenario.clock import Clock

@@ -10,7 +10,7 @@ from sim.analysis import where
 from sim.laws import jkr, profiles, theories
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
-from sim.parts.contact.bodies import Adhesion
+from sim.parts.contact.models import Adhesion
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, style as pictures, theories as rival_figures

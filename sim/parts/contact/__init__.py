@@ -1,4 +1,3 @@
 """The contact of sphere and half-space: its radius under a load, an indentation, or behind a stiffness."""
 
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.contact.models import Contact, Equilibrium, RateDependent
+from sim.parts.contact.models import Adhesion, Contact, Equilibrium, RateDependent, Solid, Sphere

@@ -1,13 +1,149 @@
-"""Terms of the effective work of adhesion, and the phases of a contact."""
+"""Terms of the effective work of adhesion, and the equilibrium of a contact with them.
+
+A contact is under load control, displacement control, or displacement behind a stiffness. The control is a number at
+one time, an array of shape (times, 1) at many. Each control gives the stable equilibrium for a work of adhesion. It
+also gives the load, the indentation and the energy at any radius. Radii are arrays, shape (1,) or (members,), nan if
+the contact is open.
+
+On a disc the share of ΔΓ that the contact pays is not convex in its radius, so neither Newton's method nor a
+fixed-point iteration is safe. A walk inwards starts from the radius without fluctuations. Between the two places where
+the sign changes Ridders's method goes down to rounding. If the walk meets no crossing, the least surplus along it is
+searched, because two crossings may lie between two places.
+"""
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from sim.laws.reversible import mean_stress_energy
-from sim.parts.contact.control import Bodies
-from sim.parts.exchange import Array
+from sim.laws import jkr
+from sim.laws.jkr.scales import series_shares
+from sim.laws.reversible import (
+    mean_stress_energy,
+    radius_at_displacement_reversible,
+    radius_at_indentation_reversible,
+    radius_at_load_reversible,
+)
+from sim.numerics.jit import device, kernel
+from sim.parts.exchange import Array, Flags, Mount
+from sim.spectrum.finite_contact import share_of
+
+
+class Bodies(NamedTuple):
+    """Radius R of the sphere [m], contact modulus E* [Pa] and Poisson ratio of the half-space [1]."""
+
+    sphere_radius: float
+    modulus: float
+    poisson_ratio: float
+
+
+def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
+    """Elastic energy of a contact of any radius a and indentation δ [J].
+
+    ``E* (a δ² − 2 a³ δ/(3R) + a⁵/(5R²))``: its slope over δ is the load, over the area the energy release
+    rate G with the sign turned (Maugis 2000).
+    """
+    a, curvature = radius, 1.0 / bodies.sphere_radius
+    third = a**3 * curvature
+    return bodies.modulus * (a * indentation**2 - 2.0 / 3.0 * third * indentation + 0.2 * third * a**2 * curvature)
+
+
+@dataclass(frozen=True)
+class LoadControl:
+    """Dead load, compression positive [N]."""
+
+    load: float | Array
+
+    @property
+    def mount(self) -> Mount:
+        """Load and base that hold the sphere."""
+        return Mount(self.load, 0.0, 0.0)
+
+    @property
+    def closes(self) -> bool | Flags:
+        """True if a detached sphere comes back into contact: where the load is not tensile."""
+        return self.load >= 0.0
+
+    def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
+        """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
+        if reversible == 0.0:
+            return np.asarray(jkr.radius_at_load(self.load, work, *bodies[:2]))
+        return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, *bodies))
+
+    def normal_load(self, radius: Array, bodies: Bodies) -> Array:
+        """Load on the sphere [N]; 0 where the contact is open."""
+        return np.where(np.isnan(radius), 0.0, self.load)
+
+    def indentation(self, radius: Array, bodies: Bodies) -> Array:
+        """Indentation [m]; nan where the contact is open, since a dead load does not place the sphere."""
+        return np.asarray(jkr.indentation_under_load(radius, self.load, bodies.sphere_radius, bodies.modulus))
+
+    def displacement(self, radius: Array, bodies: Bodies) -> Array:
+        """Displacement of the base [m]: the indentation, without a spring between."""
+        return self.indentation(radius, bodies)
+
+    def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
+        """Energy of this contact above that of a free sphere that just touches [J]: elastic, of the load, of adhesion.
+
+        0 under tension, where it is not defined: the free sphere moves away.
+        """
+        radius = np.where(self.closes, radius, np.nan)
+        indentation = self.indentation(radius, bodies)
+        energy = elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
+        return np.where(self.closes, energy, 0.0)
+
+
+@dataclass(frozen=True)
+class DisplacementControl:
+    """Displacement of the base [m] behind a stiffness [N/m]; an infinite stiffness makes it the indentation."""
+
+    base: float | Array
+    stiffness: float = math.inf
+
+    @property
+    def mount(self) -> Mount:
+        """Load and base that hold the sphere."""
+        return Mount(0.0, self.base, self.stiffness)
+
+    @property
+    def closes(self) -> bool | Flags:
+        """True if a detached sphere comes back into contact: at a displacement of zero or more."""
+        return self.base >= 0.0
+
+    def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
+        """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
+        rigid, held = math.isinf(self.stiffness), (self.base, self.stiffness)
+        if reversible == 0.0 and rigid:
+            return np.asarray(jkr.radius_at_indentation(self.base, work, *bodies[:2]))
+        if reversible == 0.0:
+            return np.asarray(jkr.radius_at_displacement(*held, work, *bodies[:2]))
+        if rigid:
+            return np.asarray(radius_at_indentation_reversible(self.base, work, stress, reversible, *bodies))
+        return np.asarray(radius_at_displacement_reversible(*held, work, stress, reversible, *bodies))
+
+    def normal_load(self, radius: Array, bodies: Bodies) -> Array:
+        """Load on the sphere [N]; 0 where the contact is open."""
+        load = jkr.load_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
+        return np.where(np.isnan(radius), 0.0, load)
+
+    def indentation(self, radius: Array, bodies: Bodies) -> Array:
+        """Indentation [m]; the displacement of the base where the contact is open and the spring unloaded."""
+        found = jkr.indentation_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
+        return np.where(np.isnan(radius), self.base, found)
+
+    def displacement(self, radius: Array, bodies: Bodies) -> Array:
+        """Displacement of the base [m]."""
+        return self.base + np.zeros(radius.shape)
+
+    def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
+        """Energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""
+        indentation = self.indentation(radius, bodies)
+        spring = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.base - indentation) ** 2
+        return elastic_energy(radius, indentation, bodies) + spring - gained
+
+
+Control = LoadControl | DisplacementControl
 
 
 class Shares(Protocol):
@@ -95,3 +231,103 @@ class Balance(NamedTuple):
 AHEAD, CLOSED, OPEN = 0.0, 1.0, 2.0
 #: Columns of the phases of reference contacts.
 JKR, BONDS_ONLY, NO_MEAN_STRESS, EQUILIBRIUM = range(4)
+
+#: Places of the walk inwards, its end over its start, and turns that narrow an interval down to rounding.
+_WALK, _NARROWEST, _TURNS = 128, 1e-4, 40
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+_PER_TURN = 0.5 / math.pi
+
+
+@device
+def _surplus(radius, terms, bodies, wave, ends, cubics):
+    """Energy release rate, negative below Hertz's radius, less the work of adhesion left at a radius [J/m²]."""
+    load, base, bonded, fluctuating, reversible = terms
+    curvature, modulus, stiffness = bodies
+    inverse, hertz = 1.0 / radius, radius * radius * curvature
+    missing = 2.0 / 3.0 * hertz - 0.5 * load / modulus * inverse
+    if stiffness > 0.0:
+        grips, dead = series_shares(stiffness, 2.0 * modulus * radius)
+        missing = grips * (hertz - base) + dead * (2.0 / 3.0 * hertz)
+    rate = _PER_TURN * modulus * inverse * missing * abs(missing)
+    return rate - (bonded - fluctuating * share_of(radius, wave, ends, cubics) - reversible * radius)
+
+
+@device
+def _dip(inside, outside, terms, bodies, wave, ends, cubics):
+    """Place between two others at which the surplus is least, by golden section."""
+    one, two = outside - _GOLDEN * (outside - inside), inside + _GOLDEN * (outside - inside)
+    first, second = _surplus(one, terms, bodies, wave, ends, cubics), _surplus(two, terms, bodies, wave, ends, cubics)
+    for _ in range(_TURNS):
+        if first < second:
+            outside, two, second = two, one, first
+            one = outside - _GOLDEN * (outside - inside)
+            first = _surplus(one, terms, bodies, wave, ends, cubics)
+        else:
+            inside, one, first = one, two, second
+            two = inside + _GOLDEN * (outside - inside)
+            second = _surplus(two, terms, bodies, wave, ends, cubics)
+    return 0.5 * (inside + outside)
+
+
+@device
+def _narrowed(inside, outside, terms, bodies, wave, ends, cubics):
+    """Place at which the surplus crosses zero between two places, to rounding: Ridders's method."""
+    low = _surplus(inside, terms, bodies, wave, ends, cubics)
+    high = _surplus(outside, terms, bodies, wave, ends, cubics)
+    before = 0.0
+    for _ in range(_TURNS):
+        if not (outside - inside > 4e-16 * outside and low < 0.0 and high > 0.0):
+            break
+        middle = 0.5 * (inside + outside)
+        value = _surplus(middle, terms, bodies, wave, ends, cubics)
+        guess = middle + (middle - inside) * (-value) / math.sqrt(value * value - low * high)
+        guess = min(max(guess, inside), outside)
+        if abs(guess - before) <= 4e-16 * guess:
+            return guess
+        before, at = guess, _surplus(guess, terms, bodies, wave, ends, cubics)
+        for place, found in ((middle, value), (guess, at)):
+            if inside < place < outside:
+                if found <= 0.0:
+                    inside, low = place, found
+                else:
+                    outside, high = place, found
+    return outside if high == 0.0 else inside
+
+
+@device
+def _widest(start, hertz, terms, bodies, wave, ends, cubics):
+    """Radius of one contact, see ``widest_crossings``."""
+    if not start > 0.0 or terms[3] == 0.0 or _surplus(start, terms, bodies, wave, ends, cubics) <= 0.0:
+        return start  # nothing is taken
+    low = max(hertz if hertz > 0.0 else 0.0, _NARROWEST * start)
+    ratio = (low / start) ** (1.0 / _WALK)
+    outside, inside, least, lowest = start, start, math.inf, start
+    for k in range(1, _WALK + 1):
+        outside, inside = inside, low if k == _WALK else inside * ratio
+        value = _surplus(inside, terms, bodies, wave, ends, cubics)
+        if value <= 0.0:
+            return max(_narrowed(inside, outside, terms, bodies, wave, ends, cubics), low)
+        if value < least and k < _WALK:
+            least, lowest = value, inside
+    dip = _dip(lowest * ratio, lowest / ratio, terms, bodies, wave, ends, cubics)
+    if _surplus(dip, terms, bodies, wave, ends, cubics) <= 0.0:
+        return max(_narrowed(dip, lowest / ratio, terms, bodies, wave, ends, cubics), low)
+    return hertz
+
+
+@kernel(
+    "void(float64[:, ::1], UniTuple(float64, 3), UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1],"
+    " float64[::1])"
+)
+def widest_crossings(contacts, bodies, wave, ends, cubics, radius):
+    """Largest stable radius of contacts on discs, written to ``radius`` [m].
+
+    Rows of ``contacts``: radius without fluctuations [m], nan without a contact; Hertz's radius [m], nan where pulled;
+    load [N] and displacement of the base [m], one of them 0; work of adhesion of the bonds left and energy of the
+    fluctuations [J/m²]; energy that the mean stress takes, over the radius [J/m³]. ``bodies``: curvature of the
+    sphere, contact modulus, stiffness, 0 at a load. The rest is a margin's ``terms``. The walk never goes below
+    1e-4 of its start.
+    """
+    for i in range(radius.size):
+        terms = contacts[2, i], contacts[3, i], contacts[4, i], contacts[5, i], contacts[6, i]
+        radius[i] = _widest(contacts[0, i], contacts[1, i], terms, bodies, wave, ends, cubics)

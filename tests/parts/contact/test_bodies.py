@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.laws import halfspace
-from sim.parts.contact.bodies import Adhesion, Body, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Body, Solid, Sphere
 
 
 def test_strings_with_units_become_si():

@@ -16,9 +16,9 @@ from sim.engine import march, pack, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
 from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium, RateDependent, front_steps
-from sim.parts.contact.bodies import Adhesion, Solid, Sphere
-from sim.parts.contact.control import elastic_energy
+from sim.parts.contact import Equilibrium, RateDependent, front
+from sim.parts.contact.balance import elastic_energy
+from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset
@@ -638,7 +638,7 @@ def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_
     pulled = RateDependent(load={"from": 1e-3, "to": -1e-3}, front_speed=1e-3)
     found = []
     for spot in (1e-3, 1e-2):
-        monkeypatch.setattr(front_steps, "_SPOT", spot)
+        monkeypatch.setattr(front, "_SPOT", spot)
         scenario = scene(1, steps, contact=pulled)
         *_, last = march(scenario, np.arange(1))
         assert np.isnan(last.contact.radius[0])

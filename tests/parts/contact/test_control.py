@@ -8,8 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.laws import jkr
 from sim.parts.contact import Equilibrium
-from sim.parts.contact.balance import Balance
-from sim.parts.contact.control import Bodies, DisplacementControl, LoadControl, elastic_energy
+from sim.parts.contact.balance import Balance, Bodies, DisplacementControl, LoadControl, elastic_energy
 from sim.spectrum.families import Gaussian
 from sim.spectrum.finite_contact import Margin, disc_energy
 

@@ -10,7 +10,7 @@ from scipy.integrate import quad
 
 from sim.engine import march
 from sim.parts.bonds import Steady as Weakening, Unbroken
-from sim.parts.contact.bodies import Adhesion
+from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Ramp, Spring, Steady, Table
 from sim.parts.exchange import Motion, Motions
 from sim.parts.shear import Banded, Mean

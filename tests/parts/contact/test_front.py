@@ -16,8 +16,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 
 from sim.laws import jkr
-from sim.parts.contact import crack_front as front
-from sim.parts.contact.crack_front import Kinetics
+from sim.parts.contact import front
+from sim.parts.contact.front import Kinetics
 
 W = 1.0 / math.pi
 REST = 6.0 ** (1.0 / 3.0)

@@ -1,4 +1,4 @@
-"""Crack-front kinetics: motion of the edge of an adhesive contact over one clock step.
+"""Crack-front kinetics: motion of the edge of an adhesive contact over a block of clock steps.
 
 The edge of a contact of radius a moves at the speed at which its excess of energy release rate is
 dissipated, ``G - w = work (v/speed)^exponent sgn(v)``, v = -da/dt, opening where the energy release rate
@@ -16,19 +16,125 @@ and ``mu = 1/(stiffness + 2 E* a)`` the indentation missing from Hertz's at this
 Integration. Radau IIA of three stages (order 5, L-stable; Hairer & Wanner, Solving ODEs II, IV.8)
 takes steps of its own choice inside the clock step. Where the edge runs open, the radius falls to
 zero in finite time with an infinite slope; there the same method advances the time over -ln a,
-which is smooth to the end. Control and work change linearly over the clock step, which is cut where
-the work or the force on the bare contact changes sign.
+which is smooth to the end. Within a clock step the work of adhesion changes linearly and the control piece by piece. A
+piece is cut where the work or the force on the bare contact changes sign.
 
 The contact never falls below Hertz's (y = 0): pressing alone makes that area, and linear
 elasticity has no smaller one. An edge that opens with w <= 0 stops there, and one that heals more
-slowly than Hertz's contact grows follows it.
+slowly than Hertz's contact grows follows it. A contact that closes begins as a spot, and one that has shrunk to half of
+the spot counts as open.
+
+A ``scene`` is a tuple of numbers: contact modulus, curvature of the sphere, stiffness; load, displacement and work of
+adhesion at the start, each with its rate; the unit of the excess. A ``front`` has speed and power of an opening edge,
+and those of a healing one.
 """
 
 import math
 from typing import NamedTuple
 
-from sim.numerics.jit import device
-from sim.parts.contact.edge_law import ROUNDING, bare_force, edge_speed, excess, hertz_force, hertz_radius, pushed
+import numpy as np
+
+from sim.numerics.jit import device, kernel
+from sim.numerics.special import cube_root
+from sim.parts.contact.balance import Balance
+from sim.parts.exchange import Array, ContactState
+from sim.spectrum.finite_contact import share_of
+from sim.units.course import Pieces
+
+#: Relative distance from equilibrium that rounding leaves.
+ROUNDING = 1e-12
+
+
+@device
+def excess(t, a, scene):
+    """The missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
+
+    Below Hertz's radius G goes on as -G: nothing else than a monotone continuation for the inner
+    solver, which never ends there.
+    """
+    modulus, curvature, stiffness, load, load_rate, displacement, displacement_rate, work, work_rate, scale = scene
+    if stiffness == math.inf:
+        spring, yielding = 1.0, 0.0
+    else:
+        yielding = 1.0 / (stiffness + 2.0 * modulus * a)
+        spring = stiffness * yielding
+    hertz = a * a * curvature
+    y = spring * (hertz - displacement - displacement_rate * t)
+    y += yielding * (4.0 / 3.0 * modulus * a * hertz - load - load_rate * t)
+    y_a = 2.0 * a * curvature - 2.0 * modulus * yielding * y
+    y_t = -spring * displacement_rate - yielding * load_rate
+    unit = modulus * abs(y) / (2.0 * math.pi * a * scale)
+    s = unit * y - (work + work_rate * t) / scale
+    return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
+
+
+@device
+def edge_speed(s, front):
+    """da/dt at an excess s, and its slope with s.
+
+    Closer to equilibrium than rounding resolves the law is a straight line, lest its slope end at 0 or infinity.
+    """
+    speed, power = (front[0], front[1]) if s > 0.0 else (front[2], front[3])
+    near = ROUNDING if power >= 1.0 else 1e3 * ROUNDING
+    if abs(s) < near:
+        slope = -speed * math.pow(near, power - 1.0)
+        return slope * s, slope
+    rate = -math.copysign(speed * math.pow(abs(s), power), s)
+    return rate, rate * power / s
+
+
+@device
+def bare_force(t, scene):
+    """Force of the control on a contact of vanishing radius [N]; the indentation [m] if the stiffness is infinite."""
+    _, _, stiffness, load, load_rate, displacement, displacement_rate, _, _, _ = scene
+    if stiffness == math.inf:
+        return displacement + displacement_rate * t
+    return load + load_rate * t + stiffness * (displacement + displacement_rate * t)
+
+
+@device
+def hertz_force(a, scene):
+    """The bare force that goes with Hertz's contact of radius a."""
+    if scene[2] == math.inf:
+        return a * a * scene[1]
+    return a * a * scene[1] * (scene[2] + 4.0 / 3.0 * scene[0] * a)
+
+
+@device
+def hertz_radius(t, scene):
+    """Hertz's radius under the control at t; 0 where nothing presses.
+
+    The force grows with the radius and is convex, so Newton's steps from the right go left.
+    """
+    modulus, curvature, stiffness = scene[0], scene[1], scene[2]
+    force = bare_force(t, scene)
+    if not force > 0.0:
+        return 0.0
+    if stiffness == math.inf:
+        return math.sqrt(force / curvature)
+    a = np.cbrt(0.75 * force / (curvature * modulus))
+    if stiffness > 0.0:
+        a = min(a, math.sqrt(force / (curvature * stiffness)))
+    for _ in range(60):
+        lower = a - (hertz_force(a, scene) - force) / (a * curvature * (2.0 * stiffness + 4.0 * modulus * a))
+        if not lower < a:
+            break
+        a = lower
+    return a
+
+
+@device
+def pushed(t, scene, front):
+    """True if Hertz's contact at t grows faster than the edge heals; and its radius."""
+    a = hertz_radius(t, scene)
+    modulus, curvature, stiffness, _, load_rate, _, displacement_rate, work, work_rate, scale = scene
+    rate, _ = edge_speed(-(work + work_rate * t) / scale, front)
+    if stiffness == math.inf:
+        indenting = displacement_rate
+    else:
+        indenting = (load_rate + stiffness * displacement_rate) / (stiffness + 2.0 * modulus * a)
+    return rate <= indenting / (2.0 * a * curvature), a
+
 
 _S6 = math.sqrt(6.0)
 _C1, _C2 = (4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0
@@ -327,7 +433,7 @@ def _zero(before, after, duration):
 
 @device
 def scene_of(works, loads, bases, stiffness, duration, scale, bodies):
-    """The ``scene`` of ``edge_law`` from work, load and displacement at both ends of a time."""
+    """The ``scene`` from work, load and displacement at both ends of a time."""
     per, (sphere_radius, modulus) = (1.0 / duration if duration > 0.0 else 0.0), bodies
     load, base = (0.0 if stiffness == math.inf else loads[0]), (0.0 if stiffness == 0.0 else bases[0])
     load_rate = 0.0 if stiffness == math.inf else (loads[1] - loads[0]) * per
@@ -386,3 +492,130 @@ def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, le
         if energy < math.inf and end != math.inf:
             return end, opened, energy
     return math.nan, math.nan, (0.0 if math.isnan(a) or a <= 0.0 else math.nan)
+
+
+#: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
+_SPOT = 1e-3
+_READ, _THREE = "Array(float64, 2, 'A', readonly=True)", "UniTuple(float64, 3)"
+#: ``terms`` of a contact on the whole plane, see ``Margin.terms``.
+_PLANE = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.empty((0, 4))
+
+
+@device
+def _left(radius, bonded, fluctuating, taken, wave, ends, cubics):
+    """Work of adhesion left at a radius; of an open contact that of a vanishing one."""
+    size, share = (0.0 if math.isnan(radius) else radius), 1.0
+    if len(cubics) > 0:
+        share = share_of(size, wave, ends, cubics) if size > 0.0 else 0.0
+    return bonded - fluctuating * share - taken * size
+
+
+@device
+def _energy(t, a, scene):
+    """Energy of a contact above that of an open one: elastic, of the spring or the load, of adhesion."""
+    modulus, curvature, stiffness, load, load_rate, base, base_rate, work, work_rate, _ = scene
+    hertz = a * a * curvature
+    indentation = hertz - excess(t, a, scene)[0]
+    energy = modulus * a * (indentation * indentation - 2.0 / 3.0 * hertz * indentation + 0.2 * hertz * hertz)
+    energy -= (load + load_rate * t) * indentation + math.pi * a * a * (work + work_rate * t)
+    if stiffness < math.inf:
+        stretch = base + base_rate * t - indentation
+        energy += 0.5 * stiffness * stretch * stretch
+    return energy
+
+
+@device
+def _moved(radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot):
+    """Radius or nan, time of opening or nan, and dissipated energy after a part of a clock step.
+
+    Energy still stored where the edge opens counts as dissipated, and so does what a spot gains at a touch. Under a
+    load nothing counts where it falls: below the radius at pull-off its work diverges as the radius vanishes.
+    """
+    a = spot if touches else radius
+    if math.isnan(a):
+        return math.nan, math.nan, 0.0
+    end, opened, lost = moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, 0.5 * spot)
+    scene, opens = scene_of(works, loads, bases, stiffness, duration, kinetics[0], bodies), math.isnan(end)
+    if stiffness == 0.0:
+        sphere_radius, modulus = bodies
+        fold = cube_root(9.0 * math.pi * max(works[1], 0.0) * sphere_radius * (sphere_radius / (8.0 * modulus)))
+        if opens or (loads[1] < 0.0 and radius < fold):
+            lost = 0.0
+    elif opens:
+        lost += max(_energy(opened, 0.5 * spot, scene), 0.0)
+    if touches:
+        lost += max(-_energy(0.0, max(spot, hertz_radius(0.0, scene)), scene), 0.0)
+    return end, opened, lost
+
+
+@kernel(
+    f"void(float64[:, ::1], float64[::1], int64[::1], float64[:, ::1], {_READ}, {_READ}, {_READ}, float64,"
+    f" UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean, {_THREE}, {_THREE}, float64[:, ::1],"
+    " float64[:, :, ::1])"
+)
+def _follow(
+    state, durations, opening, pieces, bonded, fluctuating, taken, stiffness, kinetics, bodies, spot, again, wave, ends,
+    cubics, out,
+):  # fmt: skip
+    for m in range(state.shape[1]):
+        work, radius, detached, dissipated = state[0, m], state[1, m], state[2, m], state[3, m]
+        for k in range(len(durations)):
+            last = _left(radius, bonded[k, m], fluctuating[k, m], taken[k, m], wave, ends, cubics)
+            first, share = (last if math.isnan(radius) else work), 0.0
+            for p in range(opening[k], opening[k + 1]):
+                before, share = share, pieces[1, p]
+                works = (1.0 - before) * first + before * last, (1.0 - share) * first + share * last
+                held, none = (pieces[2, p], pieces[3, p]), (0.0, 0.0)
+                loads, bases = (held, none) if stiffness == 0.0 else (none, held)
+                touches = math.isnan(radius) and (math.isnan(detached) or again) and held[0] >= 0.0
+                closed, duration = touches or not math.isnan(radius), durations[k] * (share - before)
+                radius, opened, lost = _moved(
+                    radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot
+                )
+                dissipated += lost
+                if closed and math.isnan(radius):
+                    detached = pieces[0, p] - duration + opened
+            work = _left(radius, bonded[k, m], fluctuating[k, m], taken[k, m], wave, ends, cubics)
+            out[0, k, m], out[1, k, m], out[2, k, m], out[3, k, m] = work, radius, detached, dissipated
+
+
+def follow(
+    state: ContactState, durations: Array, pieces: Pieces, stiffness: float, balance: Balance, reversible: float,
+    kinetics: Kinetics, again: bool,
+) -> Array:  # fmt: skip
+    """The first four quantities of ``ContactState`` at the end of each step of a block, shape (4, steps, rows).
+
+    Parameters
+    ----------
+    state : ContactState
+        The contact before the block.
+    durations : array, shape (steps,)
+        Lengths of the steps [s].
+    pieces : Pieces
+        The control in each step: the displacement of the base behind a ``stiffness`` [N/m], infinite for an
+        indentation, or for a stiffness of 0 the load.
+    balance : Balance
+        Terms of the work of adhesion at the end of each step, of which the mean stress takes the share
+        ``reversible``. What depends on the radius is taken at that of the start of the step.
+    kinetics : Kinetics
+        The law of the edge.
+    again : bool
+        Whether a contact that has come off closes again where the free sphere touches.
+    """
+    opening = np.searchsorted(pieces.interval, np.arange(len(durations) + 1))
+    begin, end = pieces.start[opening[:-1]], pieces.stop[opening[1:] - 1]
+    shares = (pieces.stop - begin[pieces.interval]) / (end - begin)[pieces.interval]
+    taken = reversible * balance.reversible(np.ones(1)) if reversible else np.zeros(1)
+    of_steps = balance.bonded, balance.fluctuating, taken
+    _, rows = np.broadcast_shapes(state.radius.shape, *((1, *values.shape)[-2:] for values in of_steps))
+    before, out = np.empty((4, rows)), np.empty((4, len(durations), rows))
+    for row, values in zip(before, state, strict=False):
+        row[:] = values
+    sphere_radius, modulus, _ = balance.bodies
+    spot = _SPOT * math.cbrt(balance.reference * sphere_radius**2 / modulus)
+    _follow(
+        before, durations, opening, np.array([pieces.stop, shares, pieces.first, pieces.last]),
+        *(np.broadcast_to(values, out.shape[1:]) for values in of_steps), stiffness, tuple(kinetics),
+        (sphere_radius, modulus), spot, again, *(_PLANE if balance.margin is None else balance.margin.terms), out,
+    )  # fmt: skip
+    return out
