@@ -14,7 +14,7 @@ from sim.laws.schallamach import bell_stress, transition_probabilities
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell
-from sim.parts.drive.prescribed import Steady
+from sim.parts.drive import Steady
 from sim.parts.exchange import Bonding
 
 #: Two-state bonds: V = Vc, and half a bond's life at rest a step.

@@ -16,7 +16,7 @@ from benchmarks.timing import Bench, Beside, Row
 from sim.engine import MemberNoise, follow, start
 from sim.laws.halfspace import surface_energy
 from sim.numerics.noise import Noise
-from sim.parts.drive.prescribed import Steady
+from sim.parts.drive import Steady
 from sim.parts.exchange import Bonding
 from sim.spectrum.families import SelfAffine
 

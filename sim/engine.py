@@ -10,9 +10,10 @@ from typing import NamedTuple, cast, get_type_hints
 import numpy as np
 
 from sim.numerics.noise import Noise
-from sim.parts import coupling, extremes
+from sim.parts import extremes
 from sim.parts.contact.balance import Balance
-from sim.parts.coupling import Around
+from sim.parts.coupled import coupled
+from sim.parts.coupled.coupled import Around
 from sim.parts.exchange import Array, Bonding, ContactState, Indices, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
 
@@ -80,13 +81,13 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
     bonds = population.start(motion, noise.bonds)
     bonding = population.bonding(bonds)
     if drive.solves_motion:
-        bonding = coupling.felt(scenario.parts, bonding, motion.speed)
+        bonding = coupled.felt(scenario.parts, bonding, motion.speed)
     shear = process.start(motion, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy, slider.position)
     touch = contact.start(motion, scenario.times.duration, terms)
     if drive.solves_motion:
         around = _around(scenario, touch, shear.energy, range(1, 2))
-        slider = coupling.load(scenario.parts, slider, bonding, around, scenario.times.duration)
+        slider = coupled.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
 
@@ -102,7 +103,7 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
         around = _around(scenario, state.contact, state.shear.energy, steps)
         before = state.drive, state.bonds
         given = scenario.parts, before, around, scenario.times, steps, noise.bonds
-        passed, motions, bonds, bonding = coupling.advance(*given)
+        passed, motions, bonds, bonding = coupled.advance(*given)
         slider, driven = passed.at(-1), drive.readings(passed)
     else:
         slider, motions = drive.advance(state.drive, scenario.times, steps)
@@ -111,7 +112,7 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, energy, motions.position)
     touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
-    if drive.solves_motion and (stand := coupling.agreed(passed, touch.radius)) < len(steps):
+    if drive.solves_motion and (stand := coupled.agreed(passed, touch.radius)) < len(steps):
         return advance(scenario, state, noise, steps[:stand])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
     largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions)

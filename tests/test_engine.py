@@ -166,7 +166,7 @@ def test_long_marches_do_not_drift(steps):
 
 def test_a_detached_contact_stays_open():
     # a ripple that grows past what tension allows and falls back again
-    from sim.parts.drive import prescribed as drive
+    from sim.parts import drive
     from sim.parts.shear import models as shear
     from sim.parts.shear.process import Onset, Time
     from sim.spectrum.families import Ripple

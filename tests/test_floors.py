@@ -69,7 +69,7 @@ def test_a_module_imports_only_from_floors_below_its_own():
 
 def test_a_part_imports_no_other_part_except_the_coupled_solution():
     for name in MODULES:
-        part = name.split(".")[1] if name.startswith("parts.") and name.count(".") > 1 else "coupled"
+        part = name.split(".")[1] if name.startswith("parts.") else "coupled"
         for other in imported(name) if part != "coupled" else ():
             if floor(other) == "parts":
                 assert other == "parts.exchange" or other.split(".")[1] == part, f"{name} imports {other}"

@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 
 from sim.engine import march
 from sim.laws import jkr
+from sim.parts import drive
 from sim.parts.bonds import cohorts, models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset, Slip, Wave
 from sim.scenario.clock import Record

@@ -12,7 +12,7 @@ from sim import analysis
 from sim.analysis import blocks
 from sim.ensemble.simulate import run
 from sim.parts.contact import Equilibrium
-from sim.parts.drive.prescribed import Steady
+from sim.parts.drive import Steady
 from sim.scenario.clock import Record
 
 

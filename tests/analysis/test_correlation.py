@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from sim import analysis
 from sim.analysis import correlation
 from sim.ensemble.simulate import run
-from sim.parts.drive import prescribed as drive
+from sim.parts import drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Time
 from sim.scenario.clock import Clock, Ensemble

@@ -11,10 +11,10 @@ from helpers.lens import scene
 from sim import analysis
 from sim.ensemble.simulate import run
 from sim.laws import jkr
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact import Equilibrium
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.scenario.clock import Clock, Ensemble, Record
 

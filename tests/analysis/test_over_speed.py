@@ -13,9 +13,9 @@ from sim.analysis import blocks, over_speed
 from sim.analysis.observables import charged_in_turn, observables, share_observables
 from sim.ensemble.simulate import run
 from sim.laws import jkr
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.scenario.clock import Clock, Ensemble, Record
 

@@ -6,8 +6,8 @@ from helpers.lens import RADIUS, scene
 from sim import analysis
 from sim.analysis.scene import resolved, word
 from sim.ensemble.simulate import run
+from sim.parts import drive
 from sim.parts.contact import Equilibrium
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 
 

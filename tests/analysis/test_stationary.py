@@ -16,7 +16,7 @@ from sim import analysis
 from sim.analysis import correlation, stationary
 from sim.analysis.statistics import QUANTILES, quantile_ranks
 from sim.ensemble.simulate import run
-from sim.parts.drive import prescribed as drive
+from sim.parts import drive
 from sim.scenario.clock import Clock, Ensemble
 
 LEVELS = np.array(QUANTILES)

@@ -14,9 +14,9 @@ from helpers.lens import scene
 import sim
 from sim import analysis
 from sim.ensemble.simulate import run
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.scenario.clock import Clock, Ensemble, Record
 

@@ -3,10 +3,10 @@
 import functools
 
 from sim.ensemble.simulate import run
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion, Solid, Sphere
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset, Time
 from sim.scenario.clock import Clock, Ensemble

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion, Solid, Sphere
-from sim.parts.drive import Force, Spring, prescribed as drive
+from sim.parts.drive import Force, Spring
 from sim.parts.exchange import Motions
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Constant as ConstantAmplitude, Diffusion, Onset, Slip, SlipRate, Stress, Time, Wave

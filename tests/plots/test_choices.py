@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose
 
 import sim
 from sim import analysis
+from sim.parts import drive
 from sim.parts.contact import Equilibrium, RateDependent
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS

@@ -9,7 +9,7 @@ from helpers.pictured import CELL, STEADY, field, mapped, rendered, simulated
 from matplotlib.patches import Circle
 
 from sim.numerics.grid import Grid
-from sim.parts.drive import prescribed as drive
+from sim.parts import drive
 from sim.parts.shear import Carried, models as shear
 from sim.parts.shear.modes import modes
 from sim.parts.shear.process import Onset, Stress

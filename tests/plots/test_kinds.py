@@ -9,9 +9,9 @@ import pytest
 from helpers.pictured import STEADY, drawn, field, legend_of, lines_of, mapped, rendered, simulated
 
 from sim import analysis
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, style as pictures
 from sim.scenario.clock import Clock, Ensemble, Record

@@ -6,9 +6,9 @@ from helpers.pictured import drawn, rendered, simulated
 from numpy.testing import assert_allclose
 
 from sim.laws import schallamach
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import bond_laws, kinds as plots, style as pictures
 from sim.plots.stress import maximum_of, starts_of

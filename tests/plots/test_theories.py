@@ -8,10 +8,10 @@ from numpy.testing import assert_allclose
 
 from sim.analysis import where
 from sim.laws import jkr, profiles, theories
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, style as pictures, theories as rival_figures
 from sim.plots.profile import shapes_of

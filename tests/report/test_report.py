@@ -21,9 +21,9 @@ from xarray import Dataset
 from sim import analysis
 from sim.analysis.observables import all_observables, full_area
 from sim.ensemble.simulate import run
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.plots import kinds
 from sim.plots.style import BOTH, STYLE, fill, rows

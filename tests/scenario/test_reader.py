@@ -14,8 +14,8 @@ import pytest
 from helpers.commands import LENS
 from hypothesis import example, given, strategies as st
 
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.scenario.declared import all_tables, declaration, distinct, keys, quantities, tables
 from sim.scenario.reader import BadInput, load

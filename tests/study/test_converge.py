@@ -12,10 +12,10 @@ from numpy.testing import assert_allclose
 import sim.study.converge as converge_module
 from sim.engine import MemberNoise, follow
 from sim.laws.schallamach import bell_stress, first_moment_stress
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant
 from sim.parts.contact import Equilibrium, RateDependent
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.bands import BandedProcess
 from sim.parts.shear.process import Onset, Slip, Stress, Time, Wave

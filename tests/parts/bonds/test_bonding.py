@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sim.engine import march, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.numerics.noise import Noise
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
-from sim.parts.drive import prescribed as drive
 
 READ = {variable.name: variable.read for variable in VARIABLES}
 FORTH_AND_BACK = drive.Table(

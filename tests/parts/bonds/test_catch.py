@@ -12,9 +12,9 @@ from scipy.integrate import quad
 
 from sim.engine import march
 from sim.laws.schallamach import bell_moments, catch_lives, catch_moments, constant_moments
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Catch, fresh_integral, growth, hazard_integral, hazard_time
-from sim.parts.drive import prescribed as drive
 from sim.scenario.clock import Clock
 
 #: Half of the bonds of rest are bound; force holds them up to some 12 pN and breaks them beyond.

@@ -12,10 +12,10 @@ from sim.engine import march, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
 from sim.numerics.noise import Noise
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.models import share_kept
 from sim.parts.bonds.rupture import Constant
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Time
 from sim.scenario.clock import Clock

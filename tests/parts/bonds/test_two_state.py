@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose
 from scipy.stats import binom, chi2
 
 from sim.engine import march
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Constant
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.scenario.clock import Clock
 from sim.spectrum.bond_made import BondMade

@@ -15,11 +15,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from sim.engine import march, pack, trajectory_of
 from sim.ensemble.recorded import VARIABLES
 from sim.laws import jkr
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium, RateDependent, front
 from sim.parts.contact.balance import elastic_energy
 from sim.parts.contact.models import Adhesion, Solid, Sphere
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset
 from sim.scenario.clock import Clock

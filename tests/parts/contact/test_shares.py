@@ -10,10 +10,10 @@ from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
 from sim import analysis
 from sim.ensemble.simulate import run
 from sim.laws import jkr, reversible
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium, RateDependent
 from sim.parts.contact.models import Adhesion
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.scenario.clock import Clock, Record
 from sim.spectrum.families import Band

@@ -18,8 +18,8 @@ from scipy.stats import expon, kstest, ncx2
 from sim.engine import march, pack, unpack
 from sim.ensemble import simulate as ensemble
 from sim.numerics.noise import Noise
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
-from sim.parts.drive import prescribed as drive
 from sim.parts.exchange import Bonding
 from sim.parts.shear import models as shear
 from sim.parts.shear.bands import BandedProcess, Bands

@@ -14,9 +14,9 @@ from sim.laws import jkr
 from sim.laws.disc import ripple_energy, ripple_marginal_energy
 from sim.laws.halfspace import disc_tangential_energy, surface_energy
 from sim.numerics.grid import Grid
+from sim.parts import drive
 from sim.parts.bonds.models import Counted, Unbroken
 from sim.parts.contact import Equilibrium, RateDependent
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import Carried, Mapped
 from sim.parts.shear.maps import Passing
 from sim.parts.shear.process import Onset, Slip, Stress

@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose
 
 from sim.engine import march
 from sim.laws import halfspace
+from sim.parts import drive
 from sim.parts.bonds import models as bonds
-from sim.parts.drive import prescribed as drive
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.scenario.clock import Clock

@@ -1,6 +1,6 @@
 """Drive and bonds inside one clock step, where the friction feeds back into the motion.
 
-The two are solved together in sub-steps (``sim.parts.coupling_step``) that depend on the member alone. The radius of an
+The two are solved together in sub-steps (``radau``, ``cohorts``) that depend on the member alone. The radius of an
 equilibrium contact follows the bonds within them; the fluctuations ΔΓ, a ``rate_dependent`` edge and what a disc pays
 of ΔΓ stay as they were at the start of the clock step.
 """
@@ -12,7 +12,6 @@ import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
 from sim.numerics.noise import Noise
-from sim.parts import coupling_equations as columns
 from sim.parts.bonds.cohorts import Cohorts, numbers_of
 from sim.parts.bonds.models import (
     Ages,
@@ -27,11 +26,12 @@ from sim.parts.bonds.models import (
     Unbroken,
 )
 from sim.parts.bonds.tracked import AGAIN, Tracks
-from sim.parts.coupling_cohorts import advance_cohorts
-from sim.parts.coupling_equations import Law, Resting, Slider
-from sim.parts.coupling_rows import advance_rows
-from sim.parts.coupling_tracks import advance_tracks
-from sim.parts.drive.driven import FIRST, STORED, Driven, Force, Spring
+from sim.parts.coupled import row as columns
+from sim.parts.coupled.cohorts import advance_cohorts
+from sim.parts.coupled.mean_field import advance_rows
+from sim.parts.coupled.row import Law, Resting, Slider
+from sim.parts.coupled.tracked import advance_tracks
+from sim.parts.drive import FIRST, STORED, Driven, Force, Spring
 from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sliding, Times
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
@@ -49,8 +49,6 @@ _STRETCHED = [
 ]
 #: Relative difference up to which two radii are the same equilibrium, found on two ways.
 _SAME = 1e-9
-
-
 #: What goes through clock steps: rows, energies, work of adhesion without bonds, pieces of the drive, clock and
 #: contact, units of the columns and of energies.
 _Rows = tuple[Array, Array, Array, Array, Array, Array, float]

@@ -14,11 +14,31 @@ and 1/k_t are zero (then they are of index 2) or not, and a stiff spring costs n
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from sim.numerics.jit import device, inlined
+from sim.parts.coupled.row import (
+    BODY,
+    BOUND,
+    COUNT,
+    FEW,
+    FORCE,
+    MOMENT,
+    PATH,
+    POSITION,
+    RADIUS,
+    SHEARED,
+    SLIP,
+    SOME,
+    SPEED,
+    SQUARE,
+    compliance,
+    contact_area,
+    driven,
+    pull_on,
+)
+from sim.parts.drive import AREA, DAMPING, RUPTURE, VISCOSITY, WORK
 from sim.parts.exchange import Array
 
 _S6 = math.sqrt(6.0)
@@ -65,126 +85,10 @@ def _cross(a: list[float], b: list[float]) -> list[float]:
 
 
 PACE, TURNING, FORTH, BACK = _modes()
-#: Columns of a row: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the body,
-#: slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway, integral of
-#: the squared speed of the interface over the clock step, acceleration of the interface.
-FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED, SQUARE, BEND = range(15)
-COLUMNS = 15
 #: Rows of the room for a sub-step, each with what stands at its three nodes: first the unknowns slip, u, N, M, then
 #: their residuals, the unknowns of the last sub-step, contact radii, forces on a body that stays, areas, k_t; and
 #: length and root of the error of the last sub-step.
 RIGHT, PAST, RADII, PULLS, AREAS, FIRMS, LAST, ROOM = 4, 8, 12, 13, 14, 15, 16, 17
-
-
-class Slider(NamedTuple):
-    """Numbers of a drive: K, m, c, η, whether it prescribes the force, 1/k_t as constant + slope/a, tolerance."""
-
-    stiffness: float
-    mass: float
-    damping: float
-    viscosity: float
-    forced: float
-    yielding: float
-    yielding_radius: float
-    tolerance: float
-
-
-class Law(NamedTuple):
-    """Numbers of the bonds: k0, its growth with the stretch (1 or 0), 1/cut-off stretch, k_on, scale of a stretch.
-
-    Bonds without a stretch have the ``sense`` of the sliding, 1 or -1, else 0; those that follow the speed at once a
-    share 1/(1 + ``slows`` speed).
-    """
-
-    rate: float
-    softness: float
-    cuts: float
-    binding: float
-    scale: float
-    sense: float = 0.0
-    slows: float = 0.0
-
-
-class Resting(NamedTuple):
-    """Numbers of the contact during a step: whether its radius stays; work of adhesion per bond share N.
-
-    ``taken``: energy that the mean stress takes over radius and M²; load, base and their rates; the stiffness
-    behind the base; curvature, modulus, reference area.
-    """
-
-    stays: float
-    bonded: float
-    taken: float
-    load: float
-    load_rate: float
-    base: float
-    base_rate: float
-    stiffness: float
-    curvature: float
-    modulus: float
-    area: float
-
-
-@device
-def _missing(a, load, base, stiffness, curvature, modulus):
-    """Depth of a contact of Hertz of this radius beyond what holds the sphere, and its slope over the radius."""
-    hertz = a * a * curvature
-    if stiffness == math.inf:
-        return hertz - base, 2.0 * a * curvature
-    series = stiffness + 2.0 * modulus * a
-    missing = (stiffness * (hertz - base) + 4.0 / 3.0 * modulus * a * hertz - load) / series
-    return missing, (2.0 * stiffness * a * curvature + 4.0 * modulus * hertz - 2.0 * modulus * missing) / series
-
-
-@device
-def contact_area(bound, moment, time, radius, bare, held):
-    """Contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
-
-    Newton's method on the energy release rate, convex in the radius, from the last one: from the right of the root
-    it goes left. nan where there is none; Hertz's radius where adhesion does not pay for the mean stress there.
-    """
-    stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, unit = held
-    if stays > 0.0:
-        return radius, math.pi * radius * radius / unit, 0.0, 0.0
-    work, tilt = bare + bonded * bound, taken * moment * moment
-    load, base = load + load_rate * time, base + base_rate * time
-    a, slope = radius, 1.0
-    if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
-        for _ in range(60):
-            missing, growth = _missing(a, load, base, stiffness, curvature, modulus)
-            a -= min(missing / growth, 0.5 * a)
-            if math.fabs(missing) <= 1e-14 * growth * a:
-                break
-        if not work - tilt * a > 0.0:
-            return a, math.pi * a * a / unit, 0.0, 0.0
-        a = max(a, radius)
-    for _ in range(60):
-        missing, growth = _missing(a, load, base, stiffness, curvature, modulus)
-        if work > 0.0:
-            over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
-            slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
-            if missing < 0.0:
-                over, slope = missing, growth
-        else:
-            over, slope = missing, growth
-        if not slope > 0.0:
-            return math.nan, math.nan, 0.0, 0.0
-        change = min(over / slope, 0.5 * a)
-        a -= change
-        if math.fabs(change) <= 1e-14 * a:
-            break
-    if work <= 0.0:
-        return a, math.pi * a * a / unit, 0.0, 0.0
-    growth = 2.0 * math.pi * a / unit / slope
-    return a, math.pi * a * a / unit, growth * bonded, -2.0 * growth * taken * moment * a
-
-
-@device
-def compliance(radius, slider):
-    """1/k_t of the contact and its slope over the radius; 0 for an open one."""
-    if slider[6] == 0.0 or not radius > 0.0:
-        return slider[5], 0.0
-    return slider[5] + slider[6] / radius, -slider[6] / (radius * radius)
 
 
 @device
@@ -213,25 +117,6 @@ def share_left(speed, law):
 def rested(bound, time, law):
     """Bonds over those of rest after some time at rest: all of them, if they follow the speed at once."""
     return 1.0 if law[6] != 0.0 else bound - (1.0 - bound) * math.expm1(-law[3] * time)
-
-
-@device
-def driven(time, piece):
-    """A prescribed value's integral from the start of its piece, and the value: a cubic through both ends."""
-    length, first, last, integral = piece
-    share = time / length
-    cubic = (first + last) * length - 2.0 * integral
-    square = integral - first * length - cubic
-    value = first + (2.0 * square + 3.0 * cubic * share) * share / length
-    return first * time + (square + cubic * share) * share * share, value
-
-
-@device
-def pull_on(time, start, way, row, slider, piece):
-    """Spring force when the body has gone ``way`` since the ``start`` of a sub-step, or the force prescribed."""
-    if slider[4] > 0.0:
-        return driven(time, piece)[1]
-    return row[0] + slider[0] * (driven(time, piece)[0] - driven(start, piece)[0] - way)
 
 
 @device
@@ -363,3 +248,229 @@ def correct(modes, slopes, slider, room):
 def _turned(room, k):
     """Part of an unknown's residuals in the complex modes."""
     return complex(_sum(BACK, 1, room, k), _sum(BACK, 2, room, k))
+
+
+#: Share of a sub-step after which the defect of the equations is measured, between the first two nodes.
+_BETWEEN = 0.4
+
+
+def _between() -> tuple[Array, Array]:
+    """Values and slopes of the polynomials through start and nodes at ``_BETWEEN``, that of the start last."""
+    places = np.append(NODES, 0.0)
+    values, slopes = np.empty(4), np.empty(4)
+    for j in range(4):
+        others = np.delete(places, j)
+        lagrange = np.poly1d(others, r=True) / np.prod(places[j] - others)
+        values[j], slopes[j] = lagrange(_BETWEEN), lagrange.deriv()(_BETWEEN)
+    return values, slopes
+
+
+_VALUES, _SLOPES = _between()
+#: Most turns of Newton's method.
+_TURNS = 12
+#: Slopes, and solutions of the modes, before the first ones are known.
+_UNKNOWN = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0)
+_NO_MODES = (0.0,) * 11, (0.0j,) * 11
+#: Correction over the last one above which the slopes are taken anew.
+_SLOW = 0.1
+#: Lagrange's denominators at the nodes, the polynomial through the start as well.
+_BASE = np.array([1.0 / np.prod([c - d for d in (0.0, *NODES) if d != c]) for c in NODES])
+
+
+@inlined
+def _ahead(row, room, step, law):
+    """Guess slip, u, N, M at the nodes: the last sub-step's polynomial, or the slopes at the start."""
+    of_bound, of_moment, _, _, _, _ = kinetics(row[BOUND], row[MOMENT], row[SPEED], law)
+    for i in range(3):
+        if room[LAST, 0] > 0.0:
+            x = 1.0 + NODES[i] * step / room[LAST, 0]
+            first, second = x - NODES[0], x - NODES[1]
+            one = x * second * (x - 1.0) * _BASE[0]
+            two = x * first * (x - 1.0) * _BASE[1]
+            last = x * first * second * _BASE[2] - 1.0
+            for k in range(4):
+                room[k, i] = one * room[PAST + k, 0] + two * room[PAST + k, 1] + last * room[PAST + k, 2]
+        else:
+            time = NODES[i] * step
+            room[0, i], room[1, i], room[2, i], room[3, i] = row[SPEED] * time, 0.0, 0.0, 0.0
+            if law[6] == 0.0:
+                room[2, i] = of_bound[0] * time
+                room[3, i] = of_moment[0] * time if law[5] == 0.0 else law[5] * room[2, i]
+        room[2, i] = max(room[2, i], -0.5 * row[BOUND])
+
+
+@device
+def newton(row, start, step, bare, slider, law, held, piece, room):
+    """Solve for slip, u, N, M at the nodes, by Newton's method with the middle one's slopes; whether that worked.
+
+    It ends where the next correction would be small, at the pace of the last two.
+    """
+    _ahead(row, room, step, law)
+    for i in range(3):
+        room[RADII, i] = row[RADIUS]
+        room[PULLS, i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider, piece)
+    bound = min(row[BOUND], row[BOUND] + room[2, 2]) + FEW
+    moment = min(math.fabs(row[MOMENT]), math.fabs(row[MOMENT] + room[3, 2]))
+    of_slip, of_bound, of_moment = 1.0 / (law[4] + math.fabs(room[0, 2])), 1.0 / bound, 1.0 / (law[4] * bound + moment)
+    before, close = math.inf, min(1e-6, 0.1 * slider[7])
+    slopes, shrinks = _UNKNOWN, 0.5
+    modes = _NO_MODES
+    for turn in range(_TURNS):
+        latest = equations(row, room, start, step, bare, slider, law, held)
+        if math.isnan(latest[0]):
+            return False
+        if shrinks > _SLOW:
+            slopes = latest
+            modes = resolved(slopes, step, slider, law)
+        correct(modes, slopes, slider, room)
+        part, change = 1.0, 0.0
+        for i in range(3):
+            bound = row[BOUND] + room[2, i]
+            if bound - room[RIGHT + 2, i] < 0.1 * bound:  # N stays above zero
+                part = min(part, 0.9 * bound / room[RIGHT + 2, i])
+        for i in range(3):
+            change = max(change, math.fabs(room[RIGHT, i]) * of_slip)
+            change = max(change, math.fabs(room[RIGHT + 2, i]) * of_bound, math.fabs(room[RIGHT + 3, i]) * of_moment)
+            for k in range(4):
+                room[k, i] -= part * room[RIGHT + k, i]
+        shrinks = change / before if turn > 0 else 0.5
+        if change * min(1.0, shrinks / max(1.0 - shrinks, 1e-3)) <= close:
+            return True
+        if not (part > 0.0 and change < 1e12) or (turn > 2 and shrinks > 1.0):
+            return False
+        before = change
+    return False
+
+
+@inlined
+def error_of(row, start, step, bare, slider, law, held, piece, room):
+    """Defect of the equations between nodes, as an error of a stretch: of order 4 in the sub-step, over its scale.
+
+    The polynomials through start and nodes solve the equations at the nodes alone. What is missing between them of the
+    balance of forces, of N, of M and, with a mass, of the speed is taken over what resists it.
+    """
+    stiffness, mass, damping, viscosity, _, _, _, _ = slider
+    slip, body, bound, moment = 0.0, 0.0, row[BOUND], row[MOMENT]
+    speed, to_bound, to_moment, going = 0.0, 0.0, 0.0, 0.0
+    pace, bend = _VALUES[3] * row[BODY], _SLOPES[3] * row[BODY] / step
+    for j in range(3):
+        at_node = 0.0
+        for k in range(3):
+            at_node += RATES[j, k] * (room[0, k] + room[1, k]) / step
+        pace += _VALUES[j] * at_node
+        bend += _SLOPES[j] * at_node / step
+        slip += _VALUES[j] * room[0, j]
+        body += _VALUES[j] * (room[0, j] + room[1, j])
+        going += _SLOPES[j] * (room[0, j] + room[1, j]) / step
+        speed += _SLOPES[j] * room[0, j] / step
+        bound += _VALUES[j] * room[2, j]
+        moment += _VALUES[j] * room[3, j]
+        to_bound += _SLOPES[j] * room[2, j]
+        to_moment += _SLOPES[j] * room[3, j]
+    time = start + _BETWEEN * step
+    radius, area, _, _ = contact_area(bound, moment, time, room[RADII, 0], bare, held)
+    if not (area >= 0.0 and bound >= 0.0):
+        return math.inf
+    of_bound, of_moment, on, _, _, _ = kinetics(bound, moment, speed, law)
+    pace = pace if mass > 0.0 else going
+    balance = area * (moment + viscosity * speed) + damping * pace + mass * bend
+    balance -= pull_on(time, start, body, row, slider, piece)
+    bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
+    scale = law[4] * (bound + FEW) + math.fabs(moment)
+    if law[5] != 0.0:
+        to_moment = step * of_moment[0]
+    if law[6] != 0.0:
+        to_bound = step * of_bound[0] + bound - share_left(speed, law)
+    found = max(
+        math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + FEW),
+        math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,
+    )
+    # a mass between stiff springs rings within a small part of a stretch: as a force that is no small part
+    yields, _ = compliance(radius, slider)
+    stiffest = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0)
+    firm = max(1.0, stiffest / (area * (bound + SOME))) if mass > 0.0 and area > 0.0 else 1.0
+    # an open contact bears nothing: then what is missing from the spring counts
+    found = max(found, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law[4])
+    return max(found, firm * step * math.fabs(going - pace) / law[4]) if mass > 0.0 else found
+
+
+@inlined
+def tried(row, start, step, bare, slider, law, held, piece, room):
+    """Solve for a sub-step: length of the next over that of this one, and whether this one stands.
+
+    The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
+    tolerance. It goes with the sixth power of the length; where it has grown since the last sub-step, the same growth
+    is expected of the next (Gustafsson 1994).
+    """
+    if not newton(row, start, step, bare, slider, law, held, piece, room):
+        return 0.25, False
+    error = error_of(row, start, step, bare, slider, law, held, piece, room)
+    error *= math.sqrt(error) / slider[7]
+    if not error < math.inf:
+        return 0.25, False
+    root = max(error, 1e-6) ** (1.0 / 6.0)
+    if not error <= 1.0:
+        return max(0.1, 0.9 / root), False
+    grows = 0.9 / root
+    if room[LAST, 0] > 0.0:
+        grows *= min(1.0, step / room[LAST, 0] * room[LAST, 1] / root)
+    room[LAST, 1] = max(root, 0.5)
+    return min(6.0, max(0.1, grows)), True
+
+
+@inlined
+def book(row, start, step, bare, slider, law, held, piece, room, energy):
+    """Take an accepted sub-step: integrals of the powers by the method's own shares, and the row at its end."""
+    _, _, damping, viscosity, forced, _, _, _ = slider
+    way, speed, body = 0.0, 0.0, 0.0
+    follows = held[0] == 0.0
+    first, firm = math.pi * row[RADIUS] * row[RADIUS] / held[10], 0.0
+    if follows:
+        _, first, _, _ = contact_area(row[BOUND], row[MOMENT], start, row[RADIUS], bare, held)
+        yields, _ = compliance(row[RADIUS], slider)
+        firm = 1.0 / yields if yields > 0.0 else 0.0
+    for i in range(3):
+        room[AREAS, i] = first
+        if follows:
+            bound, moment = row[BOUND] + room[2, i], row[MOMENT] + room[3, i]
+            time = start + NODES[i] * step
+            room[RADII, i], room[AREAS, i], _, _ = contact_area(bound, moment, time, room[RADII, i], bare, held)
+            yields, _ = compliance(room[RADII, i], slider)
+            room[FIRMS, i] = 1.0 / yields if yields > 0.0 else 0.0
+    for i in range(3):
+        bound, moment, area = row[BOUND] + room[2, i], row[MOMENT] + room[3, i], room[AREAS, i]
+        speed, body, spreads, firms = 0.0, 0.0, 0.0, 0.0
+        for j in range(3):
+            speed += RATES[i, j] * room[0, j] / step
+            body += RATES[i, j] * (room[0, j] + room[1, j]) / step
+            if follows:
+                spreads += RATES[i, j] * (room[AREAS, j] - first)
+                firms += RATES[i, j] * (room[FIRMS, j] - firm)
+        sheared, pull = row[SHEARED] + room[1, i], room[PULLS, i] - slider[0] * (room[0, i] + room[1, i])
+        given = body if forced > 0.0 else driven(start + NODES[i] * step, piece)[1]
+        _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
+        square = moment * moment / bound if bound > 0.0 and law[5] == 0.0 else 0.0
+        fresh = law[3] * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
+        share = SHARES[i] * step
+        energy[WORK] += share * pull * given
+        energy[DAMPING] += share * damping * body * body
+        energy[VISCOSITY] += share * area * viscosity * speed * speed
+        energy[RUPTURE] += share * 0.5 * area * (square * (k + 3.0 * travel) + fresh)
+        if law[5] != 0.0:
+            energy[RUPTURE] += share * area * moment * speed
+        energy[AREA] -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
+        row[SQUARE] += share * speed * speed
+        row[PATH] += math.fabs(room[0, i] - way)
+        way = room[0, i]
+    row[FORCE], row[BODY], row[SPEED] = room[PULLS, 2] - slider[0] * (room[0, 2] + room[1, 2]), body, speed
+    row[RADIUS] = room[RADII, 2]
+    row[SHEARED] += room[1, 2]
+    row[BOUND] = min(row[BOUND] + room[2, 2], 1.0)
+    row[MOMENT] += room[3, 2]
+    row[POSITION] += room[0, 2] + room[1, 2]
+    row[SLIP] += room[0, 2]
+    row[COUNT] += 1.0
+    for k in range(4):
+        for i in range(3):
+            room[PAST + k, i] = room[k, i]
+    room[LAST, 0] = step

@@ -5,40 +5,138 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.coupling_equations import (
+from sim.parts.coupled.radau import LAST, RATES, ROOM, book, kinetics, newton, rested, share_left, tried
+from sim.parts.coupled.row import (
     BODY,
     BOUND,
     COLUMNS,
-    COUNT,
     ENDED,
     FORCE,
-    LAST,
+    LEAST,
     MOMENT,
+    MOST_STEPS,
     NEXT,
     PATH,
     POSITION,
     RADIUS,
-    RATES,
-    ROOM,
+    SHEARED,
     SLIP,
     SPEED,
-    SQUARE,
+    area_kept,
     compliance,
     contact_area,
     driven,
+    elastic,
+    free_ways,
+    later,
     pull_on,
-    rested,
-    share_left,
-)  # fmt: skip
-from sim.parts.coupling_snaps import NEAR, area_kept, elastic, free_ways, let_go, snap, stored_in
-from sim.parts.coupling_step import book, newton, tried
-from sim.parts.drive.driven import AREA, STORED, WORK
+    put_down,
+    slip_free,
+    slips_free,
+    take_up,
+)
+from sim.parts.drive import AREA, RUPTURE, SNAP, STORED, WORK
 
-#: Share of a clock step below which a sub-step means that there is no solution to go on with.
-LEAST = 1e-13
+#: Way over the cut-off stretch on which bonds are tried, and that within which they may snap.
+_TRIED, NEAR = 1e-7, 1e-3
+
+
+@device
+def stored_in(row, bare, time, slider, law, held):
+    """Elastic and kinetic energy of spring, body, contact and bonds."""
+    _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
+    stiffness, mass, _, viscosity, _, _, _, _ = slider
+    energy = 0.5 * mass * row[BODY] * row[BODY]
+    energy += 0.5 * row[SHEARED] * area * (row[MOMENT] + viscosity * row[SPEED])
+    if stiffness > 0.0:
+        energy += 0.5 * row[FORCE] * row[FORCE] / stiffness
+    if row[BOUND] > 0.0 and law[5] == 0.0:
+        energy += 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
+    return energy
+
+
+@device
+def _lacking(way, row, time, bare, slider, law, held):
+    """What the bonds lack along the pull once they have gone a way at once: force, or way where the body stays.
+
+    Also N, M, radius, area, u then, and the way of the body.
+    """
+    stiffness, mass, damping, _, _, _, _, _ = slider
+    left, sense = math.exp(-math.fabs(way) * law[2]), math.copysign(1.0, row[MOMENT])
+    bound, moment = row[BOUND] * left, (row[MOMENT] * left + sense * row[BOUND] * (1.0 - left) / law[2]) * left
+    radius, area, _, _ = contact_area(bound, moment, time, row[RADIUS], bare, held)
+    yields, _ = compliance(radius, slider)
+    sheared = yields * area * moment
+    body = way + sheared - row[SHEARED]
+    if mass + damping > 0.0:
+        return -sense * body, bound, moment, radius, area, sheared, 0.0
+    return sense * (row[FORCE] - stiffness * body - area * moment), bound, moment, radius, area, sheared, body
+
+
+@device
+def snap(row, time, reach, bare, slider, law, held, energy):
+    """Slip at once to where bonds bear the pull again, if slip breaks more than it stretches; whether it does.
+
+    That counts which does so within a ``reach`` in units of the cut-off stretch.
+
+    The force of such bonds over the way has one hump, so that there is one such place.
+    """
+    if not slider[0] + slider[1] + slider[2] > 0.0:
+        return False
+    sense, high, limit = math.copysign(1.0, row[MOMENT]), _TRIED / law[2], 1.0 / law[2]
+    here, _, _, _, first, _, _ = _lacking(0.0, row, time, bare, slider, law, held)
+    lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
+    while not lacks > max(here, 0.0):
+        if high > reach * limit:
+            return False
+        high *= 2.0
+        lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
+    while lacks > 0.0:
+        high *= 2.0
+        lacks = _lacking(sense * high, row, time, bare, slider, law, held)[0]
+    low = 0.5 * high
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        over = _lacking(sense * middle, row, time, bare, slider, law, held)[0] > 0.0
+        low, high = (middle, high) if over else (low, middle)
+    _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, bare, slider, law, held)
+    if not area >= 0.0:
+        return False
+    # on the way ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
+    left, mean = math.exp(-high * law[2]), sense * row[MOMENT]
+    later = mean * left + row[BOUND] * limit * (1.0 - left)
+    broken = 0.25 * (first + area) * (1.0 - left) * (mean * mean + mean * later + later * later) / row[BOUND]
+    before = stored_in(row, bare, time, slider, law, held)
+    row[BOUND], row[MOMENT], row[RADIUS], row[SHEARED] = bound, moment, radius, sheared
+    row[FORCE] -= slider[0] * body
+    row[POSITION] += body
+    row[SLIP] += sense * high
+    row[PATH] += high
+    energy[RUPTURE] += broken
+    energy[SNAP] += before - stored_in(row, bare, time, slider, law, held) - broken
+    return True
+
+
+@device
+def let_go(row, time, brief, bare, slider, law, held, energy):
+    """Break all bonds at once and slip, where nothing delays it, if they last less than a ``brief`` time.
+
+    Bonds that are stretched the more the fewer are left break ever faster, all of them in no time; whether that is so.
+    """
+    _, _, _, _, k, _ = kinetics(row[BOUND], row[MOMENT], 0.0, law)
+    if not (k * brief > 1.0 and slips_free(row, slider)):
+        return False
+    before = stored_in(row, bare, time, slider, law, held)
+    _, area, _, _ = area_kept(row[BOUND], row[MOMENT], time, row, bare, held)
+    broken = 0.5 * area * row[MOMENT] * row[MOMENT] / row[BOUND]
+    slip_free(row, time, bare, slider, held)
+    energy[RUPTURE] += broken
+    energy[SNAP] += before - stored_in(row, bare, time, slider, law, held) - broken
+    return True
+
+
 #: Share of a piece below which a rejected sub-step means that an avalanche may have begun.
 _BRIEF = 1e-9
-MOST_STEPS = 2_000_000
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
 #: Shares of bonds and of a piece beyond which equilibrium is looked for where there is no way on, and most changes
@@ -46,14 +144,6 @@ _PLACES, _HALVINGS = 32, 60
 _NEXT_TO, _CHANGES = 1e-6, 10_000
 #: Turns in which area and stress of a slider at rest settle.
 _FEW_TURNS = 20
-
-
-@device
-def later(held, time, stays):
-    """The contact's numbers some time later, its radius as it is from there on if it ``stays``."""
-    _, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area = held
-    load, base = load + load_rate * time, base + base_rate * time
-    return stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area
 
 
 @device
@@ -285,32 +375,6 @@ def _clock_step(row, bare, slider, law, held, pieces, room, energy):
             return time, False
     energy[STORED] = stored_in(row, bare, time, slider, law, now)
     return time, True
-
-
-@device
-def take_up(row, energy, given, gained, units, work):
-    """Lay out a row and its energies for a clock step, in the units of the equations."""
-    for c in range(COLUMNS):
-        row[c] = given[c] / units[c]
-    row[POSITION], row[SLIP], row[PATH], row[SQUARE], row[COUNT] = 0.0, 0.0, 0.0, 0.0, 0.0
-    energy[:] = 0.0
-    energy[STORED] = gained[STORED] / work
-
-
-@device
-def put_down(row, energy, given, gained, units, work, passed, spent):
-    """Take back a row and its energies after a clock step, and write what has been reached."""
-    position, count = given[POSITION], given[COUNT]
-    for c in range(COLUMNS):
-        given[c] = row[c] * units[c]
-    given[POSITION] += position
-    given[COUNT] += count
-    for c in range(COLUMNS):
-        passed[c] = given[c]
-    for c in range(STORED):
-        gained[c] += energy[c] * work
-    gained[STORED] = energy[STORED] * work
-    spent[:] = gained
 
 
 @kernel(

@@ -1,7 +1,7 @@
 """Rows of sliders and bonds followed one by one through a clock step, from one rupture or binding to the next.
 
 Between two events the number of bonds stays and their force is linear in the slip, so that a sub-step of the scheme in
-``coupling_maps`` is tried on sums alone; the bonds, whose arrays are spent, then go its way once. It ends at the next
+``cohorts`` is tried on sums alone; the bonds, whose arrays are spent, then go its way once. It ends at the next
 event. What does not hold the slider back is set right at once after an event: it slips as far as the bonds that are
 left have it, and bond after bond where slip itself breaks them.
 """
@@ -26,24 +26,7 @@ from sim.parts.bonds.tracked import (
     one_step,
     room,
 )
-from sim.parts.coupling_equations import (
-    BEND,
-    BODY,
-    BOUND,
-    COLUMNS,
-    ENDED,
-    MOMENT,
-    NEXT,
-    PATH,
-    POSITION,
-    RADIUS,
-    SHEARED,
-    SLIP,
-    SPEED,
-    compliance,
-    contact_area,
-)
-from sim.parts.coupling_maps import (
+from sim.parts.coupled.cohorts import (
     AT_AREA,
     AT_BOUND,
     AT_MOMENT,
@@ -60,9 +43,30 @@ from sim.parts.coupling_maps import (
     start_of,
     stored_energy,
 )
-from sim.parts.coupling_rows import LEAST, MOST_STEPS, later, put_down, take_up
-from sim.parts.coupling_snaps import elastic
-from sim.parts.drive.driven import AREA, RUPTURE, SNAP, STORED, WORK
+from sim.parts.coupled.row import (
+    BEND,
+    BODY,
+    BOUND,
+    COLUMNS,
+    ENDED,
+    LEAST,
+    MOMENT,
+    MOST_STEPS,
+    NEXT,
+    PATH,
+    POSITION,
+    RADIUS,
+    SHEARED,
+    SLIP,
+    SPEED,
+    compliance,
+    contact_area,
+    elastic,
+    later,
+    put_down,
+    take_up,
+)
+from sim.parts.drive import AREA, RUPTURE, SNAP, STORED, WORK
 
 #: Slip over that to which bonds are stretched below which it is a rounding: back and forth it would have them turn.
 _ROUNDING = 1e-13
@@ -289,7 +293,7 @@ def advance_tracks(
     """Advance all rows, their energies and their bonds, in place, through some clock steps, each row by itself.
 
     ``law``: rate, softness, limit and k_on; ``seed`` and ``members`` of the lives' draws; ``frames``, of shape (steps,
-    rows, columns), get those of the bonds after each step. The rest as in ``coupling_rows.advance_rows``. What it
+    rows, columns), get those of the bonds after each step. The rest as in ``mean_field.advance_rows``. What it
     returns is zero, or ``SPENT`` where the bonds have been advanced already.
     """
     birth, due, life, soonest, stamp, frame = tracks
