@@ -298,7 +298,6 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     absent.other_arrays()
     from sim import analysis
     from sim.analysis import scene
-    from sim.units.refusals import BadInput
 
     opened: Any = scene.open
     if not path.exists() and path.with_name(f"{path.name}.parts").is_dir():
@@ -311,12 +310,7 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
             found = analysis.where(dataset, options.values(chosen, "--where"))
         except ValueError as fault:
             _fail(f"{path}: --where {fault}", BAD_INPUT)
-        try:
-            yield found
-        except RuntimeError as trouble:
-            if "NetCDF" not in str(trouble):
-                raise
-            raise BadInput([f"{path}: {scene.BROKEN}"]) from None
+        yield found
 
 
 @cli.command()

@@ -1,39 +1,43 @@
-"""Damaged and hostile files of four kinds: each is used, or refused in plain words and with exit code 2."""
+"""Damaged tables: each is used, or refused in plain words and with exit code 2."""
 
-import json
-import os
-import subprocess
-import sys
+import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
-from helpers import hostile
+from helpers.commands import sim
 
-ROOT = Path(__file__).parents[1]
-#: Files of each kind, ten thousand in all, and how many one process reads.
-COUNTS = {"scenario": 4000, "table": 2500, "map": 2500, "dataset": 1000}
-BATCH = 250
+from tests.scenario.test_fuzz import BESIDE, FILES, FOLDER, flip, insert_mark, remove_line, scale_number, truncate
+
+#: Tables of the scenarios of the same names, and the command that reads each, with its options.
+COMMANDS = {
+    "jkr_test.csv": ["check"],
+    "measured_lens.csv": ["fit", "measured_lens.csv", "--free", "bonds.critical_speed", "--steady", "--force"],
+    "own_map.csv": ["check"],
+    "own_psd.csv": ["check"],
+}
+DAMAGES = (flip, insert_mark, truncate, remove_line, scale_number)
 
 
 @pytest.mark.filterwarnings("ignore")  # of numbers beyond all measure
-@pytest.mark.parametrize("kind", ["table", "map", "dataset"])  # tests/scenario/test_fuzz.py has the scenarios
-def test_some_damaged_files_are_used_or_refused_in_plain_words(tmp_path, monkeypatch, kind):
+@pytest.mark.parametrize("seeds", [range(10_001, 10_007), pytest.param(range(1000), marks=pytest.mark.verify)])
+def test_damaged_tables_are_used_or_refused_in_plain_words(tmp_path, monkeypatch, seeds):
     monkeypatch.chdir(tmp_path)
-    # seeds beyond those of the thousands; of the datasets one has a page, the others `sim stats` alone
-    for _, seed, _, _, wrong in hostile.answers(kind, range(10_001, 10_007), tmp_path):
-        assert wrong == "", seed
-
-
-@pytest.mark.verify
-@pytest.mark.parametrize("kind", hostile.KINDS)
-def test_thousands_of_damaged_files_end_without_traceback_crash_or_20_s_or_1_gib(kind):
-    path = os.pathsep.join([str(ROOT), str(ROOT / "tests")])
-    for first in range(0, COUNTS[kind], BATCH):
-        run = [sys.executable, "-m", "helpers.hostile", kind, str(first), str(BATCH)]
-        done = subprocess.run(
-            run, cwd=ROOT, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
-        )
-        answers = [json.loads(line) for line in done.stdout.splitlines()]
-        assert (done.returncode, len(answers)) == (0, BATCH), (answers[-1:], done.stderr[-2000:])
-        assert not [answer for answer in answers if answer[4]]
-        assert max(answer[5] for answer in answers) < hostile.MEMORY
+    for name, content in BESIDE.items():
+        Path(name).write_text(content, encoding="utf-8")
+    Path("tables.toml").write_bytes(FILES)
+    for name in COMMANDS:
+        shutil.copy(FOLDER / f"{Path(name).stem}.toml", ".")
+    for seed in seeds:
+        draw = np.random.Generator(np.random.Philox(key=seed))
+        name = sorted(BESIDE)[draw.integers(len(BESIDE))]
+        content = BESIDE[name].encode()
+        for _ in range(int(draw.choice([1, 1, 2, 5, 20]))):
+            content = DAMAGES[draw.integers(len(DAMAGES))](content, draw) or b"x"
+        Path(name).write_bytes(content)
+        command, *options = COMMANDS.get(name, ["check"])
+        done = sim(command, f"{Path(name).stem}.toml" if name in COMMANDS else "tables.toml", *options)
+        assert isinstance(done.exception, SystemExit | None), (seed, done.exception)
+        assert done.exit_code in (0, 2, *([1] if command == "fit" else [])) and done.output, seed
+        assert done.output.replace("\n", "").isprintable(), seed
+        Path(name).write_text(BESIDE[name], encoding="utf-8")

@@ -17,6 +17,7 @@ import numpy as np
 import xarray as xr
 
 from sim.numerics import files, hdf5
+from sim.numerics.lazy import Refused, open_lazily
 from sim.units.recorded import Recorded
 from sim.units.refusals import BadInput, refuse_old
 
@@ -24,18 +25,8 @@ Given = ParamSpec("Given")
 T = TypeVar("T")
 
 MEMBERS = "member"
-#: What is said of a file that cannot be read.
-BROKEN = f"{hdf5.BROKEN}; run the scenario again"
-#: What every dataset has: attributes with their kinds, and numbers at each point of the sweep.
-_ATTRIBUTES = {"sim_version": str, "scenario_resolved": str, "members": np.integer}
-_NUMBERS = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio", "radius_at_rest")
-#: Longest unit, name and symbol of a variable.
-_LONGEST = 300
 #: A missing variable in the words of xarray, without the ending of a statistic.
 _MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
-_STATISTIC = re.compile("_(mean|std|sem)$")
-#: Tables of a scenario that are read here.
-_TABLES = ("contact", "drive", "record", "shear")
 _CONTROLS = ("load", "indentation", "displacement")
 _MOST_BYTES = 2**28
 
@@ -46,29 +37,41 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
     Raises
     ------
     BadInput
-        If there is no such file, or it is none of our datasets: what analysis reads of one is checked here, once.
+        If there is no such file, or no run wrote it.
     OSError
         If it cannot be read.
+    sim.numerics.lazy.Damaged
+        Later, if a variable that is read is damaged.
     """
     if not os.path.exists(path) or os.path.isdir(path):
-        what = "is a folder" if os.path.isdir(path) else "there is no such file"
-        raise BadInput([f"{path}: {what}; name a dataset"])
+        reason = "is a folder" if os.path.isdir(path) else "there is no such file"
+        raise BadInput([f"{path}: {reason}; name a dataset"])
     try:
-        dataset = hdf5.lazily(path)
-    except hdf5.Refused as fault:
-        said = f"{fault}; run the scenario again"
+        dataset = open_lazily(path)
+    except Refused as fault:
+        reason = f"{fault}; run the scenario again"
         if str(path).endswith(".toml"):
-            said = "is a scenario; name the dataset that `sim run` makes of it"
-        raise BadInput([f"{path}: {said}"]) from None
+            reason = "is a scenario; name the dataset that `sim run` makes of it"
+        raise BadInput([f"{path}: {reason}"]) from None
     with contextlib.ExitStack() as refused:
         refused.callback(dataset.close)
         if "sim_version" not in dataset.attrs:
             raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
         refuse_old(path, [*dataset.variables, *dataset.dims])
-        if changed := _fault(dataset):
-            raise BadInput([f"{path}: {changed}: it was changed after its run; run the scenario again"])
+        if fault := _fault(dataset):
+            raise BadInput([f"{path}: {fault}: it was changed after its run; run the scenario again"])
         refused.pop_all()
     return hdf5.located(dataset)
+
+
+def _fault(dataset: xr.Dataset) -> str:
+    """Return the first thing that every dataset of a run has and this one lacks; "" if there is none."""
+    if not isinstance(dataset.attrs.get("members"), np.integer):
+        return "lacks the attribute members"
+    if not hdf5.tables(dataset.attrs.get("scenario_resolved")):
+        return "the attribute scenario_resolved is no scenario"
+    missing = [name for name in ("contact_modulus", "t") if name not in dataset or dataset[name].dtype.kind != "f"]
+    return f"lacks the numbers {missing[0]}" if missing else ""
 
 
 def plain(dataset: xr.Dataset) -> xr.Dataset:
@@ -85,67 +88,6 @@ def of_dataset(function: Callable[Given, T]) -> Callable[Given, T]:
         return function(*given, **named) if first is None else function(first, *given[1:], **named)  # type: ignore[arg-type]
 
     return taking
-
-
-def _fault(dataset: xr.Dataset) -> str:
-    """What makes a dataset none that `sim run` writes; "" for nothing."""
-    for name, kind in _ATTRIBUTES.items():
-        if not isinstance(dataset.attrs.get(name), kind):
-            return f"lacks the attribute {name}"
-    scenario = hdf5.tables(dataset.attrs["scenario_resolved"])
-    if not _sound(scenario):
-        return "the attribute scenario_resolved is no scenario"
-    for name in (*_NUMBERS, "t"):
-        if name not in dataset.variables or dataset[name].dtype.kind != "f":
-            return f"lacks the numbers {name}"
-    sweep, time = sweep_dims(dataset), dataset["t"]
-    if time.dims != ("t",) or not time.size or not np.all(np.diff(time.to_numpy()) > 0.0):
-        return "its times t do not increase"
-    orders = (*sweep, MEMBERS, "t"), (*sweep, "map_member", "map_time", "x", "y")
-    for key, variable in dataset.variables.items():
-        name, dims = str(key), variable.dims
-        label = variable.dtype.kind in "OUST"
-        if not any(dims == tuple(one for one in order if one in dims) for order in orders) or 0 in variable.shape:
-            return f"its variable {name[:40]} has dimensions of another kind of dataset"
-        if variable.dtype.kind not in "fiuOUST" or (label and not (len(dims) == 1 and dims[0] in sweep)):
-            return f"its variable {name[:40]} is neither a number nor a label"
-        whole = _STATISTIC.sub("", name) in get_args(Recorded) or name in _NUMBERS
-        if whole and (label or dims[: len(sweep)] != sweep):
-            return f"its variable {name[:40]} does not follow the sweep"
-        for text in (variable.attrs.get(name, "") for name in ("units", "long_name", "symbol")):
-            if not isinstance(text, str) or len(text) > _LONGEST or not text.isprintable():
-                return f"its variable {name[:40]} is described by no plain words"
-    if missing := [name for name in sweep if name not in dataset.variables]:
-        return f"lacks the swept values of {missing[0][:40]}"
-    missing = [key for key in _numbers(scenario) if not _there(dataset, key)]
-    return f"lacks the number {missing[0][:80]}" if missing else ""
-
-
-def _sound(scenario: dict[str, Any]) -> bool:
-    """Whether these are the tables of a scenario as far as they are read here."""
-    if not scenario or not all(isinstance(scenario.get(name, {}), dict) for name in _TABLES):
-        return False
-    names = scenario.get("record", {}).get("quantities")
-    return names is None or (isinstance(names, list) and set(map(str, names)) <= set(get_args(Recorded)))
-
-
-def _numbers(tables: dict[str, Any], within: str = "") -> Iterator[str]:
-    """Dotted keys of the numbers of a scenario but those of its sweep."""
-    for name, value in tables.items():
-        if isinstance(value, dict) and name != "sweep":
-            yield from _numbers(value, f"{within}{name}.")
-        elif isinstance(value, int | float) and not isinstance(value, bool):
-            yield f"{within}{name}"
-
-
-def _there(dataset: xr.Dataset, key: str) -> bool:
-    """Whether a number of the scenario is a variable, or may be none as keys of its table are swept."""
-    table = key.split(".")[0]
-    if any(name == table or name.startswith(f"{table}_") for name in sweep_dims(dataset)):
-        return True
-    with contextlib.suppress(KeyError):
-        return not np.any(np.isnan(setting(dataset, key).to_numpy()))
-    return False
 
 
 def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others: Path) -> None:

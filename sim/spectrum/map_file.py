@@ -104,11 +104,11 @@ def _from_npy(path: Path) -> Array:
 
 def _from_netcdf(path: Path, variable: str) -> MapFile:
     """Maps and their spacings in a netCDF file."""
-    from sim.numerics import hdf5  # heavy: only where a map is read
+    from sim.numerics.lazy import Refused, open_lazily  # imports xarray, which only maps need here
 
     try:
-        dataset = hdf5.lazily(path)
-    except hdf5.Refused as fault:
+        dataset = open_lazily(path)
+    except Refused as fault:
         raise ValueError(f"{fault}; write the map anew, as a plain variable") from None
     with HDF5, dataset:
         if variable not in dataset:

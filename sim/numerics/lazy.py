@@ -1,0 +1,62 @@
+"""netCDF files as lazy datasets of xarray; damage that appears while numbers are read is named by its variable."""
+
+import os
+from typing import Any
+
+import xarray as xr
+from xarray.backends import CachingFileManager, NetCDF4DataStore, StoreBackendEntrypoint
+from xarray.backends.netCDF4_ import NetCDF4ArrayWrapper
+from xarray.core.indexing import LazilyIndexedArray
+
+from sim.numerics.files import HDF5
+from sim.numerics.hdf5 import Refused, opened, readable
+
+__all__ = ["Damaged", "Refused", "open_lazily"]
+
+
+class Damaged(RuntimeError):
+    """A variable whose bytes do not match their checksum, or cannot be unpacked."""
+
+    exit_code = 2
+
+
+class _Array(NetCDF4ArrayWrapper):
+    """Numbers of one variable, read on use."""
+
+    __slots__ = ()
+
+    def __getitem__(self, key: Any) -> Any:
+        try:
+            return super().__getitem__(key)
+        except (OSError, RuntimeError):
+            place = f"{self.datastore.path}: variable {self.variable_name}"
+            raise Damaged(f"{place} is damaged; take another copy of the file") from None
+
+
+class _Store(NetCDF4DataStore):
+    """A file of netCDF4 that names its damaged variables."""
+
+    path: str | os.PathLike[str]
+
+    def open_store_variable(self, name: str, var: Any) -> Any:
+        variable = super().open_store_variable(name, var)
+        return xr.Variable(variable.dims, LazilyIndexedArray(_Array(name, self)), variable.attrs, variable.encoding)
+
+
+def open_lazily(path: str | os.PathLike[str]) -> xr.Dataset:
+    """Open a netCDF file; its numbers are read on use.
+
+    Raises
+    ------
+    OSError
+        If there is no such file.
+    Refused
+        If it is no plain file, no netCDF file, cut short or damaged.
+    Damaged
+        Later, if a variable that is read is damaged.
+    """
+    with HDF5, readable():
+        file: Any = CachingFileManager(opened, os.path.abspath(path), lock=HDF5)  # type: ignore[type-var]
+        store: Any = _Store(file, lock=HDF5)
+        store.path = path
+        return xr.open_dataset(store, engine=StoreBackendEntrypoint, decode_times=False, decode_coords=False)
