@@ -160,8 +160,8 @@ def test_bad_input_ends_with_2_one_line_a_fault_and_nothing_written(here):
     assert done.exit_code == 2
     assert done.stdout == ""
     assert done.stderr.splitlines() == [
-        'bad.toml:12: contact.load: has the unit "kg", which is not a unit of N; write for example "4 mN"',
-        'bad.toml:24: ensemble.memebrs: is not a key; did you mean "members"?',
+        'bad.toml: contact.load: has the unit "kg", which is not a unit of N; write for example "4 mN"',
+        'bad.toml: ensemble.memebrs: is not a key; did you mean "members"?',
     ]
     assert sorted(here.iterdir()) == before
 

@@ -1,7 +1,8 @@
 """A scenario: one of each part, a clock, and what must hold between them."""
 
+import functools
 import math
-from collections.abc import Callable, Hashable
+from collections.abc import Hashable
 from dataclasses import fields
 from functools import cache, cached_property
 from pathlib import Path
@@ -27,7 +28,7 @@ from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.declared import as_html, entries, with_models
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.source import Files, Source
-from sim.scenario.sweep import read_sweep, set_key
+from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.quantity import Quantity
 from sim.units.refusals import BadInput
 
@@ -36,6 +37,8 @@ _CELL_ERROR = 0.05
 _Title = Annotated[str, Field(max_length=200, description="what the scenario is about, the title of its dataset")]
 #: Points of a sweep whose shear processes are all tried.
 _MOST_BUILT = 64
+#: Faults of a sweep that are reported at once.
+_MOST_FAULTS = 100
 
 
 @cache
@@ -80,7 +83,7 @@ class Scenario:
     shear: Shear = Field(default_factory=Uniform)
     ensemble: Ensemble = Field(default_factory=Ensemble)
     record: Record = Field(default_factory=Record)
-    sweep: Annotated[tuple[Any, ...], BeforeValidator(lambda sweep: read_sweep(sweep))] = ()
+    sweep: Annotated[tuple[Any, ...], BeforeValidator(read_sweep)] = ()
     name: _Title = "sliding contact"
     seed: Annotated[int, Quantity("1", "seed of the run", at_least=0, at_most=2**64 - 1, whole=True)] = 0
     source: Annotated[Any, Field(exclude=True)] = Source()
@@ -259,31 +262,27 @@ class Scenario:
         return list(dict.fromkeys(said))
 
     def with_values(self, values: dict[str, Any]) -> "Scenario":
-        """This scenario with some keys changed, ``{"contact.load": 1e-3}``, checked anew and without its sweep.
+        """Return this scenario without its sweep and with some keys changed, ``{"contact.load": 1e-3}``.
 
         Raises
         ------
         BadInput
             If a key is unknown or a value is not admissible.
         """
-        document = {name: getattr(self, name) for name in _FIELDS if name not in ("source", "sweep")}
-        for name in {key.partition(".")[0] for key in values if "." in key} & document.keys():  # the rest stays checked
-            document[name] = self._dumped(name)
-        _change(document, values)
+        document = {name: getattr(self, name) for name in _FIELDS if name != "sweep"} | self._changed(values)
         document["source"] = self.origin.changed(values | ({"sweep": {}} if self.sweep else {}))
-        files = Files(Path(self.source.path).parent, self.source.files)
-        with in_plain_words(Scenario, document):
-            return _adapter(Scenario).validate_python(with_models(Scenario, document), context={"files": files})
+        with in_plain_words(Scenario):
+            return _adapter(Scenario).validate_python(with_models(Scenario, document), context={"files": self._files})
 
     def points(self) -> list["Scenario"]:
-        """The scenario at each point of its sweep, the last axis fastest; one point where there is none.
+        """Return the scenario at each point of its sweep, the last axis fastest; without a sweep the only point.
 
-        Of a long sweep the processes of the shear part are tried at both ends only, as each may take long to build.
+        Of a long sweep the processes of the shear part are built at both ends only, because each may take long.
 
         Raises
         ------
         BadInput
-            If values do not go together, or points would not fit into one dataset.
+            If a value cannot be used, values do not go together, or points do not fit into one dataset.
         """
         return list(self._swept)
 
@@ -291,61 +290,74 @@ class Scenario:
     def _swept(self) -> list["Scenario"]:
         if not self.sweep:
             return [self]
-        values: list[dict[str, Any]] = [{}]
-        for axis in self.sweep:
-            values = [{**point, **dict(zip(axis.keys, row, strict=True))} for point in values for row in axis.values]
-        try:
-            points = self._points(values)
-        except BadInput as fault:
-            raise BadInput([f"some values do not go together: {said}" for said in fault.problems]) from None
-        for what, found in (
-            ("records; give clock.record", {point.clock.records for point in points}),
-            ("maps; run once for each cell and number of points", {point.map_lattice for point in points}),
-        ):
-            if len(found) > 1:
-                raise BadInput([f"the points of the sweep would have different {what}"])
+        values, origin = rows(self.sweep), self.origin
+        tables: dict[tuple[Any, ...], Any] = {}
+        points, faults = [], dict[str, None]()
+        for place, row in enumerate(values):
+            try:
+                built = len(values) <= _MOST_BUILT or place in (0, len(values) - 1)
+                points.append(self._point(row, origin, tables, built))
+            except BadInput as fault:
+                faults |= dict.fromkeys(fault.problems)
+                if len(faults) >= _MOST_FAULTS:
+                    break
+        if faults:
+            raise BadInput(list(faults))
+        if len({point.clock.records for point in points}) > 1:
+            raise BadInput(["the points of the sweep would have different records; give clock.record"])
+        if len({point.map_lattice for point in points}) > 1:
+            cure = "run once for each cell and number of points"
+            raise BadInput([f"the points of the sweep would have different maps; {cure}"])
         return points
 
-    def _points(self, values: list[dict[str, Any]]) -> list["Scenario"]:
-        """The scenario with some values each, made of tables that are read once for each of their own values."""
-        read: dict[tuple[Any, ...], Any] = {}
-        points, ends = [], (0, len(values) - 1)
-        files, origin = Files(Path(self.source.path).parent, self.source.files), self.origin
-        dumped = cache(self._dumped)
-        own = {name: self.__dict__[name] for name in _FIELDS} | {"sweep": ()}
-        for place, point in enumerate(values):
-            tables: dict[str, dict[str, Any]] = {}
-            for key, value in point.items():
-                tables.setdefault(key.partition(".")[0], {})[key] = value
-            parts = {}
-            for name, changed in tables.items():
-                which = (name, *map(id, changed.values()))  # the values live as long as the sweep
-                if which not in read:
-                    read[which] = self._table(name, changed, files, dumped)
-                parts[name] = read[which]
-            if any(part is None for part in parts.values()):  # which says what is wrong
-                points.append(self.with_values(point))
-                continue
-            made = object.__new__(Scenario)
-            made.__dict__.update(own | parts, source=origin.changed(point | {"sweep": {}}))
-            with in_plain_words(Scenario, {}):
-                made._check_across(len(values) <= _MOST_BUILT or place in ends)
-            points.append(made)
-        return points
+    def _point(
+        self, values: dict[str, Any], origin: Source, tables: dict[tuple[Any, ...], Any], built: bool
+    ) -> "Scenario":
+        """Return the scenario with some values; ``tables`` holds those that other points have read."""
+        groups: dict[str, dict[str, Any]] = {}
+        for key, value in values.items():
+            groups.setdefault(key.partition(".")[0], {})[key] = value
+        point = object.__new__(Scenario)
+        point.__dict__.update({name: self.__dict__[name] for name in _FIELDS}, sweep=())
+        point.__dict__["source"] = origin.changed(values | {"sweep": {}})
+        for name, changes in groups.items():
+            place = (name, *map(id, changes.values()))  # the values live as long as the sweep
+            if place not in tables:
+                tables[place] = self._table(name, changes)
+            point.__dict__[name] = tables[place]
+        with in_plain_words(Scenario):
+            point._check_across(built)
+        return point
 
-    def _dumped(self, name: str) -> Any:
-        """Keys and values of a table by its name, as in a document."""
-        part = getattr(self, name, None)
-        return _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)
-
-    def _table(self, name: str, values: dict[str, Any], files: Files, dumped: Callable[[str], Any]) -> Any:
-        """One table with some keys changed, checked anew; None where it cannot be read by itself."""
-        document = {} if values.keys() == {name} else {name: dumped(name)}
-        _change(document, values)
+    def _table(self, name: str, changes: dict[str, Any]) -> Any:
+        """Return a table with some keys changed."""
         try:
-            return table_adapter(name).validate_python(with_models(Scenario, document)[name], context={"files": files})
+            table = with_models(Scenario, self._changed(changes))[name]
+            return table_adapter(name).validate_python(table, context={"files": self._files})
         except (ValidationError, KeyError):
-            return None
+            return getattr(self.with_values(changes), name)  # raises BadInput with the fault
+
+    @property
+    def _files(self) -> Files:
+        return Files(Path(self.source.path).parent, self.source.files)
+
+    def _changed(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Return the document of those tables to which some dotted keys belong, with the keys changed.
+
+        A table that names a file reads it anew, except for a change of a key in ``_OF_USE``.
+        """
+        document: dict[str, Any] = {}
+        for name in {key.partition(".")[0] for key in values if "." in key} & set(_FIELDS):
+            part = getattr(self, name)
+            document[name] = _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)
+        for key, value in values.items():
+            set_key(document, key, value)
+            *above, last = key.split(".")
+            table = functools.reduce(dict.__getitem__, above, document)
+            if above and table.get("file") and last not in _FILE_COLUMNS + _OF_USE:
+                for column in _FILE_COLUMNS:
+                    table.pop(column, None)
+        return document
 
 
 #: The tables and values of a scenario.
@@ -354,26 +366,7 @@ _FIELDS = tuple(item.name for item in fields(Scenario))
 
 @cache
 def table_adapter(name: str) -> TypeAdapter[Any]:
-    """What checks a table of a scenario by itself."""
+    """Return the adapter that checks one table of a scenario."""
     declared = getattr(Scenario, "__pydantic_fields__", {})[name]
     kind: Any = Annotated[declared.annotation, Field(discriminator=declared.discriminator), *declared.metadata]
     return TypeAdapter(kind)
-
-
-def _change(document: dict[str, Any], values: dict[str, Any]) -> None:
-    """Change some keys of a document."""
-    for key, value in values.items():
-        set_key(document, key, value)
-        _forget_file(document, key)
-
-
-def _forget_file(document: dict[str, Any], key: str) -> None:
-    """Drop what a table has read from its file where one of the table's other keys was changed."""
-    *tables, last = key.split(".")
-    if not tables:
-        return
-    for name in tables:
-        document = document[name]
-    if document.get("file") and last not in _FILE_COLUMNS + _OF_USE:
-        for column in _FILE_COLUMNS:
-            document.pop(column, None)

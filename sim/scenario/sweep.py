@@ -1,20 +1,19 @@
-"""Sweeps: which keys of a scenario take which values, as an outer product of axes."""
+"""Sweeps: keys of a scenario and the values that they take, as an outer product of axes."""
 
+import itertools
 import math
-from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from pydantic_core import PydanticCustomError
 
-from sim.units.quantity import number_and_unit, same_unit
+from sim.units.quantity import same_unit
 
 _SHARED = ("clock", "clock.duration", "clock.record", "name", "ensemble", "record")
 _RANGE = ("from", "to", "count", "scale")
 _MOST_POINTS = 20_000
-
-Fault = tuple[tuple[str | int, ...], str]
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ def set_key(document: dict[str, Any], key: str, value: Any) -> None:
 
 
 def read_sweep(sweep: Any) -> tuple[Axis, ...]:
-    """Axes from a table of keys (outer product) or a list of tables (zipped into one axis).
+    """Return the axes of a table of keys (outer product) or of a list of tables (zipped into one axis).
 
     Raises
     ------
@@ -49,118 +48,91 @@ def read_sweep(sweep: Any) -> tuple[Axis, ...]:
     >>> loads.keys, loads.values
     (('contact.load',), (('1 mN',), ('4 mN',)))
     """
-    axes, faults = sweep_axes(sweep)
-    for path, said in faults:
-        where = ".".join(str(word) for word in path)
-        raise PydanticCustomError("sweep", "{text}", {"text": f"{where}: {said}" if where else said})
-    return axes
+    if isinstance(sweep, tuple) and all(isinstance(axis, Axis) for axis in sweep):
+        return sweep
+    axes = [_zipped(sweep)] if isinstance(sweep, list) else list(_columns(sweep)) if isinstance(sweep, dict) else None
+    if axes is None:
+        raise _fault('must be a table of lists, such as "contact.load" = ["1 mN", "4 mN"]')
+    keys = [key for axis in axes for key in axis.keys]
+    for key in keys:
+        _require_sweepable(key, keys)
+    for axis in axes:
+        if len({str(row) for row in axis.values}) < len(axis.values):
+            raise _fault(f"{', '.join(axis.keys)}: has a value twice; take it out once")
+    if math.prod(len(axis.values) for axis in axes) > _MOST_POINTS:
+        raise _fault(f"has more than {_MOST_POINTS:,} points; take fewer values, or several runs")
+    return tuple(axes)
+
+
+def rows(axes: tuple[Axis, ...]) -> list[dict[str, Any]]:
+    """Return the values of all keys at each point of a sweep, the last axis fastest."""
+    keys = [key for axis in axes for key in axis.keys]
+    points = itertools.product(*(axis.values for axis in axes))
+    return [dict(zip(keys, itertools.chain(*point), strict=True)) for point in points]
 
 
 def written(axes: tuple[Axis, ...]) -> Any:
-    """The sweep of a scenario file that has these axes: a list of tables of one zipped axis, else a table of lists."""
+    """Return the sweep of a scenario file: a list of tables for one zipped axis, else a table of lists."""
     if len(axes) == 1 and len(axes[0].keys) > 1:
         return [dict(zip(axes[0].keys, row, strict=True)) for row in axes[0].values]
     return {axis.keys[0]: [row[0] for row in axis.values] for axis in axes}
 
 
-def sweep_axes(sweep: Any) -> tuple[tuple[Axis, ...], list[Fault]]:
-    """The sound axes of a sweep and all of its faults, each with its path in the sweep and its cure."""
-    if isinstance(sweep, tuple) and all(isinstance(axis, Axis) for axis in sweep):
-        return sweep, []
-    faults: list[Fault] = []
-    if isinstance(sweep, list):
-        axes = _zipped(sweep, faults)
-    elif isinstance(sweep, dict):
-        axes = _columns(sweep, (), faults)
-    else:
-        return (), [((), 'must be a table of lists, such as "contact.load" = ["1 mN", "4 mN"]')]
-    keys = [key for axis in axes for key in axis.keys]
-    unfit = {key: said for key in keys if (said := _unfit(key, keys))}
-    faults += [((key,), said) for key, said in unfit.items()]
-    axes = [axis for axis in axes if not unfit.keys() & set(axis.keys)]
-    for axis in axes:
-        rows = Counter(", ".join(map(str, row)) for row in axis.values)
-        faults += [((axis.keys[0],), f"has {row} twice; take it out once") for row, n in rows.items() if n > 1][:1]
-    if math.prod(len(axis.values) for axis in axes) > _MOST_POINTS:
-        return (), [*faults, ((), f"has more than {_MOST_POINTS:,} points; take fewer values, or several runs")]
-    return tuple(axes), faults
+def _fault(message: str) -> PydanticCustomError:
+    return PydanticCustomError("sweep", "{text}", {"text": message})
 
 
-def _zipped(tables: list[Any], faults: list[Fault]) -> list[Axis]:
-    """One axis from a list of tables, each a row of values."""
-    if not tables or not all(isinstance(table, dict) and table for table in tables):
-        faults.append(((), 'must be a list of tables, each such as { "contact.load" = "1 mN" }'))
-        return []
+def _zipped(tables: list[Any]) -> Axis:
+    """Return the axis of a list of tables, each a row of values."""
+    if not tables or not all(isinstance(table, dict) and table.keys() == tables[0].keys() != set() for table in tables):
+        raise _fault('must be a list of tables with the same keys, each such as { "contact.load" = "1 mN" }')
     keys = tuple(tables[0])
-    for place, table in enumerate(tables):
-        if set(table) != set(keys):
-            other = sorted(set(table) ^ set(keys))[0]
-            said = f'has other keys than the first table of the sweep ("{other}"); give all of them the same keys'
-            faults.append(((place,), said))
-            return []
-    return [Axis(keys, tuple(tuple(table[key] for key in keys) for table in tables))]
+    return Axis(keys, tuple(tuple(table[key] for key in keys) for table in tables))
 
 
-def _columns(table: dict[str, Any], above: tuple[str, ...], faults: list[Fault]) -> list[Axis]:
-    """An axis for each swept key; keys may be quoted as one or nested as tables."""
-    axes: list[Axis] = []
+def _columns(table: dict[str, Any], above: str = "") -> Iterator[Axis]:
+    """Iterate over the axes of the swept keys; keys may be quoted as one or nested as tables."""
     for name, values in table.items():
-        path = (*above, name)
+        key = f"{above}{name}"
         if isinstance(values, dict) and any(type(values.get(word, [])) not in (list, dict) for word in _RANGE):
-            try:
-                values = _spaced(values)
-            except ValueError as fault:
-                faults.append((path, str(fault)))
-                continue
+            values = _spaced(key, values)
         if isinstance(values, list) and values:
-            axes.append(Axis((".".join(path),), tuple((value,) for value in values)))
+            yield Axis((key,), tuple((value,) for value in values))
         elif isinstance(values, dict) and values:
-            axes += _columns(values, path, faults)
+            yield from _columns(values, f"{key}.")
         else:
-            what = "must not be an empty list" if values == [] else "must be a list of values"
-            faults.append((path, f'{what}; write ["1 mN", "4 mN"] or {{ from, to, count, scale = "linear" or "log" }}'))
-    return axes
+            example = '["1 mN", "4 mN"] or { from, to, count, scale = "linear" or "log" }'
+            raise _fault(f"{key}: must be a list of values that is not empty; write {example}")
 
 
-def _unfit(key: str, keys: list[str]) -> str | None:
-    """Why a key cannot be swept, and the cure."""
-    first, _, rest = key.partition(".")
-    if first == "seed":
-        return "cannot be swept; members differ in their noise already, so raise ensemble.members"
-    if first in ("sweep", "source"):
-        return "cannot be swept; sweep keys of the scenario"
+def _require_sweepable(key: str, keys: list[str]) -> None:
+    """Refuse a key that cannot be swept, with the cure."""
+    first = key.partition(".")[0]
+    if first in ("seed", "sweep", "source"):
+        raise _fault(f"{key}: cannot be swept; members differ in their noise, so raise ensemble.members")
     if first in _SHARED[3:] or key in _SHARED:
-        return "cannot be swept, since all points of a sweep share it; run the scenario once for each value"
-    if rest.rpartition(".")[2] == "model":
+        raise _fault(
+            f"{key}: cannot be swept, since all points of a sweep share it; run the scenario once for each value"
+        )
+    if key.endswith(".model"):
         table = key.removesuffix(".model")
-        return f'a model is swept as a whole table: "{table}" = [{{ model = ... }}, {{ model = ... }}]'
+        raise _fault(f'{key}: a model is swept as a whole table: "{table}" = [{{ model = ... }}, {{ model = ... }}]')
     if any(other != key and key.startswith(f"{other}.") for other in keys) or keys.count(key) > 1:
-        return "is swept twice; take it out once"
-    return None
+        raise _fault(f"{key}: is swept twice; take it out once")
 
 
-def _spaced(values: dict[str, Any]) -> list[Any]:
-    """Evenly spaced values of a range, linearly or logarithmically; ValueError with what is wrong about it."""
-    unknown = [key for key in values if key not in _RANGE]
-    if unknown:
-        raise ValueError(f'the range has the unknown key "{unknown[0]}"; it takes {", ".join(_RANGE)}')
-    missing = [key for key in _RANGE[:3] if key not in values]
-    if missing:
-        raise ValueError(f"the range lacks {' and '.join(missing)}; write {{ from = ..., to = ..., count = ... }}")
-    low, high, count, scale = (values.get(key, "linear") for key in _RANGE)
-    ends = number_and_unit(low), number_and_unit(high)
-    if ends[0] is None or ends[1] is None:
-        raise ValueError("the range needs finite numbers, with or without a unit, as from and to")
-    both = same_unit(low, high)
-    if both is None:
-        given = [f'"{unit}"' if unit else "no unit" for _, unit in (ends[0], ends[1])]
-        raise ValueError(f"the range goes from {given[0]} to {given[1]}; write both ends in units of one dimension")
+def _spaced(key: str, values: dict[str, Any]) -> list[Any]:
+    """Return the values of a range, spaced evenly on a linear or logarithmic scale."""
+    low, high, count, scale = (values.get(word, "linear") for word in _RANGE)
+    ends = same_unit(low, high)
+    if not {"from", "to", "count"} <= values.keys() <= set(_RANGE) or scale not in ("linear", "log"):
+        raise _fault(f'{key}: write a range as {{ from = ..., to = ..., count = ..., scale = "linear" or "log" }}')
     if type(count) is not int or not 2 <= count <= _MOST_POINTS:
-        raise ValueError(f"the count of the range must be a whole number from 2 to {_MOST_POINTS:,}")
-    if scale not in ("linear", "log"):
-        raise ValueError('the scale of the range must be "linear" or "log"')
-    first, last, unit = both
+        raise _fault(f"{key}: the count of the range must be a whole number from 2 to {_MOST_POINTS:,}")
+    if ends is None:
+        raise _fault(f"{key}: both ends of the range must be finite numbers in units of one dimension")
+    first, last, unit = ends
     if scale == "log" and not (first > 0.0 and last > 0.0):
-        raise ValueError('a range with scale = "log" needs both ends above zero')
+        raise _fault(f'{key}: a range with scale = "log" needs both ends above zero')
     numbers = (np.geomspace if scale == "log" else np.linspace)(first, last, count).tolist()
     return numbers if unit is None else [f"{number!r} {unit}".strip() for number in numbers]

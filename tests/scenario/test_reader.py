@@ -1,4 +1,4 @@
-"""From a file to a scenario: lines of keys, overrides, sweeps, files beside it, the schema."""
+"""From a file to a scenario: overrides, sweeps, files beside it, the schema."""
 
 import copy
 import dataclasses
@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.commands import LENS
-from hypothesis import example, given, strategies as st
 
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
@@ -21,7 +20,6 @@ from sim.scenario.declared import all_tables, declaration, distinct, keys, quant
 from sim.scenario.reader import BadInput, load
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import scenario_schema
-from sim.scenario.toml_lines import key_lines
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
@@ -38,100 +36,6 @@ def scene(tmp_path):
         return load(path, overrides)
 
     return write
-
-
-# --- lines ---
-
-
-def test_every_key_of_every_kind_has_its_line():
-    text = '''# comment = 1
-top = 1
-"quoted key" = { inner = "x, y = 2 [no]", list = [1,
-  2, { deep = 3 }], "k\\u00e9" = 5 }
-[table]   # [other]
-text = """
-[fake]
-key = 1
-""""
-raw = \'\'\'
-also = "fake"\'\'\'
-when = 1979-05-27 07:32:00.5
-many = [
-  "a = 1", # c = 2
-  [2.5, 3.5],
-]
-[[rows]]
-"a.b" = 1
-[[rows]]
-"a.b" = 2
-[rows.below]
-c.d = -inf
-[ spaced . "out here" ]
-last = 0x1f'''
-    lines = key_lines(text)
-    assert lines["top",] == 2
-    assert lines["quoted key",] == 3
-    assert lines["table",] == 5
-    assert lines["table", "text"] == 6
-    assert lines["table", "raw"] == 10
-    assert lines["table", "when"] == 12
-    assert lines["table", "many"] == 13
-    assert [lines["rows", 0, "a.b"], lines["rows", 1], lines["rows", 1, "a.b"]] == [18, 19, 20]
-    assert lines["rows", 1, "below", "c", "d"] == 22
-    assert lines["spaced", "out here", "last"] == 24
-    assert not {("fake",), ("table", "fake"), ("table", "key"), ("comment",), ("other",)} & set(lines)
-
-
-def paths(value, above=()):
-    """Every path of a document, those inside lists and inline tables included."""
-    if above:
-        yield above
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    for key, inner in items:
-        yield from paths(inner, (*above, key))
-
-
-words = st.text(min_size=1, max_size=4)
-values = st.recursive(
-    st.integers(-9, 9) | st.text(max_size=6) | st.booleans(),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(words, inner, max_size=3),
-    max_leaves=6,
-)
-
-
-def written(value, breaks):
-    """A value as TOML, its lists broken over lines now and then."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{json.dumps(key)} = {written(inner, breaks)}" for key, inner in value.items()) + " }"
-    if isinstance(value, list):
-        gap = "\n  " if next(breaks) else " "
-        return "[" + ",".join(gap + written(inner, breaks) for inner in value) + gap + "]"
-    return json.dumps(value)
-
-
-@example({"a": [[0]]}, [True, False])  # a line of a list that reads like a table
-@given(st.dictionaries(words, values, min_size=1, max_size=4), st.lists(st.booleans(), min_size=1, max_size=5))
-def test_the_keys_that_begin_a_line_are_found_and_nothing_else(document, broken):
-    breaks = itertools.cycle(broken)
-    parts = [f"{json.dumps(key)} = {written(value, breaks)}\n" for key, value in document.items()]
-    try:
-        found = tomllib.loads("".join(parts))
-    except tomllib.TOMLDecodeError:  # JSON escapes surrogates and line breaks in a way that TOML does not know
-        return
-    starts = np.cumsum([1] + [part.count("\n") for part in parts])
-    assert key_lines("".join(parts)) == {(key,): start for key, start in zip(found, starts[:-1], strict=True)}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_lines_of_a_scenario_hold_its_keys(name):
-    text = (FOLDER / f"{name}.toml").read_text(encoding="utf-8")
-    lines = key_lines(text)
-    document = tomllib.loads(text)
-    assert set(lines) <= set(paths(document))
-    assert {(table, key) for table, inner in document.items() if isinstance(inner, dict) for key in inner} <= set(lines)
-    for path, line in lines.items():
-        name = next(word for word in reversed(path) if isinstance(word, str))  # of an item of a list that of the list
-        assert name in text.splitlines()[line - 1]
 
 
 # --- reading ---

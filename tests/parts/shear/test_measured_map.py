@@ -311,7 +311,7 @@ def test_a_bad_map_ends_in_one_message_and_nothing_is_written(tmp_path, monkeypa
         answer = command(*arguments)
         wrong = answer.stderr
         assert answer.exit_code == 2 and not answer.stdout
-        assert wrong.startswith("scene.toml:19: shear.field.file: map.csv: ") and words in wrong
+        assert wrong.startswith("scene.toml: shear.field: map.csv: ") and words in wrong
     assert sorted(path.name for path in tmp_path.iterdir()) == ["map.csv", "scene.toml"]
 
 
