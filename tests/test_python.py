@@ -142,9 +142,7 @@ def test_plot_draws_and_saves(file, dataset, tmp_path):
     assert (tmp_path / "time.png").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(
-    ("kind", "words"), [("rivals", 'now called "theories"'), ("nothing", "known: .*curve"), ("map", "can be drawn as")]
-)
+@pytest.mark.parametrize(("kind", "words"), [("nothing", "known: .*curve"), ("map", "can be drawn as")])
 def test_what_cannot_be_drawn_is_bad_input(dataset, kind, words):
     with pytest.raises(sim.BadInput, match=words):
         sim.plot(dataset, kind)

@@ -25,7 +25,7 @@ from sim.plots.profile import profile_figure, shapes_of
 from sim.plots.stress import needs_stress, stress_figure
 from sim.plots.style import STYLE, recorded, swept_value
 from sim.plots.theories import case_of, sweeps_theories, theories_figure
-from sim.units.refusals import BadInput, renamed
+from sim.units.refusals import BadInput
 
 if TYPE_CHECKING:
     from sim.scenario.scenario import Scenario
@@ -68,7 +68,6 @@ KINDS: dict[str, Kind] = {
     "curve": Kind(panels.curve_figure, panels.needs_speeds, lambda dataset: not panels.turns(dataset), _OF_CURVE),
     "sweep": Kind(panels.sweep_figure, panels.needs_sweep, lambda dataset: True),
     "time": Kind(panels.time_figure, fits=lambda dataset: True),
-    "phase": Kind(slider.phase_figure, slider.needs_one, reads=("spring_force", "speed")),
     "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=_OF_FORCE),
     "map": Kind(map_figure, needs_maps),
     "spectrum": Kind(spectrum_figure, needs_maps),
@@ -133,8 +132,6 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
     choices = choices or Choices()
     dataset = choices.of_member(dataset)
     kind = kind or _drawn_over(dataset, choices.x)
-    if renamed(kind) in KINDS:
-        raise ValueError(f'the figure "{kind}" is now called "{renamed(kind)}"')
     if kind not in KINDS:
         raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')
     missing = _missing(dataset, kind)

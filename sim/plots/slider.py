@@ -1,4 +1,4 @@
-"""Figures of a slider that feels its friction: phase portrait, creep, map of stability, area on the way to sliding."""
+"""Figures of a slider behind a spring: creep, the map of stability, and the contact area before sliding."""
 
 import contextlib
 import math
@@ -16,7 +16,7 @@ from sim.laws import jkr, schallamach
 from sim.laws.schallamach import Body
 from sim.plots import style
 from sim.plots.bond_laws import population_of
-from sim.plots.curves import Scene, choice, scene_along
+from sim.plots.curves import Scene, scene_along
 from sim.plots.measured import Measured
 from sim.plots.panels import Panel, series, stacked
 
@@ -31,32 +31,6 @@ def needs_spring(dataset: xr.Dataset) -> None:
     """Refuse a dataset without a spring."""
     if "stage_speed" not in dataset and "stage_speed_mean" not in dataset:
         raise ValueError('no stage pulls through a spring; let one: [drive] model = "spring"')
-
-
-def needs_one(dataset: xr.Dataset) -> None:
-    """Refuse a dataset without a spring, or of more than one point."""
-    needs_spring(dataset)
-    if several := style.swept(dataset):
-        raise ValueError(f"a phase portrait shows one point of a sweep; {choice(dataset, several[0])}")
-
-
-def phase_figure(dataset: xr.Dataset) -> Figure:
-    """Speed of the slider over the force of the spring: the phase portrait, of the first member."""
-    if MEMBERS in dataset.dims:
-        dataset = dataset.isel({MEMBERS: slice(0, 1)})
-    force, speed = (style.mean_of(dataset, name).to_numpy().ravel() for name in ("spring_force", "speed"))
-    figure, (panel,) = style.rows([2.4])
-    pull = style.Unit.of(force, "N")
-    factor = style.in_unit(panel.yaxis, "speed of the slider $V$", speed, "m/s")
-    panel.plot(pull.factor * force, factor * speed, color=style.BOTH, linewidth=0.6, marker="o", markersize=1.2)
-    stage = np.unique(style.mean_of(dataset, "stage_speed").to_numpy())
-    if stage.size == 1:
-        panel.axhline(factor * stage[0], label="speed of the stage", **style.GUIDE)
-    if style.axis_scale(speed[np.isfinite(speed)]) == "log":
-        panel.set_yscale("log")
-    style.across(panel, pull.factor * force, pull.label("force of the spring $Q$"), room=0.03)
-    style.legend(panel)
-    return figure
 
 
 def needs_force(dataset: xr.Dataset) -> None:

@@ -1,4 +1,4 @@
-"""One page of a whole run: the question, the answer in numbers, figures, tables, errors, cost and how to repeat it."""
+"""One page of a whole run: figures, tables, errors, the scenario and how to repeat it."""
 
 from sim.report.document import html, written
 

@@ -1,4 +1,4 @@
-"""The page of a run as HTML: filled from the dataset and its log, escaped, and complete in itself."""
+"""The page of a run as HTML, filled from the dataset and its log."""
 
 import json
 import math
@@ -13,25 +13,19 @@ import xarray as xr
 from sim.analysis import averaging, concise, highlights, is_stationary, notes, sweep_dims, table
 from sim.analysis.scene import claim
 from sim.analysis.statistics import over_members
-from sim.analysis.tables import once
 from sim.numerics import hdf5
-from sim.numerics.files import output, read_whole
-from sim.report.answers import answers
+from sim.numerics.files import output
 from sim.report.figures import Data, drawings
 from sim.report.measured import agreement, fit_of
-from sim.report.sentences import TIE
 from sim.scenario.toml_text import toml
 from sim.units.refusals import BadInput
 from sim.units.terminal import plain
 
 #: Rows of a table.
 _ROWS = 24
-#: Longest log that is read [byte], and longest text of a scenario that is shown.
-_LOG, _TEXT = 2**20, 200_000
-#: Size of what is held in memory of a dataset [byte], and what is read most.
+#: Largest dataset that is read whole into memory [byte].
 _WHOLE = 2**29
-_OFTEN = ("contact_radius", "contact_area", "work_of_adhesion", "fluctuation_energy", "friction_force")
-#: A share below it is nothing.
+#: Standard error that counts as zero.
 _ROUNDING = 1e-12
 #: Attributes on where a dataset comes from, in the page's words.
 _PROVENANCE = {
@@ -105,13 +99,12 @@ def html(
     """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy: for this command alone
 
-    dataset = _held(dataset)
+    if dataset.nbytes <= _WHOLE:
+        dataset = dataset.load()
     fitted = None if fit is None else fit_of(Path(fit), dataset)
-    shown = drawings(dataset, data)
-    points = [one.measured for one in shown if one.measured]
-    compared = agreement(dataset, points, fitted) if points else None
-    found = once(dataset)
-    rows, whole = table(dataset, _ROWS), highlights(dataset, _ROWS, found)
+    figures = drawings(dataset, data)
+    points = [figure.measured for figure in figures if figure.measured]
+    rows, whole = table(dataset, _ROWS), highlights(dataset, _ROWS)
     stem = Path(source).stem
     page = Environment(
         loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, finalize=_cleaned,
@@ -119,13 +112,12 @@ def html(
     )  # fmt: skip
     return page.get_template("page.html").render(
         question=question(dataset),
-        answers=answers(dataset, found),
-        compared=compared,
+        compared=agreement(dataset, points, fitted) if points else None,
         fitted=fitted,
         measured=str(data) if isinstance(data, Path | str) else "the columns given",
-        averaged=f"{averaged.capitalize()}. " if (averaged := averaging(dataset, is_stationary(dataset))) else "",
-        drawings=shown,
-        tables=[some for some in (rows, whole) if some],
+        averaged=averaging(dataset, is_stationary(dataset)),
+        drawings=figures,
+        tables=[rows, whole],
         notes=notes(dataset, rows, whole),
         known=list(known(dataset)),
         scenario=scenario(dataset),
@@ -140,27 +132,16 @@ def html(
     )
 
 
-def _held(dataset: xr.Dataset) -> xr.Dataset:
-    """A dataset of which what several figures and tables read is in memory, as far as there is room for it."""
-    room, found = _WHOLE, {}
-    for name in sorted(dataset.data_vars, key=lambda name: (dataset[name].nbytes, name not in _OFTEN)):
-        room -= dataset[name].nbytes
-        if room < 0:
-            break
-        found[name] = dataset[name].load()
-    return dataset.assign(found)
-
-
 def _cleaned(value: Any) -> Any:
-    """A text without control characters; what is marked as HTML stays."""
-    return TIE.join(map(plain, value.split(TIE))) if type(value) is str else value
+    """Return a text without control characters; values marked as HTML stay as they are."""
+    return plain(value) if type(value) is str else value
 
 
 def question(dataset: xr.Dataset) -> Question:
     """The question of a scenario: the first paragraph of its first comment, else its name."""
     text, name = str(dataset.attrs.get("scenario_toml", "")), str(dataset.attrs.get("title", "")) or "A run of sim"
     lines = []
-    for line in text[:_TEXT].splitlines():
+    for line in text.splitlines():
         if not line.startswith("#"):
             break
         lines.append(line[1:].strip())
@@ -178,7 +159,7 @@ def scenario(dataset: xr.Dataset) -> str:
     text = str(dataset.attrs.get("scenario_toml", ""))
     if not text:
         text = json.dumps(hdf5.tables(dataset.attrs["scenario_resolved"]), indent=2, ensure_ascii=False)
-    return text[:_TEXT].expandtabs(4)
+    return text.expandtabs(4)
 
 
 def commands(dataset: xr.Dataset, stem: str) -> list[str]:
@@ -194,8 +175,7 @@ def commands(dataset: xr.Dataset, stem: str) -> list[str]:
 def cost(log: Path) -> dict[str, str]:
     """Cost of the run by its log's last line: when it began, seconds in all and of each stage; nothing without."""
     try:
-        text = read_whole(log) if log.stat().st_size <= _LOG else b""
-        entry = json.loads(text.splitlines()[-1])
+        entry = json.loads(log.read_text(encoding="utf-8").splitlines()[-1])
         stages = {f"of it {name}": float(seconds) for name, seconds in entry["stages"].items()}
         times = {"in all": float(entry["seconds"])} | stages
         return {"began": str(entry["began"])} | {words: f"{seconds:.3g} s" for words, seconds in times.items()}

@@ -115,19 +115,9 @@ def test_the_area_on_the_way_to_sliding_lies_beside_the_law_fitted_to_its_beginn
     assert any("alpha" in text for text in legend_of(figure.axes[0])[0])
 
 
-def test_a_phase_portrait_is_the_speed_over_the_force_of_one_member():
-    dataset = driven("pull")
-    figure = rendered(draw(dataset, "phase"))
-    (force, speed), *_ = lines_of(figure.axes[0])
-    assert_allclose(force, 1e3 * dataset["spring_force"].isel(member=0), rtol=1e-12)
-    assert_allclose(speed, 1e3 * dataset["speed"].isel(member=0), rtol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("kind", "of", "cure"),
     [
-        ("phase", "creep", "spring"),
-        ("phase", "map", "where"),
         ("creep", "pull", "force"),
         ("stability", "pull", "drive.stiffness"),
         ("stability", "creep", "spring"),
