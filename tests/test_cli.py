@@ -187,10 +187,10 @@ def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, 
     progress.announce_compiling()
     for _ in range(2):
         for notice in list(jit.on_compiling):
-            notice("sim.laws.jkr.load.pull_off_load")
+            notice("sim.laws.jkr.pull_off_load")
     assert capsys.readouterr().err.count("compiling") == 1
     progress.announce_compiling(quiet=True)
-    jit.on_compiling[0]("sim.laws.jkr.load.pull_off_load")
+    jit.on_compiling[0]("sim.laws.jkr.pull_off_load")
     monkeypatch.setattr("time.monotonic", iter([0.0, 10.0, 40.0, 50.0]).__next__)
     with progress.progress_bar(100, each=10) as shown:
         shown.begin("simulating")

@@ -26,8 +26,13 @@ import math
 
 import numpy as np
 
-from sim.laws.jkr import hertz_radius_at_indentation, hertz_radius_at_load, radius_at_indentation, radius_at_load
-from sim.laws.jkr.scales import twice_pull_off
+from sim.laws.jkr import (
+    hertz_radius_at_indentation,
+    hertz_radius_at_load,
+    radius_at_indentation,
+    radius_at_load,
+    twice_pull_off,
+)
 from sim.laws.mixed_mode import (
     scaled_angle_at_indentation,
     scaled_angle_at_load,

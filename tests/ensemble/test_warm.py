@@ -9,7 +9,7 @@ from sim.cli import cli
 from sim.ensemble import warm
 from sim.numerics import jit
 
-SOME = ["sim.laws.jkr.load.pull_off_load", "sim.laws.jkr.load.radius_at_load", "sim.numerics.special.lambert_w"]
+SOME = ["sim.laws.jkr.pull_off_load", "sim.laws.jkr.radius_at_load", "sim.numerics.special.lambert_w"]
 
 
 @pytest.fixture

@@ -18,7 +18,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from sim.laws import jkr
-from sim.laws.jkr.scales import series_shares
+from sim.laws.jkr import series_shares
 from sim.laws.reversible import (
     mean_stress_energy,
     radius_at_displacement_reversible,
