@@ -26,7 +26,7 @@ from sim.ensemble.plan import Block, Plan, Task, snapshots
 from sim.ensemble.progress import note
 from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.ensemble.workers import share_out
-from sim.laws.disc import cross_energy_of_map, disc_energy_of_map
+from sim.laws.halfspace import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import StoreTrouble, claim, explained
 from sim.numerics.hdf5 import located
 from sim.parts.drive import READINGS

@@ -3,7 +3,7 @@
 import importlib
 from types import ModuleType
 
-__all__ = ["disc", "halfspace", "jkr", "mixed_mode", "profiles", "reversible", "schallamach", "theories"]
+__all__ = ["halfspace", "jkr", "reversible", "schallamach", "theories"]
 
 
 def __getattr__(name: str) -> ModuleType:

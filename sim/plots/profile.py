@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from sim.analysis import setting
-from sim.laws import jkr, profiles
+from sim.laws import halfspace, jkr
 from sim.plots import style
 
 #: Points of a profile on one side, and how far it goes in contact radii.
@@ -32,13 +32,13 @@ class Shape(NamedTuple):
 
     def pressure(self, r: np.ndarray) -> np.ndarray:
         """Normal stress at distances from the axis [Pa]."""
-        return np.asarray(profiles.pressure(r, self.radius, self.indentation, self.sphere_radius, self.modulus))
+        return np.asarray(halfspace.pressure(r, self.radius, self.indentation, self.sphere_radius, self.modulus))
 
     def surfaces(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Heights of half-space and sphere at distances from the axis [m]."""
         given = r, self.radius, self.indentation, self.sphere_radius
-        low = -np.asarray(profiles.normal_displacement(*given))
-        return low, low + np.asarray(profiles.gap(*given))
+        low = -np.asarray(halfspace.normal_displacement(*given))
+        return low, low + np.asarray(halfspace.gap(*given))
 
     def distances(self, reach: float) -> np.ndarray:
         """Distances on both sides of the axis, crowded on both sides of the edge and with the edge itself [m]."""
@@ -148,7 +148,7 @@ def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.U
     """Tangential displacement along and across the sliding direction; the edge as thin lines."""
     distance = reach * np.linspace(-1.0, 1.0, 801)
     bodies = shape.shear_modulus, shape.poisson_ratio
-    found = profiles.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
+    found = halfspace.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
     factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(found), "m")
     for values, line, words in zip(found, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
         panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
@@ -160,7 +160,7 @@ def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.U
 def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
     """Tangential displacement of the surface around the contact circle."""
     bodies = shape.shear_modulus, shape.poisson_ratio
-    x, moved = profiles.tangential_map(shape.radius, shape.stress, *bodies, points=_MAP, extent=reach / shape.radius)
+    x, moved = halfspace.tangential_map(shape.radius, shape.stress, *bodies, points=_MAP, extent=reach / shape.radius)
     unit = style.Unit.of(moved, "m")
     x, moved = length.factor * x, unit.factor * moved.T
     side = x[-1] + 0.5 * (x[1] - x[0])

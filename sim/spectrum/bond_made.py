@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import ArrayLike
 from pydantic.dataclasses import dataclass
 
-from sim.laws.disc import energy_factors
+from sim.laws.halfspace import energy_factors
 from sim.spectrum.family import Array, Factors
 from sim.spectrum.finite_contact import disc_sums
 from sim.spectrum.radial import Isotropic

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
-#: Shares of a wave's energy that a disc holds as a function of x = 2qa, see ``sim.laws.disc``.
+#: Shares of a wave's energy that a disc holds as a function of x = 2qa, see ``sim.laws.halfspace``.
 Factors = Callable[[Array], tuple[Array, Array]]
 
 

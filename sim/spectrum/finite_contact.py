@@ -1,7 +1,7 @@
 """Mean energy of a fluctuating shear stress on a finite disc of contact, for every family of spectra.
 
 ``surface_energy`` of a spectrum is that of the infinite plane, right for a contact of very many wavelengths. On
-a disc of radius a every wave counts with the share that ``laws.disc`` gives in closed form, so that
+a disc of radius a every wave counts with the share that ``laws.halfspace`` gives in closed form, so that
 
 ``E/(pi a^2) = 1/(4 pi^3 G) integral of [(1 - nu/2) C0(q) P(2qa) + (nu/2) C2(q) S(2qa)] dq``,
 
@@ -18,8 +18,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from sim.laws.disc import energy_factors, marginal_factors
-from sim.laws.halfspace import angular_compliance
+from sim.laws.halfspace import angular_compliance, energy_factors, marginal_factors
 from sim.numerics.jit import device
 from sim.numerics.special import erf_between, si
 from sim.spectrum.family import Array, Factors, Family

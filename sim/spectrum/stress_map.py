@@ -15,8 +15,7 @@ from pydantic.dataclasses import dataclass
 from pydantic.json_schema import SkipJsonSchema
 from pydantic_core import PydanticCustomError
 
-from sim.laws.disc import free_energy_of_map
-from sim.laws.halfspace import noise_energy, surface_energy
+from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
 from sim.spectrum.map_file import SPACING, MapFile, blamed, read_map

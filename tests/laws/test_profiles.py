@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.laws import jkr, profiles
+from sim.laws import halfspace, jkr
 from sim.laws.halfspace import disc_displacement
 
 LENS = {"sphere_radius": 2e-3, "modulus": 6.4e6}
@@ -30,7 +30,7 @@ def over_the_contact(values_of, radius, points=64):
 
 @pytest.mark.parametrize(("radius", "indentation"), STATES)
 def test_the_pressure_carries_the_load(radius, indentation):
-    load = over_the_contact(lambda r: profiles.pressure(r, radius, indentation, **LENS), radius)
+    load = over_the_contact(lambda r: halfspace.pressure(r, radius, indentation, **LENS), radius)
     exact = jkr.load_under_indentation(radius, indentation, **LENS)
     # the largest part of the load is Hertz's; punch and quadrature add to it and may cancel to less
     size = jkr.load_under_indentation(radius, radius**2 / LENS["sphere_radius"], **LENS)
@@ -43,30 +43,30 @@ def test_the_pressure_of_hertz_is_johnsons():
     peak = 1.5 * load / (math.pi * radius**2)
     exact = peak * np.sqrt(1.0 - (r / radius) ** 2)
     # the indentation a^2/R is rounded: that leaves a punch of a few 1e-16 of Hertz's, 7 times larger at 0.99
-    computed = profiles.pressure(r, radius, radius**2 / LENS["sphere_radius"], **LENS)
+    computed = halfspace.pressure(r, radius, radius**2 / LENS["sphere_radius"], **LENS)
     assert_allclose(computed, exact, rtol=1e-13, atol=0)
 
 
 def test_the_edge_pulls_with_the_intensity_that_the_work_of_adhesion_asks_for():
     radius, indentation = lens_contact()
-    intensity = profiles.edge_intensity(radius, indentation, **LENS)
+    intensity = halfspace.edge_intensity(radius, indentation, **LENS)
     # a^2/R - delta is a twelfth of its terms here
     assert_allclose(intensity**2 / (2.0 * LENS["modulus"]), 0.042, rtol=1e-13, atol=0)
     for near in (1e-4, 1e-6):
-        pull = profiles.pressure(radius * (1.0 - near), radius, indentation, **LENS)
+        pull = halfspace.pressure(radius * (1.0 - near), radius, indentation, **LENS)
         # the next terms are near/4 and Hertz's 4 a^2/(a^2 - R delta) near = 13 near of this one
         assert_allclose(pull, -intensity / math.sqrt(2.0 * math.pi * near * radius), rtol=20.0 * near, atol=0)
-    assert profiles.pressure(radius, radius, indentation, **LENS) == -math.inf
+    assert halfspace.pressure(radius, radius, indentation, **LENS) == -math.inf
 
 
 def test_hertz_has_no_tension_and_jkr_has_at_the_edge_only():
     radius, indentation = lens_contact()
     r = np.linspace(0.0, 0.999, 200) * radius
-    assert np.all(profiles.pressure(r, radius, radius**2 / LENS["sphere_radius"], **LENS) > 0.0)
-    pulls = profiles.pressure(r, radius, indentation, **LENS) < 0.0
+    assert np.all(halfspace.pressure(r, radius, radius**2 / LENS["sphere_radius"], **LENS) > 0.0)
+    pulls = halfspace.pressure(r, radius, indentation, **LENS) < 0.0
     assert pulls[-1] and not pulls[0]
     assert np.count_nonzero(np.diff(pulls)) == 1
-    assert_array_equal(profiles.pressure([1.0001 * radius, 9.0], radius, indentation, **LENS), 0.0)
+    assert_array_equal(halfspace.pressure([1.0001 * radius, 9.0], radius, indentation, **LENS), 0.0)
 
 
 def exact_displacement(r, radius, indentation, sphere_radius):
@@ -84,34 +84,34 @@ def test_displacement_and_gap_outside_against_fifty_digits(radius, indentation, 
     # 1.0198 is where the series of the gap ends, 4.04 where that of the displacement begins
     r = radius * ratio
     hertz, punch, opening = exact_displacement(r, radius, indentation, 2e-3)
-    u = float(profiles.normal_displacement(r, radius, indentation, 2e-3))
+    u = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
     assert abs(u - (hertz + punch)) < 3e-15 * (abs(hertz) + abs(punch))
     # sqrt(r^2 - a^2) is that of r - a, exact for the r given; the series hold 1e-14 where they meet
-    assert abs(profiles.gap(r, radius, indentation, 2e-3) / opening - 1) < 2e-14
+    assert abs(halfspace.gap(r, radius, indentation, 2e-3) / opening - 1) < 2e-14
 
 
 @pytest.mark.parametrize("ratio", [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 1e3])
 def test_hertz_opens_beside_its_edge_as_fifty_digits_say(ratio):
     opening = exact_displacement(ratio, 1.0, 1.0, 1.0)[2]
-    assert abs(profiles.gap(ratio, 1.0, 1.0, 1.0) / opening - 1) < 2e-14
+    assert abs(halfspace.gap(ratio, 1.0, 1.0, 1.0) / opening - 1) < 2e-14
 
 
 def test_far_away_the_surface_feels_only_the_load():
     radius, indentation = lens_contact()
     r = 1e4 * radius
-    far = float(profiles.normal_displacement(r, radius, indentation, 2e-3))
+    far = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
     # the next term of the expansion is of relative order (a/r)^2 = 1e-8
     assert_allclose(far, 4e-3 / (math.pi * LENS["modulus"] * r), rtol=1e-7, atol=0)
 
 
 @pytest.mark.parametrize(("radius", "indentation"), STATES)
 def test_the_surface_is_continuous_at_the_edge_and_follows_the_sphere_inside(radius, indentation):
-    inside = profiles.normal_displacement(radius, radius, indentation, 2e-3)
+    inside = halfspace.normal_displacement(radius, radius, indentation, 2e-3)
     assert_allclose(inside, indentation - radius**2 / 4e-3, rtol=1e-15, atol=0)
-    outside = profiles.normal_displacement(radius * (1.0 + 1e-12), radius, indentation, 2e-3)
+    outside = halfspace.normal_displacement(radius * (1.0 + 1e-12), radius, indentation, 2e-3)
     # the punch leaves the edge as a square root: sqrt(2e-12) of a^2/R
     assert abs(outside - inside) < 2e-6 * radius**2 / 2e-3
-    assert_array_equal(profiles.gap(np.linspace(0.0, 1.0, 9) * radius, radius, indentation, 2e-3), 0.0)
+    assert_array_equal(halfspace.gap(np.linspace(0.0, 1.0, 9) * radius, radius, indentation, 2e-3), 0.0)
 
 
 def test_surfaces_never_overlap_where_the_edge_pulls():
@@ -120,19 +120,19 @@ def test_surfaces_never_overlap_where_the_edge_pulls():
     sphere_radius = radius * 10.0 ** rng.uniform(0.0, 4.0, 4000)
     indentation = radius**2 / sphere_radius * rng.uniform(-3.0, 1.0, 4000)
     r = radius * (1.0 + 10.0 ** rng.uniform(-15.0, 6.0, 4000))
-    assert np.all(profiles.gap(r, radius, indentation, sphere_radius) >= 0.0)
+    assert np.all(halfspace.gap(r, radius, indentation, sphere_radius) >= 0.0)
 
 
 def test_a_contact_pressed_beyond_hertz_would_overlap_beside_its_edge():
-    assert profiles.gap(1.001, 1.0, 1.5, 1.0) < 0.0
+    assert halfspace.gap(1.001, 1.0, 1.5, 1.0) < 0.0
 
 
 def test_the_work_of_the_pressure_is_the_elastic_energy():
     radius, indentation = lens_contact()
 
     def density(r):
-        u = profiles.normal_displacement(r, radius, indentation, 2e-3)
-        return 0.5 * profiles.pressure(r, radius, indentation, **LENS) * u
+        u = halfspace.normal_displacement(r, radius, indentation, 2e-3)
+        return 0.5 * halfspace.pressure(r, radius, indentation, **LENS) * u
 
     energy = over_the_contact(density, radius)
     exact = jkr.potential_at_indentation(-indentation, 0.0, radius, 0.0, **LENS)
@@ -142,17 +142,17 @@ def test_the_work_of_the_pressure_is_the_elastic_energy():
 
 def test_the_shear_carries_the_friction_and_its_displacement_the_energy():
     radius, stress, shear_modulus = 1.2e-4, 3e5, 1.6e6
-    assert_array_equal(profiles.shear_stress([0.0, radius, 1.01 * radius], radius, stress), [stress, stress, 0.0])
-    assert np.isnan(profiles.shear_stress(math.nan, radius, stress))
-    along, across = profiles.tangential_profiles(np.linspace(-2.0, 2.0, 9) * radius, radius, stress, shear_modulus)
+    assert_array_equal(halfspace.shear_stress([0.0, radius, 1.01 * radius], radius, stress), [stress, stress, 0.0])
+    assert np.isnan(halfspace.shear_stress(math.nan, radius, stress))
+    along, across = halfspace.tangential_profiles(np.linspace(-2.0, 2.0, 9) * radius, radius, stress, shear_modulus)
     assert_array_equal(along, along[::-1])
     assert_allclose(along[4], 0.75 * stress * radius / shear_modulus, rtol=1e-14, atol=0)
     assert_allclose(across[6] / along[4], 0.424413181578387 / 0.75, rtol=1e-13, atol=0)
 
 
 def test_the_map_holds_both_profiles():
-    x, v = profiles.tangential_map(1.2e-4, 3e5, 1.6e6, poisson_ratio=0.3, points=33, extent=3.0)
-    along, across = profiles.tangential_profiles(x, 1.2e-4, 3e5, 1.6e6, poisson_ratio=0.3)
+    x, v = halfspace.tangential_map(1.2e-4, 3e5, 1.6e6, poisson_ratio=0.3, points=33, extent=3.0)
+    along, across = halfspace.tangential_profiles(x, 1.2e-4, 3e5, 1.6e6, poisson_ratio=0.3)
     assert x[0] == -x[-1] == -3.0 * 1.2e-4
     assert_array_equal(v[:, 16], along)
     assert_array_equal(v[16], across)

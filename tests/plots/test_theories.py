@@ -7,7 +7,7 @@ from matplotlib.patches import Circle
 from numpy.testing import assert_allclose
 
 from sim.analysis import where
-from sim.laws import jkr, profiles, theories
+from sim.laws import halfspace, jkr, theories
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
@@ -181,12 +181,12 @@ def test_pressure_is_that_of_the_first_member_at_the_last_time_and_at_rest(slid)
     radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
     (x, p), (_, rest) = data_of(panel, pictures.BOTH)[0], data_of(panel, pictures.REFERENCE, "--")[0]
     inside = np.abs(1e-6 * x) < 0.999 * radius
-    exact = profiles.pressure(np.abs(1e-6 * x[inside]), radius, depth, 2e-3, 6.4e6)
+    exact = halfspace.pressure(np.abs(1e-6 * x[inside]), radius, depth, 2e-3, 6.4e6)
     assert_allclose(p[inside], 1e-3 * exact, rtol=1e-9)
     assert np.all(np.nan_to_num(p[np.abs(1e-6 * x) > 1.001 * radius]) == 0.0)
     full = jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)
     depth = jkr.indentation_at_radius(full, 42e-3, 2e-3, 6.4e6)
-    assert_allclose(rest[len(rest) // 2], 1e-3 * profiles.pressure(0.0, full, depth, 2e-3, 6.4e6), rtol=1e-12)
+    assert_allclose(rest[len(rest) // 2], 1e-3 * halfspace.pressure(0.0, full, depth, 2e-3, 6.4e6), rtol=1e-12)
 
 
 def test_surfaces_touch_inside_and_are_the_gap_apart_outside(slid):
@@ -195,7 +195,7 @@ def test_surfaces_touch_inside_and_are_the_gap_apart_outside(slid):
     radius, depth = (float(slid[name][0, -1]) for name in ("contact_radius", "indentation"))
     r = np.abs(1e-6 * x)
     assert np.all(high[r < radius] == low[r < radius])
-    assert_allclose(low, -1e6 * profiles.normal_displacement(r, radius, depth, 2e-3), rtol=1e-9, atol=1e-12)
+    assert_allclose(low, -1e6 * halfspace.normal_displacement(r, radius, depth, 2e-3), rtol=1e-9, atol=1e-12)
     # outside the upper surface is the sphere's own; heights are some micrometres
     out = r > radius
     assert_allclose(high[out], 1e6 * (r[out] ** 2 / 4e-3 - depth), rtol=0, atol=1e-11)
@@ -205,7 +205,7 @@ def test_tangential_displacement_is_that_of_the_uniform_stress(slid):
     panels = plots.draw(slid, "profile").axes
     radius, stress = float(slid["contact_radius"][0, -1]), float(slid["shear_stress"][-1])
     (x, along), (_, across) = (data_of(panels[2], pictures.BOTH, style)[0] for style in ("-", "--"))
-    exact = profiles.tangential_profiles(1e-6 * x, radius, stress, 1.6e6)
+    exact = halfspace.tangential_profiles(1e-6 * x, radius, stress, 1.6e6)
     assert_allclose([along, across], 1e6 * np.array(exact), rtol=1e-9)
     shown = panels[3].images[0].get_array()
     assert_allclose(shown.max(), along.max(), rtol=1e-9)

@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy import special
 
-from sim.laws import disc, halfspace
+from sim.laws import halfspace
 from sim.spectrum.bond_made import BondMade
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
 from sim.spectrum.finite_contact import disc_energy, marginal_energy
@@ -71,7 +71,9 @@ def jinc_correlation(band):
 def test_waves_along_and_across_a_disc_store_the_tabulated_energy(k, along, across, marginal):
     q = np.pi * k
     for angle, ratio in ((0.0, along), (math.pi / 2, across)):
-        assert_allclose(disc.ripple_energy(1.0, q, angle, 1.0, 1.0) * q / PLANE[angle], ratio, rtol=1e-10, atol=0)
+        assert_allclose(
+            halfspace.disc_ripple_energy(1.0, q, angle, 1.0, 1.0) * q / PLANE[angle], ratio, rtol=1e-10, atol=0
+        )
         wave = Ripple(2.0, 2e-5 / k, angle)
         assert_allclose(disc_energy(wave, 1e-5, 1.6e6) / wave.surface_energy(1.6e6), ratio, rtol=1e-10, atol=0)
         # the five digits given
@@ -79,9 +81,11 @@ def test_waves_along_and_across_a_disc_store_the_tabulated_energy(k, along, acro
         assert_allclose(edge, marginal, rtol=5e-6 / 0.9, atol=0)
 
 
-@pytest.mark.parametrize("factors", [disc.energy_factors, disc.marginal_factors])
+@pytest.mark.parametrize("factors", [halfspace.energy_factors, halfspace.marginal_factors])
 def test_factors_are_the_bessel_integrals_of_the_overlap(factors):
-    area = (lambda t: mpmath.acos(t) - t * mpmath.sqrt(1 - t * t)) if factors is disc.energy_factors else mpmath.acos
+    area = (
+        (lambda t: mpmath.acos(t) - t * mpmath.sqrt(1 - t * t)) if factors is halfspace.energy_factors else mpmath.acos
+    )
     for x in (1e-3, 0.7, 2.999, 3.001, 9.0, 40.0):
         cuts = mpmath.linspace(0, 1, 2 + int(x / 3))
         mean = x * mpmath.quad(lambda t, x=x: area(t) * mpmath.besselj(0, x * t), cuts)
@@ -115,7 +119,9 @@ def test_a_self_affine_field_is_the_sum_of_its_bands():
     edge = np.geomspace(q1, q2, 4001)
     inner = np.sqrt(edge[1:] * edge[:-1])
     waves = Ripple(1.0, 1.0)
-    ratio = disc.ripple_energy(1.0, inner, 0.0, 1.0, 1.0) + disc.ripple_energy(1.0, inner, math.pi / 2, 1.0, 1.0)
+    ratio = halfspace.disc_ripple_energy(1.0, inner, 0.0, 1.0, 1.0) + halfspace.disc_ripple_energy(
+        1.0, inner, math.pi / 2, 1.0, 1.0
+    )
     # a ring's energy is the mean of its two principal waves; variance of each ring from the closed form
     rings = np.diff(spectrum.cumulative(edge)) * ratio / (2 * waves.variance)
     # 4000 rings a step of 1.5e-3 wide: the oscillation sin(x)/x^2, x up to 1200, turns by 0.1 to 1 rad a ring
@@ -223,13 +229,13 @@ def test_a_radius_that_is_no_length_is_refused():
 
 def test_samples_weigh_the_whole_disc_and_its_second_moment():
     for points, r in [(16, 8.0), (17, 5.27), (9, 0.18)]:
-        _, _, weight = disc._coverage(points, r)
+        _, _, weight = halfspace._coverage(points, r)
         assert_allclose(weight.sum(), np.pi * r**2, rtol=1e-12, atol=0)
     # shares alone are a disc smoothed over a pixel: on the mean of all radii their second moment is 1/(3 r^2) too
     # large; the differences take that away, up to terms that fall with r
     excess = []
     for r in 20.0 + np.arange(200) / 200:
-        _, position, weight = disc._coverage(64, r)
+        _, position, weight = halfspace._coverage(64, r)
         excess.append((weight * position**2).sum() / (np.pi * r**4 / 4) - 1)
     assert abs(np.mean(excess)) < 0.01 / (3 * 20.0**2)
 
@@ -241,8 +247,8 @@ def test_a_uniform_map_stores_the_energy_of_a_uniform_disc(nu):
     field = np.full((points, points), 3.0)
     # the edge is blurred over a pixel: 0.1 (pixel/a)^2 relative
     rtol = 0.1 * (2.0 / points / a) ** 2
-    assert_allclose(disc.disc_energy_of_map(field, 2.0, a, 2.0, nu), exact, rtol=rtol, atol=0)
-    assert_allclose(disc.cross_energy_of_map(field, 2.0, a, 3.0, 2.0, nu), 2 * exact, rtol=rtol, atol=0)
+    assert_allclose(halfspace.disc_energy_of_map(field, 2.0, a, 2.0, nu), exact, rtol=rtol, atol=0)
+    assert_allclose(halfspace.cross_energy_of_map(field, 2.0, a, 3.0, 2.0, nu), 2 * exact, rtol=rtol, atol=0)
 
 
 def wave_maps(points, k, angle, cell=2.0):
@@ -256,7 +262,9 @@ def wave_maps(points, k, angle, cell=2.0):
 def test_the_map_of_a_wave_converges_to_the_table(k, along, across, _):
     for angle, ratio in ((0.0, along), (math.pi / 2, across)):
         exact = ratio * PLANE[angle] / (np.pi * k)
-        coarse, fine = (np.mean(disc.disc_energy_of_map(wave_maps(n, k, angle), 2.0, 1.0, 1.0)) for n in (128, 256))
+        coarse, fine = (
+            np.mean(halfspace.disc_energy_of_map(wave_maps(n, k, angle), 2.0, 1.0, 1.0)) for n in (128, 256)
+        )
         # second order in the pixel: a quarter of the error, 0.24 k (pixel/a)^2 at most
         assert abs(coarse / exact - 1) < 0.3 * k * (2 / 128) ** 2
         assert 3.5 < (coarse - exact) / (fine - exact) < 4.8
@@ -265,15 +273,15 @@ def test_the_map_of_a_wave_converges_to_the_table(k, along, across, _):
 
 @pytest.mark.parametrize("nu", [0.0, 0.3])
 def test_an_oblique_wave_on_a_map_stores_its_energy_at_any_poisson_ratio(nu):
-    exact = disc.ripple_energy(1.0, 3 * np.pi, 0.5, 0.77, 1.0, nu)
-    energy = np.mean(disc.disc_energy_of_map(wave_maps(160, 3, 0.5), 2.0, 0.77, 1.0, nu))
+    exact = halfspace.disc_ripple_energy(1.0, 3 * np.pi, 0.5, 0.77, 1.0, nu)
+    energy = np.mean(halfspace.disc_energy_of_map(wave_maps(160, 3, 0.5), 2.0, 0.77, 1.0, nu))
     assert_allclose(energy, exact, rtol=0.3 * 3 * (2 / 160 / 0.77) ** 2, atol=0)
 
 
 def test_a_disc_has_no_images_of_itself():
     # the cell around the disc does not matter
-    small = disc.disc_energy_of_map(np.ones((40, 40)), 1.0, 0.5, 1.0)
-    large = disc.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0)
+    small = halfspace.disc_energy_of_map(np.ones((40, 40)), 1.0, 0.5, 1.0)
+    large = halfspace.disc_energy_of_map(np.ones((120, 120)), 3.0, 0.5, 1.0)
     assert_allclose(small, large, rtol=1e-13, atol=0)
 
 
@@ -281,10 +289,10 @@ def test_energies_of_a_sum_are_a_square_with_the_cross_energy_in_it():
     # (tau0 + tau1): E = E0 + cross + E1; the cross term by displacement and by convolution differ at the edge only
     field = gaussian_maps(1, 96, 2.0, 0.3, seed=5)[0]
     a, tau0 = 0.9, 0.7
-    own = disc.disc_energy_of_map(field, 2.0, a, 1.0)
-    mean = disc.disc_energy_of_map(np.full_like(field, tau0), 2.0, a, 1.0)
-    cross = disc.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - own - mean
-    direct = disc.cross_energy_of_map(field, 2.0, a, tau0, 1.0)
+    own = halfspace.disc_energy_of_map(field, 2.0, a, 1.0)
+    mean = halfspace.disc_energy_of_map(np.full_like(field, tau0), 2.0, a, 1.0)
+    cross = halfspace.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - own - mean
+    direct = halfspace.cross_energy_of_map(field, 2.0, a, tau0, 1.0)
     assert abs(cross - direct) < 0.3 * (2 / 96 / a) ** 2 * 2 * math.sqrt(own * mean)
 
 
@@ -308,8 +316,8 @@ def five_sigma_of_spread(sample):
 def test_the_expected_energy_of_sampled_discs_is_the_overlap_integral(points):
     # the sum that the maps' energy is on the mean: kernel x correlation x overlap of the sampled disc with itself
     pixel, xi = 3.0 / points, 0.15
-    _, _, weight = disc._coverage(points, 1.0 / pixel)
-    grid, kernel = disc._free_kernel(disc._padded_size(1.0 / pixel), 0.5)
+    _, _, weight = halfspace._coverage(points, 1.0 / pixel)
+    grid, kernel = halfspace._free_kernel(halfspace._padded_size(1.0 / pixel), 0.5)
     overlap = np.fft.irfft2(np.abs(np.fft.rfft2(weight, s=(grid.points,) * 2)) ** 2, s=(grid.points,) * 2)
     shift = np.fft.fftfreq(grid.points, 1 / grid.points) * pixel
     correlation = np.exp(-(shift[:, None] ** 2 + shift**2) / xi**2)
@@ -321,7 +329,7 @@ def test_the_expected_energy_of_sampled_discs_is_the_overlap_integral(points):
 def test_discs_of_random_maps_average_to_the_overlap_integral():
     # a cell of 3 a: the ends of the disc are 1 a apart through the border, correlated by e^-44
     xi, members, pixel = 0.15, 2000, 0.05
-    energy = disc.disc_energy_of_map(gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, 1.0)
+    energy = halfspace.disc_energy_of_map(gaussian_maps(members, 60, 3.0, xi, seed=11), 3.0, 1.0, 1.0)
     exact, plane = disc_energy(Gaussian(1.0, xi), 1.0, 1.0), Gaussian(1.0, xi).surface_energy(1.0)
     error = 5 * energy.std() / math.sqrt(members)
     assert abs(energy.mean() - exact) < error + 0.6 * pixel**2 * exact
@@ -334,7 +342,7 @@ def test_discs_of_random_maps_average_to_the_overlap_integral():
 
 def test_the_cross_energy_has_zero_mean_and_the_size_of_the_energy():
     xi, members, cell = 0.1, 2000, 2.4
-    cross = disc.cross_energy_of_map(gaussian_maps(members, 48, cell, xi, seed=12), cell, 1.0, 2.0, 1.0)
+    cross = halfspace.cross_energy_of_map(gaussian_maps(members, 48, cell, xi, seed=12), cell, 1.0, 2.0, 1.0)
     assert abs(cross.mean()) < 5 * cross.std() / math.sqrt(members)
     # its variance is integral of C(q) |w0(q)|^2, here from samples of w0 on a fine lattice
     points, step = 480, cell / 480
@@ -357,8 +365,8 @@ def test_a_map_has_the_same_energy_alone_and_in_a_batch():
     maps = gaussian_maps(5, 40, 2.0, 0.3, seed=3)
     radius = np.array([0.4, 1.0, 0.0, 0.77, 0.4])
     for energy in (
-        lambda field, a: disc.disc_energy_of_map(field, 2.0, a, 1.6e6),
-        lambda field, a: disc.cross_energy_of_map(field, 2.0, a, 3e5, 1.6e6),
+        lambda field, a: halfspace.disc_energy_of_map(field, 2.0, a, 1.6e6),
+        lambda field, a: halfspace.cross_energy_of_map(field, 2.0, a, 3e5, 1.6e6),
     ):
         batch = energy(maps, radius)
         assert batch.shape == (5,)
@@ -372,4 +380,4 @@ def test_a_map_has_the_same_energy_alone_and_in_a_batch():
 def test_a_disc_larger_than_the_cell_is_refused():
     for radius in (0.51, np.array([0.1, np.inf])):
         with pytest.raises(ValueError, match="at least twice the radius"):
-            disc.disc_energy_of_map(np.ones((2, 8, 8)), 1.0, radius, 1.0)
+            halfspace.disc_energy_of_map(np.ones((2, 8, 8)), 1.0, radius, 1.0)

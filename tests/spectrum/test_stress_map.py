@@ -10,8 +10,12 @@ import xarray as xr
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.laws.disc import free_energy_of_map, ripple_energy
-from sim.laws.halfspace import disc_tangential_energy, surface_energy
+from sim.laws.halfspace import (
+    disc_tangential_energy,
+    free_energy_of_map,
+    disc_ripple_energy as ripple_energy,
+    surface_energy,
+)
 from sim.spectrum.stress_map import StressMap
 from tests.spectrum.test_measured import Files
 

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import scipy
 
-from sim.laws.disc import disc_energies_of_map, soft_disc
+from sim.laws.halfspace import disc_energies_of_map, soft_disc
 from sim.numerics.grid import Lattice
 from sim.parts.exchange import Array
 from sim.parts.shear.process import Fluctuation, SmoothProcess

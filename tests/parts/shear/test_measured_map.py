@@ -11,8 +11,12 @@ from numpy.testing import assert_allclose
 import sim
 from sim.engine import MemberNoise, follow, march
 from sim.laws import jkr
-from sim.laws.disc import ripple_energy, ripple_marginal_energy
-from sim.laws.halfspace import disc_tangential_energy, surface_energy
+from sim.laws.halfspace import (
+    disc_tangential_energy,
+    disc_ripple_energy as ripple_energy,
+    ripple_marginal_energy,
+    surface_energy,
+)
 from sim.numerics.grid import Grid
 from sim.parts import drive
 from sim.parts.bonds.models import Counted, Unbroken
