@@ -19,8 +19,7 @@ Made by `python docs/make_api.py` from the code. Numbers are in SI units, arrays
 the result; `help(sim.laws.jkr.radius_at_load)` and its like give arguments, formula, source and an example.
 """
 MODULES = (
-    *(f"sim.laws.{name}" for name in ("halfspace", "jkr", "reversible", "schallamach")),
-    *(f"sim.laws.{name}" for name in ("theories", "mixed_mode")),
+    *(f"sim.laws.{name}" for name in ("halfspace", "jkr", "reversible", "schallamach", "theories")),
     "sim.spectrum",
     "sim.analysis",
     "sim.plots",

@@ -220,7 +220,7 @@ Answer = Callable[[Array], tuple[Complex, Complex]]
 _LOOKS, _STEPS = 48, 12
 
 
-def onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tuple[Array, Array], body: Body) -> Onset:
+def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tuple[Array, Array], body: Body) -> Onset:
     """Onset of oscillations of a body at a speed [m/s] on bonds of a stress [Pa], ``between`` two frequencies."""
     area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (np.asarray(one, dtype=float) for one in body)
     bears = area * (stress + viscosity * np.abs(speed))
@@ -346,7 +346,7 @@ def resolved_onset(
             return site_density * bond_stiffness * found, bound / (births * life)
 
         stress = site_density * bond_stiffness * births * way
-        return onset_behind(answer, speed, stress, (_SLOWEST / life, _FASTEST / life), body)
+        return _onset_behind(answer, speed, stress, (_SLOWEST / life, _FASTEST / life), body)
 
 
 # Linear law of the bond fraction: steady sliding, rate equation and its exact step.
@@ -980,7 +980,7 @@ def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebin
         return stretched, -rate * turns / own / unit
 
     pace = rebinding_rate + (1.0 + tilt) * rate
-    return onset_behind(answer, speed, density * tilt * unit, (_LOWEST_RATE * pace, _HIGHEST_RATE * pace), body)
+    return _onset_behind(answer, speed, density * tilt * unit, (_LOWEST_RATE * pace, _HIGHEST_RATE * pace), body)
 
 
 def first_moment_amplitude(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate):

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from sim.laws import jkr, mixed_mode, theories
+from sim.laws import jkr, theories
 
 U = 2.0**-53
 #: R, w and E* at which Maugis' units are m, N and m: pi w R = 1 N, 3 pi w R^2/(4 E*) = 1 m^3.
 WORK, MODULUS = 1.0 / math.pi, 0.75
 LAWS = {
-    "scaled_angle": (mixed_mode.scaled_angle_at_load, mixed_mode.scaled_angle_at_indentation),
-    "shear_share": (mixed_mode.shear_share_at_load, mixed_mode.shear_share_at_indentation),
-    "scaled_tangent": (mixed_mode.scaled_tangent_at_load, mixed_mode.scaled_tangent_at_indentation),
+    "scaled_angle": (theories.scaled_angle_at_load, theories.scaled_angle_at_indentation),
+    "shear_share": (theories.shear_share_at_load, theories.shear_share_at_indentation),
+    "scaled_tangent": (theories.scaled_tangent_at_load, theories.scaled_tangent_at_indentation),
 }
 #: f(psi) of each law.
 EXCESS = {
@@ -132,7 +132,7 @@ def test_a_branch_ends_at_its_fold(name, at_load, level, mixity, last, force):
 
 def test_the_scaled_angle_jumps_or_reaches_hertz_smoothly():
     for load, mixity in ((1.0, 0.2), (1.0, 0.5), (-1.0, 0.3), (0.0, 0.9), (100.0, 0.2), (100.0, 1.0)):
-        limit = float(mixed_mode.scaled_angle_limit(load, WORK, mixity, 1.0))
+        limit = float(theories.scaled_angle_limit(load, WORK, mixity, 1.0))
         hertz = float(jkr.hertz_radius_at_load(load, 1.0, MODULUS)) if load >= 0.0 else math.nan
         before, after = (float(radius("scaled_angle", load, limit * (1.0 + off), mixity)) for off in (-1e-9, 1e-9))
         assert after == hertz or (math.isnan(hertz) and math.isnan(after))
@@ -141,9 +141,9 @@ def test_the_scaled_angle_jumps_or_reaches_hertz_smoothly():
         if smooth:
             assert_allclose(limit, 2.0 * math.sqrt(load) / math.sin(0.5 * math.pi * mixity), rtol=4 * U, atol=0)
     stuck = theories.savkoor_briggs_limit(5.0, 0.1, 2.0, 0.3)
-    assert_allclose(mixed_mode.scaled_angle_limit(5.0, 0.1, 1.0, 2.0, 0.3), stuck, rtol=1e-12, atol=0)
-    assert [mixed_mode.scaled_angle_limit(1.0, *rest, 1.0) for rest in ((0.0, 0.5), (1.0, 0.0))] == [0.0, math.inf]
-    assert np.isnan(mixed_mode.scaled_angle_limit(-1.6, WORK, 0.5, 1.0))
+    assert_allclose(theories.scaled_angle_limit(5.0, 0.1, 1.0, 2.0, 0.3), stuck, rtol=1e-12, atol=0)
+    assert [theories.scaled_angle_limit(1.0, *rest, 1.0) for rest in ((0.0, 0.5), (1.0, 0.0))] == [0.0, math.inf]
+    assert np.isnan(theories.scaled_angle_limit(-1.6, WORK, 0.5, 1.0))
 
 
 def test_the_scaled_tangent_keeps_its_share_of_adhesion_under_any_force():

@@ -11,9 +11,9 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.laws.halfspace import (
+    disc_ripple_energy as ripple_energy,
     disc_tangential_energy,
     free_energy_of_map,
-    disc_ripple_energy as ripple_energy,
     surface_energy,
 )
 from sim.spectrum.stress_map import StressMap

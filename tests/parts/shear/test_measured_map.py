@@ -12,8 +12,8 @@ import sim
 from sim.engine import MemberNoise, follow, march
 from sim.laws import jkr
 from sim.laws.halfspace import (
-    disc_tangential_energy,
     disc_ripple_energy as ripple_energy,
+    disc_tangential_energy,
     ripple_marginal_energy,
     surface_energy,
 )
