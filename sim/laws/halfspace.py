@@ -662,7 +662,7 @@ def disc_ripple_energy(amplitude, wavenumber, angle, radius, shear_modulus, pois
     Ten waves along a diameter of 2: the disc stores 2 % more than the plane, and 1 % less if they run across:
 
     >>> for angle, plane in (0.0, 0.125), (math.pi / 2, 0.25):
-    ...     print(f"{ripple_energy(1.0, 10 * math.pi, angle, 1.0, 1.0) * 10 * math.pi / plane:.5f}")
+    ...     print(f"{disc_ripple_energy(1.0, 10 * math.pi, angle, 1.0, 1.0) * 10 * math.pi / plane:.5f}")
     1.02027
     0.98987
     """

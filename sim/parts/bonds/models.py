@@ -25,8 +25,7 @@ from pydantic_core import PydanticCustomError
 import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.mean_field as mean_field
 import sim.parts.bonds.tracked as tracks
-from sim.laws.schallamach import Body, Onset, linear_onset, steady_fraction, transition_probabilities
-from sim.laws.schallamach import relaxed
+from sim.laws.schallamach import Body, Onset, linear_onset, relaxed, steady_fraction, transition_probabilities
 from sim.numerics.binomial import binomial
 from sim.numerics.jit import kernel
 from sim.numerics.noise import Noise, stream
