@@ -18,10 +18,7 @@ from pydantic_core import PydanticCustomError
 from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
-from sim.spectrum.map_file import SPACING, MapFile, blamed, read_map
-from sim.spectrum.measured import Measured, estimate
-from sim.spectrum.periodogram import tapered
-from sim.spectrum.tabulated import by_name
+from sim.spectrum.measured import SPACING, MapFile, Measured, blamed, by_name, estimate, read_map, tapered
 from sim.units.quantity import Quantity
 from sim.units.table import TableError
 
