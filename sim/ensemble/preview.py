@@ -133,7 +133,8 @@ def _quantities(points: Sequence[Scenario]) -> Rows:
         unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
         meaning = "" if quantity is None or key.endswith(quantity.meaning) else quantity.meaning
         if isinstance(value, tuple | bool):
-            value = f"{len(value)} values" if isinstance(value, tuple) else str(value).lower()
+            span = f", {_span(value, unit)}" if quantity and isinstance(value, tuple) else ""
+            value = f"{len(value)} values{span}" if isinstance(value, tuple) else str(value).lower()
         found.setdefault(key, (unit, meaning, []))[2].append(value)
     order = list(dict.fromkeys(key.partition(".")[0] for key in found))
     rows: Rows = []

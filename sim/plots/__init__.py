@@ -1,6 +1,7 @@
 """Figures of datasets."""
 
-from sim.plots.kinds import KINDS, Choices, draw
+from sim.plots.choices import Choices
+from sim.plots.kinds import KINDS, draw
 
 __all__ = ["KINDS", "Choices", "draw"]
 

@@ -78,7 +78,7 @@ def with_models(table: type, given: Any) -> Any:
 
 
 class Entry(NamedTuple):
-    """A value of a scenario by its dotted ``key`` in a file, with its declaration if it is a number."""
+    """A value of a scenario by its dotted ``key``, with its declaration if it is a number or a column of them."""
 
     key: str
     value: Any
@@ -92,7 +92,8 @@ def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
         if is_dataclass(value):
             yield from () if isinstance(value, Source) else entries(value, f"{prefix}{key}.")
         elif quantity is not None:
-            number = isinstance(value, int | float) and not isinstance(value, bool)
+            number = value[0] if isinstance(value, tuple) and value else value
+            number = isinstance(number, int | float) and not isinstance(number, bool)
             yield Entry(prefix + key, value, quantity if number else None)
 
 
@@ -156,7 +157,8 @@ def as_html(title: str, listed: Iterable[Entry]) -> str:
 
 def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:
     """Every number of a scenario with its declaration, by its dotted key in a scenario file."""
-    return {key: (quantity, value) for key, value, quantity in entries(part) if quantity is not None}
+    listed = entries(part)
+    return {key: (quantity, value) for key, value, quantity in listed if quantity and not isinstance(value, tuple)}
 
 
 def declaration(declared: Any) -> Quantity | None:

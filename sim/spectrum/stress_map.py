@@ -18,9 +18,12 @@ from pydantic_core import PydanticCustomError
 from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
-from sim.spectrum.measured import SPACING, MapFile, Measured, blamed, by_name, estimate, read_map, tapered
+from sim.spectrum.map_file import SPACING, MapFile, read_map
+from sim.spectrum.measured import Measured, estimate
+from sim.spectrum.periodogram import tapered
+from sim.spectrum.tabulated import by_name
 from sim.units.quantity import Quantity
-from sim.units.table import TableError
+from sim.units.table import blamed
 
 _START = Quantity("m", "place along x of the map where a disc begins, left out the middle", "x_0", at_least=0)
 _NOISE = Quantity("Pa", "rms of the measurement's white noise in a pixel, which is reported", "s", at_least=0)
@@ -106,7 +109,7 @@ class StressMap:
             keys = [None if given.get(key) is None else SPACING.read(given[key]) for key in ("pixel", "pixel_y")]
         except ValueError:
             return given  # refused by the field's own check
-        with blamed(name, info.context):
+        with blamed(name):
             found = read_map(name, info.context, str(given.get("variable", "shear_map")), gaps=True)
             values = _one_map(found, rows)
             if not mask and np.isnan(values).any():
@@ -206,7 +209,7 @@ def _one_map(found: MapFile, rows: str) -> Array:
     """The only map of a file, shape (nx, ny)."""
     if math.prod(found.values.shape[:-2]) != 1:
         many = math.prod(found.values.shape[:-2])
-        raise TableError(f"it holds {many} maps; save the one that is meant on its own")
+        raise ValueError(f"it holds {many} maps; save the one that is meant on its own")
     values = found.values.reshape(found.values.shape[-2:])
     return np.ascontiguousarray(values if found.named or rows == "x" else values.T)
 

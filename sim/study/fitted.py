@@ -120,7 +120,8 @@ def _explanation(fit: Fit) -> str:
     lines = [f"chi^2 {best.chi_square:.4g} at {problem.freedom} degrees of freedom{likely}, AICc {_number(fit.aicc)}"]
     if not fit.converged:
         lines.append("the fit has not converged: start nearer, give bounds, or free fewer keys")
-    return "\n".join([*lines, *fit.remarks])
+    tables = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in problem.tables]
+    return "\n".join([*lines, *fit.remarks, *tables])
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:

@@ -43,13 +43,14 @@ class Measured(NamedTuple):
 
     ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"held"`` (load, indentation or displacement) and those of
     other keys of the scenario, by the key; rows are numbered alike in all columns. ``held`` is the key of the contact
-    that holds the sphere.
+    that holds the sphere. ``ranges`` names the range of each column, for people.
     """
 
     path: Path
     held: str
     conditions: dict[str, Array]
     curves: tuple[Curve, ...]
+    ranges: str = ""
 
     @property
     def rows(self) -> int:
@@ -76,7 +77,8 @@ def read(path: Path, scenario: Scenario) -> Measured:
         With one line.
     """
     at, outcomes = _conditions(scenario), _outcomes(scenario)
-    found = table.read(path, {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}, outcomes)
+    known = {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}
+    found = table.read(path, known, outcomes)
     conditions = {at[name][0]: points.values for name, points in found.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in found.items() if name not in at)
     unclear = _unclear(scenario, conditions)
@@ -90,7 +92,9 @@ def read(path: Path, scenario: Scenario) -> Measured:
         )
     if unclear:
         raise BadInput([f"{path}: {unclear}"])
-    return Measured(path, scenario.contact.kind, conditions, curves)
+    extremes = ((name, points.values.min(), points.values.max(), known[name].unit) for name, points in found.items())
+    ranges = ", ".join(f"{name} {low:.4g} to {high:.4g} {unit}" for name, low, high, unit in extremes)
+    return Measured(path, scenario.contact.kind, conditions, curves, ranges)
 
 
 def _against(conditions: dict[str, Array], curves: tuple[Curve, ...]) -> str:

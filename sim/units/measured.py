@@ -16,8 +16,6 @@ Array = NDArray[np.float64]
 
 #: End of the names of columns with standard errors.
 ERROR = "_error"
-#: Characters of a cell that are shown.
-_SHOWN = 40
 
 
 class Points(NamedTuple):
@@ -33,8 +31,7 @@ def read(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quant
     Parameters
     ----------
     path : Path
-        CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``, named by the user:
-        messages show what stands in a cell.
+        CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``.
     known : dict of str to Quantity
         All names that a column may have.
     outcomes : dict of str to Quantity
@@ -52,9 +49,7 @@ def read(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quant
     except OSError as fault:
         raise BadInput([f"{path}: cannot be read ({fault.strerror}); name a CSV file"]) from None
     except TableError as fault:
-        said, sign, cure = str(fault).partition("; ")
-        shown = f' (the cell has "{fault.cell[:_SHOWN]}")' if fault.cell else ""
-        raise BadInput([f"{path}: {said}{shown}{sign}{cure}"]) from None
+        raise BadInput([f"{path}: {fault}"]) from None
 
 
 def given(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:

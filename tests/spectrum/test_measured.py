@@ -11,7 +11,9 @@ from pydantic import TypeAdapter, ValidationError
 
 from sim.numerics.grid import Grid, Rectangle
 from sim.spectrum.families import Band, SelfAffine, Spectrum
-from sim.spectrum.measured import Measured, Tabulated, periodogram, radial_average
+from sim.spectrum.measured import Measured
+from sim.spectrum.periodogram import periodogram, radial_average
+from sim.spectrum.tabulated import Tabulated
 
 TURN = 2 * math.pi
 
@@ -107,11 +109,11 @@ def test_a_table_is_read_from_csv_with_its_units(files):
         ),
         ("q [rad/m], C [m^3]\n1, 1\n2, 1\n", "it is a spectrum of heights"),
         ("q [rad/m], C [kPa^2 um]\n1, 1\n2, 1\n", "it is the spectrum of a line; give that of the plane"),
-        ("1 1\n2 1\n", r'psd.csv: line 1: the columns have no header; .* header = "q \[rad/m\], C \[Pa\^2 m\^2\]"'),
-        ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C is nan"),
+        ("1 1\n2 1\n", r'psd.csv: the columns have no header; .* header = "q \[rad/m\], C \[Pa\^2 m\^2\]"'),
+        ("q [rad/m], C [Pa^2 m^2]\n1, 1\n2, nan\n", "line 3: C must be finite"),
         ("q [rad/m], C [Pa^2 m^2]\n0, 1\n2, 0\n", "psd.csv: line 2: q must be above 0"),
         ("q [rad/m], C [Pa^2 m^2]\n1, -1\n2, 0\n", "line 2: C must be at least 0"),
-        ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", 'line 1: column "C" has a unit that is not a unit of'),
+        ("q [rad/m], C [Pa^2]\n1, 1\n2, 0\n", 'line 1: column "C" has the unit "Pa.2", which is not a unit of'),
         ("k, S\n1, 1\n2, 0\n", 'psd.csv: line 1: column "q" is missing'),
         ("", "psd.csv: the table is empty"),
     ],
@@ -312,7 +314,7 @@ def test_netcdf_without_coordinates_takes_the_spacing_of_the_key(files):
     assert_allclose(found.densities, 1.0, rtol=1e-10, atol=0)
     for given, words in [
         ({"variable": "tau"}, "no coordinates; give spacing"),
-        ({"variable": "tua", "spacing": 0.1}, r'no variable "tua"; .* \(found: tau\)'),
+        ({"variable": "tua", "spacing": 0.1}, r'no variable "tua"; name it'),
     ]:
         with pytest.raises(ValidationError, match=words):
             read(files, model="measured", file="maps.nc", **given)
@@ -343,8 +345,8 @@ def test_a_wrong_map_is_refused_with_the_cure(files, change, words):
     ("given", "words"),
     [
         ({"file": "a.csv"}, "no coordinates; give spacing"),
-        ({"file": "missing.csv", "spacing": 1}, "missing.csv cannot be read"),
-        ({"file": "missing.nc", "spacing": 1}, "missing.nc cannot be read"),
+        ({"file": "missing.csv", "spacing": 1}, "missing.csv: cannot be read"),
+        ({"file": "missing.nc", "spacing": 1}, "missing.nc: cannot be read"),
         ({"file": "a.nc", "spacing": 1}, "a.nc: "),
         ({"file": "bad.csv", "spacing": 1}, "bad.csv: line 1: value is not a number"),
         ({"file": "a.csv", "spacing": "-1 m"}, "above 0"),

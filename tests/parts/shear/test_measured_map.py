@@ -303,7 +303,7 @@ def test_check_prints_the_energy_of_the_map_beside_that_of_its_spectrum(tmp_path
     [
         ("x [m], stress [Pa]\n1, 2\n", "value is not a number"),
         ("1\n", "too small"),
-        ("1, 2\n3\n", "complete the row"),
+        ("1, 2\n3\n", "1 cells where the first row has 2"),
         ("\n".join(["1, nan, 3, 4, 5, 6, 7, 8"] * 8), "gaps"),
     ],
 )
