@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from sim.engine import march
 from sim.laws import jkr
 from sim.parts import drive
-from sim.parts.bonds import cohorts, models as bonds, tracked as tracks
+from sim.parts.bonds import models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
@@ -62,7 +62,7 @@ def test_tracked_bonds_become_cohorts_as_their_number_grows(rupture, sites):
     members, recipe = 400, {"rupture": rupture, **STRETCHED, "start_from": "bonded"}
     dense = bonds.Cohort(**recipe)
     exact = last(bonds=dense, drive=STARTED)
-    share, stress = cohorts.bound(exact.bonds.cohorts)[0], exact.bonding.stress[0]
+    share, stress = exact.bonds.cohorts.weight.sum(), exact.bonding.stress[0]
     varying = exact.bonding.varying[0]
     few = bonds.Tracked(**recipe, sites=sites)
     found = last(members, bonds=few, drive=STARTED)

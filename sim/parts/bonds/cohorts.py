@@ -17,15 +17,15 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import exp
-from sim.parts.bonds.rupture import RuptureRate, fresh_integral, growth, hazard_integral, hazard_time, law_of, rate_at
+from sim.parts.bonds.rupture import RuptureRate, fresh_integral, growth, hazard_integral, hazard_time, rate_at
 from sim.parts.exchange import Array
 
 
 @device
 def settle(weight, stretch, width, count, direction, travelled, rules):
-    """Merge ``count`` cohorts in place until at most ``rules.most`` are left; the number left.
+    """Merge ``count`` cohorts in place until at most ``rules.most`` are left, and return the number left.
 
-    If that is not enough, sharp fronts within a cell are given up, and then the lattice is made coarser.
+    If plain merging does not suffice, sharp fronts within a cell are merged, too, and then the lattice is made coarser.
     """
     _sort(weight, stretch, width, count, direction)
     finest, cell, fronts = 64, rules.cell, rules.limit < math.inf
@@ -43,7 +43,7 @@ def settle(weight, stretch, width, count, direction, travelled, rules):
 
 @device
 def _sort(weight, stretch, width, count, direction):
-    """Farthest along ``direction`` first; cohorts come almost in that order, oldest first."""
+    """Sort cohorts in place, farthest along ``direction`` first; oldest first is almost that order."""
     for i in range(1, count):
         w, x, b = weight[i], stretch[i], width[i]
         j = i
@@ -55,9 +55,9 @@ def _sort(weight, stretch, width, count, direction):
 
 @device
 def _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules):
-    """Merge sorted cohorts cell by cell; the number left.
+    """Merge sorted cohorts cell by cell, and return the number left.
 
-    A cell of many bonds is halved until its width times its share is below ``rules.heavy``: a cell
+    A cell of many bonds is halved until its width times its share is below ``rules.heavy``. A cell
     that comes back through zero, where the rupture has a kink, then errs by less than the tolerance.
     """
     whole = 0.0
@@ -73,15 +73,14 @@ def _merge(weight, stretch, width, count, travelled, cell, finest, fronts, rules
         parts = 1
         while parts < finest and cell * rules.steepness * inside > rules.heavy * whole * parts * parts:
             parts *= 2
-        segments = rules.limit < math.inf
-        left = _merge_cell(weight, stretch, width, first, last, left, travelled, cell / parts, segments, fronts)
+        left = _merge_cell(weight, stretch, width, first, last, left, travelled, cell / parts, fronts, rules)
         first = last
     return left
 
 
 @device
-def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, segments, fronts):
-    """Merge the cohorts ``first`` to ``last`` in cells of one width, writing from ``left`` on; where writing ends."""
+def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, fronts, rules):
+    """Merge the cohorts ``first`` to ``last`` in cells of one width, writing from ``left`` on; return the end."""
     while first < last:
         place = math.floor((stretch[first] - travelled) / cell)
         end = first + 1
@@ -89,32 +88,29 @@ def _merge_cell(weight, stretch, width, first, last, left, travelled, cell, segm
             if fronts and not _alike(weight, width, end - 1, end):
                 break
             end += 1
-        left += _gauss(weight, stretch, width, first, end, left, segments)
+        left += _gauss(weight, stretch, width, first, end, left, rules.limit < math.inf)
         first = end
     return left
 
 
 @device
-def _alike(weight, width, one, other):
-    """True if two neighbouring segments have about the same density: a sharp front between others is not smeared."""
-    here, there = weight[one] * width[other], weight[other] * width[one]
-    return here <= 4.0 * there and there <= 4.0 * here
+def _alike(weight, width, i, j):
+    """True if two neighbouring segments have about the same density, so that merging them smears no sharp front."""
+    density, beyond = weight[i] * width[j], weight[j] * width[i]
+    return density <= 4.0 * beyond and beyond <= 4.0 * density
 
 
 @device
 def _gauss(weight, stretch, width, first, end, left, segments):
-    """Write the cohorts ``first`` to ``end`` as two points (or one segment) of equal moments; how many.
+    """Write the cohorts ``first`` to ``end`` as two points, or one segment, of equal moments, and return their number.
 
     Two points are the Gauss rule of the group: positive weights, inside its hull, moments 0 to 3
-    exact. A segment keeps moments 0 to 2.
+    exact. A segment has moments 0 to 2 exact.
     """
     if end - first <= (1 if segments else 2):
         for i in range(end - first):
-            weight[left + i], stretch[left + i], width[left + i] = (
-                weight[first + i],
-                stretch[first + i],
-                width[first + i],
-            )
+            w, x, b = weight[first + i], stretch[first + i], width[first + i]
+            weight[left + i], stretch[left + i], width[left + i] = w, x, b
         return end - first
     total, start, mean = 0.0, stretch[first], 0.0
     for i in range(first, end):
@@ -132,8 +128,8 @@ def _gauss(weight, stretch, width, first, end, left, segments):
         return 1
     lean = 0.5 * cube / total / square
     reach = math.sqrt(lean * lean + square)
-    above = square / (reach + math.fabs(lean))  # the nearer node's distance from the mean, without cancellation
     below = reach + math.fabs(lean)
+    above = square / below  # the nearer node's distance from the mean, without cancellation
     if lean > 0.0:
         above, below = below, above
     weight[left], stretch[left], width[left] = total * (below / (above + below)), mean + above, 0.0
@@ -142,14 +138,14 @@ def _gauss(weight, stretch, width, first, end, left, segments):
 
 
 class Rules(NamedTuple):
-    """Numbers that all rows of a population share."""
+    """Constants that all rows of a population share."""
 
     law: tuple[float, ...]  # RuptureRate
-    limit: float  # its limit [m]
+    limit: float  # limit of the stretch [m]
     steepness: float  # largest relative change of the rupture rate per stretch [1/m]
     rebinding: float
     tolerance: float
-    largest: float  # longest step of its own [s]
+    largest: float  # longest sub-step [s]
     cell: float  # width of a merging cell [m]
     heavy: float  # width × share of a cell allowed, in units of 1/steepness
     most: float  # cohorts left by merging
@@ -157,13 +153,15 @@ class Rules(NamedTuple):
 
 @device
 def rules_of(numbers):
-    own = numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5], numbers[6], numbers[7]
-    return Rules(law_of(numbers[8:]), *own)
+    """Return the ``Rules`` of an array of ``numbers_of``."""
+    law = numbers[8], numbers[9], numbers[10], numbers[11], numbers[12]
+    cells = numbers[5], numbers[6], numbers[7]
+    return Rules(law, numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], *cells)
 
 
 @device
 def inside(stretch, width, limit):
-    """The part of a segment that lies between ± ``limit``."""
+    """Return the share of a segment that lies between ± ``limit`` [1]."""
     if width == 0.0:
         return 1.0 if math.fabs(stretch) < limit else 0.0
     over = max(0.0, stretch + 0.5 * width - limit) + max(0.0, -limit - stretch + 0.5 * width)
@@ -172,39 +170,39 @@ def inside(stretch, width, limit):
 
 @device
 def survive(pool, count, move, speed, step, off, rules):
-    """Bonds that outlive a third of a step and all of it; pool[4] gets what outlives it, cohort by cohort.
+    """Return the share of bonds that outlive a third of a step and all of it, and write each cohort's to pool[4].
 
-    Their stretch is ``off`` by so much on average from that of a motion at constant speed.
+    ``off`` is the mean deviation of their stretch from that of a motion at constant speed [m].
     """
-    weight, stretch, width, steepness, kept, kept_early = pool[0], pool[1], pool[2], pool[3], pool[4], pool[8]
+    weight, stretch, width, steepness, survivors, survivors_early = pool[0], pool[1], pool[2], pool[3], pool[4], pool[8]
     early, short = step / 3.0, move / 3.0
     soon, late = fresh_integral(early, speed, rules.law), fresh_integral(step, speed, rules.law)
     for i in range(count):
-        kept_early[i] = weight[i] * exp(-steepness[i] * soon)
-        kept[i] = weight[i] * exp(-steepness[i] * late)
+        survivors_early[i] = weight[i] * exp(-steepness[i] * soon)
+        survivors[i] = weight[i] * exp(-steepness[i] * late)
     at_early, at_end = 0.0, 0.0
     for i in range(count):
         if steepness[i] == 0.0:
-            kept_early[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, short, early, rules.law))
-            kept[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, move, step, rules.law))
+            survivors_early[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, short, early, rules.law))
+            survivors[i] = weight[i] * math.exp(-hazard_integral(stretch[i] + off, move, step, rules.law))
         if rules.limit < math.inf:
-            kept_early[i] *= inside(stretch[i] + short, width[i], rules.limit)
-            kept[i] *= inside(stretch[i] + move, width[i], rules.limit)
-        at_early += kept_early[i]
-        at_end += kept[i]
+            survivors_early[i] *= inside(stretch[i] + short, width[i], rules.limit)
+            survivors[i] *= inside(stretch[i] + move, width[i], rules.limit)
+        at_early += survivors_early[i]
+        at_end += survivors[i]
     return at_early, at_end
 
 
 @device
 def steepen(pool, count, slip, off, rules):
-    """pool[3]: ∫k dt of each bond over that of a fresh one, where such a factor exists; 0 marks the others."""
+    """Write ∫k dt of each bond over that of a fresh one to pool[3], or 0 if no such factor exists."""
     for i in range(count):
         pool[3, i] = growth(pool[1, i] + off, slip, rules.law)
 
 
 @device
 def births(free, early, late, step, speed, rules):
-    """Births of a step by Radau IIA: weights at its third and at its end, free sites then, and the error.
+    """Return the births of a step by Radau IIA: weights at its third and at its end, free sites then, and the error.
 
     F(t) = 1 − R(t) − ∫k_on F(s) S(t − s)ds at t = h/3 and h, R = ``early`` and ``late``, the integral by the
     two-stage rule: third order, and stable for any k_on h. The error is the distance to the
@@ -221,87 +219,86 @@ def births(free, early, late, step, speed, rules):
     error = math.fabs(other + 0.25 * z * last - c * first)
     if min(first, last) >= 0.0:
         return c * first, 0.25 * z * last, 0.0, error
-    made = min(max(q - last, 0.0), q)  # only roundings, or a step too short to refuse, end with these
-    return (made if first > 0.0 else 0.0), (0.0 if first > 0.0 else made), min(first, last), error
+    born = min(max(q - last, 0.0), q)  # only roundings, or a step too short to refuse, end with these
+    return (born if first > 0.0 else 0.0), (0.0 if first > 0.0 else born), min(first, last), error
 
 
 @device
-def carry(pool, count, move, off, one, two, rules):
-    """Accept a step: keep what survived, move it, drop the negligible, add the births; the new count."""
-    weight, stretch, width, kept = pool[0], pool[1], pool[2], pool[4]
-    whole = one + two
+def carry(pool, count, move, off, born_early, born_late, rules):
+    """Accept a step: move the survivors, drop negligible cohorts, add the births, and return the new count."""
+    weight, stretch, width, survivors = pool[0], pool[1], pool[2], pool[4]
+    whole = born_early + born_late
     for i in range(count):
-        whole += kept[i]
+        whole += survivors[i]
     left = 0
     for i in range(count):
-        if kept[i] > 1e-18 * whole:
-            weight[left], stretch[left], width[left] = kept[i], stretch[i] + move, width[i]
+        if survivors[i] > 1e-18 * whole:
+            weight[left], stretch[left], width[left] = survivors[i], stretch[i] + move, width[i]
             if rules.limit < math.inf:
                 low = max(stretch[left] - 0.5 * width[i], -rules.limit)
                 high = min(stretch[left] + 0.5 * width[i], rules.limit)
                 stretch[left], width[left] = 0.5 * (low + high), high - low
             left += 1
-    if one + two <= 1e-18 * whole:
+    if born_early + born_late <= 1e-18 * whole:
         return left
     far = 2.0 / 3.0 * move - 4.0 / 3.0 * off
     if rules.limit < math.inf or far == 0.0:
-        share = one / (one + two)
-        weight[left], stretch[left], width[left] = one + two, share * far, 0.0
+        share = born_early / (born_early + born_late)
+        weight[left], stretch[left], width[left] = born_early + born_late, share * far, 0.0
         width[left] = math.sqrt(12.0 * share * (1.0 - share)) * math.fabs(far)
         return left + 1
-    weight[left], stretch[left], width[left] = one, far, 0.0
-    weight[left + 1], stretch[left + 1], width[left + 1] = two, 0.0, 0.0
-    return left + (2 if two > 0.0 else 1)
+    weight[left], stretch[left], width[left] = born_early, far, 0.0
+    weight[left + 1], stretch[left + 1], width[left + 1] = born_late, 0.0, 0.0
+    return left + (2 if born_late > 0.0 else 1)
 
 
 @device
 def try_step(pool, count, move, speed, step, off, free, rules):
-    """One step tried: births at its two stages, and the factor by which the step should change; < 1 refuses it."""
+    """Try a step; return births at its two stages, and the factor by which the step should change (< 1 refuses it)."""
     early, late = survive(pool, count, move, speed, step, off, rules)
     if rules.rebinding == 0.0:
         return 0.0, 0.0, 4.0
-    one, two, lowest, error = births(free, early, late, step, speed, rules)
+    born_early, born_late, lowest, error = births(free, early, late, step, speed, rules)
     if lowest < -1e-14:
-        return one, two, 0.2
-    allowed = rules.tolerance / 3.0 * (late + one + two + 1e-9 * (1.0 - free)) + 1e-15 * (1.0 + rules.rebinding * step)
+        return born_early, born_late, 0.2
+    allowed = rules.tolerance / 3.0 * (late + born_early + born_late + 1e-9 * (1.0 - free)) + 1e-15 * (
+        1.0 + rules.rebinding * step
+    )
     factor = 4.0 if error <= 0.0 else (allowed / error) ** (1.0 / 3.0)
     if factor < 1.0:
-        return one, two, max(0.02, 0.85 * factor)
-    return one, two, min(4.0, max(1.0, 0.9 * factor))
+        return born_early, born_late, max(0.02, 0.85 * factor)
+    return born_early, born_late, min(4.0, max(1.0, 0.9 * factor))
 
 
 @device
 def _forgets(pool, other, count, speed, duration, rules):
-    """Number of cohorts of the steady state in pool[5:] if a step is so long that nothing else is left, else 0."""
-    if rules.rebinding == 0.0:
-        return 0, 0.0
+    """Return the number of cohorts of the steady state, written to ``other``, if a step forgets its start, else 0."""
     depth = math.log(100.0 / rules.tolerance)
-    typical = hazard_time(0.0, speed, 1.0, rules.law)
-    if not duration > depth * typical:
-        return 0, 0.0
-    found, life, square = fill_steady(other, speed, rules)
+    if rules.rebinding == 0.0 or not duration > depth * hazard_time(0.0, speed, 1.0, rules.law):
+        return 0
+    steady_count, life, square = fill_steady(other, speed, rules)
     pause = 1.0 / rules.rebinding
     cycle = life + pause
     spread = max(0.0, 2.0 * square / life / life - 1.0) * (life / cycle) ** 2 + (pause / cycle) ** 2
     lives = min(300.0, depth / min(1.0, 2.0 * math.pi**2 * spread))
     rest = duration - lives * life
     if rest <= 0.0:
-        return 0, 0.0
+        return 0
     _, left = survive(pool, count, speed * rest, speed, rest, 0.0, rules)
-    return (found if left <= 1e-3 * rules.tolerance * (life / cycle) else 0), life
+    return steady_count if left <= 1e-3 * rules.tolerance * (life / cycle) else 0
 
 
 @device
 def _step_row(pool, count, travelled, settled, slip, duration, rules):
-    """Advance one population by a clock step in steps of its own; cohorts, slider position and settled number."""
+    """Advance a population by a clock step in sub-steps; return its cohorts, slider position and settled number."""
     speed = min(max(slip / duration, -1e200), 1e200) if duration > 0.0 else 0.0
     direction = -1.0 if slip < 0.0 else 1.0
     steepen(pool, count, slip, 0.0, rules)
-    found, _ = _forgets(pool, pool[5:], count, speed, duration, rules)
-    if found > 0:
+    steady_count = _forgets(pool, pool[5:], count, speed, duration, rules)
+    if steady_count > 0:
         for k in range(3):
-            pool[k, :found] = pool[5 + k, :found]
-        left = settle(pool[0], pool[1], pool[2], found, direction, 0.0, rules)
+            pool[k, :steady_count] = pool[5 + k, :steady_count]
+        left = settle(pool[0], pool[1], pool[2], steady_count, direction, 0.0, rules)
         return left, 0.0, left
     typical = hazard_time(0.0, speed, 1.0, rules.law)
     longest = min(rules.largest, typical * (7.0 * rules.tolerance) ** (1.0 / 3.0))
@@ -322,11 +319,11 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
         for i in range(count):
             bound += pool[0, i]
         move = speed * step if done > 0.0 or going else slip
-        one, two, factor = try_step(pool, count, move, speed, step, 0.0, max(0.0, 1.0 - bound), rules)
+        born_early, born_late, factor = try_step(pool, count, move, speed, step, 0.0, max(0.0, 1.0 - bound), rules)
         if factor < 1.0 and step > shortest:
             step, going = max(step * factor, shortest), True
             continue
-        count = carry(pool, count, move, 0.0, one, two, rules)
+        count = carry(pool, count, move, 0.0, born_early, born_late, rules)
         travelled += move
         done += step
         step *= max(factor, 1.0)
@@ -338,9 +335,13 @@ def _step_row(pool, count, travelled, settled, slip, duration, rules):
     return count, travelled, settled
 
 
+#: Arrays of ``Cohorts``.
+_COHORTS = "UniTuple(float64[:,::1], 4)"
+
+
 @device
 def read_row(pool, weight, stretch, width, share):
-    """Read a ``share`` of each cohort of a row into a pool, empty places left out; their number."""
+    """Read a ``share`` of each cohort of a row into a pool, without empty places, and return their number."""
     count = 0
     for i in range(weight.size):
         if weight[i] * share > 0.0:
@@ -350,26 +351,10 @@ def read_row(pool, weight, stretch, width, share):
     return count
 
 
-@kernel(
-    "void(float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:], float64[:,:], float64[:],"
-    " float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,:,::1])"
-)
-def step_rows(
-    weight,
-    stretch,
-    width,
-    lattice,
-    share,
-    slip,
-    duration,
-    numbers,
-    new_weight,
-    new_stretch,
-    new_width,
-    new_lattice,
-    sums,
-):
-    """Advance all rows by all steps, each row by itself from a ``share`` of its bonds; its sums after each step."""
+@kernel(f"void({_COHORTS}, float64[:], float64[:,:], float64[:], float64[::1], {_COHORTS}, float64[:,:,::1])")
+def step_rows(before, share, slip, duration, numbers, after, sums):
+    """Advance all rows by all steps, each row from a ``share`` of its bonds, and write its sums after each step."""
+    (weight, stretch, width, lattice), (new_weight, new_stretch, new_width, new_lattice) = before, after
     rules = rules_of(numbers)
     rows, capacity = new_weight.shape
     pool = np.empty((9, capacity + 520))
@@ -394,7 +379,7 @@ def step_rows(
 
 @device
 def write_row(pool, count, weight, stretch, width):
-    """Write the first ``count`` cohorts of a pool into a row, zeros behind them; a row of one width has none."""
+    """Write the first ``count`` cohorts of a pool into a row, and zeros behind them."""
     weight[:count], stretch[:count] = pool[0, :count], pool[1, :count]
     weight[count:], stretch[count:] = 0.0, 0.0
     if width.size > 1:
@@ -403,7 +388,7 @@ def write_row(pool, count, weight, stretch, width):
 
 @device
 def sum_row(weight, stretch, width, rules, lost, sums):
-    """Sums over the cohorts of a row: as of ``cohorts.moments``; ``lost`` is room for a number of each."""
+    """Write the sums over the cohorts of a row, as of ``moments``; ``lost`` is a work array."""
     sums[:] = 0.0
     for i in range(weight.size):
         lost[i] = weight[i] * stretch[i] * rate_at(stretch[i], rules.law)
@@ -424,7 +409,7 @@ def sum_row(weight, stretch, width, rules, lost, sums):
 
 @kernel("void(float64[:,::1], float64[:,::1], float64[:,::1], float64[::1], float64[:,::1])")
 def sum_rows(weight, stretch, width, numbers, sums):
-    """Sums over the cohorts of each row, shape (5, rows)."""
+    """Write the sums over the cohorts of each row, shape (5, rows)."""
     rules, lost = rules_of(numbers), np.empty(weight.shape[1])
     for m in range(len(weight)):
         sum_row(weight[m], stretch[m], width[m], rules, lost, sums[:, m])
@@ -432,7 +417,7 @@ def sum_rows(weight, stretch, width, numbers, sums):
 
 @kernel("void(float64, float64[::1], float64[:,::1], float64[:,::1], float64[:,::1], float64[:,::1])")
 def settle_steady(speed, numbers, weight, stretch, width, lattice):
-    """The merged steady state of one row."""
+    """Write the merged steady state of one row."""
     rules = rules_of(numbers)
     pool = np.empty((3, weight.shape[1] + 520))
     count, _, _ = fill_steady(pool, min(max(speed, -1e200), 1e200), rules)
@@ -442,17 +427,12 @@ def settle_steady(speed, numbers, weight, stretch, width, lattice):
 
 
 _POINTS = np.polynomial.legendre.leggauss(5)
-
-
-_NODES = tuple((0.5 + 0.5 * _POINTS[0]).tolist())
-
-
-_SHARES = tuple((0.5 * _POINTS[1]).tolist())
+_NODES, _SHARES = tuple((0.5 + 0.5 * _POINTS[0]).tolist()), tuple((0.5 * _POINTS[1]).tolist())
 
 
 @device
 def fill_steady(room, speed, rules):
-    """Write the steady state at ``speed`` into room[0:3] (weight, stretch, width): (cohorts, ⟨T⟩, ⟨T²⟩/2).
+    """Write the steady state at ``speed`` into room[0:3] (weight, stretch, width); return (cohorts, ⟨T⟩, ⟨T²⟩/2).
 
     Notes
     -----
@@ -494,10 +474,6 @@ def fill_steady(room, speed, rules):
     return count, life, square
 
 
-#: Share of the bonds that stay where none are lost.
-_ALL = np.ones(1)
-
-
 class Cohorts(NamedTuple):
     """State of bond populations, one in each row.
 
@@ -520,7 +496,7 @@ class Cohorts(NamedTuple):
 
 
 def empty(rupture: RuptureRate, tolerance: float) -> Cohorts:
-    """One population without a bond."""
+    """Return a population without a bond."""
     _check(rupture, tolerance)
     capacity = 5 * _most(rupture, tolerance) // 4 + 32
     blank = np.zeros((1, capacity))
@@ -529,12 +505,12 @@ def empty(rupture: RuptureRate, tolerance: float) -> Cohorts:
 
 
 def resting(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> Cohorts:
-    """One population after a long rest: the share k_on/(k_on + k0) is bound, all unstretched.
+    """Return a population after a long rest: the share k_on/(k_on + k0) is bound, all unstretched.
 
     Examples
     --------
     >>> half = resting(RuptureRate(rate=2.0, softness=1e9, limit=math.inf), rebinding_rate=2.0, tolerance=1e-4)
-    >>> float(bound(half)[0])
+    >>> float(half.weight.sum())
     0.5
     """
     rest = empty(rupture, tolerance)
@@ -544,7 +520,7 @@ def resting(rupture: RuptureRate, rebinding_rate: float, tolerance: float) -> Co
 
 
 def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance: float) -> Cohorts:
-    """One population that has slid at ``speed`` [m/s], of any sign, for ever.
+    """Return a population in steady sliding at ``speed`` [m/s], of any sign.
 
     Notes
     -----
@@ -557,15 +533,15 @@ def steady(rupture: RuptureRate, rebinding_rate: float, speed: float, tolerance:
 
     >>> bell = RuptureRate(rate=1.0, softness=1.0, limit=math.inf)
     >>> moving = steady(bell, rebinding_rate=1.0, speed=1.0, tolerance=1e-4)
-    >>> print(f"{bound(moving)[0]:.3f} of {bound(steady(bell, 1.0, 0.0, 1e-4))[0]:.1f}")
+    >>> print(f"{moving.weight.sum():.3f} of {steady(bell, 1.0, 0.0, 1e-4).weight.sum():.1f}")
     0.374 of 0.5
     """
     if rebinding_rate == 0.0 or speed == 0.0:
         return resting(rupture, rebinding_rate, tolerance)
-    found = empty(rupture, tolerance)
+    result = empty(rupture, tolerance)
     numbers = numbers_of(rupture, rebinding_rate, tolerance, math.inf)
-    settle_steady(float(speed), numbers, found.weight, found.stretch, found.width, found.lattice)
-    return found
+    settle_steady(float(speed), numbers, result.weight, result.stretch, result.width, result.lattice)
+    return result
 
 
 def advance(
@@ -576,9 +552,9 @@ def advance(
     rebinding_rate: float,
     tolerance: float,
     largest: float = math.inf,
-    share: Array = _ALL,
+    share: Array | None = None,
 ) -> tuple[Cohorts, Array]:
-    """The populations after steps of constant speed each.
+    """Return the populations after steps of constant speed each, and their moments.
 
     Parameters
     ----------
@@ -597,51 +573,48 @@ def advance(
     largest : float
         Bound on the steps that a row makes by itself within a duration [s].
     share : array, shape (1,) or (rows,)
-        Share of each row's bonds that is left before the first step [1]; the other sites are free.
+        Share of each row's bonds that is left before the first step [1], by default all; the other sites are free.
 
     Returns
     -------
     cohorts : Cohorts
-        Those at the end. A row depends, bit for bit, on its own state and slips alone.
+        The populations at the end. A row depends, bit for bit, on its own state and slips alone.
     sums : array, shape (5, steps, rows)
         Their ``moments`` after each step.
 
     Notes
     -----
-    Each row takes the whole duration at once where that is accurate and else steps of its own. In a step
+    Each row takes the whole duration at once if that is accurate, else sub-steps. In a step
     of length h the free sites solve F(t) = 1 − R(t) − ∫k_on F(s) S(t − s) ds with R and S, the survival of old and
     of fresh bonds, exact: two-stage Radau IIA collocation at h/3 and h (third order, and stable for any k_on h).
-    What it gives as births are two new cohorts, so bonds and free sites add up to one. A step that nothing
+    The births make two new cohorts, so bonds and free sites add up to one. A step that no bond
     outlives ends in the steady state.
     """
+    share = np.ones(1) if share is None else share
     lengths = {slip.shape[1], len(cohorts.weight), len(share)}
     rows = max(lengths)
     if lengths - {1, rows}:
-        raise ValueError(
-            f"{slip.shape[1]} slips do not fit {len(cohorts.weight)} populations: give one of either, or as many"
-        )
-    before = cohorts.weight, cohorts.stretch, cohorts.width, cohorts.lattice
-    after, sums = [np.zeros((rows, array.shape[1])) for array in before], np.empty((5, len(duration), rows))
-    step_rows(*before, share, slip, duration, numbers_of(rupture, rebinding_rate, tolerance, largest), *after, sums)
+        populations = f"{slip.shape[1]} slips do not fit {len(cohorts.weight)} populations"
+        raise ValueError(f"{populations}: give one of either, or as many")
+    after, sums = tuple(np.zeros((rows, a.shape[1])) for a in cohorts), np.empty((5, len(duration), rows))
+    numbers = numbers_of(rupture, rebinding_rate, tolerance, largest)
+    step_rows(tuple(cohorts), share, slip, duration, numbers, after, sums)
     return Cohorts(*after), sums
 
 
-def bound(cohorts: Cohorts) -> Array:
-    """Share of the sites that is bound [1], shape (rows,)."""
-    return np.sum(cohorts.weight, axis=1)
-
-
 def moments(cohorts: Cohorts, rupture: RuptureRate, tolerance: float) -> Array:
-    """Sums over the cohorts per site, shape (5, rows).
+    """Return sums over the cohorts per site, shape (5, rows).
 
-    Share of the sites bound [1]; stretch [m], the sum of w x; square stretch [m^2], that within the width of a cohort
-    included; density of the stretch at the rupture's limit times that limit [1], ℓ ρ(ℓ), 0 without a limit; stretch
-    that thermal rupture takes in unit time [m/s], the sum of w x k(|x|). The density is the mean over the outermost of
-    the cells that are merged, which is what the tolerance resolves.
+    - Share of the sites bound [1].
+    - Stretch [m], the sum of w x.
+    - Square stretch [m^2], with the spread within the width of a cohort.
+    - Density of the stretch at the limit of the rupture times that limit [1], ℓ ρ(ℓ); 0 without a limit. It is the mean
+      over the outermost of the merged cells, because the tolerance resolves no more.
+    - Stretch that thermal rupture takes in unit time [m/s], the sum of w x k(|x|).
     """
-    found = np.empty((5, len(cohorts.weight)))
-    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, numbers_of(rupture, 0.0, tolerance, math.inf), found)
-    return found
+    sums = np.empty((5, len(cohorts.weight)))
+    sum_rows(cohorts.weight, cohorts.stretch, cohorts.width, numbers_of(rupture, 0.0, tolerance, math.inf), sums)
+    return sums
 
 
 def _check(rupture: RuptureRate, tolerance: float) -> None:
@@ -652,7 +625,7 @@ def _check(rupture: RuptureRate, tolerance: float) -> None:
 
 
 def _most(rupture: RuptureRate, tolerance: float) -> int:
-    """Cohorts left by merging, at most."""
+    """Return the largest number of cohorts left by merging."""
     if rupture.limit < math.inf:
         return int(min(4096.0, 2.2 / math.sqrt(tolerance) + 64.0))
     if rupture.steepness == 0.0:
@@ -666,20 +639,16 @@ _KINK = 66.0
 
 @functools.lru_cache(maxsize=256)
 def numbers_of(rupture: RuptureRate, rebinding_rate: float, tolerance: float, largest: float) -> Array:
-    """``Rules`` as an array.
+    """Return ``Rules`` as an array.
 
     A two-point Gauss rule over a cell of width d errs by d⁴/4320 of the cell's bonds, a uniform segment
     by d²/8 of them. A cell that contains zero averages a rupture with a kink and errs by 0.015 of its
     width times its share at most.
     """
-    cell, most = _cell(rupture, tolerance), _most(rupture, tolerance)
-    heavy = _KINK * tolerance
-    own = rupture.limit, rupture.steepness, rebinding_rate, tolerance, largest, cell, heavy, most
-    return np.array([*own, *rupture], dtype=float)
-
-
-def _cell(rupture: RuptureRate, tolerance: float) -> float:
-    """Width of the cells within which cohorts are merged [m]."""
+    cell = math.inf
     if rupture.limit < math.inf:
-        return rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
-    return (432.0 * tolerance) ** 0.25 / rupture.steepness if rupture.steepness > 0.0 else math.inf
+        cell = rupture.limit * max(math.sqrt(tolerance), 1.0 / 1800.0)
+    elif rupture.steepness > 0.0:
+        cell = (432.0 * tolerance) ** 0.25 / rupture.steepness
+    steps = rupture.limit, rupture.steepness, rebinding_rate, tolerance, largest
+    return np.array([*steps, cell, _KINK * tolerance, _most(rupture, tolerance), *rupture], dtype=float)

@@ -1,21 +1,21 @@
-"""Number and mean stretch of a bond population in time, every bond taken at the mean stretch.
+"""Number and mean stretch of a bond population in time, where every bond has the mean stretch.
 
 With the share N of the sites that is bound, M = N × (mean stretch), a rebinding rate k_on, a rupture
 rate k and a sliding speed V that is constant over a step,
 
     ``dN/dt = k_on (1 - N) - N k(|x|)``,    ``dM/dt = N V - M k(|x|)``,    ``x = M/N``
 
-since new bonds are unstretched, every bond goes with the slider and those that break take their
-stretch along. This is exact where k does not depend on the stretch. Where it does it is a mean field,
-for the bonds of a population differ: under Bell's rate it overpredicts the friction maximum by 27 to
-47 %, whatever the step in time.
+since new bonds are unstretched, every bond moves with the slider, and bonds that break take their
+stretch along. This is exact if k does not depend on the stretch. If it does, this is a mean field,
+because the bonds of a population differ: under Bell's rate it overpredicts the friction maximum by 27 to
+47 % for any step in time.
 
-A cut-off stretch l makes every bond break after the way l. Its rates in this closure are ``V/l`` for N
-and ``2V/l`` for M: bonds of all stretches up to l are equally many, those that break are stretched by l
-and the mean is l/2, so that a break takes twice the mean. The stress of steady sliding is then that of
-the renewal of such bonds, k_on closing and nothing else opening: κ (l/2) N with N = 1/(1 + V/(l k_on)).
-(Losing the mean with every break would give κ l N.) It does not go to zero with the speed but ends at
-the sign of it: the Coulomb friction of bonds that nothing but sliding breaks.
+A cut-off stretch l makes every bond break after the slip l. Its rates in this closure are ``V/l`` for N
+and ``2V/l`` for M. Bonds of all stretches up to l are equally many, bonds that break are stretched by l,
+and the mean is l/2, so a break takes twice the mean. The stress of steady sliding is then that of
+the renewal of such bonds, where k_on closes and nothing else opens: κ (l/2) N with N = 1/(1 + V/(l k_on)).
+(Losing the mean with every break would give κ l N.) As the speed goes to zero the stress does not vanish but keeps
+the sign of the speed: the Coulomb friction of bonds that only sliding breaks.
 """
 
 import math
@@ -28,7 +28,7 @@ from sim.parts.bonds.rupture import RuptureRate
 from sim.parts.exchange import Array
 
 #: Largest error of N and of M that a sub-step under Bell's rate may make, by its embedded lower order, over N and M.
-#: The fifth-order result that is kept is better; errors of sub-steps fade with the bonds that carry them.
+#: The fifth-order result is better; errors of sub-steps fade with the bonds that carry them.
 LOCAL_ERROR = 1e-9
 
 #: Most sub-steps, tries included, of one step; one that needs more gives nan. Jumps of speed over twenty decades
@@ -40,16 +40,16 @@ _NONE = 1e-290  # share below which no site is bound
 
 
 def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
-    """Population after a step of sliding at constant speed.
+    """Return the population after each of many steps of constant speed.
 
     Parameters
     ----------
     bound, moment : array, shape (1,) or (rows,)
         Share N of the sites that is bound [1], and N times the mean stretch of a bond, M [m].
-    slip, path : array, shape (1,) or (rows,)
-        Displacement, signed, and distance slid over the step [m].
-    duration : float
-        Length of the step [s]; may be 0.
+    slip, path : array, shape (steps, 1) or (steps, rows)
+        Displacement, signed, and distance slid over each step [m].
+    duration : array, shape (steps,)
+        Length of each step [s]; may be 0.
     rupture : RuptureRate
         Rupture rate of a bond; a softness and a finite limit together have no first-moment form here.
     rebinding_rate : float
@@ -57,8 +57,8 @@ def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding
 
     Returns
     -------
-    bound, moment : array, shape (1,) or (rows,)
-        N in [0, 1] and M at the end of the step; nan where more than ``MOST_STEPS`` sub-steps would be
+    bound, moment : array, shape (steps, 1) or (steps, rows)
+        N in [0, 1] and M at the end of each step; nan where more than ``MOST_STEPS`` sub-steps would be
         needed, as for mean stretches some 700 times Bell's.
 
     Raises
@@ -68,34 +68,21 @@ def advance(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding
 
     Notes
     -----
-    Without softness the step is exact whatever its length T (see ``_linear``). Under Bell's rate it is
+    Without softness a step of any length T is exact (see ``_linear``). Under Bell's rate it is
     made of steps of the Rosenbrock method Rodas5P (Steinebach, BIT 63, 27 (2023)): fifth order, L-stable, with
     the exact Jacobian, controlled to ``LOCAL_ERROR``. A steady state is a fixed point of it for any T.
     A step that would cross M = 0, where k has a kink, first goes there.
 
     Examples
     --------
-    Under Bell's rate, a contact pulled at a hundred times the speed at which bonds begin to yield holds
-    far more at first than for ever: static friction.
+    Under Bell's rate, a contact pulled at a hundred times the speed at which bonds begin to yield resists
+    far more at first than later: static friction.
 
     >>> bell = RuptureRate(rate=1.0, softness=1.0, limit=np.inf)
-    >>> bound, moment = resting(bell, 10.0)
-    >>> force = []
-    >>> for _ in range(300):
-    ...     bound, moment = advance(bound, moment, 0.2, 0.2, 0.002, bell, 10.0)
-    ...     force.append(moment[0])
-    >>> print(f"{max(force):.2f} {force[-1]:.2f} {steady(100.0, bell, 10.0)[1][0]:.2f}")
+    >>> slip, duration = np.full((300, 1), 0.2), np.full(300, 0.002)
+    >>> _, force = advance(*steady(0.0, bell, 10.0), slip, slip, duration, bell, 10.0)
+    >>> print(f"{force.max():.2f} {force[-1, 0]:.2f} {steady(100.0, bell, 10.0)[1][0]:.2f}")
     2.40 0.86 0.86
-    """
-    bound, moment, slip, path = (np.array(value, dtype=float, ndmin=1) for value in (bound, moment, slip, path))
-    bound, moment = follow(bound, moment, slip[None], path[None], np.full(1, float(duration)), rupture, rebinding_rate)
-    return bound[0], moment[0]
-
-
-def follow(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
-    """Population after each of many steps, as of ``advance``: N and M, shape (steps, 1) or (steps, rows).
-
-    ``slip`` and ``path`` have that shape or (steps, 1), ``duration`` has the shape (steps,).
     """
     _check(rupture)
     lengths = {bound.size, moment.size, slip.shape[1], path.shape[1]}
@@ -107,25 +94,20 @@ def follow(bound, moment, slip, path, duration, rupture: RuptureRate, rebinding_
     return after[0], after[1]
 
 
-def resting(rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
-    """Population at rest for ever: N = k_on/(k_on + k(0)) [1] and M = 0 [m]; arguments as in ``advance``."""
-    return steady(0.0, rupture, rebinding_rate)
-
-
 def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
-    """Population of steady sliding.
+    """Return the population of steady sliding.
 
     Parameters
     ----------
     speed : float or array
-        V [m/s], either sign.
+        V [m/s], either sign; 0 is a long rest.
     rupture, rebinding_rate
         As in ``advance``.
 
     Returns
     -------
     bound, moment : array, at least of shape (1,)
-        N [1] and M [m]. Zero without rebinding; M is zero at rest, where bonds that only sliding breaks
+        N [1] and M [m]. Zero without rebinding. M is zero at rest, although bonds that only sliding breaks
         would keep any stretch.
 
     Notes
@@ -154,7 +136,7 @@ def steady(speed, rupture: RuptureRate, rebinding_rate) -> tuple[Array, Array]:
 
 
 def _ratio(part, whole):
-    """part/whole, and 0 of nothing."""
+    """Return part/whole, or 0 if the whole is 0."""
     return np.divide(part, whole, out=np.zeros(whole.shape), where=whole > 0.0)
 
 
@@ -165,13 +147,13 @@ def _check(rupture: RuptureRate) -> None:
 
 @device
 def _mean_decay(x):
-    """(1 - exp(-x))/x for x >= 0; 1 at zero."""
+    """Return (1 - exp(-x))/x for x >= 0; 1 at zero."""
     return -math.expm1(-x) / x if x > 0.0 else 1.0
 
 
 @device
 def _second(x):
-    """(exp(x) - 1 - x)/x², 1/2 at zero, for -inf < x <= 1/2."""
+    """Return (exp(x) - 1 - x)/x² for -inf < x <= 1/2; 1/2 at zero."""
     if math.fabs(x) > 0.5:
         return (math.expm1(x) - x) / (x * x)
     total = 1.0
@@ -182,9 +164,9 @@ def _second(x):
 
 @device
 def _young(low, gap, high):
-    """∫∫ over 0 < s < t < 1 of exp(-p s - q (1-t)) for {p, q} = {low, high}, gap = high - low >= 0.
+    """Return ∫∫ over 0 < s < t < 1 of exp(-p s - q (1-t)) for {p, q} = {low, high}, gap = high - low >= 0.
 
-    The divided difference of exp at 0, -p and -q; a sum of two positive terms.
+    It is the divided difference of exp at 0, -p and -q; a sum of two positive terms.
     """
     if high == 0.0:
         return 0.5
@@ -195,7 +177,9 @@ def _young(low, gap, high):
 
 @device
 def _linear(bound, moment, slip, binding, breaking, travel):
-    """Exact step of the linear equations; the numbers of events in a step: k_on T, k T and path/l.
+    """Return N and M after an exact step of the linear equations.
+
+    ``binding``, ``breaking`` and ``travel`` are the numbers of events in a step: k_on T, k T and path/l.
 
     Notes
     -----
@@ -205,7 +189,7 @@ def _linear(bound, moment, slip, binding, breaking, travel):
         ``M(T) = M e^-q + slip (N e[-p,-q] + k_on T e[0,-p,-q])``
 
     in divided differences of the exponential, ``e[-p,-q] = (e^-p - e^-q)/(q - p)`` and
-    ``e[0,-p,-q] = ((1 - e^-p)/p - (1 - e^-q)/q)/(q - p)``, taken in forms in which nothing cancels.
+    ``e[0,-p,-q] = ((1 - e^-p)/p - (1 - e^-q)/q)/(q - p)``, in forms without cancellation.
     """
     p, q = binding + breaking + travel, breaking + 2.0 * travel
     low, high, gap = min(p, q), max(p, q), math.fabs(travel - binding)
@@ -215,7 +199,7 @@ def _linear(bound, moment, slip, binding, breaking, travel):
 
 
 def _lower(*rows: list[float]) -> Array:
-    """Rows of a strictly lower triangle, filled up with zeros."""
+    """Return the rows of a strictly lower triangle, filled up with zeros."""
     return np.array([row + [0.0] * (7 - len(row)) for row in rows])
 
 
@@ -248,10 +232,10 @@ _SLOPE = _lower(
 
 @device
 def _rosenbrock(bound, moment, step, speed, rate, binding, work):
-    """One step of Rodas5P under k = rate exp(moment/bound), moments in units of Bell's stretch.
+    """Return bound, moment and the larger of their relative errors after one step of Rodas5P.
 
-    Returns bound, moment and the larger of their relative errors: what the last stage adds is the
-    difference from the embedded fourth order. A stage without bonds has an infinite error.
+    The rate is k = rate exp(moment/bound), moments are in units of Bell's stretch. The last stage adds the
+    difference from the embedded fourth order, which is the error. A stage without bonds has an infinite error.
     """
     stretch = moment / bound
     k = rate * math.exp(stretch)
@@ -281,9 +265,9 @@ def _rosenbrock(bound, moment, step, speed, rate, binding, work):
 
 @device
 def _to_zero(bound, moment, step, below, speed, rate, binding, work):
-    """Part of ``step`` after which a moment above zero has come to zero, and bound there.
+    """Return the part of ``step`` after which a moment above zero has come to zero, and bound then.
 
-    After the whole step the moment is ``below`` zero. Regula falsi, the end that stays counting half (Illinois).
+    After the whole step the moment is ``below`` zero. Regula falsi, where the end that stays counts half (Illinois).
     """
     near, above, far, side = 0.0, moment, step, 0
     part, after = step, bound
@@ -305,7 +289,7 @@ def _to_zero(bound, moment, step, below, speed, rate, binding, work):
 
 @device
 def _first_step(bound, moment, speed, rate, binding):
-    """A fifth of the time in which bound, or the exponent of the rate, would change by one."""
+    """Return a fifth of the time in which bound, or the exponent of the rate, would change by one."""
     stretch = moment / bound
     gain, loss = binding * (1.0 - bound) / bound, rate * math.exp(stretch)
     return 0.2 / (math.fabs(gain - loss) + math.fabs(speed - stretch * gain))
@@ -313,17 +297,17 @@ def _first_step(bound, moment, speed, rate, binding):
 
 @device
 def _slow(speed, rate):
-    """Bell's rate at the steady stretch of a speed that is small beside ``rate``, or of none."""
+    """Return Bell's rate at the steady stretch of a speed that is zero or much smaller than ``rate``."""
     pace = math.fabs(speed)
     return rate * math.exp(pace / (rate + pace)) if pace > 0.0 else rate
 
 
 @device
 def _bell(bound, moment, speed, rate, binding, work):
-    """A whole step under Bell's rate, the stretch in units of Bell's and time in that of the step: bound, moment.
+    """Return bound and moment after a whole step under Bell's rate.
 
-    Sub-steps take the moment as positive and stop where it becomes zero. The error of one sets the length
-    of the next, between a tenth and six times its own.
+    The stretch is in units of Bell's and the time in units of the step. Sub-steps take the moment as positive and stop
+    if it becomes zero. The error of a sub-step sets the length of the next, between a tenth and six times its own.
     """
     left, step, sign = 1.0, 0.0, 1.0
     if not math.isfinite(bound + moment + speed):
@@ -357,25 +341,19 @@ def _bell(bound, moment, speed, rate, binding, work):
     return math.nan, math.nan
 
 
-@device
-def _at(i, size):
-    """Index of row i in an array of one entry or of all rows."""
-    return min(i, size - 1)
-
-
 @kernel("void(f8[::1], f8[::1], f8[:,:], f8[:,:], f8[:], f8, f8, f8, f8, f8[:,::1], f8[:,::1])")
 def _advance(bound, moment, slip, path, duration, rate, softness, limit, rebinding, bound_after, moment_after):
-    """All steps of every row, each by itself."""
+    """Write N and M after all steps of every row, each row by itself."""
     work = np.empty((8, 2))
     for i in range(bound_after.shape[1]):
-        share, stretch = bound[_at(i, bound.size)], moment[_at(i, moment.size)]
+        share, stretch = bound[i % bound.size], moment[i % moment.size]
         for k in range(duration.size):
-            way, breaking, binding = slip[k, _at(i, slip.shape[1])], rate * duration[k], rebinding * duration[k]
-            stiff = softness * math.fabs(stretch) <= _SMALL * share and softness * math.fabs(way) <= _SMALL * breaking
+            move, breaking, binding = slip[k, i % slip.shape[1]], rate * duration[k], rebinding * duration[k]
+            stiff = softness * math.fabs(stretch) <= _SMALL * share and softness * math.fabs(move) <= _SMALL * breaking
             if stiff or softness == 0.0 or breaking == 0.0:
-                gone, travel = _slow(softness * way, breaking), path[k, _at(i, path.shape[1])] / limit
-                share, stretch = _linear(share, stretch, way, binding, gone, travel)
+                events, travel = _slow(softness * move, breaking), path[k, i % path.shape[1]] / limit
+                share, stretch = _linear(share, stretch, move, binding, events, travel)
             else:
-                share, rest = _bell(share, softness * stretch, softness * way, breaking, binding, work)
+                share, rest = _bell(share, softness * stretch, softness * move, breaking, binding, work)
                 stretch = rest / softness
             bound_after[k, i], moment_after[k, i] = share, stretch

@@ -39,66 +39,61 @@ Area = Annotated[
     Literal["present", "carried"], Field(description='"carried": area that the contact gains comes without bonds')
 ]
 
-#: Contact radius of a population that has not seen a contact yet; share of bonds that stay where the area is no matter.
-UNSEEN, _ALL = np.full(1, np.nan), np.ones(1)
-UNSEEN.setflags(write=False)
+#: Contact radius of a population that does not depend on the area, or has not had a contact yet.
+_NO_AREA = np.full(1, np.nan)
+_NO_AREA.setflags(write=False)
 
 
-def share_kept(seen: Array, radius: Array) -> Array:
-    """Share of bound sites that is left [1] when the contact radius goes from ``seen`` to ``radius`` [m].
+def share_kept(before: Array, radius: Array) -> Array:
+    """Return the share of bound sites that is left [1] if the contact radius goes from ``before`` to ``radius`` [m].
 
-    A contact that was open (0) has none; the first contact seen (nan) keeps all.
+    A contact that was open (0) has none; the first contact (nan) keeps all.
 
     >>> print(share_kept(np.array([1.0, 2.0, 0.0, np.nan]), np.array([2.0, 1.0, 1.0, 1.0])))
     [0.25 1.   0.   1.  ]
     """
-    grown = radius > seen
-    return np.where(grown, np.square(np.divide(seen, radius, out=np.ones(grown.shape), where=grown)), 1.0)
+    grown = radius > before
+    return np.where(grown, np.square(np.divide(before, radius, out=np.ones(grown.shape), where=grown)), 1.0)
 
 
-class Common:
-    """Attributes of all models, as they are where all members share one population."""
+class _BondModel:
+    """Attributes of all bond models."""
 
     in_place: ClassVar[bool] = False
-    #: Whether they are solved through blocks of clock steps.
+    #: True if the population is solved through blocks of clock steps.
     in_blocks: ClassVar[bool] = False
-    #: Rough time of a step of a batch where it is made alone, for estimates [s].
+    #: Rough time of a single step of a batch, for estimates [s].
     step_seconds: ClassVar[float] = 0.0
 
     @property
     def numbers(self) -> int:
-        """Numbers that a member's state holds."""
+        """Count of numbers in the state of a member."""
         return 1
 
-    @property
-    def per_member(self) -> bool:
-        return False
+    def diluted(self, before: Array, radius: Array) -> tuple[Array, Array]:
+        """Return the share of bound sites left [1] over a contact of ``radius`` [m], and the radius of their area [m].
 
-    @property
-    def feeds_back(self) -> bool:
-        return False
-
-    def kept(self, seen: Array, radius: Array) -> tuple[Array, Array]:
-        """Share of bound sites left over a contact of ``radius`` [m], nan where it is open, and that of the area."""
-        return _ALL, seen
+        The radius is nan if the contact is open.
+        """
+        return np.ones(1), before
 
     def chosen(self, area: float, forces: bool) -> Self:
-        """The model for a contact of this ``area`` [m²] whose field reads the bonds' ``forces`` or not: this one."""
+        """Return this model, for any contact ``area`` [m²] and any field, reading the bonds' ``forces`` or not."""
         return self
 
     def why(self, area: float, forces: bool) -> str:
         return ""
 
     def followed(self, speeds: Array, step: float) -> float:
-        """Lives of single bonds that are followed in a step of one member at speeds [m/s], on average."""
+        """Return the mean number of bond lives that are followed in a step of one member at speeds [m/s]."""
         return 0.0
 
     def remarks(self, setting: Setting) -> list[str]:
         return []
 
 
-class OverArea(Common):
-    """Attributes of models whose population may be carried with the area of each member's own contact."""
+class _OverArea(_BondModel):
+    """Attributes of models whose population may be carried with the contact area of each member."""
 
     area: Area
 
@@ -111,21 +106,21 @@ class OverArea(Common):
         return self.area == "carried"
 
     def rows(self, noise: Noise) -> Array:
-        """Ones, one for each population: all members share one unless each has its own area."""
+        """Return ones, shape (populations,): a single population if all members share an area, else one each."""
         return np.ones(len(noise.members) if self.per_member else 1)
 
-    def kept(self, seen: Array, radius: Array) -> tuple[Array, Array]:
-        """Share of bound sites left over a contact of ``radius`` [m], nan where it is open, and that of the area.
+    def diluted(self, before: Array, radius: Array) -> tuple[Array, Array]:
+        """Return the share of bound sites left [1] over a contact of ``radius`` [m], and the radius of their area [m].
 
-        The area of a step is that at its start, so dilution follows the contact by one clock step and no
-        bond is lost in between. With an equilibrium contact and fluctuating ΔΓ the total outward motion grows without
-        bound as dt → 0, and each outward motion dilutes the bonds irreversibly: the result does not converge in dt.
-        With a ``rate_dependent`` edge it does.
+        The area of a step is that at its start, so dilution follows the
+        contact by one clock step and no bond is lost in between. With an equilibrium contact and fluctuating ΔΓ the
+        total outward motion grows without bound as dt → 0. Each outward motion dilutes the bonds irreversibly, so the
+        result does not converge in dt. With a ``rate_dependent`` edge it does.
         """
         if self.area == "present":
-            return super().kept(seen, radius)
+            return super().diluted(before, radius)
         now = np.where(np.isnan(radius), 0.0, radius)
-        return np.where(now > 0.0, share_kept(seen, now), 0.0), now  # an open contact has no bonds to fill
+        return np.where(now > 0.0, share_kept(before, now), 0.0), now  # an open contact has no bonds to fill
 
 
 Stress = Annotated[float, Quantity("Pa", "shear stress with all bonds of rest bound", "tau_0", at_least=0)]
@@ -147,16 +142,16 @@ class Population(NamedTuple):
         Fraction [1] or number of bonds.
     sense : array
         Sign of the last slip: 1, -1, or 0 before any.
-    seen : array
-        Contact radius [m] whose area the fraction refers to, nan as long as it does not matter.
+    area_radius : array
+        Contact radius [m] whose area the fraction refers to, nan if it does not matter.
     """
 
     bound: Array
     sense: Array
-    seen: Array = UNSEEN
+    area_radius: Array = _NO_AREA
 
 
-class _WithoutStretch(Common):
+class _WithoutStretch(_BondModel):
     """Attributes of all models without a stretch: their strength is proportional to the fraction."""
 
     state_class: ClassVar[type[Population]] = Population
@@ -171,13 +166,13 @@ class _WithoutStretch(Common):
         return self.stress > 0.0
 
     def advance(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Population, Bonding]:
-        bound, seen = self._bound(state, motions, radius, noise)
+        bound, area_radius = self._bound(state, motions, radius, noise)
         sense = np.empty(motions.slip.shape)
         _last_signs(motions.speed, motions.slip, state.sense, sense)
-        return Population(bound[-1], sense[-1], seen), self.bonding(Population(bound, sense))
+        return Population(bound[-1], sense[-1], area_radius), self.bonding(Population(bound, sense))
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
-        """Bonds at the end of each step, shape (steps, 1) or (steps, members), and the contact radius seen."""
+        """Return the bonds at the end of each step, shape (steps, 1) or (steps, members), and their contact radius."""
         raise NotImplementedError
 
     def bonding(self, state: Population) -> Bonding:
@@ -185,12 +180,13 @@ class _WithoutStretch(Common):
         return Bonding(state.bound, state.sense * strength, strength)
 
     def onset(self, speed: Array, body: Body) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known."""
+        """Return the onset of oscillations behind a spring at speeds [m/s], nan if unknown."""
         return Onset(*np.full((2, *speed.shape), np.nan))
 
     def steady(self, speed: Array) -> Bonding:
         fraction = self._steady_fraction(speed)
-        return Bonding(fraction, np.sign(speed) * (self.stress * fraction), self.stress * fraction)
+        strength = self.stress * fraction
+        return Bonding(fraction, np.sign(speed) * strength, strength)
 
     def _steady_fraction(self, speed: Array) -> Array:
         return np.asarray(steady_fraction(speed, self.critical_speed))
@@ -203,7 +199,7 @@ class _WithoutStretch(Common):
 
 @kernel("void(float64[:, :], float64[:, :], float64[:], float64[:, ::1])")
 def _last_signs(speed, slip, first, sense):
-    """Sign of the last slip at the end of each step: that of the speed, of the step's slip once it has stopped."""
+    """Write the sign of the last slip at the end of each step: that of the speed, or of the slip if it has stopped."""
     for m in range(sense.shape[1]):
         last = first[m]
         for k in range(len(sense)):
@@ -213,7 +209,7 @@ def _last_signs(speed, slip, first, sense):
 
 @kernel("void(float64[::1], float64[:], float64[:], float64, float64, float64[:, ::1])")
 def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound):
-    """Bond fractions at the end of each step, those before being ``bound``."""
+    """Write the bond fractions at the end of each step; ``bound`` are those before the steps."""
     for k in range(len(path)):
         for m in range(len(bound)):
             before = bound[m] if k == 0 else relaxed_bound[k - 1, m]
@@ -221,15 +217,17 @@ def _relax(bound, path, duration, critical_speed, rebinding_rate, relaxed_bound)
 
 
 class _AtOnce(_WithoutStretch):
-    """Bonds that are steady at every speed."""
+    """Attributes of models whose bonds are steady at every speed."""
 
+    per_member: ClassVar[bool] = False
+    feeds_back: ClassVar[bool] = False
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Population:
         return Population(self._steady_fraction(motion.speed), np.sign(motion.speed))
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
-        return self._steady_fraction(motions.speed), state.seen
+        return self._steady_fraction(motions.speed), state.area_radius
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -253,7 +251,7 @@ class Steady(_AtOnce):
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class Rate(OverArea, _WithoutStretch):
+class Rate(_OverArea, _WithoutStretch):
     """The rate equation dN/dt = h (N0 − N) − h (V/Vc) N. Limit: ``Steady`` as h -> infinity.
 
     One step is exact for the slip of the step spread evenly over it.
@@ -269,9 +267,8 @@ class Rate(OverArea, _WithoutStretch):
     in_blocks: ClassVar[bool] = True
 
     def start(self, motion: Motion, noise: Noise) -> Population:
-        rows = self.rows(noise) + 0.0 * motion.speed  # a drive that feels the friction has its members
-        first = rows * self._first_fraction(self.start_from, motion)
-        return Population(first, np.sign(motion.speed))
+        rows = self.rows(noise) + 0.0 * motion.speed  # a drive that solves the motion has its members
+        return Population(rows * self._first_fraction(self.start_from, motion), np.sign(motion.speed))
 
     def onset(self, speed: Array, body: Body) -> Onset:
         drag, strength = np.multiply(body.viscosity, body.area), self.stress * np.asarray(body.area)
@@ -281,11 +278,11 @@ class Rate(OverArea, _WithoutStretch):
         return linear_onset(speed, *recipe, body.mass, growth)
 
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
-        share, seen = self.kept(state.seen, radius)
-        before = state.bound * share
-        bound, rates = np.empty((len(motions.path), len(before))), (self.critical_speed, self.rebinding_rate)
+        share, area_radius = self.diluted(state.area_radius, radius)
+        before, rates = state.bound * share, (self.critical_speed, self.rebinding_rate)
+        bound = np.empty((len(motions.path), len(before)))
         _relax(before, motions.path[:, 0], motions.duration[:, 0], *rates, bound)
-        return bound, seen
+        return bound, area_radius
 
     def bonding(self, state: Population) -> Bonding:
         bonding = super().bonding(state)
@@ -309,9 +306,8 @@ class Counted(_WithoutStretch):
     start_from: Start = "steady"
     model: Literal["counted"] = "counted"
 
-    @property
-    def per_member(self) -> bool:
-        return True
+    per_member: ClassVar[bool] = True
+    feeds_back: ClassVar[bool] = False
 
     def bonding(self, state: Population) -> Bonding:
         return super().bonding(state._replace(bound=state.bound / self.sites))
@@ -324,12 +320,13 @@ class Counted(_WithoutStretch):
     def _bound(self, state: Population, motions: Motions, radius: Array, noise: Noise) -> tuple[Array, Array]:
         over = motions.path, motions.duration
         stay, bind = transition_probabilities(*over, self.critical_speed, self.rebinding_rate)
-        return self._counted(state.bound, stay, bind, motions.step, noise), state.seen
+        return self._counted(state.bound, stay, bind, motions.step, noise), state.area_radius
 
     def _counted(self, bound: Array, stay: Array, bind: Array, step: int, noise: Noise) -> Array:
-        """Bound sites at the end of each step, in which each bound and free one is bound with given probabilities.
+        """Return the bound sites at the end of each step, shape (steps, members).
 
-        These have the shape (steps, 1) or (steps, members).
+        ``stay`` and ``bind`` are the chances that a bound and a free site are bound after a step, shape (steps, 1) or
+        (steps, members).
         """
         counted = np.empty((len(stay), len(bound)))
         _count(bound, stay, bind, self.sites, *noise.at(step), counted)
@@ -338,14 +335,14 @@ class Counted(_WithoutStretch):
 
 @kernel("void(float64[:], float64[:, :], float64[:, :], float64, uint64, uint64, uint64[::1], int64, float64[:, ::1])")
 def _count(bound, stay, bind, sites, seed, part, members, step, counted):
-    """Bound sites of all members at the end of each step."""
+    """Write the bound sites of all members at the end of each step."""
     for m in range(members.size):
-        before, own = bound[m], m % stay.shape[1]
+        before, row = bound[m], m % stay.shape[1]
         for k in range(len(stay)):
             numbers = stream(seed, part, members[m], step + k, 0)
-            kept, numbers = binomial(before, stay[k, own], numbers)
-            new, numbers = binomial(sites - before, bind[k, own], numbers)
-            counted[k, m] = before = kept + new
+            still_bound, numbers = binomial(before, stay[k, row], numbers)
+            new, numbers = binomial(sites - before, bind[k, row], numbers)
+            counted[k, m] = before = still_bound + new
 
 
 Stiffness = Annotated[float, Quantity("N/m", "stiffness of a bond", "kappa", above=0, typical="0.4 mN/m")]
@@ -355,7 +352,7 @@ CohortTolerance = Annotated[float, Quantity("1", "tolerance of the cohorts", "",
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class _Stretched(Common):
+class _Stretched(_BondModel):
     """Keys and attributes of models with a stretch; a subclass gives the moments of the stretch over all sites."""
 
     stretched: ClassVar[bool] = True
@@ -369,7 +366,7 @@ class _Stretched(Common):
 
     @cached_property
     def law(self) -> RuptureRate:
-        """Rupture rate of a bond of given stretch."""
+        """Rupture rate as a function of the stretch of a bond."""
         return self.rupture.law(self.bond_stiffness)
 
     @property
@@ -378,29 +375,27 @@ class _Stretched(Common):
         return self.rebinding_rate / (self.rebinding_rate + self.law.at_rest)
 
     def onset(self, speed: Array, body: Body) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s], nan where none is known."""
+        """Return the onset of oscillations behind a spring at speeds [m/s], nan if unknown."""
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
         return self.rupture.resolved_onset(speed, *recipe, body)
 
     def amplitude(self, speed: Array) -> Array | None:
-        """Growth of the oscillations beyond their onset at speeds [m/s], where a law is known of it."""
+        """Return the growth of the oscillations beyond their onset at speeds [m/s], or None without a law of it."""
         return None
 
     def _bonding(self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array) -> Bonding:
-        """Readings of a population of these moments per site.
+        """Return the readings of a population of these moments per site.
 
-        The stress is n κ x̄; with f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²). Slip stretches all
-        bonds and breaks, at a limit ℓ of the stretch, the share ``breaking`` of the sites for each ℓ of slip. Thermal
+        The stress is n κ x̄. With f̄ and E[f²] per site the powers are n f̄² and n (E[f²] − f̄²). Slip stretches all
+        bonds. At a limit ℓ of the stretch it breaks the share ``breaking`` of the sites for each ℓ of slip. Thermal
         rupture takes the stretch ``lost`` per site and unit time.
         """
+        per_stretch = self.site_density * self.bond_stiffness
         frozen, scale = stretch**2, self.site_density * self.bond_stiffness**2
         varying = np.maximum(square - frozen, 0.0)  # nan stays nan
-        per_stretch = self.site_density * self.bond_stiffness
-        stress = per_stretch * stretch
-        fraction = bound / self.bound_at_rest
-        stiffness = per_stretch * (bound - breaking)
-        relaxation = -per_stretch * lost
-        return Bonding(fraction, stress, np.abs(stress), stiffness, relaxation, scale * frozen, scale * varying)
+        stress, stiffness = per_stretch * stretch, per_stretch * (bound - breaking)
+        powers = scale * frozen, scale * varying, 0.5 * self.site_density * self.bond_stiffness * square
+        return Bonding(bound / self.bound_at_rest, stress, np.abs(stress), stiffness, -per_stretch * lost, *powers)
 
 
 class Stretches(NamedTuple):
@@ -408,23 +403,23 @@ class Stretches(NamedTuple):
 
     bound: Array
     stretch: Array
-    seen: Array = UNSEEN
+    area_radius: Array = _NO_AREA
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
 class _Separable(_Stretched):
-    """Models that rest on a rupture law whose ∫k dt has one clock for all bonds."""
+    """Attributes of models that need a rupture law whose ∫k dt has one clock for all bonds."""
 
     @model_validator(mode="after")
     def _one_clock(self) -> Self:
         if not self.rupture.separable:
-            said = f'rupture model "{self.rupture.model}" needs the density of the stretch; use bonds.model = "cohort"'
-            raise PydanticCustomError("not_separable", said)
+            message = f'rupture model "{self.rupture.model}" needs the density of the stretch'
+            raise PydanticCustomError("not_separable", f'{message}; use bonds.model = "cohort"')
         return self
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class FirstMoment(OverArea, _Separable):
+class FirstMoment(_OverArea, _Separable):
     """Rate equations of number and mean stretch, every bond taken at the mean. Limit: ``Cohort`` at a constant rate.
 
     Exact in time for a constant rupture. Under Bell's it is a mean field: it overpredicts the friction
@@ -445,17 +440,14 @@ class FirstMoment(OverArea, _Separable):
         else:
             bound = np.full(1, self.bound_at_rest if self.start_from == "bonded" else 0.0)
             stretch = np.zeros(1)
-        rows = self.rows(noise) + 0.0 * motion.first  # a drive that feels the friction has its members
+        rows = self.rows(noise) + 0.0 * motion.first  # a drive that solves the motion has its members
         return Stretches(rows * bound, rows * stretch)
 
     def advance(self, state: Stretches, motions: Motions, radius: Array, noise: Noise) -> tuple[Stretches, Bonding]:
-        share, seen = self.kept(state.seen, radius)
-        before, slid = (
-            (state.bound * share, state.stretch * share),
-            (motions.slip, motions.path, motions.duration[:, 0]),
-        )
-        bound, stretch = mean_field.follow(*before, *slid, self.law, self.rebinding_rate)
-        return Stretches(bound[-1], stretch[-1], seen), self.bonding(Stretches(bound, stretch))
+        share, area_radius = self.diluted(state.area_radius, radius)
+        before, sliding = (state.bound * share, state.stretch * share), (motions.slip, motions.path)
+        bound, stretch = mean_field.advance(*before, *sliding, motions.duration[:, 0], self.law, self.rebinding_rate)
+        return Stretches(bound[-1], stretch[-1], area_radius), self.bonding(Stretches(bound, stretch))
 
     def onset(self, speed: Array, body: Body) -> Onset:
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
@@ -466,8 +458,8 @@ class FirstMoment(OverArea, _Separable):
 
     def remarks(self, setting: Setting) -> list[str]:
         excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)
-        said = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
-        return [said] if excess else []
+        remark = f'the mean stretch overpredicts the friction maximum by {excess:.0%}: bonds.model = "cohort" does not'
+        return [remark] if excess else []
 
     def bonding(self, state: Stretches) -> Bonding:
         mean = np.divide(state.stretch, state.bound, out=np.zeros(state.bound.shape), where=state.bound > 0.0)
@@ -483,14 +475,14 @@ class Ages(NamedTuple):
     """State of a cohort population."""
 
     cohorts: Cohorts
-    seen: Array = UNSEEN
+    area_radius: Array = _NO_AREA
 
 
 _UNKNOWN = np.full(1, np.nan)
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
-class Cohort(OverArea, _Stretched):
+class Cohort(_OverArea, _Stretched):
     """The density of bonds over their stretch, as cohorts carried with the slider. Limit: tracked bonds without noise.
 
     Bonds born together stay together: their survival over a step is exact, nothing diffuses. Births
@@ -514,26 +506,26 @@ class Cohort(OverArea, _Stretched):
             first = cohorts.resting(*recipe, self.tolerance)
         else:
             first = cohorts.empty(self.law, self.tolerance)
-        rows = max(len(self.rows(noise)), len(motion.first))  # a drive that feels the friction has its members
+        rows = max(len(self.rows(noise)), len(motion.first))  # a drive that solves the motion has its members
         return Ages(Cohorts(*(np.repeat(array, rows, axis=0) for array in first)))
 
     def advance(self, state: Ages, motions: Motions, radius: Array, noise: Noise) -> tuple[Ages, Bonding]:
-        share, seen = self.kept(state.seen, radius)
+        share, area_radius = self.diluted(state.area_radius, radius)
         recipe, duration = (self.law, self.rebinding_rate, self.tolerance), motions.duration[:, 0]
         after, sums = cohorts.advance(state.cohorts, motions.slip, duration, *recipe, share=share)
-        return Ages(after, seen), self.read(sums)
+        return Ages(after, area_radius), self.read(sums)
 
     def bonding(self, state: Ages) -> Bonding:
         return self.read(cohorts.moments(state.cohorts, self.law, self.tolerance))
 
     def read(self, sums: Array) -> Bonding:
-        """Readings of populations of these ``cohorts.moments``."""
-        return self._bonding(*sums)._replace(stored=0.5 * self.site_density * self.bond_stiffness * sums[2])
+        """Return the readings of populations of these ``cohorts.moments``."""
+        return self._bonding(*sums)
 
     def steady(self, speed: Array) -> Bonding:
         rows = [cohorts.steady(self.law, self.rebinding_rate, float(v), self.tolerance) for v in np.atleast_1d(speed)]
-        found = [self.bonding(Ages(row)) for row in rows]
-        return Bonding(*(np.concatenate(values) for values in zip(*found, strict=True)))
+        readings = zip(*(self.bonding(Ages(row)) for row in rows), strict=True)
+        return Bonding(*map(np.concatenate, readings))
 
 
 @dataclass(frozen=True, config={"extra": "forbid", "populate_by_name": True})
@@ -551,11 +543,9 @@ class Tracked(_Separable):
     model: Literal["tracked"] = "tracked"
 
     state_class: ClassVar[type[Tracks]] = Tracks
+    per_member: ClassVar[bool] = True
+    feeds_back: ClassVar[bool] = False
     in_place: ClassVar[bool] = True
-
-    @property
-    def per_member(self) -> bool:
-        return True
 
     @property
     def numbers(self) -> int:
@@ -578,10 +568,8 @@ class Tracked(_Separable):
         return self.read(state.frame)
 
     def read(self, frames: Array) -> Bonding:
-        """Readings of frames: one bond after the other breaks, at a limit or by itself."""
-        bound, stretch, square = tracks.moments(frames, self.sites)
-        stored = 0.5 * self.site_density * self.bond_stiffness * square
-        return self._bonding(bound, stretch, square, np.zeros(1), _UNKNOWN)._replace(stored=stored)
+        """Return the readings of frames: bonds break one after the other, at a limit or by themselves."""
+        return self._bonding(*tracks.moments(frames, self.sites), np.zeros(1), _UNKNOWN)
 
     def steady(self, speed: Array) -> Bonding:
         return Cohort(self.rupture, self.bond_stiffness, self.rebinding_rate, self.site_density).steady(speed)
@@ -621,8 +609,8 @@ class Auto:
     def _one_kind(self) -> "Auto":
         with_ = any(getattr(self, name) is not None for name in _STRETCHED)
         if (self.critical_speed is not None) == with_:
-            said = f"give either {' and '.join(_WITHOUT)}, or {', '.join(_WITH[:-1])} and {_WITH[-1]}"
-            raise PydanticCustomError("one_kind", said)
+            message = f"give either {' and '.join(_WITHOUT)}, or {', '.join(_WITH[:-1])} and {_WITH[-1]}"
+            raise PydanticCustomError("one_kind", message)
         missing = [name for name in (_WITH if with_ else _WITHOUT) if getattr(self, name) is None]
         if missing:
             are = "is" if len(missing) == 1 else "are"
@@ -632,13 +620,13 @@ class Auto:
         return self
 
     def number(self, area: float) -> float:
-        """Sites of a contact of this area [m²]: as given, else by their density; infinite without both."""
+        """Return the sites of a contact of this area [m²]: ``sites``, else by their density, else infinity."""
         if self.sites is not None:
             return self.sites
         return math.inf if self.site_density is None or not area > 0.0 else max(1.0, round(self.site_density * area))
 
     def chosen(self, area: float, forces: bool) -> Model:
-        """The model for a contact of this ``area`` [m²] whose field reads the bonds' ``forces`` or not."""
+        """Return the model for a contact of this ``area`` [m²]; ``forces`` is true if the field reads the forces."""
         number, start = self.number(area), self.start_from
         noisy = self.tolerance**2 * number < 1.0 and self.area == "present"
         if self.rupture is None:
@@ -655,7 +643,7 @@ class Auto:
         return Cohort(self.rupture, *rest, tolerance=tolerance, start_from=start, area=self.area)
 
     def why(self, area: float, forces: bool) -> str:
-        """The reason for the choice, in words."""
+        """Return the reason for the choice, in words."""
         number, model = self.number(area), self.chosen(area, forces).model
         if math.isinf(number):
             size = "no number of sites is given"
@@ -675,13 +663,12 @@ class Auto:
 
 
 def _tag(value: object) -> str | None:
-    """Class of a table or a part: both rate equations have one name."""
-    given = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", *_STRETCHED)}
-    model = given.get("model")
-    if not isinstance(model, str):
-        return None
-    with_stretch = any(given.get(name) is not None for name in _STRETCHED)
-    return "rate[rupture]" if model == "rate" and with_stretch else model
+    """Return the tag of the class of a table or a part, because two rate equations have one name."""
+    keys = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", *_STRETCHED)}
+    model = keys.get("model")
+    if model == "rate" and any(keys.get(name) is not None for name in _STRETCHED):
+        return "rate[rupture]"
+    return model if isinstance(model, str) else None
 
 
 Bonds = Annotated[

@@ -216,12 +216,6 @@ Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model
 
 
 @device
-def law_of(numbers):
-    """The law of which an array holds the numbers."""
-    return numbers[0], numbers[1], numbers[2], numbers[3], numbers[4]
-
-
-@device
 def rate_at(stretch, law):
     """Rupture rate of a bond of a stretch below any limit under a ``RuptureRate``."""
     rate, softness, _, catch, relief = law

@@ -36,8 +36,8 @@ from sim.numerics.special import reduced_exponential_integral, scaled_exponentia
 from sim.parts.bonds.rupture import RuptureRate, rupture_integral, time_to_rupture
 from sim.parts.exchange import Array
 
-#: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), whether bonds
-#: are stepped one by one, bound sites, sum of their births, of the births squared, steps done.
+#: Columns of a frame: slider, time and clock since the frame was set, sense of the motion (+1, -1), 1 if bonds
+#: are stepped one by one, bound sites, sum of their births, of the births squared, number of steps.
 SLIDER, TIME, CLOCK, SENSE, SINGLY, BOUND, SUM, SQUARES, STEPS = range(9)
 COLUMNS = 9
 
@@ -49,14 +49,13 @@ AT_ONCE = 1024
 
 _U = np.uint64
 PART = _U(PARTS["bonds"])
-LIVES = 4096  # of one site in one step: a stop for nonsense, since the rule for long steps comes first
+LIVES = 4096  # of one site in one step: a safeguard, because the rule for long steps comes first
 TINY = 2.2250738585072014e-308
 
-#: Columns of a step: slider, time and clock at its beginning, the rate of a bond born at the frame's origin then and
+#: A step: slider, time and clock at its beginning, the rate of a bond born at the frame's origin then and
 #: its ratio to ``rate``, relative growth of that rate in unit time, length and speed.
-_X, _T, _CLOCK, _RATE, _GROWN, _PACE, _DURATION, _SPEED = range(8)
-_STEP_COLUMNS = 8
-#: Rows of what has an event by the end of a step: bonds of less due, free sites of less time, bonds of less birth.
+_STEP = np.dtype([(name, float) for name in ("x", "time", "clock", "rate", "grown", "pace", "duration", "speed")])
+#: Rows of the ends of a step: bonds of less due, free sites of less time and bonds of less birth have had an event.
 _RUPTURE, _BINDING, _CUT = range(3)
 #: Bits of a number that are left out where a step is looked up, 128 ranges for each power of two; most ranges.
 _LEFT_OUT, _RANGES = np.int64(45), 4096
@@ -64,25 +63,25 @@ _LEFT_OUT, _RANGES = np.int64(45), 4096
 
 @device
 def room():
-    """Arrays to work in: columns of steps, their ends, changes of bound sites and their sums in each, an index of ends.
+    """Return work arrays: steps, their ends, changes of bound sites and their sums in each step, an index of ends.
 
-    Beside the index stands the number of its first range.
+    The last array is the number of the first range of the index.
     """
-    steps, index = np.empty((AT_ONCE, _STEP_COLUMNS)), np.empty((2, _RANGES), np.int16)
+    steps, index = np.empty(AT_ONCE, _STEP), np.empty((2, _RANGES), np.int16)
     return steps, np.empty((3, AT_ONCE)), np.empty((3, AT_ONCE)), index, np.empty(2, np.int64)
 
 
 @device
 def views(due, soonest):
-    """A row's due as signed and unsigned whole numbers, and the first binding, first rupture and rearmost of blocks."""
+    """Return a row's due as signed and unsigned integers, and first binding, first rupture and rearmost of blocks."""
     whole = soonest.view(np.int64)
     return due.view(np.int64), due.view(np.uint64), whole[1], soonest.view(np.uint64)[0], soonest[2]
 
 
 @device
-def least(seen, birth, block, bounded):
-    """Take anew the first binding, the first rupture and the rearmost bond of a block."""
-    signed, unsigned, binding, rupture, rear = seen
+def least(bits, birth, block, bounded):
+    """Write the first binding, the first rupture and the rearmost bond of a block anew."""
+    signed, unsigned, binding, rupture, rear = bits
     first = _U(block) * _U(BLOCK)
     size = min(BLOCK, np.int64(_U(signed.size) - first))
     soonest, earliest = signed[first], unsigned[first]
@@ -105,27 +104,27 @@ def least(seen, birth, block, bounded):
 
 @device
 def lay_out(step, slip, duration, x, time, clock, law, space):
-    """Write a step that begins with the slider at ``x`` and a ``time`` and ``clock``; clock at its end."""
+    """Write a step that begins with the slider at ``x`` and a ``time`` and ``clock``; return the clock at its end."""
     (rate, softness, limit, _), (steps, ends, _, _, _) = law, space
     grown, bell = math.exp(softness * x), softness * slip
     first, speed = rate * grown, slip / duration
     after = clock + first * duration * (math.expm1(bell) / bell if bell > 0.0 else 1.0)
-    column = steps[step]
-    column[_X], column[_T], column[_CLOCK], column[_RATE] = x, time, clock, first
-    column[_GROWN], column[_PACE], column[_DURATION], column[_SPEED] = grown, speed * softness, duration, speed
+    at = steps[step]
+    at.x, at.time, at.clock, at.rate = x, time, clock, first
+    at.grown, at.pace, at.duration, at.speed = grown, speed * softness, duration, speed
     ends[_RUPTURE, step], ends[_BINDING, step], ends[_CUT, step] = after, time + duration, x + slip - limit
     return after
 
 
 @device
 def _range(value):
-    """Number of the range that a positive number lies in, by its leading bits."""
+    """Return the number of the range that holds a positive number, by its leading bits."""
     return np.float64(value).view(np.int64) >> _LEFT_OUT
 
 
 @device
 def look_up(count, space):
-    """Index ``count`` steps by their ends: the first that ends in each range of numbers, or later."""
+    """Index ``count`` steps by their ends: write the first step that ends in each range of numbers, or later."""
     _, ends, _, index, lowest = space
     for row in range(2):
         lowest[row], filled = _range(ends[row, 0]), 0
@@ -137,9 +136,9 @@ def look_up(count, space):
 
 
 @device
-def moment(passed, rate, pace, cut, duration):
-    """Time within a step at which the clock has passed so much, or a bond is cut; of ``duration`` at most."""
-    time = passed / rate
+def moment(clock, rate, pace, cut, duration):
+    """Return the time within a step at which the clock has advanced by ``clock``, or a bond is cut, if earlier."""
+    time = clock / rate
     u = 1.0 + pace * time  # ln u/(u - 1) takes back what the sum has rounded: log1p
     moment = time * (1.0 if u == 1.0 else logarithm(u) / (u - 1.0))
     moment = moment if moment < cut else cut
@@ -148,14 +147,14 @@ def moment(passed, rate, pace, cut, duration):
 
 @device
 def follow(bonds, soonest, count, law, address, space):
-    """Lives of a row whose bonds all have the sign of the motion over the first ``count`` steps of the ``space``.
+    """Advance a row whose bonds all have the sign of the motion over the first ``count`` steps of the ``space``.
 
     ``bonds`` are its births, dues and lives, ``address`` seed and member of its draws. Arrays are not passed on from
     the loop over events: counting their references takes as long as an event.
     """
     (birth, due, life), (steps, ends, changes, index, lowest), (_, _, limit, rebinding) = bonds, space, law
-    seen, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
-    signed, unsigned, binding, rupture, rear = seen
+    bits, bounded, (seed, member) = views(due, soonest), limit < math.inf, address
+    signed, unsigned, binding, rupture, rear = bits
     clock, time, cut = ends[_RUPTURE, count - 1], ends[_BINDING, count - 1], ends[_CUT, count - 1]
     clock_bits, time_bits = np.float64(clock).view(np.uint64), np.float64(-time).view(np.int64)
     changes[:, :count] = 0.0
@@ -185,48 +184,49 @@ def follow(bonds, soonest, count, law, address, space):
                 k = next_
                 if k >= count:
                     break
-                rate, pace, speed = steps[k, _RATE], steps[k, _PACE], steps[k, _SPEED]
+                step = steps[k]
+                rate, pace, speed = step.rate, step.pace, step.speed
                 if bound:
                     changes[0, k] -= 1.0
                     changes[1, k] -= x
                     changes[2, k] -= x * x
                     number += np.uint32(1)
-                    one, two, _, _ = words_at(seed, PART, _U(i + 1), _U(number), member, _U(0))
-                    end = (x + limit - steps[k, _X]) / speed if bounded and speed > 0.0 else math.inf
-                    passed = moment(at - steps[k, _CLOCK], rate, pace, end, steps[k, _DURATION])
-                    x, wait = exponential(one), exponential(two) / rebinding
-                    at = -max(steps[k, _T] + passed + wait, TINY) if rebinding > 0.0 else -math.inf
+                    first, second, _, _ = words_at(seed, PART, _U(i + 1), _U(number), member, _U(0))
+                    end = (x + limit - step.x) / speed if bounded and speed > 0.0 else math.inf
+                    elapsed = moment(at - step.clock, rate, pace, end, step.duration)
+                    x, wait = exponential(first), exponential(second) / rebinding
+                    at = -max(step.time + elapsed + wait, TINY) if rebinding > 0.0 else -math.inf
                 else:
-                    passed = max(value - steps[k, _T], 0.0)
-                    bell = pace * passed
+                    elapsed = max(value - step.time, 0.0)
+                    bell = pace * elapsed
                     more = math.expm1(bell)
-                    clock = steps[k, _CLOCK] + rate * passed * (more / bell if bell > 0.0 else 1.0)
-                    at, x = clock + x * steps[k, _GROWN] * (1.0 + more), steps[k, _X] + speed * passed
+                    clock = step.clock + rate * elapsed * (more / bell if bell > 0.0 else 1.0)
+                    at, x = clock + x * step.grown * (1.0 + more), step.x + speed * elapsed
                     changes[0, k] += 1.0
                     changes[1, k] += x
                     changes[2, k] += x * x
                 bound = not bound
             due[i], birth[i], life[i] = at, x, number
-        least(seen, birth, block, bounded)
+        least(bits, birth, block, bounded)
 
 
-#: What ``live`` returns instead of a number of steps: the state has been advanced already; a number is not finite.
+#: Results of ``live`` other than a number of steps: the state has been advanced already; a number is not finite.
 SPENT, ENDLESS = -1, -2
 
 #: Lives of a site in one step beyond which the step ends in the stationary law of its speed.
 CYCLES = 300.0
 _FAR = 16.0  # Bell forces, cut-off stretches or natural lives after which a frame is set anew
-_LEAP = 24.0  # Bell forces within a step above which bonds are stepped one by one, lest the clock overflow
+_LEAP = 24.0  # Bell forces within a step above which bonds are stepped one by one, because the clock could overflow
 
 
 @device
-def _cycle(speed, rate, softness, limit, rebinding):
-    """About the mean time from one birth to the next of a site: a fresh bond's life at ``speed`` and the wait.
+def _cycle(speed, law):
+    """Return roughly the mean time from one birth to the next of a site: a fresh bond's life at ``speed`` and the wait.
 
-    Exact for constant rupture laws, with or without a limit; for Bell's within a sixth,
+    It is exact for constant rupture laws, with or without a limit, and within a sixth for Bell's:
     e^z E1(z) ~ ½ ln(1 + 2/z).
     """
-    life = math.inf
+    (rate, softness, limit, rebinding), life = law, math.inf
     if rate > 0.0:
         amplitude = 2.0 * math.fabs(speed) * softness / rate
         life = (math.log1p(amplitude) / amplitude if amplitude > 0.0 else 1.0) / rate
@@ -238,7 +238,7 @@ def _cycle(speed, rate, softness, limit, rebinding):
 
 @device
 def _one_by_one(bonds, row, slip, duration, law, address):
-    """One step of a row bond by bond, ``slip`` of any sign; True if all stretches then have the sign of the motion."""
+    """Advance a row by a step bond by bond; return True if all stretches then have the sign of the motion."""
     (birth, due, life), (seed, member), (rate, softness, limit, rebinding) = bonds, address, law
     x0, t0, speed = row[SLIDER], row[TIME], slip / duration
     bound, total, squares, lowest, highest = 0.0, 0.0, 0.0, math.inf, -math.inf
@@ -255,9 +255,9 @@ def _one_by_one(bonds, row, slip, duration, law, address):
                 lasts = time_to_rupture(stretch, speed, due[i], rate, softness, limit)
                 time += min(lasts, left) if lasts > 0.0 else 0.0
                 life[i] += np.uint32(1)
-                one, two, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
-                birth[i] = exponential(one)
-                due[i] = -max(t0 + time + exponential(two) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+                first, second, _, _ = words_at(seed, PART, _U(i + 1), _U(life[i]), member, _U(0))
+                birth[i] = exponential(first)
+                due[i] = -max(t0 + time + exponential(second) / rebinding, TINY) if rebinding > 0.0 else -math.inf
             elif -due[i] > t0 + duration:
                 break
             else:
@@ -275,10 +275,10 @@ def _one_by_one(bonds, row, slip, duration, law, address):
 
 @device
 def _set(bonds, soonest, row, law, singly, turn):
-    """Put the origin of a row's frame at the slider and at the present time, in which the sense may turn.
+    """Set the origin of a row's frame at the slider and at the present time; the sense may turn.
 
-    Its bonds are then stepped one by one, ``singly``, or together. Sums and least dues are taken anew, so that
-    roundings do not gather.
+    Its bonds are then stepped one by one, ``singly``, or together. Sums and least dues are computed anew, so that
+    roundings do not add up.
     """
     (birth, due, _), (_, softness, limit, _) = bonds, law
     x0, t0, clock = row[SLIDER], row[TIME], row[CLOCK]
@@ -301,9 +301,9 @@ def _set(bonds, soonest, row, law, singly, turn):
         squares += x * x
     if not singly:
         soonest[2] = math.inf
-        seen = views(due, soonest)
+        bits = views(due, soonest)
         for block in range(soonest.shape[1]):
-            least(seen, birth, block, limit < math.inf)
+            least(bits, birth, block, limit < math.inf)
     row[SLIDER], row[TIME], row[CLOCK], row[SENSE] = 0.0, 0.0, 0.0, sign * row[SENSE]
     row[SINGLY], row[BOUND], row[SUM], row[SQUARES] = 1.0 if singly else 0.0, bound, total, squares
 
@@ -314,17 +314,18 @@ TRACKS = "Tuple((float64[:,::1], float64[:,::1], uint32[:,::1], float64[:,:,::1]
 
 @device
 def _far(x, time, law):
-    """Whether a frame is to be set anew with the slider at ``x`` after a ``time``."""
+    """True if a frame must be set anew with the slider at ``x`` after a ``time``."""
     rate, softness, limit, _ = law
-    gone = math.fabs(x)
-    return gone * softness > _FAR or gone > _FAR * limit or time * rate > _FAR
+    distance = math.fabs(x)
+    return distance * softness > _FAR or distance > _FAR * limit or time * rate > _FAR
 
 
 @device
 def _together(row, slip, duration, law, space):
-    """Lay out the steps that a row's bonds can follow together, up to one after which its frame is set anew; how many.
+    """Lay out the steps that a row's bonds can follow together, and return their number.
 
-    ``slip`` and ``duration`` are those of the steps ahead.
+    The last of these is a step after which the frame is set anew. ``slip`` and ``duration`` are those of the steps
+    ahead.
     """
     x, time, clock, count = row[SLIDER], row[TIME], row[CLOCK], 0
     while count < min(duration.size, AT_ONCE) and not (count > 0 and _far(x, time, law)):
@@ -354,10 +355,10 @@ def _keep(row, slip, duration, count, space, frames):
 
 @device
 def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, shared, frames):
-    """Some of the steps ahead of a row, and its frame after each of them; how many.
+    """Advance a row by some of the steps ahead, write its frame after each of them, and return their number.
 
-    ``laid`` is the frame of a row whose steps are laid out, and their number; these serve all rows of a ``shared`` slip
-    that stand there.
+    ``laid`` is the frame of a row whose steps are laid out, and their number. They serve all rows of a ``shared`` slip
+    with the same frame.
     """
     count = 0
     if row[SINGLY] == 0.0:
@@ -383,24 +384,21 @@ def _advance(bonds, soonest, row, slip, duration, law, address, space, laid, sha
 
 @device
 def one_step(bonds, soonest, row, slip, duration, law, address, space, laid, frame):
-    """Take a row through one step, of arrays of length one; ``laid`` and ``frame`` are room for what it is not kept."""
+    """Advance a row by one step, of arrays of length one; ``laid`` and ``frame`` are work arrays."""
     laid[0] = math.nan
     _advance(bonds, soonest, row, slip, duration, law, address, space, laid, False, frame)
 
 
-@kernel(
-    f"int64({TRACKS}, float64[:,:], float64[:], float64, float64, float64, float64, uint64, uint64[:], int64,"
-    " float64[:,:,::1])"
-)
-def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members, first, frames):
-    """Advance all rows from step ``first`` on, in place; how many steps are done, or why none is.
+@kernel(f"int64({TRACKS}, float64[:,:], float64[:], UniTuple(float64, 4), uint64, uint64[:], int64, float64[:,:,::1])")
+def live(tracks, slip, duration, law, seed, members, first, frames):
+    """Advance all rows from step ``first`` on, in place; return the number of steps, ``SPENT`` or ``ENDLESS``.
 
-    The frame is the new state's own copy; ``frames``, of shape (rows, columns, steps), get that after each step. A row
-    in which a step is longer than some 300 lives of a site is left as it is before that step, its count of steps, too,
-    and no row goes on beyond it. Nothing is touched when the state is spent or a number endless.
+    The new state has its own copy of the frame. ``frames``, of shape (rows, columns, steps), get the frame after each
+    step. A row with a step that is longer than some 300 lives of a site is left as it is before that step, with its
+    count of steps, and no row advances beyond it. Nothing is touched if the state is spent or a number endless.
     """
     birth, due, life, soonest, stamp, frame = tracks
-    law, rows, end = (rate, softness, limit, rebinding), len(due), first
+    rows, end = len(due), first
     for m in range(rows):
         if stamp[m] != np.int64(frame[m, STEPS]):
             return SPENT
@@ -410,37 +408,34 @@ def live(tracks, slip, duration, rate, softness, limit, rebinding, seed, members
             return ENDLESS
         for m in range(rows):
             speed = slip[end, m % slip.shape[1]] / duration[end]
-            long[m] = duration[end] > CYCLES * _cycle(speed, rate, softness, limit, rebinding)
+            long[m] = duration[end] > CYCLES * _cycle(speed, law)
         end += 1
     space, laid, shared, start = room(), np.full(COLUMNS + 1, math.nan), slip.shape[1] == 1, first
     while start < end:
         stop = end
         for m in range(rows):
             bonds, address, k = (birth[m], due[m], life[m]), (seed, members[m]), start
-            own = min(stop, end - 1 if long[m] else end)
-            while k < own:
-                ahead = slip[k:own, m % slip.shape[1]], duration[k:own]
-                row, after = frame[m], frames[m, :, k:own]
+            until = min(stop, end - 1 if long[m] else end)
+            while k < until:
+                ahead = slip[k:until, m % slip.shape[1]], duration[k:until]
+                row, after = frame[m], frames[m, :, k:until]
                 k += _advance(bonds, soonest[m], row, *ahead, law, address, space, laid, shared, after)
-                if m == 0:  # what is laid out serves the other rows
-                    own = stop = k
+                if m == 0:  # the other rows use the same steps
+                    until = stop = k
             stamp[m] = np.int64(frame[m, STEPS])
         start = stop
     return end
 
 
-@kernel(
-    f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], float64, float64, float64, float64,"
-    " uint64, uint64[:])"
-)
-def draw(tracks, chosen, speed, share, age, rate, softness, limit, rebinding, seed, members):
+@kernel(f"void({TRACKS}, boolean[:], float64[:], float64[:], float64[:], UniTuple(float64, 4), uint64, uint64[:])")
+def draw(tracks, chosen, speed, share, age, law, seed, members):
     """Draw chosen rows anew: a ``share`` of sites bound, their ages by the survival law of a bond of mean life ``age``.
 
     The density of ages S(t)/⟨T⟩ is log-concave with its mode at 0: rejection under
     min(1, e^(1 − t/⟨T⟩))/⟨T⟩ accepts every second proposal (Devroye, Non-Uniform Random Variate
-    Generation, 1986, VII.2). Whatever its age, a bond has still an exponential threshold before it.
+    Generation, 1986, VII.2). A bond of any age still has an exponential threshold ahead.
     """
-    birth, due, life, soonest, stamp, frame = tracks
+    (birth, due, life, soonest, stamp, frame), (rate, softness, limit, rebinding) = tracks, law
     for m in range(due.shape[0]):
         if not chosen[m % chosen.size]:
             continue
@@ -448,31 +443,31 @@ def draw(tracks, chosen, speed, share, age, rate, softness, limit, rebinding, se
         for i in range(due.shape[1]):
             life[m, i] += np.uint32(1)
             site, number = _U(i + 1), _U(life[m, i])
-            one, two, three, _ = words_at(seed, PART, site, number, members[m], _U(1))
-            birth[m, i] = exponential(two)
-            due[m, i] = -max(exponential(three) / rebinding, TINY) if rebinding > 0.0 else -math.inf
-            if unit_at(one) >= bonded:
+            first, second, third, _ = words_at(seed, PART, site, number, members[m], _U(1))
+            birth[m, i] = exponential(second)
+            due[m, i] = -max(exponential(third) / rebinding, TINY) if rebinding > 0.0 else -math.inf
+            if unit_at(first) >= bonded:
                 continue
-            due[m, i], passed = birth[m, i], 0.0
+            due[m, i], elapsed = birth[m, i], 0.0
             for lane in range(2, 256 if mean > 0.0 else 2):
-                one, two, three, _ = words_at(seed, PART, site, number, members[m], _U(lane))
-                tail = 1.0 + exponential(two) if unit_at(one) >= 0.5 else unit_at(two)
-                passed, bar = tail * mean, exponential(three) + max(tail - 1.0, 0.0)
-                spent = rupture_integral(0.0, v * passed, passed, rate, softness)
-                if spent <= bar and math.fabs(v) * passed < limit:
+                first, second, third, _ = words_at(seed, PART, site, number, members[m], _U(lane))
+                tail = 1.0 + exponential(second) if unit_at(first) >= 0.5 else unit_at(second)
+                elapsed, bar = tail * mean, exponential(third) + max(tail - 1.0, 0.0)
+                spent = rupture_integral(0.0, v * elapsed, elapsed, rate, softness)
+                if spent <= bar and math.fabs(v) * elapsed < limit:
                     break
-            birth[m, i] = -v * passed
+            birth[m, i] = -v * elapsed
         row = frame[m]
         row[:STEPS] = 0.0
         row[SENSE], row[SINGLY] = 1.0, 1.0
-        _set((birth[m], due[m], life[m]), soonest[m], row, (rate, softness, limit, rebinding), False, v < 0.0)
+        _set((birth[m], due[m], life[m]), soonest[m], row, law, False, v < 0.0)
         row[STEPS] += 1.0
         stamp[m] = np.int64(row[STEPS])
 
 
 @device
 def next_event(tracks, speed, most, law):
-    """Time to the next rupture or binding at a speed [m/s], at most ``most``."""
+    """Return the time to the next rupture or binding at a speed [m/s], at most ``most``."""
     ((birth, due, _), soonest, frame), (rate, softness, limit, _) = tracks, law
     along, x, clock, time = frame[SENSE] * speed, frame[SLIDER], frame[CLOCK], frame[TIME] + most
     if frame[SINGLY] == 0.0 and along >= 0.0:
@@ -502,10 +497,10 @@ def next_event(tracks, speed, most, law):
 
 
 @device
-def next_cut(tracks, way, limit):
-    """Slip along a ``way`` to where the next bond reaches the limit of its stretch [m]."""
+def next_cut(tracks, direction, limit):
+    """Return the slip along a ``direction`` at which the next bond reaches the limit of its stretch [m]."""
     (birth, due, _), soonest, frame = tracks
-    along, x = frame[SENSE] * way, frame[SLIDER]
+    along, x = frame[SENSE] * direction, frame[SLIDER]
     nearest = math.inf
     if frame[SINGLY] == 0.0 and along >= 0.0:
         for block in range(soonest.shape[1]):
@@ -518,7 +513,7 @@ def next_cut(tracks, way, limit):
     return max(nearest, 0.0)
 
 
-#: What is said of a state that is spent.
+#: Message about a state that is spent.
 AGAIN = "these tracks have been advanced already: go on from the newest state, or from copies"
 
 
@@ -526,13 +521,13 @@ class Tracks(NamedTuple):
     """State of the bonds of all members; plain arrays, so that it can be written and read back.
 
     ``advance`` works in the large arrays themselves, which the states of a run share: only the newest
-    state can go on, an older one raises an error. The frames are each state's own, so the moments of an older state
-    stay right. Copies of all arrays make a state that goes on by itself.
+    state can go on, an older one raises an error. Each state has its own frame, so the moments of an older state
+    stay right. Copies of all arrays make an independent state.
 
     Attributes
     ----------
     birth, due : array, shape (members, sites)
-        Where each bond was born, when it breaks or its site binds, in the units of ``tracked_events``.
+        Position of each bond's birth, and clock of its rupture or minus the time of its site's binding.
     life : array of uint32, shape (members, sites)
         Number of each site's life.
     soonest : array, shape (members, 3, blocks)
@@ -554,7 +549,7 @@ class Tracks(NamedTuple):
 def start(
     rupture: RuptureRate, rebinding_rate: float, sites: int, speed: Array, begin: str, seed: int, members: Array
 ) -> Tracks:
-    """Bonds at the start of a run.
+    """Return the bonds at the start of a run.
 
     Parameters
     ----------
@@ -607,7 +602,7 @@ def start(
 def advance(
     tracks: Tracks, slip: Array, duration: Array, rupture: RuptureRate, rebinding_rate: float, seed: int, members: Array
 ) -> tuple[Tracks, Array]:
-    """Bonds after steps of constant speed each.
+    """Return the bonds after steps of constant speed each, and their frames.
 
     Parameters
     ----------
@@ -630,19 +625,19 @@ def advance(
     Raises
     ------
     RuntimeError
-        When the state has been advanced already.
+        If the state has been advanced already.
     ValueError
-        When slip or duration are not finite, or duration is not positive.
+        If slip or duration are not finite, or duration is not positive.
 
     Notes
     -----
-    Exact for any length of a step. One of more than about 300 lives of a site ends in the
-    stationary law of its speed, and is drawn from it.
+    The result is exact for any length of a step. After a step of more than about 300 lives of a site the bonds are
+    drawn from the stationary law of its speed.
     """
     members, after = np.asarray(members, dtype=np.uint64), tracks._replace(frame=tracks.frame.copy())
-    frames, done = np.empty((*after.frame.shape, len(duration))), 0
+    frames, done, law = np.empty((*after.frame.shape, len(duration))), 0, (*rupture[:3], rebinding_rate)
     while done < len(duration):
-        done = live(tuple(after), slip, duration, *rupture[:3], rebinding_rate, seed, members, done, frames)
+        done = live(tuple(after), slip, duration, law, seed, members, done, frames)
         if done == SPENT:
             raise RuntimeError(AGAIN)
         if done == ENDLESS:
@@ -654,29 +649,18 @@ def advance(
     return after, frames.transpose(2, 0, 1)
 
 
-def bound(frames: Array) -> Array:
-    """Number of bound sites of frames of shape (..., columns), shape (...)."""
-    return frames[..., BOUND]
-
-
-def mean_stretch(frames: Array, sites: int) -> Array:
-    """Sum of all stretches, with sign, over the number of sites [m]."""
-    return frames[..., SENSE] * (frames[..., BOUND] * frames[..., SLIDER] - frames[..., SUM]) / sites
-
-
-def mean_square_stretch(frames: Array, sites: int) -> Array:
-    """Sum of all squared stretches over the number of sites [m^2]."""
-    number, slider, total, squares = (frames[..., column] for column in (BOUND, SLIDER, SUM, SQUARES))
-    return np.maximum(slider * (number * slider - 2.0 * total) + squares, 0.0) / sites
-
-
 def moments(frames: Array, sites: int) -> tuple[Array, Array, Array]:
-    """Share of sites bound [1], mean stretch [m] and mean square stretch [m^2] per site, each of the frames' shape."""
-    return bound(frames) / sites, mean_stretch(frames, sites), mean_square_stretch(frames, sites)
+    """Return the share of sites bound [1], mean stretch [m] and mean square stretch [m^2] per site.
+
+    Frames of shape (..., columns) give arrays of shape (...).
+    """
+    number, slider, total, squares = (frames[..., column] for column in (BOUND, SLIDER, SUM, SQUARES))
+    square = np.maximum(slider * (number * slider - 2.0 * total) + squares, 0.0)
+    return number / sites, frames[..., SENSE] * (number * slider - total) / sites, square / sites
 
 
 def mean_life(speed: Array, rupture: RuptureRate) -> Array:
-    """Mean life of a bond born unstretched at constant speed.
+    """Return the mean life of a bond born unstretched at constant speed.
 
     Parameters
     ----------
@@ -688,7 +672,7 @@ def mean_life(speed: Array, rupture: RuptureRate) -> Array:
     Returns
     -------
     array
-        ⟨T⟩ = ∫S dt [s], to 1e-12; infinite where bonds never break.
+        ⟨T⟩ = ∫S dt [s], to 1e-12; infinite if bonds never break.
 
     Notes
     -----
@@ -718,28 +702,25 @@ def _mean_life(speed: float, rupture: RuptureRate) -> float:
         return float(reduced_exponential_integral(z, 0.0)) / rate
     if longest == math.inf:
         return float(scaled_exponential_integral(z, 0.0)) / pace
-    end = min(longest, math.log1p(40.0 / z) / pace)  # where e^-40 are left
+    end = min(longest, math.log1p(40.0 / z) / pace)  # the share e^-40 is left
     edges = np.linspace(0.0, end, 33)
     nodes, weights = np.polynomial.legendre.leggauss(16)
     age = edges[:-1, np.newaxis] + 0.5 * edges[1] * (nodes + 1.0)
     return float(0.5 * edges[1] * np.sum(weights * np.exp(-z * np.expm1(pace * age))))
 
 
-def _steady_share(age: Array, speed: Array, rebinding_rate: float) -> Array:
-    """Chance that a site is bound, ⟨T⟩/(⟨T⟩ + 1/k_on); 1 for bonds that never break and rest."""
-    if np.any(np.isinf(age) & (speed != 0.0)):
-        raise ValueError("bonds that never break have no stationary stretch: start from bonded or empty")
-    with np.errstate(invalid="ignore", over="ignore"):
-        return np.where(np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0))
-
-
 def _draw(tracks, chosen, begin, speed, rupture, rebinding_rate, seed, members) -> None:
-    """Draw the chosen members anew, in place, as a run may begin."""
+    """Draw the chosen members anew, in place, from the law of a start.
+
+    A site of steady bonds is bound with the chance ⟨T⟩/(⟨T⟩ + 1/k_on), which is 1 for bonds that never break.
+    """
     age, rest = np.zeros(1), 1.0 if rupture.rate == 0.0 else rebinding_rate / (rebinding_rate + rupture.rate)
     share = np.array([rest if begin == "bonded" else 0.0])
     if begin == "steady":
         age = mean_life(speed, rupture)
-        share = _steady_share(age, speed, rebinding_rate)
-    laws = (*rupture[:3], rebinding_rate)
-    members = np.asarray(members, dtype=np.uint64)
-    draw(tuple(tracks), chosen, speed, share, np.where(np.isinf(age), 0.0, age), *laws, seed, members)
+        if np.any(np.isinf(age) & (speed != 0.0)):
+            raise ValueError("bonds that never break have no stationary stretch: start from bonded or empty")
+        with np.errstate(invalid="ignore", over="ignore"):
+            share = np.where(np.isinf(age), 1.0, rebinding_rate * age / (rebinding_rate * age + 1.0))
+    law, addresses = (*rupture[:3], rebinding_rate), np.asarray(members, dtype=np.uint64)
+    draw(tuple(tracks), chosen, speed, share, np.where(np.isinf(age), 0.0, age), law, seed, addresses)

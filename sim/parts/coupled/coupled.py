@@ -231,11 +231,11 @@ def _advanced(
     rows, stretch = at[0], float(at[5][columns.SLIP])
     if isinstance(bonds, Cohort):
         ages = cast(Ages, population)
-        share, seen = bonds.kept(ages.seen, radius)
+        share, area_radius = bonds.diluted(ages.area_radius, radius)
         cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *passed[0].shape[1:]))
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance, math.inf)
         advance_cohorts(*at, numbers[0], numbers[2], *passed, share, rules, *cohorts, sums)
-        return Ages(cohorts, seen), bonds.read(sums)
+        return Ages(cohorts, area_radius), bonds.read(sums)
     if isinstance(bonds, Tracked):
         tracks = cast(Tracks, population)
         tracks = tracks._replace(frame=tracks.frame.copy())
@@ -246,18 +246,18 @@ def _advanced(
         return tracks, bonds.read(frames)
     if isinstance(bonds, FirstMoment):
         stretches = cast(Stretches, population)
-        share, seen = bonds.kept(stretches.seen, radius)
+        share, area_radius = bonds.diluted(stretches.area_radius, radius)
         rows[:, columns.BOUND], rows[:, columns.MOMENT] = stretches.bound * share, stretches.stretch * share
     else:
         before = cast(Population, population)
-        share, seen = bonds.kept(before.seen, radius)
+        share, area_radius = bonds.diluted(before.area_radius, radius)
         rows[:, columns.BOUND] = bonds.bonding(before).fraction * share
     advance_rows(*at, *numbers, *passed)
     bound, moment = passed[0][columns.BOUND], passed[0][columns.MOMENT]
     if isinstance(bonds, FirstMoment):
-        return Stretches(bound[-1].copy(), moment[-1].copy(), seen), bonds.bonding(Stretches(bound, moment))
+        return Stretches(bound[-1].copy(), moment[-1].copy(), area_radius), bonds.bonding(Stretches(bound, moment))
     stress = bonds.stress / stretch * moment
-    return Population(bound[-1].copy(), np.sign(stress[-1]), seen), Bonding(bound, stress, stress)
+    return Population(bound[-1].copy(), np.sign(stress[-1]), area_radius), Bonding(bound, stress, stress)
 
 
 def agreed(passed: Driven, radius: Array) -> int:

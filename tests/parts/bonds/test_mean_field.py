@@ -10,7 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import solve_ivp
 from scipy.special import lambertw
 
-from sim.parts.bonds.mean_field import LOCAL_ERROR, _rosenbrock, advance, resting, steady
+from sim.parts.bonds import mean_field
+from sim.parts.bonds.mean_field import LOCAL_ERROR, _rosenbrock, steady
 from sim.parts.bonds.rupture import RuptureRate
 
 BELL = RuptureRate(1.0, 1.0, math.inf)
@@ -18,6 +19,18 @@ ULP = 2.0**-52
 # an error of a stretch comes back in ln N multiplied by the fall of ln N, thirty at most here, and the errors of
 # three sub-steps at a time are in memory
 TRANSIENT = 100.0 * LOCAL_ERROR
+
+
+def advance(bound, moment, slip, path, duration, rupture, rebinding):
+    """The population after one step."""
+    bound, moment, slip, path = (np.array(value, dtype=float, ndmin=1) for value in (bound, moment, slip, path))
+    steps = slip[np.newaxis], path[np.newaxis], np.array([float(duration)])
+    bound, moment = mean_field.advance(bound, moment, *steps, rupture, rebinding)
+    return bound[0], moment[0]
+
+
+def resting(rupture, rebinding):
+    return steady(0.0, rupture, rebinding)
 
 
 def slide(state, speed, duration, rupture, rebinding, pieces=1):

@@ -32,15 +32,15 @@ def go(tracks, slip, duration, law, rebinding=1.0, seed=5, members=None):
 
 
 def bound(tracks):
-    return tracked.bound(tracks.frame)
+    return tracks.frame[:, BOUND]
 
 
 def mean_stretch(tracks):
-    return tracked.mean_stretch(tracks.frame, tracks.due.shape[1])
+    return tracked.moments(tracks.frame, tracks.due.shape[1])[1]
 
 
 def mean_square_stretch(tracks):
-    return tracked.mean_square_stretch(tracks.frame, tracks.due.shape[1])
+    return tracked.moments(tracks.frame, tracks.due.shape[1])[2]
 
 
 def copied(tracks):
