@@ -14,10 +14,9 @@ import sim
 from benchmarks.compare import BANDED, LOAD, RAMP, RATE, STEADY
 from benchmarks.scenes import field, loaded, scene, tiled
 from benchmarks.timing import Bench, Beside, Row, absolute, middle, spent, told
-from sim.ensemble import bounds, simulate
+from sim.ensemble import preview, simulate
 from sim.ensemble.part_files import MemoryParts, PartFiles
 from sim.ensemble.plan import Plan
-from sim.ensemble.preview import tried
 
 #: What a command cannot do without now, and what else none could in 0.1.0, when the goals were set.
 CHECKED, OLDER = "tomllib, click, numpy, numba, pydantic", ", scipy.special, pint"
@@ -208,7 +207,7 @@ def estimates(bench: Bench) -> list[Row]:
             output = Path(folder) / "x.nc"
             arguments = "run", str(path), "-o", str(output), "--force", "-j", "1"
             plan = Plan.of(sim.load(path))
-            known = bounds.takes(plan, 1, tried(plan) or 1.0)
+            known = preview.forecast(plan, 1, preview.tried(plan) or 1.0)
             seconds, megabytes = bench.command(*arguments)
             found = seconds / known.cpu, 2**20 * megabytes / known.memory, output.stat().st_size / known.file
             for kind, ratio in zip(ratios.values(), found, strict=True):

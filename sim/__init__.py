@@ -82,8 +82,8 @@ def run(
     """
     from sim.ensemble import simulate
     from sim.ensemble.plan import Plan, work
-    from sim.ensemble.progress import Shown, progress_bar
     from sim.units.refusals import BadInput
+    from sim.units.terminal import Shown, progress_bar
 
     scene = _scene(scenario)
     given = Shown(progress) if callable(progress) else Shown()
@@ -184,14 +184,9 @@ def plot(
 def converge(scenario: "Scenario | Path | dict[str, Any]", budget: float | str = "60 s") -> "xarray.Dataset":
     """Speed against error of the models and settings that a scenario admits, in about ``budget`` [s] of computing."""
     from sim.study.converge import converge as study
-    from sim.units.quantity import Quantity
-    from sim.units.refusals import BadInput
+    from sim.units.quantity import read_option
 
-    try:
-        seconds = Quantity("s", "budget", above=0).read(budget)
-    except ValueError as fault:
-        raise BadInput([f"budget: {fault}"]) from None
-    return study(_scene(scenario), seconds)
+    return study(_scene(scenario), read_option(budget, "budget", "s", above=0))
 
 
 def fit(

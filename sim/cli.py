@@ -3,6 +3,7 @@
 import atexit
 import contextlib
 import gc
+import io
 import os
 import signal
 import sys
@@ -13,9 +14,7 @@ from typing import Any, NoReturn
 
 import click
 
-from sim.ensemble.progress import Stages, announce_compiling, named, note, progress_bar, while_read
-from sim.units import absent, options
-from sim.units.terminal import print_rows, print_table, replace_unknown, say, usage
+from sim.units.terminal import Stages, note, print_rows, print_table, progress_bar, say, slow_stage, while_read
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
@@ -43,15 +42,17 @@ def main() -> None:
     gc.set_threshold(500_000)  # imports make many objects that stay: looking through them is a tenth of a start,
     atexit.register(gc.freeze)  # and as much of the end
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else what all packages declare is looked through
-    for order in (signal.SIGTERM, signal.SIGHUP):  # schedulers stop a run by these
-        signal.signal(order, signal.default_int_handler)
-    replace_unknown()
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop a run by it
+    if isinstance(sys.stdout, io.TextIOWrapper):  # letters that the terminal's encoding lacks end no command
+        sys.stdout.reconfigure(errors="replace")
     try:
         cli.main(standalone_mode=False)
     except (click.Abort, KeyboardInterrupt):
         _fail("stopped", INTERRUPTED)
     except click.ClickException as fault:
-        _fail(usage(fault), fault.exit_code)
+        shown = io.StringIO()
+        fault.show(shown)
+        _fail(shown.getvalue().rstrip("\n"), fault.exit_code)
     except MemoryError:
         _fail("there is not enough memory; fewer points, members or records take less (see `sim check`)", FAILED)
     except (OSError, RuntimeError, ValueError) as trouble:
@@ -68,8 +69,46 @@ def _fail(text: str, code: int) -> NoReturn:
     sys.exit(code)
 
 
+def _announce_compiling(quiet: bool = False) -> None:
+    """Announce the first kernel that is not in the cache, because its compilation takes seconds."""
+    from sim.numerics import jit
+
+    def announce(name: str) -> None:
+        jit.on_compiling.clear()
+        if not quiet:
+            note("compiling kernels for this scene, once: up to half a minute; `sim warm` compiles all")
+
+    jit.on_compiling[:] = [announce]
+
+
+def _values(pairs: tuple[str, ...], option: str) -> dict[str, Any]:
+    """Return the values that an option gives to keys, each read as TOML, else as text."""
+    import tomllib
+
+    values: dict[str, Any] = {}
+    for pair in pairs:
+        key, sign, text = pair.partition("=")
+        if not sign or not key.strip():
+            raise click.UsageError(f'{option} takes TABLE.KEY=VALUE, such as contact.load="2 mN", not {pair!r}')
+        try:
+            document = tomllib.loads(f"value = {text}")
+        except (ValueError, RecursionError):
+            document = {}
+        values[key.strip()] = document["value"] if len(document) == 1 else text.strip()
+    return values
+
+
+def _load(scenario: Path, changes: tuple[str, ...], seed: int | None = None, members: int | None = None) -> Any:
+    """Load a scenario with the values of --set, --seed and --members."""
+    from sim.scenario.reader import load
+
+    numbers = {"seed": seed, "ensemble.members": members}
+    overrides = _values(changes, "--set") | {key: value for key, value in numbers.items() if value is not None}
+    return load(scenario, overrides, option="--set")
+
+
 class _Commands(click.Group):
-    """Commands that end in silence where whoever reads what they print has read enough."""
+    """Commands that succeed if the reader of their output stops early."""
 
     def make_context(self, *arguments: Any, **options: Any) -> click.Context:
         with while_read():
@@ -116,17 +155,17 @@ def run(
     from sim.ensemble.part_files import PartFiles, folder_of, shard_of
 
     began, stages, share = time.time(), Stages(), shard_of("1/1" if shard is None else shard)
-    from sim.scenario.reader import load
+    from sim.units.quantity import read_option
 
-    announce_compiling(quiet)
-    until = time.monotonic() + options.quantity(max_time, "--max-time", "s", above=0, typical="8 h")
-    memory = options.quantity(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
-    with named("making modes and bands of the fluctuations", quiet):
-        scene = load(scenario, options.overrides(changes, seed, members), option="--set")
+    _announce_compiling(quiet)
+    until = time.monotonic() + read_option(max_time, "--max-time", "s", above=0, typical="8 h")
+    memory = read_option(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
+    with slow_stage("making modes and bands of the fluctuations", quiet):
+        scene = _load(scenario, changes, seed, members)
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
 
-    from sim.ensemble import bounds, plan as plans, preview, simulate
+    from sim.ensemble import plan as plans, preview, simulate
 
     simulate.claim(target, force or resume, simulate.files_read(scene), simulate.BESIDE)
     from sim.ensemble.workers import orders
@@ -139,8 +178,7 @@ def run(
     how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
     with contextlib.ExitStack() as shown:
         if not quiet:
-            bar = progress_bar(plans.work(plan, *share), each=plan.points[0].clock.steps + 1)
-            stages.shown = shown.enter_context(bar)
+            stages.shown = shown.enter_context(progress_bar(plans.work(plan, *share)))
         with orders() as ordered:
             how["stop"] = lambda: ordered() or time.monotonic() > until
             try:
@@ -149,7 +187,7 @@ def run(
                 simulate.log(target, began, stages.ended())
                 _fail(_KEPT, getattr(stopped, "exit_code", INTERRUPTED))
         shown.callback(lambda: simulate.log(target, began, stages.ended()))
-        if tabulated := not (quiet or bare or shard) and bounds.tabulated(plan):
+        if tabulated := not (quiet or bare or shard) and preview.tabulated(plan):
             stages.begin("table")
             tables = _tables_of(target)
     if tabulated:
@@ -193,10 +231,9 @@ def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
 def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: int | None) -> None:
     """Print what a scenario would run: quantities in SI, models, errors known beforehand, time, memory, file size."""
     from sim.ensemble.preview import preview
-    from sim.scenario.reader import load
 
-    announce_compiling()
-    say(preview(load(scenario, options.overrides(changes, seed, members), option="--set")))
+    _announce_compiling()
+    say(preview(_load(scenario, changes, seed, members)))
 
 
 @cli.command()
@@ -292,10 +329,22 @@ def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool
         say(str(written(dataset, output, page, force, **beside)))
 
 
+def _import_xarray() -> None:
+    """Import xarray without pint and dask, whose import takes a second and whose arrays no command uses."""
+    dask = "dask.array" if "xarray" in sys.modules else "dask"  # which xarray looks for when it is imported
+    hidden = dict.fromkeys({"pint", dask} - sys.modules.keys())
+    sys.modules.update(hidden)  # type: ignore[arg-type]
+    import xarray as xr
+
+    xr.Dataset(coords={"t": [0.0]}).t.notnull()  # which looks for both
+    for name in hidden:
+        del sys.modules[name]
+
+
 @contextlib.contextmanager
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """A dataset of ours, at chosen values of its sweep, or one message."""
-    absent.other_arrays()
+    _import_xarray()
     from sim import analysis
     from sim.analysis import scene
 
@@ -307,7 +356,7 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
             done = f"{100 * dataset.attrs['share_done']:.0f} % is computed, the rest is nan"
             say(f"note: {path} is of a run that is not done: {done}", err=True)
         try:
-            found = analysis.where(dataset, options.values(chosen, "--where"))
+            found = analysis.where(dataset, _values(chosen, "--where"))
         except ValueError as fault:
             _fail(f"{path}: --where {fault}", BAD_INPUT)
         yield found
@@ -327,11 +376,11 @@ def converge(
 
     One core is used: settings that run side by side would disturb each other's times.
     """
-    from sim.scenario.reader import load
+    from sim.units.quantity import read_option
 
-    seconds = options.quantity(budget, "--budget", "s", above=0)
-    accepted = None if tolerance is None else options.quantity(tolerance, "--tolerance", "1", above=0, below=1)
-    scene = load(scenario, options.overrides(changes), option="--set")
+    seconds = read_option(budget, "--budget", "s", above=0)
+    accepted = None if tolerance is None else read_option(tolerance, "--tolerance", "1", above=0, below=1)
+    scene = _load(scenario, changes)
     from sim.study import converge as convergence
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
@@ -354,9 +403,8 @@ def fit(
     stem: Path | None, units: tuple[str, ...], changes: tuple[str, ...], force: bool,
 ) -> None:  # fmt: skip
     """Calibrate numbers of a scenario to measured curves: CSV columns named as variables of a dataset, with units."""
-    from sim.scenario.reader import load
-
-    scene, target = load(scenario, options.overrides(changes), option="--set"), stem or scenario.with_suffix("")
+    _announce_compiling()
+    scene, target = _load(scenario, changes), stem or scenario.with_suffix("")
     from sim.study import fitted
 
     found, shown = fitted.carried_out(scene, data, keys, common, target, force, steady, judged, units)

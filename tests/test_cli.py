@@ -19,11 +19,11 @@ from click.testing import CliRunner
 from helpers.commands import SCENE, sim
 
 from sim import cli
-from sim.ensemble import bounds, progress, simulate
+from sim.ensemble import preview, simulate
 from sim.numerics import jit
 from sim.scenario.reader import BadInput, load
 from sim.study import paper
-from sim.units import options
+from sim.units import terminal
 
 LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
 
@@ -32,7 +32,7 @@ LENS = Path(__file__).parent.parent / "scenarios" / "pdms_lens.toml"
 def here(tmp_path, monkeypatch):
     """An empty folder to work in, with one scenario."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(progress, "_SLOW", 1e6)  # no stage is named because others use the machine, too
+    monkeypatch.setattr(terminal, "_SLOW", 1e6)  # no stage is named because others use the machine, too
     Path("scene.toml").write_text(SCENE)
     return tmp_path
 
@@ -184,19 +184,19 @@ def test_run_writes_the_dataset_into_a_new_folder_and_ends_with_its_path(here):
 
 
 def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, monkeypatch):
-    progress.announce_compiling()
+    cli._announce_compiling()
     for _ in range(2):
         for notice in list(jit.on_compiling):
             notice("sim.laws.jkr.pull_off_load")
     assert capsys.readouterr().err.count("compiling") == 1
-    progress.announce_compiling(quiet=True)
+    cli._announce_compiling(quiet=True)
     jit.on_compiling[0]("sim.laws.jkr.pull_off_load")
     monkeypatch.setattr("time.monotonic", iter([0.0, 10.0, 40.0, 50.0]).__next__)
-    with progress.progress_bar(100, each=10) as shown:
+    with terminal.progress_bar(100) as shown:
         shown.begin("simulating")
         shown.advance(30)
         shown.begin("writing")
-    done = "30 % of 100 member-steps, 3 of 10 members, 1 a second, 2 min left"
+    done = "30 % of 100 member-steps, 2 min left"
     assert capsys.readouterr().err.splitlines() == [done, "writing"]
 
 
@@ -204,22 +204,22 @@ def test_a_terminal_has_a_bar_with_what_is_done(capsys, monkeypatch):
     monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "120")
-    with progress.progress_bar(100, each=10) as shown:
+    with terminal.progress_bar(100) as shown:
         shown.begin("simulating")
         shown.advance(30)
     printed = capsys.readouterr()
     assert "simulating" in printed.out + printed.err
-    assert "30 %, 3 of 10 members" in printed.out + printed.err
+    assert "30%" in printed.out + printed.err
 
 
 def test_a_stage_without_a_bar_is_named_when_it_takes_long(capsys, monkeypatch):
-    monkeypatch.setattr(progress, "_SLOW", 0.0)
+    monkeypatch.setattr(terminal, "_SLOW", 0.0)
     for quiet in (False, True):
-        with progress.named("making modes", quiet):
+        with terminal.slow_stage("making modes", quiet):
             time.sleep(0.1)
         assert capsys.readouterr().err == ("" if quiet else "making modes\n")
-    monkeypatch.setattr(progress, "_SLOW", 99.0)
-    with progress.named("making modes", False):
+    monkeypatch.setattr(terminal, "_SLOW", 99.0)
+    with terminal.slow_stage("making modes", False):
         pass
     assert capsys.readouterr().err == ""
 
@@ -414,7 +414,7 @@ def test_a_fault_of_our_own_is_not_hidden(here, monkeypatch):
     ],
 )  # fmt: skip
 def test_a_value_of_set_is_toml_or_else_text(text, value):
-    assert options.overrides((f"contact.load={text}",)) == {"contact.load": value}
+    assert cli._values((f"contact.load={text}",), "--set") == {"contact.load": value}
 
 
 def test_a_whole_table_can_be_set(here):
@@ -741,7 +741,7 @@ def test_max_memory_is_honoured_and_refused_with_the_least_where_it_is_too_littl
     assert re.search(r"takes \d+ MB of memory at least, of which 9 MB are allowed \(--max-memory\)", refused.stderr)
     assert not Path("outputs").exists()
     assert sim("run", "scene.toml", "--max-memory", "4 GB", "--no-table").exit_code == 0
-    monkeypatch.setattr(bounds, "_MOST_TABULATED", 0.0)
+    monkeypatch.setattr(preview, "_MOST_TABULATED", 0.0)
     large = sim("run", "scene.toml", "--force")
     assert large.exit_code == 0
     assert "`sim stats` prints the table" in large.stderr

@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 from numpy.testing import assert_allclose
 
-from sim.cli import cli
+from sim.cli import _values, cli
 from sim.plots.kinds import KINDS
 from sim.scenario.reader import load
-from sim.units import options
 
 ROOT = Path(__file__).parent.parent
 PAGES = sorted(str(path.relative_to(ROOT)) for path in (*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")))
@@ -82,7 +81,7 @@ def test_the_commands_that_a_page_shows_exist_with_their_options_kinds_and_keys(
         assert all((ROOT / word).exists() for word in words if word.startswith("scenarios/")), words
         if given.get("changes"):
             scenario = ROOT / given["scenario"]
-            load(scenario if scenario.exists() else ROOT / "sim" / "starter.toml", options.overrides(given["changes"]))
+            load(scenario if scenario.exists() else ROOT / "sim" / "starter.toml", _values(given["changes"], "--set"))
 
 
 def test_the_page_for_newcomers_shows_what_its_code_gives():

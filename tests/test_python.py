@@ -151,8 +151,8 @@ def test_what_cannot_be_drawn_is_bad_input(dataset, kind, words):
 def test_converge_takes_a_budget_as_text(monkeypatch):
     monkeypatch.setattr("sim.study.converge.converge", lambda scene, seconds: (scene.name, seconds))
     assert sim.converge(SCENE, "2 min") == (SCENE["name"], 120.0)
-    with pytest.raises(sim.BadInput, match=r"^budget: .*without a unit"):
-        sim.converge(SCENE, "60")
+    with pytest.raises(sim.BadInput, match=r"^budget 2 kg: .*not a unit of s"):
+        sim.converge(SCENE, "2 kg")
 
 
 def test_the_version_is_that_of_the_distribution():

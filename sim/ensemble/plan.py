@@ -137,9 +137,9 @@ class Plan:
         runs = len(self.points) * self.members / group
         return runs * self.points[0].clock.steps * seconds_a_step(self.points[-1], group)
 
-    def worthwhile(self, cores: int) -> int:
-        """Processes that are worth starting."""
-        return min(cores, len(self.packs) * len(self.groups()), 1 + int(self._seconds(self.group) / _PROCESS_SECONDS))
+    def worthwhile(self) -> int:
+        """Return the number of processes that are worth starting."""
+        return min(len(self.packs) * len(self.groups()), 1 + int(self._seconds(self.group) / _PROCESS_SECONDS))
 
     @property
     def group(self) -> int:

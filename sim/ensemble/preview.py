@@ -1,52 +1,324 @@
-"""What a scenario would run, in words: for ``sim check``."""
+"""Statements about a run before it starts: models, quantities, error estimates, time, memory and disk."""
 
 import itertools
 import math
 import os
 import re
+import shutil
 import time
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from sim.ensemble import bounds
-from sim.ensemble.bounds import size, spread
-from sim.ensemble.oscillations import of_slider
-from sim.ensemble.plan import Block, Plan, seconds_a_step, work
-from sim.ensemble.progress import duration
+from sim.engine import MemberNoise, follow
+from sim.ensemble.plan import Block, Plan, map_bytes, seconds_a_step, snapshots, state_numbers, work
 from sim.laws import jkr
+from sim.laws.schallamach import Body
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
-from sim.parts.exchange import Parts
+from sim.parts.bonds.models import Cohort, FirstMoment, Rate
+from sim.parts.drive import Spring
+from sim.parts.exchange import Array, Parts
 from sim.parts.shear.modes import ModalProcess
 from sim.scenario.clock import Record
 from sim.scenario.declared import distinct, entries
 from sim.scenario.scenario import Scenario
+from sim.units.quantity import read_option
+from sim.units.terminal import duration
+
+# Rough costs of one core [s]: a start with its table, a process that shares the work; a byte of the dataset, of it
+# compressed, of a map that is drawn; a point of a sweep, a part; a mode pair that is made; a record of a batch, of a
+# member.
+_START, _WORKER = 2.5, 1.2
+_BYTE, _PACKED_BYTE, _MAP_BYTE = 16e-9, 32e-9, 2e-9
+_POINT, _PART, _MODE, _RECORD, _RECORD_OF_MEMBER = 4e-3, 2e-3, 5e-6, 5e-6, 2e-7
+# Rough memory [byte]: a process with its libraries, more of it for a table; a mode pair while it is made and while it
+# is used. Copies of a part while it is computed, and of the dataset while it is written or read.
+_PROCESS, _TABLE, _OF_MODE_MADE, _OF_MODE, _COPIES_OF_PART, _COPIES = 160e6, 100e6, 520.0, 160.0, 3.0, 2.0
+#: Largest dataset that is built in memory, and largest trajectories that are read back for a table [byte].
+_BUILT_IN_MEMORY, _MOST_TABULATED = 256e6, 1e8
+#: Bytes of a quantity's name in a part.
+_HEADER = 300.0
 
 _MOST_WORDS = 6
-#: Time for which steps are tried [s]; a run that is counted shorter [s] is not tried, or not announced.
+#: Time for which steps are tried [s]; a run with a shorter estimate [s] is not tried, or not announced.
 _TRIED, _WORTH_TRYING, _LONG = 0.25, 1.0, 10.0
-#: Keys that stand elsewhere than among the quantities.
+#: Relative change of bonds and stress in the derivative of the area.
+_LITTLE = 1e-4
+#: Keys that are listed elsewhere than among the quantities.
 _ELSEWHERE = ("name", "sweep", *(f"{part}.model" for part in Parts._fields))
-_ROWS = {"cell_error": "error of the cell", "banded_error": "error of the bands", "member_spread": "spread of a member"}
+_ERRORS = {
+    "cell_error": "error of the cell",
+    "banded_error": "error of the bands",
+    "member_spread": "spread of a member",
+}
 
 Rows = list[tuple[str, ...]]
+
+
+class NoRoom(RuntimeError):
+    """A run needs more memory than there is."""
+
+    exit_code = 1
 
 
 class _NotCompiledError(Exception):
     """A kernel is not in the cache."""
 
 
+class Forecast(NamedTuple):
+    """Estimated needs of a run: time of all cores and by the clock [s], memory, dataset and room on disk [byte]."""
+
+    cpu: float
+    clock: float
+    memory: float
+    file: float
+    disk: float
+
+
+def forecast(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: float = 1.0) -> Forecast:
+    """Estimate the needs of a run, or of one of some shares of it.
+
+    ``pace`` is the measured time of some steps over their counted time, ``left`` the fraction of steps that are not
+    done yet. The disk also holds the parts of steps that are done.
+    """
+    points, parts = plan.points, len(plan.packs) * len(plan.groups()) * len(plan.blocks(plan.points[0]))
+    packed = plan.maps if plan.scenario.record.compression == "none" else plan.bytes
+    modes = _MODE * max(_mode_pairs(point) for point in spread(points, 2))
+    steps = left * (pace * counted(plan) + parts * _PART) / shares
+    alone = _START + modes + len(points) * _POINT
+    disk = _parts(plan) / shares
+    if shares == 1:  # a share makes no dataset
+        alone += plan.bytes * _BYTE + packed * _PACKED_BYTE
+        disk += plan.file_bytes
+    started = _WORKER + modes if jobs > 1 else 0.0
+    return Forecast(
+        alone + jobs * started + steps, alone + started + steps / jobs, memory(plan, jobs), plan.file_bytes, disk
+    )
+
+
+def tabulated(plan: Plan) -> bool:
+    """True if a run ends with a table of its dataset, for which the dataset is read as a whole."""
+    return plan.trajectories <= _MOST_TABULATED
+
+
+def spread(points: Sequence[Scenario], most: int = 8) -> list[Scenario]:
+    """Return some of the points, first and last included."""
+    places = np.unique(np.linspace(0, len(points) - 1, min(most, len(points))).round().astype(int))
+    return [points[place] for place in places]
+
+
+def counted(plan: Plan) -> float:
+    """Return the counted time of all steps and records on one core [s]."""
+    some, groups = spread(plan.points), plan.groups()
+    first, last = (
+        sum(counted_block(point, group, Block(-1, point.clock.steps, point.clock.stride)) for point in some)
+        for group in (groups[0], groups[-1])
+    )
+    return len(plan.points) * ((len(groups) - 1) * first + last) / len(some)
+
+
+def counted_block(point: Scenario, members: np.ndarray, block: Block, speeds: np.ndarray | None = None) -> float:
+    """Return the counted time of the steps of a block and of the records and maps in it [s]."""
+    steps = block.end - block.start
+    maps = map_bytes(point, int(np.sum(members < point.record.map_members))) if point.record.maps else 0.0
+    maps *= sum(block.start < step <= block.end for step in snapshots(point)) / max(1, len(point.record.maps))
+    records = steps / block.stride * (_RECORD + len(members) * _RECORD_OF_MEMBER)
+    return steps * seconds_a_step(point, len(members), speeds) + records + _MAP_BYTE * maps
+
+
+def memory(plan: Plan, jobs: int) -> float:
+    """Estimate the largest memory of all processes together [byte]: libraries, and blocks or the dataset."""
+    block = 0.0
+    for point in spread(plan.points, 2):
+        pairs, states = _mode_pairs(point), 16.0 * plan.group * state_numbers(point)
+        block = max(block, _OF_MODE_MADE * pairs, _OF_MODE * pairs + states + _COPIES_OF_PART * _part(plan, point))
+    dataset = _COPIES * min(plan.bytes, _BUILT_IN_MEMORY) + (_TABLE if tabulated(plan) else 0.0)
+    return (jobs + 1 if jobs > 1 else 1) * _PROCESS + max(jobs * block, dataset)
+
+
+def _mode_pairs(point: Scenario) -> int:
+    return point.process.pairs if point.fluctuations.keeps_modes else 0
+
+
+def _part(plan: Plan, point: Scenario) -> float:
+    """Return the size of the largest part [byte]."""
+    numbers = plan.group * max(1, plan.records_of_block(point)) * len(plan.variables) * len(plan.packs[0])
+    drawn = min(1.0, plan.snapshots_of_block(point) / len(point.record.maps)) if point.record.maps else 0.0
+    return 8.0 * numbers + drawn * map_bytes(point, plan.group)
+
+
+def _parts(plan: Plan) -> float:
+    """Return the size of all parts [byte]: records in double precision, and the states between blocks."""
+    first, groups = plan.points[0], len(plan.groups())
+    blocks, each = len(plan.blocks(first)), plan.members if plan.per_member else 3 * groups
+    rows = sum(each if plan.varies(variable) else groups for variable in plan.variables)
+    states = (blocks - 1) * plan.members * state_numbers(first)
+    headers = _HEADER * len(plan.packs) * groups * blocks * len(plan.variables)
+    return plan.maps + headers + 8.0 * len(plan.points) * (rows * first.clock.records + states)
+
+
+def memory_limit() -> tuple[float, str]:
+    """Return the memory that a run may take [byte], and the source of this limit.
+
+    It is that of ``SIM_MAX_MEMORY``, else that of a job of SLURM, else the memory that is free.
+    """
+    import psutil
+
+    if text := os.environ.get("SIM_MAX_MEMORY"):
+        return read_option(text, "SIM_MAX_MEMORY", "byte", above=0, typical="4 GB"), "are allowed (SIM_MAX_MEMORY)"
+    processors = int(os.environ.get("SLURM_CPUS_ON_NODE") or cores())
+    for name, count in (("SLURM_MEM_PER_NODE", 1), ("SLURM_MEM_PER_CPU", processors)):
+        if megabytes := int(os.environ.get(name) or 0):  # 0 stands for all memory
+            return 2.0**20 * megabytes * count, f"are allowed ({name})"
+    return psutil.virtual_memory().available + psutil.Process().memory_info().rss, "are free"
+
+
+def fitting(plan: Plan, jobs: int, most: float = math.inf, kept: bool = False) -> int:
+    """Return the number of processes, at most ``jobs``, for which ``most`` [byte] of memory are enough.
+
+    If ``most`` is infinite, the limit is ``memory_limit``. A dataset that is ``kept`` in memory counts.
+
+    Raises
+    ------
+    NoRoom
+        If memory is too small for one process; the message says how much the run takes.
+    """
+    limit, source = (most, "are allowed (--max-memory)") if most < math.inf else memory_limit()
+    dataset = _parts(plan) + plan.bytes if kept else 0.0
+    for count in range(jobs, 0, -1):
+        if memory(plan, count) + dataset <= limit:
+            return count
+    cure = "fewer modes, maps, records or points of a sweep take less (see `sim check`)"
+    needed = size(memory(plan, 1) + dataset)
+    raise NoRoom(f"the run takes {needed} of memory at least, of which {size(limit)} {source}; {cure}")
+
+
+def refuse_full_disk(plan: Plan, target: Path, shares: int = 1) -> None:
+    """Refuse a run, or one of some shares of it, whose parts and dataset do not fit on the disk of its output.
+
+    Raises
+    ------
+    StoreTrouble
+        With the numbers and the cure.
+    """
+    folder = next(parent for parent in target.absolute().parents if parent.is_dir())
+    needed, free = forecast(plan, 1, shares=shares).disk, float(shutil.disk_usage(folder).free)
+    parts = Path(f"{target}.parts")  # of an unfinished run
+    free += sum(path.stat().st_size for path in parts.iterdir() if path.is_file()) if parts.is_dir() else 0.0
+    if needed > free:
+        text = f"parts and dataset take {size(needed)} until they are one file, of which {size(free)} are free"
+        raise StoreTrouble(f"{folder}: {text}; fewer members, records or maps take less, as do pooled statistics")
+
+
+def size(count: float) -> str:
+    """Return a number of bytes as text of two digits."""
+    units = ("GB", 1e9), ("MB", 1e6), ("kB", 1e3)
+    unit, factor = next((row for row in units if count >= row[1]), ("byte", 1.0))
+    return f"{float(f'{count / factor:.2g}'):g} {unit}"
+
+
+def cores() -> int:
+    """Return the number of processors that this process may use."""
+    import loky  # takes as long to import as a short run to compute
+
+    return int(loky.cpu_count())
+
+
+def usual_jobs(plan: Plan) -> int:
+    """Return the default number of processes: one a core if the work is worth it."""
+    wanted = plan.worthwhile()
+    return min(wanted, cores()) if wanted > 1 else 1
+
+
+def announced(
+    plan: Plan, jobs: int | None, most: float, shard: tuple[int, int] = (1, 1), parts: Any = ()
+) -> tuple[int, list[str]]:
+    """Return the number of processes of a run and the lines that are printed before it.
+
+    There are at most ``jobs`` processes and no more than ``most`` [byte] of memory hold. The lines of a long run, or
+    of one of several processes, say how much it takes beside the ``parts`` that are done. Missing kernels are compiled
+    for these lines, before the processes need them.
+    """
+    wanted, lines = jobs or usual_jobs(plan), [f"note: {text}" for text in remarks(plan)]
+    if (jobs := fitting(plan, wanted, most)) < wanted:
+        lines.append(f"note: there is memory for {jobs} of {wanted} processes")
+    if not tabulated(plan):
+        lines.append("note: of so large a dataset `sim stats` prints the table")
+    left = 1.0 - sum(task.done(parts) for task in plan.share(*shard)) / work(plan, *shard) if parts else 1.0
+    if jobs > 1 or left * counted(plan) > _LONG:
+        needs = forecast(plan, jobs, tried(plan, compiling=True) or 1.0, shard[1], left)
+        if jobs > 1 or needs.clock > _LONG:
+            room = f"{size(needs.memory)} of memory, {size(needs.disk)} of disk for a file of {size(needs.file)}"
+            lines.append(f"{_times(needs, jobs)}, {room}")
+    return jobs, lines
+
+
+def tried(plan: Plan, compiling: bool = False) -> float | None:
+    """Return the pace of this machine: measured time of some steps over their counted time.
+
+    It is 1 for a short run. It is None if kernels are not in the cache and ``compiling`` them is not wanted.
+    """
+
+    def refuse(name: str) -> None:
+        raise _NotCompiledError(name)
+
+    if counted(plan) < _WORTH_TRYING:
+        return 1.0
+    before, ends = list(jit.on_compiling), spread(plan.points, 3)
+    jit.on_compiling[:] = before if compiling else [refuse]
+    try:
+        trials = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
+    except _NotCompiledError:
+        return None
+    finally:
+        jit.on_compiling[:] = before
+    return sum(measured for measured, _ in trials) / sum(expected for _, expected in trials)
+
+
+def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
+    """Return measured and counted time [s] of the last of some blocks of steps at one point.
+
+    Each block is twice as long as the one before; all together take about ``most`` [s].
+    """
+    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
+    stride, last = point.clock.stride, point.clock.steps
+    dice, state, block, began = MemberNoise.of(point.seed, members), None, Block(-1, 0, stride), time.perf_counter()
+    for count in itertools.count():
+        start = time.perf_counter()
+        for steps in block.pieces(1024, []):
+            state, course = follow(point, dice, state, steps)
+            for variable in plan.variables if steps[-1] % stride == 0 else ():
+                variable.read(point, course)
+        end = time.perf_counter()
+        if block.end == last or (count > 2 and end - began + 2.0 * (end - start) > most):
+            break
+        following = max(1, 2 * block.end)
+        if following > stride:  # it ends at a record
+            following = stride * math.ceil(following / stride)
+        block = Block(block.end, min(last, following), stride)
+    point.release()
+    speeds = point.speeds(5, block.end / last)[2:]
+    return max(end - start, 1e-9), counted_block(point, members, block, speeds)
+
+
+def _times(needs: Forecast, jobs: int, compiled: bool = True) -> str:
+    """Return CPU time and time by the clock as text."""
+    clock = f", {duration(needs.clock)} by the clock in {jobs} processes" if jobs > 1 else ""
+    compiling = "" if compiled else " by rough costs, and up to half a minute to compile, once"
+    return f"about {duration(needs.cpu)} of CPU time{clock}{compiling}"
+
+
 def preview(scenario: Scenario) -> str:
-    """Models of the parts, quantities in SI, errors known before the run, and time, memory and file that it takes.
+    """Describe a run: models, quantities in SI, error estimates, and the time, memory and file that it takes.
 
     Parameters
     ----------
     scenario : Scenario
-        As ``sim.load`` returns it; of a sweep every point counts.
+        As ``sim.load`` returns it; every point of a sweep counts.
 
     Returns
     -------
@@ -68,62 +340,62 @@ def preview(scenario: Scenario) -> str:
 
 
 def remarks(plan: Plan) -> list[str]:
-    """What is to be known before a run, one sentence each."""
-    found = [text for point in spread(plan.points) for text in point.remarks()]
+    """Return the remarks on a run, one sentence each."""
+    texts = [text for point in spread(plan.points) for text in point.remarks()]
     if plan.scenario.record.per_member is None and not plan.per_member:
-        found.append(
+        texts.append(
             "every member would make a file of more than 20 GB: mean, spread and standard error are kept alone"
             " (record.per_member = true keeps every member)"
         )
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(texts))
 
 
 def _aligned(rows: Rows) -> str:
-    """Rows in columns, each as wide as its longest cell."""
+    """Return rows as text in columns, each as wide as its longest cell."""
     widths = [max(len(cell) for row in rows for cell in row[place : place + 1]) for place in range(len(rows[0]))]
     lines = ("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip() for row in rows)
     return "\n".join(f"  {line}" for line in lines)
 
 
 def _span(values: Sequence[float], unit: str = "", digits: str = ".4g") -> str:
-    """A number, or the range of several."""
+    """Return a number, or the range of several, as text."""
     low, high = format(min(values), digits), format(max(values), digits)
     return f"{low if low == high else f'{low} to {high}'} {unit}".strip()
 
 
 def _models(plan: Plan) -> Rows:
-    """The model of each part, why it is that one, and what it does."""
+    """Return the model of each part, its origin, and its description."""
     source = plan.scenario.origin
-    named = tomllib.loads(source.text.removeprefix("\ufeff").replace("\r\n", "\n"))
+    tables = tomllib.loads(source.text.removeprefix("\ufeff").replace("\r\n", "\n"))
     changed = {key.partition(".")[0] for key in source.overrides}
     swept = {key for axis in plan.scenario.sweep for key in axis.keys}
     rows: Rows = []
     for place, name in enumerate(Parts._fields):
-        why = "in the file" if name in named else "left out, so the simplest" if source.text else "given"
+        why = "in the file" if name in tables else "left out, so the simplest" if source.text else "given"
         why = "swept" if name in swept else "changed by an override" if name in changed else why
-        found: dict[str, tuple[str, ...]] = {}
+        models: dict[str, tuple[str, ...]] = {}
         for point in plan.points:
             part = getattr(point, name)
-            if part.model not in found:
-                found[part.model] = (name, part.model, why, _meaning(part))
+            if part.model not in models:
+                models[part.model] = (name, part.model, why, _meaning(part))
             if name in ("bonds", "shear") and name in point.why:
-                chosen = point.chosen[place].model
-                found[f"→ {chosen}"] = ("", f"→ {chosen}", "chosen", point.why[name])
-        rows += found.values()
+                chosen = f"→ {point.chosen[place].model}"
+                models[chosen] = ("", chosen, "chosen", point.why[name])
+        rows += models.values()
     differ = ", ".join(name for name in Parts._fields if any(point.varies[name] for point in plan.points))
-    said = f"differ in {differ}" if differ else "differ in nothing, so one is computed for all"
-    return [*rows, ("members", str(plan.scenario.ensemble.members), said)]
+    text = f"differ in {differ}" if differ else "differ in nothing, so one is computed for all"
+    return [*rows, ("members", str(plan.scenario.ensemble.members), text)]
 
 
 def _meaning(part: Any) -> str:
-    """The first sentence of a part's description."""
+    """Return the first sentence of a part's description."""
     line = (type(part).__doc__ or "").strip().partition("\n")[0].partition(". Limit")[0]
     return re.sub(r"[`\\]", "", line).rstrip(".")
 
 
 def _quantities(points: Sequence[Scenario]) -> Rows:
-    """Every number and choice of a scenario; where a sweep changes one, its range."""
-    found: dict[str, tuple[str, str, list[Any]]] = {}
+    """Return every number and choice of a scenario, with its range if a sweep changes it."""
+    columns: dict[str, tuple[str, str, list[Any]]] = {}
     tables = (entries(part, f"{name}.") for name, part in distinct(points))
     plain = (entry for entry in entries(points[0]) if "." not in entry.key)
     for key, value, quantity in itertools.chain(*tables, plain):
@@ -135,11 +407,11 @@ def _quantities(points: Sequence[Scenario]) -> Rows:
         if isinstance(value, tuple | bool):
             span = f", {_span(value, unit)}" if quantity and isinstance(value, tuple) else ""
             value = f"{len(value)} values{span}" if isinstance(value, tuple) else str(value).lower()
-        found.setdefault(key, (unit, meaning, []))[2].append(value)
-    order = list(dict.fromkeys(key.partition(".")[0] for key in found))
+        columns.setdefault(key, (unit, meaning, []))[2].append(value)
+    order = list(dict.fromkeys(key.partition(".")[0] for key in columns))
     rows: Rows = []
-    for key in sorted(found, key=lambda key: order.index(key.partition(".")[0])):
-        unit, meaning, values = found[key]
+    for key in sorted(columns, key=lambda key: order.index(key.partition(".")[0])):
+        unit, meaning, values = columns[key]
         different = list(dict.fromkeys(values))
         if all(isinstance(value, int | float) for value in different):
             shown = _span(different, unit, ".6g" if isinstance(different[0], float) else "")
@@ -150,7 +422,7 @@ def _quantities(points: Sequence[Scenario]) -> Rows:
 
 
 def _contact(points: Sequence[Scenario]) -> Rows:
-    """What is known of the contact with all its bonds and without fluctuations."""
+    """Return radius and pull-off load of the contact with all its bonds and without fluctuations."""
     rows: Rows = []
     closed = [point.rest_radius for point in points if math.isfinite(point.rest_radius)]
     if closed:
@@ -166,7 +438,7 @@ def _contact(points: Sequence[Scenario]) -> Rows:
 
 
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
-    """The spectrum on the infinite plane, and how the cell compares to it."""
+    """Return the size of the fluctuations on the infinite plane, and the errors of the cell."""
     spectra = [point.fluctuations.spectrum for point in points]
     if not any(spectrum.variance > 0.0 for spectrum in spectra):
         return []
@@ -176,42 +448,33 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
     energies = [power * energy for power, energy in zip(powers, plane, strict=True)]
     settled = any(spectrum.bond_made for spectrum in spectra)
     when = "in steady sliding at the last speed" if settled else "at amplitude 1"
-    rows: Rows = [("rms of the stress", f"{_span(rms, 'Pa')} {when}")]
-    rows.append(("stored energy", f"{_span(energies, 'J/m^2')} {when}, on the infinite plane"))
+    rows = {"rms of the stress": f"{_span(rms, 'Pa')} {when}"}
+    rows["stored energy"] = f"{_span(energies, 'J/m^2')} {when}, on the infinite plane"
     cells = {point.fluctuations.side(point.setting.cell): point for point in points}
     sides = [side for side in cells if math.isfinite(side)]
     if sides:
         ratios = [side / point.rest_radius for side, point in cells.items() if point.rest_radius > 0.0]
-        times = f", {_span(ratios)} times the JKR radius" if ratios else ""
-        rows.append(("cell", _span(sides, "m") + times))
+        rows["cell"] = _span(sides, "m") + (f", {_span(ratios)} times the JKR radius" if ratios else "")
     errors: dict[str, list[float]] = {}
     for point in points:
         for name, value in point.process.known_errors().items():
             errors.setdefault(name, []).append(value)
-    for start, title in _ROWS.items():
-        found = {name.removeprefix(f"{start}_"): errors.pop(name) for name in list(errors) if name.startswith(start)}
-        if found:
-            each = (f"{name.replace('_', ' ')} {_percent(values)}" for name, values in found.items())
-            rows.append((title, ", ".join(each)))
-    rows += [(name.replace("_", " "), _span(values, "", ",.0f")) for name, values in errors.items()]
-    details = dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting))
-    rows = [
-        *({row[0]: row[1] for row in rows} | details).items()
-    ]  # a map that is the field has an rms and an energy of its own
+    for start, title in _ERRORS.items():
+        names = [name for name in errors if name.startswith(start)]
+        each = (f"{name.removeprefix(f'{start}_').replace('_', ' ')} {_percent(errors.pop(name))}" for name in names)
+        rows |= {title: ", ".join(each)} if names else {}
+    rows |= {name.replace("_", " "): _span(values, "", ",.0f") for name, values in errors.items()}
+    # a map that is the field has an rms and an energy of its own
+    rows |= dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting))
     modes = [cast(ModalProcess, point.process).modes for point in points if point.fluctuations.keeps_modes]
     if modes:
         pairs, grid = _span([each.qx.size for each in modes], "", ","), _span([each.points for each in modes], "", ",")
-        rows.append(("modes", f"{pairs} pairs on a grid of {grid} points a side"))
-    return rows
-
-
-def _slider(points: Sequence[Scenario]) -> Rows:
-    """Stiffness of the contact, and of the spring below which friction that falls with speed makes oscillations."""
-    return [(name, f"{_span(values)} {said}" if values else said) for (name, said), values in of_slider(points).items()]
+        rows["modes"] = f"{pairs} pairs on a grid of {grid} points a side"
+    return [*rows.items()]
 
 
 def _power(point: Scenario) -> float:
-    """Factor of the spectrum's variance: 1, or n E[f²] of bonds that make the field, in steady sliding at the end."""
+    """Return the factor of the spectrum's variance: n E[f²] in steady sliding if bonds make the field, else 1."""
     if not point.fluctuations.spectrum.bond_made:
         return 1.0
     settled = point.population.steady(point.speeds(2)[1:])
@@ -223,27 +486,86 @@ def _percent(values: list[float]) -> str:
     return f"{100.0 * value:+.2g} %" if abs(value) > 1e-9 else "none"
 
 
-def usual_jobs(plan: Plan) -> int:
-    """Processes that a run has by itself: one a core where the work is worth it."""
-    return plan.worthwhile(len(os.sched_getaffinity(0)))
+def _slider(points: Sequence[Scenario]) -> Rows:
+    """Return the stiffness of the contact, and that of the spring below which sliding is unstable."""
+    rows: dict[tuple[str, str], list[float]] = {}
+    for point in points:
+        drive, (yields, slope) = cast(Spring, point.drive), cast(Spring, point.drive).yields(*point.solid.effective)
+        radius, speeds = math.sqrt(point.contact_area / math.pi), np.abs(point.speeds(41))
+        firm = 1.0 / (yields + slope / radius) if yields + slope > 0.0 else math.inf
+        rows.setdefault(("contact k_t", "N/m"), []).append(firm)
+        if not drive.spring:
+            continue
+        if drive.mass > 0.0:
+            frequency = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
+            rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(frequency)
+        bonds, body = point.population, slider_body(point, speeds)
+        bare = Body(body.area, body.area_growth, body.stress_growth)
+        sticking, stretching = cast(Rate, bonds), cast(Cohort | FirstMoment, bonds)
+        alone = stretching.onset(speeds, bare) if bonds.stretched else sticking.onset(speeds, body)
+        if np.isnan(alone.stiffness).all():
+            continue
+        worst = int(np.nanargmax(alone.stiffness))
+        at = f", at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
+        rows.setdefault(("oscillates below", f"N/m of the spring{at}"), []).append(float(alone.stiffness[worst]))
+        if not bonds.stretched:
+            continue
+        delays = {"mass": drive.mass, "damping": drive.damping, "viscosity": drive.viscosity, "k_t": yields + slope}
+        *others, last = [name for name, amount in delays.items() if amount > 0.0] or [""]
+        if last:
+            name = f"with {', '.join(others)}{' and ' if others else ''}{last}"
+            behind = stretching.onset(speeds, body).stiffness
+            if np.isnan(behind).all():
+                rows.setdefault((name, "never"), [])
+            elif np.nanmax(behind) < math.inf:
+                rows.setdefault((name, "N/m of the spring"), []).append(float(np.nanmax(behind)))
+            else:
+                text = "behind any spring: k_t is so soft that the interface jumps by itself"
+                rows.setdefault((name, text), [])
+        if drive.mass == 0.0 and (grows := stretching.amplitude(speeds)) is not None:
+            text = "suddenly, with large slips; on the way back they last to a stiffer spring"
+            if grows[worst] > 0.0:
+                text = f"gradually: friction swings by {grows[worst]:.3g} √(1 − K/K_c) of itself"
+            rows.setdefault(("sets in there", f"{text} (mean field, constant area)"), [])
+        area = np.asarray(body.area)[worst]
+        soft = 4.0 * math.pi * point.solid.effective[0] * float(area / alone.stiffness[worst])
+        if 0.5 * soft < 2.0 * radius:
+            text = "m and longer: such waves along the sliding oscillate by themselves, across half as long ones"
+            rows.setdefault(("half-space", text), []).append(soft)
+    return [(name, f"{_span(values)} {text}" if values else text) for (name, text), values in rows.items()]
+
+
+def slider_body(point: Scenario, speeds: Array) -> Body:
+    """Return the body behind the spring of a scene in steady sliding at speeds [m/s], with the growth of its area."""
+    drive, steady = cast(Spring, point.drive), point.population.steady(speeds)
+    control, (yields, slope) = point.contact.control(0.0, 0.0), drive.yields(*point.solid.effective)
+
+    def area(share: float = 1.0, stress: float = 1.0) -> Array:
+        work_left = point.adhesion.work_of_bonds(steady.fraction * share)
+        terms = steady.strength * stress, point.contact.reversible, point.bodies
+        return np.asarray(np.pi * control.radius(work_left, *terms) ** 2)
+
+    now, few = area(), _LITTLE
+    by_bonds = (area(share=1.0 + few) - area(share=1.0 - few)) / (2.0 * few * now)
+    by_stress = (area(stress=1.0 + few) - area(stress=1.0 - few)) / (2.0 * few * now)
+    firm = 1.0 / (yields + slope / np.sqrt(now / np.pi)) if yields + slope > 0.0 else math.inf
+    power = 0.5 if slope > 0.0 else 0.0
+    return Body(now, by_bonds, by_stress, drive.mass, drive.damping, drive.viscosity, firm, power)
 
 
 def _lacking(plan: Plan) -> list[str]:
-    """Memory or disk that there is not enough of for a run here."""
-    said = []
-    try:
-        bounds.fitting(plan, 1)
-    except bounds.NoRoom as trouble:
-        said.append(str(trouble))
-    try:
-        bounds.refuse_full_disk(plan, Path("outputs") / "dataset.nc")
-    except StoreTrouble as trouble:
-        said.append(str(trouble))
-    return said
+    """Return a sentence if memory, and one if the disk, is too small for a run here."""
+    texts = []
+    for refuse in (lambda: fitting(plan, 1), lambda: refuse_full_disk(plan, Path("outputs") / "dataset.nc")):
+        try:
+            refuse()
+        except (NoRoom, StoreTrouble) as trouble:
+            texts.append(str(trouble))
+    return texts
 
 
 def _run(plan: Plan) -> Rows:
-    """How much there is to compute and to keep."""
+    """Return the size of a run: steps, members, time, memory and file."""
     scene, clock, jobs = plan.scenario, plan.points[0].clock, usual_jobs(plan)
     alike = ", all alike, so one is computed" if scene.ensemble.members > plan.members else ""
     rows: Rows = [("time", f"{clock.steps:,} step{'s' if clock.steps > 1 else ''}, {clock.records:,} records")]
@@ -252,91 +574,12 @@ def _run(plan: Plan) -> Rows:
         axes = " × ".join(f"{len(axis.values)} {axis.keys[0]}" for axis in scene.sweep)
         rows.append(("sweep", f"{axes} = {len(plan.points):,} points" if len(scene.sweep) > 1 else axes))
     pace = tried(plan)
-    found = bounds.takes(plan, jobs, pace or 1.0)
-    rows.append(("work", f"{work(plan):,} member-steps, {_times(found, jobs, pace is not None)}"))
-    rows.append(("memory", f"about {size(found.memory)}{', all processes together' if jobs > 1 else ''}"))
+    needs = forecast(plan, jobs, pace or 1.0)
     before = "" if scene.record.compression == "none" else f", {size(plan.bytes)} before compression"
-    rows.append(("file", f"about {size(found.file)}{before}"))
-    rows.append(("disk", f"about {size(found.disk)} while it is made"))
-    return rows
-
-
-def announced(
-    plan: Plan, jobs: int | None, memory: float, shard: tuple[int, int] = (1, 1), kept: Any = ()
-) -> tuple[int, list[str]]:
-    """Processes of a run, of those wanted as many as ``memory`` [byte] holds, and what is said before it.
-
-    Of a long run, or one of several processes, that is how much it takes beside the parts that are ``kept`` of it;
-    kernels that are missing are compiled for it, before these processes need them.
-    """
-    wanted, said = jobs or usual_jobs(plan), [f"note: {text}" for text in remarks(plan)]
-    if (jobs := bounds.fitting(plan, wanted, memory)) < wanted:
-        said.append(f"note: there is memory for {jobs} of {wanted} processes")
-    if not bounds.tabulated(plan):
-        said.append("note: of so large a dataset `sim stats` prints the table")
-    left = 1.0 - sum(task.done(kept) for task in plan.share(*shard)) / work(plan, *shard) if kept else 1.0
-    if jobs > 1 or left * bounds.counted(plan) > _LONG:
-        found = bounds.takes(plan, jobs, tried(plan, compiling=True) or 1.0, shard[1], left)
-        if jobs > 1 or found.clock > _LONG:
-            room = f"{size(found.memory)} of memory, {size(found.disk)} of disk for a file of {size(found.file)}"
-            said.append(f"{_times(found, jobs)}, {room}")
-    return jobs, said
-
-
-def tried(plan: Plan, compiling: bool = False) -> float | None:
-    """Pace of a machine: CPU time of some steps, computed as a run does, over what is counted for them.
-
-    1 for a run that is counted short; None where kernels are not in the cache, unless ``compiling`` them is wanted.
-    """
-
-    def refuse(name: str) -> None:
-        raise _NotCompiledError(name)
-
-    if bounds.counted(plan) < _WORTH_TRYING:
-        return 1.0
-    before, ends = list(jit.on_compiling), spread(plan.points, 3)
-    jit.on_compiling[:] = before if compiling else [refuse]
-    try:
-        found = [_tried(plan, point, _TRIED / len(ends)) for point in ends]
-    except _NotCompiledError:
-        return None
-    finally:
-        jit.on_compiling[:] = before
-    return sum(took for took, _ in found) / sum(expected for _, expected in found)
-
-
-def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
-    """CPU time of some steps at one point, for ``most`` [s] altogether, and what is counted for them [s]."""
-    from sim.ensemble.part_files import MemoryParts
-    from sim.ensemble.simulate import advance_group, ignore
-
-    marks: list[float] = []
-
-    class Timed(MemoryParts):
-        """Parts of which nothing is kept but when each was made."""
-
-        def save(self, *of_part: object) -> None:
-            marks.append(time.process_time())
-
-    def late() -> bool:  # each block is twice as long as the one before
-        return len(marks) > 2 and marks[-1] - marks[0] + 2.0 * (marks[-1] - marks[-2]) > most
-
-    members = np.arange(min(plan.group, max(1, int(most / 10.0 / seconds_a_step(point, 1)))))
-    steps, stride = point.clock.steps, point.clock.stride
-    within = {2**k for k in range(stride.bit_length()) if 2**k < stride}  # beyond that, a block ends at a record
-    ends = sorted({-1, 0, *within, *(2**k * stride for k in range((steps // stride).bit_length())), steps})
-    blocks = [Block(start, end, stride) for start, end in itertools.pairwise(ends)]
-    task = next(plan.tasks())._replace(points=[point], members=members, blocks=blocks, names=["tried"] * len(blocks))
-    advance_group(Timed(), task, ignore, late)
-    point.release()
-    last = blocks[len(marks) - 1]
-    return marks[-1] - marks[-2], bounds.counted_block(
-        point, members, last, point.speeds(5, last.end / point.clock.steps)[2:]
-    )
-
-
-def _times(found: bounds.Takes, jobs: int, compiled: bool = True) -> str:
-    """CPU time and time by the clock in words."""
-    clock = f", {duration(found.clock)} by the clock in {jobs} processes" if jobs > 1 else ""
-    compiling = "" if compiled else " by rough costs, and up to half a minute to compile, once"
-    return f"about {duration(found.cpu)} of CPU time{clock}{compiling}"
+    return [
+        *rows,
+        ("work", f"{work(plan):,} member-steps, {_times(needs, jobs, pace is not None)}"),
+        ("memory", f"about {size(needs.memory)}{', all processes together' if jobs > 1 else ''}"),
+        ("file", f"about {size(needs.file)}{before}"),
+        ("disk", f"about {size(needs.disk)} while it is made"),
+    ]

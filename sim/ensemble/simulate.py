@@ -18,16 +18,15 @@ import numpy as np
 
 from sim.engine import MemberNoise, State, Trajectory, follow, pack, unpack
 from sim.ensemble import cluster
-from sim.ensemble.bounds import fitting, refuse_full_disk, room_named
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
 from sim.ensemble.part_files import WHOLE, MemoryParts, OutputExists, PartFiles, Parts, Shard, Stopped, held
 from sim.ensemble.plan import Block, Plan, Task, snapshots
-from sim.ensemble.progress import note
+from sim.ensemble.preview import fitting, refuse_full_disk
 from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.ensemble.workers import share_out
 from sim.laws.halfspace import cross_energy_of_map, disc_energy_of_map
-from sim.numerics.files import StoreTrouble, claim, explained
+from sim.numerics.files import DiskFull, StoreTrouble, claim, explained
 from sim.numerics.hdf5 import located
 from sim.parts.drive import READINGS
 from sim.parts.shear.maps import CarriedProcess
@@ -35,6 +34,7 @@ from sim.parts.shear.modes import ModalProcess
 from sim.parts.shear.process import Fluctuation
 from sim.scenario.declared import files_read
 from sim.scenario.scenario import Scenario
+from sim.units.terminal import note
 
 Progress = Callable[[int], None]
 
@@ -125,15 +125,15 @@ def run(
     wanted, source = identity(attributes(plan)), scenario.origin.written | {"sweep": order}
     if replace or not target.exists():
         refuse_full_disk(plan, target, shard[1])
-    with (
-        room_named(plan),
-        held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts,
-    ):
-        if parts is not None:
-            simulate(plan, parts, progress, jobs, stop, shard, scheduler)
-        if parts is not None and shard == WHOLE:
-            stage("writing")
-            parts.publish(target, functools.partial(write, outline(plan), parts))
+    try:
+        with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts:
+            if parts is not None:
+                simulate(plan, parts, progress, jobs, stop, shard, scheduler)
+            if parts is not None and shard == WHOLE:
+                stage("writing")
+                parts.publish(target, functools.partial(write, outline(plan), parts))
+    except DiskFull as trouble:
+        raise DiskFull(f"{trouble}; make room, and the same command with --resume goes on") from trouble
     return target
 
 

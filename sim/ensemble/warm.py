@@ -5,10 +5,10 @@ import os
 import time
 from collections.abc import Callable
 
-from sim.ensemble.progress import progress_bar
 from sim.ensemble.workers import share_out
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
+from sim.units.terminal import progress_bar
 
 
 def missing() -> list[str]:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from sim.ensemble.outline import scenario_json
-from sim.ensemble.progress import announce_compiling
 from sim.numerics import files
 from sim.plots.style import in_units
 from sim.scenario.declared import files_read
@@ -23,7 +22,7 @@ from sim.study.fitting import LEVEL
 from sim.study.measured import read
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.notation import concise, engineering, scaled
-from sim.units.options import quantity
+from sim.units.quantity import read_option
 
 #: First words of a line of the scenarios that are written here, by which they may be replaced.
 _MADE = "# Made by sim fit"
@@ -42,9 +41,8 @@ def carried_out(
     Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, of ``claim`` and of the
     figure.
     """
-    announce_compiling()
     pairs = [pair.partition("=")[::2] for pair in common]
-    sizes = {name: quantity(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
+    sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
     outputs = claim(scenario, data, stem, replace)
     refuse_units([read(path, scenario) for path in data] if units else [], units)
     found = fit(scenario, data, free, sizes, steady)

@@ -5,6 +5,7 @@ A field of a part is declared as ``radius: Annotated[float, Quantity("m", "radiu
 the JSON schema, the netCDF attributes and ``sim check``. SI inside, always.
 """
 
+import contextlib
 import difflib
 import functools
 import json
@@ -20,6 +21,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from sim.units import kept
+from sim.units.refusals import BadInput
 
 _NUMBER = r"[+-]?(?:(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|inf(?:inity)?|nan)"
 _REST = r"(?P<unit>[^\s0-9+,-](?:.*\S)?|1\s*/.*\S)?"
@@ -345,3 +347,22 @@ class Quantity:
         described |= {_BOUNDS[name][0]: bound for name, bound in self._bounds.items() if math.isfinite(bound)}
         example: Any = self.example.strip('"')
         return described | {"examples": [64 if self.whole else float(example) if self.unit == "1" else example]}
+
+
+def read_option(value: float | str | None, name: str, unit: str, **bounds: Any) -> float:
+    """Return the value of an option in SI from a number, or text with or without a unit; infinity for None.
+
+    Raises
+    ------
+    BadInput
+        With the ``name`` of the option.
+    """
+    if value is None:
+        return math.inf
+    number: float | str = value
+    with contextlib.suppress(ValueError):
+        number = float(value)
+    try:
+        return Quantity(unit, name, **bounds).read(number)
+    except ValueError as fault:
+        raise BadInput([f"{name} {value}: {fault}"]) from None

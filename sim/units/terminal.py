@@ -1,13 +1,23 @@
-"""Output on a terminal: texts from wherever, of which it takes nothing for a command, and tables."""
+"""Output on a terminal: text without control characters, tables, and the progress of a run."""
 
-import io
+import contextlib
+import os
 import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
 import click
 
+#: Seconds between two lines of progress without a terminal; seconds after which a slow stage is printed.
+_PAUSE, _SLOW = 30.0, 3.0
+#: Columns of a terminal on which no table is cut short.
+_WIDE = 100_000
+
 
 def one_line(text: str) -> str:
-    r"""A text on one line, its control characters and marks of direction written out, so that none reaches a terminal.
+    r"""Return a text on one line, with control characters and marks of direction written out.
 
     >>> print(one_line(f"{chr(27)}[31m{chr(0x202E)}3 mN"))
     \x1b[31m\u202e3 mN
@@ -16,41 +26,127 @@ def one_line(text: str) -> str:
 
 
 def plain(text: str) -> str:
-    """A text of several lines, each as ``one_line`` writes it."""
+    """Return a text of several lines, each as ``one_line`` writes it."""
     return "\n".join(map(one_line, text.split("\n")))
 
 
 def say(text: str = "", err: bool = False) -> None:
-    """Print a text, cleaned."""
+    """Print a text without control characters."""
     click.echo(plain(text), sys.stderr if err else sys.stdout)
 
 
-def usage(fault: click.ClickException) -> str:
-    """Words on a command that cannot be understood."""
-    shown = io.StringIO()
-    fault.show(shown)
-    return shown.getvalue().rstrip("\n")
-
-
-def replace_unknown() -> None:
-    """Let letters that the terminal's encoding lacks be replaced instead of ending the command."""
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")
+def note(text: str) -> None:
+    """Print a line to standard error; a reader that is gone is no error."""
+    with contextlib.suppress(OSError):
+        say(text, err=True)
 
 
 def print_rows(rows: list[dict[str, str]]) -> None:
-    """Print a table, its headings the keys of the rows, as wide as its cells are."""
-    headings = [plain(heading).split("\n") for heading in (rows[0] if rows else ())]
-    deep = max(map(len, headings), default=0)
-    table = [list(line) for line in zip(*([""] * (deep - len(lines)) + lines for lines in headings), strict=True)]
-    table += [[one_line(cell) for cell in row.values()] for row in rows]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    for place, row in enumerate(table):
-        line = "  ".join(cell.rjust(width) for cell, width in zip(row, widths, strict=True))
-        click.echo(click.style(line, bold=True) if place < deep else line, sys.stdout)
+    """Print a table, as wide as its cells are. The keys of the rows are the headings."""
+    if not rows:
+        return
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    for heading in rows[0]:
+        table.add_column(Text(plain(heading)), justify="right", no_wrap=True, vertical="bottom")
+    for row in rows:
+        table.add_row(*(Text(one_line(cell)) for cell in row.values()))
+    Console(file=sys.stdout, width=_WIDE).print(table)
 
 
 def print_table(rows: list[dict[str, str]], text: str) -> None:
     """Print a table and the text below it."""
     print_rows(rows)
     say(text)
+
+
+@contextlib.contextmanager
+def while_read() -> Iterator[None]:
+    """End the program with success if the reader of its output stops early."""
+    try:
+        yield
+    except (BrokenPipeError, SystemExit) as end:
+        if not isinstance(end, BrokenPipeError) and not isinstance(end.__context__, BrokenPipeError):
+            raise  # click and rich exit by themselves
+        with open(os.devnull, "w", encoding="utf-8") as nowhere:
+            os.dup2(nowhere.fileno(), 1)
+        sys.exit(0)
+
+
+class Shown(NamedTuple):
+    """Display of progress: ``advance`` takes the work done since its last call, ``begin`` the name of a stage."""
+
+    advance: Callable[[int], None] = lambda done: None
+    begin: Callable[[str], None] = lambda stage: None
+
+
+class Stages:
+    """Stages of a run one after the other, and the ``seconds`` that each took."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self.shown = Shown()
+        self._stage, self._since = "loading", time.monotonic()
+
+    def begin(self, stage: str) -> None:
+        """End the present stage and begin another."""
+        now = time.monotonic()
+        self.seconds[self._stage] = round(now - self._since, 2)
+        self._stage, self._since = stage, now
+        self.shown.begin(stage)
+
+    def ended(self) -> dict[str, float]:
+        """End the present stage; return the seconds of all."""
+        self.begin("")
+        return self.seconds
+
+
+@contextlib.contextmanager
+def progress_bar(total: int, what: str = "member-steps") -> Iterator[Shown]:
+    """Show the fraction of a total that is done: as a bar on a terminal, else as a line from time to time."""
+    if sys.stderr.isatty() and sys.stdout.isatty():
+        from rich.progress import Progress
+
+        with Progress(transient=True) as progress:
+            task = progress.add_task(what, total=total)
+            yield Shown(
+                lambda done: progress.advance(task, done), lambda stage: progress.update(task, description=stage)
+            )
+        return
+    finished, began = 0, time.monotonic()
+    printed = began
+
+    def advance(done: int) -> None:
+        nonlocal finished, printed
+        finished, now = finished + done, time.monotonic()
+        if now - printed > _PAUSE and finished:
+            printed, left = now, (now - began) * (total - finished) / finished
+            note(f"{100 * finished / total:.0f} % of {total:,} {what}, {duration(left)} left")
+
+    def begin(stage: str) -> None:
+        if stage and time.monotonic() - began > _PAUSE:  # shorter runs need no lines
+            note(stage)
+
+    yield Shown(advance, begin)
+
+
+def duration(seconds: float) -> str:
+    """Return a time as text."""
+    if seconds < 90.0:
+        return f"{max(seconds, 1.0):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 7200.0 else f"{seconds / 3600.0:.1f} h"
+
+
+@contextlib.contextmanager
+def slow_stage(stage: str, quiet: bool) -> Iterator[None]:
+    """Print the name of a stage once it has taken some seconds."""
+    timer = threading.Timer(_SLOW, (lambda text: None) if quiet else note, [stage])
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        timer.join()

@@ -43,7 +43,7 @@ from scipy.optimize import brentq
 import sim
 from sim.analysis.tables import notes
 from sim.engine import MemberNoise, follow, march
-from sim.ensemble.oscillations import slider_body
+from sim.ensemble.preview import slider_body
 from sim.laws import jkr
 from sim.parts.bonds import Cohort, FirstMoment, Steady, Tracked, Unbroken
 from sim.parts.bonds.rupture import Constant, CutOff

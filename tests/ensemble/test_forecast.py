@@ -1,0 +1,195 @@
+"""Needs of a run: estimated before it starts, refused if there is no room, and bounded."""
+
+import itertools
+import json
+import math
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from types import SimpleNamespace
+
+import psutil
+import pytest
+from helpers.commands import COUNTED, LENS
+from helpers.scenes import SHEARS, sample
+from numpy.testing import assert_allclose
+
+from benchmarks.timing import child
+from sim import analysis
+from sim.ensemble import plan as plans, preview
+from sim.ensemble.outline import identity
+from sim.ensemble.plan import Plan
+from sim.ensemble.preview import fitting, forecast, memory, remarks, size
+from sim.ensemble.simulate import run
+from sim.numerics import jit
+from sim.numerics.files import StoreTrouble
+from sim.scenario.clock import Clock, Record
+from sim.scenario.reader import load
+
+
+def test_members_are_pooled_with_a_remark_if_their_file_would_be_too_large(monkeypatch):
+    default, each, pooled = sample(), sample(record=Record(per_member=True)), sample(record=Record(per_member=False))
+    size_of_all = 0.4 * (Plan.of(each).bytes - plans._SCENARIO_BYTES)
+    for most, per_member in ((1.01 * size_of_all, True), (0.99 * size_of_all, False)):
+        monkeypatch.setattr(plans, "_MOST_BYTES", most)
+        dataset, alike = run(default), run(each if per_member else pooled)
+        assert ("member" in dataset.dims) == per_member
+        assert sum("record.per_member = true" in text for text in remarks(Plan.of(default))) == (not per_member)
+        assert json.loads(dataset.attrs["scenario_resolved"])["record"]["per_member"] is per_member
+        assert identity(dataset.attrs) == identity(alike.attrs)  # so that either goes on with the other
+        assert analysis.table(dataset) == analysis.table(alike)
+        assert "member" in run(each).dims
+
+
+def never_begun(done):
+    raise AssertionError("the run has begun")
+
+
+def test_a_run_has_as_many_processes_as_memory_holds_and_is_refused_if_it_holds_none(monkeypatch, tmp_path):
+    plan = Plan.of(sample(8, 500))
+    needed = [memory(plan, jobs) for jobs in (1, 2, 3, 4)]
+    assert needed == sorted(needed)
+    monkeypatch.setattr(preview, "memory_limit", lambda: (needed[2], "are free"))
+    assert [fitting(plan, jobs) for jobs in (4, 2)] == [3, 2]
+    assert "note: there is memory for 3 of 4 processes" in preview.announced(plan, 4, needed[2])[1]
+    monkeypatch.setattr(preview, "memory_limit", lambda: (0.5 * needed[0], "are free"))
+    assert fitting(plan, 4, needed[2]) == 3  # what is asked for counts alone
+    for to in (None, tmp_path / "x.nc"):
+        with pytest.raises(preview.NoRoom, match=f"{size(0.5 * needed[0])} are free") as refused:
+            run(plan.scenario, to, jobs=2, progress=never_begun)
+    assert refused.value.exit_code == 1
+    assert not list(tmp_path.iterdir())
+    assert size(0.5 * needed[0]) in preview.preview(plan.scenario)
+    with pytest.raises(preview.NoRoom):
+        fitting(plan, 1, needed[0], kept=True)
+
+
+def test_the_memory_limit_is_that_of_the_variable_else_of_the_job_else_what_is_free(monkeypatch):
+    for name in ("SIM_MAX_MEMORY", "SLURM_MEM_PER_NODE", "SLURM_MEM_PER_CPU", "SLURM_CPUS_ON_NODE"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(psutil, "virtual_memory", lambda: SimpleNamespace(available=7e9))
+    assert 7e9 < preview.memory_limit()[0] < 8e9
+    monkeypatch.setenv("SLURM_MEM_PER_CPU", "1000")
+    monkeypatch.setenv("SLURM_CPUS_ON_NODE", "4")
+    assert preview.memory_limit() == (4000 * 2**20, "are allowed (SLURM_MEM_PER_CPU)")
+    monkeypatch.setenv("SLURM_MEM_PER_NODE", "6000")
+    assert preview.memory_limit()[0] == 6000 * 2**20
+    monkeypatch.setenv("SIM_MAX_MEMORY", "2 GB")
+    assert preview.memory_limit()[0] == 2e9
+
+
+def test_steps_of_a_run_that_are_done_are_not_counted_again(monkeypatch):
+    plan = Plan.of(sample(2000, 50_000, record=Record(per_member=False)))
+    monkeypatch.setattr(preview, "tried", lambda plan, compiling: 1.0)
+    done = {name for task in itertools.islice(plan.tasks(), 3) for name in task.names}
+    left = 1.0 - 3 * plan.group / plan.members
+    whole, rest = (forecast(plan, 2, left=share) for share in (1.0, left))
+    assert rest.cpu < 0.9 * whole.cpu
+    assert preview.announced(plan, 2, math.inf)[1][-1].startswith(preview._times(whole, 2))
+    assert preview.announced(plan, 2, math.inf, parts=done)[1][-1].startswith(preview._times(rest, 2))
+
+
+def test_a_run_whose_parts_and_dataset_the_disk_does_not_hold_is_refused_and_leaves_nothing(monkeypatch, tmp_path):
+    scenario, folder = sample(50, 500), tmp_path / "outputs"
+    needed = forecast(Plan.of(scenario), 1).disk
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: SimpleNamespace(total=10**12, free=0.9 * needed))
+    with pytest.raises(StoreTrouble, match=size(0.9 * needed)) as refused:
+        run(scenario, folder / "x.nc", progress=never_begun)
+    assert refused.value.exit_code == 74
+    assert not list(folder.iterdir())
+    monkeypatch.chdir(tmp_path)
+    assert size(0.9 * needed) in preview.preview(scenario)
+    parts = folder / "x.nc.parts"
+    parts.mkdir()
+    (parts / "manifest.json").write_bytes(bytes(int(0.2 * needed)))  # of an unfinished run
+    preview.refuse_full_disk(Plan.of(scenario), folder / "x.nc")
+
+
+def test_the_room_on_disk_is_that_of_parts_and_dataset(tmp_path, monkeypatch):
+    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-3)
+    mapped = sample(5, 60, shear=SHEARS["mapped, diffusion, constant"], record=Record(maps=(1e-3, 5e-2)))
+    for scenario in (sample(50, 200), sample(50, 200, record=Record(per_member=False)), mapped):
+        sizes = {}
+
+        def watch(stage, sizes=sizes):
+            if stage == "writing":
+                sizes["parts"] = sum(path.stat().st_size for path in (tmp_path / "x.nc.parts").iterdir())
+
+        dataset = run(scenario, tmp_path / "x.nc", replace=True, stage=watch).stat().st_size
+        disk = forecast(Plan.of(scenario), 1).disk
+        assert disk / 1.5 < sizes["parts"] + dataset < 1.5 * disk
+
+
+def test_the_pace_is_that_of_the_steps_and_nothing_is_compiled_for_it(monkeypatch):
+    monkeypatch.setattr(preview, "_WORTH_TRYING", 0.0)
+    plan, clock = Plan.of(sample(20, 3000, clock=Clock(duration=3.0, step=1e-3, record=0.1))), [0.0]
+    follow = preview.follow
+
+    def slow(point, noise, state, steps):
+        before = -1 if state is None else state.step
+        clock[0] += 3.0 * preview.counted_block(point, noise.shear.members, plans.Block(before, steps[-1], 100))
+        return follow(point, noise, state, steps)
+
+    monkeypatch.setattr(preview, "follow", slow)
+    monkeypatch.setattr(time, "perf_counter", lambda: clock[0])
+    assert_allclose(preview.tried(plan), 3.0, rtol=1e-9)
+    assert 0.0 < clock[0] < 0.5
+    calls, notices = [], [lambda name: None]
+    monkeypatch.setattr(jit, "on_compiling", notices[:])
+    monkeypatch.setattr(preview, "follow", lambda *arguments: calls.append(1) or jit.on_compiling[0]("a kernel"))
+    assert preview.tried(plan) is None
+    assert (jit.on_compiling, calls) == (notices, [1])
+
+
+def test_more_members_take_more_time_in_proportion_and_no_more_memory():
+    record = Record(per_member=True)
+    few, many = (Plan.of(sample(members, 20_000, record=record)) for members in (1000, 10_000))
+    assert not preview.tabulated(many)
+    assert_allclose(forecast(many, 1).cpu, 10 * forecast(few, 1).cpu, rtol=0.1)
+    assert_allclose([memory(many, jobs) for jobs in (1, 4)], [memory(few, jobs) for jobs in (1, 4)], rtol=0.1)
+
+
+def test_sizes_have_units_that_fit():
+    assert [size(count) for count in (4, 4e3, 2.34e6, 5e9)] == ["4 byte", "4 kB", "2.3 MB", "5 GB"]
+
+
+# --- processes of their own ---
+
+
+def long_scene(steps, record):
+    """Return the text of a scene of one member with so many steps, recorded seldom."""
+    clock = f'duration = "{steps} ms"\nstep = "1 ms"\nrecord = "{record} ms"\n'
+    lens = LENS.replace('duration = "1 s"\nstep = "0.1 s"\n', clock)
+    return f'{lens}[drive]\nspeed = "1 mm/s"\n{COUNTED}'
+
+
+@pytest.mark.verify
+def test_a_member_of_a_hundred_million_steps_is_kept_in_blocks_and_goes_on_from_the_last(tmp_path):
+    (tmp_path / "scene.toml").write_text(long_scene(steps=10**8, record=10**7))
+    parts = tmp_path / "x.nc.parts"
+    command = [sys.executable, "-m", "sim", "run", "scene.toml", "-o", "x.nc", "--quiet"]
+    early = subprocess.Popen(command, cwd=tmp_path)
+    while early.poll() is None and len(list(parts.glob("point*"))) < 40:
+        time.sleep(0.01)
+    early.kill()
+    assert early.wait() == -signal.SIGKILL
+    done = {path: path.stat().st_mtime_ns for path in parts.glob("point*")}
+    resumed = subprocess.Popen([*command, "--resume"], cwd=tmp_path)
+    while resumed.poll() is None and len(list(parts.glob("point*"))) < len(done) + 3:
+        time.sleep(0.01)
+    assert {path: path.stat().st_mtime_ns for path in done} == done
+    assert resumed.wait() == 0
+
+
+@pytest.mark.verify
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_path, jobs):
+    largest = []
+    for members in (500, 5000):
+        (tmp_path / "scene.toml").write_text(long_scene(steps=2000, record=2) + f"[ensemble]\nmembers = {members}\n")
+        files = str(tmp_path / "scene.toml"), "-o", str(tmp_path / "x.nc")
+        largest.append(child("-m", "sim", "run", *files, "--force", "--no-table", "-j", jobs)[1])
+        assert 2**20 * largest[-1] < 1.5 * memory(Plan.of(load(tmp_path / "scene.toml")), 1)
+    assert largest[1] < 1.1 * largest[0] + 512e6 / 2**20  # a dataset of up to 256 MB is built in memory
