@@ -4,19 +4,16 @@ Each tree has a process of its own, and the two do each row in turns; CPU time c
 work on the machine matters little. After every five turns both processes are started afresh. Of a row's
 20 ratios (time of the old)/(time of the new) the median is printed with its 95 % interval, which follows
 from the order of the ratios alone. The exit code is 1 if any median is below 0.95 and its whole
-interval below 1. Scenes are written in today's words; a tree of 0.1.0 is given its own.
+interval below 1.
 """
 
 import json
 import math
 import os
-import re
-import resource
 import subprocess
 import sys
 import tempfile
 import time
-from collections import deque
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -26,19 +23,6 @@ import numpy as np
 ROUNDS, TURNS = 4, 5
 #: CPU seconds that one measurement takes at least.
 LEAST = 0.1
-#: What is written today, and what 0.1.0 called it.
-WORDS_OF_0_1_0 = {
-    'rebinding_rate = "500': 'healing = "500',
-    "rupture": "hazard",
-    "correlation": "memory",
-    "amplitude": "growth",
-    "displacement": "travel",
-    "cycles": "trips",
-    "rate_dependent": "lagging",
-    "after_pull_off": "on_detach",
-    "radius_at_displacement": "radius_at_travel",
-}
-
 LENS = """
 name = "a lens"
 seed = 1
@@ -95,6 +79,17 @@ width = 0.3
 floor = 0.05
 """
 BANDED = FIELD.format(model="banded", more="tolerance = 0.01")
+SPRING = '[drive]\nmodel = "spring"\nstage = "{stage}"\nstiffness = "{stiffness}"\n{more}\n'
+CLUTCH = """[bonds]
+model = "{model}"
+rupture = {{ model = "bell", zero_force_rate = "25 1/s", bell_force = "4 pN" }}
+bond_stiffness = "0.8 uN/m"
+rebinding_rate = "250 1/s"
+site_density = "6.5e16 1/m^2"
+{more}
+"""
+ONSET = 'model = "onset"\nspeed = "2.5 mm/s"\nwidth = 0.3\nfloor = 0.05'
+SLIPPING = BANDED.replace(ONSET, 'model = "slip_rate"\nfloor = 0.05')
 MAPS = '[record]\nmaps = ["{}"]\n'.format('", "'.join(f"{n} ms" for n in range(1, 21)))
 
 
@@ -121,9 +116,19 @@ STEPS = {
         400, 64, RAMP, RATE, BANDED, MOVED.format(model="rate_dependent", more='front_speed = "10 mm/s"')
     ),
 }  # fmt: skip
+#: A slider behind a spring, whose contact feels the energy of the fluctuations or not.
+for _felt, _share in (("", ""), (", energy not felt", "paid_by_adhesion = 0.0\n")):
+    _shear = SLIPPING.replace("tolerance = 0.01", f"tolerance = 0.01\n{_share}")
+    for _name, _members, _bonds in (
+        ("rate", 16, CLUTCH.format(model="rate", more="")),
+        ("cohort", 2, CLUTCH.format(model="cohort", more="tolerance = 1e-3")),
+        ("tracked", 2, CLUTCH.format(model="tracked", more="sites = 300")),
+    ):
+        _drive = SPRING.format(stage="5 mm/s", stiffness="300 N/m", more="")
+        STEPS[f"spring, {_name}{_felt}"] = lens(40, _members, _drive, _bonds, _shear, LOAD)
 MAPPED = lens(20, 1, RAMP, RATE, FIELD.format(model="mapped", more="points = 256"), LOAD, MAPS)
 SMALL = lens(100, 64, RAMP, RATE, BANDED, LOAD)
-WHOLE = "whole small run"
+WHOLE, CHECK = "whole small run", "check of a small run"
 
 
 def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
@@ -133,12 +138,10 @@ def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
     from sim.laws import jkr
 
     assert Path(sim.__file__).is_relative_to(tree), f"{sim.__file__} is not of {tree}"
-    words = {} if (tree / "sim" / "numerics").exists() else WORDS_OF_0_1_0
+    noise = getattr(engine, "MemberNoise", None) or engine.Dice
 
     def written(name: str, text: str) -> Path:
         path = folder / f"{name}.toml"
-        for today, before in words.items():
-            text = re.sub(rf"\b{today}\b", before, text)
         path.write_text(text)
         return path
 
@@ -147,11 +150,7 @@ def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
 
         def marched() -> None:
             members = np.arange(scene().ensemble.members)
-            if hasattr(engine, "follow"):  # by blocks of steps where nothing feeds back, as a run does
-                noise = getattr(engine, "MemberNoise", None) or engine.Dice
-                engine.follow(scene(), noise.of(1, members), None, range(scene().clock.steps + 1))
-            else:
-                deque(engine.march(scene(), members, keep=False), maxlen=0)
+            engine.follow(scene(), noise.of(1, members), None, range(scene().clock.steps + 1))
 
         return marched
 
@@ -161,12 +160,11 @@ def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
         random.uniform(-4e-7, 2e-6, 10**5),
         random.uniform(0, 0.04, 10**5),
     )
-    moved = getattr(jkr, words.get("radius_at_displacement", "radius_at_displacement"))
 
     def radii() -> None:
         jkr.radius_at_load(load, work, 2e-3, 6.4e6)
         jkr.radius_at_indentation(depth, work, 2e-3, 6.4e6)
-        moved(depth, 2e3, work, 2e-3, 6.4e6)
+        jkr.radius_at_displacement(depth, 2e3, work, 2e-3, 6.4e6)
 
     small = written("small", SMALL)
     mapped = cache(lambda: sim.load(written("mapped", MAPPED)))
@@ -176,16 +174,17 @@ def programs(tree: Path, folder: Path) -> dict[str, Callable[[], object]]:
     rows["JKR radii, 3 of 100,000"] = radii
     rows["loading a scenario"] = lambda: sim.load(small)
     rows[WHOLE] = lambda: subprocess.run(run, check=True)
+    check = [sys.executable, "-m", "sim", "check", str(small)]
+    rows[CHECK] = lambda: subprocess.run(check, check=True, stdout=subprocess.DEVNULL)
     return rows
 
 
-ROWS = (*STEPS, "mapped field with its map, 256²", "JKR radii, 3 of 100,000", "loading a scenario", WHOLE)
+ROWS = (*STEPS, "mapped field with its map, 256²", "JKR radii, 3 of 100,000", "loading a scenario", WHOLE, CHECK)
 
 
 def spent() -> float:
     """CPU time of this process and of its children that have ended [s]."""
-    children = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + children.ru_utime + children.ru_stime
+    return sum(os.times()[:4])
 
 
 def serve(tree: Path) -> None:

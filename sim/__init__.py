@@ -169,8 +169,7 @@ def plot(
     matplotlib.figure.Figure or matplotlib.axes.Axes
         The figure, whose ``axes`` are its panels, or the axes given.
     """
-    from sim.plots.choices import Choices
-    from sim.plots.kinds import draw, save
+    from sim.plots.kinds import Choices, draw, save
     from sim.units.refusals import BadInput
 
     if unknown := choices.keys() - {*Choices._fields}:

@@ -712,7 +712,7 @@ def _coverage(points, radius):
     area = radius**2 * _quarter(corner[:, None], corner)
     weight = np.clip(np.diff(np.diff(area, axis=0), axis=1), 0.0, 1.0)
     for axis in (0, 1):
-        around = np.pad(weight, [(1, 1) if one == axis else (0, 0) for one in (0, 1)])
+        around = np.pad(weight, [(1, 1) if other == axis else (0, 0) for other in (0, 1)])
         weight = weight - np.diff(around, 2, axis=axis) / 24.0
     weight.flags.writeable = False
     return index % points, index - middle, weight
@@ -760,8 +760,8 @@ def _each(energy, field, cell, radius, poisson_ratio):
         )
     pixel, nu = cell / field.shape[-1], float(poisson_ratio)
     pairs = zip(maps, radii, strict=True)
-    found = [energy(one, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a for one, a in pairs]
-    return np.reshape(found, shape)[()]
+    energies = [energy(map_, pixel, a, nu) if a > _LEAST_RADIUS * pixel else 0.0 * a for map_, a in pairs]
+    return np.reshape(energies, shape)[()]
 
 
 def disc_energy_of_map(field, cell, radius, shear_modulus, poisson_ratio=0.5):
@@ -839,13 +839,13 @@ def disc_energies_of_map(field, pixel, radii, shear_modulus, poisson_ratio=0.5, 
     """
     held = np.asarray(radii, float) / pixel
     grid, kernel = _free_kernel(_padded_size(np.max(held) + _EDGE), float(poisson_ratio))
-    found = np.empty(held.shape)
+    energies = np.empty(held.shape)
     for place, radius in enumerate(held):
         disc = soft_disc(radius) if discs is None else discs[place]
         first = field.shape[0] // 2 - len(disc) // 2
         inside = slice(first, first + len(disc))
-        found[place] = grid.weighted_power(field[inside, inside] * disc, kernel) / radius**2
-    return 0.5 * pixel / (math.pi * grid.points**2 * shear_modulus) * found
+        energies[place] = grid.weighted_power(field[inside, inside] * disc, kernel) / radius**2
+    return 0.5 * pixel / (math.pi * grid.points**2 * shear_modulus) * energies
 
 
 def soft_disc(radius):

@@ -669,15 +669,15 @@ def radius_at_displacement(displacement, stiffness, work, sphere_radius, modulus
     >>> print("%.2e %.2e %.2e" % tuple(a))
     6.68e-05 3.83e-05 nan
     """
-    given = displacement, stiffness, work, sphere_radius, modulus
-    shape = np.broadcast(*given).shape
+    arguments = displacement, stiffness, work, sphere_radius, modulus
+    shape = np.broadcast(*arguments).shape
     if math.prod(shape) <= _BLOCK:
         small = np.empty((6, *shape))
-        for row, value in enumerate(given):
+        for row, value in enumerate(arguments):
             small[row] = value
         _solve(*small.reshape(6, -1))
         return small[5][()]
-    arrays = [np.asarray(value, dtype=float) for value in given]
+    arrays = [np.asarray(value, dtype=float) for value in arguments]
     flat = [array if array.size == 1 or array.shape == shape else np.broadcast_to(array, shape) for array in arrays]
     flat = [array.reshape(-1) for array in flat]
     radii = np.empty(math.prod(shape))

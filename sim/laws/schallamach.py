@@ -222,7 +222,9 @@ _LOOKS, _STEPS = 48, 12
 
 def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tuple[Array, Array], body: Body) -> Onset:
     """Onset of oscillations of a body at a speed [m/s] on bonds of a stress [Pa], ``between`` two frequencies."""
-    area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (np.asarray(one, dtype=float) for one in body)
+    area, by_bonds, by_stress, mass, damping, viscosity, firm, firmer = (
+        np.asarray(quantity, dtype=float) for quantity in body
+    )
     bears = area * (stress + viscosity * np.abs(speed))
 
     def of_interface(frequency: Array) -> tuple[Complex, Complex]:
@@ -236,13 +238,13 @@ def _onset_behind(answer: Answer, speed: ArrayLike, stress: Array, between: tupl
         force, ahead = of_interface(frequency)
         return frequency * (mass * frequency - 1j * damping) - force / (1.0 + ahead / firm)
 
-    found = _stiffest(needed, *between)
+    onset = _stiffest(needed, *between)
     if np.all(np.isinf(firm)):
-        return found
+        return onset
     alone = _stiffest(lambda frequency: -of_interface(frequency)[1], *between)
     jumps = alone.stiffness >= firm
-    stiffness = np.where(jumps, math.inf, found.stiffness)
-    return Onset(stiffness[()], np.where(jumps, alone.frequency, found.frequency)[()])
+    stiffness = np.where(jumps, math.inf, onset.stiffness)
+    return Onset(stiffness[()], np.where(jumps, alone.frequency, onset.frequency)[()])
 
 
 def _stiffest(needed: Callable[[Array], Complex], low: Array, high: Array) -> Onset:
@@ -261,11 +263,11 @@ def _stiffest(needed: Callable[[Array], Complex], low: Array, high: Array) -> On
     )
     with np.errstate(divide="ignore", invalid="ignore"):  # where none turns
         for _ in range(_STEPS):
-            there = here - now * (here - before) / (now - off)
-            after = needed(there).imag
+            guess = here - now * (here - before) / (now - off)
+            after = needed(guess).imag
             across = after * now < 0.0
             before, off = np.where(across, here, before), np.where(across, now, 0.5 * off)
-            here, now = there, after
+            here, now = guess, after
         stiffness = needed(here).real
     holds = turns.any(axis=-1) & (stiffness > 0.0)
     return Onset(np.where(holds, stiffness, np.nan)[()], np.where(holds, here, np.nan)[()])
@@ -341,9 +343,9 @@ def resolved_onset(
                 for rate, soft, a in rates
             )
             bound = births * np.sum(earlier, axis=-1) / (1.0 + rebinding_rate * np.sum(back * survival, axis=-1))
-            found = births * np.sum((1.0 - back) * survival + pace * age * earlier, axis=-1)
-            found -= rebinding_rate * bound * np.sum(pace * age * back * survival, axis=-1)
-            return site_density * bond_stiffness * found, bound / (births * life)
+            moment = births * np.sum((1.0 - back) * survival + pace * age * earlier, axis=-1)
+            moment -= rebinding_rate * bound * np.sum(pace * age * back * survival, axis=-1)
+            return site_density * bond_stiffness * moment, bound / (births * life)
 
         stress = site_density * bond_stiffness * births * way
         return _onset_behind(answer, speed, stress, (_SLOWEST / life, _FASTEST / life), body)
@@ -575,8 +577,8 @@ def bell_lives(speed, zero_force_rate, bell_force, bond_stiffness):
     >>> print("%.4f %.4f %.4f" % bell_lives(1.0, 1.0, 1.0, 1.0))
     0.5963 0.2660 0.1936
     """
-    given = (speed, zero_force_rate, bell_force, bond_stiffness)
-    return Lives(_life(*given, 0), _life(*given, 1), _life(*given, 2))
+    arguments = (speed, zero_force_rate, bell_force, bond_stiffness)
+    return Lives(_life(*arguments, 0), _life(*arguments, 1), _life(*arguments, 2))
 
 
 @law
@@ -627,8 +629,8 @@ def bell_moments(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_r
     >>> print(f"{bound:.5f} {force:.6f} {force / bound:.2f}")
     0.23985 0.218485 0.91
     """
-    given = (speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    return SiteMoments(_bell_bound(*given), _bell_force(*given, 1), _bell_force(*given, 2))
+    arguments = (speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    return SiteMoments(_bell_bound(*arguments), _bell_force(*arguments, 1), _bell_force(*arguments, 2))
 
 
 @law
@@ -751,8 +753,8 @@ def bell_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_
     >>> print("%.4f %.3f" % tuple(speed), "%.6f %.6f" % tuple(stress))
     4.5029 146.903 0.218485 1.794870
     """
-    given = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    return Peak(_bell_peak_speed(*given), np.multiply(site_density, _bell_peak_force(*given)))
+    arguments = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    return Peak(_bell_peak_speed(*arguments), np.multiply(site_density, _bell_peak_force(*arguments)))
 
 
 @law
@@ -929,8 +931,8 @@ def first_moment_peak(zero_force_rate, bell_force, bond_stiffness, rebinding_rat
     >>> print("%.3f %.6f" % first_moment_peak(1.0, 1.0, 1.0, 1.0, 1.0))
     4.591 0.278465
     """
-    given = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
-    return Peak(_mean_field_peak_speed(*given), np.multiply(site_density, _mean_field_peak_force(*given)))
+    arguments = (zero_force_rate, bell_force, bond_stiffness, rebinding_rate)
+    return Peak(_mean_field_peak_speed(*arguments), np.multiply(site_density, _mean_field_peak_force(*arguments)))
 
 
 def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebinding_rate, site_density, body):
@@ -975,9 +977,9 @@ def first_moment_onset(speed, zero_force_rate, bell_force, bond_stiffness, rebin
 
     def answer(frequency):
         turns = 1j * frequency
-        own = turns * (turns + rebinding_rate + 2.0 * rate) + rate * (rebinding_rate + rate) * (1.0 + tilt)
-        stretched = density * turns * (turns + rebinding_rate + (1.0 - tilt) * rate) / own
-        return stretched, -rate * turns / own / unit
+        determinant = turns * (turns + rebinding_rate + 2.0 * rate) + rate * (rebinding_rate + rate) * (1.0 + tilt)
+        stretched = density * turns * (turns + rebinding_rate + (1.0 - tilt) * rate) / determinant
+        return stretched, -rate * turns / determinant / unit
 
     pace = rebinding_rate + (1.0 + tilt) * rate
     return _onset_behind(answer, speed, density * tilt * unit, (_LOWEST_RATE * pace, _HIGHEST_RATE * pace), body)
@@ -1129,8 +1131,8 @@ def cut_off_moments(speed, rate, stretch, bond_stiffness, rebinding_rate):
     >>> print(f"{bound:.4f} {force:.6f}")
     0.4272 0.166299
     """
-    given = (speed, rate, stretch, bond_stiffness, rebinding_rate)
-    bound, size, square = (_site(*given, power) for power in range(3))
+    arguments = (speed, rate, stretch, bond_stiffness, rebinding_rate)
+    bound, size, square = (_site(*arguments, power) for power in range(3))
     return SiteMoments(bound, np.sign(speed) * size, square)
 
 
@@ -1187,8 +1189,8 @@ def cut_off_stress(speed, rate, stretch, bond_stiffness, rebinding_rate, site_de
     >>> print("%.3f %.3f" % tuple(cut_off_stress([1e-6, 1.0], 0.0, 1.0, 1.0, 1.0, 1.0)))
     0.500 0.250
     """
-    given = (speed, rate, stretch, bond_stiffness, rebinding_rate)
-    return np.multiply(site_density, np.sign(speed) * _site(*given, 1))
+    arguments = (speed, rate, stretch, bond_stiffness, rebinding_rate)
+    return np.multiply(site_density, np.sign(speed) * _site(*arguments, 1))
 
 
 # Catch bonds: two pathways of rupture, one that force slows down and one that it speeds up.
@@ -1448,8 +1450,8 @@ def start_up_peak(speed, zero_force_rate, bell_force, bond_stiffness):
     >>> print("%.4f %.4f" % tuple(start_up_peak([1e2, 1e4], 1.0, 1.0, 1.0).force))
     2.5451 6.2985
     """
-    given = (speed, zero_force_rate, bell_force, bond_stiffness)
-    return StartUpPeak(_peak_time(*given), _start_up_peak_force(*given))
+    arguments = (speed, zero_force_rate, bell_force, bond_stiffness)
+    return StartUpPeak(_peak_time(*arguments), _start_up_peak_force(*arguments))
 
 
 # A cluster of bonds that share a given force equally (Erdmann & Schwarz, PRL 92, 108102 (2004)).

@@ -111,8 +111,8 @@ def _sign_change(low, high, of_slope, level, force, mixity, which, control):
         y = 0.5 * (low + high)
         if not low < y < high:
             return high
-        found, slope, _ = _held(y, force, mixity, which, control)
-        if (slope if of_slope else found - level) > 0.0:
+        value, slope, _ = _held(y, force, mixity, which, control)
+        if (slope if of_slope else value - level) > 0.0:
             high = y
         else:
             low = y
@@ -121,17 +121,17 @@ def _sign_change(low, high, of_slope, level, force, mixity, which, control):
 @device
 def _widest(y, level, force, mixity, which, control):
     """Cube of the radius of the widest state at a level, from a y right of it; nan if there is none."""
-    found, slope, cube = _held(y, force, mixity, which, control)
+    value, slope, cube = _held(y, force, mixity, which, control)
     for _ in range(_MOST):
-        if not found > level:
+        if not value > level:
             return cube
-        lower = max(y - (found - level) / slope, _KEPT * y) if slope > 0.0 else _KEPT * y
+        lower = max(y - (value - level) / slope, _KEPT * y) if slope > 0.0 else _KEPT * y
         if not lower < y:
             return cube
         before = slope
-        found, slope, cube = _held(lower, force, mixity, which, control)
+        value, slope, cube = _held(lower, force, mixity, which, control)
         bottom = lower
-        if found > level and slope < 0.0 < before:
+        if value > level and slope < 0.0 < before:
             bottom = _sign_change(lower, y, True, level, force, mixity, which, control)
         if not (_held(bottom, force, mixity, which, control)[0] > level):
             y = _sign_change(bottom, y, False, level, force, mixity, which, control)
@@ -738,8 +738,8 @@ def _with_own_forces(radii, laws, held, stress, mixity, rest):
             low = np.zeros_like(high)
             for _ in range(_HALVINGS):
                 force = 0.5 * (low + high)
-                own = np.pi * radius_at(*held, force, mixity, *rest) ** 2 * stress  # falls as the force grows
-                low = np.fmax(low, np.fmin(own, force))
-                high = np.where(own > force, np.fmin(high, own), force)
+                limit = np.pi * radius_at(*held, force, mixity, *rest) ** 2 * stress  # falls as the force grows
+                low = np.fmax(low, np.fmin(limit, force))
+                high = np.where(limit > force, np.fmin(high, limit), force)
         radii[name] = radius_at(*held, high, mixity, *rest)
     return dict(zip(radii, (np.array(a) for a in np.broadcast_arrays(*radii.values())), strict=True))

@@ -124,9 +124,9 @@ def exp(x):
     odd = 6.61375632143793436117e-05 + t * (-1.65339022054652515390e-06 + t * 4.13813679705723846039e-08)
     c = r - t * (1.66666666666666019037e-01 + t * (-2.77777777770155933842e-03 + t * odd))
     near = 1.0 - ((low - r * c / (2.0 - c)) - high)
-    found = float_of(bits_of(near) + (bits_of(shifted) << np.int64(52)))
-    found = math.inf if x > 709.0 else found
-    return 0.0 if x < -708.0 else found
+    value = float_of(bits_of(near) + (bits_of(shifted) << np.int64(52)))
+    value = math.inf if x > 709.0 else value
+    return 0.0 if x < -708.0 else value
 
 
 @device

@@ -1,7 +1,6 @@
 """Figures of datasets."""
 
-from sim.plots.choices import Choices
-from sim.plots.kinds import KINDS, draw
+from sim.plots.kinds import KINDS, Choices, draw
 
 __all__ = ["KINDS", "Choices", "draw"]
 

@@ -17,9 +17,8 @@ from sim.parts.shear.modes import Modes, modes
 from sim.parts.shear.process import Amplitude
 from sim.plots import style
 from sim.spectrum.families import Spectrum
-from sim.spectrum.finite_contact import Waves
-from sim.spectrum.periodogram import periodogram, radial_average
-from sim.spectrum.radial import Rowed
+from sim.spectrum.measured import periodogram, radial_average
+from sim.spectrum.radial import Rowed, Waves
 
 if TYPE_CHECKING:
     from sim.scenario.scenario import Scenario

@@ -1,31 +1,94 @@
-"""The kinds of figures, each a module of its own, and the choice between them.
-
-``draw`` gives a matplotlib Figure with a canvas of its own: nothing here needs a display or touches pyplot.
-"""
+"""The kinds of figures, the choices for a figure, and its drawing."""
 
 import contextlib
 import inspect
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import matplotlib as mpl
 import xarray as xr
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
-from sim.analysis.scene import answered, claim, of_dataset
+from sim.analysis.scene import MEMBERS, answered, claim, of_dataset
 from sim.numerics.files import claim as claim_file, output
-from sim.plots import panels, slider, style
-from sim.plots.bond_laws import rest_of
-from sim.plots.choices import Choices
-from sim.plots.field import density_figure, map_figure, needs_maps, spectrum_figure
-from sim.plots.loop import loop_figure, needs_course
-from sim.plots.profile import profile_figure, shapes_of
-from sim.plots.stress import needs_stress, stress_figure
+from sim.plots import curves, field, slider, style, theories
+from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, swept_value
-from sim.plots.theories import case_of, sweeps_theories, theories_figure
+from sim.units.quantity import Quantity
 from sim.units.refusals import BadInput
+
+
+class Choices(NamedTuple):
+    """Choices for a figure.
+
+    Any kind takes ``member``, one of the ensemble, and ``units`` of axes, such as ``"mm/s"``. Kinds with these
+    parameters take ``at``, the time [s] of the record or map that is drawn; ``x``, the variable or swept key that it is
+    drawn over; ``absolute``, areas in place of shares; ``data``, measured points in a CSV table or columns in SI by
+    name (``{"speed": [1e-3], "contact_area": [4e-8]}``); ``ax``, the matplotlib axes that its first panel is drawn in.
+    """
+
+    member: int | None = None
+    at: float | str | None = None
+    x: str = ""
+    absolute: bool = False
+    units: tuple[str, ...] = ()
+    data: Path | str | Mapping[str, Any] | Measured | None = None
+    ax: Axes | None = None
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """What has been chosen, by name."""
+        unsaid = (value is None or value is False or (isinstance(value, str | tuple) and not value) for value in self)
+        return {name: value for (name, value), none in zip(self._asdict().items(), unsaid, strict=True) if not none}
+
+    def options(self, kind: str, takes: Collection[str], dataset: xr.Dataset) -> dict[str, Any]:
+        """Arguments for what draws a kind of figure.
+
+        Raises
+        ------
+        ValueError
+            For a choice that the kind does not take, or that cannot be read.
+        """
+        found = {name: value for name, value in self.given.items() if name not in ("member", "units")}
+        for name in (name for name in found if name not in takes):
+            words = f"it takes: {', '.join(takes)}" if takes else "it takes none but member and units"
+            raise ValueError(f'the figure "{kind}" has no choice of {name}; {words}')
+        if "at" in found:
+            try:
+                found["at"] = Quantity("s", "time").read(self.at)
+            except ValueError as fault:
+                raise ValueError(f"at {self.at}: {fault}") from None
+        if self.data is None:
+            return found
+        return found | {"data": self.data if isinstance(self.data, Measured) else Measured(self.data, dataset)}
+
+    def of_member(self, dataset: xr.Dataset) -> xr.Dataset:
+        """The dataset of the member chosen, or of all.
+
+        Raises
+        ------
+        ValueError
+            If there is no such member, or members were not recorded.
+        """
+        if self.member is None:
+            return dataset
+        members = int(dataset.attrs["members"])
+        if not 0 <= self.member < members:
+            raise ValueError(f"there is no member {self.member}; there are members 0 to {members - 1}")
+        if MEMBERS not in dataset.dims and any(str(name).endswith("_sem") for name in dataset.data_vars):
+            raise ValueError("members were not recorded, only statistics; run again with [record] per_member = true")
+        own = dataset.isel({MEMBERS: [self.member]}, missing_dims="ignore")
+        if "map_member" in own.dims:
+            there = own["map_member"].to_numpy() == self.member
+            own = own.isel(map_member=there) if there.any() else own.drop_dims("map_member")
+        return own
+
+
+# The kinds of figures, each a module of its own, and the choice between them.
+
 
 if TYPE_CHECKING:
     from sim.scenario.scenario import Scenario
@@ -59,19 +122,23 @@ _OF_FORCE = ("spring_force", "contact_area")
 _OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
 #: What can be drawn, by name; the first line of what draws it is its help. The default is the first kind that fits.
 KINDS: dict[str, Kind] = {
-    "loop": Kind(loop_figure, needs_course, lambda dataset: True, ("normal_load", "displacement")),
-    "theories": Kind(theories_figure, case_of, sweeps_theories, ("shear_stress", "contact_area")),
-    "stress": Kind(stress_figure, needs_stress, lambda dataset: rest_of(dataset) is not None, ("speed",)),
+    "loop": Kind(theories.loop_figure, theories.needs_course, lambda dataset: True, ("normal_load", "displacement")),
+    "theories": Kind(
+        theories.theories_figure, theories.case_of, theories.sweeps_theories, ("shear_stress", "contact_area")
+    ),
+    "stress": Kind(
+        slider.stress_figure, slider.needs_stress, lambda dataset: curves.rest_of(dataset) is not None, ("speed",)
+    ),
     "stability": Kind(slider.stability_figure, slider.needs_map, lambda dataset: True, ("spring_force",)),
     "creep": Kind(slider.creep_figure, slider.needs_force, lambda dataset: True, ("slider_position", "speed")),
-    "friction": Kind(panels.friction_figure, panels.needs_friction, panels.turns, ("speed",)),
-    "curve": Kind(panels.curve_figure, panels.needs_speeds, lambda dataset: not panels.turns(dataset), _OF_CURVE),
-    "sweep": Kind(panels.sweep_figure, panels.needs_sweep, lambda dataset: True),
-    "time": Kind(panels.time_figure, fits=lambda dataset: True),
+    "friction": Kind(curves.friction_figure, curves.needs_friction, curves.turns, ("speed",)),
+    "curve": Kind(curves.curve_figure, curves.needs_speeds, lambda dataset: not curves.turns(dataset), _OF_CURVE),
+    "sweep": Kind(curves.sweep_figure, curves.needs_sweep, lambda dataset: True),
+    "time": Kind(curves.time_figure, fits=lambda dataset: True),
     "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=_OF_FORCE),
-    "map": Kind(map_figure, needs_maps),
-    "spectrum": Kind(spectrum_figure, needs_maps),
-    "profile": Kind(profile_figure, shapes_of),
+    "map": Kind(field.map_figure, field.needs_maps),
+    "spectrum": Kind(field.spectrum_figure, field.needs_maps),
+    "profile": Kind(theories.profile_figure, theories.shapes_of),
 }
 
 
@@ -198,7 +265,7 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
 def spectrum_of(scene: "Scenario") -> Figure:
     """Spectral density of a scene's fluctuations before any run; errors as of ``density_figure``."""
     with mpl.rc_context(STYLE):
-        return density_figure(scene)
+        return field.density_figure(scene)
 
 
 def save(figure: Figure, path: Path) -> None:

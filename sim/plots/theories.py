@@ -1,4 +1,4 @@
-"""The figure of the competing theories: contact area under shear by each of them, and what was simulated."""
+"""Figures of one contact beside theory: the competing theories under shear, profiles, and the loop of a JKR test."""
 
 import contextlib
 from typing import Any, NamedTuple
@@ -7,12 +7,16 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from sim.analysis import control, is_steady, setting, settled
-from sim.analysis.scene import of_dataset
+from sim.analysis import control, is_steady, loop_energy, setting, settled
+from sim.analysis.events import cycles_of
+from sim.analysis.scene import of_dataset, stays_held
+from sim.laws import halfspace, jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
-from sim.plots.curves import choice
+from sim.plots.curves import Line, Scene, beside, choice, colour_bar, mark_jumps, scene_along
+from sim.plots.measured import Measured
 
 #: Name of each theory, its colour and line style.
 _THEORIES: dict[str, tuple[str, str, Any]] = {
@@ -181,3 +185,352 @@ def adhesive(areas: np.ndarray, hertz: np.ndarray) -> np.ndarray:
     array([ 3.,  2., nan])
     """
     return np.where(areas > np.nan_to_num(hertz) * (1.0 + 1e-9), areas, np.nan)
+
+
+# The figure that everyone draws: pressure, surfaces and tangential displacement across the contact.
+
+
+#: Points of a profile on one side, and how far it goes in contact radii.
+_SIDE, _REACH = 1500, 2.0
+
+#: Points on a side of the map.
+_MAP = 201
+
+
+class Shape(NamedTuple):
+    """A contact: radius, indentation [m], shear stress [Pa], and the bodies that it is between."""
+
+    radius: float
+    indentation: float
+    stress: float
+    sphere_radius: float
+    modulus: float
+    shear_modulus: float
+    poisson_ratio: float
+
+    def pressure(self, r: np.ndarray) -> np.ndarray:
+        """Normal stress at distances from the axis [Pa]."""
+        return np.asarray(halfspace.pressure(r, self.radius, self.indentation, self.sphere_radius, self.modulus))
+
+    def surfaces(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights of half-space and sphere at distances from the axis [m]."""
+        given = r, self.radius, self.indentation, self.sphere_radius
+        low = -np.asarray(halfspace.normal_displacement(*given))
+        return low, low + np.asarray(halfspace.gap(*given))
+
+    def distances(self, reach: float) -> np.ndarray:
+        """Distances on both sides of the axis, crowded on both sides of the edge and with the edge itself [m]."""
+        near = np.geomspace(1e-6, 0.5, 200)
+        r = np.concatenate([np.linspace(0.0, reach, _SIDE), self.radius * (1.0 - near), self.radius * (1.0 + near)])
+        r = np.unique(np.append(r[r <= reach], self.radius))
+        return np.append(-r[:0:-1], r)
+
+
+def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
+    """An observable of the first member over time, or its mean where only that was recorded."""
+    return style.recorded(dataset, name).isel({"member": 0} | at, missing_dims="ignore").to_numpy()
+
+
+#: Contacts with the look of their lines.
+_Shown = list[tuple[Shape, dict[str, Any]]]
+
+
+def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, float, float]:
+    """Contacts of the first member at the first point of the sweep: the last closed one, and any at rest.
+
+    In place of the last one that of the record nearest to a time [s]. Also the time [s] and speed [m/s] of the former.
+
+    Raises
+    ------
+    ValueError
+        If the member is never in contact, or not at that time.
+    """
+    at = style.first_point(dataset)[0]
+    names = ("contact_radius", "indentation", "shear_stress", "speed")
+    radius, depth, stress, speed = (_member(dataset, name, at) for name in names)
+    if not np.any(radius > 0.0):
+        raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
+    k = int(np.flatnonzero(radius > 0.0)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
+    if not radius[k] > 0.0:
+        raise ValueError(
+            f"the contact is open at t = {style.text_of(float(dataset['t'][k]), 's')}; choose another time"
+        )
+    sphere, work = (style.number_at(setting(dataset, key), at) for key in ("sphere.radius", "adhesion.work"))
+    moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
+    bodies = (sphere, *(style.number_at(dataset[name], at) for name in moduli))
+    last = Shape(float(radius[k]), float(depth[k]), float(stress[k]), *bodies)
+    full = float(np.ravel(dataset["radius_at_rest"].isel(at))[0])
+    shown: _Shown = [(last, {"color": style.BOTH})]
+    if full > 0.0:
+        rest = Shape(full, float(jkr.indentation_at_radius(full, work, sphere, bodies[1])), 0.0, *bodies)
+        shown.append((rest, style.GREY | {"linestyle": "--", "label": "at rest (JKR)"}))
+    return shown, float(dataset["t"][k]), float(speed[k])
+
+
+def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
+    """Pressure, surfaces and tangential displacement across the contact at the last time, or another.
+
+    The surfaces are cut along the axis of the sphere; heights are not to the scale of the lengths. The
+    shear stress is the mean one, uniform over the contact; without any its displacement is left out.
+    """
+    shown, time, speed = shapes_of(dataset, at)
+    last, reach = shown[0][0], _REACH * max(shape.radius for shape, _ in shown)
+    length = style.Unit.of(np.array([reach]), "m")
+    count = 2 if last.stress != 0.0 else 1
+    figure, axes = style.pairs(0.35 + 2.4 * count, count)
+    _pressure_panel(axes[0], shown, reach, length)
+    _surface_panel(axes[1], shown, reach, length)
+    radial = "distance from the axis $r$"
+    for panel, words in zip(axes, (radial, radial, "distance from the axis"), strict=False):
+        style.across(panel, length.factor * np.array([-reach, reach]), length.label(words))
+    if count == 2:
+        _displacement_panel(axes[2], last, reach, length)
+        _map_panel(figure, axes[3], last, reach, length)
+    told = [style.first_point(dataset)[1], f"$t$ = {style.text_of(time, 's')}"]
+    if "$V$" not in told[0]:
+        told.append(f"$V$ = {style.text_of(speed, 'm/s')}")
+    axes[0].lines[0].set_label(", ".join(filter(None, told)))
+    style.legend(axes[0])
+    return figure
+
+
+def _pressure_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
+    middle = max((float(shape.pressure(np.zeros(1))[0]) for shape, _ in shown), key=abs)
+    factor = style.in_unit(panel.yaxis, "normal pressure $p$", np.array([middle]), "Pa")
+    for shape, line in shown:
+        x = shape.distances(reach)
+        r = np.abs(x)
+        pressure = np.where(r == shape.radius, np.nan, shape.pressure(r))  # tension has no bound at the edge
+        panel.plot(length.factor * x, factor * pressure, **line)
+    panel.axhline(0.0, **style.GUIDE)
+    size = factor * abs(middle)
+    panel.set_ylim((-1.6 * size, 1.15 * size) if middle > 0.0 else (-4.0 * size, 0.5 * size))
+
+
+def _surface_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
+    """Sphere and half-space, cut along the axis; between them the gap."""
+    x = [shape.distances(reach) for shape, _ in shown]
+    heights = [shape.surfaces(np.abs(own)) for (shape, _), own in zip(shown, x, strict=True)]
+    factor = style.in_unit(panel.yaxis, "height $z$", np.concatenate([upper for _, upper in heights]), "m")
+    for (_, line), own, surfaces in zip(shown, x, heights, strict=True):
+        panel.plot(length.factor * own, factor * np.transpose(surfaces), **line)
+    low, ball = factor * np.array(heights[0])
+    bottom = float(np.min(ball)) - 0.35 * float(np.ptp(ball))
+    panel.fill_between(length.factor * x[0], bottom, low, color=style.LINES[6], alpha=0.18, linewidth=0)
+    panel.set_ylim(bottom, float(np.max(ball)))
+    panel.text(0.5, 0.8, "sphere", transform=panel.transAxes, ha="center", fontsize=7)
+    panel.text(0.5, 0.06, "half-space", transform=panel.transAxes, ha="center", fontsize=7)
+
+
+def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
+    """Tangential displacement along and across the sliding direction; the edge as thin lines."""
+    distance = reach * np.linspace(-1.0, 1.0, 801)
+    bodies = shape.shear_modulus, shape.poisson_ratio
+    found = halfspace.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
+    factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(found), "m")
+    for values, line, words in zip(found, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
+        panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
+    for edge in (-shape.radius, shape.radius):
+        panel.axvline(length.factor * edge, **style.GUIDE)
+    style.legend(panel)
+
+
+def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
+    """Tangential displacement of the surface around the contact circle."""
+    bodies = shape.shear_modulus, shape.poisson_ratio
+    x, moved = halfspace.tangential_map(shape.radius, shape.stress, *bodies, points=_MAP, extent=reach / shape.radius)
+    unit = style.Unit.of(moved, "m")
+    x, moved = length.factor * x, unit.factor * moved.T
+    side = x[-1] + 0.5 * (x[1] - x[0])
+    image = panel.imshow(moved, cmap="viridis", origin="lower", extent=(-side, side, -side, side))
+    levels = MaxNLocator(7).tick_values(np.min(moved), np.max(moved))
+    lines = panel.contour(x, x, moved, levels, colors="white", linewidths=0.4, linestyles="-")
+    panel.clabel(lines, fmt="%g", fontsize=5)
+    figure.colorbar(image, ax=panel, pad=0.02).set_label(unit.label("displacement along $x$, $u_x$"))
+    style.contact_circle(panel, length.factor * shape.radius)
+    panel.set_xlabel(length.label("$x$"))
+    panel.set_ylabel(length.label("$y$"))
+
+
+# The figure of a loop: load and contact radius over the displacement of what holds the sphere, and the energy lost.
+
+
+#: Radii at which the equilibrium curve is evaluated.
+_RADII = 600
+
+#: Load at the fold of fixed grips over that at the fold of a dead load: 5/6 pi w R over 3/2 pi w R.
+_GRIPS = 5.0 / 9.0
+
+#: Line width of the cycles after the first.
+_LATER = 0.6
+
+#: Height of a name, in that of the panel.
+_NAME = 0.1
+
+#: Axis of each control, in words and as a symbol; the indentation where no stiffness is between.
+_DISPLACEMENTS = {"displacement": ("displacement", r"\Delta"), "": ("displacement, or indentation,", r"\Delta")}
+
+
+class Theory(NamedTuple):
+    """JKR's contact at rest as one curve of the figure has it: its equilibria and the loads of its folds."""
+
+    work: float
+    sphere_radius: float
+    modulus: float
+    stiffness: float
+
+    def equilibria(self, largest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacement [m], load [N] and radius [m] of all equilibria, stable or not, up to a radius [m]."""
+        radius = largest * np.linspace(0.0, 1.0, _RADII) ** 2  # dense at small radii, where the slopes are infinite
+        load, depth = (law(radius, *self[:3]) for law in (jkr.load_at_radius, jkr.indentation_at_radius))
+        return depth + load / self.stiffness, load, radius
+
+
+def needs_course(dataset: xr.Dataset) -> None:
+    """Refuse a dataset in which what holds the sphere stays."""
+    if bool(stays_held(dataset).all()):
+        cure = '[contact] indentation = { from = "2 um", to = "-12 um", cycles = 1 }'
+        raise ValueError(f"what holds the sphere stays the same, so that there is no loop; move it: {cure}")
+
+
+def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
+    """Load and contact radius over displacement, energy lost in a cycle, and radius over load.
+
+    A line is broken while the contact is open; there the load is a thin line at zero. Grey is JKR's contact at
+    the full work of adhesion: every equilibrium, the unstable ones as well, and the loads at which a dead load and
+    fixed grips lose it.
+    """
+    kind, stiffness, scene = "", xr.DataArray(np.nan), scene_along(dataset, "t")._replace(measured=data)
+    with contextlib.suppress(KeyError):  # the whole table [contact] is swept
+        kind, stiffness = control(dataset)
+    words, symbol = _DISPLACEMENTS.get(kind, ("indentation", r"\delta"))
+    over = "displacement" if kind in _DISPLACEMENTS else "indentation"
+    scene = scene.placed(over, scene.all("displacement_mean"), f"{words} ${symbol}$", "m")
+    work, size = setting(dataset, "adhesion.work"), setting(dataset, "sphere.radius")
+    numbers = (work, size, dataset["contact_modulus"], stiffness)
+    theories = [Theory(*(style.number_at(number, line.point) for number in numbers)) for line in scene.lines]
+    compared = data is not None and data.has_errors
+    figure, panels = style.rows([2.1, 1.5, 1.8] + [0.8] * compared, shared=False)
+    loads, radii, loaded, *below = panels
+    force = style.in_unit(loads.yaxis, "normal load $P$", scene.all("normal_load_mean"), "N")
+    length = style.in_unit(radii.yaxis, "contact radius $a$", scene.all("contact_radius_mean"), "m")
+    loaded.set_ylabel(radii.get_ylabel())
+    of_load = scene.placed("normal_load", scene.all("normal_load_mean"), "normal load $P$", "N")
+    (spent, loop), cycles = lost_energy(dataset), cycles_of(dataset)
+    named = scene._replace(lines=_named(scene, symbol, spent, loop))
+    for panel, placed, name, factor in (
+        (loads, named, "normal_load", force),
+        (radii, scene, "contact_radius", length),
+        (loaded, of_load, "contact_radius", length),
+    ):
+        for line in placed.lines:
+            _cycle(panel, placed, name, line, factor, kind, style.number_at(cycles, line.point))
+        beside(panel, placed, name, factor)
+        style.across(panel, placed.reach, placed.words, room=0.03)
+    _equilibria(panels[:3], scene, theories, (scene.unit.factor, force, length))
+    _levels(loads, theories, force)
+    if data:
+        along = scene if data.column(over) else of_load
+        data.refuse_undrawn(along.over)
+        for panel in below:
+            data.residual_panel(panel, {line.number for line in along.lines}, along.over)
+            style.across(panel, along.reach, along.words, room=0.03)
+        style.legend(loaded)
+    for panel in (radii, loaded):
+        panel.set_ylim(bottom=0.0)
+    loads.sharex(radii)
+    put_in = (
+        rf"$\oint\,P\,\mathrm{{d}}{symbol}$ put in, the area of the loop with each jump a straight line between records"
+    )
+    cycled = f"per cycle: $W$ dissipated by opening and closing; {put_in}"
+    lost = "dissipated in all: $W$" if loop is None else cycled
+    style.legend(loads, lost if bool((spent != 0.0).any()) else scene.title, columns=1)
+    style.legend(radii)
+    colour_bar(figure, panels, scene)
+    return figure
+
+
+def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind: str, cycles: float) -> None:
+    """One curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle."""
+    x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
+    mean, _, low, high = (np.where(gone, np.nan, factor * values) for values in scene.drawn(name, line))
+    along_load = scene.over == "normal_load"
+    if np.any(high > low) and not along_load:  # where the members' loads differ a band over their mean says nothing
+        style.fill(panel, x, low, high, color=line.colour, alpha=0.18, label="" if loads else scene.spread)
+    first = int(np.ceil(len(x) / max(cycles, 1.0)))
+    panel.plot(x[:first], mean[:first], color=line.colour, label=line.label if loads else "")
+    if first < len(x):
+        later: Any = {"linewidth": _LATER, "label": "" if loads else "later cycles"}
+        panel.plot(x[first - 1 :], mean[first - 1 :], color=line.colour, **later)
+    if loads:
+        colour = line.colour if scene.single else style.REFERENCE  # the open spheres of all curves lie on each other
+        panel.plot(x, np.where(gone, 0.0, np.nan), color=colour, linewidth=0.4)
+    if kind != "load" and not along_load:  # under a dead load the sphere leaves: no place to draw a jump to
+        jumps = np.concatenate(scene.openings(line))
+        panel.vlines(x[jumps], 0.0, mean[jumps], colors=line.colour, linestyles="dotted", linewidth=0.8)
+    mark_jumps(panel, scene, name, line, factor, named=not loads)
+
+
+def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:
+    """JKR's equilibria, each different curve once, as far as its contacts reached."""
+    reached: dict[Theory, float] = {}
+    for line, theory in zip(scene.lines, theories, strict=True):
+        most = float(np.nanmax(np.nan_to_num(scene.values("contact_radius_mean", line))))
+        reached[theory] = max(reached.get(theory, 0.0), most)
+    loads, radii, loaded = panels
+    for theory, most in reached.items():
+        if most > 0.0 and not np.isnan(theory.stiffness):
+            x, load, radius = (f * v for f, v in zip(factors, theory.equilibria(most), strict=True))
+            loads.plot(x, load, "--", **style.GREY)
+            radii.plot(x, radius, "--", label="JKR, stable and unstable", **style.GREY)
+            loaded.plot(load, radius, "--", **style.GREY)
+
+
+def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
+    """Loads at which a dead load and fixed grips lose JKR's contact, named where they are the same for all curves."""
+    pulls = {factor * float(jkr.pull_off_load(*theory[:2])) for theory in theories if theory.work > 0.0}
+    for pull in pulls:
+        for share in (1.0, _GRIPS):
+            panel.axhline(share * pull, **style.GUIDE)
+    if len(pulls) != 1:
+        return
+    (pull,) = pulls
+    panel.margins(y=0.15)  # a name stands below the lowest line
+    dead, grips = r"$-\frac{3}{2}\pi wR$", r"$-\frac{5}{6}\pi wR$"
+    low, high = panel.get_ylim()
+    near = -_GRIPS * pull < _NAME * (high - low)
+    names = [(1.0, f"{grips}, {dead}", "top")] if near else [(1.0, dead, "top"), (_GRIPS, grips, "bottom")]
+    look: Any = {"textcoords": "offset points", "ha": "left", "color": style.REFERENCE, "fontsize": 7}
+    for share, text, side in names:  # on the left, where spheres are open
+        at, off = (0.0, share * pull), (3, 1.5 if side == "bottom" else -1.5)
+        panel.annotate(text, at, off, va=side, xycoords=panel.get_yaxis_transform(), **look)
+
+
+def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]:
+    """Energy that opening and closing dissipate, and the closed integral of load over displacement, per cycle [J].
+
+    Means over the members, with the sweep's dimensions. Where no cycles are made, or a run stopped on the way, the
+    energy is that of the whole run, and there is no integral.
+    """
+    spent = style.recorded(dataset, "dissipated_energy")
+    spent = spent.isel(t=spent.notnull().cumsum("t").argmax("t")).drop_vars("t")  # the last record of those that stop
+    spent = spent.mean("member") if "member" in spent.dims else spent
+    cycles = cycles_of(dataset)
+    whole = bool(style.recorded(dataset, "contact_radius").isel(t=-1).notnull().all())
+    if not whole or not bool((cycles >= 1.0).all()):
+        return spent, None
+    return spent / cycles, style.mean_of(loop_energy(dataset), "loop_energy").mean("cycle")
+
+
+def _named(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray | None) -> list[Line]:
+    """The curves, each named with its energies."""
+    energies = {"$W$": spent} | ({} if loop is None else {rf"$\oint\,P\,\mathrm{{d}}{symbol}$": loop})
+    unit = style.Unit.of(np.concatenate([np.ravel(values) for values in energies.values()]), "J")
+    named = []
+    for line in scene.lines:
+        known = {words: unit.factor * style.number_at(values, line.point) for words, values in energies.items()}
+        known = {words: value for words, value in known.items() if value != 0.0}
+        parts = [f"{words} = {value:.3g} {unit.name}" for words, value in known.items() if np.isfinite(value)]
+        label = ": ".join(filter(None, [line.label, ", ".join(parts).replace("-", "−")])) if line.label else ""
+        named.append(line._replace(label=label))
+    return named

@@ -17,7 +17,7 @@ from sim.parts.drive import Drive
 from sim.parts.exchange import Setting
 from sim.parts.shear import Model
 from sim.scenario.clock import Clock, Ensemble, Record
-from sim.spectrum.bond_made import BondMade
+from sim.spectrum.families import BondMade
 
 _STEPS_A_CYCLE = 2
 #: Times between which the slip of a run is looked at.

@@ -1,24 +1,415 @@
-"""Spectrum estimated from measured stress maps.
+"""Spectra from data: tables of wavenumbers and densities, and estimates from measured stress maps.
 
 Convention: ``C(q) = ∫ d²x <τ1(x) τ1(0)> e^{-iq·x}`` in Pa² m², q in rad/m (2π over the wavelength),
-``<τ1²> = (1/2π) ∫ q C dq``. For a map of side L it is ``|∫ τ1 e^{-iq·x} d²x|² / L²``.
+``<τ1²> = (1/2π) ∫ q C dq``. For a map of side L it is ``|∫ τ1 e^{-iq·x} d²x|² / L²``. Maps are read from CSV, npy
+without pickled objects, or netCDF; declared sizes are not trusted.
 """
 
 import functools
 import math
-from typing import Annotated, Any, Literal
+from pathlib import Path
+from typing import Annotated, Any, Literal, NamedTuple, Protocol, Self
 
 import numpy as np
 from pydantic import Field, ValidationInfo, model_validator
 from pydantic.dataclasses import dataclass
+from pydantic_core import ArgsKwargs, PydanticCustomError
 
-from sim.numerics.grid import lattice_of
+from sim.numerics.files import HDF5
+from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array
-from sim.spectrum.map_file import SPACING, MapFile, read_map
-from sim.spectrum.periodogram import periodogram, radial_average, side_of_rings
-from sim.spectrum.radial import PowerLaws
-from sim.spectrum.tabulated import Densities, FromFile, Rescaled, Wavenumbers, by_name
-from sim.units.table import blamed
+from sim.spectrum.radial import PowerLaws, Rowed
+from sim.units.quantity import Quantity
+from sim.units.table import at_once, blamed, file_columns, file_path, file_text, matrix
+
+_WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
+_HEIGHTS = 'it is a spectrum of heights; a stress is needed, whose density over the plane is in "Pa^2 m^2"'
+_LINE = 'it is the spectrum of a line; give that of the plane, whose density is in "Pa^2 m^2"'
+_MISTAKEN = (("m^4", _HEIGHTS), ("m^3", _HEIGHTS), ("m^2", _HEIGHTS), ("Pa^2 m", _LINE))
+_DENSITY = Quantity("Pa^2 m^2", "power spectral density of the stress", "C", at_least=0, mistaken=_MISTAKEN)
+_RMS = Quantity("Pa", "root mean square of the shear stress", "σ", above=0)
+Wavenumbers = Annotated[tuple[Annotated[float, _WAVENUMBER], ...], at_once(_WAVENUMBER)]
+Densities = Annotated[tuple[Annotated[float, _DENSITY], ...], at_once(_DENSITY)]
+Rescaled = Annotated[float, _RMS]
+_WHERE = "4π² in the integral, <τ1²> = ∫ d²q C / 4π², or in the density, <τ1²> = ∫ d²q C (Persson)"
+_Normalization = Annotated[Literal["in_integral", "in_density"], Field(description=_WHERE)]
+#: Factor from a density to C: the 4π² stands in the integral ⟨τ1²⟩ = ∫ d²q C / 4π², or already in the density.
+NORMALIZATIONS = {"in_integral": 1.0, "in_density": 4 * math.pi**2}
+#: How near 2π the ratio of two rms is taken for that of the normalizations.
+_NEAR = 0.05
+#: Exponent of q below which a table is flat at its first row, and the part of the mean energy that matters.
+_FLAT, _PART = 0.5, 0.01
+
+
+_COLUMNS = {"q": _WAVENUMBER, "C": _DENSITY}
+
+
+class FromFile(Rowed, Protocol):
+    """Base of spectra whose rows may be read from a file."""
+
+    wavenumbers: Wavenumbers
+    densities: Densities
+    rms: Rescaled | None
+
+    @model_validator(mode="after")
+    def _check(self) -> Self:
+        """Refuse rows that are no spectrum."""
+        rows, steps = (len(self.wavenumbers), len(self.densities)), np.diff(self.wavenumbers)
+        falls = np.flatnonzero((-steps if self._falling else steps) <= 0.0)
+        if rows[0] != rows[1] or rows[0] < 2:
+            text = "a spectrum needs at least two rows and as many densities as wavenumbers"
+            raise PydanticCustomError("table_too_short", f"{text}, not {rows[0]} and {rows[1]}")
+        if len(falls):
+            text = f"the wavenumbers must all rise or all fall, but row {falls[0] + 2} does not go on from the one"
+            raise PydanticCustomError("table_not_increasing", f"{text} before; sort the rows and merge equal ones")
+        if not any(self.densities):
+            raise PydanticCustomError("table_empty", "every density is zero; give a row with a positive one", {})
+        return self
+
+    @property
+    def _falling(self) -> bool:
+        return len(self.wavenumbers) > 1 and self.wavenumbers[0] > self.wavenumbers[-1]
+
+    def _chain(self, factor: float = 1.0) -> PowerLaws:
+        """The rows with a factor of the density as a chain of power laws."""
+        order = slice(None, None, -1 if self._falling else 1)
+        return PowerLaws(np.array(self.wavenumbers[order]), factor * np.array(self.densities[order]))
+
+    def _scaled(self, chain: PowerLaws) -> PowerLaws:
+        """A chain at the rms that is given."""
+        if self.rms is None:
+            return chain
+        return PowerLaws(chain.q, chain.density * (self.rms**2 / float(chain.cumulative(chain.q[-1]))))
+
+
+def by_name(values: Any, names: tuple[str, ...]) -> Any:
+    """Arguments of a direct construction as a dictionary, as in a scenario, arrays as lists."""
+    if isinstance(values, ArgsKwargs):
+        if len(values.args) > len(names):
+            raise TypeError(f"at most {len(names)} positional arguments: {', '.join(names)}")
+        values = dict(zip(names, values.args, strict=False)) | dict(values.kwargs or {})
+    if not isinstance(values, dict):
+        return values
+    return {key: value.tolist() if isinstance(value, np.ndarray) else value for key, value in values.items()}
+
+
+@dataclass(frozen=True, config={"extra": "forbid"})
+class Tabulated(FromFile):
+    """A radial density given by rows: power laws between them, zero outside.
+
+    Parameters
+    ----------
+    wavenumbers : tuple of float
+        q [rad/m], all rising or all falling.
+    densities : tuple of float
+        Density at each q [Pa² m²]; next to a zero, which may stand at either end, the interpolation is linear.
+    normalization : {"in_integral", "in_density"}
+        Where the 4π² stands. "in_integral": the densities are C, and ``<τ1²> = ∫ d²q C / 4π²``. "in_density":
+        they are C / 4π², as in Persson's papers, and ``<τ1²> = ∫ d²q`` of them.
+    file : str
+        In a scenario instead of the rows: a CSV with the columns ``q [rad/m], C [Pa^2 m^2]``. It is
+        not read if the rows are given too.
+    header : str
+        Names of the columns of a file without a header.
+    rms : float, optional
+        Root mean square [Pa] to which the densities are scaled.
+
+    Examples
+    --------
+    Two rows of equal density are a band:
+
+    >>> table = Tabulated((1e5, 3e5), (2.0, 2.0))
+    >>> print(f"{table.variance:.6e} {2.0 * (9e10 - 1e10) / (4 * np.pi):.6e}")
+    1.273240e+10 1.273240e+10
+    """
+
+    wavenumbers: Wavenumbers
+    densities: Densities
+    normalization: _Normalization = "in_integral"
+    file: Annotated[str, Field(description="CSV with the columns q [rad/m], C [Pa^2 m^2], in place of the rows")] = ""
+    header: Annotated[str, Field(description="header of a file without one, as q [cycles/um], C [Pa^2 m^2]")] = ""
+    rms: Rescaled | None = None
+    model: Literal["tabulated"] = "tabulated"
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, values: Any, info: ValidationInfo) -> Any:
+        values = by_name(values, ("wavenumbers", "densities", "normalization", "file", "header", "rms"))
+        if not isinstance(values, dict) or "wavenumbers" in values or "densities" in values:
+            return values
+        name = values.get("file")
+        if not name or not isinstance(name, str):
+            raise PydanticCustomError("no_table", 'needs file = "psd.csv" with the columns q [rad/m], C [Pa^2 m^2]', {})
+        header = values.get("header", "")
+        table = file_columns(name, info.context, _COLUMNS, header if isinstance(header, str) else "")
+        return {**values, "wavenumbers": table["q"], "densities": table["C"]}
+
+    @model_validator(mode="after")
+    def _no_gaps(self) -> Self:
+        """Refuse zeros between positive rows, which are empty bins and no density."""
+        full = np.flatnonzero(self.densities)
+        gaps = np.setdiff1d(np.arange(full[0], full[-1]), full) if full.size else full
+        if gaps.size:
+            text = (
+                f"row {gaps[0] + 1} is zero between positive ones, as an empty bin of an average is: its energy would"
+            )
+            raise PydanticCustomError("table_gaps", f"{text} be lost; leave such rows out")
+        return self
+
+    @functools.cached_property
+    def rows(self) -> PowerLaws:
+        """The table as a chain of power laws, with the 4π² in the integral."""
+        return self._scaled(self._chain(NORMALIZATIONS[self.normalization]))
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Remarks on the normalization and on the first row."""
+        return self._normalized() + self._cut_plateau()
+
+    def _normalized(self) -> tuple[str, ...]:
+        """Remark on the rms that the table has under the other normalization."""
+        chains = {where: self._chain(factor) for where, factor in NORMALIZATIONS.items()}
+        rms = {where: math.sqrt(float(chain.cumulative(chain.q[-1]))) for where, chain in chains.items()}
+        other = next(where for where in NORMALIZATIONS if where != self.normalization)
+        words = {"in_integral": "in the integral", "in_density": "in the density"}
+        if self.rms is not None and abs(math.log(self.rms / rms[other])) < _NEAR:
+            text = f"the table has the rms of {self.rms:.3g} Pa with the 4π² {words[other]}, to which it is scaled:"
+            return (f'{text} normalization = "{other}" may be meant',)
+        if self.rms is None and self.file:
+            text = f"the table is read with the 4π² {words[self.normalization]}, rms {rms[self.normalization]:.3g} Pa;"
+            text += f" {words[other]} it would be {rms[other]:.3g} Pa, and the energy 39.5 times as"
+            more = "large" if rms[other] > rms[self.normalization] else "small"
+            return (f"{text} {more}: shear.spectrum.normalization chooses, rms fixes it",)
+        return ()
+
+    def _cut_plateau(self) -> tuple[str, ...]:
+        """Remark on the energy below a first row at which the density is flat; the mean energy goes as ∫ C dq."""
+        (q, *_), (density, *_) = self.rows.q, self.rows.density
+        flat = density > 0.0 and abs(math.log(self.rows.density[1] / density)) < _FLAT * math.log(self.rows.q[1] / q)
+        if not (flat and self.file) or q * density < _PART * self.rows.line_integral:
+            return ()
+        more, condition = q * density / self.rows.line_integral, ""
+        if self.rms is not None:  # the plateau takes its part of the variance from the rest
+            more = (1.0 + more) / (1.0 + density * q**2 / (4.0 * math.pi * self.rms**2)) - 1.0
+            condition = ", the rms kept"
+        text = f"the table is flat at its first row and zero before: below {q:.3g} rad/m a plateau down to 0 would add"
+        return (f"{text} {more:.0%} to the mean energy{condition}; add a row where it ends",)
+
+
+# Files of measured stress maps: CSV, npy without pickled objects, netCDF. Declared sizes are not trusted.
+
+
+STRESS = Quantity("Pa", "shear stress", "τ1")
+SPACING = Quantity("m", "distance between neighbouring points of the map", "h", above=0)
+#: Most numbers of a map, and least along a side.
+_MOST, LEAST = 10**8, 8
+
+
+class MapFile(NamedTuple):
+    """Contents of a file: stresses (..., rows, columns) [Pa], or (..., x, y) where the file names its axes.
+
+    ``spacings`` are those of its coordinates x and y [m], None without.
+    """
+
+    values: Array
+    has_axes: bool = False
+    spacings: tuple[float | None, float | None] = (None, None)
+
+
+def read_map(name: str, context: Any, variable: str, gaps: bool = False) -> MapFile:
+    """Read a map from a file that a scenario names, by the ending of its name.
+
+    Parameters
+    ----------
+    name : str
+        Path relative to the scenario: .nc, .nc4 or .cdf is netCDF, .npy an array of numpy, all else CSV.
+    context : dict or None
+        The validation's context, as of ``sim.units.table.file_text``.
+    variable : str
+        Name of the map in a netCDF file.
+    gaps : bool
+        Whether points may be nan.
+
+    Raises
+    ------
+    ValueError
+        If it cannot be read as a map, is too small or has gaps; within ``blamed`` a fault of the file.
+    """
+    if name.lower().endswith((".nc", ".nc4", ".cdf")):
+        map_file = _from_netcdf(file_path(name, context), variable)
+    elif name.lower().endswith(".npy"):
+        map_file = MapFile(_from_npy(file_path(name, context)))
+    else:
+        map_file = MapFile(matrix(file_text(name, context), STRESS, gaps))
+    if map_file.values.ndim < 2 or min(map_file.values.shape) < 1:
+        raise ValueError("the map has not two dimensions; give rows and columns")
+    if min(map_file.values.shape[-2:]) < LEAST:
+        points = min(map_file.values.shape[-2:])
+        raise ValueError(f"a map of {points} points along a side is too small; give at least {LEAST}")
+    if not np.all(np.isfinite(map_file.values) | (np.isnan(map_file.values) & gaps)):
+        raise ValueError("the map has gaps (nan or infinite); fill them or crop the map")
+    for value in (np.nanmin(map_file.values), np.nanmax(map_file.values)) if np.isfinite(map_file.values).any() else ():
+        STRESS.read(float(value))
+    return map_file
+
+
+def _from_npy(path: Path) -> Array:
+    """Return the numbers of an array that numpy has saved."""
+    if not path.is_file():
+        raise ValueError("it is no plain file")
+    values = np.load(path, mmap_mode="r", allow_pickle=False)  # the file holds as many numbers as its header says
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "fiu":
+        raise ValueError("it holds no plain real numbers; save a map of numbers, such as numpy.save of a float array")
+    if values.size > _MOST:
+        raise ValueError(f"it holds more than {_MOST:.0e} numbers; crop the map")
+    return np.array(values, float)
+
+
+def _from_netcdf(path: Path, variable: str) -> MapFile:
+    """Maps and their spacings in a netCDF file."""
+    from sim.numerics.lazy import Refused, open_lazily  # imports xarray, which only maps need here
+
+    try:
+        dataset = open_lazily(path)
+    except Refused as fault:
+        raise ValueError(f"{fault}; write the map anew, as a plain variable") from None
+    with HDF5, dataset:
+        if variable not in dataset:
+            raise ValueError(f'there is no variable "{variable}"; name it by variable = "..."')
+        data = dataset[variable]
+        if data.ndim < 2 or data.dtype.kind not in "fiu":
+            raise ValueError(f'"{variable}" has no two dimensions, or no numbers; name a map by variable = "..."')
+        if data.size > _MOST:
+            raise ValueError(f'"{variable}" has more than {_MOST:.0e} numbers; crop the map')
+        data = data.load()
+    has_axes = {"x", "y"} <= set(data.dims)
+    if has_axes:
+        data = data.transpose(..., "x", "y")
+    spacings = _spacing(data, "x"), _spacing(data, "y")
+    return MapFile(np.asarray(data, float) * _factor(data, STRESS), has_axes, spacings if has_axes else (None, None))
+
+
+def _factor(data: Any, quantity: Quantity) -> float:
+    """Factor to SI from a netCDF variable's ``units``; without the attribute it is SI."""
+    unit = str(data.attrs.get("units", quantity.unit))
+    return Quantity(quantity.unit, quantity.meaning).read(f"1 {unit}")
+
+
+def _spacing(data: Any, axis: str) -> float | None:
+    """Spacing of a coordinate [m]; None without it."""
+    if axis not in data.dims or axis not in data.coords or data.sizes[axis] < 2:
+        return None
+    steps = np.diff(np.asarray(data[axis], float)) * _factor(data[axis], SPACING)
+    step = float(np.mean(steps))
+    if not np.allclose(steps, step, rtol=1e-4, atol=0.0):
+        raise ValueError(f"the coordinate {axis} is not spaced by one step; interpolate the map onto a square lattice")
+    return abs(step)
+
+
+# Power spectral density of a stress map on a grid, and its radial average.
+
+
+def periodogram(field: Array, cell: float | tuple[float, float], window: str = "none") -> Array:
+    """Power spectral density of maps, on the half spectrum of their lattice.
+
+    Parameters
+    ----------
+    field : array, shape (..., nx, ny)
+        Stress [Pa], x along axis -2.
+    cell : float or (float, float)
+        Sides of the map along x and y [m], one for both if they are equal.
+    window : {"none", "hann"}
+        Multiplies the field by a periodic Hann window in x and y, normalised to keep the power.
+
+    Returns
+    -------
+    array, shape (..., nx, ny // 2 + 1)
+        ``|τ(q)|² / A`` [Pa² m²], A the area, of the field less its (windowed) mean; zero at q = 0.
+
+    Examples
+    --------
+    Its sum over the whole lattice / L² is the mean square (Parseval):
+
+    >>> from sim.numerics.grid import Grid
+    >>> field = np.random.default_rng(1).normal(size=(16, 16))
+    >>> grid = Grid(cell=2.0, points=16)
+    >>> total = grid.mode_sum(periodogram(field, 2.0)) / 2.0**2
+    >>> print(f"{float(total / np.var(field)):.12f}")
+    1.000000000000
+    """
+    lattice = lattice_of(cell, field.shape[-2:])
+    transform = lattice.forward(tapered(field, window))
+    transform[..., 0, 0] = 0.0  # what rounding left of the mean
+    return np.asarray((transform.real**2 + transform.imag**2) / lattice.area)
+
+
+def tapered(field: Array, window: str) -> Array:
+    """Maps less their mean under a window, times the window, whose mean square is one; arguments of ``periodogram``."""
+    if window not in ("none", "hann"):
+        raise ValueError(f'window must be "none" or "hann", not {window!r}')
+    along, across = (
+        np.ones(points) if window == "none" else 1.0 - np.cos(2 * np.pi * (np.arange(points) + 0.5) / points)
+        for points in field.shape[-2:]
+    )
+    taper = along[:, None] * across
+    mean = np.mean(field * taper, axis=(-2, -1), keepdims=True) / np.mean(taper)
+    return np.asarray((field - mean) * (taper / math.sqrt(np.mean(taper**2))))
+
+
+class RadialAverage(NamedTuple):
+    """Means over rings of the wavevector lattice, each array of shape (rings,)."""
+
+    q: Array  #: mean wavenumber of the ring [rad/m]
+    density: Array  #: mean density [Pa² m²]
+    standard_error: Array  #: of that mean, from the scatter within the ring [Pa² m²]
+    pairs: Array  #: independent modes ±q in the ring
+
+
+def side_of_rings(lattice: Lattice) -> float:
+    """Length L whose wavenumber 2π/L is the width of a ring: the side of a square of the same area [m]."""
+    first, second = lattice.sides
+    return first if first == second else math.sqrt(lattice.area)
+
+
+def radial_average(density: Array, grid: Lattice) -> RadialAverage:
+    """Average a density over rings |q| L/2π in [k - ½, k + ½), k = 1, 2, ... below Nyquist.
+
+    Parameters
+    ----------
+    density : array, shape (nx, ny // 2 + 1)
+        On the half spectrum of ``grid``.
+    grid : Grid or Rectangle
+        The periodic cell, L its side or the square root of its area; all longer waves count to the first ring.
+
+    Examples
+    --------
+    The innermost ring holds the eight neighbours of q = 0, four pairs:
+
+    >>> from sim.numerics.grid import Grid
+    >>> grid = Grid(cell=1.0, points=16)
+    >>> print(radial_average(np.ones((16, 9)), grid).pairs[0])
+    4.0
+    """
+    q = np.hypot(*grid.wavevectors)
+    length = side_of_rings(grid)
+    ring = np.floor(q * length / (2 * np.pi) + 0.5).astype(int)
+    ring[(ring == 0) & (q > 0.0)] = 1
+    rings = min((points - 1) // 2 if side == length else int((points - 1) / 2 * length / side)
+                for points, side in zip(grid.shape, grid.sides, strict=True))  # fmt: skip
+    inside = (ring > 0) & (ring <= rings)
+    share = np.broadcast_to(grid.multiplicity / 2, q.shape)[inside]  # the first column holds both q and -q
+    place = ring[inside] - 1
+
+    def total(values: Array) -> Array:
+        return np.asarray(np.bincount(place, share * values, rings), float)
+
+    pairs = total(np.ones(len(place)))
+    mean = total(density[inside]) / pairs
+    scatter = total((density[inside] - mean[place]) ** 2) / np.maximum(pairs - 1, 1)
+    return RadialAverage(total(q[inside]) / pairs, mean, np.sqrt(scatter / pairs), pairs)
+
+
+# Spectrum estimated from measured stress maps.
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -77,9 +468,9 @@ class Measured(FromFile):
         except ValueError:
             return values  # refused by the field's own check
         with blamed(name):
-            found = read_map(name, info.context, str(values.get("variable", "shear_map")))
-            spacing = _one_spacing(found, spacing)
-            maps = found.values.reshape(-1, *found.values.shape[-2:])
+            map_file = read_map(name, info.context, str(values.get("variable", "shear_map")))
+            spacing = _one_spacing(map_file, spacing)
+            maps = map_file.values.reshape(-1, *map_file.values.shape[-2:])
             q, density = estimate(maps, (maps.shape[1] * spacing, maps.shape[2] * spacing), window)
         return {**values, "spacing": spacing, "wavenumbers": q.tolist(), "densities": density.tolist()}
 
@@ -89,13 +480,13 @@ class Measured(FromFile):
         return self._scaled(self._chain())
 
 
-def _one_spacing(found: MapFile, spacing: float | None) -> float:
+def _one_spacing(map_file: MapFile, spacing: float | None) -> float:
     """Spacing in x and y alike [m], which must agree with the one given."""
-    for one in filter(None, found.spacings):
-        if spacing is not None and not math.isclose(one, spacing, rel_tol=1e-4):
-            said = "the coordinates are not spaced by one step, equal in x and y and to the key spacing"
-            raise ValueError(f"{said}; interpolate the map onto a square lattice")
-        spacing = one if spacing is None else spacing
+    for step in filter(None, map_file.spacings):
+        if spacing is not None and not math.isclose(step, spacing, rel_tol=1e-4):
+            text = "the coordinates are not spaced by one step, equal in x and y and to the key spacing"
+            raise ValueError(f"{text}; interpolate the map onto a square lattice")
+        spacing = step if spacing is None else spacing
     if spacing is None:
         raise ValueError('the map has no coordinates; give spacing, such as "0.5 um"')
     return spacing

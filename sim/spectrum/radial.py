@@ -1,21 +1,319 @@
-"""Isotropic spectra: a radial density, the variance within a circle, the energy.
+"""Isotropic spectra, and the mean energy of the fluctuating shear stress on a finite disc of contact.
 
-A spectrum that is given by rows (a band, a self-affine law with cut-offs, a table, a measurement)
-is a chain of power laws, whose integrals are closed forms.
+A spectrum that is given by rows (a band, a self-affine law with cut-offs, a table, a measurement) is a chain of
+power laws, whose integrals over a circle are closed forms.
+
+``surface_energy`` of a spectrum is that of the infinite plane, right for a contact of very many wavelengths. On
+a disc of radius a every wave counts with the share that ``laws.halfspace`` gives in closed form, so that
+
+``E/(pi a^2) = 1/(4 pi^3 G) integral of [(1 - nu/2) C0(q) P(2qa) + (nu/2) C2(q) S(2qa)] dq``,
+
+C0 and C2 the integrals of C and of C cos(2 theta) over the directions theta from the sliding direction. This is
+the overlap integral over the autocorrelation in another order, and one-dimensional for anisotropic spectra, too.
 """
 
 import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from functools import cached_property
+from typing import ClassVar, Protocol
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike, NDArray
 
-from sim.laws.halfspace import angular_compliance
-from sim.spectrum.family import Array
-from sim.spectrum.finite_contact import Waves
-from sim.spectrum.pixels import Radial, radial_quadrant
+from sim.laws.halfspace import angular_compliance, energy_factors, marginal_factors
+from sim.numerics.jit import device
+from sim.numerics.special import erf_between, si
+from sim.spectrum.family import Array, Factors, Family, Radial, radial_quadrant
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
+
+#: P and S oscillate like cos(x)/x: followed within this distance of x = 0 and of each break of the spectrum, and
+#: faded out beyond over a length so large that nothing of a smooth spectrum is left of the oscillation.
+_FOLLOWED, _FADING = 60.0, 10.0
+#: Beyond this x only the two ends of a spectrum are followed, not the kinks of its rows.
+_LAST_KINK = 3000.0
+
+#: Points of the splines over ln a, from 1e-4 to 1 sphere radii. Good to 1e-8 for smooth spectra, 1e-5 for a broad
+#: power law, 3e-5 for a band and 3e-3 for one a few per cent wide: its share oscillates with the waves in the contact.
+_POINTS, _DECADES = 513, 4
+
+
+class Waves(Protocol):
+    """Base of the families (``sim.spectrum.family``) with a density, whose integrals over discs are quadratures."""
+
+    wavevector: ClassVar[None] = None
+    bond_made: ClassVar[bool] = False
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """Sentences on what is assumed of the spectrum."""
+        return ()
+
+    @property
+    def support(self) -> tuple[float, float]:
+        """Wavenumbers [rad/m] between which the density may differ from zero."""
+        return 0.0, math.inf
+
+    @property
+    def breaks(self) -> Array:
+        """Wavenumbers [rad/m] where the density jumps or kinks."""
+        return np.empty(0)
+
+    def reach(self, radius: float) -> tuple[float, float]:
+        """Wavenumbers [rad/m] below which nothing varies, and beyond which a disc of this radius [m] stores nothing."""
+        return self.support
+
+    def harmonics(self, q: Array) -> tuple[Array, Array]:
+        """``∫ C dθ`` and ``∫ C cos 2θ dθ`` over the directions at wavenumber q [Pa² m²]."""
+
+    def surface_energy(self, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+        """Mean elastic energy per area of an infinite half-space [J/m²]."""
+
+    def on_disc(self, factors: Factors, radii: Array) -> tuple[Array, Array]:
+        """Integrals over discs, by quadrature over the wavenumbers, see ``Family``."""
+
+        def integrals(radius: float) -> tuple[float, float]:
+            q, step = _nodes(self, radius)
+            x = 2 * radius * q
+            followed = _window(self, radius, x)
+            mean, skew = factors(x)
+            # without its oscillation P is pi/2 and S, beyond its slow part, -pi/2
+            limit = 4.0 / x if factors is energy_factors else 2.0 / x
+            mean = followed * mean + (1.0 - followed) * (0.5 * math.pi)
+            skew = followed * skew + (1.0 - followed) * (limit - 0.5 * math.pi)
+            level, lean = self.harmonics(q)
+            return float(np.sum(level * mean * step)), float(np.sum(lean * skew * step))
+
+        return disc_sums(self, radii, integrals)
+
+
+def disc_energy(spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5) -> Array:
+    """Mean elastic energy per area that a fluctuating shear stress stores on a disc of contact.
+
+    Parameters
+    ----------
+    spectrum : Family
+        Any family of ``sim.spectrum``.
+    radius : float or array
+        a [m]; 0 stores nothing, inf is the infinite plane.
+    shear_modulus, poisson_ratio : float or array
+        G [Pa], nu [1]; they broadcast with the radius.
+
+    Returns
+    -------
+    float or array
+        ``E/(pi a^2)`` [J/m^2]: ``spectrum.surface_energy`` for a disc of many wavelengths, ``(2 - nu) 2 a
+        sigma^2/(3 pi G)`` on one much smaller than any of them.
+
+    Raises
+    ------
+    ValueError
+        If a radius is negative or nan.
+
+    Notes
+    -----
+    Relative accuracy 1e-12, or 1e-9 for tables whose rows scatter widely at hundreds of waves per contact. A
+    spectrum that is smooth through q = 0 lacks the share ``(2/pi) xi/(sqrt(pi) a)`` of the plane's energy (of
+    ``Gaussian``); without waves as long as the disc hardly anything is missing.
+
+    Examples
+    --------
+    Patches of a tenth of the radius store 3.6 % less than on the infinite plane:
+
+    >>> from sim.spectrum import Gaussian
+    >>> patches = Gaussian(rms=1.0, length=0.1)
+    >>> print(f"{disc_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.5f}")
+    0.96410
+    """
+    return _on_disc(energy_factors, spectrum, radius, shear_modulus, poisson_ratio)
+
+
+def marginal_energy(
+    spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike = 0.5
+) -> Array:
+    """Mean energy that a unit of new contact area stores at the edge of a growing disc: dE/dA.
+
+    Parameters
+    ----------
+    spectrum, radius, shear_modulus, poisson_ratio
+        As for ``disc_energy``.
+
+    Returns
+    -------
+    float or array
+        ``(1/(2 pi a)) dE/da`` [J/m^2], the exact derivative of the overlap integral; 0 at a = 0,
+        ``spectrum.surface_energy`` at a = inf.
+
+    Notes
+    -----
+    This, not the mean over the disc, enters the energy balance at the contact's edge.
+
+    Examples
+    --------
+    The deficit of the whole disc comes from its edge; a unit of new area lacks half of it:
+
+    >>> from sim.spectrum import Gaussian
+    >>> patches = Gaussian(rms=1.0, length=0.1)
+    >>> print(f"{1 - marginal_energy(patches, 1.0, 1.0) / patches.surface_energy(1.0):.4f}")
+    0.0180
+    """
+    return _on_disc(marginal_factors, spectrum, radius, shear_modulus, poisson_ratio)
+
+
+def _on_disc(
+    factors: Factors, spectrum: Family, radius: ArrayLike, shear_modulus: ArrayLike, poisson_ratio: ArrayLike
+) -> Array:
+    radii = np.asarray(radius, float)
+    if not np.all(radii >= 0.0):
+        raise ValueError("the radius of a disc must be at least zero; give detached contacts the radius 0")
+    mean, skew = spectrum.on_disc(factors, radii)
+    level, swing = angular_compliance(np.asarray(poisson_ratio, float))
+    return (level * mean - swing * skew) / (4 * math.pi**3 * np.asarray(shear_modulus, float))
+
+
+def disc_sums(spectrum: Waves, radii: Array, integrals: Callable[[float], tuple[float, float]]) -> tuple[Array, Array]:
+    """``∫ C0 P dq`` and ``∫ C2 S dq`` for discs of any radius, by ``one`` for those between 0 and infinity."""
+
+    def sums(radius: float) -> tuple[float, float]:
+        if radius == 0.0:
+            return 0.0, 0.0
+        if math.isinf(radius):
+            at_zero, at_one = (4 * math.pi**3 * float(spectrum.surface_energy(1.0, nu)) for nu in (0.0, 1.0))
+            return at_zero, 2 * at_one - at_zero
+        return integrals(radius)
+
+    mean, skew = np.array([sums(radius) for radius in radii.ravel().tolist()]).reshape(-1, 2).T
+    return mean.reshape(radii.shape), skew.reshape(radii.shape)
+
+
+def _nodes(spectrum: Waves, radius: float) -> tuple[Array, Array]:
+    """Wavenumbers and steps of a composite Gauss-Legendre sum over all q that matter."""
+    low, high = spectrum.reach(radius)
+    start = low if spectrum.breaks.size else min(low, 0.5 / radius)
+    halves = math.ceil(2 * math.log2(high / start))
+    edges: list[ArrayLike] = [spectrum.breaks, start * 2.0 ** (0.5 * np.arange(halves)), [high]]
+    if not spectrum.breaks.size:
+        edges.append([0.0])
+    for begin, end in _followed(spectrum, radius):
+        begin, end = max(begin - 6 * _FADING, 0.0), end + 6 * _FADING
+        count = math.ceil((end - begin) / (2 * math.pi))
+        turns = np.linspace(begin, end, count + 1) / (2 * radius)
+        edges.append(turns[(turns > start) & (turns < high)])
+    edge: Array = np.unique(np.concatenate(edges))
+    half = 0.5 * np.diff(edge)[:, None]
+    return (edge[:-1, None] + half * (1 + _NODES)).ravel(), (half * _WEIGHTS).ravel()
+
+
+def _followed(spectrum: Waves, radius: float) -> list[tuple[float, float]]:
+    """Intervals of x = 2qa in which the oscillation of P and S is followed, increasing and apart."""
+    x = 2 * radius * spectrum.breaks
+    near = np.concatenate([[0.0], x[x < _LAST_KINK], x[:1], x[-1:]])
+    intervals: list[tuple[float, float]] = []
+    for begin, end in zip(np.sort(near) - _FOLLOWED, np.sort(near) + _FOLLOWED, strict=True):
+        if intervals and begin - intervals[-1][1] < 12 * _FADING:
+            begin = intervals.pop()[0]
+        intervals.append((begin, end))
+    return intervals
+
+
+def _window(spectrum: Waves, radius: float, x: Array) -> Array:
+    """1 where the oscillation of P and S is followed, falling smoothly to 0 elsewhere."""
+    followed = np.zeros_like(x)
+    for number, (begin, end) in enumerate(_followed(spectrum, radius)):
+        rise = erf_between((begin - x) / _FADING, math.inf) if number else 2.0
+        followed += 0.25 * rise * erf_between((x - end) / _FADING, math.inf)
+    return followed
+
+
+class Margin:
+    """Share of ΔΓ that a growing contact of finite radius pays, dE/dA over ΔΓ of the plane [1].
+
+    1 for many waves in the contact, 0 for a vanishing one. A spline over ln a, made once for a scene; closed form
+    for a ripple.
+    """
+
+    def __init__(self, spectrum: Family, shear_modulus: float, poisson_ratio: float, sphere_radius: float) -> None:
+        self.spectrum, self.solid = spectrum, (shear_modulus, poisson_ratio)
+        self._ends = sphere_radius * 10.0**-_DECADES, sphere_radius
+        self._splines: dict[Callable[..., Array], scipy.interpolate.CubicSpline] = {}
+
+    def __call__(self, radius: Array) -> Array:
+        """Share at contact radii [m]; nan at nan."""
+        return self._share(radius, marginal_energy)
+
+    def mean(self, radius: Array) -> Array:
+        """Mean of the share over the area of the disc: E/(πa²) over ΔΓ of the plane [1]."""
+        return self._share(radius, disc_energy)
+
+    def at(self, position: Array) -> "Margin":
+        """The same share at any position of the slider."""
+        return self
+
+    @property
+    def least(self) -> float:
+        """0: no wave gives energy back, on average over its phases."""
+        return 0.0
+
+    @property
+    def each(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float], Array]]:
+        """The ``terms``, which are the same at all steps."""
+        return [self.terms]
+
+    def _share(self, radius: Array, law: Callable[..., Array]) -> Array:
+        if self.spectrum.wavevector is not None and self._plane > 0.0:
+            share = law(self.spectrum, np.nan_to_num(radius), *self.solid) / self._plane
+            return np.where(np.isnan(radius), np.nan, share)
+        low, high = self._ends
+        share = self._spline(law)(np.log(np.clip(radius, low, high)))
+        return np.where(radius < low, share * np.maximum(radius, 0.0) / low, share)
+
+    @cached_property
+    def terms(self) -> tuple[tuple[float, float, float], tuple[float, float, float], Array]:
+        """Inputs of ``share_of``: the wave of a ripple or (0, 0, 0), beginning and pieces of the spline, its cubics."""
+        (low, high), wave = self._ends, self.spectrum.wavevector
+        if wave is not None and self._plane > 0.0:
+            level, swing = angular_compliance(np.asarray(self.solid[1], float))
+            square = wave[0] ** 2 + wave[1] ** 2
+            lean = float(swing) * (wave[0] ** 2 - wave[1] ** 2) / square
+            whole = 0.5 * math.pi * (float(level) + lean)
+            return (2.0 * math.sqrt(square), float(level) / whole, -lean / whole), (0.0, 0.0, 0.0), np.zeros((1, 4))
+        count, spline = _POINTS - 1, self._spline(marginal_energy)
+        step = math.log(high / low) / count
+        cubics = np.ascontiguousarray(spline.c.T * step ** np.arange(3, -1, -1))
+        return (0.0, 0.0, 0.0), (low, math.log(low), 1.0 / step), cubics
+
+    @cached_property
+    def _plane(self) -> float:
+        return float(self.spectrum.surface_energy(*self.solid))
+
+    def _spline(self, law: Callable[..., Array]) -> "scipy.interpolate.CubicSpline":
+        if law not in self._splines:
+            radii = np.geomspace(*self._ends, _POINTS)
+            energies = law(self.spectrum, radii, *self.solid) if self._plane > 0.0 else np.zeros(_POINTS)
+            self._splines[law] = scipy.interpolate.CubicSpline(np.log(radii), energies / (self._plane or 1.0))
+        return self._splines[law]
+
+
+@device
+def share_of(radius, wave, ends, cubics):
+    """``Margin`` in compiled loops at a radius above 0, given its ``terms``."""
+    double, level, lean = wave
+    if double > 0.0:
+        x = double * radius
+        integral, half = si(x), math.sin(0.5 * x)
+        return level * integral + lean * (4.0 * half * half / x - integral)
+    low, begin, rate = ends
+    place = min(rate * (math.log(max(radius, low)) - begin), float(len(cubics)))
+    i = min(int(max(place, 0.0)), len(cubics) - 1)
+    s = place - i
+    share = ((cubics[i, 0] * s + cubics[i, 1]) * s + cubics[i, 2]) * s + cubics[i, 3]
+    return share if radius >= low else share * radius / low
+
+
+# Isotropic spectra: a radial density, the variance within a circle, the energy.
 
 
 class Isotropic(Waves, Radial, Protocol):

@@ -18,10 +18,7 @@ from pydantic_core import PydanticCustomError
 from sim.laws.halfspace import free_energy_of_map, noise_energy, surface_energy
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
-from sim.spectrum.map_file import SPACING, MapFile, read_map
-from sim.spectrum.measured import Measured, estimate
-from sim.spectrum.periodogram import tapered
-from sim.spectrum.tabulated import by_name
+from sim.spectrum.measured import SPACING, MapFile, Measured, by_name, estimate, read_map, tapered
 from sim.units.quantity import Quantity
 from sim.units.table import blamed
 
@@ -96,35 +93,35 @@ class StressMap:
 
     @model_validator(mode="before")
     @classmethod
-    def _read_file(cls, given: Any, info: ValidationInfo) -> Any:
-        given = by_name(given, ("file", "pixel", "pixel_y", "window", "rows", "mask", "noise", "start", "variable"))
-        if not isinstance(given, dict) or isinstance(given.get("values"), bytes):
-            return given
-        if strange := {"values", "shape"} & given.keys():
+    def _read_file(cls, table: Any, info: ValidationInfo) -> Any:
+        table = by_name(table, ("file", "pixel", "pixel_y", "window", "rows", "mask", "noise", "start", "variable"))
+        if not isinstance(table, dict) or isinstance(table.get("values"), bytes):
+            return table
+        if strange := {"values", "shape"} & table.keys():
             raise PydanticCustomError("not_given", "{key} is read from the file; leave it out", {"key": strange.pop()})
-        name, rows, mask = given.get("file"), given.get("rows", "y"), given.get("mask", False)
+        name, rows, mask = table.get("file"), table.get("rows", "y"), table.get("mask", False)
         if not isinstance(name, str) or not isinstance(mask, bool) or rows not in ("x", "y"):
-            return given
+            return table
         try:
-            keys = [None if given.get(key) is None else SPACING.read(given[key]) for key in ("pixel", "pixel_y")]
+            keys = [None if table.get(key) is None else SPACING.read(table[key]) for key in ("pixel", "pixel_y")]
         except ValueError:
-            return given  # refused by the field's own check
+            return table  # refused by the field's own check
         with blamed(name):
-            found = read_map(name, info.context, str(given.get("variable", "shear_map")), gaps=True)
-            values = _one_map(found, rows)
+            map_file = read_map(name, info.context, str(table.get("variable", "shear_map")), gaps=True)
+            values = _one_map(map_file, rows)
             if not mask and np.isnan(values).any():
                 raise ValueError("the map has gaps (nan); with mask = true they are what lies outside of the contact")
             if not np.nanmax(values, initial=-math.inf) > np.nanmin(values, initial=math.inf):
                 raise ValueError("the stress is the same everywhere, so that nothing fluctuates; check the file")
-            pixel, pixel_y = _pixels(found, *keys)
+            pixel, pixel_y = _pixels(map_file, *keys)
         about = {"pixel": pixel, "pixel_y": pixel_y, "values": values.tobytes(), "shape": values.shape}
-        return {**given, **about}
+        return {**table, **about}
 
     @model_validator(mode="after")
     def _goes_together(self) -> "StressMap":
         if self.mask and self.window != "none":
-            said = "a window would taper the stress inside of the contact; leave it out beside mask"
-            raise PydanticCustomError("window", said, {})
+            message = "a window would taper the stress inside of the contact; leave it out beside mask"
+            raise PydanticCustomError("window", message, {})
         if self.mask and not self.square:
             raise PydanticCustomError("pixels", "a masked map needs square pixels; interpolate it onto them", {})
         return self
@@ -137,7 +134,7 @@ class StressMap:
 
     @property
     def square(self) -> bool:
-        """Whether a pixel is as wide as it is high."""
+        """True if a pixel is as wide as it is high."""
         return math.isclose(*self.pixels, rel_tol=1e-4)
 
     @property
@@ -174,10 +171,10 @@ class StressMap:
     @cached_property
     def field(self) -> Array:
         """Fluctuation τ1 [Pa], shape (nx, ny): less its mean, tapered by the window, 0 outside of the contact."""
-        found = np.nan_to_num(self._measured - self.mean, nan=0.0)
-        found = found if self.window == "none" else tapered(self._measured, self.window)
-        found.flags.writeable = False
-        return found
+        fluctuation = np.nan_to_num(self._measured - self.mean, nan=0.0)
+        fluctuation = fluctuation if self.window == "none" else tapered(self._measured, self.window)
+        fluctuation.flags.writeable = False
+        return fluctuation
 
     @cached_property
     def rms(self) -> float:
@@ -205,23 +202,23 @@ class StressMap:
         return float(noise_energy(self.noise, math.sqrt(self.lattice.pixel), shear_modulus, poisson_ratio))
 
 
-def _one_map(found: MapFile, rows: str) -> Array:
+def _one_map(map_file: MapFile, rows: str) -> Array:
     """The only map of a file, shape (nx, ny)."""
-    if math.prod(found.values.shape[:-2]) != 1:
-        many = math.prod(found.values.shape[:-2])
+    if math.prod(map_file.values.shape[:-2]) != 1:
+        many = math.prod(map_file.values.shape[:-2])
         raise ValueError(f"it holds {many} maps; save the one that is meant on its own")
-    values = found.values.reshape(found.values.shape[-2:])
-    return np.ascontiguousarray(values if found.named or rows == "x" else values.T)
+    values = map_file.values.reshape(map_file.values.shape[-2:])
+    return np.ascontiguousarray(values if map_file.has_axes or rows == "x" else values.T)
 
 
-def _pixels(found: MapFile, pixel: float | None, pixel_y: float | None) -> tuple[float, float]:
+def _pixels(map_file: MapFile, pixel: float | None, pixel_y: float | None) -> tuple[float, float]:
     """Distances of neighbouring points along x and y [m], of the keys or the file, which must agree."""
     across = pixel if pixel_y is None else pixel_y
-    for given, own in zip((pixel, across), found.spacings, strict=True):
-        if given is not None and own is not None and not math.isclose(given, own, rel_tol=1e-4):
-            raise ValueError(f"the points are {own:g} m apart, not {given:g} m as pixel has it; leave pixel out")
-    along = pixel or found.spacings[0]
-    across = across or found.spacings[1] or along
+    for step, spacing in zip((pixel, across), map_file.spacings, strict=True):
+        if step is not None and spacing is not None and not math.isclose(step, spacing, rel_tol=1e-4):
+            raise ValueError(f"the points are {spacing:g} m apart, not {step:g} m as pixel has it; leave pixel out")
+    along = pixel or map_file.spacings[0]
+    across = across or map_file.spacings[1] or along
     if along is None or across is None:
         raise ValueError('the map has no coordinates; give pixel, such as "0.5 um"')
     return along, across

@@ -235,7 +235,7 @@ def blamed(name: str) -> Iterator[None]:
         reason = "is not UTF-8 text; save it as plain CSV in UTF-8"
     except OSError as fault:
         reason = f"cannot be read ({fault.strerror or fault}); give a path relative to the scenario"
-    except (ValueError, RuntimeError, MemoryError) as fault:
+    except (ValueError, RuntimeError, EOFError, MemoryError) as fault:
         reason = str(fault)
     about = {"file": name[:200], "reason": reason.partition("\n")[0]}
     raise PydanticCustomError("bad_table", "{file}: {reason}", about)

@@ -128,7 +128,7 @@ def test_maps_of_netcdf_in_its_formats_are_read_and_other_files_are_refused(fold
         maps.to_netcdf("map.nc", **options)
         assert sim("check", "mapped.toml").exit_code == 0
     with monkeypatch.context() as patched:
-        patched.setattr("sim.spectrum.map_file._MOST", 255)
+        patched.setattr("sim.spectrum.measured._MOST", 255)
         assert '"shear_map" has more than' in sim("check", "mapped.toml").stderr
     Path("map.nc").write_bytes(Path("map.nc").read_bytes()[:2000])
     assert "map.nc: is not a netCDF file" in sim("check", "mapped.toml").stderr

@@ -4,8 +4,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from sim.numerics import noise
-from sim.numerics.binomial import _hat, _log_chance, binomial
 from sim.numerics.jit import kernel
+from sim.numerics.noise import _hat, _log_chance, binomial
 
 #: Two-sided probability of five standard deviations.
 FIVE_SIGMA = 5.7e-7

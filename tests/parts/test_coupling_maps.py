@@ -38,7 +38,7 @@ from sim.parts.bonds.rupture import Catch, Constant, CutOff
 from sim.parts.drive import READINGS, Steady as AtSpeed
 from sim.parts.shear import Mean
 from sim.scenario.scenario import Scenario
-from sim.spectrum.bond_made import BondMade
+from sim.spectrum.families import BondMade
 
 #: Way, share bound and force a site of a massless slider, from a collocation that agrees with itself to 5e-14.
 MASSLESS = {

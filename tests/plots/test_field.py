@@ -17,8 +17,8 @@ from sim.plots import field as field_figures, kinds as plots
 from sim.scenario.clock import Ensemble, Record
 from sim.scenario.reader import load
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple
+from sim.spectrum.measured import Tabulated
 from sim.spectrum.stress_map import StressMap
-from sim.spectrum.tabulated import Tabulated
 
 STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 

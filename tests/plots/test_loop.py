@@ -11,8 +11,8 @@ from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, style as pictures
-from sim.plots.loop import lost_energy
 from sim.plots.style import recorded
+from sim.plots.theories import lost_energy
 from sim.scenario.clock import Clock, Ensemble, Record
 
 JKR = (42e-3, 2e-3, 6.4e6)

@@ -16,7 +16,7 @@ from sim.parts.bonds import Cohort, FirstMoment
 from sim.parts.bonds.rupture import Bell
 from sim.parts.contact.models import Adhesion
 from sim.parts.drive import Force, Spring
-from sim.plots import draw, panels
+from sim.plots import curves, draw
 from sim.scenario.clock import Clock
 
 #: Bonds of a unit of stretch of 5 µm, and their numbers as the laws take them; the area stays.
@@ -63,8 +63,8 @@ def test_slips_that_last_few_records_are_remarked_on_with_the_key_that_shows_the
     assert lasting < 3.0
     title = draw(dataset, "time").axes[0].get_legend().get_title().get_text()
     assert "clock.step" in title
-    assert "clock.record" in panels.coarse_slips(dataset.isel(t=slice(None, None, 2)))
-    assert panels.coarse_slips(driven("pull")) == ""
+    assert "clock.record" in curves.coarse_slips(dataset.isel(t=slice(None, None, 2)))
+    assert curves.coarse_slips(driven("pull")) == ""
 
 
 def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():

@@ -10,8 +10,8 @@ from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.shear import models as shear
-from sim.plots import bond_laws, kinds as plots, style as pictures
-from sim.plots.stress import maximum_of, starts_of
+from sim.plots import kinds as plots, slider, style as pictures
+from sim.plots.slider import maximum_of, starts_of
 from sim.scenario.clock import Clock, Ensemble, Record
 
 #: Bonds whose friction is largest at 19.3 zero_force_rate bell_force/bond_stiffness = 1.93 mm/s.
@@ -85,7 +85,7 @@ def test_the_exact_law_and_the_mean_field_are_beside_the_simulated(ramp):
 def test_every_rupture_has_its_own_law(rupture, law):
     dataset = ramped(bonds.FirstMoment(rupture=rupture, **SITES), clock=Clock(duration=1.0, step=0.1))
     speed = np.array([1e-5, 1e-3])
-    (found,) = bond_laws.steady_laws(dataset, {}, speed)
+    (found,) = slider.steady_laws(dataset, {}, speed)
     assert_allclose(found.stress, law(speed), rtol=1e-12)
     plots.draw(dataset, "stress")
 
@@ -98,7 +98,7 @@ def test_a_swept_rupture_has_a_law_at_each_point():
     for k, force in enumerate((4e-12, 8e-12)):
         exact = schallamach.bell_stress(speed, 1e4, force, 4e-4, 1e5, 9e16)
         assert_allclose(
-            bond_laws.steady_laws(dataset, {"bonds_rupture_bell_force": k}, speed)[0].stress, exact, rtol=1e-12
+            slider.steady_laws(dataset, {"bonds_rupture_bell_force": k}, speed)[0].stress, exact, rtol=1e-12
         )
 
 

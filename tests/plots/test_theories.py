@@ -14,7 +14,7 @@ from sim.parts.contact import Equilibrium
 from sim.parts.contact.models import Adhesion
 from sim.parts.shear import models as shear
 from sim.plots import kinds as plots, style as pictures, theories as rival_figures
-from sim.plots.profile import shapes_of
+from sim.plots.theories import shapes_of
 from sim.scenario.clock import Clock, Ensemble, Record
 
 NUMBERS = (42e-3, 2e-3, 6.4e6, 0.5, 0.1)

@@ -25,8 +25,8 @@ from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
 from sim.plots import kinds
 from sim.plots.style import BOTH, STYLE, fill, rows
-from sim.report import document, figures, html
-from sim.report.measured import agreement, fit_of
+from sim.report import html, report
+from sim.report.report import agreement, fit_of
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.reader import load
 
@@ -114,13 +114,13 @@ def here(run_folder, tmp_path, monkeypatch):
 @pytest.fixture
 def bare(monkeypatch):
     """Pages without figures, which take most of the time."""
-    monkeypatch.setattr(document, "drawings", lambda *_: [])
+    monkeypatch.setattr(report, "drawings", lambda *_: [])
 
 
 @pytest.fixture
 def unwritten(monkeypatch):
     """Figures that are drawn but not written as SVG, which takes most of their time."""
-    monkeypatch.setattr(figures, "svg_of", lambda figure, prefix: "<svg></svg>")
+    monkeypatch.setattr(report, "svg_of", lambda figure, prefix: "<svg></svg>")
 
 
 def shipped(name, **changes):
@@ -165,14 +165,14 @@ def test_the_figures_of_a_page_are_those_that_show_more_of_a_run():
         (crept, "creep", {"sweep"}, {"stress", "time", "curve"}),
         (steady, "sweep", set(), {"time"}),  # nothing changes in time
     ):
-        drawings = [drawing.kind for drawing in figures.drawings(dataset)]
+        drawings = [drawing.kind for drawing in report.drawings(dataset)]
         assert drawings[0] == best and shown <= {*drawings} and not left_out & {*drawings}
 
 
 def test_a_figure_that_cannot_be_drawn_is_left_out_with_the_reason(monkeypatch, smooth):
-    draw = figures.kinds.draw
-    monkeypatch.setattr(figures.kinds, "draw", lambda dataset, kind: draw(dataset, "map"))
-    assert ["no stress maps" in drawing.lacks for drawing in figures.drawings(smooth)] == [True]
+    draw = report.kinds.draw
+    monkeypatch.setattr(report.kinds, "draw", lambda dataset, kind: draw(dataset, "map"))
+    assert ["no stress maps" in drawing.lacks for drawing in report.drawings(smooth)] == [True]
 
 
 # -- figures as SVG ---------------------------------------------------------------------------
@@ -181,9 +181,9 @@ def test_a_figure_that_cannot_be_drawn_is_left_out_with_the_reason(monkeypatch, 
 def test_images_are_within_the_page_and_ink_and_paper_are_its_own(ramp):
     dataset = shipped("stability_map", sweep={"drive.stiffness": [50.0, 1600.0]})
     for figure, count in ((kinds.draw(mapped(), "map"), 2), (kinds.draw(dataset, "stability"), 3)):
-        images = [given for tag, given in harmless(Page(figures.svg_of(figure, "x-"))).elements if tag == "image"]
+        images = [given for tag, given in harmless(Page(report.svg_of(figure, "x-"))).elements if tag == "image"]
         assert sum(image["href"].startswith("data:image/png") for image in images) >= count  # bars are images, too
-    text = figures.svg_of(kinds.draw(ramp, "curve"), "x-")
+    text = report.svg_of(kinds.draw(ramp, "curve"), "x-")
     assert "currentColor" in text and "#0072b2" in text and "#000000" not in text and "#ffffff" not in text
 
 
@@ -193,7 +193,7 @@ def test_a_band_of_many_records_is_drawn_by_few_corners_that_reach_as_far():
         figure, (panel,) = rows([2.0])
         x, noise = np.linspace(0.0, 1.0, count), 0.1 * np.random.default_rng(5).random((2, count))
         fill(panel, x, noise[0] - 1.0, 1.0 - noise[1], color=BOTH)
-    picture = Page(figures.svg_of(figure, "x-"))
+    picture = Page(report.svg_of(figure, "x-"))
     (path,) = (
         attributes["d"] for tag, attributes in picture.elements if tag == "path" and len(attributes.get("d", "")) > 2000
     )
@@ -211,7 +211,7 @@ def test_a_figure_is_laid_out_in_the_style_in_which_it_is_saved():
         for panel in axes:
             panel.set(ylim=(-0.8, 16.3), ylabel="friction")  # ticks 5 or 2.5 apart, as the style has their font
     (figure, _), (saved, _) = panels
-    figures.svg_of(figure, "x-")
+    report.svg_of(figure, "x-")
     saved.savefig(io.BytesIO(), format="svg")
     for laid_out, drawn in zip(figure.axes, saved.axes, strict=True):
         assert laid_out.get_position().bounds == drawn.get_position().bounds
@@ -235,13 +235,13 @@ def test_chi_square_its_degrees_of_freedom_and_p_are_those_of_the_distances(smoo
     distances = (0.5, -4.0, 1.5, 0.2)
     points = measured_about(smooth, *distances, 1.0)
     points["speed"][-1] *= 1e3  # beyond the curve
-    (drawing,) = figures.drawings(smooth, points)
+    (drawing,) = report.drawings(smooth, points)
     square = float(np.sum(np.square(distances)))
     (row,) = agreement(smooth, [drawing.measured]).rows
     p = special.gammaincc(2.0, 0.5 * square)  # of four degrees of freedom
     assert list(row.values()) == ["area ratio", f"{square:.4g}", "4", f"{p:.2g}", "1"]
     del points["area_ratio_error"]
-    (drawing,) = figures.drawings(smooth, points)
+    (drawing,) = report.drawings(smooth, points)
     without = agreement(smooth, [drawing.measured])
     assert not without.rows and "no errors" in without.lacks
 
@@ -252,24 +252,24 @@ def test_each_curve_of_a_sweep_is_compared_with_its_own_points():
     light, heavy = (measured_about(dataset.isel(contact_load=k), 1.0, 2.0, d) for k, d in ((0, 1.0), (1, 9.0)))
     points = {name: np.concatenate([light[name], heavy[name]]) for name in light}
     points["contact_load"] = np.repeat([1e-3, 4e-3], 3)
-    shown = [drawing.measured for drawing in figures.drawings(dataset, points) if drawing.measured]
+    shown = [drawing.measured for drawing in report.drawings(dataset, points) if drawing.measured]
     table = agreement(dataset, shown).rows
     assert [row["measured"] for row in table] == [
         "area ratio (contact load 1 mN)", "area ratio (contact load 4 mN)", "all"
     ]  # fmt: skip
     assert [row["χ²"] for row in table] == ["6", "86", "92"]
     del points["contact_load"]
-    drawing, *_ = figures.drawings(dataset, points)
+    drawing, *_ = report.drawings(dataset, points)
     assert "contact_load" in agreement(dataset, [drawing.measured]).lacks
 
 
 @pytest.mark.usefixtures("unwritten")
 def test_points_that_the_best_figure_lacks_make_another_and_those_of_none_are_refused(ramp):
     time = {"t": ramp["t"].to_numpy()[[5, 9]], "friction_force": [1e-3, 1e-3]}
-    first, second = figures.drawings(ramp, time)
+    first, second = report.drawings(ramp, time)
     assert (first.kind, second.kind, second.measured) == ("friction", "curve", None)
     with pytest.raises(ValueError, match="no column"):
-        figures.drawings(ramp, {"bond_fraction": [0.5]})
+        report.drawings(ramp, {"bond_fraction": [0.5]})
 
 
 NUMBER = {
@@ -300,7 +300,7 @@ def test_a_fit_is_a_table_and_costs_a_degree_of_freedom_if_it_is_of_these_points
         "bonds.critical_speed", "20.0(2) mm/s", "19.6 to unknown", "30 mm/s", analysis.engineering(in_run, "m/s")
     ]  # fmt: skip
     assert not of_others.in_run and of_others.notes[-1] == "odd"
-    (drawing,) = figures.drawings(smooth, measured_about(smooth, 1.0, 1.0, 1.0, 0.0))
+    (drawing,) = report.drawings(smooth, measured_about(smooth, 1.0, 1.0, 1.0, 0.0))
     same = fit_of(fit(numbers={"bonds.critical_speed": NUMBER | {"value": in_run}}), smooth)
     for fitted, count, freedom in ((of_others, 1, "4"), (same, 2, "3"), (same._replace(freedom=9), 1, "4")):
         table = agreement(smooth, [drawing.measured], fitted).rows
@@ -323,7 +323,7 @@ def test_a_file_that_is_no_result_of_a_fit_is_refused_in_one_line(here):
 
 def test_error_estimates_stand_beside_the_errors_that_were_measured():
     dataset = simulated(drive=STEADY, ensemble=Ensemble(members=400), clock=Clock(duration=0.04, step=0.02))
-    row, mean, *_ = document.known(dataset)
+    row, mean, *_ = report.known(dataset)
     energy = dataset["fluctuation_energy"].isel(t=-1).to_numpy()
     left_out = [np.delete(energy, k) for k in range(energy.size)]
     each = np.array([np.std(members, ddof=1) / np.mean(members) for members in left_out])
@@ -337,9 +337,9 @@ def test_error_estimates_stand_beside_the_errors_that_were_measured():
 
 def test_the_question_is_the_first_paragraph_of_the_scenarios_comment_else_its_name(ramp):
     text = "# Why\n# so?\n#\n# Because\n# of that.\n#\n# Really.\nname = 'x'\n# no more\n"
-    asked = document.question(ramp.assign_attrs(scenario_toml=text, title="x"))
+    asked = report.question(ramp.assign_attrs(scenario_toml=text, title="x"))
     assert asked == ("x", "Why so?", ["Because of that.", "Really."])
-    assert document.question(ramp.assign_attrs(scenario_toml="", title="x")) == ("x", "x", [])
+    assert report.question(ramp.assign_attrs(scenario_toml="", title="x")) == ("x", "x", [])
 
 
 @pytest.mark.usefixtures("bare")
@@ -418,7 +418,7 @@ def test_hostile_headings_of_measured_data_are_refused_in_one_short_line(here):
 def test_a_log_that_cannot_be_read_costs_only_its_table(tmp_path):
     for log in ("", "no JSON\n", '{"seconds": "x"}\n', "[1]\n", '{"began": 1, "seconds": 1}\n', "\xff\n"):
         (tmp_path / "x.nc.log").write_bytes(log.encode("latin-1"))
-        assert document.cost(tmp_path / "x.nc.log") == {}
+        assert report.cost(tmp_path / "x.nc.log") == {}
 
 
 @pytest.mark.usefixtures("bare")

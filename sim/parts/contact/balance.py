@@ -27,7 +27,7 @@ from sim.laws.reversible import (
 )
 from sim.numerics.jit import device, kernel
 from sim.parts.exchange import Array, Flags, Mount
-from sim.spectrum.finite_contact import share_of
+from sim.spectrum.radial import share_of
 
 
 class Bodies(NamedTuple):
@@ -147,7 +147,7 @@ Control = LoadControl | DisplacementControl
 
 
 class Shares(Protocol):
-    """Share of ``fluctuating`` that a contact of finite radius pays, as ``sim.spectrum.finite_contact.Margin``."""
+    """Share of ``fluctuating`` that a contact of finite radius pays, as ``sim.spectrum.radial.Margin``."""
 
     def __call__(self, radius: Array) -> Array:
         """Share of new contact at the edge, at contact radii [m]."""

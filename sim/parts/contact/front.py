@@ -38,7 +38,7 @@ from sim.numerics.jit import device, kernel
 from sim.numerics.special import cube_root
 from sim.parts.contact.balance import Balance
 from sim.parts.exchange import Array, ContactState
-from sim.spectrum.finite_contact import share_of
+from sim.spectrum.radial import share_of
 from sim.units.course import Pieces
 
 #: Relative distance from equilibrium that rounding leaves.

@@ -171,7 +171,7 @@ class Passing:
 
     @property
     def each(self) -> list[Terms]:
-        """Inputs of ``sim.spectrum.finite_contact.share_of`` at each position."""
+        """Inputs of ``sim.spectrum.radial.share_of`` at each position."""
         low = float(self.radii[0])
         cubics = self._new.transpose(0, 2, 1) * self._step ** np.arange(3, -1, -1)
         return [((0.0, 0.0, 0.0), (low, math.log(low), 1.0 / self._step), np.ascontiguousarray(one)) for one in cubics]

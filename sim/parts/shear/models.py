@@ -24,8 +24,8 @@ from sim.parts.shear.modes import FixedProcess, ModalProcess, SiteMean, SiteMode
 from sim.parts.shear.process import Amplitude, Constant, Correlation, SmoothProcess
 from sim.spectrum.families import Ripple, Spectrum
 from sim.spectrum.family import Family
-from sim.spectrum.finite_contact import Margin, marginal_energy
 from sim.spectrum.measured import Measured
+from sim.spectrum.radial import Margin, marginal_energy
 from sim.spectrum.stress_map import StressMap
 from sim.units import kept
 from sim.units.quantity import Quantity

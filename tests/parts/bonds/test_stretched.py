@@ -19,8 +19,7 @@ from sim.parts.bonds.rupture import Constant
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Time
 from sim.scenario.clock import Clock
-from sim.spectrum.bond_made import BondMade
-from sim.spectrum.families import Band
+from sim.spectrum.families import Band, BondMade
 from sim.units.refusals import BadInput
 
 READ = {variable.name: variable.read for variable in VARIABLES}

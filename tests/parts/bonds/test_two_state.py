@@ -14,7 +14,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Constant
 from sim.parts.shear import models as shear
 from sim.scenario.clock import Clock
-from sim.spectrum.bond_made import BondMade
+from sim.spectrum.families import BondMade
 
 STEPPED = drive.Table(time=(0.0, 0.7, 0.7, 1.4, 1.4, 2.1), speed=(1e-5, 1e-5, 8e-2, 8e-2, 2e-3, 2e-3))
 

@@ -25,7 +25,7 @@ from sim.parts.shear.process import Onset
 from sim.scenario.clock import Clock
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
-from sim.spectrum.finite_contact import Margin, marginal_energy, share_of
+from sim.spectrum.radial import Margin, marginal_energy, share_of
 
 WORK = 1.0 / math.pi
 GAUGE = {variable.name: variable for variable in VARIABLES}
@@ -618,7 +618,7 @@ def test_a_pulled_contact_on_a_disc_keeps_a_neck_that_the_plane_would_not_bear()
 
 def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
     """-int w dA = -w0 A + DeltaGamma int dE: the mean over the disc, not its edge, enters the energy."""
-    from sim.spectrum.finite_contact import disc_energy
+    from sim.spectrum.radial import disc_energy
 
     spectrum = Gaussian(rms=0.05, length=0.3)
     plane = float(spectrum.surface_energy(0.1875))

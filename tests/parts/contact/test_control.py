@@ -10,7 +10,7 @@ from sim.laws import jkr
 from sim.parts.contact import Equilibrium
 from sim.parts.contact.balance import Balance, Bodies, DisplacementControl, LoadControl, elastic_energy
 from sim.spectrum.families import Gaussian
-from sim.spectrum.finite_contact import Margin, disc_energy
+from sim.spectrum.radial import Margin, disc_energy
 
 #: Maugis's units: K = 4 E*/3, R and pi w are 1, so that radii, loads and displacements are those of the textbooks.
 MAUGIS = Bodies(1.0, 0.75, 0.5)

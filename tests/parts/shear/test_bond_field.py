@@ -13,7 +13,7 @@ from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding, Motion
 from sim.parts.shear.modes import SiteMean, SiteModes, modes
 from sim.parts.shear.process import Constant, Time
-from sim.spectrum.bond_made import BondMade
+from sim.spectrum.families import BondMade
 
 B, G, CELL, POINTS = 1e-6, 1.6e6, 24e-6, 32
 #: So many members in `make test`, and in `make verify`; bounds are five derived standard errors of either.

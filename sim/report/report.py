@@ -1,0 +1,595 @@
+"""One page of HTML of a whole run: its figures as SVG, tables, measured points, a fit, errors, and the scenario."""
+
+import contextlib
+import io
+import json
+import math
+import re
+import shlex
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+from xml.etree import ElementTree as Tree
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_svg import FigureCanvasSVG
+from matplotlib.collections import PolyCollection
+from matplotlib.figure import Figure
+from matplotlib.path import Path as Outline
+
+from sim.analysis import (
+    averaging,
+    concise,
+    engineering,
+    highlights,
+    is_stationary,
+    is_steady,
+    notes,
+    setting,
+    speed_of,
+    sweep_dims,
+    table,
+)
+from sim.analysis.scene import claim, speed_name
+from sim.analysis.statistics import over_members
+from sim.numerics import hdf5
+from sim.numerics.files import output
+from sim.plots import kinds
+from sim.plots.kinds import Choices
+from sim.plots.measured import Measured, Residuals
+from sim.plots.style import STYLE
+from sim.scenario.toml_text import toml
+from sim.units.notation import scaled
+from sim.units.refusals import BadInput
+from sim.units.terminal import plain
+
+#: Measured points: a CSV table, or columns in SI by name.
+Data = Path | str | Mapping[str, Any]
+
+#: Hint of how to read a figure of each kind.
+HINTS = {
+    "loop": "A cross is a pull-off, a ring a jump into contact; the enclosed area is energy lost.",
+    "theories": "Measured areas tell theories apart where their curves separate.",
+    "stress": "A mark is the maximum of the stress; thin lines are closed forms.",
+    "stability": "Dark is stick-slip; below the line steady sliding is unstable in theory.",
+    "creep": "A line of slope one is sliding at a constant speed; a line that bends up runs away.",
+    "friction": "The area of the friction loop is the work of friction.",
+    "curve": "Blue is lost to broken bonds, vermilion to fluctuations; adhesion is masked on Hertz's dotted line.",
+    "sweep": "Each point is a run of its own.",
+    "time": "The contact lies between JKR's radius and Hertz's.",
+    "incipient": "Slip begins where the area leaves the dashed law.",
+    "map": "The circle is the edge of the contact.",
+    "spectrum": "The maps follow the spectrum of the scenario.",
+    "profile": "Adhesion pulls up the neck at the edge of the contact.",
+}
+#: Kinds that are drawn wherever they can be, beside those that fit.
+_ALSO = ("stress", "incipient", "map", "spectrum")
+#: Different speeds at which a run that changes between them has transients rather than a curve over speed, at most.
+_SPEEDS = 4
+#: Corners of a shaded band from which on some are left out.
+_CORNERS = 300
+#: Inks of figures that follow the page from light to dark.
+_INKS = {"#000000": "currentColor", "#ffffff": "var(--paper)"}
+_NUMBER = re.compile(r"\d+\.\d{3,}")
+_REFERENCE = re.compile(r"url\(#([^)]+)\)")
+
+
+class Drawing(NamedTuple):
+    """A figure of a page: its kind, its caption, a hint, and its SVG or the reason why it has none.
+
+    ``measured`` holds the measured points that it shows.
+    """
+
+    kind: str
+    caption: str
+    hint: str
+    svg: str = ""
+    lacks: str = ""
+    measured: Measured | None = None
+
+
+def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
+    """The figures of a dataset: the one that fits it best, then others that show more of it.
+
+    Measured points are in those that have their variables; if there is none, in another that has.
+
+    Raises
+    ------
+    ValueError
+        If measured points cannot be drawn in any figure.
+    """
+    best = kinds.default(dataset)
+    could = kinds.drawable(dataset)
+    others = [kind for kind in could if kind in _ALSO or kinds.KINDS[kind].fits(dataset)]
+    # theories have an axis of their own; the end of a run that is on its way says little, and over the speed a sweep
+    # is a curve already; only bonds with a rupture law have a maximum of the stress, which transients after steps
+    # between few speeds do not show, nor many springs upon each other
+    lasts = is_stationary(dataset)
+    less = {"sweep": best in ("theories", "curve") or not lasts, "friction": best in ("creep", "stability")}
+    less["curve"] = best == "creep"  # whose speed nothing sets
+    less["stress"] = best != "stress" and (best == "stability" or _steps(dataset) or not _rupture(dataset))
+    # time is no more than another axis for a speed that rises or for creep, and nothing happens in it where a run lasts
+    less["time"] = best in ("curve", "creep", "stability") or (best != "time" and lasts and "incipient" not in could)
+    shown = [best, *(kind for kind in others if not less.get(kind, False))]
+    found = [_drawing(dataset, kind, f"f{number}-", data) for number, kind in enumerate(dict.fromkeys(shown))]
+    if data is None or any(one.measured for one in found):
+        return found
+    refusals = []
+    for kind in (kind for kind in could if kind not in shown and "data" in kinds.KINDS[kind].takes):
+        try:
+            return [_with_data(dataset, kind, "f-data-", data), *found]
+        except ValueError as fault:
+            refusals.append(str(fault))
+    for kind in (kind for kind in shown if "data" in kinds.KINDS[kind].takes):
+        _with_data(dataset, kind, "", data)  # refuses it
+    raise ValueError(refusals[0] if refusals else "no figure of this run can have measured points")
+
+
+def _drawing(dataset: xr.Dataset, kind: str, prefix: str, data: Data | None) -> Drawing:
+    """Return a figure, with measured points if it can show them."""
+    if data is not None and "data" in kinds.KINDS[kind].takes:
+        with contextlib.suppress(ValueError):
+            return _with_data(dataset, kind, prefix, data)
+    drawing = Drawing(kind, kinds.KINDS[kind].shows, HINTS.get(kind, ""))
+    try:
+        return drawing._replace(svg=svg_of(kinds.draw(dataset, kind), prefix))
+    except ValueError as fault:  # a fault that only the drawing of the kind detects
+        return drawing._replace(lacks=str(fault))
+
+
+def _with_data(dataset: xr.Dataset, kind: str, prefix: str, data: Data) -> Drawing:
+    """Return a figure with measured points; raise ValueError if it cannot show them."""
+    measured = Measured(data, dataset)
+    svg = svg_of(kinds.draw(dataset, kind, Choices(data=measured)), prefix)
+    hint = f"{HINTS.get(kind, '')} Rings are measured points."
+    return Drawing(kind, kinds.KINDS[kind].shows, hint, svg, measured=measured)
+
+
+def _rupture(dataset: xr.Dataset) -> bool:
+    return any(str(name).startswith("bonds_rupture") for name in dataset.variables)
+
+
+def _steps(dataset: xr.Dataset) -> bool:
+    """Whether the speed is one of a few in the course of a run."""
+    recorded = speed_name(dataset) in dataset and not is_steady(dataset)
+    return recorded and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
+
+
+def svg_of(figure: Figure, prefix: str) -> str:
+    """A figure as an SVG element for a page of HTML.
+
+    All ids begin with ``prefix``. The element has no script, no namespaces and no address outside of itself. Black and
+    white are the page's ink and paper.
+    """
+    content, fineness = io.BytesIO(), figure.dpi
+    figure.dpi = 72.0  # that of SVG
+    FigureCanvasSVG(figure)
+    if layout := figure.get_layout_engine():  # here, as saving would draw the figure twice
+        with mpl.rc_context(STYLE):
+            layout.execute(figure)
+        figure.set_layout_engine(None)
+    for panel in figure.axes:
+        _thin(panel)
+    figure.savefig(content, format="svg", transparent=True, dpi=fineness)  # of images within it
+    root = Tree.fromstring(content.getvalue())
+    for parent in list(root.iter()):
+        for child in [child for child in parent if child.tag.endswith(("}metadata", "}style"))]:
+            parent.remove(child)
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+        element.text = element.tail = None
+        for key, value in list(element.attrib.items()):
+            del element.attrib[key]
+            name = key.rpartition("}")[2]
+            if name == "id":
+                value = prefix + value
+            elif name == "href" and value.startswith("#"):
+                value = f"#{prefix}{value[1:]}"
+            elif name in ("d", "x", "y"):
+                value = _NUMBER.sub(lambda found: f"{float(found[0]):.2f}", " ".join(value.split()))
+            elif name in ("style", "clip-path"):
+                value = _REFERENCE.sub(rf"url(#{prefix}\1)", value)
+                for ink, own in _INKS.items():
+                    value = value.replace(ink, own)
+            element.set(name, value)
+    width, height = 72.0 * figure.get_size_inches()
+    root.attrib = {"viewBox": f"0 0 {width:g} {height:g}", "role": "img", "fill": "currentColor"}
+    root.set("style", f"min-width: {0.9 * width:.0f}px; max-width: {1.9 * width:.0f}px")
+    return Tree.tostring(root, encoding="unicode")
+
+
+def _thin(panel: Axes) -> None:
+    """Leave out corners of shaded bands that no eye can tell apart, as matplotlib does of lines alone."""
+    for band in panel.collections:
+        if isinstance(band, PolyCollection):
+            band.set_verts([_thinned(np.asarray(path.vertices), panel) for path in band.get_paths()])
+
+
+def _thinned(corners: np.ndarray, panel: Axes) -> np.ndarray:
+    """Corners of a polygon, of many fewer that look the same."""
+    placed = panel.transData.transform(corners)
+    if len(corners) < _CORNERS or not np.all(np.isfinite(placed)):
+        return corners
+    fewer = Outline(placed).cleaned(simplify=True)
+    drawn = np.isin(np.asarray(fewer.codes), (Outline.MOVETO, Outline.LINETO))
+    return panel.transData.inverted().transform(np.asarray(fewer.vertices)[drawn])
+
+
+# Tables of measured points beside a run, and of a fit of its scenario.
+
+
+Rows = list[dict[str, str]]
+
+#: Relative difference below which a number of the run equals that of the fit.
+_SAME = 1e-6
+
+
+class Fit(NamedTuple):
+    """The result of ``sim fit`` as tables of its numbers and of their correlations, with notes.
+
+    ``freedom`` is the number of degrees of freedom of its chi^2; ``in_run`` is true if the run has the fitted numbers.
+    """
+
+    rows: Rows
+    correlations: Rows
+    notes: list[str]
+    freedom: int
+    in_run: bool
+
+
+class Agreement(NamedTuple):
+    """Agreement of measured points with a run: one row a curve and one for all, or the reason why there is none."""
+
+    rows: Rows
+    lacks: str = ""
+
+
+def agreement(dataset: xr.Dataset, drawn: list[Measured], fit: Fit | None = None) -> Agreement:
+    """Return the agreement of measured points with the curves of the figure that shows most of them.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        The run.
+    drawn : list of Measured
+        The points of each figure, at least one.
+    fit : Fit, optional
+        A fit. Its numbers are subtracted from the degrees of freedom if the run has them and it is of these points.
+
+    Returns
+    -------
+    Agreement
+        chi^2 sums the squares of the distances in standard errors of point and curve; p is the probability of a chi^2
+        at least as large if only these errors separate them.
+    """
+    curves = max((_by_curve(measured) for measured in drawn), key=lambda curves: sum(map(_count, curves)))
+    if not curves:
+        keys = [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
+        lacks = "no curve of the run reaches the measured points, or the curve has several branches"
+        if not {*keys} <= {*drawn[0].table}:
+            lacks = f"the run has several curves; give the points a column {keys[0]}, or choose one curve by --where"
+        if not drawn[0].has_errors:
+            lacks = "the measured points have no errors; give them in a column such as contact_area_error"
+        return Agreement([], lacks)
+    rows = [_row(_label(dataset, curve), [curve]) for curve in curves]
+    freedom = sum(map(_count, curves))
+    fitted = len(fit.rows) if fit and fit.in_run and freedom - len(fit.rows) == fit.freedom else 0
+    if len(curves) > 1 or fitted:
+        rows.append(_row(f"all, {fitted} numbers fitted" if fitted else "all", curves, fitted))
+    return Agreement(rows)
+
+
+def _by_curve(measured: Measured) -> list[Residuals]:
+    """Return the residuals of each variable and curve once, for curves of one branch."""
+    residuals = {(each.name, each.number): each for each in reversed(measured.residuals) if each.branches == 1}
+    return list(reversed(residuals.values()))
+
+
+def _count(residuals: Residuals) -> int:
+    return int(np.sum(np.isfinite(residuals.values)))
+
+
+def _label(dataset: xr.Dataset, residuals: Residuals) -> str:
+    """Return a variable with the swept values of its curve."""
+    texts = []
+    for name, place in residuals.point.items():
+        value = dataset[name][place]
+        number = engineering(value.item(), value.attrs.get("units", "1")) if value.dtype.kind in "fi" else value.item()
+        texts += [f"{name.replace('_', ' ')} {number}"] if dataset.sizes[name] > 1 else []
+    return residuals.name.replace("_", " ") + (f" ({', '.join(texts)})" if texts else "")
+
+
+def _row(words: str, curves: list[Residuals], fitted: int = 0) -> dict[str, str]:
+    """Return a row of the table; ``fitted`` numbers are subtracted from the degrees of freedom."""
+    from scipy.special import chdtrc  # heavy: for measured points alone
+
+    square = sum(float(np.nansum(np.square(curve.values))) for curve in curves)
+    freedom = sum(map(_count, curves)) - fitted
+    p = f"{chdtrc(freedom, square):.2g}" if freedom > 0 else "–"
+    beyond = sum(curve.values.size - _count(curve) for curve in curves)
+    row = {"measured": words, "χ²": f"{square:.4g}", "degrees of\nfreedom": str(freedom), "p": p}
+    return row | {"points beyond\nthe curve": str(beyond)}
+
+
+def fit_of(path: Path, dataset: xr.Dataset) -> Fit:
+    """Read ``<stem>_fit.json``, which ``sim fit`` wrote.
+
+    Raises
+    ------
+    BadInput
+        If the file cannot be read or is no such file.
+    """
+    try:
+        return _read(json.loads(path.read_text(encoding="utf-8")), dataset)
+    except OSError as fault:
+        raise BadInput([f"{path}: cannot be read ({fault.strerror}); name the file STEM_fit.json"]) from None
+    except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, RecursionError):
+        raise BadInput([f"{path}: is no result of `sim fit`; name the file STEM_fit.json that it wrote"]) from None
+
+
+def _read(content: dict[str, Any], dataset: xr.Dataset) -> Fit:
+    rows, in_run = [], []
+    for key, number in content["numbers"].items():
+        unit, value, error = str(number["unit"]), float(number["value"]), _known(number["standard_error"])
+        factor, shown = scaled(value, unit)
+        low, high = (_end(factor * _known(number[end]), bool(number[f"{end}_open"])) for end in ("low", "high"))
+        run = _in_run(dataset, key)
+        rows.append({
+            "key": key,
+            "fitted": f"{concise(factor * value, factor * error)} {shown}".rstrip(),
+            f"{float(content['level']):.0%} interval": f"{low} to {high}",
+            "start": engineering(float(number["start"]), unit),
+            "in this run": "–" if math.isnan(run) else engineering(run, unit),
+        })  # fmt: skip
+        in_run.append(abs(run - value) <= _SAME * abs(value))
+    keys, matrix = content["correlations"]["keys"], content["correlations"]["matrix"]
+    correlations = [
+        {"correlation": key, **{other: _number(matrix[k][n]) for n, other in enumerate(keys)}}
+        for k, key in enumerate(keys)
+    ]
+    freedom, square = int(content["degrees_of_freedom"]), float(content["chi_square"])
+    notes = [f"fit to {', '.join(map(str, content['data']))}: χ² {square:.4g} at {freedom} degrees of freedom"]
+    notes += [] if content["converged"] is True else ["the fit has not converged"]
+    notes += [] if all(in_run) else ["this run has other numbers than the fit: run its scenario STEM_fit.toml"]
+    if not rows:
+        raise ValueError
+    few = correlations if len(keys) > 1 else []
+    return Fit(rows, few, [*notes, *map(str, content["remarks"])], freedom, all(in_run))
+
+
+def _in_run(dataset: xr.Dataset, key: str) -> float:
+    """Return a number of the run's scenario; nan if it has none or several."""
+    try:
+        return float(setting(dataset, key).item())
+    except (KeyError, ValueError):
+        return math.nan
+
+
+def _known(value: Any) -> float:
+    return math.nan if value is None else float(value)
+
+
+def _number(value: Any) -> str:
+    return "–" if value is None else f"{float(value):.2f}".replace("-", "−")
+
+
+def _end(end: float, is_open: bool) -> str:
+    """Return an end of an interval; "(bound)" if the bound of the key sets it, "unknown" if nothing does."""
+    return "unknown" if math.isnan(end) else f"{end:.4g}" + (" (bound)" if is_open else "")
+
+
+# The page of a run as HTML, filled from the dataset and its log.
+
+
+#: Rows of a table.
+_ROWS = 24
+#: Largest dataset that is read whole into memory [byte].
+_WHOLE = 2**29
+#: Standard error that counts as zero.
+_ROUNDING = 1e-12
+#: Attributes on where a dataset comes from, in the page's words.
+_PROVENANCE = {
+    "source": "written by", "history": "scenario and versions", "seed": "seed", "members": "members",
+    "references": "references", "Conventions": "conventions of the file",
+}  # fmt: skip
+
+
+class Known(NamedTuple):
+    """An error or a spread: in words, as known before the run, and as measured in it."""
+
+    words: str
+    before: str
+    measured: str = "–"
+
+
+class Question(NamedTuple):
+    """Purpose of a scenario: its name, its question, and what else its first comment says, a paragraph each."""
+
+    name: str
+    asked: str
+    more: list[str]
+
+
+def written(
+    dataset: xr.Dataset, source: Path, path: Path | None, replace: bool,
+    data: Path | None = None, fit: Path | None = None,
+) -> Path:  # fmt: skip
+    """Write the page of the dataset of a file, by default beside it; the page's path.
+
+    Raises
+    ------
+    BadInput
+        If the page is not to be written there.
+    OutputExists
+        If there is a file that is not to be replaced.
+    """
+    target = path or source.with_suffix(".html")
+    claim(dataset, source, target, replace, *filter(None, (data, fit)))
+    try:
+        text = html(dataset, source, data, fit)
+    except BadInput:
+        raise
+    except ValueError as fault:
+        raise BadInput([f"{source}: {fault}"]) from None
+    with output(target) as beside:
+        beside.write_text(text, encoding="utf-8")
+    return target
+
+
+def html(
+    dataset: xr.Dataset, source: Path | str = "OUT.nc", data: Data | None = None, fit: Path | str | None = None
+) -> str:
+    """The page of a run as one text of HTML.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it; ``sim.analysis.where`` chooses values of its sweep.
+    source : path
+        The file that it is of: its name is in the commands that repeat the run, and ``<source>.log`` says what it cost.
+    data : path or dict of str to array, optional
+        Measured points, a CSV table or columns in SI by name, as ``sim plot --data`` takes them.
+    fit : path, optional
+        What ``sim fit`` has found of this scenario, ``<stem>_fit.json``.
+
+    Returns
+    -------
+    str
+        A page without scripts or anything outside of itself. What comes from the file is escaped.
+    """
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined  # heavy: for this command alone
+
+    if dataset.nbytes <= _WHOLE:
+        dataset = dataset.load()
+    fitted = None if fit is None else fit_of(Path(fit), dataset)
+    figures = drawings(dataset, data)
+    points = [figure.measured for figure in figures if figure.measured]
+    rows, whole = table(dataset, _ROWS), highlights(dataset, _ROWS)
+    stem = Path(source).stem
+    page = Environment(
+        loader=FileSystemLoader(Path(__file__).parent), autoescape=True, undefined=StrictUndefined, finalize=_cleaned,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    return page.get_template("page.html").render(
+        question=question(dataset),
+        compared=agreement(dataset, points, fitted) if points else None,
+        fitted=fitted,
+        measured=str(data) if isinstance(data, Path | str) else "the columns given",
+        averaged=averaging(dataset, is_stationary(dataset)),
+        drawings=figures,
+        tables=[rows, whole],
+        notes=notes(dataset, rows, whole),
+        known=list(known(dataset)),
+        scenario=scenario(dataset),
+        changes=changes(dataset),
+        files=list(hdf5.tables(dataset.attrs.get("scenario_files"))),
+        commands="\n".join(commands(dataset, stem)),
+        cost=cost(Path(f"{source}.log")),
+        provenance={words: str(dataset.attrs[key]) for key, words in _PROVENANCE.items() if key in dataset.attrs},
+        version=str(dataset.attrs["sim_version"]),
+        source=str(source),
+        saved=f"{stem}.toml" if dataset.attrs.get("scenario_toml") else f"{stem}.json",
+    )
+
+
+def _cleaned(value: Any) -> Any:
+    """Return a text without control characters; values marked as HTML stay as they are."""
+    return plain(value) if type(value) is str else value
+
+
+def question(dataset: xr.Dataset) -> Question:
+    """The question of a scenario: the first paragraph of its first comment, else its name."""
+    text, name = str(dataset.attrs.get("scenario_toml", "")), str(dataset.attrs.get("title", "")) or "A run of sim"
+    lines = []
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            break
+        lines.append(line[1:].strip())
+    asked, *more = [" ".join(part.split()) for part in "\n".join(lines).split("\n\n") if part.strip()] or [name]
+    return Question(name, asked, more)
+
+
+def changes(dataset: xr.Dataset) -> dict[str, str]:
+    """Values that took the place of the scenario's, by key, as TOML has them."""
+    return {key: toml(value) for key, value in hdf5.tables(dataset.attrs.get("scenario_overrides")).items()}
+
+
+def scenario(dataset: xr.Dataset) -> str:
+    """The scenario's text; of one made in Python all of its keys, as JSON."""
+    text = str(dataset.attrs.get("scenario_toml", ""))
+    if not text:
+        text = json.dumps(hdf5.tables(dataset.attrs["scenario_resolved"]), indent=2, ensure_ascii=False)
+    return text.expandtabs(4)
+
+
+def commands(dataset: xr.Dataset, stem: str) -> list[str]:
+    """Commands that repeat a run, its scenario saved as ``<stem>.toml``, or ``<stem>.json`` where Python made it."""
+    if not dataset.attrs.get("scenario_toml"):
+        return [f'sim.run(json.load(open("{stem}.json")), to="{stem}.nc")']
+    words = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in changes(dataset).items()]
+    name = shlex.quote(f"{stem}.toml")
+    made = shlex.quote(f"{stem}.nc")
+    return [" ".join(["sim run", name, "-o", made, *words]), f"sim stats {made}", f"sim report {made}"]
+
+
+def cost(log: Path) -> dict[str, str]:
+    """Cost of the run by its log's last line: when it began, seconds in all and of each stage; nothing without."""
+    try:
+        entry = json.loads(log.read_text(encoding="utf-8").splitlines()[-1])
+        stages = {f"of it {name}": float(seconds) for name, seconds in entry["stages"].items()}
+        times = {"in all": float(entry["seconds"])} | stages
+        return {"began": str(entry["began"])} | {words: f"{seconds:.3g} s" for words, seconds in times.items()}
+    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        return {}
+
+
+def known(dataset: xr.Dataset) -> Iterator[Known]:
+    """Errors known before the run, beside what the run itself says of them.
+
+    The spread of the fluctuation energy between members is the largest over the sweep at the last record; its own
+    standard error is that of the jackknife over the members.
+    """
+    count = int(dataset.attrs["members"])
+    measured = _spreads(dataset)
+    if "member_spread_energy" in dataset:
+        spread = float(dataset["member_spread_energy"].max())
+        yield Known("spread of ΔΓ between members, over its mean", _percent(spread), measured.get("spread", "–"))
+        if count > 1:
+            error = spread / math.sqrt(count)
+            words = f"standard error of the mean ΔΓ of {count} members, over the mean"
+            yield Known(words, _percent(error), measured.get("error", "–"))
+    for name in dataset.data_vars:
+        if str(name).startswith(("cell_error_", "banded_error_")):
+            variable = dataset[name]
+            most = float(abs(variable).max())
+            if np.isfinite(most):
+                yield Known(str(variable.attrs.get("long_name", name)), _percent(most))
+    times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
+    found = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
+    if "area_ratio_sem" in found and (error := float(found["area_ratio_sem"].max())) > _ROUNDING:
+        yield Known(f"largest standard error of the mean area over JKR's, of {times.size} times", "–", _percent(error))
+
+
+def _spreads(dataset: xr.Dataset) -> dict[str, str]:
+    """Standard deviation of ΔΓ over its mean, at the point of the sweep where it is largest, and of the mean."""
+    if "fluctuation_energy" not in dataset or "member" not in dataset["fluctuation_energy"].dims:
+        return {}
+    energy = dataset["fluctuation_energy"].isel(t=-1).astype(float).transpose(*sweep_dims(dataset), "member").to_numpy()
+    rows = [row for row in energy.reshape(-1, energy.shape[-1]) if len(row) > 2 and np.all(np.isfinite(row))]
+    rows = [row for row in rows if np.mean(row) > 0.0]
+    if not rows:
+        return {}
+    row = max(rows, key=lambda one: np.std(one) / np.mean(one))
+    count, total, squares = len(row), np.sum(row), np.sum(row**2)
+    spread = np.std(row, ddof=1) / np.mean(row)
+    means = (total - row) / (count - 1)
+    each = np.sqrt(np.maximum((squares - row**2) / (count - 1) - means**2, 0.0) * (count - 1) / (count - 2)) / means
+    error = np.sqrt((count - 1) / count * np.sum((each - each.mean()) ** 2))
+    return {"spread": _percent(spread, error), "error": _percent(spread / math.sqrt(count), error / math.sqrt(count))}
+
+
+def _percent(value: float, error: float = 0.0) -> str:
+    return f"{concise(100.0 * value, 100.0 * error)} %" if error else f"{100.0 * value:.3g} %"
