@@ -2,7 +2,7 @@
 
 import contextlib
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import prod
 from typing import Any, NamedTuple, cast
 
@@ -14,7 +14,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
 from sim.analysis import averaging, bond_work, is_stationary, is_steady, setting, settled, slips, summary, sweep_dims
-from sim.analysis.observables import KEPT, charged_in_turn, observables, share_observables
+from sim.analysis.observables import KEPT, observables, share_observables
 from sim.analysis.over_speed import speed_dim
 from sim.analysis.scene import answered, speed_of, stays_held
 from sim.analysis.transients import jumps
@@ -22,22 +22,19 @@ from sim.plots import style
 from sim.plots.measured import Compared, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol
 
-#: Different points up to which each carries a marker.
-MARKED = 25
+#: Largest number of points of a curve that carry markers.
+_MARKED = 25
 
-#: Curves that a panel holds at most: named in a legend, and along a colour bar; and columns of panels.
-NAMED, MOST, COLUMNS = 10, 20, 4
+#: Largest number of curves of a panel: named in a legend, and along a colour bar; and of columns of panels.
+_NAMED, _MOST, _COLUMNS = 10, 20, 4
 
-#: Zero while the contact is open: lines break there.
+#: Variables that are zero while the contact is open: lines break there.
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
 
 #: Markers that stand for line styles where points are not joined.
 _MARKS = {"-": "o", "--": "s", "-.": "^"}
 
-#: Line width that a curve gains by each later one that lies upon it, where there are few: a bundle shows anyway.
-_UNDERNEATH, _FEW = 1.0, 4
-
-#: Width that the curves of a category share.
+#: Width of the place that the curves of a category share.
 _CATEGORY = 0.6
 
 _CROSS: Any = {"marker": "x", "markersize": 4, "linestyle": "none", "zorder": 3}
@@ -45,7 +42,7 @@ _RING: Any = HOLLOW | {"mew": 0.8, "zorder": 3}
 
 
 class Line(NamedTuple):
-    """One curve of a panel: a point of the sweep, its name, "" where a colour bar names it, and its colour."""
+    """A curve of a panel: a point of the sweep, its name, "" if a colour bar names it, and its colour."""
 
     number: int
     point: dict[str, int]
@@ -53,70 +50,63 @@ class Line(NamedTuple):
     colour: str
 
 
-class Statistics:
-    """Statistics over the members of a dataset, each made when it is first read.
+#: Columns of panels: a heading and the curves of each.
+Columns = tuple[tuple[str, list[Line]], ...]
 
-    Along time (``"t"``), or along a dimension of the sweep: then of the means over the second half of the run where
-    neither speed nor control change, else of the last record.
+
+class Statistics:
+    """Statistics over the members along time (``"t"``) or a dimension of the sweep, each computed when first read.
+
+    Along the sweep they are those of the means over the second half of a stationary run, else of the last record.
     """
 
     def __init__(self, dataset: xr.Dataset, along: str) -> None:
-        self.dataset, self.over_time = dataset, along == "t"
-        self.late = not self.over_time and is_stationary(dataset)
-        self.stated = self._at(observables(dataset))
-        self._found: dict[str, xr.DataArray | None] = {}
-        self._dearer = [share_observables, charged_in_turn]
+        self.dataset, self.along = dataset, along
+        self.late = along != "t" and is_stationary(dataset)
+        self.observables = self._along(observables(dataset))
+        self._computed: dict[str, xr.DataArray | None] = {}
         with contextlib.suppress(KeyError):
-            self.stated["bond_work"] = self._at(xr.Dataset({"bond_work": bond_work(dataset)}))["bond_work"]
+            self.observables.update(self._along(bond_work(dataset).to_dataset(name="bond_work")))
 
-    def _at(self, some: xr.Dataset) -> xr.Dataset:
-        if self.over_time:
-            return some
-        return (settled(some) if self.late else some.isel(t=slice(-1, None))).isel(t=0, drop=True)
+    def _along(self, trajectories: xr.Dataset) -> xr.Dataset:
+        if self.along == "t":
+            return trajectories
+        return (settled(trajectories) if self.late else trajectories.isel(t=[-1])).isel(t=0, drop=True)
 
     def get(self, name: str) -> xr.DataArray | None:
-        """A statistic by its name, such as ``contact_radius_mean``; None where it is not known."""
-        if name not in self._found:
-            stem = name.rpartition("_")[0]
-            while not (own := self._own(stem)) and self._dearer and stem.startswith(("lost_to", "order_of")):
-                self._charge()
-            self._found[name] = None
-            self._found |= {str(key): one for key, one in summary(self.stated[own]).items()}
-        return self._found[name]
-
-    def _own(self, stem: str) -> list[str]:
-        """An observable, or the statistics of it that were recorded."""
-        return [name for name in (stem, *(f"{stem}_{kind}" for kind in KEPT)) if name in self.stated]
-
-    def _charge(self) -> None:
-        """Add shares of the lost area in the next order of charging, as far as they are known."""
-        with contextlib.suppress(ValueError), answered():
-            self.stated.update(self._at(self._dearer.pop(0)(self.dataset)))
+        """Return a statistic by its name, such as ``contact_radius_mean``; None if it is not known."""
+        stem = name.rpartition("_")[0]
+        if stem.startswith("lost_to") and name not in self._computed and stem not in self.observables:
+            with contextlib.suppress(ValueError), answered():
+                self.observables.update(self._along(share_observables(self.dataset)))
+        if name not in self._computed:
+            recorded = {stem, *(f"{stem}_{kind}" for kind in KEPT)}
+            chosen = self.observables[[each for each in self.observables if each in recorded]]
+            self._computed |= {name: None} | {str(key): each for key, each in summary(chosen).items()}
+        return self._computed[name]
 
     def names(self) -> list[str]:
-        """All observables."""
-        while self._dearer:
-            self._charge()
-        parted = (str(name).rpartition("_") for name in self.stated)
-        return sorted({stem if kind in KEPT else f"{stem}{line}{kind}" for stem, line, kind in parted})
+        """Return the names of all observables."""
+        self.get("lost_to_bonds_mean")
+        parts = (str(name).rpartition("_") for name in self.observables)
+        return sorted({stem if kind in KEPT else f"{stem}{line}{kind}" for stem, line, kind in parts})
 
 
 class Scene(NamedTuple):
-    """Statistics laid out for panels: along time or a swept key, one curve for each other point of the sweep.
+    """Statistics laid out for panels, one curve for each point of the sweep.
 
-    ``x`` has shape (curves, points), in the unit of the axis, which has ``words`` and a ``scale``, and is the variable
-    ``over``. Points that are categories are not ``joined``; where the speed jumps lines are ``broken``. ``averaged`` is
-    what the curves are means over, in words; ``bar`` a colour bar with its label, in place of the names of many curves;
-    ``columns`` the curves of each column of panels, by what they have in common.
+    ``x`` has shape (curves, points) and holds the variable ``over`` in the ``unit`` of the axis, which has ``words``
+    and a ``scale``. ``averaged`` and ``spread`` state the means and bands of the curves. ``bar`` is a colour bar with
+    its label, in place of the names of many curves. ``width`` is that of the place of a curve's points if these are
+    categories, else 0. If lines are ``broken``, they have a gap at each jump of the speed.
     """
 
-    found: Statistics
-    along: str
+    statistics: Statistics
     lines: list[Line]
+    columns: Columns
     averaged: str
     spread: str
     bar: tuple[ScalarMappable, str] | None = None
-    columns: tuple[tuple[str, list[Line]], ...] = ()
     over: str = ""
     heading: str = ""
     measured: Measured | None = None
@@ -124,7 +114,7 @@ class Scene(NamedTuple):
     unit: Unit = Unit(1.0, "")
     words: str = ""
     scale: str = "linear"
-    joined: bool = True
+    width: float = 0.0
     broken: bool = False
 
     @property
@@ -132,51 +122,30 @@ class Scene(NamedTuple):
         return len(self.lines) == 1
 
     @property
+    def over_time(self) -> bool:
+        return self.statistics.along == "t"
+
+    @property
     def marked(self) -> bool:
-        """True if each point carries a marker: where curves have few, over anything but time."""
-        over_time = self.along == "t" and not self.broken
-        return not over_time and self.x.shape[1] <= MARKED
+        """True if each point carries a marker: curves of few points over anything but time."""
+        return (self.broken or not self.over_time) and self.x.shape[1] <= _MARKED
 
     @property
     def title(self) -> str:
-        """A heading, or words for what several curves are means over; a single one says so itself."""
+        """The heading, or a statement of the means of several curves; the name of a single curve states its own."""
         return self.heading or ("" if self.single else self.averaged)
 
     def placed(
         self, over: str, x: np.ndarray, words: str, si: str, scale: str = "linear", broken: bool = False
     ) -> "Scene":
-        """With values [SI] of a variable along x, (points,) for all curves or (curves, points), and the axis' words."""
+        """Return the scene over values ``x`` [SI] of a variable, of shape (points,) or (curves, points)."""
         unit = Unit.of(x, si, scale == "log")
-        x = np.broadcast_to(unit.factor * x, (len(self.lines), self.found.dataset.sizes[self.along]))
+        x = np.broadcast_to(unit.factor * x, (len(self.lines), self.statistics.dataset.sizes[self.statistics.along]))
         return self._replace(over=over, x=x, unit=unit, words=unit.label(words), scale=scale, broken=broken)
-
-    def apart(self) -> "Scene":
-        """With points that are categories, the curves of each side by side."""
-        shift = (np.arange(len(self.lines)) % self.abreast - 0.5 * (self.abreast - 1)) * self.category
-        return self._replace(x=self.x + shift[:, None], joined=False)
-
-    def middle(self) -> "Scene":
-        """With every curve in the middle of its category, for one that stands for all."""
-        return self._replace(x=np.broadcast_to(self.x.mean(axis=0), self.x.shape)) if not self.joined else self
-
-    @property
-    def category(self) -> float:
-        """Width of a curve's place within a category."""
-        return _CATEGORY / self.abreast
-
-    @property
-    def abreast(self) -> int:
-        """Curves of a panel."""
-        return len(self.columns[0][1] if self.columns else self.lines)
-
-    def look(self, style: Any) -> dict[str, Any]:
-        """A line style, or the marker that stands for it where points are not joined."""
-        marks = {"linestyle": "none", "marker": _MARKS[style], "markersize": 3.5}
-        return {"linestyle": style} if self.joined else marks
 
     @property
     def reach(self) -> np.ndarray:
-        """Places on the x axis of all that is drawn, curves and measured points."""
+        """Places on the x axis of the curves and of the measured points."""
         points = self.measured.column(self.over) if self.measured else None
         return self.x if points is None else np.append(self.x, self.unit.factor * points.values)
 
@@ -185,69 +154,50 @@ class Scene(NamedTuple):
         return self.values("fraction_detached_mean", line) >= 1.0
 
     def openings(self, line: Line) -> tuple[np.ndarray, np.ndarray]:
-        """Records after which the contact opens, and at which an open one has closed; none in a sweep."""
-        gone = self.opened(line) & (self.along == "t")
+        """Return the records after which the contact opens, and those at which it has closed again."""
+        gone = self.opened(line) & self.over_time
         return np.flatnonzero(~gone[:-1] & gone[1:]), np.flatnonzero(gone[:-1] & ~gone[1:]) + 1
 
     def values(self, name: str, line: Line) -> np.ndarray:
-        """A statistic along the x axis; nan where it is not known."""
-        points, known = self.found.dataset.sizes[self.along], self.found.get(name)
+        """Return a statistic along a curve; nan where it is not known."""
+        points, known = self.statistics.dataset.sizes[self.statistics.along], self.statistics.get(name)
         if known is None:
             return np.full(points, np.nan)
         return np.broadcast_to(known.isel(line.point, missing_dims="ignore").to_numpy(), points)
 
     def all(self, *names: str) -> np.ndarray:
-        """Statistics of all curves, shape (statistics * curves, points)."""
-        return np.stack([self.values(name, line) for name in names for line in self.lines])
-
-    def extent(self, *names: str) -> np.ndarray:
-        """Statistics of the curves of all columns of panels."""
-        lines = [line for _, own in self.columns for line in own] or self.lines
-        return self._replace(lines=lines).all(*names)
+        """Return statistics of the curves of all columns, of shape (statistics * curves, points)."""
+        return np.stack([self.values(name, line) for name in names for _, lines in self.columns for line in lines])
 
     def drawn(self, name: str, line: Line) -> list[np.ndarray]:
-        """Mean, its standard error, and both sides of the band; nan where there is no contact that it is of.
+        """Return the mean, its standard error, and both sides of the band; nan where there is no contact.
 
-        The band is between 5 and 95 % quantiles, or one standard deviation on both sides where only that was recorded.
+        The band is between the 5 and 95 % quantiles, or one standard deviation to both sides if only that is recorded.
         """
         mean, error, spread = (self.values(f"{name}_{kind}", line) for kind in ("mean", "sem", "std"))
         low, high = mean - spread, mean + spread
-        if (quantiles := self.found.get(f"{name}_quantile")) is not None:
+        if (quantiles := self.statistics.get(f"{name}_quantile")) is not None:
             low, _, high = quantiles.isel(line.point).to_numpy()
         gone = self.opened(line) if name in _OF_CONTACT else False
         return [np.where(gone, np.nan, values) for values in (mean, error, low, high)]
 
-    def parted(self, line: Line, *several: np.ndarray) -> list[np.ndarray]:
-        """The x values of a curve and values over them, with a nan in each where lines break."""
+    def parted(self, line: Line, *along: np.ndarray) -> list[np.ndarray]:
+        """Return the x values of a curve and values over them, with a nan at each gap of the line."""
         at = jumps(self.speeds(line), self.over == "speed") if self.broken else ()
-        return [np.insert(values, at, np.nan) for values in (self.x[line.number], *several)]
+        return [np.insert(values, at, np.nan) for values in (self.x[line.number], *along)]
 
     def speeds(self, line: Line) -> np.ndarray:
-        """The speed that is prescribed along a curve [m/s], that of the stage where it pulls through a spring."""
-        staged = self.found.get("stage_speed_mean") is not None
+        """Return the prescribed speed along a curve [m/s], of the stage if there is one."""
+        staged = self.statistics.get("stage_speed_mean") is not None
         return self.values("stage_speed_mean" if staged else "speed_mean", line)
 
-    def covered(self, name: str, lines: list[Line]) -> list[int]:
-        """How many later curves hide each one, nowhere farther from it than a hundredth of what all span."""
-        values = np.stack([self.values(f"{name}_mean", line) for line in lines])
-        if len(lines) > _FEW or not np.any(np.isfinite(values)):
-            return [0] * len(lines)
-        near = 0.01 * (np.nanmax(values) - np.nanmin(values))
-        hidden = np.all(np.abs(values[:, None] - values) <= near, axis=-1)
-        return [int(np.sum(later)) for later in np.triu(hidden, 1)]
-
-    def distinct(self, name: str) -> list[Line]:
-        """Curves that do not lie on an earlier one."""
-        values = [self.values(f"{name}_mean", line).tobytes() for line in self.lines]
-        return [line for k, (line, own) in enumerate(zip(self.lines, values, strict=True)) if values.index(own) == k]
-
     def varies(self, name: str) -> bool:
-        """True if the observable is there and changes along the axis or between the curves."""
-        return _changes(self.extent(f"{name}_mean"))
+        """True if the observable is known and changes along the axis or between the curves."""
+        return _changes(self.all(f"{name}_mean"))
 
     def moves(self, name: str) -> bool:
         """True if the observable changes along the axis."""
-        return any(_changes(values) for values in self.extent(f"{name}_mean"))
+        return any(_changes(values) for values in self.all(f"{name}_mean"))
 
 
 def _changes(values: np.ndarray) -> bool:
@@ -256,31 +206,30 @@ def _changes(values: np.ndarray) -> bool:
 
 
 def scene_along(dataset: xr.Dataset, along: str) -> Scene:
-    """``Statistics`` along time (``"t"``), or along a dimension of the sweep, as curves."""
-    columns, bar, some = _columns_of(dataset, [name for name in sweep_dims(dataset) if name != along])
-    lines, found = [line for _, own in columns for line in own], Statistics(dataset, along)
-    words = "; ".join(filter(None, [averaging(dataset, found.late), some]))
+    """Return ``Statistics`` along time (``"t"``) or a dimension of the sweep, as curves."""
+    columns, bar, left_out = _columns_of(dataset, [name for name in sweep_dims(dataset) if name != along])
+    lines, statistics = [line for _, lines in columns for line in lines], Statistics(dataset, along)
+    words = "; ".join(filter(None, [averaging(dataset, statistics.late), left_out]))
     if len(lines) == 1:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
+        columns = (("", lines),)
     spread = "± 1 std. dev. of members" if "contact_radius_std" in dataset else "5–95 % of members"
-    return Scene(found, along, lines, words, f"{spread}' means" if found.late else spread, bar, columns[1:] and columns)
+    return Scene(statistics, lines, columns, words, f"{spread}' means" if statistics.late else spread, bar)
 
 
-def _columns_of(
-    dataset: xr.Dataset, dims: list[str]
-) -> tuple[tuple[tuple[str, list[Line]], ...], tuple[ScalarMappable, str] | None, str]:
-    """Columns of panels, each with its curves, one for each point of some dimensions of the sweep.
+def _columns_of(dataset: xr.Dataset, dims: list[str]) -> tuple[Columns, tuple[ScalarMappable, str] | None, str]:
+    """Return columns of panels with their curves, one for each point of some dimensions of the sweep.
 
-    Also a colour bar where the curves are many along one number, and what is said of those that are left out. Of two
-    dimensions or more with many points that of fewer values makes columns.
+    The colour bar is that of many curves along one number; the text counts curves and columns that are left out. Of two
+    or more dimensions with many points that with fewer values makes columns.
     """
     fixed = {name: 0 for name in dims if dataset.sizes[name] == 1}
     sizes = {name: dataset.sizes[name] for name in dims if name not in fixed}
     apart = min(sizes, key=lambda name: sizes[name]) if len(sizes) > 1 and prod(sizes.values()) > len(LINES) else ""
-    places = _spread(sizes.pop(apart), COLUMNS) if apart else [0]
+    places = _spread(sizes.pop(apart), _COLUMNS) if apart else [0]
     points = [dict(zip(sizes, at, strict=True)) for at in np.ndindex(*sizes.values())]
     keyed = [name for name in sizes if len(sizes) == 1 and len(points) > len(LINES) and _is_number(dataset[name])]
-    drawn = _spread(len(points), MOST if keyed else NAMED)
+    drawn = _spread(len(points), _MOST if keyed else _NAMED)
     shades, bar = list(LINES), None
     if keyed:
         bar, shades = _bar(dataset[keyed[0]])
@@ -293,13 +242,13 @@ def _columns_of(
             words = "" if keyed else ", ".join(swept_value(dataset, name, at) for name, at in points[k].items())
             lines.append(Line(len(columns) * len(drawn) + len(lines), fixed | common | points[k], words, shades[k]))
         columns.append((swept_value(dataset, apart, place) if apart else "", lines))
-    left = {"columns": (len(places), dataset.sizes[apart] if apart else 1), "curves": (len(drawn), len(points))}
-    some = [f"{few} of {many} {what} drawn" for what, (few, many) in left.items() if few < many]
-    return tuple(columns), bar, ", ".join(some) and f"{', '.join(some)} (--where draws others)"
+    counts = {"columns": (len(places), dataset.sizes[apart] if apart else 1), "curves": (len(drawn), len(points))}
+    left_out = [f"{few} of {many} {what} drawn" for what, (few, many) in counts.items() if few < many]
+    return tuple(columns), bar, ", ".join(left_out) and f"{', '.join(left_out)} (--where draws others)"
 
 
 def _spread(count: int, most: int) -> list[int]:
-    """At most so many places of a count, evenly spread from the first to the last."""
+    """Return at most ``most`` places of a count, evenly spread from the first to the last."""
     return [int(at) for at in np.rint(np.linspace(0, count - 1, min(count, most)))]
 
 
@@ -338,35 +287,37 @@ def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
 
 
 def curve(
-    panel: Axes, scene: Scene, name: str, line: Line, factor: float, colour: str = "", style: Any = "-",
-    label: str = "", spread: str = "", hidden: int = 0,
+    panel: Axes, scene: Scene, name: str, line: Line, factor: float, colour: str = "", style: str = "-",
+    label: str = "", spread: str = "",
 ) -> None:  # fmt: skip
-    """The mean with its standard error, and the band of the members; the wider, the more later curves lie upon it."""
+    """Draw the mean with its standard error and the band of the members."""
     colour = colour or line.colour
     x, mean, sem, low, high = scene.parted(line, *(factor * values for values in scene.drawn(name, line)))
     shade: Any = {"color": colour, "alpha": 0.18, "label": spread}
-    spreads = np.any(high > low)
-    if spreads and scene.joined:
-        fill(panel, x, low, high, **shade)
-    elif spreads:
-        panel.vlines(x, low, high, linewidth=5.0, **shade)
-    dots: Any = {"marker": "o", "markersize": 2.6} if scene.marked else {}
-    width = {"linewidth": mpl.rcParams["lines.linewidth"] + hidden * _UNDERNEATH} if scene.joined else {}
-    panel.plot(
-        x, mean, color=colour, label=label if np.any(np.isfinite(mean)) else "", **(dots | scene.look(style) | width)
-    )
+    if np.any(high > low):
+        if scene.width:
+            panel.vlines(x, low, high, linewidth=5.0, **shade)
+        else:
+            fill(panel, x, low, high, **shade)
+    look: Any = ({"marker": "o", "markersize": 2.6} if scene.marked else {}) | line_style(scene, style)
+    panel.plot(x, mean, color=colour, label=label if np.any(np.isfinite(mean)) else "", **look)
     if not np.any(sem > 0.0):
         return
-    if scene.along == "t":
+    if scene.over_time:
         fill(panel, x, mean - sem, mean + sem, color=colour, alpha=0.45)
     else:
         panel.errorbar(x, mean, np.nan_to_num(sem), fmt="none", ecolor=colour, elinewidth=0.8, capsize=1.5)
 
 
+def line_style(scene: Scene, style: str) -> dict[str, Any]:
+    """Return a line style, or the marker that stands for it if points are not joined."""
+    return {"linestyle": "none", "marker": _MARKS[style], "markersize": 3.5} if scene.width else {"linestyle": style}
+
+
 def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
-    """Curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
-    for line, hidden in zip(scene.lines, scene.covered(name, scene.lines), strict=True):
-        curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread, hidden=hidden)
+    """Draw the curves of a contact: a cross at each pull-off of the last member in contact, a ring at each jump-in."""
+    for line in scene.lines:
+        curve(panel, scene, name, line, factor, label=line.label, spread=scene.spread)
         if name in _OF_CONTACT:
             mark_jumps(panel, scene, name, line, factor)
     beside(panel, scene, name, factor)
@@ -401,7 +352,7 @@ def over_speed(dataset: xr.Dataset) -> Scene:
     scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
     speeds = np.stack([scene.speeds(line) for line in scene.lines])
     words = "speed of the stage $V$" if "stage_speed" in dataset else "sliding speed $V$"
-    return scene.placed("speed", speeds, words, "m/s", axis_scale(speeds), broken=scene.along == "t")
+    return scene.placed("speed", speeds, words, "m/s", axis_scale(speeds), broken=scene.over_time)
 
 
 def over_time(dataset: xr.Dataset) -> Scene:
@@ -414,7 +365,11 @@ def over_key(dataset: xr.Dataset, name: str) -> Scene:
     key, scene = dataset[name], scene_along(dataset, name)
     words = f"{key.attrs.get('long_name', name).partition(',')[0]} {symbol(key)}".strip()
     if not _is_number(key):
-        return scene.placed(name, np.arange(key.size, dtype=float), words, "1").apart()
+        scene = scene.placed(name, np.arange(key.size, dtype=float), words, "1")
+        abreast = len(scene.columns[0][1])
+        width = _CATEGORY / abreast
+        shift = (np.arange(len(scene.lines)) % abreast - 0.5 * (abreast - 1)) * width
+        return scene._replace(x=scene.x + shift[:, None], width=width)
     values = key.to_numpy().astype(float)
     return scene.placed(name, values, words, key.attrs["units"], axis_scale(values))
 
@@ -437,9 +392,9 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
     if name == "t":
         return over_time(dataset)
     scene = scene_along(dataset, "t")
-    about, mean = (scene.found.get(f"{name}_{kind}") for kind in ("std", "mean"))
+    about, mean = (scene.statistics.get(f"{name}_{kind}") for kind in ("std", "mean"))
     if about is None or mean is None:
-        known = scene.found.names()
+        known = scene.statistics.names()
         near = difflib.get_close_matches(name, [*known, *swept], 1, 0.6)
         cure = f'did you mean "{near[0]}"?' if near else f"choose of: t, speed, {', '.join([*swept, *known])}"
         raise ValueError(f'nothing can be drawn over "{name[:40]}"; {cure}')
@@ -472,7 +427,7 @@ def series(name: str, words: str, si: str) -> Panel:
     """A panel of one observable."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
-        contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.extent(f"{name}_mean"), si))
+        contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.all(f"{name}_mean"), si))
 
     return panel_of
 
@@ -480,37 +435,39 @@ def series(name: str, words: str, si: str) -> Panel:
 friction_panel = series("friction_force", "friction $F$", "N")
 
 
-def radius_panel(panel: Axes, scene: Scene) -> None:
-    """Contact radius between Hertz's and JKR's."""
-    radii = scene.extent("contact_radius_mean", "jkr_radius_mean")
-    factor = style.in_unit(panel.yaxis, "contact radius $a$", radii, "m")
-    contact_curves(panel, scene, "contact_radius", factor)
-    for which, dashes in (("JKR", "--"), ("Hertz", ":")):
-        _reference(panel, scene, factor * scene.all(f"{which.lower()}_radius_mean"), dashes, which)
-    style.legend(panel, scene.title)
+def _size_panel(name: str, words: str, si: str, of_radius: Callable[[np.ndarray], np.ndarray]) -> Panel:
+    """Return a panel of the size of the contact between Hertz's and JKR's, a function of the radius."""
+
+    def panel_of(panel: Axes, scene: Scene) -> None:
+        sizes = np.append(scene.all(f"{name}_mean"), of_radius(scene.all("jkr_radius_mean")))
+        factor = style.in_unit(panel.yaxis, words, sizes, si)
+        contact_curves(panel, scene, name, factor)
+        for theory, dashes in (("JKR", "--"), ("Hertz", ":")):
+            radii = [scene.values(f"{theory.lower()}_radius_mean", line) for line in scene.lines]
+            _reference(panel, scene, [factor * of_radius(radius) for radius in radii], dashes, theory)
+        style.legend(panel, scene.title)
+
+    return panel_of
 
 
-def area_panel(panel: Axes, scene: Scene) -> None:
-    """Contact area between Hertz's and JKR's."""
-    areas = {name: np.pi * scene.all(f"{name.lower()}_radius_mean") ** 2 for name in ("JKR", "Hertz")}
-    most = np.append(scene.extent("contact_area_mean"), areas["JKR"])
-    factor = style.in_unit(panel.yaxis, "contact area $A$", most, "m^2")
-    contact_curves(panel, scene, "contact_area", factor)
-    for (which, values), dashes in zip(areas.items(), ("--", ":"), strict=True):
-        _reference(panel, scene, factor * values, dashes, which)
-    style.legend(panel, scene.title)
+radius_panel = _size_panel("contact_radius", "contact radius $a$", "m", lambda radius: radius)
+area_panel = _size_panel("contact_area", "contact area $A$", "m^2", lambda radius: np.pi * radius**2)
 
 
-def _reference(panel: Axes, scene: Scene, values: np.ndarray, dashes: str, name: str) -> None:
-    """Lines of a closed form: one grey one where all curves have the same, else in their colours."""
-    known = [_broken(own) for own in values]
-    same = scene.joined and all(np.array_equal(own, known[0], equal_nan=True) for own in known)
+def _same(curves: Sequence[np.ndarray]) -> bool:
+    return all(np.array_equal(values, curves[0], equal_nan=True) for values in curves)
+
+
+def _reference(panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str, name: str) -> None:
+    """Draw lines of a closed form: one grey line if all curves have the same, else lines in their colours."""
+    known = [_broken(values) for values in curves]
     if not np.any(np.isfinite(known)):
         return
-    for line, own in zip(scene.lines[:1] if same else scene.lines, known, strict=False):
-        x, y = scene.parted(line, own)
-        if not scene.joined:  # a short line for each category
-            half = 0.5 * scene.category
+    same = not scene.width and _same(known)
+    for line, values in zip(scene.lines[:1] if same else scene.lines, known, strict=False):
+        x, y = scene.parted(line, values)
+        if scene.width:  # a short line for each category
+            half = 0.5 * scene.width
             x, y = np.stack([x - half, x + half, x], axis=1).ravel(), np.repeat(y, 3)
             y[2::3] = np.nan
         panel.plot(x, y, dashes, **style.GREY | ({} if same else {"color": line.colour}))
@@ -532,44 +489,46 @@ _ENERGIES: Any = (
 
 
 def energy_panel(panel: Axes, scene: Scene) -> None:
-    """Work of adhesion of the bonds left, fluctuation energy, and what both leave to the contact."""
-    drawn = [entry for entry in _ENERGIES if np.any(np.nan_to_num(scene.extent(f"{entry[0]}_mean")))]
+    """Draw the work of adhesion of the bonds left, the fluctuation energy, and what both leave to the contact."""
+    shown = [entry for entry in _ENERGIES if np.any(np.nan_to_num(scene.all(f"{entry[0]}_mean")))]
     if _small_fluctuations(scene):
-        drawn = [entry for entry in drawn if entry[0] != "fluctuation_energy"]
-    left, work = (scene.extent(f"{name}_mean") for name in ("bond_work", "work_of_adhesion"))
+        shown = [entry for entry in shown if entry[0] != "fluctuation_energy"]
+    left, work = (scene.all(f"{name}_mean") for name in ("bond_work", "work_of_adhesion"))
     # one colour for each curve leaves line styles for the energies; without fluctuations all is left to the contact
     if not scene.single or np.allclose(left, work, rtol=1e-9, atol=0.0, equal_nan=True):
-        drawn = [entry for entry in drawn if entry[0] != "bond_work"]
-    values = scene.extent(*(f"{name}_mean" for name, *_ in drawn))
+        shown = [entry for entry in shown if entry[0] != "bond_work"]
+    values = scene.all(*(f"{name}_mean" for name, *_ in shown))
     factor = style.in_unit(panel.yaxis, "energy per area", values, "J/m^2")
-    for name, text, own, dashes in drawn:
-        lines = scene.distinct(name)
-        placed = scene.middle() if len(lines) == 1 else scene
-        for line, hidden in zip(lines, scene.covered(name, lines), strict=True):
-            colour = own if scene.single else style.REFERENCE if len(lines) == 1 else line.colour
-            curve(panel, placed, name, line, factor, colour, dashes, hidden=hidden)
-        panel.plot([], [], color=own if scene.single else style.REFERENCE, label=text, **scene.look(dashes))
+    for name, text, colour, dashes in shown:
+        _energies(panel, scene, name, factor, colour, dashes)
+        colour = colour if scene.single else style.REFERENCE
+        panel.plot([], [], color=colour, label=text, **line_style(scene, dashes))
     if np.any(values <= 0.0):
         panel.axhline(0.0, **style.GUIDE)
     style.legend(panel)
 
 
+def _energies(panel: Axes, scene: Scene, name: str, factor: float, colour: str, dashes: str) -> None:
+    """Draw the curves of an energy: a single one in its colour, one grey line if all are the same."""
+    same = not scene.width and _same([scene.values(f"{name}_mean", line) for line in scene.lines])
+    for line in scene.lines[:1] if same else scene.lines:
+        own = colour if scene.single else style.REFERENCE if same else line.colour
+        curve(panel, scene, name, line, factor, own, dashes)
+
+
 def _small_fluctuations(scene: Scene) -> bool:
     """Whether the fluctuation energy changes, but would be a line at zero beside the work left to the contact."""
     most, work = (
-        float(np.max(np.nan_to_num(scene.extent(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
+        float(np.max(np.nan_to_num(scene.all(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
     )
     return 0.0 < most < _SMALL * work and scene.varies("fluctuation_energy")
 
 
 def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
-    """Fluctuation energy where it is small."""
-    energies = scene.extent("fluctuation_energy_mean")
+    """Draw a fluctuation energy that is small."""
+    energies = scene.all("fluctuation_energy_mean")
     factor = style.in_unit(panel.yaxis, r"fluctuations $\Delta\Gamma$", energies, "J/m^2")
-    lines = scene.distinct("fluctuation_energy")
-    for line in lines:
-        colour = style.FLUCTUATIONS if scene.single else style.REFERENCE if len(lines) == 1 else line.colour
-        curve(panel, scene, "fluctuation_energy", line, factor, colour, "--")
+    _energies(panel, scene, "fluctuation_energy", factor, style.FLUCTUATIONS, "--")
     panel.set_ylim(bottom=0.0)
 
 
@@ -579,8 +538,11 @@ def share_panel(panel: Axes, scene: Scene) -> None:
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
     panel.axhline(1.0, linestyle="--", label="JKR", **style.GREY)
-    hertz, jkr = (scene.all(f"{name}_radius_mean") for name in ("hertz", "jkr"))
-    _reference(panel, scene, (hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2, ":", "Hertz")
+    ratios = []
+    for line in scene.lines:
+        hertz, jkr = (scene.values(f"{name}_radius_mean", line) for name in ("hertz", "jkr"))
+        ratios.append((hertz / np.where(jkr > 0.0, jkr, np.nan)) ** 2)
+    _reference(panel, scene, ratios, ":", "Hertz")
     style.legend(panel, scene.title)
     panel.set_ylabel(r"contact area $A/A_\mathrm{JKR}$")
 
@@ -609,16 +571,15 @@ def stacked(
     Below them are residuals of measured points, if any. The panels of the first column are returned. With ``ax`` the
     first panel alone is drawn, there.
     """
-    columns = scene.columns or (("", scene.lines),)
     compared = scene.measured is not None and scene.measured.has_errors and ax is None
     if ax is None:
         heights = [height for height, _ in panels] + [0.8] * compared
-        figure, axes = style.grid(heights, len(columns))
+        figure, axes = style.grid(heights, len(scene.columns))
     else:
         figure, axes, panels = cast(Figure, ax.figure), np.array([[ax]]), panels[:1]
-        if len(columns) > 1:
-            raise ValueError(f"{len(columns)} panels side by side do not go into one; choose by where, or leave ax out")
-    for number, (words, lines) in enumerate(columns):
+        if len(scene.columns) > 1:
+            raise ValueError("panels side by side do not fit into one; choose values by where, or leave ax out")
+    for number, (words, lines) in enumerate(scene.columns):
         part = scene._replace(lines=lines)
         for panel, (_, drawing) in zip(axes[:, number], panels, strict=False):
             drawing(panel, part)
@@ -628,7 +589,7 @@ def stacked(
         style.across(axes[-1, number], scene.reach, scene.words, scene.scale, edge if room is None else room)
         if words:
             axes[0, number].set_title(words)
-    if scene.columns:
+    if len(scene.columns) > 1:
         style.legends_of_first(figure, axes)
     elif ax is not None:
         style.moved_legend(ax, ax, loc="best")  # above the panel there may be no room
@@ -742,12 +703,12 @@ def sweep_figure(
 ) -> Figure:
     """Contact radius, energies and friction over the first swept key; further keys make curves."""
     scene = (over(dataset, x) if x else over_key(dataset, style.swept(dataset)[0]))._replace(measured=data)
-    room = None if scene.joined else (0.5 * scene.category + 0.1) / max(float(np.ptp(scene.x)), 1.0)
+    room = None if not scene.width else (0.5 * scene.width + 0.1) / max(float(np.ptp(scene.x)), 1.0)
     if not is_stationary(dataset):
         scene = scene._replace(heading=_at_the_end(dataset, scene.title))
     first = area_panel if absolute else radius_panel
     figure, axes = stacked(scene, [(1.7, first), *further_panels(scene)], room, ax)
-    if not scene.joined:
+    if scene.width:
         names = dataset[scene.over].to_numpy()
         axes[-1].set_xticks(range(names.size), [str(value) for value in names])
     return figure

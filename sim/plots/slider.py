@@ -332,7 +332,7 @@ def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | 
 
     def stress_panel(panel: Axes, scene: Scene) -> None:
         """Shear stress of the dataset upon closed forms, with the maximum of each curve."""
-        factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.extent("shear_stress_mean"), "Pa")
+        factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa")
         contact_curves(panel, scene._replace(lines=_marked(panel, scene, factor)), "shear_stress", factor)
         thin_lines(panel, scene, lambda law: factor * law.stress)
         style.legend(panel, scene.title)

@@ -185,18 +185,6 @@ def test_values_at_the_end_of_a_ramp_say_when_and_how_fast():
     assert not legend_of(plots.draw(steady, "sweep").axes[0])[1]
 
 
-def test_a_curve_beneath_another_is_wide_enough_to_be_seen():
-    dataset = simulated(shear=shear.Uniform(), sweep={"bonds.stress": [2e5, 3e5]})
-    area, *_, friction = plots.draw(dataset, "curve").axes
-    widths = [
-        {line.get_linewidth() for line in panel.lines if line.get_linestyle() == "-"} for panel in (area, friction)
-    ]
-    assert len(widths[0]) == 2 and len(widths[1]) == 1
-    dataset = simulated(shear=shear.Uniform(), sweep={"bonds.stress": [1e5, 2e5, 3e5, 4e5]})
-    lines = [line for line in plots.draw(dataset, "curve").axes[0].lines if line.get_linestyle() == "-"]
-    assert [round(line.get_linewidth(), 9) for line in lines] == [4.2, 3.2, 2.2, 1.2]
-
-
 def test_a_swept_value_has_the_unit_of_its_axis_unless_it_is_small_there_and_letters_have_words():
     dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": [4e-6, 1e-3, 4e-3]})
     assert [pictures.swept_value(dataset, "contact_load", at) for at in range(3)] == [
