@@ -241,13 +241,12 @@ def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
 def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", where: dict[str, Any] | None) -> Any:
     """What a function makes of a dataset, or of the file that holds it; ``BadInput`` for what it cannot use."""
     from sim.analysis.statistics import where as chosen
-    from sim.units.refusals import BadInput, refuse_old
+    from sim.units.refusals import BadInput
 
     try:
         if isinstance(dataset, str | os.PathLike):
             with open(dataset) as found:
                 return function(chosen(found, where or {}))
-        refuse_old("the dataset", [*dataset.variables, *dataset.dims])
         return function(chosen(dataset, where or {}))
     except BadInput:
         raise

@@ -131,7 +131,7 @@ def test_a_value_of_a_sweep_is_chosen_by_its_key():
         found = sim.stats(dataset, where={"contact.load": value})
         assert len(found) == dataset.sizes["t"]
         assert set(found["contact_load"]) == {4e-3}
-    for where, words in (({"contact.travel": 1}, "now called"), ({"contact.load": 1.0}, "there are: 1 mN, 4 mN")):
+    for where, words in (({"contact.lod": 1}, "not swept"), ({"contact.load": 1.0}, "there are: 1 mN, 4 mN")):
         with pytest.raises(sim.BadInput, match=words):
             sim.plot(dataset, where=where)
 
@@ -165,35 +165,21 @@ def swapped(**tables):
     return {**SCENE, **tables}
 
 
-@pytest.mark.parametrize(
-    ("use", "said"),
-    [
-        (lambda: sim.Scenario(**swapped(sphere={"raduis": 1})), 'sphere.raduis: is not a key; did you mean "radius"?'),
-        (lambda: sim.Scenario(**swapped(sphre={})), 'sphre: is not a key; did you mean "sphere"?'),
-        (lambda: sim.load(swapped(sphere={"radius": "2"})), "sphere.radius: is text without a unit; write for example "
-         '"2 mm", or a bare number in m'),
-        (lambda: sim.load(SCENE, {"sphere.raduis": 1}), 'overrides["sphere.raduis"]: is not a key; did you mean '
-         '"radius"?'),
-        (lambda: sim.load(SCENE).with_values({"contact.lod": 1}), 'contact.lod: is not a key; did you mean "load"?'),
-        (lambda: sim.load(SCENE).with_values({"solid.poisson_ratio": 2}), "solid.poisson_ratio: must be at most 0.5, "
-         "not 2"),
-    ],
-)  # fmt: skip
-def test_a_fault_of_a_scene_is_bad_input_in_plain_words(use, said):
-    with pytest.raises(sim.BadInput) as fault:
-        use()
-    assert fault.value.problems == [said]
-
-
-def test_a_fault_between_parts_and_one_of_a_sweep_are_bad_input_too():
-    with pytest.raises(sim.BadInput, match=r"^record.maps: .*mapped"):
-        sim.Scenario(**SCENE, record={"maps": ["0.5 s"]})
-    with pytest.raises(sim.BadInput, match=r'contact.lod: .*did you mean "load"'):
-        sim.load({**SCENE, "sweep": {"contact.lod": [1]}})
-    with pytest.raises(sim.BadInput, match=r"^sweep: .*list of values"):
-        sim.Scenario(**SCENE, sweep={"contact.load": 1})
+def test_a_fault_of_a_scene_is_bad_input_with_its_key_and_cure():
+    for use, key, cure in (
+        (lambda: sim.Scenario(**swapped(sphere={"raduis": 1})), "sphere.raduis", '"radius"'),
+        (lambda: sim.load(swapped(sphere={"radius": "2"})), "sphere.radius", '"2 mm"'),
+        (lambda: sim.load(SCENE, {"sphere.raduis": 1}), 'overrides["sphere.raduis"]', '"radius"'),
+        (lambda: sim.load(SCENE).with_values({"contact.lod": 1}), "contact.lod", '"load"'),
+        (lambda: sim.Scenario(**SCENE, record={"maps": ["0.5 s"]}), "record.maps", "mapped"),
+        (lambda: sim.load({**SCENE, "sweep": {"contact.lod": [1]}}), "sweep: contact.lod", '"load"'),
+    ):
+        with pytest.raises(sim.BadInput) as fault:
+            use()
+        (problem,) = fault.value.problems
+        assert problem.startswith(key) and cure in problem
     swept = sim.Scenario(**SCENE, sweep={"clock.step": ["0.1 s", "0.2 s"]})
-    with pytest.raises(sim.BadInput, match=r"different records; give clock\.record"):
+    with pytest.raises(sim.BadInput, match=r"clock\.record"):
         swept.points()
 
 
@@ -208,21 +194,7 @@ def test_a_scene_is_shown_in_a_line_and_as_a_table():
     assert "0.002 m" in table
 
 
-@pytest.mark.parametrize("command", ["stats", "plot"])
-def test_a_dataset_of_0_1_0_is_refused_in_one_sentence(file, dataset, command):
-    with netCDF4.Dataset("out.nc", "a") as old:
-        old.renameVariable("displacement", "travel")
-    said = "out.nc: was written by version 0.1.0, whose names have changed; run its scenario again"
-    done = CliRunner().invoke(cli, [command, "out.nc"])
-    assert said in str(done.exception)
-    for use in (sim.open, sim.stats, sim.plot):
-        with pytest.raises(sim.BadInput, match=said):
-            use("out.nc")
-    with pytest.raises(sim.BadInput, match=r"^the dataset: was written by version 0\.1\.0"):
-        sim.stats(dataset.rename(displacement="travel"))
-
-
-def test_what_is_no_dataset_is_bad_input(tmp_path, monkeypatch):
+def test_a_file_that_is_no_dataset_is_bad_input(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("x.nc").write_text("nothing")
     for name, words in (("no.nc", "no such file"), (".", "is a folder"), ("x.nc", "not a netCDF file")):

@@ -18,8 +18,8 @@ import xarray as xr
 
 from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
-from sim.units.recorded import Recorded
-from sim.units.refusals import BadInput, refuse_old
+from sim.units.notation import Recorded
+from sim.units.refusals import BadInput
 
 Given = ParamSpec("Given")
 T = TypeVar("T")
@@ -57,7 +57,6 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         refused.callback(dataset.close)
         if "sim_version" not in dataset.attrs:
             raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
-        refuse_old(path, [*dataset.variables, *dataset.dims])
         if fault := _fault(dataset):
             raise BadInput([f"{path}: {fault}: it was changed after its run; run the scenario again"])
         refused.pop_all()

@@ -15,7 +15,6 @@ from sim.analysis.observables import KEPT, charges, pure, readings, reference_ra
 from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
-from sim.units.refusals import renamed
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -79,8 +78,6 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
         dims = sweep_dims(dataset)
         full = key.replace(".", "_")
         fitting = [n for n in dims if n == full] or [n for n in dims if n.endswith(f"_{full}")]
-        if not fitting and renamed(key):
-            raise ValueError(f'{key} is now called "{renamed(key)}"')
         if len(fitting) != 1:
             raise ValueError(f"{key} is not swept; swept: {', '.join(dims) or 'nothing'}")
         name = fitting[0]

@@ -8,8 +8,8 @@ from pydantic import Field, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
+from sim.units.notation import Recorded
 from sim.units.quantity import Quantity
-from sim.units.recorded import Recorded
 
 _Duration = Annotated[float, Quantity("s", "duration of the run", "T", above=0)]
 _MOST_RECORDS = 10_000_000

@@ -1,13 +1,27 @@
-"""Numbers as a reader writes them: with the prefix that suits, and with their error in the last digits."""
+"""Numbers as text, with a suitable prefix and their error in the last digits; names of recorded quantities."""
 
 import math
 import re
+from typing import Literal
 
 #: Of a mean that is told with its error.
 _MOST_DIGITS = 7
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
 _PREFIXABLE = re.compile(r"(?P<base>m|s|N|Pa|J)(?:\^(?P<power>\d))?(?P<rest>|[/ ].*)")
+
+#: Names of the quantities of each record and of each whole run, of which ``record.quantities`` chooses.
+Recorded = Literal[
+    "speed", "slider_position", "bond_fraction", "shear_stress", "fluctuation_energy", "work_of_adhesion",
+    "contact_radius", "contact_area", "normal_load", "indentation", "displacement", "friction_force", "in_contact",
+    "masked", "detachment_time", "dissipated_energy", "jkr_radius", "hertz_radius", "bonds_radius",
+    "fluctuations_radius", "equilibrium_radius", "applied_load",
+    "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
+    "dissipated_by_viscosity", "dissipated_by_rupture", "dissipated_by_snaps", "dissipated_by_area", "energy_residual",
+    "substeps",
+    "runaway_time",
+    "peak_stress", "peak_friction", "peak_time", "pull_off_load", "pull_off_time",
+]  # fmt: skip
 
 
 def scaled(magnitude: float, unit: str) -> tuple[float, str]:

@@ -29,7 +29,7 @@ from sim.parts.shear.process import Slip
 from sim.scenario.clock import Clock, Record
 from sim.scenario.declared import all_tables, keys, quantities, tables
 from sim.scenario.scenario import Scenario, read_sweep
-from sim.units.recorded import Recorded
+from sim.units.notation import Recorded
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))
 
