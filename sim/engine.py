@@ -13,7 +13,7 @@ from sim.numerics.noise import Noise
 from sim.parts import extremes
 from sim.parts.contact.balance import Balance
 from sim.parts.coupled import coupled
-from sim.parts.coupled.coupled import Around
+from sim.parts.coupled.coupled import StepContact
 from sim.parts.exchange import Array, Bonding, ContactState, Indices, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
 
@@ -81,12 +81,12 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
     bonds = population.start(motion, noise.bonds)
     bonding = population.bonding(bonds)
     if drive.solves_motion:
-        bonding = coupled.felt(scenario.parts, bonding, motion.speed)
+        bonding = coupled.with_contact_stress(scenario.parts, bonding, motion.speed)
     shear = process.start(motion, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, shear.energy, slider.position)
     touch = contact.start(motion, scenario.times.duration, terms)
     if drive.solves_motion:
-        around = _around(scenario, touch, shear.energy, range(1, 2))
+        around = _step_contact(scenario, touch, shear.energy, range(1, 2))
         slider = coupled.load(scenario.parts, slider, bonding, around, scenario.times.duration)
     largest = extremes.first(bonding, touch.radius, _pull(scenario, 0.0, touch.radius))
     return State(0, slider, bonds, bonding, shear, touch, largest)
@@ -100,11 +100,11 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     drive, population, process, contact = scenario.parts
     slider: Sliding
     if drive.solves_motion:
-        around = _around(scenario, state.contact, state.shear.energy, steps)
-        before = state.drive, state.bonds
-        given = scenario.parts, before, around, scenario.times, steps, noise.bonds
-        passed, motions, bonds, bonding = coupled.advance(*given)
-        slider, driven = passed.at(-1), drive.readings(passed)
+        around = _step_contact(scenario, state.contact, state.shear.energy, steps)
+        sliders, motions, bonds, bonding = coupled.advance(
+            scenario.parts, state.drive, state.bonds, around, scenario.times, steps, noise.bonds
+        )
+        slider, driven = sliders.at(-1), drive.readings(sliders)
     else:
         slider, motions = drive.advance(state.drive, scenario.times, steps)
         bonds, bonding = population.advance(state.bonds, motions, state.contact.radius, noise.bonds)
@@ -112,8 +112,10 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, energy, motions.position)
     touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
-    if drive.solves_motion and (stand := coupled.agreed(passed, touch.radius)) < len(steps):
-        return advance(scenario, state, noise, steps[:stand])
+    if drive.solves_motion:
+        valid = coupled.steps_until_contact_changes(sliders, touch.radius)
+        if valid < len(steps):
+            return advance(scenario, state, noise, steps[:valid])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
     largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions)
     end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
@@ -191,7 +193,7 @@ def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array,
     return Balance(bonded, fluctuating, strength, margin, scenario.bodies, scenario.adhesion.work)
 
 
-def _around(scenario: Scenario, touch: ContactState, energy: Array, steps: range) -> Around:
+def _step_contact(scenario: Scenario, touch: ContactState, energy: Array, steps: range) -> StepContact:
     """Contact and half-space at the start of some clock steps, for a drive that feels the friction."""
     contact, bodies, times, adhesion = scenario.contact, scenario.bodies, scenario.times, scenario.adhesion
     first, last = contact.mount_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
@@ -201,7 +203,7 @@ def _around(scenario: Scenario, touch: ContactState, energy: Array, steps: range
     area = scenario.contact_area
     stays = contact.lags or not (contact.changes or bonded or contact.reversible)
     solid = *bodies, scenario.solid.effective[0]
-    return Around(touch.radius, bare, bonded, contact.reversible, (first.mount, last.mount), stays, *solid, area)
+    return StepContact(touch.radius, bare, bonded, contact.reversible, (first.mount, last.mount), stays, *solid, area)
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:

@@ -192,7 +192,9 @@ _ContactStiffness = Annotated[
 ]
 #: Columns of ``Driven.energies``: work of the drive; lost to damping, viscosity, rupture, snaps and to the area as it
 #: changes; stored now, and at the start.
-WORK, DAMPING, VISCOSITY, RUPTURE, SNAP, AREA, STORED, FIRST = range(8)
+ENERGY = np.dtype(
+    [(name, float) for name in ("work", "damping", "viscosity", "rupture", "snaps", "area", "stored", "first")]
+)
 #: Columns of the readings of a drive that feels the friction.
 READINGS = (
     "stage_position", "stage_speed", "spring_force", "drive_work", "stored_energy", "dissipated_by_damping",
@@ -225,7 +227,7 @@ class Driven(NamedTuple):
     runaway_time : array
         Time at which nothing held the body any longer [s], nan if never.
     energies : array, shape (members, 8)
-        Energies since the start [J], columns ``WORK`` to ``FIRST``.
+        Energies since the start [J], columns of ``ENERGY``.
     acceleration : array
         Acceleration of the interface in the last sub-step [m/s²], where bonds resolved by stretch use it, else 0.
     """
@@ -311,10 +313,10 @@ class _Driven:
 
     def readings(self, state: Driven) -> Array:
         """Recorded quantities of the drive, columns ``READINGS``, as last axis."""
-        made, *spent, stored, first = (state.energies[..., k] for k in range(FIRST + 1))
-        residual = made - (stored - first) - sum(spent)
+        work, *spent, stored, first = np.moveaxis(state.energies, -1, 0)
+        residual = work - (stored - first) - sum(spent)
         stage = state.stage_position, state.stage_speed, state.spring_force
-        return np.stack([*stage, made, stored, *spent, residual, state.substeps, state.runaway_time], axis=-1)
+        return np.stack([*stage, work, stored, *spent, residual, state.substeps, state.runaway_time], axis=-1)
 
     def remarks(self, setting: Setting) -> list[str]:
         return []

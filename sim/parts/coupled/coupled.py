@@ -26,38 +26,25 @@ from sim.parts.bonds.models import (
     Unbroken,
 )
 from sim.parts.bonds.tracked import AGAIN, Tracks
-from sim.parts.coupled import row as columns
 from sim.parts.coupled.cohorts import advance_cohorts
 from sim.parts.coupled.mean_field import advance_rows
-from sim.parts.coupled.row import Law, Resting, Slider
+from sim.parts.coupled.row import COLUMNS, ROW, Inputs, Law, Slider, Solid
 from sim.parts.coupled.tracked import advance_tracks
-from sim.parts.drive import FIRST, STORED, Driven, Force, Spring
+from sim.parts.drive import ENERGY, Driven, Force, Spring
 from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sliding, Times
 
 #: Stretch by which the motion of bonds is measured that neither force nor stretch breaks, in a run without motion [m].
 _STRETCH = 1e-9
 #: Columns of a row that are measured by a stretch.
-_STRETCHED = [
-    columns.BODY,
-    columns.SHEARED,
-    columns.MOMENT,
-    columns.SPEED,
-    columns.POSITION,
-    columns.SLIP,
-    columns.PATH,
-    columns.BEND,
-]
+_STRETCHED = ["body_speed", "sheared", "moment", "speed", "position", "slip", "path", "acceleration"]
 #: Relative difference up to which two radii are the same equilibrium, found on two ways.
 _SAME = 1e-9
-#: What goes through clock steps: rows, energies, work of adhesion without bonds, pieces of the drive, clock and
-#: contact, units of the columns and of energies.
-_Rows = tuple[Array, Array, Array, Array, Array, Array, float]
-#: Numbers of slider, bonds and contact.
-_Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
+#: Numbers of slider, bonds and solid, and 1.0 if the radius stays.
+_Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float]
 
 
-class Around(NamedTuple):
-    """Contact and half-space around slider and bonds during some clock steps.
+class StepContact(NamedTuple):
+    """Contact and half-space contact slider and bonds during some clock steps.
 
     Attributes
     ----------
@@ -110,14 +97,14 @@ class _Units(NamedTuple):
     force: float
 
 
-def _units(drive: Force | Spring, bonds: _Driven, around: Around, step: float) -> _Units:
+def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: float) -> _Units:
     most = max(map(abs, drive.course.extremes))
     if not isinstance(bonds, _WITH_STRETCH):
-        force = bonds.stress * around.area
-        slow = drive.mass / step + drive.damping + drive.viscosity * around.area
+        force = bonds.stress * contact.area
+        slow = drive.mass / step + drive.damping + drive.viscosity * contact.area
         way = force / drive.spring if drive.spring else max(most, force) * step / slow
         return _Units(min(way, _renewing(bonds)), force)
-    law, bears = bonds.law, bonds.site_density * bonds.bond_stiffness * around.area
+    law, bears = bonds.law, bonds.site_density * bonds.bond_stiffness * contact.area
     if law.softness > 0.0:
         stretch = 1.0 / law.softness
     elif law.limit < math.inf:
@@ -132,11 +119,11 @@ def _renewing(bonds: _Driven) -> float:
     return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, Rate) else math.inf
 
 
-def load(parts: Parts, slider: Sliding, bonding: Bonding, around: Around, duration: float) -> Driven:
+def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, duration: float) -> Driven:
     """The slider at t = 0, with the spring loaded by what its motion takes, and the energy that is stored."""
     drive, slider = cast(Force | Spring, parts.drive), cast(Driven, slider)
-    speed, radius = slider.speed, np.nan_to_num(around.radius, nan=0.0)
-    area, (yields, slope) = np.pi * radius**2, drive.yields(around.shear_modulus, around.poisson_ratio)
+    speed, radius = slider.speed, np.nan_to_num(contact.radius, nan=0.0)
+    area, (yields, slope) = np.pi * radius**2, drive.yields(contact.shear_modulus, contact.poisson_ratio)
     friction = area * bonding.stress
     sheared = friction * (yields + np.divide(slope, radius, out=np.zeros(radius.shape), where=radius > 0.0))
     first = drive.first(duration)
@@ -144,125 +131,128 @@ def load(parts: Parts, slider: Sliding, bonding: Bonding, around: Around, durati
     ahead, stage = (pull / drive.spring, first + 0.0 * pull) if drive.spring else (0.0 * pull, 0.0 * pull)
     energies = np.zeros(slider.energies.shape)
     stored = 0.5 * (ahead * pull + drive.mass * speed**2 + sheared * friction) + area * bonding.stored
-    energies[:, STORED] = energies[:, FIRST] = stored
+    energies.view(ENERGY)[:, 0]["stored"] = energies.view(ENERGY)[:, 0]["first"] = stored
     loaded = {"spring_force": pull, "sheared": sheared, "stage_position": ahead, "stage_speed": stage}
     return slider._replace(**loaded, energies=energies)
 
 
-def felt(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
+def with_contact_stress(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
     """The readings of bonds whose strength is their actual stress, with that of a viscous interface at speeds [m/s]."""
     viscosity = cast(Force | Spring, parts.drive).viscosity
     return bonding._replace(stress=bonding.stress + viscosity * speed, strength=np.abs(bonding.stress))
 
 
 def advance(
-    parts: Parts, state: tuple[Sliding, tuple[object, ...]], around: Around, times: Times, steps: range, noise: Noise
+    parts: Parts,
+    slider: Sliding,
+    population: tuple[object, ...],
+    contact: StepContact,
+    times: Times,
+    steps: range,
+    noise: Noise,
 ) -> tuple[Driven, Motions, tuple[object, ...], Bonding]:
-    """Slider at the end of each of some clock steps, its motion, the bonds after the last and their readings at each.
+    """Return the slider at the end of each of some clock steps, its motion, the bonds at the end and their readings.
 
-    The contact is that at the start, but for its equilibrium with the bonds: ``agreed`` counts the steps that stand. So
-    is the number of ``counted`` bonds, drawn anew at the end of a step with the way that the slider has gone in it.
+    The contact is that at the start, except for its equilibrium with the bonds; ``steps_until_contact_changes`` counts
+    the valid steps. ``counted`` bonds stay as well: they are drawn at the end of a step, with the slip in it.
     """
-    drive, bonds = cast(Force | Spring, parts.drive), cast(_Driven, parts.bonds)
-    slider, population = cast(Driven, state[0]), state[1]
-    ends = times.at(np.arange(steps.start - 1.0, steps.stop))
-    units = _units(drive, bonds, around, times.step)
+    drive, bonds, slider = cast(Force | Spring, parts.drive), cast(_Driven, parts.bonds), cast(Driven, slider)
+    ends, members = times.at(np.arange(steps.start - 1.0, steps.stop)), len(slider.speed)
+    units = _units(drive, bonds, contact, times.step)
     stretch, force = units
-    radius = around.radius
-    if not around.stays:  # the sub-steps go on with their own
-        radius = np.where(_agree(slider.radius, radius), slider.radius, radius)
-    rows = np.zeros((len(slider.speed), columns.COLUMNS))
-    of_rows = {
-        columns.FORCE: slider.spring_force, columns.BODY: slider.body_speed, columns.SHEARED: slider.sheared,
-        columns.SPEED: slider.speed, columns.POSITION: slider.position, columns.BEND: slider.acceleration,
-        columns.RADIUS: radius, columns.NEXT: slider.next_step, columns.COUNT: slider.substeps,
-        columns.ENDED: slider.runaway_time,
-    }  # fmt: skip
-    for column, values in of_rows.items():
-        rows[:, column] = values
-    scales = np.ones(columns.COLUMNS)
-    scales[columns.FORCE], scales[_STRETCHED], scales[columns.SQUARE] = force, stretch, stretch**2
+    rows, scales = np.zeros(members, ROW), np.ones(1, ROW)
+    for name in set(ROW.names or ()) & set(Driven._fields):
+        rows[name] = getattr(slider, name)
+    settled = _agree(slider.radius, contact.radius)
+    # an equilibrium contact goes on with the radius of the sub-steps
+    rows["radius"] = contact.radius if contact.stays else np.where(settled, slider.radius, contact.radius)
+    scales["spring_force"], scales["squared_speed"] = force, stretch**2
+    for name in _STRETCHED:
+        scales[name] = stretch
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
-    given = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
-    clock, energies = _clock(around, ends), slider.energies.copy()
-    passed, spent = np.empty((columns.COLUMNS, len(steps), len(rows))), np.empty((len(steps), *energies.shape))
-    numbers = _numbers(drive, bonds, around, units)
-    bare = around.bare + np.zeros(len(rows))
-    at = rows, energies, bare, given, clock, scales, stretch * force
-    population, bonding = _advanced(bonds, population, around.radius, at, numbers, (passed, spent), noise)
-    stage, stage_speed = np.zeros((2, *passed[0].shape))
+    course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
+    bare = contact.bare + np.zeros(members)
+    table = rows.view(float).reshape(members, COLUMNS)
+    inputs = Inputs(
+        table, slider.energies.copy(), bare, course, _clock(contact, ends), scales.view(float), stretch * force
+    )
+    columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
+    numbers = _numbers(drive, bonds, contact, units)
+    end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), noise)
+    reached = dict(zip(ROW.names or (), columns, strict=True))
+    stage, stage_speed = np.zeros((2, len(steps), members))
     if drive.spring:
         whole = pieces.joined
         stage[:], stage_speed[:] = whole.integral[:, np.newaxis], whole.last[:, np.newaxis]
         stage[0] += slider.stage_position
         np.add.accumulate(stage, out=stage)
-    after = Driven(
-        passed[columns.POSITION], passed[columns.BODY], passed[columns.SPEED], passed[columns.FORCE],
-        passed[columns.SHEARED], stage, stage_speed, passed[columns.RADIUS], passed[columns.NEXT],
-        passed[columns.COUNT], passed[columns.ENDED], spent, passed[columns.BEND],
-    )  # fmt: skip
+    state = reached | {"stage_position": stage, "stage_speed": stage_speed, "energies": energies}
+    after = Driven(*(state[name] for name in Driven._fields))
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
-    slid, path, spans = passed[columns.SLIP], passed[columns.PATH], duration[:, np.newaxis]
-    unsteady = np.maximum(passed[columns.SQUARE] - path**2 / spans, 0.0)  # what slips at once is spread over the step
-    slid = slid, path, first, after.speed, after.position, unsteady
-    motions = Motions(steps.start, ends[1:, np.newaxis], spans, *slid)
+    path, spans = reached["path"], duration[:, np.newaxis]
+    unsteady = np.maximum(reached["squared_speed"] - path**2 / spans, 0.0)  # slip at once is spread over the step
+    motions = Motions(
+        steps.start, ends[1:, np.newaxis], spans, reached["slip"], path, first, after.speed, after.position, unsteady
+    )
     if isinstance(bonds, Counted):
-        population, drawn = bonds.advance(cast(Population, state[1]), motions, around.radius, noise)
+        end, drawn = bonds.advance(cast(Population, population), motions, contact.radius, noise)
         stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)
         bonding = Bonding(drawn.fraction, stress, stress)
-    return after, motions, population, felt(parts, bonding, after.speed)
+    return after, motions, end, with_contact_stress(parts, bonding, after.speed)
 
 
 def _advanced(
     bonds: _Driven,
     population: tuple[object, ...],
     radius: Array,
-    at: _Rows,
+    inputs: Inputs,
     numbers: _Numbers,
-    passed: tuple[Array, Array],
+    outputs: tuple[Array, Array],
     noise: Noise,
 ) -> tuple[tuple[object, ...], Bonding]:
-    """Bonds after some clock steps, which the rows ``at`` their start go through, and their readings at each.
+    """Return the bonds after some clock steps and their readings at each.
 
-    ``radius`` of the contact at the start [m]; ``passed``: what rows and energies come to. Bonds without a stretch have
-    the sense of the sliding in place of one.
+    ``radius`` of the contact at the start [m]; ``outputs`` are filled with the rows and energies at the end of each
+    step. Bonds without a stretch have the sense of the sliding in its place.
     """
-    rows, stretch = at[0], float(at[5][columns.SLIP])
+    shape, rows = outputs[0].shape[1:], inputs.rows.view(ROW)[:, 0]
+    reached = dict(zip(ROW.names or (), outputs[0], strict=True))
     if isinstance(bonds, Cohort):
         ages = cast(Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
-        cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *passed[0].shape[1:]))
+        cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *shape))
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance, math.inf)
-        advance_cohorts(*at, numbers[0], numbers[2], *passed, share, rules, *cohorts, sums)
+        advance_cohorts(tuple(inputs), numbers, outputs, share, rules, *cohorts, sums)
         return Ages(cohorts, area_radius), bonds.read(sums)
     if isinstance(bonds, Tracked):
         tracks = cast(Tracks, population)
         tracks = tracks._replace(frame=tracks.frame.copy())
-        frames = np.empty((*passed[0].shape[1:], tracks.frame.shape[1]))
+        frames = np.empty((*shape, tracks.frame.shape[1]))
         lives = (*bonds.law[:3], bonds.rebinding_rate), noise.seed, np.asarray(noise.members, dtype=np.uint64)
-        if advance_tracks(*at, numbers[0], numbers[2], *passed, tuple(tracks), *lives, frames):
+        if advance_tracks(tuple(inputs), numbers, outputs, tuple(tracks), *lives, frames):
             raise RuntimeError(AGAIN)
         return tracks, bonds.read(frames)
     if isinstance(bonds, FirstMoment):
         stretches = cast(Stretches, population)
         share, area_radius = bonds.diluted(stretches.area_radius, radius)
-        rows[:, columns.BOUND], rows[:, columns.MOMENT] = stretches.bound * share, stretches.stretch * share
+        rows["bound"], rows["moment"] = stretches.bound * share, stretches.stretch * share
     else:
         before = cast(Population, population)
         share, area_radius = bonds.diluted(before.area_radius, radius)
-        rows[:, columns.BOUND] = bonds.bonding(before).fraction * share
-    advance_rows(*at, *numbers, *passed)
-    bound, moment = passed[0][columns.BOUND], passed[0][columns.MOMENT]
+        rows["bound"] = bonds.bonding(before).fraction * share
+    advance_rows(tuple(inputs), numbers, outputs)
+    bound, moment = reached["bound"], reached["moment"]
     if isinstance(bonds, FirstMoment):
         return Stretches(bound[-1].copy(), moment[-1].copy(), area_radius), bonds.bonding(Stretches(bound, moment))
+    stretch = float(inputs.units.view(ROW)["slip"][0])
     stress = bonds.stress / stretch * moment
     return Population(bound[-1].copy(), np.sign(stress[-1]), area_radius), Bonding(bound, stress, stress)
 
 
-def agreed(passed: Driven, radius: Array) -> int:
+def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
     """Number of clock steps up to the first that ends with another contact radius [m] than its sub-steps."""
-    apart = ~np.all(_agree(passed.radius, radius), axis=1)
+    apart = ~np.all(_agree(slider.radius, radius), axis=1)
     return int(np.argmax(apart)) + 1 if apart[:-1].any() else len(apart)
 
 
@@ -273,11 +263,11 @@ def _agree(own: Array, radius: Array) -> Flags:
     return same
 
 
-def _numbers(drive: Force | Spring, bonds: _Driven, around: Around, units: _Units) -> _Numbers:
+def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units: _Units) -> _Numbers:
     """The numbers of slider, bonds and contact, but for what holds the sphere, in their units."""
     stretch, force = units
-    stiff, density = force / stretch, force / (stretch * around.area)
-    yields, slope = (stiff * value for value in drive.yields(around.shear_modulus, around.poisson_ratio))
+    stiff, density = force / stretch, force / (stretch * contact.area)
+    yields, slope = (stiff * value for value in drive.yields(contact.shear_modulus, contact.poisson_ratio))
     body = drive.spring / stiff, drive.mass / stiff, drive.damping / stiff, drive.viscosity / density
     slider = Slider(*body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
     if isinstance(bonds, _WITH_STRETCH):
@@ -288,21 +278,21 @@ def _numbers(drive: Force | Spring, bonds: _Driven, around: Around, units: _Unit
         binding = bonds.rebinding_rate if isinstance(bonds, Rate) else 0.0
         breaking, of_rest = Law(0.0, 0.0, stretch / _renewing(bonds), binding, 1.0, 1.0, slows), 1.0
     taken = 0.0
-    if around.reversible:
+    if contact.reversible:
         stress = density * stretch
-        taken = around.reversible * float(mean_stress_energy(1.0, stress, around.modulus, around.poisson_ratio))
-    held = Resting(
-        float(around.stays), around.bonded / of_rest, taken, 0.0, 0.0, 0.0, 0.0, around.mounts[0].stiffness,
-        1.0 / around.sphere_radius, around.modulus, around.area,
+        taken = contact.reversible * float(mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio))
+    solid = Solid(
+        contact.bonded / of_rest, taken, contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus,
+        contact.area,
     )  # fmt: skip
-    return tuple(slider), tuple(breaking), tuple(held)
+    return tuple(slider), tuple(breaking), tuple(solid), float(contact.stays)
 
 
-def _clock(around: Around, ends: Array) -> Array:
+def _clock(contact: StepContact, ends: Array) -> Array:
     """Beginning of each step, load and displacement of the base there, each with its rate; shape (steps, 5)."""
     duration = ends[1:] - ends[:-1]
     clock = np.zeros((len(duration), 5))
     clock[:, 0] = ends[:-1]
-    for column, (first, last) in enumerate(zip(*(mount[:2] for mount in around.mounts), strict=True)):
+    for column, (first, last) in enumerate(zip(*(mount[:2] for mount in contact.mounts), strict=True)):
         clock[:, 2 * column + 1], clock[:, 2 * column + 2] = first, (last - first) / duration
     return clock

@@ -18,27 +18,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, inlined
-from sim.parts.coupled.row import (
-    BODY,
-    BOUND,
-    COUNT,
-    FEW,
-    FORCE,
-    MOMENT,
-    PATH,
-    POSITION,
-    RADIUS,
-    SHEARED,
-    SLIP,
-    SOME,
-    SPEED,
-    SQUARE,
-    compliance,
-    contact_area,
-    driven,
-    pull_on,
-)
-from sim.parts.drive import AREA, DAMPING, RUPTURE, VISCOSITY, WORK
+from sim.parts.coupled.row import FEW, SOME, compliance, contact_area, driven, pull_on
 from sim.parts.exchange import Array
 
 _S6 = math.sqrt(6.0)
@@ -85,16 +65,26 @@ def _cross(a: list[float], b: list[float]) -> list[float]:
 
 
 PACE, TURNING, FORTH, BACK = _modes()
-#: Rows of the room for a sub-step, each with what stands at its three nodes: first the unknowns slip, u, N, M, then
-#: their residuals, the unknowns of the last sub-step, contact radii, forces on a body that stays, areas, k_t; and
-#: length and root of the error of the last sub-step.
-RIGHT, PAST, RADII, PULLS, AREAS, FIRMS, LAST, ROOM = 4, 8, 12, 13, 14, 15, 16, 17
+_THREE = ("f8", 3)
+#: Three nodes of a sub-step: the unknowns slip, u, N, M as ``values`` and by their names, their residuals, their values
+#: in the last sub-step; contact radii, forces on a body that stays, areas, k_t; length and root of the error of the
+#: last sub-step.
+NODE_VALUES = np.dtype(
+    {
+        "names": [
+            "values", "slip", "sheared", "bound", "moment", "residuals", "past", "radii", "pulls", "areas", "firms",
+            "last_step", "last_root",
+        ],
+        "formats": [("f8", (4, 3)), *4 * [_THREE], *2 * [("f8", (4, 3))], *4 * [_THREE], "f8", "f8"],
+        "offsets": [0, 0, 24, 48, 72, 96, 192, 288, 312, 336, 360, 384, 392],
+    }
+)  # fmt: skip
 
 
 @device
 def kinetics(bound, moment, speed, law):
     """Ṅ and its slopes over N and M; Ṁ and its slope over N; that over M, and over the speed; Ṅ's; k, \\|speed\\|/l."""
-    rate, softness, cuts, binding, _, sense, _ = law
+    rate, softness, cuts, binding, sense = law.rate, law.softness, law.cuts, law.binding, law.sense
     stretch = moment / bound if bound > 0.0 else 0.0
     k = rate * math.exp(min(softness * math.fabs(stretch), 690.0))
     steeper = math.copysign(k * softness, stretch)
@@ -110,70 +100,72 @@ def kinetics(bound, moment, speed, law):
 @device
 def share_left(speed, law):
     """Bonds over those of rest of bonds without a stretch, continued smoothly through a speed of zero."""
-    return 1.0 / (1.0 + law[6] * law[5] * speed)
+    return 1.0 / (1.0 + law.slows * law.sense * speed)
 
 
 @device
 def rested(bound, time, law):
     """Bonds over those of rest after some time at rest: all of them, if they follow the speed at once."""
-    return 1.0 if law[6] != 0.0 else bound - (1.0 - bound) * math.expm1(-law[3] * time)
+    return 1.0 if law.slows != 0.0 else bound - (1.0 - bound) * math.expm1(-law.binding * time)
 
 
 @device
-def _sum(weights, i, values, k):
-    """A row of weights times what stands at the three nodes of one unknown."""
-    return weights[i, 0] * values[k, 0] + weights[i, 1] * values[k, 1] + weights[i, 2] * values[k, 2]
+def _sum(weights, i, values):
+    """Return the sum over the three nodes of values times a row of weights."""
+    return weights[i, 0] * values[0] + weights[i, 1] * values[1] + weights[i, 2] * values[2]
 
 
 @inlined
-def equations(row, room, start, step, bare, slider, law, held):
+def equations(row, nodes, start, step, slider, law, contact):
     """Residuals at the three nodes for slip, u, N, M there, and their slopes at the middle one.
 
     The slopes are those of the balance of forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ; nan where
     there is no equilibrium.
     """
-    stiffness, mass, damping, viscosity, _, _, _, _ = slider
-    over, gives = 1.0 / step, slider[5] + slider[6] > 0.0
-    radius, area, by_bound, by_moment = row[RADIUS], 0.0, 0.0, 0.0
-    if held[0] > 0.0:
-        area = math.pi * radius * radius / held[10]
+    stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
+    over, gives = 1.0 / step, slider.yielding + slider.yielding_radius > 0.0
+    radius, area, by_bound, by_moment = row.radius, 0.0, 0.0, 0.0
+    if contact.stays > 0.0:
+        area = math.pi * radius * radius / contact.solid.area
     of_balance, of_u = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     of_bonds = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        bound, moment = row[BOUND] + room[2, i], row[MOMENT] + room[3, i]
-        if held[0] == 0.0:
+        bound, moment = row.bound + nodes.bound[i], row.moment + nodes.moment[i]
+        if contact.stays == 0.0:
             now = start + NODES[i] * step
-            radius, area, by_bound, by_moment = contact_area(bound, moment, now, room[RADII, i], bare, held)
-            room[RADII, i] = radius
+            radius, area, by_bound, by_moment = contact_area(bound, moment, now, nodes.radii[i], contact)
+            nodes.radii[i] = radius
         if not (bound >= 0.0 and area >= 0.0):
             return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        speed = _sum(RATES, i, room, 0) * over
-        body = speed + _sum(RATES, i, room, 1) * over if gives else speed
+        speed = _sum(RATES, i, nodes.slip) * over
+        body = speed + _sum(RATES, i, nodes.sheared) * over if gives else speed
         stress = moment + viscosity * speed
         yields, softer = compliance(radius, slider)
-        room[RIGHT, i] = area * stress + damping * body - room[PULLS, i] + stiffness * (room[0, i] + room[1, i])
+        nodes.residuals[0, i] = (
+            area * stress + damping * body - nodes.pulls[i] + stiffness * (nodes.slip[i] + nodes.sheared[i])
+        )
         if mass > 0.0:
-            bend = (_sum(BENDS, i, room, 0) + _sum(BENDS, i, room, 1)) * over - _OFF[i] * row[BODY]
-            room[RIGHT, i] += mass * bend * over
-        room[RIGHT + 1, i] = row[SHEARED] + room[1, i] - yields * area * stress
+            bend = (_sum(BENDS, i, nodes.slip) + _sum(BENDS, i, nodes.sheared)) * over - _OFF[i] * row.body_speed
+            nodes.residuals[0, i] += mass * bend * over
+        nodes.residuals[1, i] = row.sheared + nodes.sheared[i] - yields * area * stress
         of_bound, of_moment, on, turn, _, _ = kinetics(bound, moment, speed, law)
-        room[RIGHT + 2, i] = _sum(RATES, i, room, 2) * over - of_bound[0]
-        room[RIGHT + 3, i] = _sum(RATES, i, room, 3) * over - of_moment[0]
+        nodes.residuals[2, i] = _sum(RATES, i, nodes.bound) * over - of_bound[0]
+        nodes.residuals[3, i] = _sum(RATES, i, nodes.moment) * over - of_moment[0]
         if i == 1:
             of_bonds = of_bound[1], of_bound[2], turn, of_moment[1], on[0], on[1]
-        if law[5] != 0.0:
-            room[RIGHT + 3, i] = moment - law[5] * bound
+        if law.sense != 0.0:
+            nodes.residuals[3, i] = moment - law.sense * bound
             if i == 1:
-                of_bonds = of_bound[1], 0.0, turn, law[5], -1.0, 0.0
-        if law[6] != 0.0:
+                of_bonds = of_bound[1], 0.0, turn, law.sense, -1.0, 0.0
+        if law.slows != 0.0:
             left = share_left(speed, law)
-            room[RIGHT + 2, i] = bound - left
+            nodes.residuals[2, i] = bound - left
             if i == 1:
-                of_bonds = -1.0, 0.0, -law[6] * law[5] * left * left, law[5], -1.0, 0.0
+                of_bonds = -1.0, 0.0, -law.slows * law.sense * left * left, law.sense, -1.0, 0.0
         if i == 1:
             of_balance = by_bound * stress, area + by_moment * stress, area * viscosity
             if yields > 0.0:
-                softer *= held[10] / (2.0 * math.pi * radius) * area * stress
+                softer *= contact.solid.area / (2.0 * math.pi * radius) * area * stress
                 of_u = (
                     -yields * of_balance[0] - softer * by_bound,
                     -yields * of_balance[1] - softer * by_moment,
@@ -196,13 +188,13 @@ def _resolved(rate, slopes, slider, law):
     """
     to_bound, to_moment, thick, u_bound, u_moment, u_speed = slopes[:6]
     n_bound, n_moment, n_speed, m_bound, m_moment, m_speed = slopes[6:]
-    n = (rate if law[6] == 0.0 else 0.0 * rate) - n_bound
-    m = (rate if law[5] == 0.0 else 0.0 * rate) - m_moment
+    n = (rate if law.slows == 0.0 else 0.0 * rate) - n_bound
+    m = (rate if law.sense == 0.0 else 0.0 * rate) - m_moment
     scale = _over(n * m - n_moment * m_bound)
     nn, nm, mn, mm = m * scale, n_moment * scale, m_bound * scale, n * scale
     n_slip, m_slip = rate * (nn * n_speed + nm * m_speed), rate * (mn * n_speed + mm * m_speed)
     u_slip = -(u_speed * rate + u_bound * n_slip + u_moment * m_slip)
-    firm = slider[0] + rate * (slider[2] + rate * slider[1])
+    firm = slider.stiffness + rate * (slider.damping + rate * slider.mass)
     yields = _over(firm * (1.0 + u_slip) + rate * thick + to_bound * n_slip + to_moment * m_slip)
     by_n, by_m = firm * u_bound - to_bound, firm * u_moment - to_moment
     slip = yields, -firm * yields, (by_n * nn + by_m * mn) * yields, (by_n * nm + by_m * mm) * yields
@@ -230,24 +222,24 @@ def _taken(mode, slopes, balance, yielding, bonds, stretches):
 
 
 @inlined
-def correct(modes, slopes, slider, room):
+def correct(modes, slopes, slider, nodes):
     """Replace residuals at the nodes by what takes them away."""
-    b, u, n, m = RIGHT, RIGHT + 1, RIGHT + 2, RIGHT + 3
-    gives = slider[5] + slider[6] > 0.0
-    real = _sum(BACK, 0, room, b), _sum(BACK, 0, room, u) if gives else 0.0, _sum(BACK, 0, room, n)
-    one = _taken(modes[0], slopes, real[0], real[1], real[2], _sum(BACK, 0, room, m))
-    turned = _turned(room, u) if gives else complex(0.0, 0.0)
-    two = _taken(modes[1], slopes, _turned(room, b), turned, _turned(room, n), _turned(room, m))
+    balance, yielding, bonds, stretches = nodes.residuals[0], nodes.residuals[1], nodes.residuals[2], nodes.residuals[3]
+    gives = slider.yielding + slider.yielding_radius > 0.0
+    real = _sum(BACK, 0, balance), _sum(BACK, 0, yielding) if gives else 0.0, _sum(BACK, 0, bonds)
+    one = _taken(modes[0], slopes, real[0], real[1], real[2], _sum(BACK, 0, stretches))
+    turned = _turned(yielding) if gives else complex(0.0, 0.0)
+    two = _taken(modes[1], slopes, _turned(balance), turned, _turned(bonds), _turned(stretches))
     for i in range(3):
         first, second, third = FORTH[i, 0], FORTH[i, 1], FORTH[i, 2]
         for k in range(4):
-            room[RIGHT + k, i] = first * one[k] + second * two[k].real + third * two[k].imag
+            nodes.residuals[k, i] = first * one[k] + second * two[k].real + third * two[k].imag
 
 
 @device
-def _turned(room, k):
-    """Part of an unknown's residuals in the complex modes."""
-    return complex(_sum(BACK, 1, room, k), _sum(BACK, 2, room, k))
+def _turned(residuals):
+    """Return the part of an unknown's residuals in the complex modes."""
+    return complex(_sum(BACK, 1, residuals), _sum(BACK, 2, residuals))
 
 
 #: Share of a sub-step after which the defect of the equations is measured, between the first two nodes.
@@ -278,61 +270,67 @@ _BASE = np.array([1.0 / np.prod([c - d for d in (0.0, *NODES) if d != c]) for c 
 
 
 @inlined
-def _ahead(row, room, step, law):
+def _ahead(row, nodes, step, law):
     """Guess slip, u, N, M at the nodes: the last sub-step's polynomial, or the slopes at the start."""
-    of_bound, of_moment, _, _, _, _ = kinetics(row[BOUND], row[MOMENT], row[SPEED], law)
+    of_bound, of_moment, _, _, _, _ = kinetics(row.bound, row.moment, row.speed, law)
     for i in range(3):
-        if room[LAST, 0] > 0.0:
-            x = 1.0 + NODES[i] * step / room[LAST, 0]
+        if nodes.last_step > 0.0:
+            x = 1.0 + NODES[i] * step / nodes.last_step
             first, second = x - NODES[0], x - NODES[1]
             one = x * second * (x - 1.0) * _BASE[0]
             two = x * first * (x - 1.0) * _BASE[1]
             last = x * first * second * _BASE[2] - 1.0
             for k in range(4):
-                room[k, i] = one * room[PAST + k, 0] + two * room[PAST + k, 1] + last * room[PAST + k, 2]
+                nodes.values[k, i] = one * nodes.past[k, 0] + two * nodes.past[k, 1] + last * nodes.past[k, 2]
         else:
             time = NODES[i] * step
-            room[0, i], room[1, i], room[2, i], room[3, i] = row[SPEED] * time, 0.0, 0.0, 0.0
-            if law[6] == 0.0:
-                room[2, i] = of_bound[0] * time
-                room[3, i] = of_moment[0] * time if law[5] == 0.0 else law[5] * room[2, i]
-        room[2, i] = max(room[2, i], -0.5 * row[BOUND])
+            nodes.slip[i], nodes.sheared[i], nodes.bound[i], nodes.moment[i] = row.speed * time, 0.0, 0.0, 0.0
+            if law.slows == 0.0:
+                nodes.bound[i] = of_bound[0] * time
+                nodes.moment[i] = of_moment[0] * time if law.sense == 0.0 else law.sense * nodes.bound[i]
+        nodes.bound[i] = max(nodes.bound[i], -0.5 * row.bound)
 
 
 @device
-def newton(row, start, step, bare, slider, law, held, piece, room):
+def newton(row, start, step, slider, law, contact, piece, nodes):
     """Solve for slip, u, N, M at the nodes, by Newton's method with the middle one's slopes; whether that worked.
 
     It ends where the next correction would be small, at the pace of the last two.
     """
-    _ahead(row, room, step, law)
+    _ahead(row, nodes, step, law)
     for i in range(3):
-        room[RADII, i] = row[RADIUS]
-        room[PULLS, i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider, piece)
-    bound = min(row[BOUND], row[BOUND] + room[2, 2]) + FEW
-    moment = min(math.fabs(row[MOMENT]), math.fabs(row[MOMENT] + room[3, 2]))
-    of_slip, of_bound, of_moment = 1.0 / (law[4] + math.fabs(room[0, 2])), 1.0 / bound, 1.0 / (law[4] * bound + moment)
-    before, close = math.inf, min(1e-6, 0.1 * slider[7])
+        nodes.radii[i] = row.radius
+        nodes.pulls[i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider, piece)
+    bound = min(row.bound, row.bound + nodes.bound[2]) + FEW
+    moment = min(math.fabs(row.moment), math.fabs(row.moment + nodes.moment[2]))
+    of_slip, of_bound, of_moment = (
+        1.0 / (law.scale + math.fabs(nodes.slip[2])),
+        1.0 / bound,
+        1.0 / (law.scale * bound + moment),
+    )
+    before, close = math.inf, min(1e-6, 0.1 * slider.tolerance)
     slopes, shrinks = _UNKNOWN, 0.5
     modes = _NO_MODES
     for turn in range(_TURNS):
-        latest = equations(row, room, start, step, bare, slider, law, held)
+        latest = equations(row, nodes, start, step, slider, law, contact)
         if math.isnan(latest[0]):
             return False
         if shrinks > _SLOW:
             slopes = latest
             modes = resolved(slopes, step, slider, law)
-        correct(modes, slopes, slider, room)
+        correct(modes, slopes, slider, nodes)
         part, change = 1.0, 0.0
         for i in range(3):
-            bound = row[BOUND] + room[2, i]
-            if bound - room[RIGHT + 2, i] < 0.1 * bound:  # N stays above zero
-                part = min(part, 0.9 * bound / room[RIGHT + 2, i])
+            bound = row.bound + nodes.bound[i]
+            if bound - nodes.residuals[2, i] < 0.1 * bound:  # N stays above zero
+                part = min(part, 0.9 * bound / nodes.residuals[2, i])
         for i in range(3):
-            change = max(change, math.fabs(room[RIGHT, i]) * of_slip)
-            change = max(change, math.fabs(room[RIGHT + 2, i]) * of_bound, math.fabs(room[RIGHT + 3, i]) * of_moment)
+            change = max(change, math.fabs(nodes.residuals[0, i]) * of_slip)
+            change = max(
+                change, math.fabs(nodes.residuals[2, i]) * of_bound, math.fabs(nodes.residuals[3, i]) * of_moment
+            )
             for k in range(4):
-                room[k, i] -= part * room[RIGHT + k, i]
+                nodes.values[k, i] -= part * nodes.residuals[k, i]
         shrinks = change / before if turn > 0 else 0.5
         if change * min(1.0, shrinks / max(1.0 - shrinks, 1e-3)) <= close:
             return True
@@ -343,32 +341,32 @@ def newton(row, start, step, bare, slider, law, held, piece, room):
 
 
 @inlined
-def error_of(row, start, step, bare, slider, law, held, piece, room):
+def error_of(row, start, step, slider, law, contact, piece, nodes):
     """Defect of the equations between nodes, as an error of a stretch: of order 4 in the sub-step, over its scale.
 
     The polynomials through start and nodes solve the equations at the nodes alone. What is missing between them of the
     balance of forces, of N, of M and, with a mass, of the speed is taken over what resists it.
     """
-    stiffness, mass, damping, viscosity, _, _, _, _ = slider
-    slip, body, bound, moment = 0.0, 0.0, row[BOUND], row[MOMENT]
+    stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
+    slip, body, bound, moment = 0.0, 0.0, row.bound, row.moment
     speed, to_bound, to_moment, going = 0.0, 0.0, 0.0, 0.0
-    pace, bend = _VALUES[3] * row[BODY], _SLOPES[3] * row[BODY] / step
+    pace, bend = _VALUES[3] * row.body_speed, _SLOPES[3] * row.body_speed / step
     for j in range(3):
         at_node = 0.0
         for k in range(3):
-            at_node += RATES[j, k] * (room[0, k] + room[1, k]) / step
+            at_node += RATES[j, k] * (nodes.slip[k] + nodes.sheared[k]) / step
         pace += _VALUES[j] * at_node
         bend += _SLOPES[j] * at_node / step
-        slip += _VALUES[j] * room[0, j]
-        body += _VALUES[j] * (room[0, j] + room[1, j])
-        going += _SLOPES[j] * (room[0, j] + room[1, j]) / step
-        speed += _SLOPES[j] * room[0, j] / step
-        bound += _VALUES[j] * room[2, j]
-        moment += _VALUES[j] * room[3, j]
-        to_bound += _SLOPES[j] * room[2, j]
-        to_moment += _SLOPES[j] * room[3, j]
+        slip += _VALUES[j] * nodes.slip[j]
+        body += _VALUES[j] * (nodes.slip[j] + nodes.sheared[j])
+        going += _SLOPES[j] * (nodes.slip[j] + nodes.sheared[j]) / step
+        speed += _SLOPES[j] * nodes.slip[j] / step
+        bound += _VALUES[j] * nodes.bound[j]
+        moment += _VALUES[j] * nodes.moment[j]
+        to_bound += _SLOPES[j] * nodes.bound[j]
+        to_moment += _SLOPES[j] * nodes.moment[j]
     time = start + _BETWEEN * step
-    radius, area, _, _ = contact_area(bound, moment, time, room[RADII, 0], bare, held)
+    radius, area, _, _ = contact_area(bound, moment, time, nodes.radii[0], contact)
     if not (area >= 0.0 and bound >= 0.0):
         return math.inf
     of_bound, of_moment, on, _, _, _ = kinetics(bound, moment, speed, law)
@@ -376,10 +374,10 @@ def error_of(row, start, step, bare, slider, law, held, piece, room):
     balance = area * (moment + viscosity * speed) + damping * pace + mass * bend
     balance -= pull_on(time, start, body, row, slider, piece)
     bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
-    scale = law[4] * (bound + FEW) + math.fabs(moment)
-    if law[5] != 0.0:
+    scale = law.scale * (bound + FEW) + math.fabs(moment)
+    if law.sense != 0.0:
         to_moment = step * of_moment[0]
-    if law[6] != 0.0:
+    if law.slows != 0.0:
         to_bound = step * of_bound[0] + bound - share_left(speed, law)
     found = max(
         math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + FEW),
@@ -390,87 +388,94 @@ def error_of(row, start, step, bare, slider, law, held, piece, room):
     stiffest = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0)
     firm = max(1.0, stiffest / (area * (bound + SOME))) if mass > 0.0 and area > 0.0 else 1.0
     # an open contact bears nothing: then what is missing from the spring counts
-    found = max(found, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law[4])
-    return max(found, firm * step * math.fabs(going - pace) / law[4]) if mass > 0.0 else found
+    found = max(found, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law.scale)
+    return max(found, firm * step * math.fabs(going - pace) / law.scale) if mass > 0.0 else found
 
 
 @inlined
-def tried(row, start, step, bare, slider, law, held, piece, room):
+def tried(row, start, step, slider, law, contact, piece, nodes):
     """Solve for a sub-step: length of the next over that of this one, and whether this one stands.
 
     The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
     tolerance. It goes with the sixth power of the length; where it has grown since the last sub-step, the same growth
     is expected of the next (Gustafsson 1994).
     """
-    if not newton(row, start, step, bare, slider, law, held, piece, room):
+    if not newton(row, start, step, slider, law, contact, piece, nodes):
         return 0.25, False
-    error = error_of(row, start, step, bare, slider, law, held, piece, room)
-    error *= math.sqrt(error) / slider[7]
+    error = error_of(row, start, step, slider, law, contact, piece, nodes)
+    error *= math.sqrt(error) / slider.tolerance
     if not error < math.inf:
         return 0.25, False
     root = max(error, 1e-6) ** (1.0 / 6.0)
     if not error <= 1.0:
         return max(0.1, 0.9 / root), False
     grows = 0.9 / root
-    if room[LAST, 0] > 0.0:
-        grows *= min(1.0, step / room[LAST, 0] * room[LAST, 1] / root)
-    room[LAST, 1] = max(root, 0.5)
+    if nodes.last_step > 0.0:
+        grows *= min(1.0, step / nodes.last_step * nodes.last_root / root)
+    nodes.last_root = max(root, 0.5)
     return min(6.0, max(0.1, grows)), True
 
 
 @inlined
-def book(row, start, step, bare, slider, law, held, piece, room, energy):
+def book(row, start, step, slider, law, contact, piece, nodes, energy):
     """Take an accepted sub-step: integrals of the powers by the method's own shares, and the row at its end."""
-    _, _, damping, viscosity, forced, _, _, _ = slider
+    damping, viscosity = slider.damping, slider.viscosity
     way, speed, body = 0.0, 0.0, 0.0
-    follows = held[0] == 0.0
-    first, firm = math.pi * row[RADIUS] * row[RADIUS] / held[10], 0.0
+    follows = contact.stays == 0.0
+    first, firm = math.pi * row.radius * row.radius / contact.solid.area, 0.0
     if follows:
-        _, first, _, _ = contact_area(row[BOUND], row[MOMENT], start, row[RADIUS], bare, held)
-        yields, _ = compliance(row[RADIUS], slider)
+        _, first, _, _ = contact_area(row.bound, row.moment, start, row.radius, contact)
+        yields, _ = compliance(row.radius, slider)
         firm = 1.0 / yields if yields > 0.0 else 0.0
     for i in range(3):
-        room[AREAS, i] = first
+        nodes.areas[i] = first
         if follows:
-            bound, moment = row[BOUND] + room[2, i], row[MOMENT] + room[3, i]
+            bound, moment = row.bound + nodes.bound[i], row.moment + nodes.moment[i]
             time = start + NODES[i] * step
-            room[RADII, i], room[AREAS, i], _, _ = contact_area(bound, moment, time, room[RADII, i], bare, held)
-            yields, _ = compliance(room[RADII, i], slider)
-            room[FIRMS, i] = 1.0 / yields if yields > 0.0 else 0.0
+            nodes.radii[i], nodes.areas[i], _, _ = contact_area(bound, moment, time, nodes.radii[i], contact)
+            yields, _ = compliance(nodes.radii[i], slider)
+            nodes.firms[i] = 1.0 / yields if yields > 0.0 else 0.0
     for i in range(3):
-        bound, moment, area = row[BOUND] + room[2, i], row[MOMENT] + room[3, i], room[AREAS, i]
+        bound, moment, area = row.bound + nodes.bound[i], row.moment + nodes.moment[i], nodes.areas[i]
         speed, body, spreads, firms = 0.0, 0.0, 0.0, 0.0
         for j in range(3):
-            speed += RATES[i, j] * room[0, j] / step
-            body += RATES[i, j] * (room[0, j] + room[1, j]) / step
+            speed += RATES[i, j] * nodes.slip[j] / step
+            body += RATES[i, j] * (nodes.slip[j] + nodes.sheared[j]) / step
             if follows:
-                spreads += RATES[i, j] * (room[AREAS, j] - first)
-                firms += RATES[i, j] * (room[FIRMS, j] - firm)
-        sheared, pull = row[SHEARED] + room[1, i], room[PULLS, i] - slider[0] * (room[0, i] + room[1, i])
-        given = body if forced > 0.0 else driven(start + NODES[i] * step, piece)[1]
+                spreads += RATES[i, j] * (nodes.areas[j] - first)
+                firms += RATES[i, j] * (nodes.firms[j] - firm)
+        sheared, pull = (
+            row.sheared + nodes.sheared[i],
+            nodes.pulls[i] - slider.stiffness * (nodes.slip[i] + nodes.sheared[i]),
+        )
+        given = body if slider.forced > 0.0 else driven(start + NODES[i] * step, piece)[1]
         _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
-        square = moment * moment / bound if bound > 0.0 and law[5] == 0.0 else 0.0
-        fresh = law[3] * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
+        square = moment * moment / bound if bound > 0.0 and law.sense == 0.0 else 0.0
+        fresh = law.binding * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
         share = SHARES[i] * step
-        energy[WORK] += share * pull * given
-        energy[DAMPING] += share * damping * body * body
-        energy[VISCOSITY] += share * area * viscosity * speed * speed
-        energy[RUPTURE] += share * 0.5 * area * (square * (k + 3.0 * travel) + fresh)
-        if law[5] != 0.0:
-            energy[RUPTURE] += share * area * moment * speed
-        energy[AREA] -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
-        row[SQUARE] += share * speed * speed
-        row[PATH] += math.fabs(room[0, i] - way)
-        way = room[0, i]
-    row[FORCE], row[BODY], row[SPEED] = room[PULLS, 2] - slider[0] * (room[0, 2] + room[1, 2]), body, speed
-    row[RADIUS] = room[RADII, 2]
-    row[SHEARED] += room[1, 2]
-    row[BOUND] = min(row[BOUND] + room[2, 2], 1.0)
-    row[MOMENT] += room[3, 2]
-    row[POSITION] += room[0, 2] + room[1, 2]
-    row[SLIP] += room[0, 2]
-    row[COUNT] += 1.0
+        energy.work += share * pull * given
+        energy.damping += share * damping * body * body
+        energy.viscosity += share * area * viscosity * speed * speed
+        energy.rupture += share * 0.5 * area * (square * (k + 3.0 * travel) + fresh)
+        if law.sense != 0.0:
+            energy.rupture += share * area * moment * speed
+        energy.area -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
+        row.squared_speed += share * speed * speed
+        row.path += math.fabs(nodes.slip[i] - way)
+        way = nodes.slip[i]
+    row.spring_force, row.body_speed, row.speed = (
+        nodes.pulls[2] - slider.stiffness * (nodes.slip[2] + nodes.sheared[2]),
+        body,
+        speed,
+    )
+    row.radius = nodes.radii[2]
+    row.sheared += nodes.sheared[2]
+    row.bound = min(row.bound + nodes.bound[2], 1.0)
+    row.moment += nodes.moment[2]
+    row.position += nodes.slip[2] + nodes.sheared[2]
+    row.slip += nodes.slip[2]
+    row.substeps += 1.0
     for k in range(4):
         for i in range(3):
-            room[PAST + k, i] = room[k, i]
-    room[LAST, 0] = step
+            nodes.past[k, i] = nodes.values[k, i]
+    nodes.last_step = step

@@ -3,18 +3,38 @@
 import math
 from typing import NamedTuple
 
-from sim.numerics.jit import device
-from sim.parts.drive import STORED, WORK
+import numpy as np
 
-#: Columns of a row: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the body,
-#: slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway, integral of
-#: the squared speed of the interface over the clock step, acceleration of the interface.
-FORCE, BODY, SHEARED, BOUND, MOMENT, SPEED, POSITION, SLIP, PATH, RADIUS, NEXT, COUNT, ENDED, SQUARE, BEND = range(15)
-COLUMNS = 15
+from sim.numerics.jit import device
+from sim.parts.drive import ENERGY
+from sim.parts.exchange import Array
+
+#: Row of slider and bonds: spring force S, speed of the body, u, N, M, speed of the interface, displacement of the
+#: body, slip and path of the clock step, contact radius, next sub-step, number of sub-steps, time of a runaway,
+#: integral of the squared speed of the interface over the clock step, acceleration of the interface.
+ROW = np.dtype(
+    [
+        (name, float)
+        for name in (
+            "spring_force", "body_speed", "sheared", "bound", "moment", "speed", "position", "slip", "path", "radius",
+            "next_step", "substeps", "runaway_time", "squared_speed", "acceleration",
+        )
+    ]
+)  # fmt: skip
+COLUMNS = len(ROW.names or ())
+SLIP = (ROW.names or ()).index("slip")
+ENERGIES = len(ENERGY.names or ())
+_STORED = (ENERGY.names or ()).index("stored")
+#: Types of ``Inputs``, of the numbers of slider, bonds and contact, and of what rows and energies come to.
+INPUTS = (
+    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64))"
+)
+NUMBERS = "Tuple((UniTuple(float64, 8), UniTuple(float64, 7), UniTuple(float64, 6), float64))"
+OUTPUTS = "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 
 
 class Slider(NamedTuple):
-    """Numbers of a drive: K, m, c, η, whether it prescribes the force, 1/k_t as constant + slope/a, tolerance."""
+    """Numbers of a drive: K, m, c, η, 1 if it prescribes the force, 1/k_t as constant + slope/a, tolerance."""
 
     stiffness: float
     mass: float
@@ -42,29 +62,66 @@ class Law(NamedTuple):
     slows: float = 0.0
 
 
-class Resting(NamedTuple):
-    """Numbers of the contact during a step: whether its radius stays; work of adhesion per bond share N.
+class Solid(NamedTuple):
+    """Numbers of the contact that stay: work of adhesion per bond share N, ``mean_stress``, stiffness behind the base,
+    curvature, modulus, reference area.
 
-    ``taken``: energy that the mean stress takes over radius and M²; load, base and their rates; the stiffness
-    behind the base; curvature, modulus, reference area.
+    ``mean_stress`` is the energy that the mean stress takes, over radius and M².
     """
 
-    stays: float
     bonded: float
-    taken: float
-    load: float
-    load_rate: float
-    base: float
-    base_rate: float
+    mean_stress: float
     stiffness: float
     curvature: float
     modulus: float
     area: float
 
 
+class Contact(NamedTuple):
+    """Numbers of the contact from some time on.
+
+    Work of adhesion without bonds; load and base with their rates; 1 if the radius stays during the step, else 0.
+    """
+
+    bare: float
+    load: float
+    load_rate: float
+    base: float
+    base_rate: float
+    stays: float
+    solid: Solid
+
+
+class Piece(NamedTuple):
+    """Piece of a clock step: length, value of the drive at both ends, and its integral."""
+
+    length: float
+    first: float
+    last: float
+    integral: float
+
+
+class Inputs(NamedTuple):
+    """State and course of some clock steps, for all rows.
+
+    ``rows`` and ``energies`` have the columns of ``ROW`` and ``ENERGY`` and are advanced in place; ``bare`` is the work
+    of adhesion of each row without bonds. ``pieces``: number of the clock step and a ``Piece``. ``clock``: beginning of
+    each step, load and its rate, base and its rate. ``units`` of the columns and of ``work``: the equations have none.
+    """
+
+    rows: Array
+    energies: Array
+    bare: Array
+    pieces: Array
+    clock: Array
+    units: Array
+    work: float
+
+
 @device
-def _missing(a, load, base, stiffness, curvature, modulus):
+def _missing(a, load, base, solid):
     """Depth of a contact of Hertz of this radius beyond what holds the sphere, and its slope over the radius."""
+    stiffness, curvature, modulus = solid.stiffness, solid.curvature, solid.modulus
     hertz = a * a * curvature
     if stiffness == math.inf:
         return hertz - base, 2.0 * a * curvature
@@ -74,21 +131,22 @@ def _missing(a, load, base, stiffness, curvature, modulus):
 
 
 @device
-def contact_area(bound, moment, time, radius, bare, held):
+def contact_area(bound, moment, time, radius, contact):
     """Contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
 
     Newton's method on the energy release rate, convex in the radius, from the last one: from the right of the root
     it goes left. nan where there is none; Hertz's radius where adhesion does not pay for the mean stress there.
     """
-    stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, unit = held
-    if stays > 0.0:
-        return radius, math.pi * radius * radius / unit, 0.0, 0.0
-    work, tilt = bare + bonded * bound, taken * moment * moment
-    load, base = load + load_rate * time, base + base_rate * time
+    solid = contact.solid
+    if contact.stays > 0.0:
+        return radius, math.pi * radius * radius / solid.area, 0.0, 0.0
+    bonded, taken, unit, modulus = solid.bonded, solid.mean_stress, solid.area, solid.modulus
+    work, tilt = contact.bare + bonded * bound, taken * moment * moment
+    load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
     a, slope = radius, 1.0
     if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
         for _ in range(60):
-            missing, growth = _missing(a, load, base, stiffness, curvature, modulus)
+            missing, growth = _missing(a, load, base, solid)
             a -= min(missing / growth, 0.5 * a)
             if math.fabs(missing) <= 1e-14 * growth * a:
                 break
@@ -96,7 +154,7 @@ def contact_area(bound, moment, time, radius, bare, held):
             return a, math.pi * a * a / unit, 0.0, 0.0
         a = max(a, radius)
     for _ in range(60):
-        missing, growth = _missing(a, load, base, stiffness, curvature, modulus)
+        missing, growth = _missing(a, load, base, solid)
         if work > 0.0:
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
             slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
@@ -119,15 +177,15 @@ def contact_area(bound, moment, time, radius, bare, held):
 @device
 def compliance(radius, slider):
     """1/k_t of the contact and its slope over the radius; 0 for an open one."""
-    if slider[6] == 0.0 or not radius > 0.0:
-        return slider[5], 0.0
-    return slider[5] + slider[6] / radius, -slider[6] / (radius * radius)
+    if slider.yielding_radius == 0.0 or not radius > 0.0:
+        return slider.yielding, 0.0
+    return slider.yielding + slider.yielding_radius / radius, -slider.yielding_radius / (radius * radius)
 
 
 @device
 def driven(time, piece):
     """A prescribed value's integral from the start of its piece, and the value: a cubic through both ends."""
-    length, first, last, integral = piece
+    length, first, last, integral = piece.length, piece.first, piece.last, piece.integral
     share = time / length
     cubic = (first + last) * length - 2.0 * integral
     square = integral - first * length - cubic
@@ -138,9 +196,9 @@ def driven(time, piece):
 @device
 def pull_on(time, start, way, row, slider, piece):
     """Spring force when the body has gone ``way`` since the ``start`` of a sub-step, or the force prescribed."""
-    if slider[4] > 0.0:
+    if slider.forced > 0.0:
         return driven(time, piece)[1]
-    return row[0] + slider[0] * (driven(time, piece)[0] - driven(start, piece)[0] - way)
+    return row.spring_force + slider.stiffness * (driven(time, piece)[0] - driven(start, piece)[0] - way)
 
 
 #: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
@@ -151,71 +209,93 @@ MOST_STEPS = 2_000_000
 
 
 @device
-def later(held, time, stays):
-    """The contact's numbers some time later, its radius as it is from there on if it ``stays``."""
-    _, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area = held
-    load, base = load + load_rate * time, base + base_rate * time
-    return stays, bonded, taken, load, load_rate, base, base_rate, stiffness, curvature, modulus, area
+def contact_from(solid, stays, bare, clock):
+    """Return the numbers of the contact from the beginning of a clock step on."""
+    return Contact(bare, clock[1], clock[2], clock[3], clock[4], stays, solid)
 
 
 @device
-def take_up(row, energy, given, gained, units, work):
+def later(contact, time, stays):
+    """Return the numbers of the contact some time later; its radius is fixed from there on if it ``stays``."""
+    load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
+    return Contact(contact.bare, load, contact.load_rate, base, contact.base_rate, stays, contact.solid)
+
+
+@device
+def piece_of(pieces, p):
+    """Return a piece of a clock step."""
+    return Piece(pieces[p, 1], pieces[p, 2], pieces[p, 3], pieces[p, 4])
+
+
+@device
+def pieces_to(step, start, pieces):
+    """Return the end of the pieces of a clock step that begin at ``start``."""
+    stop = start
+    while stop < len(pieces) and pieces[stop, 0] == step:
+        stop += 1
+    return stop
+
+
+@device
+def take_up(columns, spent, given, gained, units, work):
     """Lay out a row and its energies for a clock step, in the units of the equations."""
-    for c in range(COLUMNS):
-        row[c] = given[c] / units[c]
-    row[POSITION], row[SLIP], row[PATH], row[SQUARE], row[COUNT] = 0.0, 0.0, 0.0, 0.0, 0.0
-    energy[:] = 0.0
-    energy[STORED] = gained[STORED] / work
+    columns[:] = given / units
+    row = columns.view(ROW)[0]
+    row.position, row.slip, row.path, row.squared_speed, row.substeps = 0.0, 0.0, 0.0, 0.0, 0.0
+    spent[:] = 0.0
+    spent[_STORED] = gained[_STORED] / work
 
 
 @device
-def put_down(row, energy, given, gained, units, work, passed, spent):
-    """Take back a row and its energies after a clock step, and write what has been reached."""
-    position, count = given[POSITION], given[COUNT]
-    for c in range(COLUMNS):
-        given[c] = row[c] * units[c]
-    given[POSITION] += position
-    given[COUNT] += count
-    for c in range(COLUMNS):
-        passed[c] = given[c]
-    for c in range(STORED):
-        gained[c] += energy[c] * work
-    gained[STORED] = energy[STORED] * work
-    spent[:] = gained
+def put_down(columns, spent, given, gained, units, work):
+    """Take back a row and its energies after a clock step."""
+    before = given.view(ROW)[0]
+    position, substeps = before.position, before.substeps
+    given[:] = columns * units
+    before.position += position
+    before.substeps += substeps
+    gained[:_STORED] += spent[:_STORED] * work
+    gained[_STORED] = spent[_STORED] * work
 
 
 @device
-def area_kept(bound, moment, time, row, bare, held):
+def run_away(row, spent, time):
+    """End a row that nothing holds any longer; bonds and contact stay as they were."""
+    row.runaway_time, row.position, row.speed, row.body_speed = time, math.nan, math.nan, math.nan
+    spent[:] = math.nan
+
+
+@device
+def area_kept(bound, moment, time, row, contact):
     """What ``contact_area`` gives for such bonds, and the area of the row where equilibrium was lost on the way."""
-    radius, area, by_bound, by_moment = contact_area(bound, moment, time, row[RADIUS], bare, held)
+    radius, area, by_bound, by_moment = contact_area(bound, moment, time, row.radius, contact)
     if area >= 0.0:
         return radius, area, by_bound, by_moment
-    return row[RADIUS], math.pi * row[RADIUS] * row[RADIUS] / held[10], 0.0, 0.0
+    return row.radius, math.pi * row.radius * row.radius / contact.solid.area, 0.0, 0.0
 
 
 @device
-def elastic(row, time, bare, slider, held, piece, energy):
+def elastic(row, time, slider, contact, piece, energy):
     """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
 
     Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
     back to the drive is booked to the area that has changed.
     """
-    stiffness, mass, damping, viscosity, forced, _, _, _ = slider
-    held_back = mass + damping > 0.0
-    yields, _ = compliance(row[RADIUS], slider)
-    row[FORCE] = driven(time, piece)[1] if forced > 0.0 else row[FORCE]
-    if (viscosity > 0.0 and row[RADIUS] > 0.0) or (held_back and yields == 0.0):
+    stiffness, forced, held_back = slider.stiffness, slider.forced, slider.mass + slider.damping > 0.0
+    yields, _ = compliance(row.radius, slider)
+    row.spring_force = driven(time, piece)[1] if forced > 0.0 else row.spring_force
+    if (slider.viscosity > 0.0 and row.radius > 0.0) or (held_back and yields == 0.0):
         return True
-    slip, bound, moment, way, radius, area = 0.0, row[BOUND], row[MOMENT], 0.0, row[RADIUS], 0.0
+    slip, bound, moment, way, radius, area = 0.0, row.bound, row.moment, 0.0, row.radius, 0.0
     for _ in range(40):
-        radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, bare, held)
+        radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, contact)
         if not area >= 0.0:
             return False
         yields, _ = compliance(radius, slider)
         force = area * (moment + bound * slip)
         slope = (area + by_moment * (moment + bound * slip)) * bound
-        way = 0.0 if held_back else slip + yields * force - row[SHEARED]
-        over = slip + yields * force - row[SHEARED] if held_back else stiffness * way + force - row[FORCE]
+        way = 0.0 if held_back else slip + yields * force - row.sheared
+        over = slip + yields * force - row.sheared if held_back else stiffness * way + force - row.spring_force
         slope = 1.0 + yields * slope if held_back else stiffness * (1.0 + yields * slope) + slope
         if not slope > 0.0:
             return over == 0.0
@@ -223,36 +303,36 @@ def elastic(row, time, bare, slider, held, piece, energy):
         if math.fabs(over / slope) <= 1e-14 * (math.fabs(slip) + math.fabs(moment)):
             break
     moment += bound * slip
-    row[MOMENT], row[SHEARED], row[RADIUS] = moment, yields * area * moment, radius
-    row[POSITION] += way
-    row[SLIP] += slip
-    row[PATH] += math.fabs(slip)
-    energy[WORK] += row[FORCE] * way if forced > 0.0 else 0.0
-    row[FORCE] -= 0.0 if forced > 0.0 else stiffness * way
+    row.moment, row.sheared, row.radius = moment, yields * area * moment, radius
+    row.position += way
+    row.slip += slip
+    row.path += math.fabs(slip)
+    energy.work += row.spring_force * way if forced > 0.0 else 0.0
+    row.spring_force -= 0.0 if forced > 0.0 else stiffness * way
     return True
 
 
 @device
 def slips_free(row, slider):
     """Whether a slip without bonds takes no time and has an end: behind a spring, or where a body stays behind."""
-    yields, _ = compliance(row[RADIUS], slider)
-    return slider[3] == 0.0 and (yields > 0.0 if slider[1] + slider[2] > 0.0 else slider[0] > 0.0)
+    yields, _ = compliance(row.radius, slider)
+    return slider.viscosity == 0.0 and (yields > 0.0 if slider.mass + slider.damping > 0.0 else slider.stiffness > 0.0)
 
 
 @device
 def free_ways(row, slider):
     """Ways of an interface without bonds, and of its body, to where nothing pulls them."""
-    body = 0.0 if slider[1] + slider[2] > 0.0 else row[FORCE] / slider[0]
-    return body + row[SHEARED], body
+    body = 0.0 if slider.mass + slider.damping > 0.0 else row.spring_force / slider.stiffness
+    return body + row.sheared, body
 
 
 @device
-def slip_free(row, time, bare, slider, held):
+def slip_free(row, time, slider, contact):
     """Slip at once, with next to no bonds, to where nothing pulls the interface."""
     slip, body = free_ways(row, slider)
-    radius, area, _, _ = contact_area(FEW, 0.0, time, row[RADIUS], bare, held)
-    row[BOUND], row[MOMENT], row[SHEARED], row[RADIUS] = FEW, 0.0, 0.0, radius if area >= 0.0 else row[RADIUS]
-    row[FORCE] -= slider[0] * body
-    row[POSITION] += body
-    row[SLIP] += slip
-    row[PATH] += math.fabs(slip)
+    radius, area, _, _ = contact_area(FEW, 0.0, time, row.radius, contact)
+    row.bound, row.moment, row.sheared, row.radius = FEW, 0.0, 0.0, radius if area >= 0.0 else row.radius
+    row.spring_force -= slider.stiffness * body
+    row.position += body
+    row.slip += slip
+    row.path += math.fabs(slip)
