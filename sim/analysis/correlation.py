@@ -100,61 +100,9 @@ def time_of(covariance: np.ndarray, members: int, records: int, step: float, lar
     return IntegralTime(time, time * math.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)))
 
 
-def seen(members: int, records: int) -> int:
-    """The first so many members are enough for a correlation time."""
+def members_for_memory(members: int, records: int) -> int:
+    """Return the number of members that are enough for a correlation time."""
     return min(members, max(2, _VALUES // records))
-
-
-class Covariance:
-    """Covariance of records by the number of records between them, of series that come in pieces.
-
-    Parameters
-    ----------
-    records : int
-        Of each series; of long ones no more than 65,536 between two are looked at.
-    """
-
-    def __init__(self, records: int) -> None:
-        self.records, self.lags = records, min(records, _LAGS)
-        self.length = scipy.fft.next_fast_len(self.lags, real=True)
-        self.power = np.zeros((2, self.length + 1), complex)
-        self.pieces: list[np.ndarray] = []
-        self.before: list[np.ndarray] = []
-
-    def add(self, deviations: np.ndarray) -> None:
-        """Go on with the next records of some series, shape (series, records), as deviations from their means."""
-        self.pieces.append(deviations)
-        if sum(piece.shape[1] for piece in self.pieces) >= self.length:
-            self._sum(end=False)
-
-    def end(self) -> None:
-        """End these series, so that others may follow."""
-        self._sum(end=True)
-        self.before = []
-
-    def _sum(self, end: bool) -> None:
-        """Add the power of each stretch of ``length`` records, and its product with the stretch before."""
-        values = np.concatenate(self.pieces, axis=1) if self.pieces else np.empty((0, 0))
-        whole = values.shape[1] if end else values.shape[1] // self.length * self.length
-        self.pieces = [values[:, whole:].copy()] if whole < values.shape[1] else []
-        rows = max(1, _AT_ONCE // (2 * self.length))
-        for at in range(0, whole, self.length):
-            before, self.before = self.before, []
-            if not values[:, at : at + self.length].any():
-                continue
-            for k, first in enumerate(range(0, len(values), rows)):
-                found = scipy.fft.rfft(values[first : first + rows, at : at + self.length], 2 * self.length)
-                self.power[0] += np.sum(found.real**2 + found.imag**2, axis=0)
-                if before:
-                    self.power[1] += np.sum(found * before[k].conj(), axis=0)
-                if self.records > self.length:
-                    self.before.append(found)
-
-    def over(self, free: float) -> np.ndarray:
-        """The covariance, of so many free series."""
-        power = self.power[0] + (-1.0) ** np.arange(self.length + 1) * self.power[1]  # one is half the length later
-        sums = scipy.fft.irfft(power, 2 * self.length)[: self.lags]
-        return sums / (free * np.arange(self.records, self.records - self.lags, -1))
 
 
 def autocovariance(values: np.ndarray) -> np.ndarray:
@@ -166,15 +114,39 @@ def autocovariance(values: np.ndarray) -> np.ndarray:
         Independent members of one process. Deviations are those from the ensemble mean at each record, of a single
         member from its own mean in time; and one member less counts as free.
     """
+    members = len(values)
+    mean = values.mean(axis=0) if members > 1 else values.mean()
+    return covariance_of(values, mean, max(members - 1.0, 1.0))
+
+
+def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> np.ndarray:
+    """Return the mean product of deviations by the number of records between them.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        Series; of long ones no more than 65,536 records between two are looked at.
+    mean : float or array, shape (records,)
+        Value from which deviations are taken.
+    free : float
+        Number of independent series.
+    """
     members, records = values.shape
-    mean = np.broadcast_to(values.mean(axis=0) if members > 1 else values.mean(), records)
-    found, rows = Covariance(records), max(1, _AT_ONCE // (2 * records))
-    for start in range(0, members, rows):
-        for at in range(0, records, _LAGS):
-            here = slice(at, at + _LAGS)
-            found.add(values[start : start + rows, here] - mean[here])
-        found.end()
-    return found.over(max(members - 1.0, 1.0))
+    lags = min(records, _LAGS)
+    length = scipy.fft.next_fast_len(lags, real=True)
+    power, rows = np.zeros((2, length + 1), complex), max(1, _AT_ONCE // (2 * length))
+    mean = np.broadcast_to(mean, records)
+    for first in range(0, members, rows):
+        before = None
+        for start in range(0, records, length):  # stretches; each with itself and with the one before
+            stretch = slice(start, start + length)
+            spectrum = scipy.fft.rfft(values[first : first + rows, stretch] - mean[stretch], 2 * length)
+            power[0] += np.sum(spectrum.real**2 + spectrum.imag**2, axis=0)
+            if before is not None:
+                power[1] += np.sum(spectrum * before.conj(), axis=0)
+            before = spectrum
+    total = power[0] + (-1.0) ** np.arange(length + 1) * power[1]  # the second is half the length later
+    return scipy.fft.irfft(total, 2 * length)[:lags] / (free * np.arange(records, records - lags, -1))
 
 
 class Inflation(NamedTuple):
@@ -233,7 +205,7 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
     times = [xr.full_like(dataset["contact_modulus"], math.nan) for _ in range(3)]
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
-        energy = energy.isel({MEMBERS: slice(seen(energy.sizes[MEMBERS], energy.sizes["t"]))})
+        energy = energy.isel({MEMBERS: slice(members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"]))})
         all_points = steady_points(dataset).broadcast_like(dataset["contact_modulus"])
         steady = all_points.transpose(*sweep_dims(dataset)).to_numpy()
         for point in np.ndindex(steady.shape):

@@ -6,17 +6,18 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sim.analysis.blocks import alone, in_blocks
 from sim.analysis.observables import KEPT, masks, ordered, pure
 from sim.analysis.scene import (
     MEMBERS,
     answered,
     control,
+    in_pieces,
     may_stop,
     of_dataset,
     setting,
     sweep_dims,
     where_recorded,
+    with_trajectories,
     word,
 )
 from sim.analysis.stick_slip import stick_slip
@@ -59,14 +60,14 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
-    dims, latest = (*sweep_dims(dataset), MEMBERS), alone(dataset, "detachment_time")
+    dims, latest = (*sweep_dims(dataset), MEMBERS), with_trajectories(dataset, "detachment_time")
     if "detachment_time" in latest and bool(latest["detachment_time"].isel(t=-1).isnull().all()):
         latest = latest.isel(t=[-1])  # none was open before either
-    found = in_blocks(latest, dims, _openings)
+    found = in_pieces(latest, dims, _openings)
     read = ["masked", "in_contact_mean", *(f"masked_{kind}" for kind in KEPT)]
     read += ["contact_area"] if may_stop(dataset) else []
     with where_recorded():
-        found = found.merge(in_blocks(alone(dataset, *read), dims, _masks))
+        found = found.merge(in_pieces(with_trajectories(dataset, *read), dims, _masks))
     for part in (peaks, stick_slip, speed_step, way_to_sliding):
         with where_recorded():
             found = found.merge(part(dataset))
@@ -194,8 +195,8 @@ def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
 
     dims, several = sweep_dims(recorded), recorded.sizes.get(MEMBERS, 1) > 1
     if several:
-        recorded = recorded.assign(top=in_blocks(recorded, ("t", *dims), mean)["mean"].fillna(-1.0).argmax("t"))
-    found = in_blocks(recorded, (*dims, MEMBERS), each)
+        recorded = recorded.assign(top=in_pieces(recorded, ("t",), mean)["mean"].fillna(-1.0).argmax("t"))
+    found = in_pieces(recorded, (*dims, MEMBERS), each)
     ends = found["first"], found["last"]
     above = [found["size"] / (1.0 + _ROUNDING) > end for end in ends]
     if several:
@@ -253,7 +254,7 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     suffix = "" if "normal_load" in dataset else "_mean"
     read = (f"{name}{suffix}" for name in ("contact_radius", "normal_load", "displacement", "dissipated_energy"))
     dims = (*sweep_dims(dataset), MEMBERS)
-    return in_blocks(alone(dataset, *read), dims, lambda some: _loops(some, suffix, count))
+    return in_pieces(with_trajectories(dataset, *read), dims, lambda some: _loops(some, suffix, count))
 
 
 def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:

@@ -5,14 +5,12 @@ recorded contact is at that time.
 """
 
 import contextlib
-import functools
 import itertools
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Collection
 
 import numpy as np
 import xarray as xr
 
-from sim.analysis.blocks import alone, keep
 from sim.analysis.scene import (
     MEMBERS,
     answered,
@@ -22,11 +20,13 @@ from sim.analysis.scene import (
     setting,
     stays_held,
     where_recorded,
+    with_trajectories,
     word,
 )
 from sim.laws import jkr
 
 KEPT = ("mean", "std", "sem")
+_ENDINGS = tuple(f"_{kind}" for kind in KEPT)
 
 #: Shares of the area after that lost to bonds, in the order of charging: radius before each, and what it is lost to.
 _LOSSES = {
@@ -38,8 +38,11 @@ _LOSSES = {
 _DIFFERENCES = frozenset(("lost_to_bonds_last", "order_of_charging"))
 #: Radii that others are compared with.
 _REFERENCES = ("jkr_radius", "hertz_radius")
-#: Trajectories that observables of other names follow from.
-_FROM = {"area_ratio": "contact_area", "fraction_detached": "in_contact", "fraction_masked": "masked"}
+#: Trajectories from which observables of other names follow; those of shares, beside the radii of their losses.
+_SOURCES = {
+    "area_ratio": ("contact_area",), "fraction_detached": ("in_contact",), "fraction_masked": ("masked", "in_contact"),
+}  # fmt: skip
+_SOURCES_OF_SHARES = ("contact_area", "fluctuation_energy", "applied_load", "indentation", "displacement")
 
 
 def ordered(variable: xr.DataArray) -> xr.DataArray:
@@ -210,47 +213,51 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
 @of_dataset
 def all_observables(dataset: xr.Dataset) -> xr.Dataset:
     """``observables``, with the shares of the lost area where they are known, in both orders of charging."""
-    return _with_charges(dataset, None)
+    return chosen_observables(dataset, None)
 
 
 def charges(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
-    """Shares of the lost area in both orders of charging, as far as they are known and, given ``names``, wanted."""
-    found = xr.Dataset()
+    """Return the shares of the lost area in both orders of charging, as far as they are known.
+
+    The differences between both orders are left out if ``names`` holds none of them.
+    """
+    shares = xr.Dataset()
     with contextlib.suppress(ValueError), answered():
-        found = share_observables(dataset)
+        shares = share_observables(dataset)
         first = _charged_first(dataset)
         if names is None or not _DIFFERENCES.isdisjoint(names):
-            return found.assign(_in_turn(found, first))
-        found = found.assign(lost_to_fluctuations_first=first)
-    return found
+            return shares.assign(_in_turn(shares, first))
+        shares = shares.assign(lost_to_fluctuations_first=first)
+    return shares
 
 
-def readings(
-    dataset: xr.Dataset, names: Collection[str] | None = None
-) -> Iterator[tuple[xr.Dataset, Callable[[xr.Dataset], xr.Dataset]]]:
-    """A dataset with one trajectory of the members at a time, and what makes observables of it: those of all in turn.
-
-    What members have in common comes first; then what one trajectory takes of memory is all that is taken; those that
-    shares follow from come together and last. Of ``names`` only those that they follow from.
-    """
-    each = [str(name) for name, variable in dataset.data_vars.items() if {MEMBERS, "t"} <= set(variable.dims)]
-    wanted = each if names is None else [name for name in each if name in {_FROM.get(one, one) for one in names}]
-    of_shares = list[str]()
-    if names is None or any(name.startswith(("lost_to", "order_of")) for name in names):
-        of_shares = ["contact_area", *(radius for radius, _ in _LOSSES.values()), "fluctuation_energy", "applied_load"]
-        with contextlib.suppress(KeyError):  # the dataset does not say
-            of_shares.append(control(dataset).kind)
-    yield keep(dataset), observables
-    for name in wanted:
-        if name not in of_shares:
-            yield alone(dataset, name, *_REFERENCES), observables
-    if of_shares:
-        chosen = alone(dataset, *of_shares, *_REFERENCES) if each else dataset  # statistics alone are small
-        yield chosen, functools.partial(_with_charges, names=names)
+def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
+    """Return the dataset without trajectories that the observables ``names`` do not need; None stands for all."""
+    if names is None:
+        return dataset
+    sources = {source for name in names for source in _SOURCES.get(name, (name,))} | set(_REFERENCES)
+    if _shares_among(names):
+        sources |= {*_SOURCES_OF_SHARES, *(radius for radius, _ in _LOSSES.values())}
+    return with_trajectories(dataset, *(f"{name}{kind}" for name in sources for kind in ("", *_ENDINGS)))
 
 
-def _with_charges(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
-    return observables(dataset).merge(charges(dataset, names))
+def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
+    """Return the observables ``names``, with their statistics if only these were recorded; all of them if None."""
+    result = observables(dataset)
+    if names is None or _shares_among(names):
+        result = result.merge(charges(dataset, names))
+    if names is None:
+        return result
+    return result[[key for key in result if str(key) in names or str(key).removesuffix(_ending(str(key))) in names]]
+
+
+def _shares_among(names: Collection[str]) -> bool:
+    return any(name.startswith(("lost_to", "order_of")) for name in names)
+
+
+def _ending(key: str) -> str:
+    """Return the ending of a recorded statistic, "" for another variable."""
+    return next((ending for ending in _ENDINGS if key.endswith(ending)), "")
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:

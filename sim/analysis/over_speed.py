@@ -1,17 +1,17 @@
 """Observables over the sliding speed, and the speeds at which sliding has taken the contact area, with their errors."""
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.analysis.blocks import ROOM, blocks
 from sim.analysis.observables import observables, reference_radii
 from sim.analysis.scene import (
     MEMBERS,
     answered,
+    in_pieces,
     is_stationary,
     is_steady,
     of_dataset,
@@ -19,6 +19,7 @@ from sim.analysis.scene import (
     speed_of,
     stays_held,
     sweep_dims,
+    with_trajectories,
 )
 from sim.analysis.stationary import of_second_half
 from sim.analysis.statistics import LEVEL, over_members
@@ -27,8 +28,8 @@ from sim.analysis.statistics import LEVEL, over_members
 LOSSES = (0.05, 0.5)
 #: Observables whose curves over the speed are wanted, unless others are named.
 _CURVES = ("contact_area", "friction_force", "shear_stress")
-#: Groups of members that are left out in turn, at most.
-_GROUPS = 64
+#: Groups of members that are left out in turn, and means of them, at most.
+_GROUPS, _MOST_MEANS = 64, 2**22
 _WORDS = {f"speed_at_{100.0 * loss:.0f}_percent_lost": f"lost {100.0 * loss:.0f} % of JKR's" for loss in LOSSES}
 _WORDS["speed_halfway_to_hertz"] = "lost half of what it can, down to Hertz's"
 _ENDS = {"": "", "_low": "lower end of the 95 % interval of the ", "_high": "upper end of the 95 % interval of the "}
@@ -193,22 +194,23 @@ def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
 
 def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.DataArray]:
     """Means of A/A_JKR over groups of members, of steady speeds over the second half of the run; and their sizes."""
-    timed = [name for name, variable in dataset.data_vars.items() if "t" in variable.dims and name not in _READ]
-    read, sweep = dataset.drop_vars(timed), sweep_dims(dataset)
-    if along != "t":
-        read = read.isel(t=slice(dataset.sizes["t"] // 2, None))
-    kept = {name: dataset.sizes[name] for name in (*sweep, *(["t"] if along == "t" else []))}
+    some, outer = with_trajectories(dataset, *_READ), (*sweep_dims(dataset), *(["t"] if along == "t" else []))
     members = dataset.sizes.get(MEMBERS, 1)
-    count = min(members, _GROUPS, max(2, ROOM // (8 * math.prod(kept.values()))))
-    of = np.arange(members) % count
-    sums = np.zeros((count, *kept.values()))
-    for block in blocks(read, (*sweep, MEMBERS, *(["t"] if along == "t" else []))):
-        ratio = observables(read.isel(block).load())["area_ratio"]
-        ratio = ratio if along == "t" else ratio.mean("t")
+    count = min(members, _GROUPS, max(2, _MOST_MEANS // math.prod(dataset.sizes[name] for name in outer)))
+
+    def ratios(piece: xr.Dataset) -> xr.Dataset:
+        ratio = observables(piece)[["area_ratio"]]
+        return ratio if along == "t" else ratio.mean("t")
+
+    def means(ratio: xr.Dataset) -> xr.Dataset:
         ratio = ratio if MEMBERS in ratio.dims else ratio.expand_dims(MEMBERS)
-        at: Any = of[block.get(MEMBERS, slice(None))], *(block[name] for name in kept)
-        np.add.at(sums, at, ratio.transpose(MEMBERS, *kept).to_numpy())
-    sizes = np.bincount(of).astype(float)
-    means = sums / sizes.reshape(-1, *[1] * len(kept))
-    coords = {name: dataset[name] for name in kept if name in dataset.coords}
-    return xr.DataArray(means, coords, ("group", *kept)), xr.DataArray(sizes, dims="group")
+        groups = [ratio.isel({MEMBERS: slice(first, None, count)}).mean(MEMBERS) for first in range(count)]
+        return xr.concat(groups, "group", coords="minimal", compat="override")
+
+    if along == "t":
+        result = in_pieces(some, ("t",), lambda piece: means(ratios(piece)))
+    else:
+        late = some.isel(t=slice(dataset.sizes["t"] // 2, None))
+        result = means(in_pieces(late, (*outer, MEMBERS), ratios))
+    sizes = np.bincount(np.arange(members) % count).astype(float)
+    return result["area_ratio"].transpose("group", *outer), xr.DataArray(sizes, dims="group")

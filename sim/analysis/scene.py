@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args
 
@@ -25,6 +25,8 @@ Given = ParamSpec("Given")
 T = TypeVar("T")
 
 MEMBERS = "member"
+#: Trajectories that are read and worked on at once [byte].
+ROOM = 2**26
 #: A missing variable in the words of xarray, without the ending of a statistic.
 _MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
 _CONTROLS = ("load", "indentation", "displacement")
@@ -57,8 +59,8 @@ def open(path: str | os.PathLike[str]) -> xr.Dataset:
         refused.callback(dataset.close)
         if "sim_version" not in dataset.attrs:
             raise BadInput([f"{path}: was not written by `sim run`; name one of its outputs"])
-        if fault := _fault(dataset):
-            raise BadInput([f"{path}: {fault}: it was changed after its run; run the scenario again"])
+        if reason := _fault(dataset):
+            raise BadInput([f"{path}: {reason}: it was changed after its run; run the scenario again"])
         refused.pop_all()
     return hdf5.located(dataset)
 
@@ -71,6 +73,44 @@ def _fault(dataset: xr.Dataset) -> str:
         return "the attribute scenario_resolved is no scenario"
     missing = [name for name in ("contact_modulus", "t") if name not in dataset or dataset[name].dtype.kind != "f"]
     return f"lacks the numbers {missing[0]}" if missing else ""
+
+
+def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:
+    """Return the dataset without its trajectories, except those named."""
+    timed = [str(name) for name, variable in dataset.data_vars.items() if "t" in variable.dims]
+    return dataset.drop_vars([name for name in timed if name not in names])
+
+
+def in_pieces(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dataset], xr.Dataset]) -> xr.Dataset:
+    """Apply a function to pieces of a dataset, so that little of a large file is in memory, and join the results.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        Opened lazily.
+    dims : sequence of str
+        Dimensions along which the function works on each value alone. The longest one is cut, at ends of chunks.
+    reduce : callable
+        Function of a dataset in memory.
+    """
+    sizes = {name: dataset.sizes[name] for name in dims if name in dataset.sizes}
+    dim = max(sizes, key=sizes.__getitem__, default="t")
+    timed = [variable for variable in dataset.variables.values() if {dim, "t"} <= set(variable.dims)]
+    chunk = max((_chunk(variable, dim) for variable in timed), default=1)
+    size = dataset.sizes[dim]
+    share = int(size * ROOM / max(ROOM, sum(variable.nbytes for variable in timed)))
+    length = max(share // chunk, 1) * chunk
+    pieces = (dataset.isel({dim: slice(start, start + length)}).compute() for start in range(0, size, length))
+    results = [reduce(piece) for piece in pieces]
+    if len(results) == 1:
+        return results[0]
+    return xr.concat(results, dim, data_vars="minimal", coords="minimal", compat="override", join="override")
+
+
+def _chunk(variable: xr.Variable, dim: str) -> int:
+    """Return the length of a file's chunks along a dimension; 1 for an array in memory."""
+    chunks = variable.encoding.get("chunksizes") or ()
+    return int(chunks[variable.dims.index(dim)]) if len(chunks) == variable.ndim else 1  # joined runs have other sizes
 
 
 def plain(dataset: xr.Dataset) -> xr.Dataset:

@@ -1,18 +1,25 @@
 """Statistics over the members of an ensemble, at each time and sweep value."""
 
-import functools
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.analysis.blocks import in_blocks
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
-from sim.analysis.observables import KEPT, charges, pure, readings, reference_radii, share_observables
-from sim.analysis.scene import MEMBERS, of_dataset, sweep_dims
+from sim.analysis.observables import (
+    KEPT,
+    charges,
+    chosen_observables,
+    observables,
+    pure,
+    reference_radii,
+    restricted,
+    share_observables,
+)
+from sim.analysis.scene import MEMBERS, in_pieces, of_dataset, sweep_dims
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
 
@@ -42,9 +49,6 @@ _OF = {
     "quantile_low": "lower end of the 95 % intervals of the quantiles",
     "quantile_high": "upper end of the 95 % intervals of the quantiles",
 }
-
-#: Records whose members are put side by side at once.
-_STRIP = 64
 
 #: Units of statistics that are not in that of their observable.
 _UNITS = {"skewness": "1", "effective_samples": "1", "correlation_time": "s", "correlation_time_sem": "s"}
@@ -164,7 +168,7 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
         ends = ("quantile", "quantile_low", "quantile_high") if quantiles else ()
         alike = {"mean": variable, "std": none, "sem": none, "low": variable, "high": variable}
         return alike | {"skewness": xr.full_like(none, np.nan)} | dict.fromkeys(ends, levels)
-    values = _members_last(variable)
+    values = np.moveaxis(variable.to_numpy(), variable.get_axis_num(MEMBERS), -1).copy()
     if quantiles:
         values.sort()  # nan last
     count = np.sum(~np.isnan(values), axis=-1, dtype=float)
@@ -174,17 +178,6 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
         for kind, data in _quantiles(values, count).items():
             found[kind] = one.expand_dims(quantile=list(QUANTILES)).copy(data=data)
     return found
-
-
-def _members_last(variable: xr.DataArray) -> np.ndarray:
-    """A copy of the values with the members last, made in strips of records that fit into the processor's cache."""
-    given = np.moveaxis(variable.to_numpy(), variable.get_axis_num(MEMBERS), -1)
-    if given.ndim < 2:
-        return given.copy()
-    values = np.empty(given.shape, given.dtype)
-    for start in range(0, given.shape[-2], _STRIP):
-        values[..., start : start + _STRIP, :] = given[..., start : start + _STRIP, :]
-    return values
 
 
 def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
@@ -232,7 +225,8 @@ def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
     places = {"quantile": levels * (counts[:, None] - 1.0)}
     places["quantile_low"], places["quantile_high"] = quantile_ranks(counts[:, None], levels)
     return {
-        kind: np.moveaxis(_at_ranks(ordered, place[of.reshape(count.shape)]), -1, 0) for kind, place in places.items()
+        kind: np.moveaxis(values_at_ranks(ordered, place[of.reshape(count.shape)]), -1, 0)
+        for kind, place in places.items()
     }
 
 
@@ -257,7 +251,7 @@ def quantile_ranks(count: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np
     return np.where(none, np.nan, low), np.where(none, np.nan, high)
 
 
-def _at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
+def values_at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Values at places along the last axis, from 0 on and between; nan where a place is."""
     known = places >= 0.0
     below = np.where(known, places, 0.0).astype(np.intp)
@@ -290,17 +284,12 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
-    """The ``summary`` of observables at each sweep value and time, by default of all but shares, read in blocks."""
-    found, dims = xr.Dataset(), ("t", *sweep_dims(dataset))
+    """Return the ``summary`` of observables at each sweep value and time, by default of all except shares."""
 
-    def reduce(block: xr.Dataset, observed: Callable[[xr.Dataset], xr.Dataset], known: xr.Dataset) -> xr.Dataset:
-        made = observed(block)
-        return summary(made[[name for name in made if f"{name}_mean" not in known]], quantiles)
+    def reduce(piece: xr.Dataset) -> xr.Dataset:
+        return summary(observables(piece) if names is None else chosen_observables(piece, names), quantiles)
 
-    for some, observed in readings(dataset, set(map(str, dataset)) if names is None else names):
-        # what members have in common comes with each reading
-        found = found.merge(in_blocks(some, dims, functools.partial(reduce, observed=observed, known=found)))
-    return found
+    return in_pieces(restricted(dataset, names), ("t",), reduce)
 
 
 @of_dataset
@@ -334,5 +323,5 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     radii = reference_radii(dataset)
     ratio = pure((radii["radius_hertz"] / radii["radius_jkr"]) ** 2, "Hertz's contact area over JKR's")
     share_observables(dataset.isel(t=[0]))  # where they are not known it says why
-    dims, read = ("t", *sweep_dims(dataset)), list(readings(dataset))[-1][0]
-    return in_blocks(read, dims, lambda some: summary(charges(some))).merge(radii).assign(area_ratio_hertz=ratio)
+    lost = in_pieces(restricted(dataset, ["lost_to_bonds"]), ("t",), lambda piece: summary(charges(piece)))
+    return lost.merge(radii).assign(area_ratio_hertz=ratio)

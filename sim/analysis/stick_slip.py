@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sim.analysis.blocks import in_blocks, keep
 from sim.analysis.observables import ordered
-from sim.analysis.scene import MEMBERS, is_stationary, sweep_dims
+from sim.analysis.scene import MEMBERS, in_pieces, is_stationary, sweep_dims, with_trajectories
 
 #: Fall of the spring's force over its largest in the run that makes a slip.
 LEAST = 0.02
@@ -177,7 +176,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     if "stage_speed" not in dataset or not read <= set(dataset.variables):
         return xr.Dataset()
     half, several = _beginning(dataset), varies(dataset)
-    return in_blocks(keep(dataset, *read), (*sweep_dims(dataset), MEMBERS), lambda some: _means(some, half, several))
+    some = with_trajectories(dataset, *read)
+    return in_pieces(some, (*sweep_dims(dataset), MEMBERS), lambda piece: _means(piece, half, several))
 
 
 def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset:

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from sim.analysis.blocks import READ, at_records
 from sim.analysis.correlation import correlation_time
 from sim.analysis.events import events
 from sim.analysis.lifetimes import half_lives
-from sim.analysis.observables import KEPT, all_observables, readings
+from sim.analysis.observables import restricted
 from sim.analysis.over_speed import loss_speeds
 from sim.analysis.scene import (
     MEMBERS,
@@ -300,15 +299,9 @@ def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dat
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
             dataset = dataset.isel(t=slice(_last(dataset) + 1))
             counts["t"] = min(counts["t"], dataset.sizes["t"])
-            needed = {name for some, _ in readings(dataset, names) for name in some}
             records = _spread(dataset.sizes["t"], counts["t"])
-            dataset = at_records(dataset[[name for name in dataset if name in needed]], records)
-        if dataset.nbytes < READ:
-            trajectories = all_observables(dataset)
-            shown = {f"{name}{kind}" for name in names for kind in ("", *(f"_{kind}" for kind in KEPT))}
-            found = summary(trajectories[[name for name in trajectories if name in shown]], quantiles=False)
-        else:
-            found = over_members(dataset, names, quantiles=False)
+            dataset = restricted(dataset, names).isel(t=records)
+        found = over_members(dataset, names, quantiles=False)
         if "applied_load" in dataset and "normal_load_mean" in found:  # it is known of open contacts too
             for kind in ("mean", "low", "high"):
                 found[f"normal_load_{kind}"] = dataset["applied_load"].fillna(found[f"normal_load_{kind}"])

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from sim.analysis.blocks import in_blocks, keep
-from sim.analysis.scene import MEMBERS, speed_name, speed_of, sweep_dims, word
+from sim.analysis.scene import MEMBERS, in_pieces, speed_name, speed_of, sweep_dims, with_trajectories, word
 from sim.analysis.stick_slip import LEAST
 
 #: A speed jumps between two records if it changes by more than this many times what it does before and after.
@@ -152,7 +151,8 @@ def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any
     """What a function gives of the trajectories ``read`` of each member, described by units and meanings."""
     first = dataset[read[-1]]
     outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in first.dims]
-    return in_blocks(keep(dataset, *read), outer, functools.partial(_block, described=described, of=of, read=read))
+    block = functools.partial(_block, described=described, of=of, read=read)
+    return in_pieces(with_trajectories(dataset, *read), outer, block)
 
 
 def _block(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any, read: tuple[str, ...]) -> xr.Dataset:

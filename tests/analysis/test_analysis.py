@@ -9,7 +9,7 @@ from helpers import lens
 from helpers.lens import scene
 
 from sim import analysis
-from sim.analysis import blocks
+from sim.analysis import scene as dataset_module
 from sim.ensemble.simulate import run
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import Steady
@@ -109,32 +109,35 @@ def test_a_file_gives_the_same_statistics_as_memory(ramp, tmp_path):
         xr.testing.assert_identical(analysis.statistics(opened).load(), analysis.statistics(ramp))
 
 
-def test_blocks_of_a_few_numbers_give_the_statistics_of_all_at_once(ramp, tmp_path, monkeypatch):
+def test_pieces_of_a_few_numbers_give_the_statistics_of_all_at_once(tmp_path, monkeypatch):
     path = run(scene(record=Record(quantities=["friction_force", "masked"])), to=tmp_path / "out.nc")
-    with xr.open_dataset(path) as opened:
-        whole = analysis.statistics(opened).load(), analysis.table(opened, 5)
     cycles = run(scene(contact=Equilibrium(load={"from": 4e-3, "to": 1e-3, "cycles": 2})))
-    loops = analysis.loop_energy(cycles)
-    monkeypatch.setattr(blocks, "ROOM", 1000)
-    monkeypatch.setattr(blocks, "READ", 2000)
-    assert len(list(blocks.blocks(blocks.keep(ramp, "contact_area"), ("member",)))) > 2
-    with xr.open_dataset(path) as opened:
-        xr.testing.assert_identical(analysis.statistics(opened).load(), whole[0])
-        assert analysis.table(opened, 5) == whole[1]
-    xr.testing.assert_identical(analysis.loop_energy(cycles), loops)
+    results = []
+    for room in (2**27, 1000):
+        monkeypatch.setattr(dataset_module, "ROOM", room)
+        with xr.open_dataset(path) as opened:
+            results.append((analysis.statistics(opened).load(), analysis.loop_energy(cycles)))
+    for whole, pieces in zip(*results, strict=True):
+        xr.testing.assert_identical(pieces, whole)
 
 
-@pytest.mark.parametrize("packed", [None, (2, 4)])
-@pytest.mark.parametrize(("read", "room"), [(10**6, 10**6), (1000, 400), (700, 100), (8, 8)])
-def test_blocks_within_what_is_read_at_once_cover_all_of_it(monkeypatch, read, room, packed):
-    monkeypatch.setattr(blocks, "READ", read)
-    monkeypatch.setattr(blocks, "ROOM", room)
+@pytest.mark.parametrize("chunks", [None, (2, 4)])
+@pytest.mark.parametrize("room", [8, 400, 10**6])
+def test_pieces_cover_all_of_a_dataset(monkeypatch, room, chunks):
+    monkeypatch.setattr(dataset_module, "ROOM", room)
     numbers = xr.Dataset({"x": (("member", "t"), np.arange(7.0 * 23.0).reshape(7, 23))})
-    numbers["x"].encoding["chunksizes"] = packed
-    for dims in (("t",), ("member",), ("member", "t"), ("t", "member")):
-        xr.testing.assert_equal(blocks.in_blocks(numbers, dims, lambda some: 2.0 * some), 2.0 * numbers)
-    records = np.array([0, 3, 4, 11, 22])
-    xr.testing.assert_equal(blocks.at_records(numbers, records), numbers.isel(t=records))
+    numbers["x"].encoding["chunksizes"] = chunks
+    lengths = []
+
+    def double(piece):
+        lengths.append(piece.sizes["t"])
+        return 2.0 * piece
+
+    for dims in (("t",), ("member",), ("member", "t")):
+        doubled = dataset_module.in_pieces(numbers, dims, double)
+        xr.testing.assert_equal(doubled, 2.0 * numbers)
+    assert room > 1000 or len(lengths) > 6
+    assert chunks is None or {length % 4 for length in lengths} <= {0, 3}  # cut where chunks end
 
 
 @pytest.mark.verify  # dask comes with its extra

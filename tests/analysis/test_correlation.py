@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from helpers import lens
 from helpers.lens import FIELD, scene
-from numpy.testing import assert_allclose
 
 from sim import analysis
 from sim.analysis import correlation
@@ -139,22 +138,3 @@ def test_scores_of_the_correlation_time_are_standard_normal():
         scores.append((time - exact_time(0.9, 1.0)) / sem)
     # the window cuts e^-6 off and the error is Gaussian theory: mean and spread to a third of a unit
     assert abs(np.mean(scores)) < 0.33 and 0.67 < np.std(scores) < 1.33
-
-
-@pytest.mark.parametrize("cuts", [[500], [100, 350, 50], [1, 499]])
-@pytest.mark.parametrize("longest", [64, 2**16])
-def test_a_covariance_does_not_depend_on_the_pieces_that_series_come_in(cuts, longest, monkeypatch):
-    monkeypatch.setattr(correlation, "_LAGS", longest)
-    monkeypatch.setattr(correlation, "_AT_ONCE", 256)  # series are transformed one by one
-    values = np.random.default_rng(11).normal(size=(7, sum(cuts)))
-    values[:, 128:256] = 0.0  # a stretch without products
-    found = correlation.Covariance(values.shape[1])
-    for series in (values[:4], values[4:]):
-        for piece in np.split(series, np.cumsum(cuts)[:-1], axis=1):
-            found.add(piece)
-        found.end()
-    covariance = found.over(7.0)
-    assert len(covariance) == min(longest, values.shape[1])
-    for lag in (0, 1, 37, 63):
-        products = values[:, lag:] * values[:, : values.shape[1] - lag]
-        assert_allclose(covariance[lag], products.sum() / (7 * products.shape[1]), rtol=1e-12, atol=1e-14)

@@ -9,7 +9,7 @@ from helpers import lens
 from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
 
 from sim import analysis
-from sim.analysis import blocks, over_speed
+from sim.analysis import over_speed, scene as dataset_module
 from sim.analysis.observables import charged_in_turn, observables, share_observables
 from sim.ensemble.simulate import run
 from sim.laws import jkr
@@ -116,7 +116,7 @@ def test_curves_over_a_speed_that_stays_are_refused_and_those_of_what_is_missing
 def test_a_ramp_is_read_in_pieces_of_its_time(monkeypatch):
     ramp, read = lens.ramp().isel(member=[0]), []
     whole = analysis.loss_speeds(ramp)
-    monkeypatch.setattr(blocks, "ROOM", 500)
+    monkeypatch.setattr(dataset_module, "ROOM", 500)
     monkeypatch.setattr(over_speed, "observables", lambda some: read.append(some.sizes["t"]) or observables(some))
     xr.testing.assert_identical(analysis.loss_speeds(ramp), whole)
     assert len(read) > 1 and sum(read) == ramp.sizes["t"] and math.isfinite(whole[NAMES[0]])

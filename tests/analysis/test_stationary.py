@@ -1,6 +1,5 @@
 """Statistics over members and stationary time: against exact laws, with intervals that hold what they promise."""
 
-import itertools
 import math
 
 import numpy as np
@@ -13,7 +12,6 @@ import sim
 from benchmarks.scenes import tiled
 from benchmarks.timing import child
 from sim import analysis
-from sim.analysis import correlation, stationary
 from sim.analysis.statistics import QUANTILES, quantile_ranks
 from sim.ensemble.simulate import run
 from sim.parts import drive
@@ -161,29 +159,14 @@ def test_white_noise_tells_as_much_as_its_values():
     assert abs(found["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(found["correlation_time"])
 
 
-@pytest.mark.parametrize(("members", "stops"), [(40, True), (40, False), (3, False), (1, False)])
-def test_blocks_of_members_and_records_give_what_all_give_at_once(monkeypatch, members, stops):
-    monkeypatch.setattr(stationary, "_SAMPLE", 1000)
-    monkeypatch.setattr(stationary, "_NEAR", 0.2)
-    monkeypatch.setattr(correlation, "_LAGS", 64)
+@pytest.mark.parametrize("members", [40, 3, 1])
+def test_statistics_of_some_values_leave_out_those_that_are_missing(members):
     values = ornstein_uhlenbeck(np.random.default_rng(19), members, 2000, math.exp(-0.2)) ** 2
-    if stops:
-        values[7, 100:] = math.nan
-    found = []
-    for rows, times in ((17, 150), (members, 2000)):
-        series = stationary.Series(members, 2000)
-        for reading in (series.first, series.second):
-            for row, time in itertools.product(range(0, members, rows), range(0, 2000, times)):
-                piece = slice(row, min(row + rows, members)), slice(time, min(time + times, 2000))
-                reading(values[piece], *piece)
-        found.append(series.found())
-    for key, value in found[0].items():  # intervals of quantiles, and of one member's, come from a sample of a block
-        if not key.startswith("quantile_"):
-            np.testing.assert_allclose(value, found[1][key], rtol=1e-9, err_msg=key)
-    known = values[np.isfinite(values)]
-    np.testing.assert_allclose(found[0]["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
-    np.testing.assert_allclose(found[0]["std"], known.std(), rtol=1e-2)
-    assert stops or found[0]["correlation_time"] > 1.0
+    values[0, 100:] = math.nan
+    found, known = analysis.over_time(values), values[np.isfinite(values)]
+    np.testing.assert_allclose(found["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
+    np.testing.assert_allclose(found["mean"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
+    assert math.isnan(found.get("correlation_time", math.nan)) and (members == 1) == math.isnan(found["sem"])
 
 
 STEADY = {"drive": drive.Steady(speed=4e-3), "clock": Clock(duration=0.8, step=0.01)}
