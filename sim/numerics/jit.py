@@ -6,6 +6,9 @@ the calling loop (Philox words in the lives of single bonds: a tenth of their ti
 and laws compile at their first call. Their machine code is kept on disk, one file each, in a folder named by a hash of
 all compiled sources; it is loaded without numba's tables of what it can compile, which take half a second to set up. A
 cache that is broken, read-only or full costs time, never a run.
+
+Loading in this way needs some internals of numba. If a version of numba lacks one of them, ``FAST`` is false: the
+decorators are then numba's public ones with numba's own cache, in the same folder. The numbers are the same.
 """
 
 import contextlib
@@ -22,21 +25,28 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-from llvmlite.binding import add_symbol
-from numba.core.compiler import CompileResult
-from numba.core.compiler_lock import global_compiler_lock
-from numba.core.extending import intrinsic
-from numba.core.registry import CPUDispatcher, cpu_target
-from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
-from numba.core.serialize import dumps
-from numba.np.ufunc import _internal  # type: ignore[attr-defined]
-from numba.np.ufunc.ufuncbuilder import UFuncDispatcher
-from numba.np.ufunc.wrappers import build_ufunc_wrapper
+from llvmlite import binding
+from numba.extending import intrinsic
 
 from sim.units import kept
 
 #: Floats divide as numpy divides them; no wrapper is made for calls from C, which nobody makes.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+
+
+try:
+    from numba.core.compiler import CompileResult
+    from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.registry import CPUDispatcher, cpu_target
+    from numba.core.runtime import _nrt_python  # type: ignore[attr-defined]
+    from numba.core.serialize import dumps
+    from numba.np.ufunc import _internal  # type: ignore[attr-defined]
+    from numba.np.ufunc.ufuncbuilder import UFuncDispatcher
+    from numba.np.ufunc.wrappers import build_ufunc_wrapper
+
+    FAST = True
+except ImportError:
+    FAST, CPUDispatcher = False, object
 
 
 class _Device(CPUDispatcher):
@@ -52,6 +62,8 @@ class _Device(CPUDispatcher):
 
 def device(function: Callable, inline: str = "never") -> Callable:
     """Compile a helper into its callers."""
+    if not FAST:
+        return numba.njit(error_model="numpy", inline=inline)(function)
     options = {"nopython": True, "no_cpython_wrapper": True, "inline": inline}
     return _Device(function, targetoptions=_OPTIONS | options)
 
@@ -86,9 +98,9 @@ _BLOCK = 4096
 def sources() -> dict[str, bytes]:
     """Texts of the modules that import this one and of those that they import, whose constants are compiled in."""
     texts = kept.sources()
-    own = [name for name, text in texts.items() if b"sim.numerics.jit" in text]
-    imported = {word.decode() for name in own for word in re.findall(rb"^from (sim[\w.]*) import", texts[name], re.M)}
-    return {name: texts[name] for name in sorted({*own, *imported} & texts.keys())}
+    users = [name for name, text in texts.items() if b"sim.numerics.jit" in text]
+    imported = {word.decode() for name in users for word in re.findall(rb"^from (sim[\w.]*) import", texts[name], re.M)}
+    return {name: texts[name] for name in sorted({*users, *imported} & texts.keys())}
 
 
 @functools.cache
@@ -103,7 +115,9 @@ def _cache_folder() -> str:
 def machine() -> str:
     """The processor as compiled code and numpy use it."""
     vectors = np._core._multiarray_umath.__cpu_features__  # type: ignore[attr-defined]
-    return repr((cpu_target.target_context.codegen().magic_tuple(), np.__version__, vectors))
+    features = binding.get_host_cpu_features().flatten()
+    processor = binding.get_process_triple(), binding.get_host_cpu_name(), features
+    return repr((processor, numba.config.CPU_NAME, numba.config.CPU_FEATURES, np.__version__, vectors))
 
 
 def _path(name: str) -> Path:
@@ -112,7 +126,9 @@ def _path(name: str) -> Path:
 
 
 def cached(name: str) -> bool:
-    """Whether the cache holds the code of a kernel or law."""
+    """True if the cache holds the code of a kernel or law."""
+    if not FAST:
+        return any(Path(_cache_folder()).rglob(f"*{name.rpartition('.')[2]}-*.nbi"))
     return kept.read(_path(name)) is not None
 
 
@@ -120,11 +136,11 @@ def cached(name: str) -> bool:
 def _add_symbols() -> None:
     """Give the linker what cached code calls of numba's memory: the part of its set-up that needs no compiler."""
     for name, address in _nrt_python.c_helpers.items():
-        add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
+        binding.add_symbol(name if name.startswith("_") else f"NRT_{name}", address)
 
 
 def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: Callable[..., Callable]) -> Callable:
-    """What ``load`` makes of the code in the cache; where that fails in any way, what ``make`` compiles.
+    """Load the code of a function from the cache; compile the function by ``make`` if loading fails in any way.
 
     Unpickling and rebuilding raise whatever they meet (EOFError, UnpicklingError, AttributeError, ...), so every
     exception leads to compilation, where a fault of the function itself shows again.
@@ -136,10 +152,22 @@ def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: C
             return load(*pickle.loads(kept.read(path) or b""))
         for notice in on_compiling:
             notice(_name(function))
-        made, code = make()
+        result, code = make()
         with contextlib.suppress(Exception):
             kept.store(path, dumps(code()))
-        return made
+        return result
+
+
+def _public(decorator: Callable[..., Callable], function: Callable) -> Callable:
+    """Compile a function by a public decorator of numba, cached in the folder of these sources if that is possible."""
+    for notice in on_compiling if not cached(_name(function)) else ():
+        notice(_name(function))
+    try:
+        Path(_cache_folder()).mkdir(parents=True, exist_ok=True)
+        numba.config.CACHE_DIR = _cache_folder()  # read as the function is decorated
+        return decorator(cache=True)(function)
+    except (OSError, RuntimeError):  # no place for a cache
+        return decorator()(function)
 
 
 def _name(function: Callable) -> str:
@@ -162,6 +190,8 @@ def kernel(signature: str) -> Callable[[Callable], Callable]:
 
         @functools.cache
         def built() -> Callable:
+            if not FAST:
+                return _public(functools.partial(numba.njit, signature, error_model="numpy"), function)
             return _built(function, make, load)
 
         @functools.wraps(function)
@@ -183,24 +213,27 @@ def law(function: Callable) -> Callable:
     parameters = inspect.signature(function).parameters
     count = len(parameters)
 
-    def made(library: Any, name: str) -> Callable:
+    signature = f"float64({', '.join(['float64'] * count)})"
+
+    def ufunc_of(library: Any, name: str) -> Callable:
         pointer, doubles = library.get_pointer_to_function(name), [np.dtype(float).num] * (count + 1)
-        named = function.__name__, function.__doc__
-        return _internal.fromfunc(*named, [pointer], [doubles], count, 1, [None], [library], _internal.PyUFunc_None)
+        labels = function.__name__, function.__doc__
+        return _internal.fromfunc(*labels, [pointer], [doubles], count, 1, [None], [library], _internal.PyUFunc_None)
 
     def make() -> tuple[Callable, Callable]:
-        signature = f"float64({', '.join(['float64'] * count)})"
-        one = UFuncDispatcher(function, targetoptions={"nopython": True}).compile(signature)
-        inner = one.library, one.target_context, one.fndesc.llvm_func_name, one.signature
-        library, _, name = build_ufunc_wrapper(*inner, False, one)
+        result = UFuncDispatcher(function, targetoptions={"nopython": True}).compile(signature)
+        inner = result.library, result.target_context, result.fndesc.llvm_func_name, result.signature
+        library, _, name = build_ufunc_wrapper(*inner, False, result)
         library.enable_object_caching()
-        return made(library, name), lambda: (library.serialize_using_object_code(), name)
+        return ufunc_of(library, name), lambda: (library.serialize_using_object_code(), name)
 
     def load(code: Any, name: str) -> Callable:
-        return made(cpu_target.target_context.codegen().unserialize_library(code), name)
+        return ufunc_of(cpu_target.target_context.codegen().unserialize_library(code), name)
 
     @functools.cache
     def built() -> Callable:
+        if not FAST:
+            return _public(functools.partial(numba.vectorize, [signature], nopython=True), function)
         return _built(function, make, load)
 
     bind = inspect.signature(function).bind

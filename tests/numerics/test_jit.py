@@ -1,5 +1,9 @@
 """Compiled laws broadcast like numpy, and their cache may be missing, broken, read-only or full."""
 
+import os
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
@@ -10,8 +14,8 @@ from sim.numerics import jit
 
 def test_a_law_keeps_its_signature_defaults_and_docstring():
     assert "G_x(q)" in halfspace.compliance.__doc__
-    one = halfspace.compliance(1e4, 0.0, 1e6)
-    assert one == halfspace.compliance(qx=1e4, qy=0.0, shear_modulus=1e6, poisson_ratio=0.5)
+    compliance = halfspace.compliance(1e4, 0.0, 1e6)
+    assert compliance == halfspace.compliance(qx=1e4, qy=0.0, shear_modulus=1e6, poisson_ratio=0.5)
     with pytest.raises(TypeError):
         halfspace.compliance(1e4)
 
@@ -35,6 +39,30 @@ def test_a_law_broadcasts_and_keeps_shapes():
     )
     assert jkr.radius_at_load(np.empty((0, 3)), 0.042, 2e-3, 6.4e6).shape == (0, 3)
     assert jkr.radius_at_load(np.zeros(1), 0.042, np.full(5000, 2e-3), 6.4e6).shape == (5000,)
+
+
+WITHOUT_INTERNALS = """
+import numba.np.ufunc.wrappers
+del numba.np.ufunc.wrappers.build_ufunc_wrapper
+import numpy as np
+from sim.laws import jkr
+from sim.numerics import jit
+assert not jit.FAST
+loads = np.linspace(-1e-4, 4e-3, 7)
+radii = jkr.radius_at_load(loads, 42e-3, 2e-3, 6.4e6), jkr.radius_at_displacement(loads / 1e4, 2e3, 42e-3, 2e-3, 6.4e6)
+assert jit.cached("sim.laws.jkr.radius_at_load")
+print(np.concatenate(radii).tobytes().hex())
+"""
+
+
+def test_without_an_internal_of_numba_the_public_decorators_give_the_same_bits(tmp_path):
+    environment = {**os.environ, "SIM_CACHE_DIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
+    command = [sys.executable, "-c", WITHOUT_INTERNALS]
+    printed = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+    loads = np.linspace(-1e-4, 4e-3, 7)
+    at_load = jkr.radius_at_load(loads, 42e-3, 2e-3, 6.4e6)
+    behind_spring = jkr.radius_at_displacement(loads / 1e4, 2e3, 42e-3, 2e-3, 6.4e6)
+    assert printed.strip() == np.concatenate([at_load, behind_spring]).tobytes().hex()
 
 
 LITTLE = """
