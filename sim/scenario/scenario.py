@@ -250,7 +250,7 @@ class Scenario:
         """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""
         said = [remark for part in self.chosen for remark in part.remarks(self.setting)]
         said += remarks_between(*self.chosen[1:], self.setting, self.speeds(41), self.varies["shear"])
-        if self.ensemble.members > 1 and self.fluctuations.given and not any(self.varies.values()):
+        if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
             said.append(
                 "the map is the same for all members and seeds, and nothing else is random: one member is enough"
             )

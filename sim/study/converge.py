@@ -79,7 +79,7 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
             f'drive.model is "{scenario.drive.model}", whose slider feels the noise: no law gives its truth; study the'
         )
         raise BadInput([f'{said} scene at a speed that is prescribed, such as [drive] model = "ramp"'])
-    if scenario.fluctuations.given:
+    if scenario.fluctuations.measured:
         said = "shear.field is a measured map, which no simpler model stands for: study random fields of its spectrum,"
         raise BadInput([f'{said} spectrum = {{ model = "measured", file = "..." }}'])
     left_out: list[str] = []

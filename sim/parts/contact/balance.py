@@ -39,7 +39,7 @@ class Bodies(NamedTuple):
 
 
 def elastic_energy(radius: Array, indentation: Array, bodies: Bodies) -> Array:
-    """Elastic energy of a contact of any radius a and indentation δ [J].
+    """Return the elastic energy of a contact of any radius a and indentation δ [J].
 
     ``E* (a δ² − 2 a³ δ/(3R) + a⁵/(5R²))``: its slope over δ is the load, over the area the energy release
     rate G with the sign turned (Maugis 2000).
@@ -62,31 +62,32 @@ class LoadControl:
 
     @property
     def closes(self) -> bool | Flags:
-        """True if a detached sphere comes back into contact: where the load is not tensile."""
+        """True if a detached sphere comes back into contact, because the load is not tensile."""
         return self.load >= 0.0
 
     def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
-        """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
+        """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
         if reversible == 0.0:
             return np.asarray(jkr.radius_at_load(self.load, work, *bodies[:2]))
         return np.asarray(radius_at_load_reversible(self.load, work, stress, reversible, *bodies))
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
-        """Load on the sphere [N]; 0 where the contact is open."""
+        """Return the load on the sphere [N]; 0 if the contact is open."""
         return np.where(np.isnan(radius), 0.0, self.load)
 
     def indentation(self, radius: Array, bodies: Bodies) -> Array:
-        """Indentation [m]; nan where the contact is open, since a dead load does not place the sphere."""
+        """Return the indentation [m]; nan if the contact is open, because a dead load does not place the sphere."""
         return np.asarray(jkr.indentation_under_load(radius, self.load, bodies.sphere_radius, bodies.modulus))
 
     def displacement(self, radius: Array, bodies: Bodies) -> Array:
-        """Displacement of the base [m]: the indentation, without a spring between."""
+        """Return the displacement of the base [m], which is the indentation without a spring."""
         return self.indentation(radius, bodies)
 
     def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
-        """Energy of this contact above that of a free sphere that just touches [J]: elastic, of the load, of adhesion.
+        """Return the energy of this contact above that of a free sphere that just touches [J].
 
-        0 under tension, where it is not defined: the free sphere moves away.
+        It is elastic, of the load and of adhesion. Under tension it is not defined, because the free sphere moves away,
+        and 0 is returned.
         """
         radius = np.where(self.closes, radius, np.nan)
         indentation = self.indentation(radius, bodies)
@@ -112,7 +113,7 @@ class DisplacementControl:
         return self.base >= 0.0
 
     def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
-        """Largest stable equilibrium radius [m]; Hertz's where no work of adhesion is left; nan without one."""
+        """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
         rigid, held = math.isinf(self.stiffness), (self.base, self.stiffness)
         if reversible == 0.0 and rigid:
             return np.asarray(jkr.radius_at_indentation(self.base, work, *bodies[:2]))
@@ -123,21 +124,21 @@ class DisplacementControl:
         return np.asarray(radius_at_displacement_reversible(*held, work, stress, reversible, *bodies))
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
-        """Load on the sphere [N]; 0 where the contact is open."""
+        """Return the load on the sphere [N]; 0 if the contact is open."""
         load = jkr.load_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
         return np.where(np.isnan(radius), 0.0, load)
 
     def indentation(self, radius: Array, bodies: Bodies) -> Array:
-        """Indentation [m]; the displacement of the base where the contact is open and the spring unloaded."""
-        found = jkr.indentation_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
-        return np.where(np.isnan(radius), self.base, found)
+        """Return the indentation [m]; if the contact is open, the displacement of the base of the unloaded spring."""
+        closed = jkr.indentation_under_displacement(radius, self.base, self.stiffness, *bodies[:2])
+        return np.where(np.isnan(radius), self.base, closed)
 
     def displacement(self, radius: Array, bodies: Bodies) -> Array:
-        """Displacement of the base [m]."""
+        """Return the displacement of the base [m]."""
         return self.base + np.zeros(radius.shape)
 
     def energy(self, radius: Array, gained: Array, bodies: Bodies) -> Array:
-        """Energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""
+        """Return the energy of this contact above that of an open one [J]: elastic, of the spring, and of adhesion."""
         indentation = self.indentation(radius, bodies)
         spring = 0.0 if math.isinf(self.stiffness) else 0.5 * self.stiffness * (self.base - indentation) ** 2
         return elastic_energy(radius, indentation, bodies) + spring - gained
@@ -146,29 +147,30 @@ class DisplacementControl:
 Control = LoadControl | DisplacementControl
 
 
+#: Inputs of ``share_of`` at a position of the slider, and their type in kernels.
+Share = tuple[tuple[float, float, float], tuple[float, float, float], Array]
+SHARE = "Tuple((UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1]))"
+
+
 class Shares(Protocol):
     """Share of ``fluctuating`` that a contact of finite radius pays, as ``sim.spectrum.radial.Margin``."""
 
     def __call__(self, radius: Array) -> Array:
-        """Share of new contact at the edge, at contact radii [m]."""
+        """Return the share of new contact at the edge, at contact radii [m]."""
 
     def mean(self, radius: Array) -> Array:
-        """Mean of the share over the area of the disc."""
+        """Return the mean of the share over the area of the disc."""
 
     def at(self, position: Array) -> "Shares":
-        """The shares at positions of the slider [m]."""
+        """Return the shares at positions of the slider [m]."""
 
     @property
     def least(self) -> Array | float:
-        """The lowest share at any radius, 0 where none is negative."""
+        """The lowest share at any radius, 0 if none is negative."""
 
     @property
-    def each(self) -> list[tuple[tuple[float, float, float], tuple[float, float, float], Array]]:
-        """Inputs of ``share_of``, one for each position or one for all."""
-
-    @property
-    def terms(self) -> tuple[tuple[float, float, float], tuple[float, float, float], Array]:
-        """Those of a single position."""
+    def each(self) -> list[Share]:
+        """Inputs of ``share_of`` at each position, or once for all positions."""
 
 
 class Balance(NamedTuple):
@@ -198,36 +200,36 @@ class Balance(NamedTuple):
     reference: float
 
     def at(self, k: int) -> "Balance":
-        """The terms at the end of step k of a block."""
+        """Return the terms at the end of step k of a block."""
         stress = self.stress[k] if self.stress.ndim > 1 else self.stress
         return self._replace(bonded=self.bonded[k], fluctuating=self.fluctuating[k], stress=stress)
 
     def without_stress(self) -> "Balance":
-        """The terms without that of the mean stress."""
+        """Return the terms without that of the mean stress."""
         return self._replace(stress=np.zeros(1))
 
     def work(self, radius: Array) -> Array:
-        """Work of adhesion left at a radius, before the mean stress takes its share [J/m²]."""
+        """Return the work of adhesion left at a radius, before the mean stress reduces it [J/m²]."""
         if self.margin is None:
             return self.bonded - self.fluctuating
         return self.bonded - self.fluctuating * self.margin(radius)
 
     def reversible(self, radius: Array) -> Array:
-        """Energy per area that the mean stress would give back if the contact shrank [J/m²].
+        """Return the energy per area that the mean stress would release if the contact shrank [J/m²].
 
-        6 τ0² a/(π E*) for an incompressible half-space.
+        It is 6 τ0² a/(π E*) for an incompressible half-space.
         """
         _, modulus, poisson_ratio = self.bodies
         return np.asarray(mean_stress_energy(radius, self.stress, modulus, poisson_ratio))
 
     def gained(self, radius: Array, reversible: float) -> Array:
-        """Energy that adhesion has given for the area of a contact: ∫ w dA over its radii [J]."""
+        """Return the energy that adhesion has released for the area of a contact: ∫ w dA over its radii [J]."""
         share = 1.0 if self.margin is None else self.margin.mean(radius)
         mean = 2.0 / 3.0 * reversible * self.reversible(radius)
         return math.pi * radius**2 * (self.bonded - self.fluctuating * share - mean)
 
 
-#: A contact before its first touch, in touch, and after a pull-off.
+#: Phases of a contact: before its first touch, in touch, after a pull-off.
 AHEAD, CLOSED, OPEN = 0.0, 1.0, 2.0
 #: Columns of the phases of reference contacts.
 JKR, BONDS_ONLY, NO_MEAN_STRESS, EQUILIBRIUM = range(4)
@@ -239,10 +241,9 @@ _PER_TURN = 0.5 / math.pi
 
 
 @device
-def _surplus(radius, terms, bodies, wave, ends, cubics):
-    """Energy release rate, negative below Hertz's radius, less the work of adhesion left at a radius [J/m²]."""
-    load, base, bonded, fluctuating, reversible = terms
-    curvature, modulus, stiffness = bodies
+def _surplus(radius, contact):
+    """Return the energy release rate, negative below Hertz's radius, minus the work left at a radius [J/m²]."""
+    (load, base, bonded, fluctuating, reversible), (curvature, modulus, stiffness), (wave, ends, cubics) = contact
     inverse, hertz = 1.0 / radius, radius * radius * curvature
     missing = 2.0 / 3.0 * hertz - 0.5 * load / modulus * inverse
     if stiffness > 0.0:
@@ -253,81 +254,76 @@ def _surplus(radius, terms, bodies, wave, ends, cubics):
 
 
 @device
-def _dip(inside, outside, terms, bodies, wave, ends, cubics):
-    """Place between two others at which the surplus is least, by golden section."""
-    one, two = outside - _GOLDEN * (outside - inside), inside + _GOLDEN * (outside - inside)
-    first, second = _surplus(one, terms, bodies, wave, ends, cubics), _surplus(two, terms, bodies, wave, ends, cubics)
+def _dip(inside, outside, contact):
+    """Return the radius between two others at which the surplus is least, by golden section."""
+    low, high = outside - _GOLDEN * (outside - inside), inside + _GOLDEN * (outside - inside)
+    at_low, at_high = _surplus(low, contact), _surplus(high, contact)
     for _ in range(_TURNS):
-        if first < second:
-            outside, two, second = two, one, first
-            one = outside - _GOLDEN * (outside - inside)
-            first = _surplus(one, terms, bodies, wave, ends, cubics)
+        if at_low < at_high:
+            outside, high, at_high = high, low, at_low
+            low = outside - _GOLDEN * (outside - inside)
+            at_low = _surplus(low, contact)
         else:
-            inside, one, first = one, two, second
-            two = inside + _GOLDEN * (outside - inside)
-            second = _surplus(two, terms, bodies, wave, ends, cubics)
+            inside, low, at_low = low, high, at_high
+            high = inside + _GOLDEN * (outside - inside)
+            at_high = _surplus(high, contact)
     return 0.5 * (inside + outside)
 
 
 @device
-def _narrowed(inside, outside, terms, bodies, wave, ends, cubics):
-    """Place at which the surplus crosses zero between two places, to rounding: Ridders's method."""
-    low = _surplus(inside, terms, bodies, wave, ends, cubics)
-    high = _surplus(outside, terms, bodies, wave, ends, cubics)
-    before = 0.0
+def _narrowed(inside, outside, contact):
+    """Return the radius at which the surplus crosses zero between two others, to rounding: Ridders's method."""
+    low, high, before = _surplus(inside, contact), _surplus(outside, contact), 0.0
     for _ in range(_TURNS):
         if not (outside - inside > 4e-16 * outside and low < 0.0 and high > 0.0):
             break
         middle = 0.5 * (inside + outside)
-        value = _surplus(middle, terms, bodies, wave, ends, cubics)
+        value = _surplus(middle, contact)
         guess = middle + (middle - inside) * (-value) / math.sqrt(value * value - low * high)
         guess = min(max(guess, inside), outside)
         if abs(guess - before) <= 4e-16 * guess:
             return guess
-        before, at = guess, _surplus(guess, terms, bodies, wave, ends, cubics)
-        for place, found in ((middle, value), (guess, at)):
+        before = guess
+        for place, surplus in ((middle, value), (guess, _surplus(guess, contact))):
             if inside < place < outside:
-                if found <= 0.0:
-                    inside, low = place, found
+                if surplus <= 0.0:
+                    inside, low = place, surplus
                 else:
-                    outside, high = place, found
+                    outside, high = place, surplus
     return outside if high == 0.0 else inside
 
 
 @device
-def _widest(start, hertz, terms, bodies, wave, ends, cubics):
-    """Radius of one contact, see ``widest_crossings``."""
-    if not start > 0.0 or terms[3] == 0.0 or _surplus(start, terms, bodies, wave, ends, cubics) <= 0.0:
-        return start  # nothing is taken
+def _widest(start, hertz, contact):
+    """Return the radius of one contact, see ``widest_crossings``."""
+    if not start > 0.0 or contact[0][3] == 0.0 or _surplus(start, contact) <= 0.0:
+        return start  # fluctuations do not reduce the work
     low = max(hertz if hertz > 0.0 else 0.0, _NARROWEST * start)
     ratio = (low / start) ** (1.0 / _WALK)
     outside, inside, least, lowest = start, start, math.inf, start
     for k in range(1, _WALK + 1):
         outside, inside = inside, low if k == _WALK else inside * ratio
-        value = _surplus(inside, terms, bodies, wave, ends, cubics)
+        value = _surplus(inside, contact)
         if value <= 0.0:
-            return max(_narrowed(inside, outside, terms, bodies, wave, ends, cubics), low)
+            return max(_narrowed(inside, outside, contact), low)
         if value < least and k < _WALK:
             least, lowest = value, inside
-    dip = _dip(lowest * ratio, lowest / ratio, terms, bodies, wave, ends, cubics)
-    if _surplus(dip, terms, bodies, wave, ends, cubics) <= 0.0:
-        return max(_narrowed(dip, lowest / ratio, terms, bodies, wave, ends, cubics), low)
+    dip = _dip(lowest * ratio, lowest / ratio, contact)
+    if _surplus(dip, contact) <= 0.0:
+        return max(_narrowed(dip, lowest / ratio, contact), low)
     return hertz
 
 
-@kernel(
-    "void(float64[:, ::1], UniTuple(float64, 3), UniTuple(float64, 3), UniTuple(float64, 3), float64[:, ::1],"
-    " float64[::1])"
-)
-def widest_crossings(contacts, bodies, wave, ends, cubics, radius):
-    """Largest stable radius of contacts on discs, written to ``radius`` [m].
+@kernel(f"void(float64[:, ::1], UniTuple(float64, 3), {SHARE}, float64[::1])")
+def widest_crossings(contacts, bodies, share, radius):
+    """Write the largest stable radius of contacts on discs to ``radius`` [m].
 
-    Rows of ``contacts``: radius without fluctuations [m], nan without a contact; Hertz's radius [m], nan where pulled;
+    Rows of ``contacts``: radius without fluctuations [m], nan without a contact; Hertz's radius [m], nan under tension;
     load [N] and displacement of the base [m], one of them 0; work of adhesion of the bonds left and energy of the
     fluctuations [J/m²]; energy that the mean stress takes, over the radius [J/m³]. ``bodies``: curvature of the
-    sphere, contact modulus, stiffness, 0 at a load. The rest is a margin's ``terms``. The walk never goes below
+    sphere, contact modulus, stiffness, 0 at a load. ``share``: a ``Share``. The walk never goes below
     1e-4 of its start.
     """
     for i in range(radius.size):
         terms = contacts[2, i], contacts[3, i], contacts[4, i], contacts[5, i], contacts[6, i]
-        radius[i] = _widest(contacts[0, i], contacts[1, i], terms, bodies, wave, ends, cubics)
+        radius[i] = _widest(contacts[0, i], contacts[1, i], (terms, bodies, share))

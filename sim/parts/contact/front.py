@@ -24,19 +24,17 @@ elasticity has no smaller one. An edge that opens with w <= 0 stops there, and o
 slowly than Hertz's contact grows follows it. A contact that closes begins as a spot, and one that has shrunk to half of
 the spot counts as open.
 
-A ``scene`` is a tuple of numbers: contact modulus, curvature of the sphere, stiffness; load, displacement and work of
-adhesion at the start, each with its rate; the unit of the excess. A ``front`` has speed and power of an opening edge,
-and those of a healing one.
 """
 
 import math
+from collections import namedtuple
 from typing import NamedTuple
 
 import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.numerics.special import cube_root
-from sim.parts.contact.balance import Balance
+from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
 from sim.spectrum.radial import share_of
 from sim.units.course import Pieces
@@ -47,22 +45,22 @@ ROUNDING = 1e-12
 
 @device
 def excess(t, a, scene):
-    """The missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
+    """Return the missing indentation y, the excess s = (G - w)/work, and the slopes of s with a and with t.
 
-    Below Hertz's radius G goes on as -G: nothing else than a monotone continuation for the inner
+    Below Hertz's radius G continues as -G: only a monotone continuation for the inner
     solver, which never ends there.
     """
-    modulus, curvature, stiffness, load, load_rate, displacement, displacement_rate, work, work_rate, scale = scene
+    modulus, curvature, stiffness, load, load_rate, base, base_rate, work, work_rate, scale = scene
     if stiffness == math.inf:
         spring, yielding = 1.0, 0.0
     else:
         yielding = 1.0 / (stiffness + 2.0 * modulus * a)
         spring = stiffness * yielding
     hertz = a * a * curvature
-    y = spring * (hertz - displacement - displacement_rate * t)
+    y = spring * (hertz - base - base_rate * t)
     y += yielding * (4.0 / 3.0 * modulus * a * hertz - load - load_rate * t)
     y_a = 2.0 * a * curvature - 2.0 * modulus * yielding * y
-    y_t = -spring * displacement_rate - yielding * load_rate
+    y_t = -spring * base_rate - yielding * load_rate
     unit = modulus * abs(y) / (2.0 * math.pi * a * scale)
     s = unit * y - (work + work_rate * t) / scale
     return y, s, unit * (2.0 * y_a - y / a), 2.0 * unit * y_t - work_rate / scale
@@ -70,11 +68,11 @@ def excess(t, a, scene):
 
 @device
 def edge_speed(s, front):
-    """da/dt at an excess s, and its slope with s.
+    """Return da/dt at an excess s, and its slope with s.
 
-    Closer to equilibrium than rounding resolves the law is a straight line, lest its slope end at 0 or infinity.
+    Closer to equilibrium than rounding resolves, the law is a straight line, because its slope would be 0 or infinite.
     """
-    speed, power = (front[0], front[1]) if s > 0.0 else (front[2], front[3])
+    speed, power = (front.speed, front.power) if s > 0.0 else (front.heal_speed, front.heal_power)
     near = ROUNDING if power >= 1.0 else 1e3 * ROUNDING
     if abs(s) < near:
         slope = -speed * math.pow(near, power - 1.0)
@@ -85,29 +83,25 @@ def edge_speed(s, front):
 
 @device
 def bare_force(t, scene):
-    """Force of the control on a contact of vanishing radius [N]; the indentation [m] if the stiffness is infinite."""
-    _, _, stiffness, load, load_rate, displacement, displacement_rate, _, _, _ = scene
-    if stiffness == math.inf:
-        return displacement + displacement_rate * t
-    return load + load_rate * t + stiffness * (displacement + displacement_rate * t)
+    """Return the force on a contact of vanishing radius [N], or the indentation [m] if the stiffness is infinite."""
+    base = scene.base + scene.base_rate * t
+    return base if scene.stiffness == math.inf else scene.load + scene.load_rate * t + scene.stiffness * base
 
 
 @device
 def hertz_force(a, scene):
-    """The bare force that goes with Hertz's contact of radius a."""
-    if scene[2] == math.inf:
-        return a * a * scene[1]
-    return a * a * scene[1] * (scene[2] + 4.0 / 3.0 * scene[0] * a)
+    """Return the bare force of Hertz's contact of radius a."""
+    hertz = a * a * scene.curvature
+    return hertz if scene.stiffness == math.inf else hertz * (scene.stiffness + 4.0 / 3.0 * scene.modulus * a)
 
 
 @device
 def hertz_radius(t, scene):
-    """Hertz's radius under the control at t; 0 where nothing presses.
+    """Return Hertz's radius under the control at t; 0 if the control does not press.
 
     The force grows with the radius and is convex, so Newton's steps from the right go left.
     """
-    modulus, curvature, stiffness = scene[0], scene[1], scene[2]
-    force = bare_force(t, scene)
+    modulus, curvature, stiffness, force = scene.modulus, scene.curvature, scene.stiffness, bare_force(t, scene)
     if not force > 0.0:
         return 0.0
     if stiffness == math.inf:
@@ -125,15 +119,12 @@ def hertz_radius(t, scene):
 
 @device
 def pushed(t, scene, front):
-    """True if Hertz's contact at t grows faster than the edge heals; and its radius."""
-    a = hertz_radius(t, scene)
-    modulus, curvature, stiffness, _, load_rate, _, displacement_rate, work, work_rate, scale = scene
-    rate, _ = edge_speed(-(work + work_rate * t) / scale, front)
-    if stiffness == math.inf:
-        indenting = displacement_rate
-    else:
-        indenting = (load_rate + stiffness * displacement_rate) / (stiffness + 2.0 * modulus * a)
-    return rate <= indenting / (2.0 * a * curvature), a
+    """Return True if Hertz's contact at t grows faster than the edge heals, and its radius."""
+    a, stiffness, indenting = hertz_radius(t, scene), scene.stiffness, scene.base_rate
+    rate, _ = edge_speed(-(scene.work + scene.work_rate * t) / scene.scale, front)
+    if stiffness < math.inf:
+        indenting = (scene.load_rate + stiffness * indenting) / (stiffness + 2.0 * scene.modulus * a)
+    return rate <= indenting / (2.0 * a * scene.curvature), a
 
 
 _S6 = math.sqrt(6.0)
@@ -164,11 +155,18 @@ class Kinetics(NamedTuple):
     heal_exponent: float
 
 
+#: Contact modulus, curvature of the sphere, stiffness; load, displacement of the base and work of adhesion at the
+#: start, each with its rate; unit of the excess.
+Scene = namedtuple("Scene", "modulus curvature stiffness load load_rate base base_rate work work_rate scale")
+#: Speed and power of an opening edge, and of a healing one.
+Front = namedtuple("Front", "speed power heal_speed heal_power")
+
+
 @device
 def _slope(running, x, y, start, scene, front):
-    """The equation to integrate: its right side, that one's slopes with y and with x, and s times an area.
+    """Return the right side of the equation to integrate, its slopes with y and with x, and s times an area.
 
-    At rest in time, y is the radius and x the time; ``running``, y is the time and x the logarithm
+    Normally y is the radius and x the time; ``running``, y is the time and x the logarithm
     of start/radius. The last number times \\|dy\\| (times dx, ``running``) is energy over 2 pi work.
     """
     if running:
@@ -187,7 +185,7 @@ def _slope(running, x, y, start, scene, front):
 
 @device
 def _solved(m11, m22, m33, r1, r2, r3):
-    """Cramer's rule for the inverse matrix of the method with another diagonal."""
+    """Solve for the inverse matrix of the method with another diagonal, by Cramer's rule."""
     c1 = m22 * m33 - _I23 * _I32
     c2 = _I21 * m33 - _I23 * _I31
     c3 = _I21 * _I32 - m22 * _I31
@@ -200,9 +198,9 @@ def _solved(m11, m22, m33, r1, r2, r3):
 
 @device
 def _stages(running, x, y, h, z1, z2, z3, start, scene, front):
-    """The three stages' residuals, slopes and excesses, and the size of the residuals as a length.
+    """Return the three stages' residuals, slopes and excesses, and the size of the residuals as a length.
 
-    A residual counts by the change of radius that would mend it: opening and healing may differ by
+    A residual counts by the change of radius that would remove it, because opening and healing may differ by
     decades in speed.
     """
     if not (running or (y + z1 > 0.0 and y + z2 > 0.0 and y + z3 > 0.0)):
@@ -219,11 +217,11 @@ def _stages(running, x, y, h, z1, z2, z3, start, scene, front):
 
 @device
 def _radau(running, x, y, h, size, first, start, scene, front):
-    """One step of Radau IIA: change of y, error over tolerance (nan: no solution), and energy/(2 pi work).
+    """Return change of y, error over tolerance (nan: no solution) and energy/(2 pi work) of a step of Radau IIA.
 
     Newton's steps are halved while they do not lower the residual. The error is that of the embedded
     method, filtered by the slope at the end: a fast layer narrower than the tolerance is stepped
-    over, but not a turn from a fast edge to a slow one. The energy is the method's own quadrature,
+    over, but not a turn from a fast edge to a slow one. The energy is the quadrature of the method,
     of positive weights and signs.
     """
     f, j, f_x = first
@@ -264,10 +262,10 @@ def _radau(running, x, y, h, size, first, start, scene, front):
 
 @device
 def _ride(t, a, end, least, scene, front):
-    """Follow Hertz's contact from t to ``end`` at most, or to where the edge leaves it.
+    """Follow Hertz's contact from t to ``end`` at most, or until the edge leaves it; return time, radius and energy.
 
-    The energy is that of new area against G = 0, int w a da, exact by Gauss's three points since
-    work and force are linear in time; none is counted where w <= 0, where pressing pays for the area.
+    The energy is that of new area against G = 0, int w a da, exact by Gauss's three points because
+    work and force are linear in time. None is counted for w <= 0, because pressing pays for the area.
     """
     riding, b = pushed(end, scene, front)
     if not riding:
@@ -282,35 +280,34 @@ def _ride(t, a, end, least, scene, front):
         b, before, after = min(a, least), bare_force(t, scene), bare_force(end, scene)
         end = t + (end - t) * min(max((before - hertz_force(b, scene)) / (before - after), 0.0), 1.0)
     energy = 0.0
-    if b > a and scene[7] + scene[8] * 0.5 * (t + end) > 0.0:
+    if b > a and scene.work + scene.work_rate * 0.5 * (t + end) > 0.0:
         low, span = hertz_force(a, scene), hertz_force(b, scene) - hertz_force(a, scene)
         for node, weight in ((-math.sqrt(0.6), 5.0 / 18.0), (0.0, 8.0 / 18.0), (math.sqrt(0.6), 5.0 / 18.0)):
             c = 0.5 * (a + b) + 0.5 * node * (b - a)
             moment = t + (end - t) * (hertz_force(c, scene) - low) / span
-            energy += weight * (b - a) * c * max(0.0, scene[7] + scene[8] * moment) / scene[9]
+            energy += weight * (b - a) * c * max(0.0, scene.work + scene.work_rate * moment) / scene.scale
     return end, b, energy
 
 
 @device
 def _fallback(t, a, stop, least, scene, front):
-    """Fallback when the adaptive steps are used up: one implicit Euler step to ``stop``.
+    """Return radius and energy after one implicit Euler step to ``stop``, if the adaptive steps are used up.
 
-    Takes the root nearest to the present radius, bracketed by stepping, then bisected.
+    The root nearest to the present radius is bracketed by stepping, then bisected.
     """
-    _, s, _, _ = excess(stop, a, scene)
+    s = excess(stop, a, scene)[1]
     rate, _ = edge_speed(s, front)
     factor, low, energy = (0.98 if s > 0.0 else 1.02), a, 0.0
     for _ in range(4000):
         if rate == 0.0 or not low > least:
             break
         high = low * factor
-        _, s, _, _ = excess(stop, high, scene)
+        s = excess(stop, high, scene)[1]
         f, _ = edge_speed(s, front)
         if (high - a - (stop - t) * f) * rate >= 0.0:
             for _ in range(60):
                 middle = 0.5 * (low + high)
-                _, s, _, _ = excess(stop, middle, scene)
-                f, _ = edge_speed(s, front)
+                f, _ = edge_speed(excess(stop, middle, scene)[1], front)
                 low, high = (low, middle) if (middle - a - (stop - t) * f) * rate >= 0.0 else (middle, high)
             break
         energy += abs(s * high * (high - low))
@@ -329,7 +326,7 @@ def _runs(a, rate, bend, s_a, s_t, left):
 
 @device
 def _start(running, t, a, rate, stop, least):
-    """First step, longest step, and size of an error that counts, in the variable that ``running`` makes the time."""
+    """Return first step, longest step, reach, and size of an error that counts; ``running``, the time is an error's."""
     if running:
         reach = math.log(a / least)
         return 0.1, min(reach, _LONGEST), reach, 1e-3 * stop - a / rate
@@ -338,7 +335,7 @@ def _start(running, t, a, rate, stop, least):
 
 @device
 def _try(running, t, a, h, size, scene, front):
-    """An inner step: time and radius after it, error over tolerance, and energy/(2 pi work)."""
+    """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work)."""
     x, now = (0.0, t) if running else (t, a)
     f, j, f_x, _ = _slope(running, x, now, a, scene, front)
     change, error, energy = _radau(running, x, now, h, size, (f, j, f_x), a, scene, front)
@@ -349,7 +346,7 @@ def _try(running, t, a, h, size, scene, front):
 
 @device
 def _piece(t, a, stop, least, tries, scene, front):
-    """Advance to ``stop``: time, radius or 0 if open, energy/(2 pi work), and tries left.
+    """Advance to ``stop``; return time, radius or 0 if open, energy/(2 pi work), and tries left.
 
     A time below ``stop`` with a radius means that the tries are used up.
     """
@@ -359,7 +356,7 @@ def _piece(t, a, stop, least, tries, scene, front):
         tries -= 1
         y, s, s_a, s_t = excess(t, a, scene)
         rate, bend = edge_speed(s, front)
-        if y <= _TOUCH * a * a * scene[1] and pushed(t, scene, front)[0]:
+        if y <= _TOUCH * a * a * scene.curvature and pushed(t, scene, front)[0]:
             t, a, more = _ride(t, a, min(stop, t + tick), least, scene, front)
             energy, h = energy + more, 0.0
             if a <= least:
@@ -387,7 +384,7 @@ def _piece(t, a, stop, least, tries, scene, front):
             cross = True
             continue
         y1, _, _, _ = excess(t1, a1, scene)
-        edge = _TOUCH * a1 * a1 * scene[1]
+        edge = _TOUCH * a1 * a1 * scene.curvature
         if y1 < -edge and y > edge:
             h *= max(1e-6, y / (y - y1))
             continue
@@ -401,12 +398,12 @@ def _piece(t, a, stop, least, tries, scene, front):
 
 @device
 def _member(a, duration, least, scene, front):
-    """One member over one clock step: radius or nan, time of detachment or nan, dissipated energy."""
+    """Return radius or nan, time of detachment or nan, and dissipated energy of a member after a clock step."""
     a = max(a, hertz_radius(0.0, scene))
     if not a > 0.0:
         return math.nan, math.nan, 0.0
     ends = (bare_force(0.0, scene), bare_force(duration, scene))
-    first = _zero(scene[7], scene[7] + scene[8] * duration, duration)
+    first = _zero(scene.work, scene.work + scene.work_rate * duration, duration)
     second = _zero(ends[0], ends[1], duration)
     t, energy, tries = 0.0, 0.0, _TRIES
     for stop in (min(first, second), max(first, second), duration):
@@ -419,13 +416,13 @@ def _member(a, duration, least, scene, front):
                 if a <= least:
                     a = 0.0
             if not a > 0.0:
-                return math.nan, t, 2.0 * math.pi * scene[9] * energy
-    return a, math.nan, 2.0 * math.pi * scene[9] * energy
+                return math.nan, t, 2.0 * math.pi * scene.scale * energy
+    return a, math.nan, 2.0 * math.pi * scene.scale * energy
 
 
 @device
 def _zero(before, after, duration):
-    """Time at which a number that changes linearly changes sign; the end if it does not."""
+    """Return the time at which a number that changes linearly changes sign; the end if it does not."""
     if (before < 0.0) == (after < 0.0):
         return duration
     return duration * min(max(before / (before - after), 0.0), 1.0)
@@ -433,23 +430,23 @@ def _zero(before, after, duration):
 
 @device
 def scene_of(works, loads, bases, stiffness, duration, scale, bodies):
-    """The ``scene`` from work, load and displacement at both ends of a time."""
+    """Return the ``Scene`` of work, load and displacement at start and end of a time."""
     per, (sphere_radius, modulus) = (1.0 / duration if duration > 0.0 else 0.0), bodies
     load, base = (0.0 if stiffness == math.inf else loads[0]), (0.0 if stiffness == 0.0 else bases[0])
     load_rate = 0.0 if stiffness == math.inf else (loads[1] - loads[0]) * per
     base_rate = 0.0 if stiffness == 0.0 else (bases[1] - bases[0]) * per
-    held = modulus, 1.0 / sphere_radius, stiffness, load, load_rate, base, base_rate
-    return held + (works[0], (works[1] - works[0]) * per, scale)
+    work_rate = (works[1] - works[0]) * per
+    return Scene(modulus, 1.0 / sphere_radius, stiffness, load, load_rate, base, base_rate, works[0], work_rate, scale)
 
 
 @device
 def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, least):
-    """Radius, time of detachment and dissipated energy of an edge after a time in which work and control are linear.
+    """Return radius, time of detachment and dissipated energy of an edge after a time of linear work and control.
 
     Parameters
     ----------
     a : float
-        Radius at the start [m]; nan or 0 for an open contact, which stays open. Below Hertz's it starts as that.
+        Radius at the start [m]; nan or 0 for an open contact, which stays open. It is at least Hertz's.
     works, loads, bases : pair of floats
         Work of adhesion w of any sign [J/m^2], load [N] and displacement of the base [m] at start and end.
     stiffness, duration : float
@@ -467,17 +464,17 @@ def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, le
     Returns
     -------
     tuple
-        The radius at the end [m], nan where open; the time since the start at which it opened [s], nan where it did
-        not; int \\|G - w\\| 2 pi a \\|da\\| [J] up to there. Where a number is nan or invalid all three are nan.
+        The radius at the end [m], nan if open; the time since the start at which it opened [s], nan if it did
+        not; int \\|G - w\\| 2 pi a \\|da\\| [J] until then. If a number is nan or invalid all three are nan.
 
     Notes
     -----
-    Exponents above 1, whose edge is infinitely mobile at rest, cost much and lose digits in stiff
-    cases. Where pressing advances the edge faster than it heals, w dA is dissipated if w > 0, and nothing if w <= 0.
+    Exponents above 1, with an edge that is infinitely mobile at rest, are expensive and lose digits in stiff
+    cases. If pressing advances the edge faster than it heals, w dA is dissipated for w > 0, and nothing for w <= 0.
     """
     scale, speed, exponent, heal_speed, heal_exponent = kinetics
     scene = scene_of(works, loads, bases, stiffness, duration, scale, bodies)
-    ends = abs(scene[3]) + abs(scene[5]) + abs(works[0]) + abs(works[1])
+    ends = abs(scene.load) + abs(scene.base) + abs(works[0]) + abs(works[1])
     ends += (0.0 if stiffness == math.inf else abs(loads[1])) + (0.0 if stiffness == 0.0 else abs(bases[1]))
     positive = min(scale, exponent, heal_exponent, bodies[0], bodies[1])
     wide = max(abs(a), scale, exponent, heal_exponent, bodies[0], bodies[1], duration, least)
@@ -487,7 +484,7 @@ def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, le
         power, heal_power = 1.0 / exponent, 1.0 / heal_exponent
         speed = min(speed, a * per * min(ROUNDING**-power, 1e250))
         heal_speed = min(heal_speed, a * per * min(ROUNDING**-heal_power, 1e250))
-        front = speed, power, heal_speed, heal_power
+        front = Front(speed, power, heal_speed, heal_power)
         end, opened, energy = _member(a, duration, max(least, _LEAST * a), scene, front)
         if energy < math.inf and end != math.inf:
             return end, opened, energy
@@ -496,23 +493,23 @@ def moved_edge(a, works, loads, bases, stiffness, duration, kinetics, bodies, le
 
 #: Radius of a first touch over the length (w R²/E*)^(1/3) of adhesive contacts.
 _SPOT = 1e-3
-_READ, _THREE = "Array(float64, 2, 'A', readonly=True)", "UniTuple(float64, 3)"
-#: ``terms`` of a contact on the whole plane, see ``Margin.terms``.
+_READ = "Array(float64, 2, 'A', readonly=True)"
+#: ``Share`` of a contact on the whole plane.
 _PLANE = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), np.empty((0, 4))
 
 
 @device
-def _left(radius, bonded, fluctuating, taken, wave, ends, cubics):
-    """Work of adhesion left at a radius; of an open contact that of a vanishing one."""
-    size, share = (0.0 if math.isnan(radius) else radius), 1.0
-    if len(cubics) > 0:
-        share = share_of(size, wave, ends, cubics) if size > 0.0 else 0.0
-    return bonded - fluctuating * share - taken * size
+def _left(radius, bonded, fluctuating, reversible, share):
+    """Return the work of adhesion left at a radius; of an open contact that of a vanishing one."""
+    size, part = (0.0 if math.isnan(radius) else radius), 1.0
+    if len(share[2]) > 0:
+        part = share_of(size, share[0], share[1], share[2]) if size > 0.0 else 0.0
+    return bonded - fluctuating * part - reversible * size
 
 
 @device
 def _energy(t, a, scene):
-    """Energy of a contact above that of an open one: elastic, of the spring or the load, of adhesion."""
+    """Return the energy of a contact above that of an open one: elastic, of the spring or the load, of adhesion."""
     modulus, curvature, stiffness, load, load_rate, base, base_rate, work, work_rate, _ = scene
     hertz = a * a * curvature
     indentation = hertz - excess(t, a, scene)[0]
@@ -526,10 +523,11 @@ def _energy(t, a, scene):
 
 @device
 def _moved(radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot):
-    """Radius or nan, time of opening or nan, and dissipated energy after a part of a clock step.
+    """Return radius or nan, time of opening or nan, and dissipated energy after a part of a clock step.
 
-    Energy still stored where the edge opens counts as dissipated, and so does what a spot gains at a touch. Under a
-    load nothing counts where it falls: below the radius at pull-off its work diverges as the radius vanishes.
+    Energy that is stored as the edge opens counts as dissipated, and so does the energy that a spot gains at a touch.
+    Under a load nothing counts below the radius at pull-off, because the work of the load diverges as the radius
+    vanishes.
     """
     a = spot if touches else radius
     if math.isnan(a):
@@ -550,32 +548,32 @@ def _moved(radius, touches, works, loads, bases, stiffness, duration, kinetics, 
 
 @kernel(
     f"void(float64[:, ::1], float64[::1], int64[::1], float64[:, ::1], {_READ}, {_READ}, {_READ}, float64,"
-    f" UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean, {_THREE}, {_THREE}, float64[:, ::1],"
-    " float64[:, :, ::1])"
+    f" UniTuple(float64, 5), UniTuple(float64, 2), float64, boolean, {SHARE}, float64[:, :, ::1])"
 )
 def _follow(
-    state, durations, opening, pieces, bonded, fluctuating, taken, stiffness, kinetics, bodies, spot, again, wave, ends,
-    cubics, out,
+    state, durations, opening, pieces, bonded, fluctuating, reversible, stiffness, kinetics, bodies, spot, again, share,
+    out,
 ):  # fmt: skip
+    """Write work, radius, time of detachment and dissipated energy at the end of each step; see ``follow``."""
     for m in range(state.shape[1]):
         work, radius, detached, dissipated = state[0, m], state[1, m], state[2, m], state[3, m]
         for k in range(len(durations)):
-            last = _left(radius, bonded[k, m], fluctuating[k, m], taken[k, m], wave, ends, cubics)
-            first, share = (last if math.isnan(radius) else work), 0.0
+            last = _left(radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share)
+            first, end = (last if math.isnan(radius) else work), 0.0
             for p in range(opening[k], opening[k + 1]):
-                before, share = share, pieces[1, p]
-                works = (1.0 - before) * first + before * last, (1.0 - share) * first + share * last
-                held, none = (pieces[2, p], pieces[3, p]), (0.0, 0.0)
-                loads, bases = (held, none) if stiffness == 0.0 else (none, held)
-                touches = math.isnan(radius) and (math.isnan(detached) or again) and held[0] >= 0.0
-                closed, duration = touches or not math.isnan(radius), durations[k] * (share - before)
+                begin, end = end, pieces[1, p]
+                works = (1.0 - begin) * first + begin * last, (1.0 - end) * first + end * last
+                mount, none = (pieces[2, p], pieces[3, p]), (0.0, 0.0)
+                loads, bases = (mount, none) if stiffness == 0.0 else (none, mount)
+                touches = math.isnan(radius) and (math.isnan(detached) or again) and mount[0] >= 0.0
+                closed, duration = touches or not math.isnan(radius), durations[k] * (end - begin)
                 radius, opened, lost = _moved(
                     radius, touches, works, loads, bases, stiffness, duration, kinetics, bodies, spot
                 )
                 dissipated += lost
                 if closed and math.isnan(radius):
                     detached = pieces[0, p] - duration + opened
-            work = _left(radius, bonded[k, m], fluctuating[k, m], taken[k, m], wave, ends, cubics)
+            work = _left(radius, bonded[k, m], fluctuating[k, m], reversible[k, m], share)
             out[0, k, m], out[1, k, m], out[2, k, m], out[3, k, m] = work, radius, detached, dissipated
 
 
@@ -583,7 +581,7 @@ def follow(
     state: ContactState, durations: Array, pieces: Pieces, stiffness: float, balance: Balance, reversible: float,
     kinetics: Kinetics, again: bool,
 ) -> Array:  # fmt: skip
-    """The first four quantities of ``ContactState`` at the end of each step of a block, shape (4, steps, rows).
+    """Return the first four quantities of ``ContactState`` at the end of each step of a block, (4, steps, rows).
 
     Parameters
     ----------
@@ -596,17 +594,17 @@ def follow(
         indentation, or for a stiffness of 0 the load.
     balance : Balance
         Terms of the work of adhesion at the end of each step, of which the mean stress takes the share
-        ``reversible``. What depends on the radius is taken at that of the start of the step.
+        ``reversible``. Terms that depend on the radius are those of the radius at the start of the step.
     kinetics : Kinetics
         The law of the edge.
     again : bool
-        Whether a contact that has come off closes again where the free sphere touches.
+        True if a contact that has pulled off closes again as the free sphere touches.
     """
     opening = np.searchsorted(pieces.interval, np.arange(len(durations) + 1))
     begin, end = pieces.start[opening[:-1]], pieces.stop[opening[1:] - 1]
     shares = (pieces.stop - begin[pieces.interval]) / (end - begin)[pieces.interval]
-    taken = reversible * balance.reversible(np.ones(1)) if reversible else np.zeros(1)
-    of_steps = balance.bonded, balance.fluctuating, taken
+    of_stress = reversible * balance.reversible(np.ones(1)) if reversible else np.zeros(1)
+    of_steps = balance.bonded, balance.fluctuating, of_stress
     _, rows = np.broadcast_shapes(state.radius.shape, *((1, *values.shape)[-2:] for values in of_steps))
     before, out = np.empty((4, rows)), np.empty((4, len(durations), rows))
     for row, values in zip(before, state, strict=False):
@@ -616,6 +614,6 @@ def follow(
     _follow(
         before, durations, opening, np.array([pieces.stop, shares, pieces.first, pieces.last]),
         *(np.broadcast_to(values, out.shape[1:]) for values in of_steps), stiffness, tuple(kinetics),
-        (sphere_radius, modulus), spot, again, *(_PLANE if balance.margin is None else balance.margin.terms), out,
+        (sphere_radius, modulus), spot, again, _PLANE if balance.margin is None else balance.margin.each[0], out,
     )  # fmt: skip
     return out

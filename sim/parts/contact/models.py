@@ -56,26 +56,22 @@ class Body:
     @model_validator(mode="after")
     def _one_modulus(self) -> "Body":
         if (self.shear_modulus is None) == (self.youngs_modulus is None):
-            found = "none is" if self.shear_modulus is None else "both are"
-            raise PydanticCustomError(
-                "one_modulus",
-                'needs exactly one modulus, but {found} given: write either shear_modulus = "1.6 MPa" '
-                'or youngs_modulus = "4.8 MPa"',
-                {"found": found},
-            )
+            count = "none is" if self.shear_modulus is None else "both are"
+            cure = 'write either shear_modulus = "1.6 MPa" or youngs_modulus = "4.8 MPa"'
+            raise PydanticCustomError("one_modulus", f"needs exactly one modulus, but {count} given: {cure}")
         return self
 
     @cached_property
     def own_shear_modulus(self) -> float:
-        """G of this body alone [Pa]: as given, or E/(2(1 + nu))."""
+        """G of this body alone [Pa]: ``shear_modulus``, or E/(2(1 + nu))."""
         if self.youngs_modulus is not None:
             return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))
-        return cast(float, self.shear_modulus)  # one of the two is there, as checked above
+        return cast(float, self.shear_modulus)  # not None, as checked above
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Solid(Body):
-    """The elastic half-space, with what presses on it if that yields too.
+    """The elastic half-space, with the body that presses on it if that yields too.
 
     Parameters
     ----------
@@ -100,7 +96,7 @@ class Solid(Body):
 
     @cached_property
     def effective(self) -> tuple[float, float]:
-        """G [Pa] and nu [1] of the one half-space that yields as both bodies do.
+        """G [Pa] and nu [1] of the half-space that yields as the two bodies together.
 
         The bodies' 1/G and nu/G add, and with them both the tangential and the normal compliance.
         """
@@ -158,7 +154,7 @@ class Adhesion:
     ] = 1.0
 
     def work_of_bonds(self, fraction):
-        """Delta gamma [J/m^2] at a bond fraction phi [1], a float or an array."""
+        """Return Delta gamma [J/m^2] at a bond fraction phi [1], a float or an array."""
         return self.work * (1.0 - self.bond_share + self.bond_share * fraction)
 
 
@@ -187,9 +183,9 @@ class _Controlled:
     state_class: ClassVar[type[ContactState]] = ContactState
     per_member: ClassVar[bool] = False
     feeds_back: ClassVar[bool] = False
-    #: Whether the edge takes time to reach equilibrium.
+    #: True if the edge takes time to reach equilibrium.
     lags: ClassVar[bool] = False
-    #: Rough time of a step of one member where its edge lags, for estimates [s].
+    #: Rough time of a step of one member if its edge lags, for estimates [s].
     edge_seconds: ClassVar[float] = 0.0
 
     load: _Load | None = None  # type: ignore[valid-type]
@@ -201,38 +197,37 @@ class _Controlled:
 
     @model_validator(mode="after")
     def _one_control(self) -> "_Controlled":
-        given = [name for name in _KINDS if getattr(self, name) is not None]
-        if not given:
-            raise PydanticCustomError(
-                "control",
-                'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", or a displacement'
-                " with a stiffness",
-            )
-        if len(given) > 1:
-            names = " and ".join(f"an {name}" if name == "indentation" else f"a {name}" for name in given)
-            raise PydanticCustomError("control", f"{names} cannot both hold the sphere; leave one of them out")
-        if (self.displacement is None) != (self.stiffness is None):
-            said = 'a displacement needs the stiffness between base and sphere, such as "1 kN/m"'
-            other = "a stiffness belongs to a displacement; give contact.displacement, or leave it out"
-            raise PydanticCustomError("control", said if self.stiffness is None else other)
+        kinds = [name for name in _KINDS if getattr(self, name) is not None]
+        message = ""
+        if not kinds:
+            message = 'nothing holds the sphere; give a load such as "4 mN", an indentation such as "2 um", '
+            message += "or a displacement with a stiffness"
+        elif len(kinds) > 1:
+            names = " and ".join(f"an {name}" if name == "indentation" else f"a {name}" for name in kinds)
+            message = f"{names} cannot both hold the sphere; leave one of them out"
+        elif self.displacement is not None and self.stiffness is None:
+            message = 'a displacement needs the stiffness between base and sphere, such as "1 kN/m"'
+        elif self.displacement is None and self.stiffness is not None:
+            message = "a stiffness belongs to a displacement; give contact.displacement, or leave it out"
+        if message:
+            raise PydanticCustomError("control", message)
         return self
 
     def remarks(self, setting: Setting) -> list[str]:
-        said = []
+        remarks = []
         if setting.rest_radius > _LARGEST_SHARE * setting.sphere_radius:
-            said.append(
-                f"the contact exceeds {_LARGEST_SHARE} of the sphere's radius: the theory is for small contacts"
-            )
+            limit = f"{_LARGEST_SHARE} of the sphere's radius"
+            remarks.append(f"the contact exceeds {limit}: the theory is for small contacts")
         if math.isnan(setting.rest_radius):
             never = "is open for the whole run: raise contact.{} to zero, where the sphere touches"
             jumps = "begins open and jumps in where contact.{} first reaches zero"
             course = jumps if max(self.course.extremes) >= 0.0 else never
-            said.append(f"the contact {course.format(self.kind)}")
-        return said
+            remarks.append(f"the contact {course.format(self.kind)}")
+        return remarks
 
     @cached_property
     def kind(self) -> str:
-        """Name of what is prescribed: load, indentation or displacement."""
+        """Name of the prescribed quantity: load, indentation or displacement."""
         return next(name for name in _KINDS if getattr(self, name) is not None)
 
     @cached_property
@@ -241,7 +236,7 @@ class _Controlled:
         return prescribed(getattr(self, self.kind))
 
     def control(self, time: float | Array, duration: float) -> Control:
-        """The control at a time of a run of ``duration`` [s], or at many, shape (times, 1)."""
+        """Return the control at a time of a run of ``duration`` [s], or at many, shape (times, 1)."""
         if not self.changes:
             return self._steady
         value = self.course.at(np.asarray(time), duration)
@@ -249,14 +244,14 @@ class _Controlled:
 
     @cached_property
     def _steady(self) -> Control:
-        """The control where it does not change."""
+        """The control if it does not change."""
         return self._control(self.course.at(np.zeros(()), 0.0).item())
 
     def _control(self, value: float | Array) -> Control:
         return DisplacementControl(value, self.stiffness or math.inf) if self.load is None else LoadControl(value)
 
     def mount_between(self, ends: Array, duration: float) -> tuple[Control, Control]:
-        """The control at the two ends of each interval between some times of a run [s], before any jump at its end."""
+        """Return the control at start and end of each interval between times of a run [s], before a jump at its end."""
         if not self.changes:
             return self._steady, self._steady
         pieces = self.course.pieces(ends, duration).joined
@@ -264,7 +259,7 @@ class _Controlled:
 
     @property
     def makes_load(self) -> bool:
-        """True if the load follows from the contact or changes in time, rather than staying as given."""
+        """True if the load follows from the contact or changes in time."""
         return self.load is None or self.changes
 
     @property
@@ -273,71 +268,68 @@ class _Controlled:
         return self.course.changes
 
     def equilibrium_radius(self, work: Array, sphere_radius: float, modulus: float) -> Array:
-        """JKR radius at the start for a work of adhesion; Hertz where it is zero or less; nan without equilibrium."""
+        """Return the JKR radius at the start for a work of adhesion; Hertz's if it is not positive; nan if open."""
         return self.control(0.0, 0.0).radius(work, np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
 
     def largest_radius(self, work: float, sphere_radius: float, modulus: float) -> float:
-        """JKR radius for a work of adhesion where the control presses most [m]; 0 without equilibrium."""
+        """Return the JKR radius for a work of adhesion as the control presses most [m]; 0 without equilibrium."""
         control = self._control(max(self.course.extremes))
         radius = control.radius(np.array([work]), np.zeros(1), 0.0, Bodies(sphere_radius, modulus, 0.5))
         return float(np.nan_to_num(radius[0]))
 
     def start(self, motion: Motion, duration: float, balance: Balance) -> ContactState:
-        """The contact at the start, in equilibrium."""
+        """Return the contact at the start, in equilibrium."""
         control = self.control(motion.time, duration)
         radius = self.equilibrium(control, balance)
         phases = np.where(self._without_equilibrium(control, balance), AHEAD, CLOSED)
-        work, unknown, none = self._left(radius, balance), np.full(radius.shape, np.nan), np.zeros(radius.shape)
-        return ContactState(work, radius, unknown, none, phases)
+        unknown = np.full(radius.shape, np.nan)
+        return ContactState(self._left(radius, balance), radius, unknown, np.zeros(radius.shape), phases)
 
     def stopped(self, radius: Array, detached: Array) -> Flags:
-        """True where a trajectory has ended, at the pull-off of a contact that stops there."""
+        """True if a trajectory has ended, at the pull-off of a contact that stops then."""
         return np.isnan(radius) & ~np.isnan(detached) & (self.after_pull_off == "stop")
 
     def _without_equilibrium(self, control: Control, balance: Balance) -> Flags:
-        """True where a reference contact has no equilibrium, shape (..., rows, 4); those not followed as the first."""
+        """True if a reference contact has no equilibrium, shape (..., rows, 4); those not followed as the first."""
         whole = np.full((*balance.bonded.shape[:-1], 1), balance.reference)
-        found = control.radius(np.concatenate([whole, balance.bonded], axis=-1), np.zeros(1), 0.0, balance.bodies)
-        stressless = self.equilibrium(control, balance.without_stress()) if self.reversible else found[..., :1]
-        settled = self.equilibrium(control, balance) if self.lags else found[..., :1]
-        references = found[..., :1], found[..., 1:], stressless, settled
-        rows = max(radius.shape[-1] for radius in references)
-        lost = np.empty((*whole.shape[:-1], rows, len(references)), dtype=bool)
-        for column, radius in enumerate(references):
-            lost[..., column] = np.isnan(radius)
-        return lost
+        radii = control.radius(np.concatenate([whole, balance.bonded], axis=-1), np.zeros(1), 0.0, balance.bodies)
+        jkr, bonds_only = radii[..., :1], radii[..., 1:]
+        no_mean_stress = self.equilibrium(control, balance.without_stress()) if self.reversible else jkr
+        equilibrium = self.equilibrium(control, balance) if self.lags else jkr
+        return np.isnan(np.stack(np.broadcast_arrays(jkr, bonds_only, no_mean_stress, equilibrium), axis=-1))
 
     def _phases(self, state: ContactState, control: Control, balance: Balance) -> Array:
-        """Phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
+        """Return the phases of the reference contacts at the end of each step, shape (steps, rows, 4)."""
         if min(self.course.extremes) >= 0.0:
             return during(state.phases, len(balance.bonded))
         return self._followed(state.phases, control, self._without_equilibrium(control, balance))
 
     def _followed(self, phases: Array, control: Control, lost: Flags) -> Array:
-        """Phases of contacts at the end of each step, shape (steps, rows, contacts), where equilibrium is ``lost``."""
+        """Return phases at the end of each step, shape (steps, rows, contacts), of contacts that have ``lost`` it."""
         after, closes = np.empty(lost.shape), np.full((len(lost), 1), control.closes)
         _follow(phases, closes[:, 0], lost, self.after_pull_off == "reattach", after)
         return after
 
     def equilibrium(self, control: Control, balance: Balance) -> Array:
-        """Largest stable radius in equilibrium with the work left there [m], nan without one."""
+        """Return the largest stable radius in equilibrium with the work left there [m], nan without one."""
         if balance.margin is None:
             return control.radius(balance.work(np.zeros(1)), balance.stress, self.reversible, balance.bodies)
         bodies = balance.bodies
         most = balance.bonded - balance.margin.least * balance.fluctuating
         wide = control.radius(most, balance.stress, self.reversible, bodies)
         hertz = control.radius(np.zeros(1), np.zeros(1), 0.0, bodies)
-        taken = self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
-        terms = (wide, hertz, *control.mount[:2], balance.bonded, balance.fluctuating, taken)
-        each, sphere = balance.margin.each, (1.0 / bodies.sphere_radius, bodies.modulus)
-        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(len(terms), len(each), -1)
+        of_stress = self.reversible * balance.reversible(np.ones(1)) if self.reversible else 0.0
+        load, base, stiffness = control.mount
+        terms = wide, hertz, load, base, balance.bonded, balance.fluctuating, of_stress
+        shares, sphere = balance.margin.each, (1.0 / bodies.sphere_radius, bodies.modulus, stiffness)
+        contacts = np.stack(np.broadcast_arrays(*terms)).reshape(len(terms), len(shares), -1)
         radius = np.empty(contacts.shape[1:])
-        for k, margin in enumerate(each):
-            widest_crossings(np.ascontiguousarray(contacts[:, k]), (*sphere, control.mount[2]), *margin, radius[k])
+        for k, share in enumerate(shares):
+            widest_crossings(np.ascontiguousarray(contacts[:, k]), sphere, share, radius[k])
         return radius.reshape(wide.shape)
 
     def _left(self, radius: Array, balance: Balance) -> Array:
-        """Work of adhesion left at a radius; of an open contact that of a vanishing one."""
+        """Return the work of adhesion left at a radius; of an open contact that of a vanishing one."""
         if balance.margin is None and self.reversible == 0.0:
             return balance.work(radius)
         size = np.nan_to_num(radius, nan=0.0)
@@ -349,9 +341,10 @@ class _Controlled:
 class Equilibrium(_Controlled):
     """The contact is in JKR equilibrium with the work of adhesion at every step, on its stable branch.
 
-    Where no equilibrium is left it pulls off. Then, by ``after_pull_off``, it stays open, or reattaches as soon as the
-    free sphere touches (at a load or a displacement of zero or more), where it jumps into equilibrium, or the
-    member's trajectory stops. A contact that begins open jumps in at its first touch in any case.
+    Without an equilibrium it pulls off. By ``after_pull_off`` the contact then stays open, or the trajectory of
+    the member stops, or the contact reattaches as soon as the free sphere touches. The free sphere touches at a load or
+    a displacement of zero or more, and the contact jumps into equilibrium. A contact that begins open jumps in at its
+    first touch in any case.
     """
 
     model: Literal["equilibrium"] = "equilibrium"
@@ -365,30 +358,28 @@ class Equilibrium(_Controlled):
             followed = self._followed(phase[:, np.newaxis], control, np.isnan(radius)[:, :, np.newaxis])
             radius = np.where(followed[:, :, 0] == CLOSED, radius, np.nan)
             before = np.concatenate([state.radius[np.newaxis], radius[:-1]])
-            opens, closes = (np.isnan(one) & ~np.isnan(other) for one, other in ((radius, before), (before, radius)))
-            lost = np.zeros(radius.shape)
+            is_open, was_open, lost = np.isnan(radius), np.isnan(before), np.zeros(radius.shape)
+            opens, closes = is_open & ~was_open, was_open & ~is_open
             for happens, size, sign in ((opens, before, 1.0), (closes, radius, -1.0)):
-                if not happens.any():
-                    continue
-                over = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
-                lost += np.where(happens, np.maximum(sign * over, 0.0), 0.0)
+                if happens.any():
+                    energy = control.energy(size, balance.gained(size, self.reversible), balance.bodies)
+                    lost += np.where(happens, np.maximum(sign * energy, 0.0), 0.0)
             dissipated = np.add.accumulate(np.concatenate([dissipated[:1], lost]))[1:]
-            gone = np.where(opens, motions.time, np.nan)
-            detached = np.fmax.accumulate(np.concatenate([detached[:1], gone]))[1:]
-        return ContactState(
-            self._left(radius, balance), radius, detached, dissipated, self._phases(state, control, balance)
-        )
+            opened = np.where(opens, motions.time, np.nan)
+            detached = np.fmax.accumulate(np.concatenate([detached[:1], opened]))[1:]
+        work, phases = self._left(radius, balance), self._phases(state, control, balance)
+        return ContactState(work, radius, detached, dissipated, phases)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
 class RateDependent(_Controlled):
     """The edge of the contact has a finite speed: G − w = work (v/v0)ⁿ. Limit: equilibrium as v0 -> infinity.
 
-    It opens where the energy release rate G exceeds the work of adhesion w that is left, and heals, with a
-    speed and an exponent of its own, where it falls short. A clock step is integrated to 1e-8, in parts between
+    The edge opens if the energy release rate G exceeds the work of adhesion w that is left. It heals, with a
+    speed and an exponent of its own, if G is smaller. A clock step is integrated to 1e-8, in parts between
     which the control turns or jumps. The part of the work that depends on the radius itself (a disc, ``reversible``)
-    is taken at the start of the step. Under a dead load no dissipation is counted below the radius at pull-off,
-    where the load falls freely.
+    is that at the start of the step. Under a dead load no dissipation is counted below the radius at pull-off,
+    because the load falls freely then.
     """
 
     lags: ClassVar[bool] = True
@@ -415,7 +406,7 @@ class RateDependent(_Controlled):
 
 @kernel("void(float64[:, :], boolean[:], boolean[:, :, :], boolean, float64[:, :, ::1])")
 def _follow(phases, closes, lost, again, after):
-    """Phases of contacts at the end of each step, ``phases`` being those before."""
+    """Write the phases of contacts at the end of each step; ``phases`` are those before the steps."""
     steps, rows, contacts = after.shape
     for m in range(rows):
         for c in range(contacts):
@@ -429,7 +420,7 @@ def _follow(phases, closes, lost, again, after):
 
 
 def _model(value: object) -> object:
-    """Name of a contact's model; equilibrium where none is given."""
+    """Return the name of a contact's model, by default equilibrium."""
     return value.get("model", "equilibrium") if isinstance(value, dict) else getattr(value, "model", None)
 
 

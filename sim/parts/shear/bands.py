@@ -54,7 +54,7 @@ class Pairs:
 
 
 def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus: float, poisson_ratio: float) -> Pairs:
-    """Mode pairs of a cell, listed near q = 0 where the weight sits, counted in blocks beyond.
+    """Return the mode pairs of a cell, listed near q = 0 where the weight is, counted in blocks beyond.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus:
     cell : float
         Side L of the cell [m].
     points : int, optional
-        Points of the grid along a side; by default what the spectrum's shortest wave needs.
+        Points of the grid along a side; by default enough for the spectrum's shortest wave.
     shear_modulus, poisson_ratio : float
         G [Pa], nu [1].
 
@@ -83,9 +83,9 @@ def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus:
         As ``sim.parts.shear.modes.modes``.
     """
     if spectrum.wavevector is not None:
-        found = modes(spectrum, cell, points)
-        weight = found.energies(shear_modulus, poisson_ratio)
-        return Pairs(weight, np.hypot(found.qx, found.qy), np.ones(1))
+        cell_modes = modes(spectrum, cell, points)
+        weight = cell_modes.energies(shear_modulus, poisson_ratio)
+        return Pairs(weight, np.hypot(cell_modes.qx, cell_modes.qy), np.ones(1))
     reach, _ = grid_reach(spectrum, cell, points)
     levels, block = [], 1
     while block == 1 or _LISTED * (block // 3) + block // 6 < reach:
@@ -100,7 +100,7 @@ def cell_pairs(spectrum: Family, cell: float, points: int | None, shear_modulus:
 def _level(
     spectrum: Family, cell: float, reach: int, block: int, shear_modulus: float, poisson_ratio: float
 ) -> tuple[Array, Array, Array]:
-    """Weight, wavenumber and count of the blocks of block² pixels around the finer ones."""
+    """Return weight, wavenumber and count of the blocks of block² pixels around the finer ones."""
     step = 2.0 * math.pi / cell
     outermost = min(_LISTED, math.ceil((reach + 0.5) / block - 0.5))
     ix, iy, share = half_lattice(spectrum, cell / block, outermost)
@@ -108,18 +108,18 @@ def _level(
         softness = compliance(ix, iy, shear_modulus * step, poisson_ratio)
         return softness * share, step * np.hypot(ix, iy), np.ones(ix.size)
     farthest = np.maximum(np.abs(ix), iy)
-    kept = farthest > (_LISTED - 1) // 3
-    ix, iy, share, farthest = ix[kept], iy[kept], share[kept], farthest[kept]
+    listed = farthest > (_LISTED - 1) // 3
+    ix, iy, share, farthest = ix[listed], iy[listed], share[listed], farthest[listed]
     radius = block * np.hypot(ix, iy)
     ends = (np.abs(radius - limit / step) < block for limit in spectrum.support)
     cut = functools.reduce(np.logical_or, ends, block * farthest > reach - block)
-    found = [np.empty((3, 0))]
+    blocks_of_squares = [np.empty((3, 0))]
     for blocks, side in ((np.flatnonzero(~cut), 3), (np.flatnonzero(cut), min(block, 27))):
         for first in range(0, blocks.size, _SQUARES // side**2):
             some = blocks[first : first + _SQUARES // side**2]
             squares = _Squares.of(spectrum, step, reach, block * ix[some], block * iy[some], block / side, side)
-            found.append(squares.counted(share[some], poisson_ratio))
-    weight, wavenumber, count = np.concatenate(found, axis=1)
+            blocks_of_squares.append(squares.counted(share[some], poisson_ratio))
+    weight, wavenumber, count = np.concatenate(blocks_of_squares, axis=1)
     return weight / (shear_modulus * step), step * wavenumber, count
 
 
@@ -143,7 +143,7 @@ class _Squares:
     def of(
         cls, spectrum: Family, step: float, reach: int, x: Indices, y: Indices, size: float, side: int
     ) -> "_Squares":
-        """The squares of blocks around (x, y)."""
+        """Return the squares of blocks around (x, y)."""
         offsets = size * (np.arange(side) - 0.5 * (side - 1))
         qx = x[:, np.newaxis, np.newaxis] + offsets[:, np.newaxis]
         qy = y[:, np.newaxis, np.newaxis] + offsets
@@ -156,7 +156,7 @@ class _Squares:
         return cls(size, qx, qy, radius, held, spectrum.density(inside * qx, inside * qy), on_grid)
 
     def counted(self, share: Array, poisson_ratio: float) -> Array:
-        """Rows weight, wavenumber and count of the blocks: sum and sum of squares of their energies are kept."""
+        """Return rows weight, wavenumber and count of blocks that have their sum and sum of squares of energies."""
         energy = compliance(self.qx, self.qy, 1.0, poisson_ratio) * self.on_grid * self.density
         # of the pixels in a square only those on the edge are held in part
         square = energy**2 * self.held * (1.0 - (1.0 - self.held) / self.size)
@@ -169,7 +169,7 @@ class _Squares:
 
 
 def _within(edge: float, qx: Array, qy: Array, radius: Array, size: float) -> Array:
-    """Share of squares within a circle so wide that it is a straight line in each."""
+    """Return the share of squares within a circle so wide that it is a straight line in each."""
     if math.isinf(edge):
         return np.ones_like(radius)
     along = np.maximum(np.abs(qx), np.abs(qy)) / radius
@@ -220,14 +220,9 @@ class Bands:
         """Mean energy of all bands [J/m^2]."""
         return float(np.sum(0.5 * self.weight * self.freedom))
 
-    @property
-    def variance(self) -> float:
-        """Variance of the energy of all bands."""
-        return float(np.sum(0.5 * self.weight**2 * self.freedom))
-
 
 def group(pairs: Pairs, power: int, tolerance: float, relaxing: bool = False) -> Bands:
-    """Coarsest bands whose known errors all stay within a tolerance.
+    """Return the coarsest bands whose known errors all stay within a tolerance.
 
     Parameters
     ----------
@@ -299,7 +294,7 @@ class _Scaled:
         return cls(weight, rate, moments, moments.sum(axis=1), relaxing and power > 0)
 
     def score(self, sums: Array, tolerance: float) -> Array:
-        """The four errors of bands with these sums of moments, each over its share of the tolerance, added up."""
+        """Return the sum of the four errors of bands with these sums of moments, each over its tolerance."""
         s1, s2, s3, s4, by_rate, over_rate, by_rate_squared, once_by_rate, once_by_rate_squared = sums
         mean = by_rate / s2
         third = (s3 - s2 * (s2 / s1)) / self.totals[2]
@@ -315,7 +310,7 @@ class _Scaled:
 
 @dataclass(frozen=True, eq=False)
 class _Candidate:
-    """A band with its share of the errors, and what its best cut in two would gain."""
+    """A band with its share of the errors, and the gain of its best cut in two."""
 
     entries: Indices
     score: float
@@ -344,7 +339,7 @@ class _Candidate:
         return cls(entries, score, *best)
 
     def parts(self, scaled: _Scaled) -> tuple[Indices, Indices]:
-        """The entries on either side of the best cut."""
+        """Return the entries on either side of the best cut."""
         order = np.argsort(getattr(scaled, self.along)[self.entries], kind="stable")
         return self.entries[order[: self.first]], self.entries[order[self.first :]]
 
@@ -354,13 +349,13 @@ def _merged(scaled: _Scaled, groups: list[Indices], pairs: Pairs, power: int) ->
     s1, s2, _, _, by_rate, *_ = sums
     rate = by_rate / s2
     wavenumber = pairs.wavenumber.max() * (rate ** (1.0 / power) if power else np.ones_like(rate))
-    found = (
+    relative = (
         1.0 - float(np.sum(s2 * (s2 / s1))) / scaled.totals[2],
         1.0 - float(np.sum(s2 * (s2 / s1) ** 2)) / scaled.totals[3],
         1.0 - float(np.sum(s2 / rate)) / scaled.totals[5],
         _relaxation_error(scaled, 1, s2, rate),
     )
-    errors = dict(zip(_ERRORS, found, strict=True))
+    errors = dict(zip(_ERRORS, relative, strict=True))
     if scaled.relaxing:
         errors["banded_error_relaxing_mean"] = _relaxation_error(scaled, 0, s1, rate)
     freedom = np.maximum(2.0 * s1 * (s1 / s2), 2.0)
@@ -368,7 +363,7 @@ def _merged(scaled: _Scaled, groups: list[Indices], pairs: Pairs, power: int) ->
 
 
 def _relaxation_error(scaled: _Scaled, moment: int, sums: Array, rate: Array) -> float:
-    """Largest difference over all times of Σ w^(n+1) e^(−2λt) over its start, n the ``moment``: mean or correlation."""
+    """Return the largest difference over all times of Σ w^(n+1) e^(−2λt) over its start, where n is the ``moment``."""
     slowest = float(scaled.rate.min())
     if slowest == 1.0:
         return 0.0
@@ -408,7 +403,7 @@ class BandedProcess(Renewing):
 
     @property
     def pairs(self) -> int:
-        """Numbers that a state holds, half as many as for a mode pair."""
+        """Count of numbers in a state, half as many as for a mode pair."""
         return (self.bands.weight.size + 1) // 2
 
     @cached_property
@@ -439,7 +434,7 @@ class BandedProcess(Renewing):
         return Gammas(self.bands.weight, 0.5 * self.bands.freedom, self.wavenumber)
 
     def known_errors(self) -> dict[str, float]:
-        """Errors that banding adds to the cell's own mode sum, and the cell's own errors beside them."""
+        """Return the errors that banding adds to the mode sum of the cell, and the errors of the cell."""
         return self.cell_errors | self.bands.errors | {"bands": float(self.bands.weight.size)}
 
 
@@ -448,21 +443,21 @@ class BandedProcess(Renewing):
     " uint64, uint64, uint64[::1], int64, float64[:,::1])"
 )
 def _renew_bands(values, keep, renew, size, shapes, half_weight, seed, part, members, step, energy):
-    """Exact steps of all bands of all members in place, and their energy at the end of each."""
+    """Advance all bands of all members in place by exact steps, and write their energy after each step."""
     many = keep.shape[2] > 1
     for m in range(members.size):
-        own = m % keep.shape[1]
+        row = m % keep.shape[1]
         for s in range(len(keep)):
             numbers = stream(seed, part, members[m], step + s, 0)
             total, unit = 0.0, size[s, m % size.shape[1]]
             for k in range(shapes.size):
                 i = k if many else 0
-                x, share = values[m, k], renew[s, own, i]
+                x, share = values[m, k], renew[s, row, i]
                 if share != 0.0:  # else nothing has passed: not even a rounding
-                    one, numbers = normal(numbers)
+                    first, numbers = normal(numbers)
                     rest, numbers = gamma(shapes[k], numbers)
                     kick = share * unit
-                    moved = kick * one + keep[s, own, i] * math.sqrt(x)
+                    moved = kick * first + keep[s, row, i] * math.sqrt(x)
                     x = moved * moved + 2.0 * kick * kick * rest
                 values[m, k] = x
                 total += half_weight[k] * x

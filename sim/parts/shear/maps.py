@@ -42,29 +42,28 @@ class CarriedProcess(SmoothProcess):
         return self.field.lattice
 
     def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
-        """Stress maps τ1(x, y) of the first ``members``, shape (members, nx, ny) [Pa].
+        """Return stress maps τ1(x, y) of the first ``members``, shape (members, nx, ny) [Pa].
 
-        At ``position`` X [m] the pattern has moved by X. Under a disc it stands so that the contact is in the middle,
-        and there is no stress beyond it; else it is periodic.
+        At ``position`` X [m] the pattern has moved by X. Under a disc the contact is in the middle of the pattern,
+        and there is no stress beyond the pattern; else it is periodic.
         """
         lattice, ahead = self.field.lattice, self.field.middle - self.field.begin if self.on_disc else 0.0
         places = lattice.sides[0] / lattice.shape[0] * np.arange(lattice.shape[0])
         spectrum, (qx, _), nyquist = np.fft.rfft2(self.field.field), lattice.wavevectors, lattice.shape[0] // 2
         moved = np.empty((members, *lattice.shape))
-        for one, x, size in zip(
-            moved, *(np.broadcast_to(a, members) for a in (position, state.amplitude)), strict=True
-        ):
+        positions, sizes = (np.broadcast_to(values, members) for values in (position, state.amplitude))
+        for map_, x, size in zip(moved, positions, sizes, strict=True):
             turned = np.exp(-1j * qx * (x + ahead))
             if lattice.shape[0] % 2 == 0:  # the Nyquist row holds both signs
                 turned[nyquist] = turned[nyquist].real
-            one[:] = size * np.fft.irfft2(spectrum * turned, lattice.shape)
-            came = places - (x + ahead)
+            map_[:] = size * np.fft.irfft2(spectrum * turned, lattice.shape)
+            before = places - (x + ahead)
             if self.on_disc:
-                one[(came < 0.0) | (came >= lattice.sides[0])] = 0.0
+                map_[(before < 0.0) | (before >= lattice.sides[0])] = 0.0
         return moved
 
     def centred(self, maps: Array) -> tuple[Array, float]:
-        """The squares of maps around the middle of a disc, and their side [m]."""
+        """Return the squares of maps around the middle of a disc, and their side [m]."""
         half = min(self.field.shape) // 2
         first, second = (points // 2 - half for points in self.field.shape)
         return maps[:, first : first + 2 * half, second : second + 2 * half], 2 * half * self.field.pixels[0]
@@ -85,7 +84,7 @@ class Passing:
     position: Array
 
     def at(self, position: Array) -> "Passing":
-        """The shares at other positions of the slider [m], the same for all members."""
+        """Return the shares at other positions of the slider [m], the same for all members."""
         moved = replace(self, position=position[..., :1])
         moved.__dict__.update(_rows=self._rows, _discs=self._discs, radii=self.radii)
         return moved
@@ -113,8 +112,8 @@ class Passing:
             half = math.ceil(self.widest / pixel) + _AROUND
             padded = np.pad(self.field.field, half)
             window = padded[place : place + 2 * half, across : across + 2 * half]
-            found = disc_energies_of_map(window, pixel, self.radii, 1.0, self.poisson_ratio, self._discs)
-            self._rows[place] = found / self.field.surface_energy(1.0, self.poisson_ratio)
+            energies = disc_energies_of_map(window, pixel, self.radii, 1.0, self.poisson_ratio, self._discs)
+            self._rows[place] = energies / self.field.surface_energy(1.0, self.poisson_ratio)
         return self._rows[place]
 
     @cached_property
@@ -122,7 +121,7 @@ class Passing:
         """Cubics of the mean share over ln a at each position, shape (steps, 4, pieces)."""
         shares = np.empty((self.position.size, self.radii.size))
         last = self.field.shape[0]
-        for one, x in zip(shares, self.position.flat, strict=True):
+        for row, x in zip(shares, self.position.flat, strict=True):
             place = (self.field.begin - x) / self.field.pixels[0]
             nodes = [min(max(math.floor(place) + int(node), 0), last) for node in _NODES]
             s = place - math.floor(place)
@@ -130,7 +129,7 @@ class Passing:
                 -s * (s - 1.0) * (s - 2.0) / 6.0, (s + 1.0) * (s - 1.0) * (s - 2.0) / 2.0,
                 -(s + 1.0) * s * (s - 2.0) / 2.0, (s + 1.0) * s * (s - 1.0) / 6.0,
             )  # fmt: skip
-            one[:] = sum(weight * self._row(node) for weight, node in zip(weights, nodes, strict=True) if weight != 0.0)
+            row[:] = sum(weight * self._row(node) for weight, node in zip(weights, nodes, strict=True) if weight != 0.0)
         return scipy.interpolate.CubicSpline(np.log(self.radii), shares, axis=1).c.transpose(2, 0, 1)
 
     @cached_property
@@ -140,11 +139,11 @@ class Passing:
         return np.stack([a, b + 1.5 * a, c + b, d + 0.5 * c], axis=1)
 
     def __call__(self, radius: Array) -> Array:
-        """Share at contact radii [m]; nan at nan."""
+        """Return the share at contact radii [m]; nan at nan."""
         return self._read(self._new, radius)
 
     def mean(self, radius: Array) -> Array:
-        """Mean of the share over the area of the disc: E/(πa²) over the energy of the whole map [1]."""
+        """Return the mean of the share over the area of the disc: E/(πa²) over the energy of the whole map [1]."""
         return self._read(self._mean, radius)
 
     def _read(self, cubics: Array, radius: Array) -> Array:
@@ -165,18 +164,13 @@ class Passing:
 
     @property
     def least(self) -> Array:
-        """The lowest share of new contact at any radius, or 0 where none is negative."""
-        lowest = self._new[:, 3].min(axis=1)
-        return np.minimum(lowest, 0.0).reshape(self.position.shape)
+        """The lowest share of new contact at any radius, or 0 if none is negative."""
+        return np.minimum(self._new[:, 3].min(axis=1), 0.0).reshape(self.position.shape)
 
     @property
     def each(self) -> list[Terms]:
         """Inputs of ``sim.spectrum.radial.share_of`` at each position."""
         low = float(self.radii[0])
         cubics = self._new.transpose(0, 2, 1) * self._step ** np.arange(3, -1, -1)
-        return [((0.0, 0.0, 0.0), (low, math.log(low), 1.0 / self._step), np.ascontiguousarray(one)) for one in cubics]
-
-    @property
-    def terms(self) -> Terms:
-        """Those of a single position."""
-        return self.each[0]
+        ends = low, math.log(low), 1.0 / self._step
+        return [((0.0, 0.0, 0.0), ends, np.ascontiguousarray(cubic)) for cubic in cubics]

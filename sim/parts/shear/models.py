@@ -62,9 +62,9 @@ class ShearModel:
     feeds_back: ClassVar[bool] = False
     draws_maps: ClassVar[bool] = False
     keeps_modes: ClassVar[bool] = False
-    #: Whether one given pattern is all that any member and seed has.
-    given: ClassVar[bool] = False
-    #: Whether the energy on a disc depends on where the slider is.
+    #: True if all members and seeds have one measured pattern.
+    measured: ClassVar[bool] = False
+    #: True if the energy on a disc depends on the position of the slider.
     passes: ClassVar[bool] = False
     #: Rough time that one step of a mode pair takes on one core, for estimates [s].
     pair_seconds: ClassVar[float] = 10e-9
@@ -77,30 +77,29 @@ class ShearModel:
     tolerance: float = 0.01
 
     @model_validator(mode="after")
-    def _what_sets_the_size(self) -> Self:
-        fixed = self.mode_amplitudes == "fixed"
-        if fixed and self.amplitude.relaxing:
-            said = 'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false'
-            raise PydanticCustomError("fixed_cannot_relax", said)
-        if self.spectrum.bond_made and self.amplitude.model != "constant":
+    def _one_size(self) -> Self:
+        law, fixed = self.amplitude, self.mode_amplitudes == "fixed"
+        if fixed and law.relaxing:
+            message = 'fixed mode_amplitudes are never renewed; use mode_amplitudes = "gaussian" or relaxing = false'
+            raise PydanticCustomError("fixed_cannot_relax", message)
+        if self.spectrum.bond_made and law.model != "constant":
             raise PydanticCustomError("bond_made", "the bonds set the size of the field they make; leave amplitude out")
-        law = self.amplitude
         if law.model == "slip_rate" and law.memory_length is None and math.isnan(self._memory):
-            said = 'slip_rate remembers a distance: give memory_length, or shear.correlation.model = "slip"'
-            raise PydanticCustomError("no_memory", said)
+            message = 'slip_rate remembers a distance: give memory_length, or shear.correlation.model = "slip"'
+            raise PydanticCustomError("no_memory", message)
         if self.spectrum.bond_made and fixed:
-            said = 'bonds at random places make mode_amplitudes = "gaussian"; leave it out'
-            raise PydanticCustomError("bond_made", said)
+            cure = "leave it out"
+            raise PydanticCustomError("bond_made", f'bonds at random places make mode_amplitudes = "gaussian"; {cure}')
         return self
 
     @property
     def stays(self) -> bool:
-        """Whether what the contact feels of the fluctuations is the same at all times, whatever the rest does."""
+        """True if the energy that the contact reads is the same at all times."""
         return False
 
     @property
     def _memory(self) -> float:
-        """Correlation length of the field [m]; nan where its modes have none in common."""
+        """Correlation length of the field [m]; nan if its modes have none in common."""
         return math.nan
 
     @property
@@ -110,39 +109,39 @@ class ShearModel:
 
     @property
     def reads_stress(self) -> bool:
-        """Whether the size of the field follows the bonds."""
+        """True if the size of the field follows the bonds."""
         return self.amplitude.reads_stress or self.spectrum.bond_made
 
     def side(self, cell: float) -> float:
-        """Side of the periodic cell [m], ``cell`` where the scene gives none; infinite without a cell."""
+        """Return the side of the periodic cell [m], by default ``cell``; infinite without a cell."""
         return math.inf
 
     def chosen(self, maps: bool) -> Self:
-        """The model for a scene that records ``maps`` or does not: this one."""
+        """Return this model, for a scene with or without recorded ``maps``."""
         return self
 
     def why(self, maps: bool) -> str:
-        """The reason for the choice, in words; empty where there is none."""
+        """Return the reason for the choice, in words; empty without a choice."""
         return ""
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> Process:
-        """The process on a given solid, and a cell of this side [m] if none is given."""
+        """Return the process on a solid, by default with a ``cell`` of this side [m]."""
         raise NotImplementedError
 
     def faults(self, shear_modulus: float, poisson_ratio: float, rest_radius: float) -> list[tuple[str, str]]:
-        """Reasons why the process cannot be built on a solid and a contact at rest, each as (key, words)."""
+        """Return reasons why the process cannot be built on a solid and a contact at rest, each as (key, words)."""
         return []
 
     def margin(self, solid: tuple[float, float], sphere_radius: float, widest: float) -> Margin | Passing:
-        """Share of ΔΓ that a contact of finite radius pays, on a solid (G, ν) and a contact of at most a radius [m]."""
+        """Return the share of ΔΓ that a contact of up to the ``widest`` radius [m] pays on a solid (G, ν)."""
         return _margin(self.spectrum, *solid, sphere_radius)
 
     def off_the_map(self, positions: tuple[float, float], radius: float) -> list[tuple[str, str]]:
-        """Reasons why a contact of a radius [m] cannot slide between two positions [m], each as (key, words)."""
+        """Return reasons why a contact of a radius [m] cannot slide between two positions [m], as (key, words)."""
         return []
 
     def details(self, setting: Setting) -> list[tuple[str, str]]:
-        """What is to be known of a given pattern, each as (name, words)."""
+        """Return properties of a measured pattern, each as (name, words)."""
         return []
 
     def remarks(self, setting: Setting) -> list[str]:
@@ -150,28 +149,29 @@ class ShearModel:
         plane, rms = float(spectrum.surface_energy(*solid)), math.sqrt(spectrum.variance)
         if not plane > 0.0:
             return []
-        said = list(spectrum.remarks)
+        remarks = list(spectrum.remarks)
         if self.paid_by_adhesion > 0.0:
-            said.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
+            remarks.append("adhesion pays for the stored energy: the paper's assumption (shear.paid_by_adhesion)")
             if spectrum.bond_made:
-                said.append("friction has paid for the energy under each bond: with paid_by_adhesion it counts twice")
+                twice = "with paid_by_adhesion it counts twice"
+                remarks.append(f"friction has paid for the energy under each bond: {twice}")
         longest, side = 2.0 * math.pi / max(spectrum.support[0], 1e-300), self.side(setting.cell)
         if spectrum.wavevector is None and side < longest < 1e300:
-            said.append("the spectrum has waves longer than the cell, which are missing: give a larger shear.cell")
+            remarks.append("the spectrum has waves longer than the cell, which are missing: give a larger shear.cell")
         if self.contact == "plane" and radius > 0.0:
             share = float(marginal_energy(spectrum, radius, *solid)) / plane
             long = min(longest, side) > 2.0 * radius
             what = "the longest waves exceed the contact, which" if long else "a contact of this size"
             off = f"{what} pays {share:.1%} of the plane's fluctuation energy when it grows"
             if abs(share - 1.0) > self.tolerance:
-                said.append(f'{off}: shear.contact = "disc" takes that into account')
+                remarks.append(f'{off}: shear.contact = "disc" takes that into account')
         if not spectrum.bond_made and rms > setting.shear_modulus:
             times = f"{rms / setting.shear_modulus:.3g} times the shear modulus"
-            said.append(f"the rms of the fluctuations is {times}, beyond linear elasticity: check shear.spectrum")
+            remarks.append(f"the rms of the fluctuations is {times}, beyond linear elasticity: check shear.spectrum")
         if not spectrum.bond_made and plane > _MOST_STORED * setting.work > 0.0:
             times = f"{plane / setting.work:.2g} times the work of adhesion"
-            said.append(f"the stored energy is {times}: check shear.spectrum and adhesion.work")
-        return said
+            remarks.append(f"the stored energy is {times}: check shear.spectrum and adhesion.work")
+        return remarks
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -206,8 +206,8 @@ class Mean(ShearModel):
     @model_validator(mode="after")
     def _no_memory(self) -> "Mean":
         if self.amplitude.relaxing:
-            said = 'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"'
-            raise PydanticCustomError("mean_has_no_memory", said)
+            message = 'amplitude that relaxes needs a correlation, which "mean" has not; use model = "modal"'
+            raise PydanticCustomError("mean_has_no_memory", message)
         return self
 
     @property
@@ -250,10 +250,10 @@ class _Fluctuating(ShearModel):
     def faults(self, shear_modulus: float, poisson_ratio: float, rest_radius: float) -> list[tuple[str, str]]:
         cell = self.side(math.sqrt(math.pi) * rest_radius)
         if self.contact == "disc" and self.draws_maps and not 2.0 * rest_radius <= cell:
-            said = f"the cell of {cell:g} m does not hold the contact, which is {2.0 * rest_radius:g} m wide at rest"
-            return [("cell", f'{said}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more')]
-        too_many = self._too_many_modes(cell)
-        if too_many:
+            contact = f"the contact, which is {2.0 * rest_radius:g} m wide at rest"
+            message = f"the cell of {cell:g} m does not hold {contact}"
+            return [("cell", f'{message}; give shear.cell = "{2.2e6 * rest_radius:.3g} um" or more')]
+        if too_many := self._too_many_modes(cell):
             return [("", f'{too_many}; take a smaller cell, longer waves or fewer points, or model = "mean"')]
         try:
             self.process(shear_modulus, poisson_ratio, cell)
@@ -262,15 +262,15 @@ class _Fluctuating(ShearModel):
         return []
 
     def _too_many_modes(self, cell: float) -> str:
-        """What is too large about the smallest grid that holds the spectrum, or about the one given; empty if none."""
+        """Return the reason why the grid, or the smallest that holds the spectrum, is too large; empty if it is not."""
         ripple = self.spectrum.wavevector
         waves = (max(map(abs, ripple)) if ripple else self.spectrum.support[1]) * cell / (2.0 * math.pi)
         if math.isfinite(waves) and waves > _MOST_WAVES:
             return f"the cell of {cell:g} m holds {waves:.2g} of the shortest waves along a side"
         reach = waves if self.points is None else min(waves, (self.points - 1) // 2)
         pairs = (2.0 * reach + 1.0) * (reach + 1.0)
-        kept = self.keeps_modes and (self.draws_maps or not ripple)
-        if kept and math.isfinite(reach) and pairs > _MOST_PAIRS:
+        listed = self.keeps_modes and (self.draws_maps or not ripple)
+        if listed and math.isfinite(reach) and pairs > _MOST_PAIRS:
             return f"the cell of {cell:g} m has {pairs:.2g} Fourier modes, of which {_MOST_PAIRS:.2g} can be kept"
         return ""
 
@@ -286,8 +286,8 @@ class Modal(_Fluctuating):
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
         free_or_fixed = FixedProcess if self.mode_amplitudes == "fixed" else ModalProcess
         kind = SiteModes if self.spectrum.bond_made else free_or_fixed
-        found = modes(self.spectrum, self.side(cell), self.points)
-        return kind(found, shear_modulus, poisson_ratio, self.correlation, self.law)
+        of_cell = modes(self.spectrum, self.side(cell), self.points)
+        return kind(of_cell, shear_modulus, poisson_ratio, self.correlation, self.law)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -304,14 +304,14 @@ class Mapped(Modal):
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> ModalProcess:
         process = super().process(shear_modulus, poisson_ratio, cell)
         if not process.modes.on_lattice:
-            said = "a map is periodic: make the cell a whole number of wavelengths along x and along y"
-            raise PydanticCustomError("off_lattice", said)
+            message = "a map is periodic: make the cell a whole number of wavelengths along x and along y"
+            raise PydanticCustomError("off_lattice", message)
         return process
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Banded(_Fluctuating):
-    """ΔΓ(t) of a periodic cell with its modes grouped into bands, every error known beforehand. Limit: modal.
+    """ΔΓ(t) of a periodic cell with its modes grouped into bands, every error known before the run. Limit: modal.
 
     ``tolerance`` bounds what banding adds to the cell's own sum over modes: relative errors of the
     third and fourth cumulant and of the integral correlation time, and the largest difference of the
@@ -327,8 +327,8 @@ class Banded(_Fluctuating):
     @model_validator(mode="after")
     def _not_of_bonds(self) -> "Banded":
         if self.spectrum.bond_made:
-            said = 'the frozen part of a field that bonds make has no bands; use model = "mean" or "modal"'
-            raise PydanticCustomError("bond_made", said)
+            message = 'the frozen part of a field that bonds make has no bands; use model = "mean" or "modal"'
+            raise PydanticCustomError("bond_made", message)
         return self
 
     def process(self, shear_modulus: float, poisson_ratio: float, cell: float) -> BandedProcess | SmoothProcess:
@@ -343,20 +343,20 @@ class Banded(_Fluctuating):
 
 
 def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
-    """The spectrum at an rms of 1 Pa with the factor of its density; as it is with 1 where no key sets its rms."""
+    """Return the spectrum at an rms of 1 Pa and the factor of its density, or itself and 1 if no key sets its rms."""
     keys = {item.name for item in fields(spectrum)}  # type: ignore[arg-type]
     return (replace(spectrum, rms=1.0), spectrum.variance) if "rms" in keys else (spectrum, 1.0)  # type: ignore[type-var]
 
 
 @functools.lru_cache(maxsize=20_000)  # as many as a sweep has points, each a few kilobytes
 def _grouped(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
-    """``_grouped_anew``, from the disk where an earlier run has grouped the same modes."""
+    """Return ``_grouped_anew``, from the disk if an earlier run has grouped the same modes."""
     key = jit.machine(), scipy.__version__, astuple(spectrum), cell_of  # type: ignore[call-overload]
     return kept.found(key, lambda: _grouped_anew(spectrum, cell_of))
 
 
 def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
-    """The bands of a cell at a shear modulus of 1 Pa, and the cell's own errors against the infinite plane."""
+    """Return the bands of a cell at a shear modulus of 1 Pa, and the errors of the cell against the infinite plane."""
     cell, points, poisson_ratio, power, tolerance, relaxing = cell_of
     pairs = cell_pairs(spectrum, cell, points, 1.0, poisson_ratio)
     energy = float(np.sum(pairs.count * pairs.weight))
@@ -388,7 +388,7 @@ class Auto:
     model: Literal["auto"] = "auto"
 
     def chosen(self, maps: bool) -> "Mean | Banded | Modal":
-        """The model for a scene that records ``maps`` or does not.
+        """Return the model for a scene with or without recorded ``maps``.
 
         Raises
         ------
@@ -402,7 +402,7 @@ class Auto:
         return kind(**{key.name: getattr(self, key.name) for key in fields(kind) if key.name != "model"})
 
     def why(self, maps: bool) -> str:
-        """The reason for the choice, in words."""
+        """Return the reason for the choice, in words."""
         if self.correlation is None:
             return "no correlation is given, so the ensemble mean answers, exactly and without noise"
         if maps:
@@ -427,7 +427,7 @@ class Carried(ShearModel):
 
     per_member: ClassVar[bool] = False
     draws_maps: ClassVar[bool] = True
-    given: ClassVar[bool] = True
+    measured: ClassVar[bool] = True
 
     field: StressMap
     amplitude: Amplitude = Field(default_factory=Constant)
@@ -440,12 +440,11 @@ class Carried(ShearModel):
         if self.amplitude.relaxing:
             raise PydanticCustomError("never_renewed", "a measured map is never renewed: give relaxing = false")
         if self.contact == "disc" and (self.field.window != "none" or not self.field.square):
-            said = 'a disc needs square pixels and no window; interpolate the map, or take contact = "plane"'
-            raise PydanticCustomError("disc_of_map", said)
+            message = 'a disc needs square pixels and no window; interpolate the map, or take contact = "plane"'
+            raise PydanticCustomError("disc_of_map", message)
         if self.contact == "plane" and self.field.start is not None:
-            raise PydanticCustomError(
-                "disc_of_map", 'start is where a disc begins: give contact = "disc", or leave it out'
-            )
+            message = 'start is where a disc begins: give contact = "disc", or leave it out'
+            raise PydanticCustomError("disc_of_map", message)
         return self
 
     @property
@@ -480,36 +479,36 @@ class Carried(ShearModel):
         first, last = radius + high, length - radius + low
         if first <= begin <= last:
             return []
-        said = f"the contact, {2.0 * radius:g} m wide, slides beyond the end of the map, which is {length:g} m long"
+        message = f"the contact, {2.0 * radius:g} m wide, slides beyond the end of the map, which is {length:g} m long"
         if first <= last:
-            return [("", f'{said}; begin elsewhere: start = "{0.5e6 * (first + last):.4g} um"')]
-        return [("", f"{said}; shorten the slip to {max(length - 2.0 * radius, 0.0):.3g} m, or give a longer map")]
+            return [("", f'{message}; begin elsewhere: start = "{0.5e6 * (first + last):.4g} um"')]
+        return [("", f"{message}; shorten the slip to {max(length - 2.0 * radius, 0.0):.3g} m, or give a longer map")]
 
     def details(self, setting: Setting) -> list[tuple[str, str]]:
-        found, solid = self.field, (setting.shear_modulus, setting.poisson_ratio)
-        own, radial = found.surface_energy(*solid), float(found.spectrum.surface_energy(*solid))
-        (nx, ny), (along, across) = found.shape, found.pixels
+        field, solid = self.field, (setting.shear_modulus, setting.poisson_ratio)
+        energy, radial = field.surface_energy(*solid), float(field.spectrum.surface_energy(*solid))
+        (nx, ny), (along, across) = field.shape, field.pixels
         size = f"{nx} × {ny} points of {along:.4g} m × {across:.4g} m along and across the sliding"
-        less = f"{100.0 * abs(own / radial - 1.0):.2g} % {'more' if own > radial else 'less'}"
-        mean = f"{found.mean:.4g} Pa, which is no part of the field; the bonds at rest bear {setting.strength:.4g} Pa"
-        rows = [("rms of the stress", f"{found.rms:.4g} Pa at amplitude 1"), ("map", size), ("mean of the map", mean)]
-        energy = f"{own:.4g} J/m^2 at amplitude 1 of the map itself, {less} than that of its radial spectrum"
-        rows.append(("stored energy", energy))
-        if found.mask:
-            rows.append(("inside of the contact", f"{found.inside:.1%} of the map"))
-        if found.noise:
-            noise = found.noise_energy(*solid)
-            rows.append(("noise of the map", f"seems to store {noise:.3g} J/m^2, {noise / own:.1%} of that energy"))
+        less = f"{100.0 * abs(energy / radial - 1.0):.2g} % {'more' if energy > radial else 'less'}"
+        mean = f"{field.mean:.4g} Pa, which is no part of the field; the bonds at rest bear {setting.strength:.4g} Pa"
+        rows = [("rms of the stress", f"{field.rms:.4g} Pa at amplitude 1"), ("map", size), ("mean of the map", mean)]
+        stored = f"{energy:.4g} J/m^2 at amplitude 1 of the map itself, {less} than that of its radial spectrum"
+        rows.append(("stored energy", stored))
+        if field.mask:
+            rows.append(("inside of the contact", f"{field.inside:.1%} of the map"))
+        if field.noise:
+            noise = field.noise_energy(*solid)
+            rows.append(("noise of the map", f"seems to store {noise:.3g} J/m^2, {noise / energy:.1%} of that energy"))
         return rows
 
 
 def _tag(value: object) -> str | None:
-    """Class of a table or a part: random maps and a measured one have one name."""
-    given = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", "field")}
-    model = given.get("model")
-    if not isinstance(model, str):
-        return None
-    return "mapped[field]" if model == "mapped" and given.get("field") is not None else model
+    """Return the tag of the class of a table or a part, because random maps and a measured one have one name."""
+    keys = value if isinstance(value, dict) else {name: getattr(value, name, None) for name in ("model", "field")}
+    model = keys.get("model")
+    if model == "mapped" and keys.get("field") is not None:
+        return "mapped[field]"
+    return model if isinstance(model, str) else None
 
 
 #: A model that has a process.

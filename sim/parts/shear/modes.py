@@ -55,7 +55,7 @@ class Modes:
     variance : array, shape (pairs,)
         Share of the mean square stress that each pair carries [Pa²].
     on_lattice : bool
-        False where a ripple does not fit the cell; qx, qy are then its own, ix, iy the nearest.
+        False if a ripple does not fit the cell. Then qx, qy are those of the ripple, ix, iy the nearest.
     """
 
     spectrum: Family
@@ -69,7 +69,7 @@ class Modes:
     on_lattice: bool = True
 
     def energies(self, shear_modulus: float, poisson_ratio: float = 0.5) -> Array:
-        """Mean energy per area of each pair [J/m²], shape (pairs,).
+        """Return the mean energy per area of each pair [J/m²], shape (pairs,).
 
         Notes
         -----
@@ -84,7 +84,7 @@ class Modes:
         return _relative(float(np.sum(self.variance)), self.spectrum.variance)
 
     def error_energy(self, shear_modulus: float = 1.0, poisson_ratio: float = 0.5) -> float:
-        """Relative error of the cell's mean ΔΓ against the infinite plane's; any modulus gives the same."""
+        """Return the relative error of the cell's mean ΔΓ against the infinite plane's, for any modulus the same."""
         total = float(np.sum(self.energies(shear_modulus, poisson_ratio)))
         return _relative(total, float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)))
 
@@ -94,7 +94,7 @@ class Modes:
         return _spread(self.variance)
 
     def energy_spread(self, poisson_ratio: float = 0.5) -> float:
-        """Expected relative standard deviation of one realisation's ΔΓ, Gaussian amplitudes."""
+        """Return the expected relative standard deviation of one realisation's ΔΓ, Gaussian amplitudes."""
         return _spread(self.energies(1.0, poisson_ratio))
 
 
@@ -109,7 +109,7 @@ def _spread(weights: Array) -> float:
 
 @functools.lru_cache(maxsize=4)  # a sweep needs the same modes again and again
 def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
-    """The mode pairs of a spectrum on a periodic square cell.
+    """Return the mode pairs of a spectrum on a periodic square cell.
 
     Parameters
     ----------
@@ -151,15 +151,15 @@ def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     reach, points = grid_reach(spectrum, cell, points)
     ix, iy, share = half_lattice(spectrum, cell, reach)
     if not len(ix):
-        said = f"no wave of the spectrum fits the cell of {cell:g} m; make the cell longer"
-        raise PydanticCustomError("no_modes", said)
+        message = f"no wave of the spectrum fits the cell of {cell:g} m; make the cell longer"
+        raise PydanticCustomError("no_modes", message)
     order = np.lexsort((iy, ix, ix**2 + iy**2))
     ix, iy, share = ix[order], iy[order], share[order]
     return _frozen(spectrum, cell, points, ix, iy, step * ix, step * iy, 2 * share)
 
 
 def _frozen(spectrum: Family, cell: float, points: int, *arrays: NDArray, on_lattice: bool = True) -> Modes:
-    """Modes whose arrays cannot be written: several callers share them."""
+    """Return modes with read-only arrays, because callers share them."""
     for array in arrays:
         array.flags.writeable = False
     ix, iy, qx, qy, variance = arrays
@@ -167,31 +167,31 @@ def _frozen(spectrum: Family, cell: float, points: int, *arrays: NDArray, on_lat
 
 
 def grid_reach(spectrum: Family, cell: float, points: int | None) -> tuple[int, int]:
-    """Largest lattice index that holds modes of a spectrum, and the points of the grid; raises as ``modes``."""
+    """Return the largest lattice index of modes of a spectrum, and the points of the grid; raise as ``modes``."""
     _, high = spectrum.support
     step = 2 * math.pi / cell
     return _reach(None if math.isinf(high) else math.ceil(high / step * (1 - _TOUCH) - 0.5), points)
 
 
 def _reach(needed: int | None, points: int | None) -> tuple[int, int]:
-    """Largest lattice index below Nyquist and the points of the grid."""
+    """Return the largest lattice index below Nyquist and the points of the grid."""
     if points is None:
         if needed is None:
-            said = "the spectrum has no shortest wavelength; give points (such as points = 256)"
-            raise PydanticCustomError("points_needed", said)
+            message = "the spectrum has no shortest wavelength; give points (such as points = 256)"
+            raise PydanticCustomError("points_needed", message)
         points = 2 * (needed + 1)
     elif points < 3:
         raise PydanticCustomError("too_few_points", "points must be at least 3, not {points}", {"points": points})
     reach = (points - 1) // 2
     if needed is not None and needed > reach:
-        said = f"the shortest wavelength needs at least {2 * needed + 1} points, not {points}; give more points or"
-        cure = "leave them out, a longer shortest wavelength or a smaller cell"
-        raise PydanticCustomError("grid_too_coarse", f"{said} {cure}")
+        message = f"the shortest wavelength needs at least {2 * needed + 1} points, not {points}"
+        cure = "give more points or leave them out, a longer shortest wavelength or a smaller cell"
+        raise PydanticCustomError("grid_too_coarse", f"{message}; {cure}")
     return (reach if needed is None else needed), points
 
 
 def _single(spectrum: Family, cell: float, points: int | None, wavevector: tuple[float, float]) -> Modes:
-    """The one pair of a ripple, at its own wavevector."""
+    """Return the single pair of a ripple, at the wavevector of the ripple."""
     qx, qy = wavevector
     size = math.hypot(qx, qy)
     qx, qy = (0.0 if abs(part) < 1e-12 * size else part for part in (qx, qy))
@@ -207,10 +207,9 @@ def _single(spectrum: Family, cell: float, points: int | None, wavevector: tuple
 
 
 def cell_variance(spectrum: Family, cell: float, points: int | None = None) -> float:
-    """Variance that the modes of a cell carry together [Pa²], without listing them.
+    """Return the variance that the modes of a cell carry together [Pa²], without listing them; raise as ``modes``.
 
-    The square of all their pixels is itself a pixel, of a lattice as much coarser; that of q = 0 is
-    left out. Raises as ``modes``.
+    The square of all their pixels is a pixel of a coarser lattice; that of q = 0 is left out.
     """
     if spectrum.wavevector is not None:
         return spectrum.variance
@@ -221,12 +220,12 @@ def cell_variance(spectrum: Family, cell: float, points: int | None = None) -> f
 
 
 def half_lattice(spectrum: Family, cell: float, reach: int) -> tuple[Indices, Indices, Array]:
-    """Lattice indices and pixel variance of one of each pair up to ``reach``, without q = 0 and negligible ones."""
+    """Return lattice indices and pixel variance of each pair up to ``reach``, without q = 0 and negligible pairs."""
     pixels = spectrum.pixels(2 * math.pi / cell, reach)
     ix, iy = (index.ravel() for index in np.mgrid[-reach : reach + 1, 0 : reach + 1])
     share = pixels.ravel()
-    kept = ((iy > 0) | (ix > 0)) & (2 * share > _NEGLIGIBLE * spectrum.variance)
-    return ix[kept], iy[kept], share[kept]
+    counted = ((iy > 0) | (ix > 0)) & (2 * share > _NEGLIGIBLE * spectrum.variance)
+    return ix[counted], iy[counted], share[counted]
 
 
 @dataclass(frozen=True)
@@ -277,16 +276,11 @@ class ModalProcess(Renewing):
         return energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
-        """Real and imaginary parts, shape (members, 2, pairs), and the size that multiplies each with its deviation."""
+        """Return real and imaginary parts, shape (members, 2, pairs), and their size in units of the deviation."""
         return state.values, 0.5 * (np.ones(1) if self.amplitude.relaxing else state.amplitude)
 
-    def complex_amplitudes(self, state: Fluctuation) -> Array:
-        """c_q of τ1(x) = Σ c_q e^{iqx} + conjugate in the slider's frame, shape (members, pairs) [Pa]."""
-        parts, size = self._standard(state)
-        return size[:, np.newaxis] * self.deviation * (parts[:, 0] + 1j * parts[:, 1])
-
     def maps(self, state: Fluctuation, position: Array, members: int) -> Array:
-        """Stress maps τ1(x, y) on the grid of the first ``members``, shape (members, points, points) [Pa].
+        """Return stress maps τ1(x, y) of the first ``members``, shape (members, points, points) [Pa].
 
         The pattern is carried with the slider: at ``position`` X [m] a mode e^{iqx} has become
         e^{iq(x − X)}.
@@ -295,35 +289,30 @@ class ModalProcess(Renewing):
         if len(state.amplitude) > 1:
             first = first._replace(amplitude=state.amplitude[:members])
         parts, size = self._standard(first)
-        maps, points = np.empty((members, self.grid.points, self.grid.points)), self.grid.points
-        shifts, sizes = (np.broadcast_to(values, members) for values in (2.0 * np.pi / self.grid.cell * position, size))
+        points, shift = self.modes.points, 2.0 * np.pi / self.modes.cell * position
+        maps, shifts, sizes = np.empty((members, points, points)), *(np.broadcast_to(a, members) for a in (shift, size))
         try:
             half, between = self._spare.pop()
         except IndexError:  # the first map, or another thread has them
             half, between = np.zeros((2, points, points // 2 + 1), dtype=complex)
-        for part, shift, one, field in zip(parts, shifts, sizes, maps, strict=True):
-            spread_modes(part, one, self.deviation, self.modes.ix, self.modes.iy, shift, half)
-            self.grid.superpose(half, between, field)
+        for part, shift, amplitude, field in zip(parts, shifts, sizes, maps, strict=True):
+            spread_modes(part, amplitude, self.deviation, self.modes.ix, self.modes.iy, shift, half)
+            self.lattice.superpose(half, between, field)
         self._spare.append((half, between))
         return maps
 
     @cached_property
-    def grid(self) -> Grid:
-        """The grid of the map."""
-        return Grid(self.modes.cell, self.modes.points)
-
-    @property
     def lattice(self) -> Grid:
         """The lattice of the maps."""
-        return self.grid
+        return Grid(self.modes.cell, self.modes.points)
 
     def centred(self, maps: Array) -> tuple[Array, float]:
-        """The squares of maps around the middle of a disc, and their side [m]: the maps."""
+        """Return the squares of maps around the middle of a disc, here the whole maps, and their side [m]."""
         return maps, self.modes.cell
 
     @cached_property
     def _spare(self) -> list[tuple[Array, Array]]:
-        """Half spectra that no map is being made of; the first of two is zero but at the modes."""
+        """Work arrays for half spectra that are not in use; the first of two is zero but at the modes."""
         return []
 
     @property
@@ -331,7 +320,7 @@ class ModalProcess(Renewing):
         return Gammas(2.0 * self.weights, np.ones(self.pairs), self.wavenumber)
 
     def known_errors(self) -> dict[str, float]:
-        """The cell's own errors against the infinite plane, and the spreads of one realisation."""
+        """Return the errors of the cell against the infinite plane, and the spreads of one realisation."""
         return {
             "cell_error_variance": self.modes.error_variance,
             "cell_error_energy": self.modes.error_energy(self.shear_modulus, self.poisson_ratio),
@@ -341,7 +330,7 @@ class ModalProcess(Renewing):
 
 
 class FixedProcess(ModalProcess):
-    """Modes that keep their modulus and diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
+    """Modes with constant modulus that diffuse in phase by 2∫λdt, as the paper's ripple: ΔΓ does not fluctuate."""
 
     def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Fluctuation:
         past, amplitude = self.amplitude.started(motion, bonding.strength)
@@ -377,23 +366,23 @@ class FixedProcess(ModalProcess):
     " uint64, uint64, uint64[::1], int64, int64, float64[:,::1])"
 )
 def renew_modes(values, keep, renew, size, weights, seed, part, members, step, row, energy):
-    """Ornstein-Uhlenbeck steps of all modes of all members in place, and the energy by Parseval at the end of each.
+    """Advance all modes of all members in place by Ornstein-Uhlenbeck steps, and write the energy after each step.
 
-    The amplitudes of a member stand in two rows from ``row`` on, which is also the lane of their numbers.
+    The amplitudes of a member are in two rows from ``row`` on, which is also the lane of their numbers.
     """
     many = keep.shape[2] > 1
     for m in range(members.size):
-        own = m if keep.shape[1] > 1 else 0
+        step_row = m if keep.shape[1] > 1 else 0
         for s in range(len(keep)):
             numbers = stream(seed, part, members[m], step + s, row)
             total, unit = 0.0, size[s, m if size.shape[1] > 1 else 0]
             for k in range(weights.size):
-                one, numbers = normal(numbers)
-                other, numbers = normal(numbers)
+                first, numbers = normal(numbers)
+                second, numbers = normal(numbers)
                 i = k if many else 0
-                kept, kick = keep[s, own, i], renew[s, own, i] * unit
-                x = kept * values[m, row, k] + kick * one
-                y = kept * values[m, row + 1, k] + kick * other
+                keeping, kick = keep[s, step_row, i], renew[s, step_row, i] * unit
+                x = keeping * values[m, row, k] + kick * first
+                y = keeping * values[m, row + 1, k] + kick * second
                 values[m, row, k], values[m, row + 1, k] = x, y
                 total += weights[k] * (x * x + y * y)
             energy[s, m] = total
@@ -401,15 +390,15 @@ def renew_modes(values, keep, renew, size, weights, seed, part, members, step, r
 
 @kernel("void(float64[:,::1], float64[:,:,:], uint64, uint64, uint64[::1], int64)")
 def turn_phases(phases, exponents, seed, part, members, step):
-    """Diffusion of all phases of all members in place, by √(2∫λdt) of a normal number in each step."""
+    """Let all phases of all members diffuse in place, by √(2∫λdt) of a normal number in each step."""
     many = exponents.shape[2] > 1
     for m in range(members.size):
-        own = m % exponents.shape[1]
+        row = m % exponents.shape[1]
         for s in range(len(exponents)):
             numbers = stream(seed, part, members[m], step + s, 0)
             for k in range(phases.shape[1]):
                 turn, numbers = normal(numbers)
-                phases[m, k] += math.sqrt(2.0 * exponents[s, own, k if many else 0]) * turn
+                phases[m, k] += math.sqrt(2.0 * exponents[s, row, k if many else 0]) * turn
 
 
 @kernel(
@@ -417,7 +406,7 @@ def turn_phases(phases, exponents, seed, part, members, step):
     " Array(int64, 1, 'C', readonly=True), float64, complex128[:,::1])"
 )
 def spread_modes(parts, size, deviation, ix, iy, shift, half):
-    """Amplitudes of mode pairs, each turned by exp(−i ix shift), at their places in a half spectrum."""
+    """Write the amplitudes of mode pairs, each turned by exp(−i ix shift), at their places in a half spectrum."""
     points = len(half)
     turns = np.empty(2 * points + 1, np.complex128)
     for j in range(turns.size):
@@ -460,20 +449,15 @@ class SiteModes(ModalProcess):
         return Fluctuation(energy[-1], sizes[:, -1].T, parts), energy
 
     def _standard(self, state: Fluctuation) -> tuple[Array, Array]:
-        return _combined(state.values, state.amplitude.T), np.array([0.5])
+        frozen, varying = state.amplitude.T[:, :, np.newaxis, np.newaxis]
+        return frozen * state.values[:, :2] + varying * state.values[:, 2:], np.array([0.5])
 
 
 def _sizes(bonding: Bonding) -> Array:
-    """Sizes of both parts, shape (2, steps, 1) or (2, steps, members), of one step where they stay."""
+    """Return the sizes of frozen and renewed part, shape (2, steps, 1) or (2, steps, members), or of a single step."""
     sizes = np.sqrt(np.stack([np.atleast_2d(bonding.frozen), np.atleast_2d(bonding.varying)]))
     sizes[0] *= np.where(bonding.stress < 0.0, -1.0, 1.0)
     return sizes
-
-
-def _combined(parts: Array, sizes: Array) -> Array:
-    """The field of both parts at their sizes (2, members), shape (members, 2, pairs)."""
-    frozen, varying = sizes[:, :, np.newaxis, np.newaxis]
-    return frozen * parts[:, :2] + varying * parts[:, 2:]
 
 
 @kernel(
@@ -481,22 +465,22 @@ def _combined(parts: Array, sizes: Array) -> Array:
     " uint64, uint64, uint64[::1], int64, float64[:,::1])"
 )
 def _renew_sites(parts, keep, renew, sizes, weights, seed, part, members, step, energy):
-    """Ornstein-Uhlenbeck steps of Y of all modes of all members in place, and the energy of the field after each.
+    """Advance Y of all modes of all members in place by Ornstein-Uhlenbeck steps, and write the energy after each.
 
-    Z stands in the first two rows of a member, Y in the others, whose first is the lane of its numbers.
+    Z is in the first two rows of a member, Y in the others, of which the first is the lane of its numbers.
     """
     many = keep.shape[2] > 1
     for m in range(members.size):
-        own = m % keep.shape[1]
+        row = m % keep.shape[1]
         for s in range(len(keep)):
             numbers, total = stream(seed, part, members[m], step + s, 2), 0.0
             frozen, varying = sizes[:, s % sizes.shape[1], m % sizes.shape[2]]
             for k in range(weights.size):
-                one, numbers = normal(numbers)
-                other, numbers = normal(numbers)
+                first, numbers = normal(numbers)
+                second, numbers = normal(numbers)
                 i = k if many else 0
-                parts[m, 2, k] = keep[s, own, i] * parts[m, 2, k] + renew[s, own, i] * one
-                parts[m, 3, k] = keep[s, own, i] * parts[m, 3, k] + renew[s, own, i] * other
+                parts[m, 2, k] = keep[s, row, i] * parts[m, 2, k] + renew[s, row, i] * first
+                parts[m, 3, k] = keep[s, row, i] * parts[m, 3, k] + renew[s, row, i] * second
                 x = frozen * parts[m, 0, k] + varying * parts[m, 2, k]
                 y = frozen * parts[m, 1, k] + varying * parts[m, 3, k]
                 total += weights[k] * (x * x + y * y)

@@ -22,30 +22,30 @@ _Memory = Annotated[
     float, Quantity("m", "slip that the fluctuations remember, by default the correlation length", "l_m", above=0)
 ]
 Relaxing = Annotated[bool, Field(description="true: only what the correlation renews has the new size")]
-#: What a law that lives in the moment keeps of the past.
+#: Memory of a law that depends on the moment alone.
 NO_PAST = np.empty(0)
 
 
 class _OfTheMoment:
     """Attributes of laws that depend on speed and stress of the moment alone; a subclass gives ``factor``."""
 
-    #: Whether the amplitude depends on the sliding before.
+    #: True if the amplitude depends on earlier sliding.
     remembers: ClassVar[bool] = False
 
     def within(self, length: float) -> Self:
-        """The law in a field with this correlation length [m]."""
+        """Return the law in a field with this correlation length [m]."""
         return self
 
     def factor(self, speed: Array, stress: Array) -> Array:
-        """g [1] in steady sliding at a speed [m/s] and mean shear stress [Pa], shape of the argument it reads."""
+        """Return g [1] in steady sliding at a speed [m/s] and mean shear stress [Pa], in the shape of either."""
         raise NotImplementedError
 
     def started(self, motion: Motion, stress: Array) -> tuple[Array, Array]:
-        """What is kept of the past at t = 0, and g [1]."""
+        """Return the memory of the past at t = 0, and g [1]."""
         return NO_PAST, self.factor(motion.speed, stress)
 
     def followed(self, past: Array, motions: Motions, stress: Array) -> tuple[Array, Array]:
-        """What is kept of the past after a block of steps, and g [1] at the end of each."""
+        """Return the memory of the past after a block of steps, and g [1] at the end of each."""
         return past, self.factor(motions.speed, stress)
 
 
@@ -66,8 +66,8 @@ class Constant(_OfTheMoment):
 class Onset(_OfTheMoment):
     """A prescribed amplitude around the onset of stick-slip: g = floor + (1 − floor)/(1 + (V/V0)^(−1/width)).
 
-    A stand-in: that fluctuations set in near ``speed`` is the paper's supposition, without a mechanism.
-    With ``relaxing`` only what the correlation renews has the new size; otherwise the whole field scales
+    This is a stand-in without a mechanism for the paper's hypothesis that fluctuations set in near ``speed``.
+    With ``relaxing`` only the part that the correlation renews has the new size; otherwise the whole field scales
     at once.
     """
 
@@ -108,15 +108,15 @@ class Stress(_OfTheMoment):
 class SlipRate(_OfTheMoment):
     """The fluctuations grow where sliding is unsteady: g² = floor² + (1 − floor²) × variance of the speed over ⟨V²⟩.
 
-    Means are over the past with the weight e^(−s/l) for the distance s slid since, l the ``memory_length``: a field
-    knows the last l of sliding. Steady sliding has the floor, stick-slip that slides the share d of the time
+    Means are over the past with the weight e^(−s/l) for the distance s slid since then, where l is the
+    ``memory_length``. Steady sliding has the floor; stick-slip that slides for the share d of the time has
     1 − d. Rest changes nothing until sliding resumes, then it counts as part of the past.
 
     Notes
     -----
-    With A_j = ∫ e^(−s/l) \\|V\\|^j dt, g² = floor² + (1 − floor²)(1 − A1²/(A0 A2)). Kept are A0, the mean speed
-    A1/A0, A2 − A1²/A0 and the time at rest since the last slip. Within a clock step all of its
-    sliding has one weight, the mean of it over the step.
+    With A_j = ∫ e^(−s/l) \\|V\\|^j dt, g² = floor² + (1 − floor²)(1 − A1²/(A0 A2)). The memory holds A0, the mean speed
+    A1/A0, A2 − A1²/A0 and the time at rest since the last slip. All sliding within a clock step has the mean of the
+    weight over the step.
     """
 
     reads_stress: ClassVar[bool] = False
@@ -149,7 +149,7 @@ class SlipRate(_OfTheMoment):
 
 @kernel("void(float64[:, ::1], float64[:,:], float64[:], float64[:,:], float64, float64[:, ::1])")
 def _remember(past, path, duration, spent, length, unsteady):
-    """What each row keeps of its past after one step after the other, in place, and how unsteady it is then."""
+    """Update the memory of each row in place, step by step, and write the unsteadiness after each step."""
     for m in range(len(past)):
         weight, mean, spread, rest = past[m]
         for s in range(len(duration)):
@@ -186,9 +186,9 @@ class Time:
     model: Literal["time"] = "time"
 
     def exponents(self, wavenumber: Array, motion: Motion | Motions) -> Array:
-        """∫λdt over a step, shape (1, 1) or (members, 1), or with that of ``wavenumber`` [rad/m] as last axis.
+        """Return ∫λdt over a step, shape (1, 1) or (members, 1), or (members, wavenumbers) [rad/m].
 
-        Of a block with the step as first axis.
+        For a block of steps the step is the first axis.
         """
         return np.asarray(motion.duration)[..., np.newaxis] / self.time
 
@@ -248,11 +248,10 @@ class Fluctuation(NamedTuple):
     amplitude : array, shape (1,) or (members,)
         Amplitude factor g [1] at this time.
     values : array
-        Own numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
-        standard deviation, or phases (members, pairs) [rad]; empty where there are none.
+        Numbers of the process: complex amplitudes (members, 2, pairs) in units of each mode's
+        standard deviation, or phases (members, pairs) [rad]; empty for a process without any.
     past : array
-        What the law of the amplitude keeps of the sliding before, shape (1, 4) or (members, 4); empty of one that
-        keeps nothing.
+        Memory of earlier sliding in the law of the amplitude, shape (1, 4) or (members, 4); empty without memory.
     """
 
     energy: Array
@@ -282,7 +281,7 @@ class SmoothProcess:
         return Fluctuation(energy[-1], amplitude[-1], np.empty(0), past), energy
 
     def _level(self, amplitude: Array, bonding: Bonding) -> Array:
-        """Energy of the fluctuations at an amplitude [J/m²]."""
+        """Return the energy of the fluctuations at an amplitude [J/m²]."""
         return amplitude**2 * self.energy
 
     @property
@@ -290,7 +289,7 @@ class SmoothProcess:
         return Gammas(constant=self.energy)
 
     def known_errors(self) -> dict[str, float]:
-        """Errors and spreads known before the run."""
+        """Return errors and spreads that are known before the run."""
         return {}
 
 
@@ -299,19 +298,19 @@ class Renewing:
 
     correlation: Correlation
     amplitude: Amplitude
-    #: Where a mode has the rate of each number of the state [rad/m].
+    #: Wavenumber of a mode that has the rate of each number of the state [rad/m].
     wavenumber: Array
     state_class: ClassVar[type[Fluctuation]] = Fluctuation
 
     def _empty(self, members: int) -> Array:
-        """Numbers of a state without any fluctuation."""
+        """Return the numbers of a state without any fluctuation."""
         raise NotImplementedError
 
     def _renew(self, values: Array, keep: Array, renew: Array, size: Array, step: int, noise: Noise) -> Array:
-        """Keep a share of the numbers, in place, and renew the rest at a size, in one step after the other.
+        """Renew a share of the numbers at a size, in place, step by step, and return their energy after each step.
 
-        Shares have the shape (steps, 1 or members, 1 or numbers of a member), sizes (steps, 1 or members). Returns the
-        energy of the numbers at the end of each step, shape (steps, members).
+        Shares have the shape (steps, 1 or members, 1 or numbers of a member), sizes (steps, 1 or members), energies
+        (steps, members).
         """
         raise NotImplementedError
 
@@ -333,22 +332,23 @@ class Renewing:
         return Fluctuation(energy[-1], amplitude[-1], values, past), energy
 
     def _shares(self, motions: Motions) -> tuple[Array, Array]:
-        """Shares of a number that a step keeps and renews, whose squares add up to one."""
+        """Return the shares of a number that a step keeps and renews, whose squares add up to one."""
         exponents = self.correlation.exponents(self.wavenumber, motions)
         keep, renew = np.empty_like(exponents), np.empty_like(exponents)
         _shares(exponents.ravel(), keep.ravel(), renew.ravel())
         return keep, renew
 
     def _scaled(self, amplitude: Array, energy: Array) -> Array:
-        """The energy of numbers, scaled at once unless the amplitude relaxes."""
+        """Return the energy of numbers, scaled at once unless the amplitude relaxes."""
         return energy if self.amplitude.relaxing else amplitude**2 * energy
 
 
 def renewed_size(law: Amplitude, state: Fluctuation, motions: Motions, amplitude: Array) -> Array:
-    """Amplitude of what a step renews: 1 unless it relaxes, then the mean variance of the step's two ends.
+    """Return the amplitude of the part that a step renews: 1 unless it relaxes.
 
-    Second order in the step. Its beginning is seen after a jump of the speed; stress has no jumps
-    but under bonds that follow the speed at once, nor has what is remembered of the past.
+    If it relaxes, its square is the mean of those at the two ends of the step: second order in the step. The start of
+    the step is after a jump of the speed. The memory has no jumps, and stress has jumps only under bonds that follow
+    the speed at once.
     """
     if not law.relaxing:
         return np.ones((len(amplitude), 1))
@@ -360,7 +360,7 @@ def renewed_size(law: Amplitude, state: Fluctuation, motions: Motions, amplitude
 
 @device
 def shares(exponent):
-    """Shares of a number that are kept and renewed over an ``exponent`` ∫λdt; their squares add up to one."""
+    """Return the shares of a number that stay and are renewed over an ``exponent`` ∫λdt; their squares add to one."""
     lost = -math.expm1(-exponent)
     return 1.0 - lost, math.sqrt(lost * (2.0 - lost))
 

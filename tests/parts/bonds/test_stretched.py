@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers.fields import complex_amplitudes
 from helpers.scenes import BELL, BONDS, CELL, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose
 
@@ -264,7 +265,7 @@ def test_sites_of_the_slider_keep_a_pattern_and_forget_what_differs():
     members, steady = 400, {"bonds": COHORT, "drive": drive.Steady(speed=2.0 * PACE)}
     scenario = scene(members, steps=16, shear=shear.Modal(**CELLED), **steady)
     states = list(march(scenario, np.arange(members)))
-    first, then = (scenario.process.complex_amplitudes(states[k].shear) for k in (0, 16))
+    first, then = (complex_amplitudes(scenario.process, states[k].shear) for k in (0, 16))
     kept = np.real(np.mean(first * then.conj(), axis=None)) / np.mean(np.abs(first) ** 2)
     _, force, square = bell_moments(2.0 * PACE, *RATES, BINDING)
     frozen = force**2 / square

@@ -171,8 +171,8 @@ def test_pull_off_force_grows_with_the_speed_of_a_hard_machine(speed, path, lowe
 
 
 def test_one_inner_step_is_of_order_five_per_unit_time():
-    scene = (0.75, 1.0, 0.0, -1.0, -0.5, 0.0, 0.0, W, 0.1, W)
-    law = (1.0, 1.0 / 0.6, 1.0, 1.0 / 0.6)
+    scene = front.Scene(0.75, 1.0, 0.0, -1.0, -0.5, 0.0, 0.0, W, 0.1, W)
+    law = front.Front(1.0, 1.0 / 0.6, 1.0, 1.0 / 0.6)
 
     def end(count):
         t, a, h = 0.0, REST, 1.0 / count

@@ -55,6 +55,10 @@ MEMORIES = {
 TOLERANCES = [0.3, 0.1, 0.03, 0.01, 0.003]
 
 
+def variance_of(bands):
+    return float(np.sum(0.5 * bands.weight**2 * bands.freedom))
+
+
 def listed(name, points=41, poisson_ratio=0.5):
     """Weights w [J/m^2] and wavenumbers of all mode pairs of a cell."""
     found = modes(FAMILIES[name], CELL, points)
@@ -97,7 +101,7 @@ def test_mean_and_variance_are_those_of_all_modes(name, correlation, points, poi
             spectrum=FAMILIES[name], correlation=MEMORIES[correlation][0], cell=CELL, points=points, tolerance=tolerance
         )
         bands = recipe.process(G, poisson_ratio, 1.0).bands
-        for moment, found in ((1, bands.mean), (2, bands.variance)):
+        for moment, found in ((1, bands.mean), (2, variance_of(bands))):
             assert_allclose(found, math.fsum(weights**moment), rtol=1e-12, atol=0)
         assert np.all(bands.freedom >= 2.0)
 
@@ -179,7 +183,7 @@ def test_any_pairs_are_grouped_within_the_tolerance(seed):
         bands = group(pairs, power, tolerance)
         weights, counts = pairs.weight, pairs.count
         assert_allclose(bands.mean, math.fsum(counts * weights), rtol=1e-12, atol=0)
-        assert_allclose(bands.variance, math.fsum(counts * weights**2), rtol=1e-12, atol=0)
+        assert_allclose(variance_of(bands), math.fsum(counts * weights**2), rtol=1e-12, atol=0)
         assert np.all(bands.freedom >= 2.0)
         assert max(bands.errors.values()) <= tolerance
         assert min(bands.errors.values()) >= 0.0
@@ -200,7 +204,7 @@ def test_one_ripple_is_one_band_of_two_degrees_without_error():
 
 def test_pairs_without_energy_are_one_band_that_stores_nothing():
     bands = group(Pairs(np.zeros(1), np.full(1, 1e5), np.ones(1)), 1, 0.01)
-    assert (bands.mean, bands.variance, bands.freedom.tolist()) == (0.0, 0.0, [2.0])
+    assert (bands.mean, variance_of(bands), bands.freedom.tolist()) == (0.0, 0.0, [2.0])
     assert set(bands.errors.values()) == {0.0}
 
 

@@ -4,6 +4,7 @@ import itertools
 
 import numpy as np
 import pytest
+from helpers.fields import complex_amplitudes
 from helpers.scenes import CELL, SPECTRUM, scene
 from numpy.testing import assert_allclose
 
@@ -122,7 +123,7 @@ def test_a_map_is_the_sum_of_its_waves_whatever_map_was_made_before(points, ampl
     process, position = scenario.process, np.array([0.37, -5.3]) * CELL
     x = np.arange(points) * CELL / points
     for state in found:
-        turned = process.complex_amplitudes(state.shear) * np.exp(-1j * position[:, np.newaxis] * process.modes.qx)
+        turned = complex_amplitudes(process, state.shear) * np.exp(-1j * position[:, np.newaxis] * process.modes.qx)
         along, across = (np.exp(1j * np.multiply.outer(q, x)) for q in (process.modes.qx, process.modes.qy))
         expected = 2.0 * np.einsum("mk,kx,ky->mxy", turned, along, across).real
         maps = process.maps(state.shear, position, 2)
