@@ -316,9 +316,7 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
 @click.argument("output", type=_PATH)
 @click.option("-o", "--page", type=_PATH, help="The page; default beside the dataset.")
 @_WHERE
-@click.option(
-    "--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`: whether they and the run agree."
-)
+@click.option("--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`; do they and the run agree?")
 @click.option("--fit", type=_PATH, help="What `sim fit` has found, STEM_fit.json.")
 @_FORCE
 def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool, **beside: Any) -> None:
@@ -355,11 +353,7 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
         if "share_done" in dataset.attrs:
             done = f"{100 * dataset.attrs['share_done']:.0f} % is computed, the rest is nan"
             say(f"note: {path} is of a run that is not done: {done}", err=True)
-        try:
-            found = analysis.where(dataset, _values(chosen, "--where"))
-        except ValueError as fault:
-            _fail(f"{path}: --where {fault}", BAD_INPUT)
-        yield found
+        yield analysis.where(dataset, _values(chosen, "--where"))
 
 
 @cli.command()

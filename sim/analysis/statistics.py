@@ -21,7 +21,8 @@ from sim.analysis.observables import (
 )
 from sim.analysis.scene import MEMBERS, in_pieces, of_dataset, sweep_dims
 from sim.units.notation import engineering
-from sim.units.quantity import Quantity
+from sim.units.quantity import read_option
+from sim.units.refusals import BadInput
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -75,7 +76,7 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
 
     Raises
     ------
-    ValueError
+    BadInput
         If a key is not swept, or has no such value; the message lists those there are.
     """
     for key, value in chosen.items():
@@ -83,12 +84,12 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
         full = key.replace(".", "_")
         fitting = [n for n in dims if n == full] or [n for n in dims if n.endswith(f"_{full}")]
         if len(fitting) != 1:
-            raise ValueError(f"{key} is not swept; swept: {', '.join(dims) or 'nothing'}")
+            raise BadInput([f"{key} is not swept; swept: {', '.join(dims) or 'nothing'}"])
         name = fitting[0]
         swept = dataset[name]
         if swept.dtype.kind in "fi":
             unit = swept.attrs.get("units", "1")
-            wanted = Quantity(unit, key).read(value)
+            wanted = read_option(value, key, unit)
             near = int(np.abs(swept.to_numpy() - wanted).argmin())
             there = abs(float(swept[near]) - wanted) <= _NEAR * abs(wanted)
             known = [engineering(float(f"{number:.4g}"), unit) for number in swept.to_numpy()]
@@ -96,7 +97,7 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
             known = [str(text) for text in swept.to_numpy()]
             there, near = value in known, known.index(value) if value in known else 0
         if not there:
-            raise ValueError(f"{key} has no value {value}; there are: {', '.join(known)}")
+            raise BadInput([f"{key} has no value {value}; there are: {', '.join(known)}"])
         dataset = dataset.isel({name: [near]})
     return dataset
 

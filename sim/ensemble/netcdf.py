@@ -105,7 +105,7 @@ def _write(outline: Outline, parts: Parts, path: Path) -> None:
 
 
 def _variable(file: netCDF4.Dataset, name: str, one: Described) -> netCDF4.Variable:
-    packed = _PACKED[one.compression] if one.dimensions and one.kind is not str else {}
+    packed = {"fletcher32": True, **_PACKED[one.compression]} if one.dimensions and one.kind is not str else {}
     variable = file.createVariable(name, one.kind, one.dimensions, chunksizes=one.chunks, fill_value=False, **packed)
     if one.chunks:
         variable.set_var_chunk_cache(CHUNK_CACHE)

@@ -301,6 +301,23 @@ def test_six_digits_are_kept_in_a_plain_file(tmp_path):
         assert np.array_equal(file["t"][:], exact["t"][:]) and np.array_equal(file["peak_stress"], exact["peak_stress"])
 
 
+def test_a_flipped_byte_of_any_variable_with_a_dimension_is_an_error(tmp_path):
+    path = ensemble.run(sample(record=Record(compression="none")), tmp_path / "out.nc")
+    content = path.read_bytes()
+    with netCDF4.Dataset(path) as file:
+        arrays = {name: variable[:].tobytes() for name, variable in file.variables.items() if variable.ndim}
+    plain = [stored for stored in arrays.values() if content.count(stored) and len(set(stored)) > 8]
+    assert len(plain) > 5
+    for stored in plain:
+        place = content.index(stored) + len(stored) // 2
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
+        with netCDF4.Dataset(path) as file, pytest.raises(RuntimeError, match="NetCDF: HDF error"):
+            for other in arrays:  # equal arrays are stored more than once
+                file[other][:]
+        with sim.open(path) as dataset, pytest.raises(RuntimeError, match=r"variable \w+ is damaged"):
+            dataset.load()
+
+
 def test_reading_one_map_reads_one_map(tmp_path):
     path = ensemble.run(sample(shear=MAPPED, record=Record(maps=(2e-3, 4e-3), map_members=2)), tmp_path / "out.nc")
     with netCDF4.Dataset(path) as file:
