@@ -4,7 +4,6 @@ import math
 
 import mpmath
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad
 
@@ -42,23 +41,23 @@ def test_compliance_is_even_and_zero_without_a_wave():
     assert_allclose(halfspace.compliance(1e200, 0.0, 1e6), 0.5e-206, rtol=1e-14, atol=0)
 
 
-@pytest.mark.parametrize("nu", RATIOS)
-@pytest.mark.parametrize("direction", [0.0, 0.7, math.pi / 2])
-def test_compliance_is_the_transform_of_the_point_kernel(nu, direction):
-    # both sides weighted by a Gaussian of unit width, which makes either integral smooth:
-    # integral of G(x) e^{-r^2/2} cos(q.x) = integral of G(k) 2 pi e^{-|k-q|^2/2} / (2 pi)^2
-    q = 1.5
-    r = 20.0 * 0.5 * (1.0 + NODES)
-    weight = 20.0 * 0.5 * WEIGHTS * r
-    angle = 2.0 * np.pi * np.arange(200) / 200
-    x, y = r[:, None] * np.cos(angle), r[:, None] * np.sin(angle)
-    phase = q * (x * math.cos(direction) + y * math.sin(direction))
-    kernel = halfspace.point_displacement(x, y, 1.0, nu) * np.exp(-0.5 * r[:, None] ** 2) * np.cos(phase)
-    real = np.sum(weight @ kernel) * 2.0 * np.pi / 200
-    away = (x - q * math.cos(direction)) ** 2 + (y - q * math.sin(direction)) ** 2
-    spread = halfspace.compliance(x, y, 1.0, nu) * np.exp(-0.5 * away)
-    spectral = np.sum(weight @ spread) / 200
-    assert_allclose(real, spectral, rtol=1e-10, atol=0)
+def test_compliance_is_the_transform_of_the_point_kernel():
+    for nu in RATIOS:
+        for direction in [0.0, 0.7, math.pi / 2]:
+            # both sides weighted by a Gaussian of unit width, which makes either integral smooth:
+            # integral of G(x) e^{-r^2/2} cos(q.x) = integral of G(k) 2 pi e^{-|k-q|^2/2} / (2 pi)^2
+            q = 1.5
+            r = 20.0 * 0.5 * (1.0 + NODES)
+            weight = 20.0 * 0.5 * WEIGHTS * r
+            angle = 2.0 * np.pi * np.arange(200) / 200
+            x, y = r[:, None] * np.cos(angle), r[:, None] * np.sin(angle)
+            phase = q * (x * math.cos(direction) + y * math.sin(direction))
+            kernel = halfspace.point_displacement(x, y, 1.0, nu) * np.exp(-0.5 * r[:, None] ** 2) * np.cos(phase)
+            real = np.sum(weight @ kernel) * 2.0 * np.pi / 200
+            away = (x - q * math.cos(direction)) ** 2 + (y - q * math.sin(direction)) ** 2
+            spread = halfspace.compliance(x, y, 1.0, nu) * np.exp(-0.5 * away)
+            spectral = np.sum(weight @ spread) / 200
+            assert_allclose(real, spectral, rtol=1e-10, atol=0)
 
 
 def test_point_displacement_is_the_paper_s_at_one_half():
@@ -95,12 +94,12 @@ def exact_inside(rho, theta):
         return float((1.5 * e + skew * mpmath.cos(2 * theta)) / mpmath.pi)
 
 
-@pytest.mark.parametrize("rho", [1e-8, 1e-4, 0.03, 0.3, 0.7, 0.94, 0.95, 0.999, 1.0 - 1e-9])
-def test_displacement_inside_the_disc_is_the_paper_s(rho):
-    for theta in (0.0, 0.4, 1.1, math.pi / 2):
-        computed = halfspace.disc_displacement(rho * math.cos(theta), rho * math.sin(theta), 1.0, 1.0, 1.0)
-        # near the edge the elliptic integrals amplify the rounding of rho by the logarithm of 1 - rho
-        assert_allclose(computed, exact_inside(rho, theta), rtol=3e-14, atol=0)
+def test_displacement_inside_the_disc_is_the_paper_s():
+    for rho in [1e-8, 1e-4, 0.03, 0.3, 0.7, 0.94, 0.95, 0.999, 1.0 - 1e-9]:
+        for theta in (0.0, 0.4, 1.1, math.pi / 2):
+            computed = halfspace.disc_displacement(rho * math.cos(theta), rho * math.sin(theta), 1.0, 1.0, 1.0)
+            # near the edge the elliptic integrals amplify the rounding of rho by the logarithm of 1 - rho
+            assert_allclose(computed, exact_inside(rho, theta), rtol=3e-14, atol=0)
 
 
 def test_displacement_at_the_centre_and_on_the_edge():
@@ -109,24 +108,25 @@ def test_displacement_at_the_centre_and_on_the_edge():
     assert_allclose(v / unit, [0.75, (1.5 + 1.0 / 6.0) / math.pi, (1.5 - 1.0 / 6.0) / math.pi], rtol=1e-14, atol=0)
 
 
-@pytest.mark.parametrize("nu", RATIOS)
-@pytest.mark.parametrize(("x", "y"), [(0.0, 0.0), (0.3, 0.0), (0.2, -0.5), (-0.1, 0.9)])
-def test_displacement_inside_is_the_integral_of_the_point_kernel(nu, x, y):
-    def ray(angle):  # the kernel falls as 1/r: along a ray from the point its integral is the ray's length
-        c, s = math.cos(angle), math.sin(angle)
-        length = -(x * c + y * s) + math.sqrt(1.0 - (x * s - y * c) ** 2)
-        return length * halfspace.point_displacement(c, s, 1.0, nu)
+def test_displacement_inside_is_the_integral_of_the_point_kernel():
+    for nu in RATIOS:
+        for x, y in [(0.0, 0.0), (0.3, 0.0), (0.2, -0.5), (-0.1, 0.9)]:
 
-    exact, _ = quad(ray, 0.0, 2.0 * math.pi, epsabs=1e-13, epsrel=1e-13, limit=200)
-    assert_allclose(halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
+            def ray(angle):  # the kernel falls as 1/r: along a ray from the point its integral is the ray's length
+                c, s = math.cos(angle), math.sin(angle)
+                length = -(x * c + y * s) + math.sqrt(1.0 - (x * s - y * c) ** 2)
+                return length * halfspace.point_displacement(c, s, 1.0, nu)
+
+            exact, _ = quad(ray, 0.0, 2.0 * math.pi, epsabs=1e-13, epsrel=1e-13, limit=200)
+            assert_allclose(halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0, nu), exact, rtol=1e-11, atol=0)
 
 
-@pytest.mark.parametrize("nu", RATIOS)
-@pytest.mark.parametrize(("x", "y"), [(1.5, 0.0), (0.0, 1.5), (-1.3, 1.1), (6.0, -2.0)])
-def test_displacement_outside_is_the_integral_of_the_point_kernel(nu, x, y):
-    at_x, at_y, weight = disc_nodes()
-    exact = np.sum(weight * halfspace.point_displacement(x - at_x, y - at_y, 1.0, nu))
-    assert_allclose(halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0, nu), exact, rtol=1e-12, atol=0)
+def test_displacement_outside_is_the_integral_of_the_point_kernel():
+    for nu in RATIOS:
+        for x, y in [(1.5, 0.0), (0.0, 1.5), (-1.3, 1.1), (6.0, -2.0)]:
+            at_x, at_y, weight = disc_nodes()
+            exact = np.sum(weight * halfspace.point_displacement(x - at_x, y - at_y, 1.0, nu))
+            assert_allclose(halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0, nu), exact, rtol=1e-12, atol=0)
 
 
 def test_far_from_the_disc_only_its_force_is_felt():
@@ -147,15 +147,17 @@ def test_displacement_is_continuous_across_the_edge():
     assert np.max(np.abs(inner - outer)) < 2e-12 * 30.0
 
 
-@pytest.mark.parametrize("nu", RATIOS)
-def test_means_over_the_disc_and_along_its_edge(nu):
-    x, y, weight = disc_nodes()
-    v = halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0, nu)
-    # the field ends at the edge as (1 - rho) log(1 - rho): the quadrature holds about 1e-7
-    assert_allclose(np.sum(weight * v) / np.pi, halfspace.disc_mean_displacement(1.0, 1.0, 1.0, nu), rtol=1e-6, atol=0)
-    angle = 2.0 * np.pi * np.arange(16) / 16
-    edge = np.mean(halfspace.disc_displacement(np.cos(angle), np.sin(angle), 1.0, 1.0, 1.0, nu))
-    assert_allclose(edge, halfspace.disc_edge_mean_displacement(1.0, 1.0, 1.0, nu), rtol=1e-14, atol=0)
+def test_means_over_the_disc_and_along_its_edge():
+    for nu in RATIOS:
+        x, y, weight = disc_nodes()
+        v = halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0, nu)
+        # the field ends at the edge as (1 - rho) log(1 - rho): the quadrature holds about 1e-7
+        assert_allclose(
+            np.sum(weight * v) / np.pi, halfspace.disc_mean_displacement(1.0, 1.0, 1.0, nu), rtol=1e-6, atol=0
+        )
+        angle = 2.0 * np.pi * np.arange(16) / 16
+        edge = np.mean(halfspace.disc_displacement(np.cos(angle), np.sin(angle), 1.0, 1.0, 1.0, nu))
+        assert_allclose(edge, halfspace.disc_edge_mean_displacement(1.0, 1.0, 1.0, nu), rtol=1e-14, atol=0)
 
 
 def test_disc_means_are_the_paper_s_at_one_half():
@@ -169,18 +171,18 @@ def test_disc_means_are_the_paper_s_at_one_half():
     assert_allclose(halfspace.edge_work(a, tau, shear), -12 * tau**2 * a**2 / modulus, rtol=1e-14, atol=0)
 
 
-@pytest.mark.parametrize("nu", RATIOS)
-def test_the_disc_s_energy_mean_and_edge_belong_together(nu):
-    a, tau, shear = 1.3, 0.7, 2.1
-    energy = halfspace.disc_tangential_energy(a, tau, shear, nu)
-    mean = halfspace.disc_mean_displacement(a, tau, shear, nu)
-    edge = halfspace.disc_edge_mean_displacement(a, tau, shear, nu)
-    slope = 3.0 * energy / a  # of a cube
-    assert_allclose(energy, 0.5 * tau * np.pi * a**2 * mean, rtol=1e-14, atol=0)
-    assert_allclose(tau * edge, slope / (2.0 * np.pi * a), rtol=1e-14, atol=0)
-    assert_allclose(halfspace.edge_work(a, tau, shear, nu), -slope, rtol=1e-14, atol=0)
-    modulus = halfspace.contact_modulus(shear, nu)
-    assert_allclose(edge, 2 * (2 - nu) / (1 - nu) * tau * a / (np.pi * modulus), rtol=1e-14, atol=0)
+def test_the_disc_s_energy_mean_and_edge_belong_together():
+    for nu in RATIOS:
+        a, tau, shear = 1.3, 0.7, 2.1
+        energy = halfspace.disc_tangential_energy(a, tau, shear, nu)
+        mean = halfspace.disc_mean_displacement(a, tau, shear, nu)
+        edge = halfspace.disc_edge_mean_displacement(a, tau, shear, nu)
+        slope = 3.0 * energy / a  # of a cube
+        assert_allclose(energy, 0.5 * tau * np.pi * a**2 * mean, rtol=1e-14, atol=0)
+        assert_allclose(tau * edge, slope / (2.0 * np.pi * a), rtol=1e-14, atol=0)
+        assert_allclose(halfspace.edge_work(a, tau, shear, nu), -slope, rtol=1e-14, atol=0)
+        modulus = halfspace.contact_modulus(shear, nu)
+        assert_allclose(edge, 2 * (2 - nu) / (1 - nu) * tau * a / (np.pi * modulus), rtol=1e-14, atol=0)
 
 
 def test_ripples_across_the_sliding_cost_twice_those_along_it():
@@ -192,68 +194,66 @@ def test_ripples_across_the_sliding_cost_twice_those_along_it():
     )
 
 
-@pytest.mark.parametrize(
-    ("angle", "lens", "soft_lens"), [(0.0, 375.1577679867801, 51.370593037412235), (np.pi / 2, 265.28, 36.32)]
-)
-def test_the_paper_s_masking_amplitudes(angle, lens, soft_lens):
-    computed = halfspace.masking_amplitude(0.042, np.array([0.24e-3, 4e-3]) / 10.0, np.array([1.6e6, 0.5e6]), angle)
-    assert_allclose(computed / 1e3, [lens, soft_lens], rtol=1e-12 if angle == 0.0 else 2e-4, atol=0)
+def test_the_paper_s_masking_amplitudes():
+    for angle, lens, soft_lens in [(0.0, 375.1577679867801, 51.370593037412235), (np.pi / 2, 265.28, 36.32)]:
+        computed = halfspace.masking_amplitude(0.042, np.array([0.24e-3, 4e-3]) / 10.0, np.array([1.6e6, 0.5e6]), angle)
+        assert_allclose(computed / 1e3, [lens, soft_lens], rtol=1e-12 if angle == 0.0 else 2e-4, atol=0)
 
 
-@pytest.mark.parametrize("nu", RATIOS)
-def test_the_masking_amplitude_stores_the_work_of_adhesion(nu):
-    angle = np.linspace(0.0, np.pi, 7)
-    tau = halfspace.masking_amplitude(0.042, 24e-6, 1.6e6, angle, nu)
-    assert_allclose(halfspace.ripple_energy(tau, 2 * np.pi / 24e-6, angle, 1.6e6, nu), 0.042, rtol=1e-14, atol=0)
-    assert np.isnan(halfspace.masking_amplitude(-1.0, 24e-6, 1.6e6))
+def test_the_masking_amplitude_stores_the_work_of_adhesion():
+    for nu in RATIOS:
+        angle = np.linspace(0.0, np.pi, 7)
+        tau = halfspace.masking_amplitude(0.042, 24e-6, 1.6e6, angle, nu)
+        assert_allclose(halfspace.ripple_energy(tau, 2 * np.pi / 24e-6, angle, 1.6e6, nu), 0.042, rtol=1e-14, atol=0)
+        assert np.isnan(halfspace.masking_amplitude(-1.0, 24e-6, 1.6e6))
 
 
 def stress_map(points, members=(), seed=4):
     return 2e5 + 1e5 * np.random.default_rng(seed).standard_normal((*members, points, points))
 
 
-@pytest.mark.parametrize("points", [5, 8, 33, 64])
-@pytest.mark.parametrize("nu", RATIOS)
-def test_surface_energy_is_half_the_mean_of_stress_times_displacement(points, nu):
-    cell, field = 2.4e-4, stress_map(points, (2, 3))
-    moved = halfspace.displacement(field, cell, 1.6e6, nu)
-    fluctuation = field - field.mean(axis=(-2, -1), keepdims=True)
-    wanted = 0.5 * np.mean(fluctuation * moved, axis=(-2, -1))
-    assert_allclose(halfspace.surface_energy(field, cell, 1.6e6, nu), wanted, rtol=1e-12, atol=0)
-    assert np.max(np.abs(moved.mean(axis=(-2, -1)))) < 1e-14 * np.max(np.abs(moved))
+def test_surface_energy_is_half_the_mean_of_stress_times_displacement():
+    for points in [5, 8, 33, 64]:
+        for nu in RATIOS:
+            cell, field = 2.4e-4, stress_map(points, (2, 3))
+            moved = halfspace.displacement(field, cell, 1.6e6, nu)
+            fluctuation = field - field.mean(axis=(-2, -1), keepdims=True)
+            wanted = 0.5 * np.mean(fluctuation * moved, axis=(-2, -1))
+            assert_allclose(halfspace.surface_energy(field, cell, 1.6e6, nu), wanted, rtol=1e-12, atol=0)
+            assert np.max(np.abs(moved.mean(axis=(-2, -1)))) < 1e-14 * np.max(np.abs(moved))
 
 
-@pytest.mark.parametrize("points", [6, 7])
-def test_surface_energy_is_the_sum_over_the_full_spectrum(points):
-    cell, field = 3.0, stress_map(points)
-    q = 2.0 * np.pi * np.fft.fftfreq(points, cell / points)
-    spectrum = np.fft.fft2(field) * (cell / points) ** 2
-    wanted = 0.0
-    for i in range(points):
-        for j in range(points):
-            if i or j:
-                length = np.hypot(q[i], q[j])
-                wanted += (1.0 + (q[j] / length) ** 2) / (2.0 * 1.3 * length) * abs(spectrum[i, j]) ** 2
-    assert_allclose(halfspace.surface_energy(field, cell, 1.3), 0.5 * wanted / cell**4, rtol=1e-12, atol=0)
+def test_surface_energy_is_the_sum_over_the_full_spectrum():
+    for points in [6, 7]:
+        cell, field = 3.0, stress_map(points)
+        q = 2.0 * np.pi * np.fft.fftfreq(points, cell / points)
+        spectrum = np.fft.fft2(field) * (cell / points) ** 2
+        wanted = 0.0
+        for i in range(points):
+            for j in range(points):
+                if i or j:
+                    length = np.hypot(q[i], q[j])
+                    wanted += (1.0 + (q[j] / length) ** 2) / (2.0 * 1.3 * length) * abs(spectrum[i, j]) ** 2
+        assert_allclose(halfspace.surface_energy(field, cell, 1.3), 0.5 * wanted / cell**4, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("points", [31, 32])
-@pytest.mark.parametrize("waves", [(3, 0), (0, 3), (2, 5), (-4, 1)])
-def test_surface_energy_of_a_ripple_is_the_closed_form(points, waves):
-    cell, grid = 2.4e-4, Grid(2.4e-4, points)
-    qx, qy = 2.0 * np.pi * np.array(waves) / cell
-    x, y = grid.position[:, None], grid.position[None, :]
-    field = 4e5 + 3e5 * np.cos(qx * x + qy * y + 0.4)
-    wanted = halfspace.ripple_energy(3e5, np.hypot(qx, qy), np.arctan2(qy, qx), 1.6e6, 0.4)
-    assert_allclose(halfspace.surface_energy(field, cell, 1.6e6, 0.4), wanted, rtol=1e-12, atol=0)
+def test_surface_energy_of_a_ripple_is_the_closed_form():
+    for points in [31, 32]:
+        for waves in [(3, 0), (0, 3), (2, 5), (-4, 1)]:
+            cell, grid = 2.4e-4, Grid(2.4e-4, points)
+            qx, qy = 2.0 * np.pi * np.array(waves) / cell
+            x, y = grid.position[:, None], grid.position[None, :]
+            field = 4e5 + 3e5 * np.cos(qx * x + qy * y + 0.4)
+            wanted = halfspace.ripple_energy(3e5, np.hypot(qx, qy), np.arctan2(qy, qx), 1.6e6, 0.4)
+            assert_allclose(halfspace.surface_energy(field, cell, 1.6e6, 0.4), wanted, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("points", [9, 16])
-def test_a_uniform_stress_stores_no_surface_energy(points):
-    field = stress_map(points)
-    plain = halfspace.surface_energy(field, 1e-4, 1.6e6)
-    assert_allclose(halfspace.surface_energy(field + 1e8, 1e-4, 1.6e6), plain, rtol=1e-10, atol=0)
-    assert halfspace.surface_energy(np.full((points, points), 0.3e6), 1e-4, 1.6e6) < 1e-30 * plain
+def test_a_uniform_stress_stores_no_surface_energy():
+    for points in [9, 16]:
+        field = stress_map(points)
+        plain = halfspace.surface_energy(field, 1e-4, 1.6e6)
+        assert_allclose(halfspace.surface_energy(field + 1e8, 1e-4, 1.6e6), plain, rtol=1e-10, atol=0)
+        assert halfspace.surface_energy(np.full((points, points), 0.3e6), 1e-4, 1.6e6) < 1e-30 * plain
 
 
 def test_members_and_moduli_go_with_the_leading_axes():
@@ -272,16 +272,16 @@ def test_displacement_grows_with_the_size_of_the_cell():
     assert np.max(np.abs(wide - 2.0 * narrow)) < 1e-13 * np.max(np.abs(wide))
 
 
-@pytest.mark.parametrize(("points", "sides"), [((12, 7), (3.0, 1.4)), ((8, 8), (1.0, 2.0)), ((9, 16), (2.0, 2.0))])
-def test_energy_and_displacement_of_a_rectangle_belong_together(points, sides):
-    field = np.random.default_rng(5).standard_normal((3, *points)) + 2.0
-    moved = halfspace.displacement(field, sides, 2.0, 0.3)
-    energy = halfspace.surface_energy(field, sides, 2.0, 0.3)
-    assert_allclose(energy, 0.5 * np.mean(field * moved, axis=(-2, -1)), rtol=1e-12)
-    twice = np.concatenate([field, field], axis=-1)  # the same field in a cell twice as wide
-    assert_allclose(halfspace.surface_energy(twice, (sides[0], 2.0 * sides[1]), 2.0, 0.3), energy, rtol=1e-12)
-    turned = halfspace.surface_energy(np.swapaxes(field, -1, -2), sides[::-1], 2.0, 0.0)
-    assert_allclose(turned, halfspace.surface_energy(field, sides, 2.0, 0.0), rtol=1e-12)  # at nu = 0 x is as y
+def test_energy_and_displacement_of_a_rectangle_belong_together():
+    for points, sides in [((12, 7), (3.0, 1.4)), ((8, 8), (1.0, 2.0)), ((9, 16), (2.0, 2.0))]:
+        field = np.random.default_rng(5).standard_normal((3, *points)) + 2.0
+        moved = halfspace.displacement(field, sides, 2.0, 0.3)
+        energy = halfspace.surface_energy(field, sides, 2.0, 0.3)
+        assert_allclose(energy, 0.5 * np.mean(field * moved, axis=(-2, -1)), rtol=1e-12)
+        twice = np.concatenate([field, field], axis=-1)  # the same field in a cell twice as wide
+        assert_allclose(halfspace.surface_energy(twice, (sides[0], 2.0 * sides[1]), 2.0, 0.3), energy, rtol=1e-12)
+        turned = halfspace.surface_energy(np.swapaxes(field, -1, -2), sides[::-1], 2.0, 0.0)
+        assert_allclose(turned, halfspace.surface_energy(field, sides, 2.0, 0.0), rtol=1e-12)  # at nu = 0 x is as y
 
 
 def test_white_noise_of_pixels_seems_to_store_a_closed_form():

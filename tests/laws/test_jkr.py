@@ -12,7 +12,6 @@ import math
 
 import mpmath
 import numpy as np
-import pytest
 from hypothesis import example, given, settings, strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
@@ -70,17 +69,17 @@ FOLD_AT_GRIPS = (6.0 ** (-1 / 3), -5.0 / 6.0, -3.0 * 6.0 ** (-2 / 3))
 ONLY_AT_GRIPS = (2.0 / 3.0, -28.0 / 27.0, -8.0 / 9.0)
 
 
-@pytest.mark.parametrize(("radius", "load", "indentation"), [*STATES, FOLD_AT_LOAD, FOLD_AT_GRIPS, ONLY_AT_GRIPS])
-def test_load_and_indentation_of_the_known_states(radius, load, indentation):
-    # atol: zero load and zero indentation are differences of numbers of order one
-    assert_allclose(jkr.load_at_radius(radius, **MAUGIS), load, rtol=1e-12, atol=1e-14)
-    assert_allclose(jkr.indentation_at_radius(radius, **MAUGIS), indentation, rtol=1e-12, atol=1e-14)
+def test_load_and_indentation_of_the_known_states():
+    for radius, load, indentation in [*STATES, FOLD_AT_LOAD, FOLD_AT_GRIPS, ONLY_AT_GRIPS]:
+        # atol: zero load and zero indentation are differences of numbers of order one
+        assert_allclose(jkr.load_at_radius(radius, **MAUGIS), load, rtol=1e-12, atol=1e-14)
+        assert_allclose(jkr.indentation_at_radius(radius, **MAUGIS), indentation, rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize(("radius", "load", "indentation"), STATES)
-def test_radius_of_the_known_states(radius, load, indentation):
-    assert_allclose(jkr.radius_at_load(load, **MAUGIS), radius, rtol=1e-12, atol=0)
-    assert_allclose(jkr.radius_at_indentation(indentation, **MAUGIS), radius, rtol=1e-12, atol=0)
+def test_radius_of_the_known_states():
+    for radius, load, indentation in STATES:
+        assert_allclose(jkr.radius_at_load(load, **MAUGIS), radius, rtol=1e-12, atol=0)
+        assert_allclose(jkr.radius_at_indentation(indentation, **MAUGIS), radius, rtol=1e-12, atol=0)
 
 
 def test_a_neck_that_no_load_holds_stands_at_an_indentation():
@@ -150,16 +149,16 @@ def test_near_both_folds_only_half_the_digits_are_lost(distance, work, sphere_ra
     )
 
 
-@pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
-def test_the_contact_leaves_each_fold_as_a_square_root(distance):
-    load = jkr.pull_off_load(MAUGIS["work"], 1.0) * (1.0 - distance)
-    indentation = jkr.pull_off_indentation(**MAUGIS) * (1.0 - distance)
-    wider = jkr.radius_at_load(load, **MAUGIS) / FOLD_AT_LOAD[0] - 1.0
-    longer = jkr.radius_at_indentation(indentation, **MAUGIS) / FOLD_AT_GRIPS[0] - 1.0
-    # leading terms (1 + sqrt d)^(2/3) and (1 + t)^2, t^2 = d/2; the next is smaller by sqrt d
-    room = math.sqrt(distance) + 20.0 * U / distance
-    assert_allclose(wider, 2.0 / 3.0 * math.sqrt(distance), rtol=room, atol=0)
-    assert_allclose(longer, math.sqrt(2.0 * distance), rtol=room, atol=0)
+def test_the_contact_leaves_each_fold_as_a_square_root():
+    for distance in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12]:
+        load = jkr.pull_off_load(MAUGIS["work"], 1.0) * (1.0 - distance)
+        indentation = jkr.pull_off_indentation(**MAUGIS) * (1.0 - distance)
+        wider = jkr.radius_at_load(load, **MAUGIS) / FOLD_AT_LOAD[0] - 1.0
+        longer = jkr.radius_at_indentation(indentation, **MAUGIS) / FOLD_AT_GRIPS[0] - 1.0
+        # leading terms (1 + sqrt d)^(2/3) and (1 + t)^2, t^2 = d/2; the next is smaller by sqrt d
+        room = math.sqrt(distance) + 20.0 * U / distance
+        assert_allclose(wider, 2.0 / 3.0 * math.sqrt(distance), rtol=room, atol=0)
+        assert_allclose(longer, math.sqrt(2.0 * distance), rtol=room, atol=0)
 
 
 def test_radius_at_indentation_is_the_root_that_scipy_finds():
@@ -225,19 +224,21 @@ def test_load_and_indentation_are_two_views_of_one_contact():
     )
 
 
-@pytest.mark.parametrize("work", [0.0, -0.0, -1e-12, -3.0, -1e10])
-def test_radius_at_no_or_negative_work_is_hertz(work):
-    load = np.array([0.0, 1e-12, 1.0, 1e12])
-    assert_array_equal(jkr.radius_at_load(load, work, 2e-3, 6.4e6), jkr.hertz_radius_at_load(load, 2e-3, 6.4e6))
-    assert_array_equal(jkr.radius_at_indentation(load, work, 2e-3, 6.4e6), jkr.hertz_radius_at_indentation(load, 2e-3))
-    assert jkr.radius_at_load(0.0, work, 2e-3, 6.4e6) == 0.0
-    assert np.isnan(jkr.radius_at_load(-1e-12, work, 2e-3, 6.4e6))
-    assert np.isnan(jkr.radius_at_indentation(-1e-12, work, 2e-3, 6.4e6))
-    assert jkr.pull_off_load(work, 2e-3) == 0.0
-    assert jkr.pull_off_indentation(work, 2e-3, 6.4e6) == 0.0
-    a = 1e-4
-    assert_allclose(jkr.load_at_radius(a, work, 2e-3, 6.4e6), 4 * 6.4e6 * a**3 / 6e-3, rtol=1e-14, atol=0)
-    assert_allclose(jkr.indentation_at_radius(a, work, 2e-3, 6.4e6), a**2 / 2e-3, rtol=1e-14, atol=0)
+def test_radius_at_no_or_negative_work_is_hertz():
+    for work in [0.0, -0.0, -1e-12, -3.0, -1e10]:
+        load = np.array([0.0, 1e-12, 1.0, 1e12])
+        assert_array_equal(jkr.radius_at_load(load, work, 2e-3, 6.4e6), jkr.hertz_radius_at_load(load, 2e-3, 6.4e6))
+        assert_array_equal(
+            jkr.radius_at_indentation(load, work, 2e-3, 6.4e6), jkr.hertz_radius_at_indentation(load, 2e-3)
+        )
+        assert jkr.radius_at_load(0.0, work, 2e-3, 6.4e6) == 0.0
+        assert np.isnan(jkr.radius_at_load(-1e-12, work, 2e-3, 6.4e6))
+        assert np.isnan(jkr.radius_at_indentation(-1e-12, work, 2e-3, 6.4e6))
+        assert jkr.pull_off_load(work, 2e-3) == 0.0
+        assert jkr.pull_off_indentation(work, 2e-3, 6.4e6) == 0.0
+        a = 1e-4
+        assert_allclose(jkr.load_at_radius(a, work, 2e-3, 6.4e6), 4 * 6.4e6 * a**3 / 6e-3, rtol=1e-14, atol=0)
+        assert_allclose(jkr.indentation_at_radius(a, work, 2e-3, 6.4e6), a**2 / 2e-3, rtol=1e-14, atol=0)
 
 
 def test_hertz_is_the_limit_of_vanishing_work():
@@ -262,17 +263,17 @@ def test_an_adhesive_contact_is_never_smaller_than_hertz():
     assert np.all(b[pressed] >= jkr.hertz_radius_at_indentation(indentation, sphere_radius)[pressed])
 
 
-@pytest.mark.parametrize("name", ["radius_at_load", "radius_at_indentation"])
-def test_no_input_raises_or_hangs(name):
-    solve = getattr(jkr, name)
-    special = [0.0, -1.0, 1.0, math.inf, -math.inf, math.nan, 1e-300, 1e300, 5e-324]
-    cases = np.array(list(itertools.product(special, repeat=4)))
-    assert solve(*cases.T).shape == (9**4,)
-    decisive = np.isnan(cases[:, :2]).any(axis=1)
-    assert np.all(np.isnan(solve(*cases[decisive].T)))
-    assert solve(math.inf, 0.042, 2e-3, 6.4e6) == math.inf
-    assert np.isnan(solve(-math.inf, 0.042, 2e-3, 6.4e6))
-    assert np.isnan(solve(1.0, 0.042, 2e-3, math.nan))
+def test_no_input_raises_or_hangs():
+    for name in ["radius_at_load", "radius_at_indentation"]:
+        solve = getattr(jkr, name)
+        special = [0.0, -1.0, 1.0, math.inf, -math.inf, math.nan, 1e-300, 1e300, 5e-324]
+        cases = np.array(list(itertools.product(special, repeat=4)))
+        assert solve(*cases.T).shape == (9**4,)
+        decisive = np.isnan(cases[:, :2]).any(axis=1)
+        assert np.all(np.isnan(solve(*cases[decisive].T)))
+        assert solve(math.inf, 0.042, 2e-3, 6.4e6) == math.inf
+        assert np.isnan(solve(-math.inf, 0.042, 2e-3, 6.4e6))
+        assert np.isnan(solve(1.0, 0.042, 2e-3, math.nan))
 
 
 def test_laws_broadcast():
@@ -294,19 +295,16 @@ def integral(function, low, high):
     return half * np.sum(WEIGHTS * function(middle + half * NODES))
 
 
-@pytest.mark.parametrize(
-    ("potential", "slope", "control"),
-    [
+def test_the_slope_of_a_potential_integrates_to_it():
+    for potential, slope, control in [
         (jkr.potential_at_indentation, jkr.potential_slope_at_indentation, -0.8),
         (jkr.potential_at_indentation, jkr.potential_slope_at_indentation, 0.3),
         (jkr.potential_at_load, jkr.potential_slope_at_load, -2.1),
         (jkr.potential_at_load, jkr.potential_slope_at_load, 1.4),
-    ],
-)
-def test_the_slope_of_a_potential_integrates_to_it(potential, slope, control):
-    gained = integral(lambda a: slope(control, radius=a, **POTENTIAL), 0.8, 1.9)
-    wanted = potential(control, radius=1.9, **POTENTIAL) - potential(control, radius=0.8, **POTENTIAL)
-    assert_allclose(gained, wanted, rtol=1e-12, atol=0)
+    ]:
+        gained = integral(lambda a: slope(control, radius=a, **POTENTIAL), 0.8, 1.9)
+        wanted = potential(control, radius=1.9, **POTENTIAL) - potential(control, radius=0.8, **POTENTIAL)
+        assert_allclose(gained, wanted, rtol=1e-12, atol=0)
 
 
 def test_the_tractive_force_is_the_slope_of_the_potential_over_separation():
@@ -318,25 +316,25 @@ def test_the_tractive_force_is_the_slope_of_the_potential_over_separation():
     assert_allclose(force * (high - low), gained, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("force", [-2.0, 0.4])
-def test_the_potentials_are_legendre_transforms(force):
-    radius = np.linspace(0.5, 2.0, 7)
-    separation = -jkr.indentation_under_load(radius, -force, POTENTIAL["sphere_radius"], POTENTIAL["modulus"])
-    at_grips = jkr.potential_at_indentation(separation, radius=radius, **POTENTIAL)
-    at_load = jkr.potential_at_load(force, radius=radius, **POTENTIAL)
-    scale = np.abs(at_grips) + np.abs(force * separation)
-    assert np.max(np.abs(at_load - (at_grips - force * separation)) / scale) < 1e-12
+def test_the_potentials_are_legendre_transforms():
+    for force in [-2.0, 0.4]:
+        radius = np.linspace(0.5, 2.0, 7)
+        separation = -jkr.indentation_under_load(radius, -force, POTENTIAL["sphere_radius"], POTENTIAL["modulus"])
+        at_grips = jkr.potential_at_indentation(separation, radius=radius, **POTENTIAL)
+        at_load = jkr.potential_at_load(force, radius=radius, **POTENTIAL)
+        scale = np.abs(at_grips) + np.abs(force * separation)
+        assert np.max(np.abs(at_load - (at_grips - force * separation)) / scale) < 1e-12
 
 
-@pytest.mark.parametrize("stress", [0.0, 1e5, 1e7])
-def test_a_uniform_stress_of_any_size_leaves_the_jkr_contact(stress):
-    load, indentation = 2e-3, 3e-6
-    a = jkr.radius_at_load(load, **LENS)
-    b = jkr.radius_at_indentation(indentation, **LENS)
-    for slope, control, radius in (
-        (jkr.potential_slope_at_load, -load, a),
-        (jkr.potential_slope_at_indentation, -indentation, b),
-    ):
-        done = -12.0 * stress**2 * radius**2 / LENS["modulus"]
-        scale = abs(done) + 2.0 * math.pi * LENS["work"] * radius
-        assert abs(slope(control, stress, radius, **LENS) - done) / scale < 1e-12
+def test_a_uniform_stress_of_any_size_leaves_the_jkr_contact():
+    for stress in [0.0, 1e5, 1e7]:
+        load, indentation = 2e-3, 3e-6
+        a = jkr.radius_at_load(load, **LENS)
+        b = jkr.radius_at_indentation(indentation, **LENS)
+        for slope, control, radius in (
+            (jkr.potential_slope_at_load, -load, a),
+            (jkr.potential_slope_at_indentation, -indentation, b),
+        ):
+            done = -12.0 * stress**2 * radius**2 / LENS["modulus"]
+            scale = abs(done) + 2.0 * math.pi * LENS["work"] * radius
+            assert abs(slope(control, stress, radius, **LENS) - done) / scale < 1e-12

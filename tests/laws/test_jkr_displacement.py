@@ -137,22 +137,22 @@ class Wide:
         return np.count_nonzero(pulled), np.count_nonzero(held)
 
 
-@pytest.mark.parametrize(("stiffness", "radius", "load", "indentation"), PULL_OFF)
-def test_the_last_contact_behind_every_spring(stiffness, radius, load, indentation):
-    last = jkr.pull_off_at_stiffness(stiffness, **MAUGIS)
-    assert_allclose(last, (radius, load, indentation), rtol=1e-12, atol=0)
-    if stiffness > 0.0:
-        displacement = jkr.pull_off_displacement(stiffness, **MAUGIS)
-        assert_allclose(displacement, indentation + load / stiffness, rtol=1e-12, atol=0)
-        assert_allclose(jkr.radius_at_displacement(displacement, stiffness, **MAUGIS), radius, rtol=1e-12, atol=0)
-        assert np.isnan(jkr.radius_at_displacement(np.nextafter(displacement, -9e9), stiffness, **MAUGIS))
+def test_the_last_contact_behind_every_spring():
+    for stiffness, radius, load, indentation in PULL_OFF:
+        last = jkr.pull_off_at_stiffness(stiffness, **MAUGIS)
+        assert_allclose(last, (radius, load, indentation), rtol=1e-12, atol=0)
+        if stiffness > 0.0:
+            displacement = jkr.pull_off_displacement(stiffness, **MAUGIS)
+            assert_allclose(displacement, indentation + load / stiffness, rtol=1e-12, atol=0)
+            assert_allclose(jkr.radius_at_displacement(displacement, stiffness, **MAUGIS), radius, rtol=1e-12, atol=0)
+            assert np.isnan(jkr.radius_at_displacement(np.nextafter(displacement, -9e9), stiffness, **MAUGIS))
 
 
-@pytest.mark.parametrize(("radius", "load", "indentation"), STATES)
-@pytest.mark.parametrize("stiffness", [1e-3, 0.1, 1.0, 5.0, 100.0, 1e6, math.inf])
-def test_radius_of_the_known_states_behind_every_spring(radius, load, indentation, stiffness):
-    computed = jkr.radius_at_displacement(indentation + load / stiffness, stiffness, **MAUGIS)
-    assert_allclose(computed, radius, rtol=1e-12, atol=0)
+def test_radius_of_the_known_states_behind_every_spring():
+    for radius, load, indentation in STATES:
+        for stiffness in [1e-3, 0.1, 1.0, 5.0, 100.0, 1e6, math.inf]:
+            computed = jkr.radius_at_displacement(indentation + load / stiffness, stiffness, **MAUGIS)
+            assert_allclose(computed, radius, rtol=1e-12, atol=0)
 
 
 def test_a_neck_that_no_load_holds_stands_behind_a_stiff_spring():
@@ -217,17 +217,19 @@ def test_radius_to_fifty_digits_with_half_of_them_lost_towards_the_fold(distance
     assert error < 1e-12 or nearness < 1e-5
 
 
-@pytest.mark.parametrize("stiffness", [0.1, 5.0, 100.0])
-@pytest.mark.parametrize("distance", [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12])
-def test_the_contact_leaves_the_fold_as_a_square_root(stiffness, distance):
-    last = jkr.pull_off_displacement(stiffness, **MAUGIS)
-    radius = jkr.pull_off_at_stiffness(stiffness, **MAUGIS).radius
-    wider = jkr.radius_at_displacement(last * (1.0 - distance), stiffness, **MAUGIS) - radius
-    # Δ'' of Δ(a) = a^2 - 2/3 sqrt(6a) + (a^3 - sqrt(6 a^3))/k at the fold
-    bend = 2.0 + math.sqrt(6.0) / 6.0 * radius**-1.5 + (6.0 * radius - 0.75 * math.sqrt(6.0 / radius)) / stiffness
-    # the next term is smaller by about wider/radius; the rounding of the fold by 16 U/distance
-    room = 2.0 * wider / radius + 20.0 * U / distance
-    assert_allclose(wider, math.sqrt(-2.0 * last * distance / bend), rtol=room, atol=0)
+def test_the_contact_leaves_the_fold_as_a_square_root():
+    for stiffness in [0.1, 5.0, 100.0]:
+        for distance in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12]:
+            last = jkr.pull_off_displacement(stiffness, **MAUGIS)
+            radius = jkr.pull_off_at_stiffness(stiffness, **MAUGIS).radius
+            wider = jkr.radius_at_displacement(last * (1.0 - distance), stiffness, **MAUGIS) - radius
+            # Δ'' of Δ(a) = a^2 - 2/3 sqrt(6a) + (a^3 - sqrt(6 a^3))/k at the fold
+            bend = (
+                2.0 + math.sqrt(6.0) / 6.0 * radius**-1.5 + (6.0 * radius - 0.75 * math.sqrt(6.0 / radius)) / stiffness
+            )
+            # the next term is smaller by about wider/radius; the rounding of the fold by 16 U/distance
+            room = 2.0 * wider / radius + 20.0 * U / distance
+            assert_allclose(wider, math.sqrt(-2.0 * last * distance / bend), rtol=room, atol=0)
 
 
 @pytest.mark.parametrize("count", some([100_000, 1_000_000], 100_000))
@@ -262,20 +264,22 @@ def test_newton_from_the_right_never_passes_the_root():
         x = np.where(away, lower, x)
 
 
-@pytest.mark.parametrize("work", [0.0, -0.0, -1e-12, -3.0, -1e10])
-def test_radius_at_no_or_negative_work_is_hertz_behind_the_spring(work):
-    radius = np.logspace(-9, -2, 60)
-    for stiffness in 10.0 ** np.arange(-12, 19, 3):
-        displacement = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
+def test_radius_at_no_or_negative_work_is_hertz_behind_the_spring():
+    for work in [0.0, -0.0, -1e-12, -3.0, -1e10]:
+        radius = np.logspace(-9, -2, 60)
+        for stiffness in 10.0 ** np.arange(-12, 19, 3):
+            displacement = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
+            assert_allclose(
+                jkr.radius_at_displacement(displacement, stiffness, work, 2e-3, 6.4e6), radius, rtol=1e-14, atol=0
+            )
+            assert np.isnan(jkr.radius_at_displacement(-1e-300, stiffness, work, 2e-3, 6.4e6))
+            assert jkr.radius_at_displacement(0.0, stiffness, work, 2e-3, 6.4e6) == 0.0
+        hertz = jkr.hertz_radius_at_indentation(displacement, 2e-3)
         assert_allclose(
-            jkr.radius_at_displacement(displacement, stiffness, work, 2e-3, 6.4e6), radius, rtol=1e-14, atol=0
+            jkr.radius_at_displacement(displacement, math.inf, work, 2e-3, 6.4e6), hertz, rtol=20 * U, atol=0
         )
-        assert np.isnan(jkr.radius_at_displacement(-1e-300, stiffness, work, 2e-3, 6.4e6))
-        assert jkr.radius_at_displacement(0.0, stiffness, work, 2e-3, 6.4e6) == 0.0
-    hertz = jkr.hertz_radius_at_indentation(displacement, 2e-3)
-    assert_allclose(jkr.radius_at_displacement(displacement, math.inf, work, 2e-3, 6.4e6), hertz, rtol=20 * U, atol=0)
-    assert_array_equal(jkr.pull_off_at_stiffness(1e3, work, 2e-3, 6.4e6), 0.0)
-    assert jkr.pull_off_displacement(1e3, work, 2e-3, 6.4e6) == 0.0
+        assert_array_equal(jkr.pull_off_at_stiffness(1e3, work, 2e-3, 6.4e6), 0.0)
+        assert jkr.pull_off_displacement(1e3, work, 2e-3, 6.4e6) == 0.0
 
 
 def test_hertz_is_the_limit_of_vanishing_work_behind_a_spring():
@@ -388,14 +392,14 @@ def test_no_input_of_ten_million_raises_or_hangs_or_gives_a_wrong_branch():
         check_wild(500_000, seed=100 + seed)
 
 
-@pytest.mark.parametrize("size", [1, 2, 7, 8, 9, 255, 4095, 4096, 4097, 9000])
-def test_a_radius_does_not_depend_on_the_batch(size):
-    states = random_states(9000, seed=14)
-    whole = jkr.radius_at_displacement(*states)
-    part = jkr.radius_at_displacement(*[value[-size:] for value in states])
-    assert_array_equal(part, whole[-size:])
-    some = np.random.default_rng(15).integers(0, 9000, 20)
-    assert_array_equal(whole[some], [jkr.radius_at_displacement(*[value[i] for value in states]) for i in some])
+def test_a_radius_does_not_depend_on_the_batch():
+    for size in [1, 2, 7, 8, 9, 255, 4095, 4096, 4097, 9000]:
+        states = random_states(9000, seed=14)
+        whole = jkr.radius_at_displacement(*states)
+        part = jkr.radius_at_displacement(*[value[-size:] for value in states])
+        assert_array_equal(part, whole[-size:])
+        some = np.random.default_rng(15).integers(0, 9000, 20)
+        assert_array_equal(whole[some], [jkr.radius_at_displacement(*[value[i] for value in states]) for i in some])
 
 
 def test_radius_at_displacement_broadcasts():

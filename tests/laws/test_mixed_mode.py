@@ -76,11 +76,11 @@ STATES = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("load", "force", "stuck", "states"), [(*row[:3], row[3:]) for row in STATES])
-def test_states_at_a_load(load, force, stuck, states):
-    found = [radius(name, load, force, mixity) for name in LAWS for mixity in (0.2, 0.5)]
-    assert_allclose(found, states, rtol=1e-12, atol=0)
-    assert_allclose([radius(name, load, force, 1.0) for name in LAWS], stuck, rtol=1e-12, atol=0)
+def test_states_at_a_load():
+    for load, force, stuck, states in [(*row[:3], row[3:]) for row in STATES]:
+        found = [radius(name, load, force, mixity) for name in LAWS for mixity in (0.2, 0.5)]
+        assert_allclose(found, states, rtol=1e-12, atol=0)
+        assert_allclose([radius(name, load, force, 1.0) for name in LAWS], stuck, rtol=1e-12, atol=0)
 
 
 def test_states_at_an_indentation():
@@ -90,18 +90,18 @@ def test_states_at_an_indentation():
     assert_allclose(found, states, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("mixity", [0.05, 0.5, 0.79, 0.99])
-@pytest.mark.parametrize("name", LAWS)
-def test_the_radius_closes_the_balance_in_fifty_digits(name, mixity):
-    for at_load, levels in ((True, (-1.2, 0.0, 0.3, 30.0)), (False, (-0.2, 0.0, 0.3, 8.0))):
-        for level, force in zip(levels, (0.3, 1.5, 2.5, 9.0), strict=True):
-            exact = exact_radius(name, level, force, mixity, at_load)
-            found = float(radius(name, level, force, mixity, at_load))
-            if exact is None:
-                hertz = np.cbrt(level) if at_load else np.sqrt(level)
-                assert_allclose(found, hertz if level >= 0.0 else math.nan, rtol=4 * U, atol=0)
-            else:
-                assert_allclose(found, float(exact), rtol=1e-12, atol=0)
+def test_the_radius_closes_the_balance_in_fifty_digits():
+    for mixity in [0.05, 0.5, 0.79, 0.99]:
+        for name in LAWS:
+            for at_load, levels in ((True, (-1.2, 0.0, 0.3, 30.0)), (False, (-0.2, 0.0, 0.3, 8.0))):
+                for level, force in zip(levels, (0.3, 1.5, 2.5, 9.0), strict=True):
+                    exact = exact_radius(name, level, force, mixity, at_load)
+                    found = float(radius(name, level, force, mixity, at_load))
+                    if exact is None:
+                        hertz = np.cbrt(level) if at_load else np.sqrt(level)
+                        assert_allclose(found, hertz if level >= 0.0 else math.nan, rtol=4 * U, atol=0)
+                    else:
+                        assert_allclose(found, float(exact), rtol=1e-12, atol=0)
 
 
 #: Law, control, level, lambda, and radius and force at the end of its branch.
@@ -118,16 +118,16 @@ FOLDS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "at_load", "level", "mixity", "last", "force"), FOLDS)
-def test_a_branch_ends_at_its_fold(name, at_load, level, mixity, last, force):
-    after = radius(name, level, force * (1.0 + 1e-10), mixity, at_load)
-    hertz = jkr.hertz_radius_at_load(level, 1.0, MODULUS) if at_load else math.sqrt(level)
-    assert after == hertz if level > 0.0 else math.isnan(after)
-    # towards the fold the radius goes as the root of what is missing of the force: its series, to the fifth order
-    missing = 1e-3 * np.arange(1, 7)
-    radii = radius(name, level, force * (1.0 - missing**2), mixity, at_load)
-    assert_allclose(np.polynomial.Polynomial.fit(missing, radii, 5)(0.0), last, rtol=1e-8, atol=0)
-    assert np.all(np.diff(radii) > 0.0)
+def test_a_branch_ends_at_its_fold():
+    for name, at_load, level, mixity, last, force in FOLDS:
+        after = radius(name, level, force * (1.0 + 1e-10), mixity, at_load)
+        hertz = jkr.hertz_radius_at_load(level, 1.0, MODULUS) if at_load else math.sqrt(level)
+        assert after == hertz if level > 0.0 else math.isnan(after)
+        # towards the fold the radius goes as the root of what is missing of the force: its series, to the fifth order
+        missing = 1e-3 * np.arange(1, 7)
+        radii = radius(name, level, force * (1.0 - missing**2), mixity, at_load)
+        assert_allclose(np.polynomial.Polynomial.fit(missing, radii, 5)(0.0), last, rtol=1e-8, atol=0)
+        assert np.all(np.diff(radii) > 0.0)
 
 
 def test_the_scaled_angle_jumps_or_reaches_hertz_smoothly():
@@ -155,57 +155,59 @@ def test_the_scaled_tangent_keeps_its_share_of_adhesion_under_any_force():
     assert np.all(found[1:] > np.cbrt(load[1:]))
 
 
-@pytest.mark.parametrize("at_load", [True, False])
-@pytest.mark.parametrize("name", LAWS)
-def test_limits_of_the_mixity(name, at_load):
-    rng = np.random.default_rng(71)
-    work, sphere_radius, modulus = 10.0 ** rng.uniform(-6.0, 3.0, (3, 400))
-    poisson_ratio = rng.uniform(0.0, 0.5, 400)
-    pull = np.pi * work * sphere_radius
-    level = pull * rng.uniform(-1.2, 30.0, 400)
-    if not at_load:
-        level = jkr.indentation_at_radius(
-            jkr.radius_at_load(level, work, sphere_radius, modulus), work, sphere_radius, modulus
-        )
-    plain = jkr.radius_at_load if at_load else jkr.radius_at_indentation
-    stuck = theories.savkoor_briggs_at_load if at_load else theories.savkoor_briggs_at_indentation
-    law, rest = LAWS[name][0 if at_load else 1], (sphere_radius, modulus)
-    force = pull * rng.uniform(0.0, 0.3, 400)  # well before any fold
-    assert_array_equal(law(level, work, force, 0.0, *rest, poisson_ratio), plain(level, work, *rest))
-    assert_array_equal(law(level, work, 0.0, 0.4, *rest, poisson_ratio), plain(level, work, *rest))
-    exact = stuck(level, work, force, *rest, poisson_ratio)
-    assert np.all(np.isfinite(exact)) and np.all(exact < plain(level, work, *rest))
-    assert_allclose(law(level, work, -force, 1.0, *rest, poisson_ratio), exact, rtol=1e-12, atol=0)
-    # the second is Savkoor & Briggs' at the force times the root of lambda, up to the jump
-    far = pull * 10.0 ** rng.uniform(-3.0, 2.0, 400)
-    for mixity in (0.05, 0.7):
-        share = LAWS["shear_share"][0 if at_load else 1](level, work, far, mixity, *rest, poisson_ratio)
-        exact = stuck(level, work, math.sqrt(mixity) * far, *rest, poisson_ratio)
-        # an error of one rounding of the force moves radii near a fold by its root
-        assert_allclose(share, exact, rtol=1e-7, atol=0)
-        assert np.nanmedian(np.abs(share / exact - 1.0)) < 1e-14
-        assert 20 < np.sum(exact > np.fmax(plain(level, 0.0, *rest), 0.0)) < 400
+def test_limits_of_the_mixity():
+    for at_load in [True, False]:
+        for name in LAWS:
+            rng = np.random.default_rng(71)
+            work, sphere_radius, modulus = 10.0 ** rng.uniform(-6.0, 3.0, (3, 400))
+            poisson_ratio = rng.uniform(0.0, 0.5, 400)
+            pull = np.pi * work * sphere_radius
+            level = pull * rng.uniform(-1.2, 30.0, 400)
+            if not at_load:
+                level = jkr.indentation_at_radius(
+                    jkr.radius_at_load(level, work, sphere_radius, modulus), work, sphere_radius, modulus
+                )
+            plain = jkr.radius_at_load if at_load else jkr.radius_at_indentation
+            stuck = theories.savkoor_briggs_at_load if at_load else theories.savkoor_briggs_at_indentation
+            law, rest = LAWS[name][0 if at_load else 1], (sphere_radius, modulus)
+            force = pull * rng.uniform(0.0, 0.3, 400)  # well before any fold
+            assert_array_equal(law(level, work, force, 0.0, *rest, poisson_ratio), plain(level, work, *rest))
+            assert_array_equal(law(level, work, 0.0, 0.4, *rest, poisson_ratio), plain(level, work, *rest))
+            exact = stuck(level, work, force, *rest, poisson_ratio)
+            assert np.all(np.isfinite(exact)) and np.all(exact < plain(level, work, *rest))
+            assert_allclose(law(level, work, -force, 1.0, *rest, poisson_ratio), exact, rtol=1e-12, atol=0)
+            # the second is Savkoor & Briggs' at the force times the root of lambda, up to the jump
+            far = pull * 10.0 ** rng.uniform(-3.0, 2.0, 400)
+            for mixity in (0.05, 0.7):
+                share = LAWS["shear_share"][0 if at_load else 1](level, work, far, mixity, *rest, poisson_ratio)
+                exact = stuck(level, work, math.sqrt(mixity) * far, *rest, poisson_ratio)
+                # an error of one rounding of the force moves radii near a fold by its root
+                assert_allclose(share, exact, rtol=1e-7, atol=0)
+                assert np.nanmedian(np.abs(share / exact - 1.0)) < 1e-14
+                assert 20 < np.sum(exact > np.fmax(plain(level, 0.0, *rest), 0.0)) < 400
 
 
-@pytest.mark.parametrize("mixity", [0.1, 0.6])
-@pytest.mark.parametrize("name", LAWS)
-def test_a_small_force_costs_its_share_of_savkoor_briggs_loss(name, mixity):
-    with mpmath.workdps(50):
-        a, lam = mpmath.mpf(2), mpmath.mpf(mixity)
-        small = mpmath.mpf(10) ** -12
-        # G_n that balances at a given radius and force, to second order in T: w - share G_s
-        shear = small**2 / (4 * a**3)
-        normal = mpmath.findroot(lambda g: EXCESS[name](mpmath.atan(mpmath.sqrt(shear / g)), lam) - g - shear, 1)
-        share = (1 - normal) / shear
-        expected = lam * (2 - lam) if name == "scaled_angle" else lam
-        assert abs(share - expected) < 1e-20
-    full = float(theories.savkoor_briggs_shrinkage(1.0, WORK, 1.0, MODULUS))
-    force = 1e-3
-    loss = math.pi * (radius(name, 1.0, 0.0, mixity) ** 2 - radius(name, 1.0, force, mixity) ** 2) / force**2
-    # the next order is of relative size T^2 = 1e-6; the loss, 1e-6 of the area, has ten digits
-    assert_allclose(loss, float(expected) * full, rtol=2e-6, atol=0)
-    found = theories.mixities(float(expected) * full, 1.0, WORK, 1.0, MODULUS)[name]
-    assert_allclose(found, mixity, rtol=1e-13, atol=0)
+def test_a_small_force_costs_its_share_of_savkoor_briggs_loss():
+    for mixity in [0.1, 0.6]:
+        for name in LAWS:
+            with mpmath.workdps(50):
+                a, lam = mpmath.mpf(2), mpmath.mpf(mixity)
+                small = mpmath.mpf(10) ** -12
+                # G_n that balances at a given radius and force, to second order in T: w - share G_s
+                shear = small**2 / (4 * a**3)
+                normal = mpmath.findroot(
+                    lambda g: EXCESS[name](mpmath.atan(mpmath.sqrt(shear / g)), lam) - g - shear, 1
+                )
+                share = (1 - normal) / shear
+                expected = lam * (2 - lam) if name == "scaled_angle" else lam
+                assert abs(share - expected) < 1e-20
+            full = float(theories.savkoor_briggs_shrinkage(1.0, WORK, 1.0, MODULUS))
+            force = 1e-3
+            loss = math.pi * (radius(name, 1.0, 0.0, mixity) ** 2 - radius(name, 1.0, force, mixity) ** 2) / force**2
+            # the next order is of relative size T^2 = 1e-6; the loss, 1e-6 of the area, has ten digits
+            assert_allclose(loss, float(expected) * full, rtol=2e-6, atol=0)
+            found = theories.mixities(float(expected) * full, 1.0, WORK, 1.0, MODULUS)[name]
+            assert_allclose(found, mixity, rtol=1e-13, atol=0)
 
 
 def test_no_mixity_shrinks_a_contact_more_than_full_stick_or_lets_it_grow():
@@ -215,36 +217,36 @@ def test_no_mixity_shrinks_a_contact_more_than_full_stick_or_lets_it_grow():
     assert np.isnan(radius("scaled_angle", 1.0, 1.0, 1.1)) and np.isnan(radius("shear_share", 1.0, 1.0, -0.1))
 
 
-@pytest.mark.parametrize("at_load", [True, False])
-@pytest.mark.parametrize("name", LAWS)
-def test_random_states_are_the_widest_in_balance(name, at_load):
-    rng = np.random.default_rng(72)
-    level = rng.uniform(-1.45, 12.0, 3000) if at_load else rng.uniform(-0.4, 5.0, 3000)
-    force, mixity = 10.0 ** rng.uniform(-2.0, 1.5, 3000), rng.uniform(0.0, 1.0, 3000)
-    mixity[::3] = 1.0 - 10.0 ** rng.uniform(-6.0, -1.0, 1000)
-    found = radius(name, level, force, mixity, at_load)
-    widest = jkr.radius_at_load(level, WORK, 1.0, MODULUS) if at_load else jkr.radius_at_indentation(
-        level, WORK, 1.0, MODULUS)  # fmt: skip
-    hertz = np.cbrt(np.fmax(level, 0.0)) if at_load else np.sqrt(np.fmax(level, 0.0))
-    on = found > hertz * (1.0 + 1e-12)
-    assert 500 < on.sum() < 3000 and np.all(found[on] <= widest[on] * (1.0 + 4 * U))
-    low = np.where(on, found, hertz + 1e-9)
+def test_random_states_are_the_widest_in_balance():
+    for at_load in [True, False]:
+        for name in LAWS:
+            rng = np.random.default_rng(72)
+            level = rng.uniform(-1.45, 12.0, 3000) if at_load else rng.uniform(-0.4, 5.0, 3000)
+            force, mixity = 10.0 ** rng.uniform(-2.0, 1.5, 3000), rng.uniform(0.0, 1.0, 3000)
+            mixity[::3] = 1.0 - 10.0 ** rng.uniform(-6.0, -1.0, 1000)
+            found = radius(name, level, force, mixity, at_load)
+            widest = jkr.radius_at_load(level, WORK, 1.0, MODULUS) if at_load else jkr.radius_at_indentation(
+                level, WORK, 1.0, MODULUS)  # fmt: skip
+            hertz = np.cbrt(np.fmax(level, 0.0)) if at_load else np.sqrt(np.fmax(level, 0.0))
+            on = found > hertz * (1.0 + 1e-12)
+            assert 500 < on.sum() < 3000 and np.all(found[on] <= widest[on] * (1.0 + 4 * U))
+            low = np.where(on, found, hertz + 1e-9)
 
-    def over(a):
-        normal = (a**3 - level) ** 2 / (6.0 * a**3) if at_load else 0.375 * (level - a**2) ** 2 / a
-        shear = force**2 / (4.0 * a**3)
-        psi = np.arctan2(np.sqrt(shear), np.sqrt(normal))
-        tan2 = np.tan(psi) ** 2
-        limit = {
-            "scaled_angle": lambda: 1.0 + np.tan((1.0 - mixity) * psi) ** 2,
-            "shear_share": lambda: 1.0 / (1.0 + (mixity - 1.0) * np.sin(psi) ** 2),
-            "scaled_tangent": lambda: 1.0 + (1.0 - mixity) * tan2,
-        }[name]()
-        return (normal + shear) / limit - 1.0
+            def over(a):
+                normal = (a**3 - level) ** 2 / (6.0 * a**3) if at_load else 0.375 * (level - a**2) ** 2 / a
+                shear = force**2 / (4.0 * a**3)
+                psi = np.arctan2(np.sqrt(shear), np.sqrt(normal))
+                tan2 = np.tan(psi) ** 2
+                limit = {
+                    "scaled_angle": lambda: 1.0 + np.tan((1.0 - mixity) * psi) ** 2,
+                    "shear_share": lambda: 1.0 / (1.0 + (mixity - 1.0) * np.sin(psi) ** 2),
+                    "scaled_tangent": lambda: 1.0 + (1.0 - mixity) * tan2,
+                }[name]()
+                return (normal + shear) / limit - 1.0
 
-    assert np.all(np.abs(over(found)[on]) < 1e-9)
-    for share in np.linspace(0.0, 1.0, 101)[1:]:  # wider contacts would open
-        assert np.all(over(low + share * (widest - low)) > -1e-9)
+            assert np.all(np.abs(over(found)[on]) < 1e-9)
+            for share in np.linspace(0.0, 1.0, 101)[1:]:  # wider contacts would open
+                assert np.all(over(low + share * (widest - low)) > -1e-9)
 
 
 @pytest.mark.parametrize("at_load", [True, False])

@@ -4,7 +4,6 @@ import math
 
 import mpmath
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.laws import halfspace, jkr
@@ -28,13 +27,13 @@ def over_the_contact(values_of, radius, points=64):
     return 0.25 * math.pi * np.sum(weights * 2.0 * math.pi * r * radius * np.cos(t) * values_of(r))
 
 
-@pytest.mark.parametrize(("radius", "indentation"), STATES)
-def test_the_pressure_carries_the_load(radius, indentation):
-    load = over_the_contact(lambda r: halfspace.pressure(r, radius, indentation, **LENS), radius)
-    exact = jkr.load_under_indentation(radius, indentation, **LENS)
-    # the largest part of the load is Hertz's; punch and quadrature add to it and may cancel to less
-    size = jkr.load_under_indentation(radius, radius**2 / LENS["sphere_radius"], **LENS)
-    assert abs(load - exact) < 1e-12 * size
+def test_the_pressure_carries_the_load():
+    for radius, indentation in STATES:
+        load = over_the_contact(lambda r: halfspace.pressure(r, radius, indentation, **LENS), radius)
+        exact = jkr.load_under_indentation(radius, indentation, **LENS)
+        # the largest part of the load is Hertz's; punch and quadrature add to it and may cancel to less
+        size = jkr.load_under_indentation(radius, radius**2 / LENS["sphere_radius"], **LENS)
+        assert abs(load - exact) < 1e-12 * size
 
 
 def test_the_pressure_of_hertz_is_johnsons():
@@ -78,22 +77,22 @@ def exact_displacement(r, radius, indentation, sphere_radius):
         return hertz, punch, r**2 / (2 * big) - delta + hertz + punch
 
 
-@pytest.mark.parametrize(("radius", "indentation"), STATES[1:])
-@pytest.mark.parametrize("ratio", [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 4.0, 9.0, 1e3, 1e6])
-def test_displacement_and_gap_outside_against_fifty_digits(radius, indentation, ratio):
-    # 1.0198 is where the series of the gap ends, 4.04 where that of the displacement begins
-    r = radius * ratio
-    hertz, punch, opening = exact_displacement(r, radius, indentation, 2e-3)
-    u = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
-    assert abs(u - (hertz + punch)) < 3e-15 * (abs(hertz) + abs(punch))
-    # sqrt(r^2 - a^2) is that of r - a, exact for the r given; the series hold 1e-14 where they meet
-    assert abs(halfspace.gap(r, radius, indentation, 2e-3) / opening - 1) < 2e-14
+def test_displacement_and_gap_outside_against_fifty_digits():
+    for radius, indentation in STATES[1:]:
+        for ratio in [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 4.0, 9.0, 1e3, 1e6]:
+            # 1.0198 is where the series of the gap ends, 4.04 where that of the displacement begins
+            r = radius * ratio
+            hertz, punch, opening = exact_displacement(r, radius, indentation, 2e-3)
+            u = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
+            assert abs(u - (hertz + punch)) < 3e-15 * (abs(hertz) + abs(punch))
+            # sqrt(r^2 - a^2) is that of r - a, exact for the r given; the series hold 1e-14 where they meet
+            assert abs(halfspace.gap(r, radius, indentation, 2e-3) / opening - 1) < 2e-14
 
 
-@pytest.mark.parametrize("ratio", [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 1e3])
-def test_hertz_opens_beside_its_edge_as_fifty_digits_say(ratio):
-    opening = exact_displacement(ratio, 1.0, 1.0, 1.0)[2]
-    assert abs(halfspace.gap(ratio, 1.0, 1.0, 1.0) / opening - 1) < 2e-14
+def test_hertz_opens_beside_its_edge_as_fifty_digits_say():
+    for ratio in [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 1e3]:
+        opening = exact_displacement(ratio, 1.0, 1.0, 1.0)[2]
+        assert abs(halfspace.gap(ratio, 1.0, 1.0, 1.0) / opening - 1) < 2e-14
 
 
 def test_far_away_the_surface_feels_only_the_load():
@@ -104,14 +103,14 @@ def test_far_away_the_surface_feels_only_the_load():
     assert_allclose(far, 4e-3 / (math.pi * LENS["modulus"] * r), rtol=1e-7, atol=0)
 
 
-@pytest.mark.parametrize(("radius", "indentation"), STATES)
-def test_the_surface_is_continuous_at_the_edge_and_follows_the_sphere_inside(radius, indentation):
-    inside = halfspace.normal_displacement(radius, radius, indentation, 2e-3)
-    assert_allclose(inside, indentation - radius**2 / 4e-3, rtol=1e-15, atol=0)
-    outside = halfspace.normal_displacement(radius * (1.0 + 1e-12), radius, indentation, 2e-3)
-    # the punch leaves the edge as a square root: sqrt(2e-12) of a^2/R
-    assert abs(outside - inside) < 2e-6 * radius**2 / 2e-3
-    assert_array_equal(halfspace.gap(np.linspace(0.0, 1.0, 9) * radius, radius, indentation, 2e-3), 0.0)
+def test_the_surface_is_continuous_at_the_edge_and_follows_the_sphere_inside():
+    for radius, indentation in STATES:
+        inside = halfspace.normal_displacement(radius, radius, indentation, 2e-3)
+        assert_allclose(inside, indentation - radius**2 / 4e-3, rtol=1e-15, atol=0)
+        outside = halfspace.normal_displacement(radius * (1.0 + 1e-12), radius, indentation, 2e-3)
+        # the punch leaves the edge as a square root: sqrt(2e-12) of a^2/R
+        assert abs(outside - inside) < 2e-6 * radius**2 / 2e-3
+        assert_array_equal(halfspace.gap(np.linspace(0.0, 1.0, 9) * radius, radius, indentation, 2e-3), 0.0)
 
 
 def test_surfaces_never_overlap_where_the_edge_pulls():

@@ -59,45 +59,45 @@ def test_limits_of_the_steady_fraction():
     assert steady_fraction(1.0, np.inf) == 1.0
 
 
-@pytest.mark.parametrize("speed", [0.0, 1e-5, 1e-2, 10.0])
-def test_the_steady_fraction_is_where_the_rate_vanishes(speed):
-    steady = steady_fraction(speed, CRITICAL)
-    flow = HEALING * (1.0 - steady) + HEALING * speed / CRITICAL * steady
-    assert abs(fraction_rate(steady, speed, CRITICAL, HEALING)) <= 4e-16 * max(flow, HEALING)
+def test_the_steady_fraction_is_where_the_rate_vanishes():
+    for speed in [0.0, 1e-5, 1e-2, 10.0]:
+        steady = steady_fraction(speed, CRITICAL)
+        flow = HEALING * (1.0 - steady) + HEALING * speed / CRITICAL * steady
+        assert abs(fraction_rate(steady, speed, CRITICAL, HEALING)) <= 4e-16 * max(flow, HEALING)
 
 
-@pytest.mark.parametrize("speed", [0.0, 3e-3, 0.5])
-def test_the_step_solves_the_rate_equation(speed):
-    duration = 4e-3
-    exact = solve_ivp(
-        lambda t, y: fraction_rate(y, speed, CRITICAL, HEALING), (0.0, duration), [0.3], rtol=1e-12, atol=1e-14
-    )
-    stepped = relax_fraction(0.3, speed * duration, duration, CRITICAL, HEALING)
-    assert_allclose(stepped, exact.y[0, -1], rtol=1e-10, atol=0)
+def test_the_step_solves_the_rate_equation():
+    for speed in [0.0, 3e-3, 0.5]:
+        duration = 4e-3
+        exact = solve_ivp(
+            lambda t, y: fraction_rate(y, speed, CRITICAL, HEALING), (0.0, duration), [0.3], rtol=1e-12, atol=1e-14
+        )
+        stepped = relax_fraction(0.3, speed * duration, duration, CRITICAL, HEALING)
+        assert_allclose(stepped, exact.y[0, -1], rtol=1e-10, atol=0)
 
 
-@pytest.mark.parametrize("start", [0.0, 0.3, 1.0])
-@pytest.mark.parametrize("ratio", [0.0, 1e-6, 0.2, 1e9])
-def test_one_step_equals_seven_steps_of_a_seventh(start, ratio):
-    duration = EXPONENTS / (HEALING * (1.0 + ratio))
-    path = ratio * CRITICAL * duration
-    once = relax_fraction(start, path, duration, CRITICAL, HEALING)
-    parts = np.full_like(once, start)
-    for _ in range(7):
-        parts = relax_fraction(parts, path / 7.0, duration / 7.0, CRITICAL, HEALING)
-    # nothing is left of bonds that opened e^-z ago: compare above the smallest normal number
-    alive = once > 1e-300
-    assert_allclose(parts[alive], once[alive], rtol=1e-12, atol=0)
+def test_one_step_equals_seven_steps_of_a_seventh():
+    for start in [0.0, 0.3, 1.0]:
+        for ratio in [0.0, 1e-6, 0.2, 1e9]:
+            duration = EXPONENTS / (HEALING * (1.0 + ratio))
+            path = ratio * CRITICAL * duration
+            once = relax_fraction(start, path, duration, CRITICAL, HEALING)
+            parts = np.full_like(once, start)
+            for _ in range(7):
+                parts = relax_fraction(parts, path / 7.0, duration / 7.0, CRITICAL, HEALING)
+            # nothing is left of bonds that opened e^-z ago: compare above the smallest normal number
+            alive = once > 1e-300
+            assert_allclose(parts[alive], once[alive], rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("ratio", [0.0, 0.2, 1e9])
-def test_a_step_keeps_the_steady_state_and_ends_in_it(ratio):
-    duration = EXPONENTS / HEALING
-    path = ratio * CRITICAL * duration
-    steady = steady_fraction(ratio * CRITICAL, CRITICAL)
-    assert_allclose(relax_fraction(steady, path, duration, CRITICAL, HEALING), steady, rtol=1e-13, atol=0)
-    late = relax_fraction([0.0, 1.0], path[-1], duration[-1], CRITICAL, HEALING)
-    assert_allclose(late, steady, rtol=1e-13, atol=0)
+def test_a_step_keeps_the_steady_state_and_ends_in_it():
+    for ratio in [0.0, 0.2, 1e9]:
+        duration = EXPONENTS / HEALING
+        path = ratio * CRITICAL * duration
+        steady = steady_fraction(ratio * CRITICAL, CRITICAL)
+        assert_allclose(relax_fraction(steady, path, duration, CRITICAL, HEALING), steady, rtol=1e-13, atol=0)
+        late = relax_fraction([0.0, 1.0], path[-1], duration[-1], CRITICAL, HEALING)
+        assert_allclose(late, steady, rtol=1e-13, atol=0)
 
 
 def test_a_short_step_is_the_rate_times_the_duration():
@@ -198,10 +198,10 @@ def some_bonds(count=12, seed=41):
     return k0, force, stiffness, k_on, k0 * force / stiffness * 10.0 ** draw(-3, 5, count)
 
 
-@pytest.mark.parametrize(("beta", "eps"), RESOLVED)
-def test_bell_populations_against_quadrature(beta, eps):
-    # rounding of the 64 weights: 2e-14
-    assert_allclose(bell_moments(eps, 1.0, 1.0, 1.0, beta), RESOLVED[beta, eps], rtol=1e-13, atol=0)
+def test_bell_populations_against_quadrature():
+    for beta, eps in RESOLVED:
+        # rounding of the 64 weights: 2e-14
+        assert_allclose(bell_moments(eps, 1.0, 1.0, 1.0, beta), RESOLVED[beta, eps], rtol=1e-13, atol=0)
 
 
 def test_bell_populations_at_equal_rates():
@@ -295,17 +295,17 @@ def test_bond_fractions_count_from_rest():
     assert_allclose(bell_fraction(1.0, 1.0, 1.0, 1.0, [0.0, math.inf]), [life, 1.0], rtol=1e-14, atol=0)
 
 
-@pytest.mark.parametrize("beta", MAXIMUM)
-def test_friction_maximum_of_bell_bonds(beta):
-    speed, stress, bound, rupture, half, spread = MAXIMUM[beta]
-    peak = bell_peak(1.0, 1.0, 1.0, beta, 1.0)
-    assert_allclose(peak.speed, speed, rtol=5e-6, atol=0)  # as many digits as are printed, here and below
-    assert_allclose(peak.stress, stress, rtol=0, atol=5.1e-7)
-    moments = bell_moments(peak.speed, 1.0, 1.0, 1.0, beta)
-    assert_allclose(moments.bound, bound, rtol=0, atol=5.1e-6)
-    assert_allclose(bell_rupture_force(peak.speed, 1.0, 1.0), rupture, rtol=0, atol=5.1e-6)
-    assert_allclose(math.sqrt(moments.force_square - moments.force**2), spread, rtol=0, atol=5.1e-6)
-    assert_allclose(bell_critical_speed(1.0, 1.0, 1.0, beta), half, rtol=5e-5, atol=0)
+def test_friction_maximum_of_bell_bonds():
+    for beta in MAXIMUM:
+        speed, stress, bound, rupture, half, spread = MAXIMUM[beta]
+        peak = bell_peak(1.0, 1.0, 1.0, beta, 1.0)
+        assert_allclose(peak.speed, speed, rtol=5e-6, atol=0)  # as many digits as are printed, here and below
+        assert_allclose(peak.stress, stress, rtol=0, atol=5.1e-7)
+        moments = bell_moments(peak.speed, 1.0, 1.0, 1.0, beta)
+        assert_allclose(moments.bound, bound, rtol=0, atol=5.1e-6)
+        assert_allclose(bell_rupture_force(peak.speed, 1.0, 1.0), rupture, rtol=0, atol=5.1e-6)
+        assert_allclose(math.sqrt(moments.force_square - moments.force**2), spread, rtol=0, atol=5.1e-6)
+        assert_allclose(bell_critical_speed(1.0, 1.0, 1.0, beta), half, rtol=5e-5, atol=0)
 
 
 def test_no_speed_has_more_friction_than_the_peak():
@@ -372,11 +372,11 @@ MEAN_MAXIMUM = {
 }
 
 
-@pytest.mark.parametrize(("beta", "eps"), MEAN_FIELD)
-def test_mean_field_against_a_root_finder(beta, eps):
-    bound = rest_share(1.0, beta) * first_moment_fraction(eps, 1.0, 1.0, 1.0, beta)
-    stress = first_moment_stress(eps, 1.0, 1.0, 1.0, beta, 1.0)
-    assert_allclose([bound, stress], MEAN_FIELD[beta, eps], rtol=2e-15, atol=0)
+def test_mean_field_against_a_root_finder():
+    for beta, eps in MEAN_FIELD:
+        bound = rest_share(1.0, beta) * first_moment_fraction(eps, 1.0, 1.0, 1.0, beta)
+        stress = first_moment_stress(eps, 1.0, 1.0, 1.0, beta, 1.0)
+        assert_allclose([bound, stress], MEAN_FIELD[beta, eps], rtol=2e-15, atol=0)
 
 
 def test_mean_field_is_where_the_closure_stands_still():
@@ -390,13 +390,13 @@ def test_mean_field_is_where_the_closure_stands_still():
     assert_allclose(stress, 1e16 * bound * stiffness * stretch, rtol=1e-14, atol=0)
 
 
-@pytest.mark.parametrize("beta", MEAN_MAXIMUM)
-def test_friction_maximum_of_mean_field(beta):
-    peak = first_moment_peak(1.0, 1.0, 1.0, beta, 1.0)
-    assert_allclose(peak, MEAN_MAXIMUM[beta], rtol=1e-13, atol=0)
-    assert_allclose(first_moment_stress(peak.speed, 1.0, 1.0, 1.0, beta, 1.0), peak.stress, rtol=1e-14, atol=0)
-    for factor in (0.9, 1.1):
-        assert first_moment_stress(factor * peak.speed, 1.0, 1.0, 1.0, beta, 1.0) < peak.stress
+def test_friction_maximum_of_mean_field():
+    for beta in MEAN_MAXIMUM:
+        peak = first_moment_peak(1.0, 1.0, 1.0, beta, 1.0)
+        assert_allclose(peak, MEAN_MAXIMUM[beta], rtol=1e-13, atol=0)
+        assert_allclose(first_moment_stress(peak.speed, 1.0, 1.0, 1.0, beta, 1.0), peak.stress, rtol=1e-14, atol=0)
+        for factor in (0.9, 1.1):
+            assert first_moment_stress(factor * peak.speed, 1.0, 1.0, 1.0, beta, 1.0) < peak.stress
 
 
 def test_mean_field_exaggerates_the_maximum():
@@ -431,20 +431,20 @@ def test_cut_off_without_rate_is_the_law_of_the_paper():
     assert_allclose(back, -2.5e7 * steady_fraction(1e-2, 1e-3), rtol=1e-14, atol=0)
 
 
-@pytest.mark.parametrize("wait", [0.0, 0.1, 1.0, 10.0])
-def test_cut_off_to_fifty_digits(wait):
-    for u in np.concatenate([10.0 ** np.arange(-8, 9), [0.2, 0.33, 0.3334, 0.5, 2.0]]):
-        with mp.workdps(50):
-            a = 1 / mp.mpf(u)
-            decay = mp.exp(-a)
-            cycle = 1 + mp.mpf(wait) - decay
-            force = (1 - (1 + a) * decay) / cycle / a
-            square = (2 - (2 + 2 * a + a * a) * decay) / cycle / a**2
-            exact = [float((1 - decay) / cycle), float(force), float(square)]
-        k_on = 1 / wait if wait > 0.0 else math.inf
-        assert_allclose(cut_off_moments(u, 1.0, 1.0, 1.0, k_on), exact, rtol=1e-14, atol=0)
-        expected = 1.0 if wait == 0.0 else exact[0] * (1 + wait)
-        assert_allclose(cut_off_fraction(u, 1.0, 1.0, k_on), expected, rtol=1e-14, atol=0)
+def test_cut_off_to_fifty_digits():
+    for wait in [0.0, 0.1, 1.0, 10.0]:
+        for u in np.concatenate([10.0 ** np.arange(-8, 9), [0.2, 0.33, 0.3334, 0.5, 2.0]]):
+            with mp.workdps(50):
+                a = 1 / mp.mpf(u)
+                decay = mp.exp(-a)
+                cycle = 1 + mp.mpf(wait) - decay
+                force = (1 - (1 + a) * decay) / cycle / a
+                square = (2 - (2 + 2 * a + a * a) * decay) / cycle / a**2
+                exact = [float((1 - decay) / cycle), float(force), float(square)]
+            k_on = 1 / wait if wait > 0.0 else math.inf
+            assert_allclose(cut_off_moments(u, 1.0, 1.0, 1.0, k_on), exact, rtol=1e-14, atol=0)
+            expected = 1.0 if wait == 0.0 else exact[0] * (1 + wait)
+            assert_allclose(cut_off_fraction(u, 1.0, 1.0, k_on), expected, rtol=1e-14, atol=0)
 
 
 def test_friction_maximum_of_the_cut_off():
@@ -486,22 +486,22 @@ def test_rupture_forces_of_bell_and_evans():
     assert bell_rupture_force(3.0, 2.0, math.inf) == 1.5
 
 
-@pytest.mark.parametrize("z", [5.0, 0.1, 1e-6])
-def test_density_of_rupture_forces(z):
-    rate = 2e-11 / z  # k0 = 2/s, f_b = 1e-11 N
-    top = 1e-11 * math.log1p(40.0 / z)
+def test_density_of_rupture_forces():
+    for z in [5.0, 0.1, 1e-6]:
+        rate = 2e-11 / z  # k0 = 2/s, f_b = 1e-11 N
+        top = 1e-11 * math.log1p(40.0 / z)
 
-    def density(x):
-        return bell_rupture_force_density(top * x, rate, 2.0, 1e-11) * top
+        def density(x):
+            return bell_rupture_force_density(top * x, rate, 2.0, 1e-11) * top
 
-    whole, _ = quad(density, 0, 1, epsabs=0, epsrel=1e-12, limit=200)
-    mean, _ = quad(lambda x: top * x * density(x), 0, 1, epsabs=0, epsrel=1e-12, limit=200)
-    assert_allclose(whole, 1.0, rtol=1e-11, atol=0)
-    assert_allclose(mean, bell_rupture_force(rate, 2.0, 1e-11), rtol=1e-11, atol=0)
-    mode = 1e-11 * max(0.0, -math.log(z))
-    near = bell_rupture_force_density(mode + 1e-13 * np.array([0.0, 1.0]), rate, 2.0, 1e-11)
-    assert near[1] < near[0]
-    assert_array_equal(bell_rupture_force_density([-1e-11, 1e-6, math.inf], rate, 2.0, 1e-11), [0.0, 0.0, 0.0])
+        whole, _ = quad(density, 0, 1, epsabs=0, epsrel=1e-12, limit=200)
+        mean, _ = quad(lambda x: top * x * density(x), 0, 1, epsabs=0, epsrel=1e-12, limit=200)
+        assert_allclose(whole, 1.0, rtol=1e-11, atol=0)
+        assert_allclose(mean, bell_rupture_force(rate, 2.0, 1e-11), rtol=1e-11, atol=0)
+        mode = 1e-11 * max(0.0, -math.log(z))
+        near = bell_rupture_force_density(mode + 1e-13 * np.array([0.0, 1.0]), rate, 2.0, 1e-11)
+        assert near[1] < near[0]
+        assert_array_equal(bell_rupture_force_density([-1e-11, 1e-6, math.inf], rate, 2.0, 1e-11), [0.0, 0.0, 0.0])
 
 
 def test_static_peak():
@@ -545,23 +545,23 @@ def test_lifetimes_of_clusters():
         assert_allclose(cluster_lifetime(bonds, force, 1.0, 1.0, beta), exact, rtol=1e-14, atol=0)
 
 
-@pytest.mark.parametrize(("bonds", "force", "beta"), [(1, 3.0, 2.0), (7, 4.0, 0.3), (40, 30.0, 2.0), (40, 0.0, 3.0)])
-def test_lifetimes_solve_the_equations_of_first_passage(bonds, force, beta):
-    i = np.arange(1, bonds + 1)
-    with mp.workdps(60):
-        up = [mp.mpf(beta) * int(bonds - k) for k in i]
-        down = [int(k) * mp.exp(mp.mpf(force) / int(k)) for k in i]
-        matrix = mp.zeros(bonds)
-        for k in range(bonds):
-            matrix[k, k] = up[k] + down[k]
-            if k > 0:
-                matrix[k, k - 1] = -down[k]
-            if k + 1 < bonds:
-                matrix[k, k + 1] = -up[k]
-        exact = float(mp.lu_solve(matrix, mp.ones(bonds, 1))[bonds - 1])
-    # three roundings a bond, and those of F/(i f_b) up to 30 in the exponent
-    got = cluster_lifetime(bonds, force * 1e-11, 50.0, 1e-11, beta * 50.0)
-    assert_allclose(got, exact / 50.0, rtol=3e-14, atol=0)
+def test_lifetimes_solve_the_equations_of_first_passage():
+    for bonds, force, beta in [(1, 3.0, 2.0), (7, 4.0, 0.3), (40, 30.0, 2.0), (40, 0.0, 3.0)]:
+        i = np.arange(1, bonds + 1)
+        with mp.workdps(60):
+            up = [mp.mpf(beta) * int(bonds - k) for k in i]
+            down = [int(k) * mp.exp(mp.mpf(force) / int(k)) for k in i]
+            matrix = mp.zeros(bonds)
+            for k in range(bonds):
+                matrix[k, k] = up[k] + down[k]
+                if k > 0:
+                    matrix[k, k - 1] = -down[k]
+                if k + 1 < bonds:
+                    matrix[k, k + 1] = -up[k]
+            exact = float(mp.lu_solve(matrix, mp.ones(bonds, 1))[bonds - 1])
+        # three roundings a bond, and those of F/(i f_b) up to 30 in the exponent
+        got = cluster_lifetime(bonds, force * 1e-11, 50.0, 1e-11, beta * 50.0)
+        assert_allclose(got, exact / 50.0, rtol=3e-14, atol=0)
 
 
 def test_large_clusters():
@@ -594,26 +594,26 @@ MOMENTS = {
 }
 
 
-@pytest.mark.parametrize("name", IN_SPEED)
-def test_fractions_are_even_and_forces_odd_in_the_speed(name):
-    sign, function = IN_SPEED[name]
-    speed = 10.0 ** np.arange(-12.0, 3.0)
-    forward = function(speed)
-    assert_array_equal(function(-speed), sign * forward)
-    assert np.all(np.isfinite(forward)) and np.all(forward >= 0.0)
-    assert function(0.0) == (1.0 if sign == 1 else 0.0)
+def test_fractions_are_even_and_forces_odd_in_the_speed():
+    for name in IN_SPEED:
+        sign, function = IN_SPEED[name]
+        speed = 10.0 ** np.arange(-12.0, 3.0)
+        forward = function(speed)
+        assert_array_equal(function(-speed), sign * forward)
+        assert np.all(np.isfinite(forward)) and np.all(forward >= 0.0)
+        assert function(0.0) == (1.0 if sign == 1 else 0.0)
 
 
-@pytest.mark.parametrize("name", MOMENTS)
-def test_moments_are_those_of_a_population(name):
-    speed = 10.0 ** np.arange(-12.0, 3.0)
-    bound, force, square = MOMENTS[name](speed)
-    back = MOMENTS[name](-speed)
-    assert_array_equal(back, [bound, -force, square])
-    assert np.all(square * bound >= force**2 * (1 - 1e-14))  # of the bonds that are there
-    assert np.all((bound > 0.0) & (bound <= 0.75 * (1 + 1e-15)))
-    for part in (*MOMENTS[name](speed.reshape(5, 3)), *MOMENTS[name](list(speed.reshape(5, 3)))):
-        assert part.shape == (5, 3)
+def test_moments_are_those_of_a_population():
+    for name in MOMENTS:
+        speed = 10.0 ** np.arange(-12.0, 3.0)
+        bound, force, square = MOMENTS[name](speed)
+        back = MOMENTS[name](-speed)
+        assert_array_equal(back, [bound, -force, square])
+        assert np.all(square * bound >= force**2 * (1 - 1e-14))  # of the bonds that are there
+        assert np.all((bound > 0.0) & (bound <= 0.75 * (1 + 1e-15)))
+        for part in (*MOMENTS[name](speed.reshape(5, 3)), *MOMENTS[name](list(speed.reshape(5, 3)))):
+            assert part.shape == (5, 3)
 
 
 def test_arguments_broadcast():
@@ -631,32 +631,36 @@ def test_arguments_broadcast():
     assert_array_equal(whole, [bell_moments(v, 1.0, 1.0, 1.0, 1.0).force for v in (1.0, 10.0)])
 
 
-@pytest.mark.parametrize(
-    ("speed", "beta", "stiffness", "frequency"),
-    [(10.0, 1.0, 0.0390213, 4.691569), (20.0, 1.0, 0.0515158, 9.999753), (50.0, 10.0, 0.1823410, 24.876979),
-     (100.0, 1.0, 0.0378665, 46.056227)],
-)  # fmt: skip
-def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues(speed, beta, stiffness, frequency):
-    found = first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, Body(1.0))
-    assert_allclose(found, (stiffness, frequency), rtol=2e-6)
-    assert np.isnan(first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, Body(1.0))).all()
+def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues():
+    for speed, beta, stiffness, frequency in [
+        (10.0, 1.0, 0.0390213, 4.691569),
+        (20.0, 1.0, 0.0515158, 9.999753),
+        (50.0, 10.0, 0.1823410, 24.876979),
+        (100.0, 1.0, 0.0378665, 46.056227),
+    ]:
+        found = first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, Body(1.0))
+        assert_allclose(found, (stiffness, frequency), rtol=2e-6)
+        assert np.isnan(first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, Body(1.0))).all()
 
 
-@pytest.mark.parametrize(
-    ("beta", "speed", "stiffness", "frequency"),
-    [(0.1, 5.0, 0.00320497, 2.00008), (0.1, 20.0, 0.00436311, 8.59175), (1.0, 5.0, 0.00559440, 1.08232),
-     (1.0, 10.0, 0.0295565, 4.25784), (1.0, 20.0, 0.0352161, 8.66919), (1.0, 100.0, 0.0205200, 36.2893),
-     (10.0, 20.0, 0.00714525, 2.71580), (10.0, 100.0, 0.127572, 39.1448), (10.0, 1000.0, 0.0408748, 281.987)],
-)  # fmt: skip
-def test_the_onset_of_bonds_resolved_by_stretch_is_that_of_the_characteristic_equation(
-    beta, speed, stiffness, frequency
-):
-    found = resolved_onset([speed, -speed], [(1.0, 1.0)], 1.0, beta, 1.0, Body(1.0))
-    assert_allclose(found, np.transpose([(stiffness, frequency)] * 2), rtol=5e-6)
-    # of rates, forces and sites only ratios count
-    assert_allclose(
-        resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, Body(0.2)).stiffness, stiffness, rtol=5e-6
-    )
+def test_the_onset_of_bonds_resolved_by_stretch_is_that_of_the_characteristic_equation():
+    for beta, speed, stiffness, frequency in [
+        (0.1, 5.0, 0.00320497, 2.00008),
+        (0.1, 20.0, 0.00436311, 8.59175),
+        (1.0, 5.0, 0.00559440, 1.08232),
+        (1.0, 10.0, 0.0295565, 4.25784),
+        (1.0, 20.0, 0.0352161, 8.66919),
+        (1.0, 100.0, 0.0205200, 36.2893),
+        (10.0, 20.0, 0.00714525, 2.71580),
+        (10.0, 100.0, 0.127572, 39.1448),
+        (10.0, 1000.0, 0.0408748, 281.987),
+    ]:
+        found = resolved_onset([speed, -speed], [(1.0, 1.0)], 1.0, beta, 1.0, Body(1.0))
+        assert_allclose(found, np.transpose([(stiffness, frequency)] * 2), rtol=5e-6)
+        # of rates, forces and sites only ratios count
+        assert_allclose(
+            resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, Body(0.2)).stiffness, stiffness, rtol=5e-6
+        )
 
 
 def test_oscillations_of_bonds_resolved_by_stretch_set_in_beyond_the_maximum_of_friction_alone():

@@ -20,70 +20,72 @@ def drawn(trials, chance, draws, seed=2):
     return binomials(trials, chance, Noise(seed, "bonds", np.arange(draws // 100)).at(3), 100).ravel()
 
 
-@pytest.mark.parametrize("chance", [1e-9, 0.01, 0.3, 0.5])
-@pytest.mark.parametrize("trials", [1, 2, 15, 16, 17, 60, 1100])
-def test_chances_are_those_of_exact_fractions(trials, chance):
-    p, whole = Fraction(chance).as_integer_ratio()
-    number = sorted({0, 1, trials // 3, trials // 2, trials - 1, trials})
-    with mpmath.workdps(40):
-        exact = [
-            mpmath.log(math.comb(trials, k) * mpmath.mpf(p) ** k * mpmath.mpf(whole - p) ** (trials - k))
-            - trials * mpmath.log(whole)
-            for k in number
-        ]
-    # far out a logarithm is large, and good to its own last places
-    assert_allclose(log_chances(number, trials, chance), [float(x) for x in exact], rtol=1e-15, atol=CLOSE)
+def test_chances_are_those_of_exact_fractions():
+    for chance in [1e-9, 0.01, 0.3, 0.5]:
+        for trials in [1, 2, 15, 16, 17, 60, 1100]:
+            p, whole = Fraction(chance).as_integer_ratio()
+            number = sorted({0, 1, trials // 3, trials // 2, trials - 1, trials})
+            with mpmath.workdps(40):
+                exact = [
+                    mpmath.log(math.comb(trials, k) * mpmath.mpf(p) ** k * mpmath.mpf(whole - p) ** (trials - k))
+                    - trials * mpmath.log(whole)
+                    for k in number
+                ]
+            # far out a logarithm is large, and good to its own last places
+            assert_allclose(log_chances(number, trials, chance), [float(x) for x in exact], rtol=1e-15, atol=CLOSE)
 
 
-@pytest.mark.parametrize("chance", [1e-4, 0.1, 0.5])
-@pytest.mark.parametrize("trials", [10**6, 10**9])
-def test_chances_of_a_billion_trials_are_those_of_the_gamma_function(trials, chance):
-    spread = math.sqrt(trials * chance * (1.0 - chance))
-    number = [int(trials * chance + z * spread) for z in (-6, -0.3, 0, 2, 8)]
-    with mpmath.workdps(60):
-        p, n = mpmath.mpf(chance), mpmath.mpf(trials)
-        exact = [
-            mpmath.loggamma(n + 1) - mpmath.loggamma(k + 1) - mpmath.loggamma(n - k + 1)
-            + k * mpmath.log(p) + (n - k) * mpmath.log(1 - p)
-            for k in number
-        ]  # fmt: skip
-    assert_allclose(log_chances(number, trials, chance), [float(x) for x in exact], rtol=0, atol=CLOSE)
+def test_chances_of_a_billion_trials_are_those_of_the_gamma_function():
+    for chance in [1e-4, 0.1, 0.5]:
+        for trials in [10**6, 10**9]:
+            spread = math.sqrt(trials * chance * (1.0 - chance))
+            number = [int(trials * chance + z * spread) for z in (-6, -0.3, 0, 2, 8)]
+            with mpmath.workdps(60):
+                p, n = mpmath.mpf(chance), mpmath.mpf(trials)
+                exact = [
+                    mpmath.loggamma(n + 1) - mpmath.loggamma(k + 1) - mpmath.loggamma(n - k + 1)
+                    + k * mpmath.log(p) + (n - k) * mpmath.log(1 - p)
+                    for k in number
+                ]  # fmt: skip
+            assert_allclose(log_chances(number, trials, chance), [float(x) for x in exact], rtol=0, atol=CLOSE)
 
 
-@pytest.mark.parametrize("mean", [10.0, 10.01, 10.5, 12.0, 17.0, 30.0, 100.0, 1e4, 1e7])
-@pytest.mark.parametrize("chance", [0.5, 0.37, 0.1, 1e-2, 1e-4])
-def test_the_hat_of_the_rejection_lies_above_the_chances_and_its_core_below(mean, chance):
-    # a number is floor of G(u) = (2a/(1/2 − |u|) + b) u + c, its share f(k) G'(u) / (most α)
-    trials = math.ceil(mean / chance)
-    chance = mean / trials
-    spread = math.sqrt(mean * (1.0 - chance))
-    a, b, size, sure = hat(spread, chance)
-    u = np.linspace(-0.5, 0.5, 200_003)[1:-1]
-    room = 0.5 - np.abs(u)
-    k = np.floor((2.0 * a / room + b) * u + mean + 0.5)
-    inside = (k >= 0.0) & (k <= trials)
-    assert np.all(inside[room >= 0.07])
-    ends = binom.logpmf(k[inside], trials, chance) - binom.logpmf(math.floor((trials + 1) * chance), trials, chance)
-    share = np.exp(ends) * (a / room[inside] ** 2 + b) / size
-    assert share.max() <= 1.0
-    assert share[room[inside] >= 0.07].min() >= sure
+def test_the_hat_of_the_rejection_lies_above_the_chances_and_its_core_below():
+    for mean in [10.0, 10.01, 10.5, 12.0, 17.0, 30.0, 100.0, 1e4, 1e7]:
+        for chance in [0.5, 0.37, 0.1, 1e-2, 1e-4]:
+            # a number is floor of G(u) = (2a/(1/2 − |u|) + b) u + c, its share f(k) G'(u) / (most α)
+            trials = math.ceil(mean / chance)
+            chance = mean / trials
+            spread = math.sqrt(mean * (1.0 - chance))
+            a, b, size, sure = hat(spread, chance)
+            u = np.linspace(-0.5, 0.5, 200_003)[1:-1]
+            room = 0.5 - np.abs(u)
+            k = np.floor((2.0 * a / room + b) * u + mean + 0.5)
+            inside = (k >= 0.0) & (k <= trials)
+            assert np.all(inside[room >= 0.07])
+            ends = binom.logpmf(k[inside], trials, chance) - binom.logpmf(
+                math.floor((trials + 1) * chance), trials, chance
+            )
+            share = np.exp(ends) * (a / room[inside] ** 2 + b) / size
+            assert share.max() <= 1.0
+            assert share[room[inside] >= 0.07].min() >= sure
 
 
-@pytest.mark.parametrize("mean", [10.0, 10.01, 10.3, 10.5, 10.9, 12.0, 17.0, 30.0, 100.3, 1e3, 1e4])
-@pytest.mark.parametrize("chance", [0.5, 0.37, 0.1, 1e-2, 1e-4])
-def test_bounds_of_the_chances_beside_the_largest_hold(mean, chance):
-    trials = math.ceil(mean / chance)
-    chance = mean / trials
-    variance, most = mean * (1.0 - chance), math.floor((trials + 1) * chance)
-    k = np.arange(most, min(most + int(0.5 * variance) + 1, trials) + 1.0)
-    above = np.cumsum(np.log((trials - k) * chance / ((k + 1.0) * (1.0 - chance))))
-    k = np.arange(most, max(most - int(0.5 * variance) - 1, 0), -1.0)
-    below = np.cumsum(np.log(k * (1.0 - chance) / ((trials - k + 1.0) * chance)))
-    for exact in (above, below):
-        off = np.arange(1.0, len(exact) + 1)
-        some = off < 0.5 * variance - 1.0
-        doubt = ((off * (off / 3 + 0.625) + 1 / 6) / variance + 0.5) * off / variance
-        assert np.all(np.abs(exact + 0.5 * off**2 / variance)[some] < doubt[some])
+def test_bounds_of_the_chances_beside_the_largest_hold():
+    for mean in [10.0, 10.01, 10.3, 10.5, 10.9, 12.0, 17.0, 30.0, 100.3, 1e3, 1e4]:
+        for chance in [0.5, 0.37, 0.1, 1e-2, 1e-4]:
+            trials = math.ceil(mean / chance)
+            chance = mean / trials
+            variance, most = mean * (1.0 - chance), math.floor((trials + 1) * chance)
+            k = np.arange(most, min(most + int(0.5 * variance) + 1, trials) + 1.0)
+            above = np.cumsum(np.log((trials - k) * chance / ((k + 1.0) * (1.0 - chance))))
+            k = np.arange(most, max(most - int(0.5 * variance) - 1, 0), -1.0)
+            below = np.cumsum(np.log(k * (1.0 - chance) / ((trials - k + 1.0) * chance)))
+            for exact in (above, below):
+                off = np.arange(1.0, len(exact) + 1)
+                some = off < 0.5 * variance - 1.0
+                doubt = ((off * (off / 3 + 0.625) + 1 / 6) / variance + 0.5) * off / variance
+                assert np.all(np.abs(exact + 0.5 * off**2 / variance)[some] < doubt[some])
 
 
 LAWS = [(1, 0.5), (7, 0.3), (12, 0.35), (19, 0.5), (20, 0.5), (21, 0.5), (22, 0.53), (1000, 0.0099), (1000, 0.0101)]

@@ -13,73 +13,73 @@ def fields(points, members=(3,), seed=1):
     return np.random.default_rng(seed).standard_normal((*members, points, points))
 
 
-@pytest.mark.parametrize("points", SIZES)
-def test_a_half_spectrum_superposed_is_its_field(points):
-    grid = Grid(cell=2.4e-4, points=points)
-    field, back = fields(points, members=()), np.empty((points, points))
-    spectrum = grid.forward(field) / grid.cell**2
-    grid.superpose(spectrum, np.empty_like(spectrum), back)
-    assert np.max(np.abs(back - field)) < 1e-13
+def test_a_half_spectrum_superposed_is_its_field():
+    for points in SIZES:
+        grid = Grid(cell=2.4e-4, points=points)
+        field, back = fields(points, members=()), np.empty((points, points))
+        spectrum = grid.forward(field) / grid.cell**2
+        grid.superpose(spectrum, np.empty_like(spectrum), back)
+        assert np.max(np.abs(back - field)) < 1e-13
 
 
-@pytest.mark.parametrize("points", SIZES)
-def test_mean_square_is_the_mean_of_the_squared_field(points):
-    grid = Grid(cell=2.4e-4, points=points)
-    field = fields(points) + 0.3
-    assert_allclose(grid.mean_square(grid.forward(field)), np.mean(field**2, axis=(-2, -1)), rtol=1e-12, atol=0)
+def test_mean_square_is_the_mean_of_the_squared_field():
+    for points in SIZES:
+        grid = Grid(cell=2.4e-4, points=points)
+        field = fields(points) + 0.3
+        assert_allclose(grid.mean_square(grid.forward(field)), np.mean(field**2, axis=(-2, -1)), rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("points", SIZES)
-def test_multiplicities_count_every_wavevector_once(points):
-    grid = Grid(cell=1.0, points=points)
-    assert grid.multiplicity.sum() * points == points**2
-    assert_array_equal(grid.mode_sum(np.ones((points, points // 2 + 1))), points**2)
+def test_multiplicities_count_every_wavevector_once():
+    for points in SIZES:
+        grid = Grid(cell=1.0, points=points)
+        assert grid.multiplicity.sum() * points == points**2
+        assert_array_equal(grid.mode_sum(np.ones((points, points // 2 + 1))), points**2)
 
 
-@pytest.mark.parametrize("points", SIZES)
-def test_mode_sum_of_an_even_function_is_the_sum_over_the_full_spectrum(points):
-    grid = Grid(cell=1.0, points=points)
-    qx, qy = grid.wavevectors
-    full = 2.0 * np.pi * np.fft.fftfreq(points, grid.spacing)
-    wanted = np.sum(np.cos(0.1 * np.hypot(full[:, None], full[None, :])))
-    assert_allclose(grid.mode_sum(np.cos(0.1 * np.hypot(qx, qy))), wanted, rtol=1e-12, atol=0)
+def test_mode_sum_of_an_even_function_is_the_sum_over_the_full_spectrum():
+    for points in SIZES:
+        grid = Grid(cell=1.0, points=points)
+        qx, qy = grid.wavevectors
+        full = 2.0 * np.pi * np.fft.fftfreq(points, grid.spacing)
+        wanted = np.sum(np.cos(0.1 * np.hypot(full[:, None], full[None, :])))
+        assert_allclose(grid.mode_sum(np.cos(0.1 * np.hypot(qx, qy))), wanted, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("points", [8, 9])
-def test_forward_is_the_integral_over_the_cell(points):
-    grid = Grid(cell=0.3, points=points)
-    field = fields(points, members=())
-    qx, qy = grid.wavevectors
-    x = grid.position
-    for i, j in [(0, 0), (1, 2), (points - 2, 3)]:
-        phase = np.exp(-1j * (qx[i, 0] * x[:, None] + qy[0, j] * x[None, :]))
-        wanted = np.sum(field * phase) * grid.spacing**2
-        assert_allclose(grid.forward(field)[i, j], wanted, rtol=1e-12, atol=0)
+def test_forward_is_the_integral_over_the_cell():
+    for points in [8, 9]:
+        grid = Grid(cell=0.3, points=points)
+        field = fields(points, members=())
+        qx, qy = grid.wavevectors
+        x = grid.position
+        for i, j in [(0, 0), (1, 2), (points - 2, 3)]:
+            phase = np.exp(-1j * (qx[i, 0] * x[:, None] + qy[0, j] * x[None, :]))
+            wanted = np.sum(field * phase) * grid.spacing**2
+            assert_allclose(grid.forward(field)[i, j], wanted, rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("points", [5, 6])
-def test_wavevectors_tell_along_from_across(points):
-    grid = Grid(cell=2.0 * np.pi, points=points)
-    along = np.cos(2.0 * grid.position)[:, None] * np.ones(points)
-    qx, qy = grid.wavevectors
-    held = np.abs(grid.forward(along)) > 1e-9
-    assert_allclose(np.unique(np.abs(np.broadcast_to(qx, held.shape)[held])), 2.0, rtol=1e-14)
-    assert_array_equal(np.broadcast_to(qy, held.shape)[held], 0.0)
-    assert qx.shape == (points, 1)
-    assert qy.shape == (1, points // 2 + 1)
+def test_wavevectors_tell_along_from_across():
+    for points in [5, 6]:
+        grid = Grid(cell=2.0 * np.pi, points=points)
+        along = np.cos(2.0 * grid.position)[:, None] * np.ones(points)
+        qx, qy = grid.wavevectors
+        held = np.abs(grid.forward(along)) > 1e-9
+        assert_allclose(np.unique(np.abs(np.broadcast_to(qx, held.shape)[held])), 2.0, rtol=1e-14)
+        assert_array_equal(np.broadcast_to(qy, held.shape)[held], 0.0)
+        assert qx.shape == (points, 1)
+        assert qy.shape == (1, points // 2 + 1)
 
 
-@pytest.mark.parametrize("points", [31, 64])
-def test_a_member_has_the_same_bits_alone_and_in_any_batch(points):
-    grid = Grid(cell=1.0, points=points)
-    batch = fields(points, members=(13,), seed=3)
-    spectra = grid.forward(batch)
-    squares = grid.mean_square(spectra)
-    for member in (0, 6, 12):
-        alone = grid.forward(batch[member])
-        assert_array_equal(alone, spectra[member])
-        assert grid.mean_square(alone) == squares[member]
-    assert_array_equal(grid.mean_square(grid.forward(batch[3:6])), squares[3:6])
+def test_a_member_has_the_same_bits_alone_and_in_any_batch():
+    for points in [31, 64]:
+        grid = Grid(cell=1.0, points=points)
+        batch = fields(points, members=(13,), seed=3)
+        spectra = grid.forward(batch)
+        squares = grid.mean_square(spectra)
+        for member in (0, 6, 12):
+            alone = grid.forward(batch[member])
+            assert_array_equal(alone, spectra[member])
+            assert grid.mean_square(alone) == squares[member]
+        assert_array_equal(grid.mean_square(grid.forward(batch[3:6])), squares[3:6])
 
 
 def test_derived_arrays_are_computed_once_and_cannot_be_written():
@@ -90,7 +90,7 @@ def test_derived_arrays_are_computed_once_and_cannot_be_written():
             array[...] = 0.0
 
 
-@pytest.mark.parametrize(("cell", "points"), [(0.0, 4), (-1.0, 4), (np.nan, 4), (np.inf, 4), (1.0, 0), (1.0, 2.5)])
-def test_an_impossible_grid_is_refused(cell, points):
-    with pytest.raises(ValueError, match="must be"):
-        Grid(cell=cell, points=points)
+def test_an_impossible_grid_is_refused():
+    for cell, points in [(0.0, 4), (-1.0, 4), (np.nan, 4), (np.inf, 4), (1.0, 0), (1.0, 2.5)]:
+        with pytest.raises(ValueError, match="must be"):
+            Grid(cell=cell, points=points)

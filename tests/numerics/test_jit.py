@@ -20,14 +20,14 @@ def test_a_law_keeps_its_signature_defaults_and_docstring():
         halfspace.compliance(1e4)
 
 
-@pytest.mark.parametrize("size", [1, 3, 255, 256, 4095, 4096, 4097, 10_000])
-def test_a_law_of_large_arrays_is_that_of_single_numbers(size):
-    random = np.random.default_rng(3)
-    load, work = random.uniform(-1e-4, 4e-3, size), random.uniform(-1e-2, 42e-3, size)
-    whole = jkr.radius_at_load(load, work, 2e-3, 6.4e6)
-    some = random.integers(0, size, 50)
-    singly = [jkr.radius_at_load(load[i], work[i], 2e-3, 6.4e6) for i in some]
-    assert_array_equal(whole[some], singly)
+def test_a_law_of_large_arrays_is_that_of_single_numbers():
+    for size in [1, 3, 255, 256, 4095, 4096, 4097, 10_000]:
+        random = np.random.default_rng(3)
+        load, work = random.uniform(-1e-4, 4e-3, size), random.uniform(-1e-2, 42e-3, size)
+        whole = jkr.radius_at_load(load, work, 2e-3, 6.4e6)
+        some = random.integers(0, size, 50)
+        singly = [jkr.radius_at_load(load[i], work[i], 2e-3, 6.4e6) for i in some]
+        assert_array_equal(whole[some], singly)
 
 
 def test_a_law_broadcasts_and_keeps_shapes():

@@ -14,13 +14,14 @@ def numbers(members, step, count, seed=7, part="shear"):
     return Noise(seed, part, np.array(members)).normals(step, count)
 
 
-@pytest.mark.parametrize("kind", ["normals", "uniforms"])
-def test_a_member_draws_the_same_alone_and_in_any_batch(kind):
-    def drawn(members):
-        return getattr(Noise(7, "shear", np.array(members)), kind)(5, 6)
+def test_a_member_draws_the_same_alone_and_in_any_batch():
+    for kind in ["normals", "uniforms"]:
 
-    assert np.array_equal(drawn([3, 11, 40])[1:2], drawn([11]))
-    assert np.array_equal(drawn([11, 3])[:1], drawn([11]))
+        def drawn(members):
+            return getattr(Noise(7, "shear", np.array(members)), kind)(5, 6)
+
+        assert np.array_equal(drawn([3, 11, 40])[1:2], drawn([11]))
+        assert np.array_equal(drawn([11, 3])[:1], drawn([11]))
 
 
 def test_a_step_can_be_asked_for_in_any_order():
@@ -34,33 +35,50 @@ def test_how_many_numbers_are_drawn_changes_none():
     assert np.array_equal(numbers([3], 5, 100)[:, :7], numbers([3], 5, 7))
 
 
-@pytest.mark.parametrize(("seed", "member"), [(0, 0), (7, 3), (2**64 - 1, 10**7), (2**63 + 5, 2**40)])
-@pytest.mark.parametrize(("step", "lane"), [(0, 0), (1, 0), (10**9, 3)])
-def test_a_stream_begins_at_the_words_of_numpys_philox(seed, member, step, lane):
-    found = states_at([(seed, PARTS["bonds"], member, step, lane)])
-    counter = step + (member << 128) + ((256 + lane) << 192)  # which numpy raises by one before it draws
-    generator = np.random.Philox(key=np.array([seed, PARTS["bonds"]], dtype=np.uint64), counter=counter - 1)
-    assert np.array_equal(found[0], generator.random_raw(4))
+def test_a_stream_begins_at_the_words_of_numpys_philox():
+    for seed, member in [(0, 0), (7, 3), (2**64 - 1, 10**7), (2**63 + 5, 2**40)]:
+        for step, lane in [(0, 0), (1, 0), (10**9, 3)]:
+            found = states_at([(seed, PARTS["bonds"], member, step, lane)])
+            counter = step + (member << 128) + ((256 + lane) << 192)  # which numpy raises by one before it draws
+            generator = np.random.Philox(key=np.array([seed, PARTS["bonds"]], dtype=np.uint64), counter=counter - 1)
+            assert np.array_equal(found[0], generator.random_raw(4))
 
 
-@pytest.mark.parametrize(
-    ("state", "wanted"),
-    [
+def test_words_are_those_of_the_authors_program():
+    for state, wanted in [
         (
             (1, 2, 3, 4),
-            (41943041, 58720359, 3588806011781223, 3591011842654386, 9228616714210784205, 9973669472204895162,
-             14011001112246962877, 12406186145184390807, 15849039046786891736, 10450023813501588000),
+            (
+                41943041,
+                58720359,
+                3588806011781223,
+                3591011842654386,
+                9228616714210784205,
+                9973669472204895162,
+                14011001112246962877,
+                12406186145184390807,
+                15849039046786891736,
+                10450023813501588000,
+            ),
         ),
         (
             (0, 0, 0, 1),
-            (0x0000000000800000, 0x0000000000800011, 0x0002200000800011, 0x0002200044000020, 0x00022000448008A1,
-             0x01102100802208A0, 0x0114002284200880, 0x0402896644A64095, 0x8A14A0A244ACC891, 0x8C88BA4680B20495),
+            (
+                0x0000000000800000,
+                0x0000000000800011,
+                0x0002200000800011,
+                0x0002200044000020,
+                0x00022000448008A1,
+                0x01102100802208A0,
+                0x0114002284200880,
+                0x0402896644A64095,
+                0x8A14A0A244ACC891,
+                0x8C88BA4680B20495,
+            ),
         ),
-    ],
-)  # fmt: skip
-def test_words_are_those_of_the_authors_program(state, wanted):
-    # outputs of the program by Blackman & Vigna that implementations in other languages publish
-    assert words_from([state], 10)[0].tolist() == list(wanted)
+    ]:
+        # outputs of the program by Blackman & Vigna that implementations in other languages publish
+        assert words_from([state], 10)[0].tolist() == list(wanted)
 
 
 def test_the_layers_of_the_ziggurat_have_equal_areas_under_the_curve():

@@ -130,28 +130,28 @@ def test_a_table_without_rows_or_file_says_what_to_give(files, given):
         read(files, model="tabulated", file="psd2.csv")
 
 
-@pytest.mark.parametrize("points", [15, 16])
-@pytest.mark.parametrize("window", ["none", "hann"])
-def test_periodogram_of_white_noise_is_flat_on_average(points, window):
-    cell, count = 3.0, 400
-    grid = Grid(cell, points)
-    field = np.random.default_rng(4).normal(size=(count, points, points))
-    density = np.mean(periodogram(field, cell, window), axis=0)
-    level = grid.spacing**2  # unit variance spread over (2π/spacing)²
-    inner = density[2:-2, 2:-2] / level  # away from what the mean takes with it
-    # Hann correlates neighbouring amplitudes by 2/3 and 1/6, powers by the squares, in each direction
-    clumps = (1 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2) ** 2 if window == "hann" else 1.0
-    assert abs(np.mean(inner) - 1) < 5 * math.sqrt(clumps / (count * inner.size))
-    assert np.all(np.abs(inner - 1) < 5 / math.sqrt(count))
-    assert density[0, 0] == 0.0
+def test_periodogram_of_white_noise_is_flat_on_average():
+    for points in [15, 16]:
+        for window in ["none", "hann"]:
+            cell, count = 3.0, 400
+            grid = Grid(cell, points)
+            field = np.random.default_rng(4).normal(size=(count, points, points))
+            density = np.mean(periodogram(field, cell, window), axis=0)
+            level = grid.spacing**2  # unit variance spread over (2π/spacing)²
+            inner = density[2:-2, 2:-2] / level  # away from what the mean takes with it
+            # Hann correlates neighbouring amplitudes by 2/3 and 1/6, powers by the squares, in each direction
+            clumps = (1 + 2 * (2 / 3) ** 2 + 2 * (1 / 6) ** 2) ** 2 if window == "hann" else 1.0
+            assert abs(np.mean(inner) - 1) < 5 * math.sqrt(clumps / (count * inner.size))
+            assert np.all(np.abs(inner - 1) < 5 / math.sqrt(count))
+            assert density[0, 0] == 0.0
 
 
-@pytest.mark.parametrize("points", [15, 16])
-def test_periodogram_sums_to_the_mean_square(points):
-    field = np.random.default_rng(2).normal(size=(3, points, points)) + 7.0
-    grid = Grid(2.0, points)
-    total = grid.mode_sum(periodogram(field, 2.0)) / 2.0**2
-    assert_allclose(total, np.var(field, axis=(1, 2)), rtol=1e-13, atol=0)
+def test_periodogram_sums_to_the_mean_square():
+    for points in [15, 16]:
+        field = np.random.default_rng(2).normal(size=(3, points, points)) + 7.0
+        grid = Grid(2.0, points)
+        total = grid.mode_sum(periodogram(field, 2.0)) / 2.0**2
+        assert_allclose(total, np.var(field, axis=(1, 2)), rtol=1e-13, atol=0)
 
 
 def test_a_ripple_stands_where_its_wavevector_is():
@@ -168,20 +168,20 @@ def test_an_unknown_window_is_refused():
         periodogram(np.ones((8, 8)), 1.0, "box")
 
 
-@pytest.mark.parametrize("points", [15, 16])
-def test_rings_hold_every_mode_below_nyquist_once(points):
-    grid = Grid(2.0, points)
-    ring = radial_average(np.ones((points, points // 2 + 1)), grid)
-    reach = (points - 1) // 2
-    n = np.arange(-reach - 1, reach + 2)
-    radius = np.hypot(n[:, None], n)
-    for k in range(1, reach + 1):
-        inside = (radius >= k - 0.5) & (radius < k + 0.5)
-        assert ring.pairs[k - 1] == inside.sum() / 2
-        assert_allclose(ring.q[k - 1], np.mean(radius[inside]) * TURN / 2.0, rtol=1e-14, atol=0)
-    assert len(ring.q) == reach
-    assert_allclose(ring.density, 1.0, rtol=1e-14, atol=0)
-    assert np.max(ring.standard_error) < 1e-15
+def test_rings_hold_every_mode_below_nyquist_once():
+    for points in [15, 16]:
+        grid = Grid(2.0, points)
+        ring = radial_average(np.ones((points, points // 2 + 1)), grid)
+        reach = (points - 1) // 2
+        n = np.arange(-reach - 1, reach + 2)
+        radius = np.hypot(n[:, None], n)
+        for k in range(1, reach + 1):
+            inside = (radius >= k - 0.5) & (radius < k + 0.5)
+            assert ring.pairs[k - 1] == inside.sum() / 2
+            assert_allclose(ring.q[k - 1], np.mean(radius[inside]) * TURN / 2.0, rtol=1e-14, atol=0)
+        assert len(ring.q) == reach
+        assert_allclose(ring.density, 1.0, rtol=1e-14, atol=0)
+        assert np.max(ring.standard_error) < 1e-15
 
 
 def test_the_standard_error_of_a_ring_is_that_of_exponential_scatter():
