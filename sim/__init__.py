@@ -18,7 +18,7 @@ A scenario is a TOML file, a dictionary of the same tables and keys, or a ``Scen
 [0.00012, 0.000113]
 >>> scene.with_values({"contact.lod": "2 mN"})
 Traceback (most recent call last):
-sim.units.refusals.BadInput: contact.lod: is not a key; did you mean "load"?
+sim.units.errors.BadInput: contact.lod: is not a key; did you mean "load"?
 """
 
 import contextlib
@@ -38,7 +38,7 @@ if TYPE_CHECKING:  # what a function needs is imported where it is called, so th
     from sim.study.fit import Fit
 
 Path = str | os.PathLike[str]
-_FROM = {"BadInput": "sim.units.refusals", "Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
+_FROM = {"BadInput": "sim.units.errors", "Scenario": "sim.scenario.scenario", "load": "sim.scenario.reader"}
 _FOLDERS = ("analysis", "laws", "plots", "report", "spectrum")
 __all__ = sorted([*_FROM, *_FOLDERS, "check", "converge", "fit", "open", "plot", "run", "stats"])
 
@@ -82,7 +82,7 @@ def run(
     """
     from sim.ensemble import simulate
     from sim.ensemble.plan import Plan, work
-    from sim.units.refusals import BadInput
+    from sim.units.errors import BadInput
     from sim.units.terminal import Shown, progress_bar
 
     scene = _scene(scenario)
@@ -170,7 +170,7 @@ def plot(
         The figure, whose ``axes`` are its panels, or the axes given.
     """
     from sim.plots.kinds import Choices, draw, save
-    from sim.units.refusals import BadInput
+    from sim.units.errors import BadInput
 
     if unknown := choices.keys() - {*Choices._fields}:
         raise BadInput([f"{sorted(unknown)[0]}: is no choice of a figure; there are: {', '.join(Choices._fields)}"])
@@ -241,7 +241,7 @@ def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
 def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", where: dict[str, Any] | None) -> Any:
     """What a function makes of a dataset, or of the file that holds it; ``BadInput`` for what it cannot use."""
     from sim.analysis.statistics import where as chosen
-    from sim.units.refusals import BadInput
+    from sim.units.errors import BadInput
 
     try:
         if isinstance(dataset, str | os.PathLike):

@@ -18,8 +18,8 @@ import xarray as xr
 
 from sim.numerics import files, hdf5
 from sim.numerics.lazy import Refused, open_lazily
+from sim.units.errors import BadInput
 from sim.units.notation import Recorded
-from sim.units.refusals import BadInput
 
 Given = ParamSpec("Given")
 T = TypeVar("T")

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 from sim.numerics.files import explained, read_whole
 from sim.scenario.toml_text import toml
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 #: Manifest of the parts of a run that is not done.
 MANIFEST = "manifest.json"

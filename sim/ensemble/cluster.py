@@ -14,8 +14,8 @@ from typing import Any
 from sim.ensemble.part_files import Arrays, Parts
 from sim.ensemble.plan import Task
 from sim.ensemble.workers import WorkerDied
-from sim.units.kept import digest
-from sim.units.refusals import BadInput
+from sim.numerics.disk_cache import digest
+from sim.units.errors import BadInput
 
 #: Seconds after which a wait looks whether the run is to stop, and for which a scheduler may be silent.
 _LOOK, _PATIENCE = 0.2, "20 s"

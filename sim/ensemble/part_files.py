@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 
 from sim.ensemble import checksums
+from sim.numerics.disk_cache import digest
 from sim.numerics.files import OutputExists, StoreTrouble, by_hdf5, explained, locked, read_whole, sync, write_whole
-from sim.units.kept import digest
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 Arrays = dict[str, np.ndarray]
 Manifest = dict[str, Any]

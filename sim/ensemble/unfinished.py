@@ -26,11 +26,11 @@ from sim.ensemble.part_files import (
 )  # fmt: skip
 from sim.ensemble.plan import Plan, work
 from sim.ensemble.simulate import run
+from sim.numerics.disk_cache import digest
 from sim.numerics.hdf5 import located
 from sim.scenario.scenario import Scenario
 from sim.scenario.source import Files, Source
-from sim.units.kept import digest
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ import numpy as np
 from llvmlite import binding
 from numba.extending import intrinsic
 
-from sim.units import kept
+from sim.numerics import disk_cache
 
 #: Floats divide as numpy divides them; no wrapper is made for calls from C, which nobody makes.
 _OPTIONS: dict[str, Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
@@ -97,7 +97,7 @@ _BLOCK = 4096
 @functools.cache
 def sources() -> dict[str, bytes]:
     """Texts of the modules that import this one and of those that they import, whose constants are compiled in."""
-    texts = kept.sources()
+    texts = disk_cache.sources()
     users = [name for name, text in texts.items() if b"sim.numerics.jit" in text]
     imported = {word.decode() for name in users for word in re.findall(rb"^from (sim[\w.]*) import", texts[name], re.M)}
     return {name: texts[name] for name in sorted({*users, *imported} & texts.keys())}
@@ -109,7 +109,7 @@ def _cache_folder() -> str:
     digest = hashlib.sha256(f"{sys.version} {numba.__version__} {llvmlite.__version__} {np.__version__}".encode())
     for text in (Path(__file__).read_bytes(), *sources().values()):
         digest.update(text)
-    return str(kept.folder() / digest.hexdigest()[:16])
+    return str(disk_cache.folder() / digest.hexdigest()[:16])
 
 
 def machine() -> str:
@@ -129,7 +129,7 @@ def cached(name: str) -> bool:
     """True if the cache holds the code of a kernel or law."""
     if not FAST:
         return any(Path(_cache_folder()).rglob(f"*{name.rpartition('.')[2]}-*.nbi"))
-    return kept.read(_path(name)) is not None
+    return disk_cache.read(_path(name)) is not None
 
 
 @functools.cache
@@ -149,12 +149,12 @@ def _built(function: Callable, make: Callable[[], tuple[Callable, Any]], load: C
         _add_symbols()
         path = _path(_name(function))
         with contextlib.suppress(Exception):
-            return load(*pickle.loads(kept.read(path) or b""))
+            return load(*pickle.loads(disk_cache.read(path) or b""))
         for notice in on_compiling:
             notice(_name(function))
         result, code = make()
         with contextlib.suppress(Exception):
-            kept.store(path, dumps(code()))
+            disk_cache.store(path, dumps(code()))
         return result
 
 

@@ -17,19 +17,19 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.parts.exchange import Array, Motion, Motions, Setting, Times
-from sim.units.course import (
+from sim.units.quantity import Quantity
+from sim.units.tables import (
     Course,
     Number,
     Pieces,
     Prescribed,
     Table as Rows,
+    at_once,
     held,
     linear_pieces,
     prescribed,
     table_pieces,
 )
-from sim.units.quantity import Quantity
-from sim.units.table import at_once
 
 _SPEED = Quantity("m/s", "sliding speed", "V")
 

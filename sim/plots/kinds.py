@@ -17,8 +17,8 @@ from sim.numerics.files import claim as claim_file, output
 from sim.plots import curves, field, slider, style, theories
 from sim.plots.measured import Measured
 from sim.plots.style import STYLE, recorded, swept_value
+from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-from sim.units.refusals import BadInput
 
 
 class Choices(NamedTuple):

@@ -12,8 +12,8 @@ from matplotlib.axes import Axes
 from sim.analysis import sweep_dims
 from sim.analysis.scene import plain
 from sim.plots.style import BOTH, GUIDE, HOLLOW, legend
-from sim.units.measured import Points, given, read
 from sim.units.quantity import Quantity
+from sim.units.tables import Points, given, read
 
 #: Names of what is prescribed and of what is recorded of it.
 _SAME = (("speed", "drive_speed"), *((name, f"contact_{name}") for name in ("indentation", "displacement")))

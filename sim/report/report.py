@@ -42,8 +42,8 @@ from sim.plots.kinds import Choices
 from sim.plots.measured import Measured, Residuals
 from sim.plots.style import STYLE
 from sim.scenario.toml_text import toml
+from sim.units.errors import BadInput
 from sim.units.notation import scaled
-from sim.units.refusals import BadInput
 from sim.units.terminal import plain
 
 #: Measured points: a CSV table, or columns in SI by name.

@@ -13,7 +13,7 @@ from sim.scenario.messages import Fault, faults, problems
 from sim.scenario.scenario import Scenario
 from sim.scenario.source import Files, Source
 from sim.scenario.toml_text import parse, put, read_text
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 __all__ = ["BadInput", "load"]
 

@@ -29,8 +29,8 @@ from sim.scenario.declared import as_html, entries, with_models
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import read_sweep, rows, set_key
+from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-from sim.units.refusals import BadInput
 
 #: Relative error of a cell against the infinite plane that is remarked on.
 _CELL_ERROR = 0.05

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from sim.units.table import plain_text
+from sim.units.tables import plain_text
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.scenario.messages import Fault
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 from sim.units.terminal import one_line
 
 _MOST_BYTES = 2**20

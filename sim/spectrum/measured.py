@@ -20,7 +20,7 @@ from sim.numerics.grid import Lattice, lattice_of
 from sim.spectrum.family import Array
 from sim.spectrum.radial import PowerLaws, Rowed
 from sim.units.quantity import Quantity
-from sim.units.table import at_once, blamed, file_columns, file_path, file_text, matrix
+from sim.units.tables import at_once, blamed, file_columns, file_path, file_text, matrix
 
 _WAVENUMBER = Quantity("rad/m", "wavenumber", "q", above=0)
 _HEIGHTS = 'it is a spectrum of heights; a stress is needed, whose density over the plane is in "Pa^2 m^2"'
@@ -224,7 +224,7 @@ def read_map(name: str, context: Any, variable: str, gaps: bool = False) -> MapF
     name : str
         Path relative to the scenario: .nc, .nc4 or .cdf is netCDF, .npy an array of numpy, all else CSV.
     context : dict or None
-        The validation's context, as of ``sim.units.table.file_text``.
+        The validation's context, as of ``sim.units.tables.file_text``.
     variable : str
         Name of the map in a netCDF file.
     gaps : bool

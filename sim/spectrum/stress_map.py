@@ -20,7 +20,7 @@ from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.spectrum.family import Array
 from sim.spectrum.measured import SPACING, MapFile, Measured, by_name, estimate, read_map, tapered
 from sim.units.quantity import Quantity
-from sim.units.table import blamed
+from sim.units.tables import blamed
 
 _START = Quantity("m", "place along x of the map where a disc begins, left out the middle", "x_0", at_least=0)
 _NOISE = Quantity("Pa", "rms of the measurement's white noise in a pixel, which is reported", "s", at_least=0)

@@ -25,7 +25,7 @@ from sim.study.figure import figure
 from sim.study.samples import Array, Estimates, affordable, coupled, estimates, fluctuates, sampled, timed
 from sim.study.settings import Row, at_step, number_of_sites, plain, settings, tolerance_of
 from sim.study.verdicts import explanation, recommendation, table
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 __all__ = ["carried_out", "claim", "converge", "explanation", "figure", "recommendation", "save", "table"]
 

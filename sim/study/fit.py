@@ -23,9 +23,9 @@ from sim.scenario.scenario import Scenario
 from sim.study.fitting import Free, Interval, Minimum, Problem, entangled, idle, interval, problem_of, with_errors
 from sim.study.measured import read
 from sim.study.predicted import groups
+from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import Quantity
-from sim.units.refusals import BadInput
 
 Array = NDArray[np.float64]
 

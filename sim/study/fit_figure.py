@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim.plots.style import BOTH, GUIDE, HOLLOW, REFERENCE, STYLE, Unit, across, axis_scale, in_units, legend, rows
 from sim.study.fitting import Minimum, Problem
 from sim.study.measured import HELD, Measured
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 Array = NDArray[np.float64]
 

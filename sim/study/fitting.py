@@ -16,8 +16,8 @@ from scipy import optimize, stats
 
 from sim.study.measured import Measured
 from sim.study.predicted import Group, Sampled, Values, asked, by_steady_sliding
+from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-from sim.units.refusals import BadInput
 
 try:
     import lmfit

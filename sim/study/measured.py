@@ -10,9 +10,9 @@ from sim.ensemble.outline import variable_name
 from sim.ensemble.recorded import VARIABLES
 from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
-from sim.units import measured as table
+from sim.units import tables as table
+from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
-from sim.units.refusals import BadInput
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from sim.parts.exchange import Motion
 from sim.scenario.scenario import Scenario
 from sim.spectrum.family import Family
 from sim.study.measured import Measured
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 Array = NDArray[np.float64]
 #: Values of keys, by their dotted names.

@@ -18,7 +18,7 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 _NUMBER = r"[+-]?(?:(?:[0-9]+(?:_[0-9]+)*\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,4})?|inf(?:inity)?|nan)"
 _REST = r"(?P<unit>[^\s0-9+,-](?:.*\S)?|1\s*/.*\S)?"

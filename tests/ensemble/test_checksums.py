@@ -13,7 +13,7 @@ from sim.ensemble import checksums, simulate as ensemble
 from sim.ensemble.checksums import Damaged, damaged, path_of, read, verify
 from sim.ensemble.part_files import OutputExists
 from sim.scenario.reader import load
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 LENS = Path(__file__).parents[2] / "scenarios" / "pdms_lens.toml"
 SHORT = {"clock": {"duration": "2 ms", "step": "1 ms"}, "ensemble.members": 2, "seed": 7}

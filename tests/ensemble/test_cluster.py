@@ -14,7 +14,7 @@ from sim.ensemble import cluster, plan as plans, simulate as ensemble
 from sim.ensemble.part_files import MemoryParts, Stopped
 from sim.ensemble.plan import Plan
 from sim.ensemble.workers import WorkerDied
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 distributed = pytest.importorskip("distributed")
 

@@ -21,7 +21,7 @@ from sim.ensemble.part_files import OutputBusy, OutputExists, PartFiles, held
 from sim.ensemble.plan import Plan
 from sim.numerics.files import DiskFull, StoreTrouble, leased, locked
 from sim.scenario.clock import Clock
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 pytestmark = pytest.mark.usefixtures("many_parts")
 sample = functools.partial(scenes.sample, sweep=LOADS)

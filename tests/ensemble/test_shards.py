@@ -17,7 +17,7 @@ from sim.ensemble.checksums import verify
 from sim.ensemble.part_files import OutputBusy, OutputExists, Stopped, held
 from sim.ensemble.plan import Plan
 from sim.ensemble.unfinished import merge
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 pytestmark = pytest.mark.usefixtures("many_parts")
 sample = functools.partial(scenes.sample, members=7, sweep=LOADS_AND_SHARES)

@@ -50,7 +50,7 @@ from sim.parts.bonds.rupture import Constant, CutOff
 from sim.parts.contact.models import Adhesion
 from sim.parts.drive import READINGS, Force, Spring, Steady as AtSpeed
 from sim.scenario.scenario import Scenario
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 #: X, N, F at 1, 1.5, 2, 2.5 and 4 of a massless slider, by two integrators that agree to 2e-12.
 MASSLESS = {

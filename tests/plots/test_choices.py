@@ -16,7 +16,7 @@ from sim.parts.shear import models as shear
 from sim.plots import Choices, kinds as plots, style as pictures
 from sim.plots.field import PIXELS
 from sim.scenario.clock import Record
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 LOADS = {"contact.load": [1e-3, 4e-3]}
 REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3))

@@ -25,7 +25,7 @@ from sim.study.fit import fit
 from sim.study.fit_figure import figure
 from sim.study.fitting import minimum, problem_of
 from sim.study.measured import Curve, Measured, read
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 SELF_AFFINE = {"model": "self_affine", "rms": "150 kPa", "hurst": 0.8, "longest": "60 um", "shortest": "1 um",
                "rolloff": "24 um"}  # fmt: skip

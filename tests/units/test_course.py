@@ -10,8 +10,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from pydantic import TypeAdapter
 from scipy.integrate import quad
 
-from sim.units.course import Pieces, held, prescribed, table_pieces
 from sim.units.quantity import Quantity
+from sim.units.tables import Pieces, held, prescribed, table_pieces
 
 DURATION = 1.2
 COURSES = {

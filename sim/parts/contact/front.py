@@ -37,7 +37,7 @@ from sim.numerics.special import cube_root
 from sim.parts.contact.balance import SHARE, Balance
 from sim.parts.exchange import Array, ContactState
 from sim.spectrum.radial import share_of
-from sim.units.course import Pieces
+from sim.units.tables import Pieces
 
 #: Relative distance from equilibrium that rounding leaves.
 ROUNDING = 1e-12

@@ -29,8 +29,8 @@ from sim.parts.contact.balance import (
 )
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import Array, ContactState, Flags, Motion, Motions, Setting, during
-from sim.units.course import Prescribed, held, prescribed
 from sim.units.quantity import Quantity
+from sim.units.tables import Prescribed, held, prescribed
 
 _SHEAR = Quantity("Pa", "shear modulus", "G", above=0)
 _YOUNG = Quantity("Pa", "Young's modulus", "E", above=0)

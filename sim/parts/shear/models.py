@@ -16,7 +16,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.dataclasses import dataclass
 from pydantic_core import PydanticCustomError
 
-from sim.numerics import jit
+from sim.numerics import disk_cache, jit
 from sim.parts.exchange import Setting
 from sim.parts.shear.bands import BandedProcess, Bands, cell_pairs, group
 from sim.parts.shear.maps import CarriedProcess, Passing
@@ -27,7 +27,6 @@ from sim.spectrum.family import Family
 from sim.spectrum.measured import Measured
 from sim.spectrum.radial import Margin, marginal_energy
 from sim.spectrum.stress_map import StressMap
-from sim.units import kept
 from sim.units.quantity import Quantity
 
 #: Side and points of a cell, Poisson's ratio; power of the rates, tolerance, and whether the amplitude relaxes.
@@ -352,7 +351,7 @@ def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
 def _grouped(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
     """Return ``_grouped_anew``, from the disk if an earlier run has grouped the same modes."""
     key = jit.machine(), scipy.__version__, astuple(spectrum), cell_of  # type: ignore[call-overload]
-    return kept.found(key, lambda: _grouped_anew(spectrum, cell_of))
+    return disk_cache.found(key, lambda: _grouped_anew(spectrum, cell_of))
 
 
 def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:

@@ -21,7 +21,7 @@ from sim.parts.shear import models as shear
 from sim.parts.shear.process import Time
 from sim.scenario.clock import Clock
 from sim.spectrum.families import Band, BondMade
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 READ = {variable.name: variable.read for variable in VARIABLES}
 RATES = BELL.zero_force_rate, BELL.bell_force, STRETCHED["bond_stiffness"]

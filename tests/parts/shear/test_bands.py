@@ -15,6 +15,7 @@ from helpers.cases import some
 from numpy.testing import assert_allclose
 from pydantic_core import PydanticCustomError
 
+from sim.numerics import disk_cache
 from sim.parts.shear import models as shear
 from sim.parts.shear.bands import Pairs, cell_pairs, group
 from sim.parts.shear.modes import modes
@@ -29,7 +30,6 @@ from sim.spectrum.families import (
     Tabulated,
     VonKarman,
 )
-from sim.units import kept
 
 G, CELL, RMS = 1.6e6, 100e-6, 150e3
 FAMILIES = {
@@ -392,7 +392,7 @@ def test_a_longest_wave_beyond_the_cell_costs_what_the_cells_error_tells():
 
 def test_bands_from_the_disk_are_those_grouped_anew(tmp_path, monkeypatch):
     monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(kept, "_WORTH", -1.0)
+    monkeypatch.setattr(disk_cache, "_WORTH", -1.0)
     spectra = [SelfAffine(1.0, 0.8, 60e-6, 24e-6, 4e-6), SelfAffine(1.0, 0.7, 60e-6, 24e-6, 4e-6)]
     cell = (240e-6, None, 0.5, 1, 0.01, False)
     for spectrum in spectra:

@@ -28,7 +28,7 @@ from sim.scenario.clock import Ensemble, Record
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import Band
 from sim.spectrum.stress_map import StressMap
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 from tests.spectrum.test_measured import white_map
 
 G = 1.6e6

@@ -17,7 +17,7 @@ from sim.parts.shear import Banded, Mean
 from sim.parts.shear.process import Slip, SlipRate, Wave
 from sim.scenario.clock import Clock
 from sim.spectrum import Gaussian
-from sim.units.refusals import BadInput
+from sim.units.errors import BadInput
 
 SPEED, PERIOD, STEPS = 2e-3, 1e-2, 40
 TIMES = np.linspace(0.0, PERIOD, STEPS + 1)

@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.scenario.source import Files
-from sim.units import table
+from sim.units import tables
 from sim.units.quantity import Quantity
-from sim.units.table import TableError, at_once, columns, file_path, file_text, headings, matrix
+from sim.units.tables import TableError, at_once, columns, file_path, file_text, headings, matrix
 
 TIME = Quantity("s", "time", at_least=0)
 SPEED = Quantity("m/s", "speed")
@@ -132,6 +132,6 @@ def test_a_file_that_cannot_be_read_is_named_with_a_cure(tmp_path, name, monkeyp
     (tmp_path / "folder").mkdir()
     (tmp_path / "long.csv").write_text("12345")
     (tmp_path / "latin.csv").write_bytes(b"\xff\xfe")
-    monkeypatch.setattr(table, "_MOST_BYTES", 4)
+    monkeypatch.setattr(tables, "_MOST_BYTES", 4)
     with pytest.raises(ValueError, match=r"(cannot be read .*; give a path relative|save it as plain CSV in UTF-8)"):
-        table.file_columns(name, {"files": Files(tmp_path)}, WANTED)
+        tables.file_columns(name, {"files": Files(tmp_path)}, WANTED)

@@ -1,0 +1,666 @@
+"""Tables: CSV with units in its header, values prescribed over time, measured curves with their errors."""
+
+import contextlib
+import csv
+import difflib
+import errno
+import itertools
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Discriminator, Field, Tag, ValidationInfo, WrapValidator, model_validator
+from pydantic.dataclasses import dataclass
+from pydantic_core import PydanticCustomError
+
+from sim.units.errors import BadInput
+from sim.units.quantity import Quantity
+
+Array = NDArray[np.float64]
+
+_HEADING = re.compile(r"(?P<name>[^\[\]()]+?)\s*(?:[\[(]\s*(?P<unit>[^\[\]()]*?)\s*[\])])?")
+_MOST_BYTES = 2**28
+
+
+class TableError(ValueError):
+    """A table that cannot be read; the message names the line and the cure, not the file nor its content."""
+
+
+def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, Array]:
+    """Return named columns of a CSV text in SI units.
+
+    Parameters
+    ----------
+    text : str
+        Cells with commas, semicolons or tabs between them. The first line that is neither empty nor a ``#``
+        comment names the columns, each with its unit in brackets; a column without brackets is in SI
+        units. Other columns are ignored. Decimal commas are read if semicolons or tabs separate the cells.
+    wanted : dict of str to Quantity
+        The columns to read, each with its SI unit and bounds.
+    header : str, optional
+        Names of the columns of a text without that line, whose numbers blanks may separate, too. An empty one
+        stands for a key ``header`` that would give them.
+
+    Returns
+    -------
+    dict of str to array, shape (rows,)
+        At least one row.
+
+    Raises
+    ------
+    TableError
+        If a column is missing or there twice, its unit is unknown or of another dimension, a row has
+        another number of cells, or a cell is no finite number within the bounds; if ``header`` is given and the
+        text has one.
+
+    Examples
+    --------
+    >>> table = columns("time [s], speed [mm/s]\\n0, 1\\n2, 5", {"speed": Quantity("m/s", "speed")})
+    >>> table["speed"].tolist()
+    [0.001, 0.005]
+    """
+    example = ", ".join(name if one.unit == "1" else f"{name} [{one.unit}]" for name, one in wanted.items())
+    table, place = _cells(text), "header"
+    if header is None or not all(map(_is_number, table.rows[0])):
+        place = f"line {table.lines[0]}"
+        if header:
+            raise TableError(f"{place}: the columns have a header of their own; leave the key header out")
+        units, table = _headings(place, table.rows[0]), table._replace(lines=table.lines[1:], rows=table.rows[1:])
+    elif header:
+        units = _headings(place, header.split(","))
+    else:
+        raise TableError(f'the columns have no header; add one, or the key header, such as header = "{example}"')
+    if not table.rows:
+        raise TableError("no rows follow the header; add rows of numbers below it")
+    if len(units) != len(table.rows[0]):
+        raise TableError(f"{place}: {len(units)} names of {len(table.rows[0])} columns; name each column")
+    result = {}
+    for name, quantity in wanted.items():
+        places = [k for k, (heading, _) in enumerate(units) if heading == name]
+        if len(places) != 1:
+            fault = "is there twice" if places else "is missing"
+            raise TableError(f'{place}: column "{name}" {fault}; write the header as "{example}"')
+        unit = units[places[0]][1]
+        unit = "" if quantity.unit == "1" and unit in ("1", "-") else unit
+        try:
+            quantity.scaled(1.0, unit)
+        except ValueError as fault:
+            raise TableError(f'{place}: column "{name}" {fault}') from None
+        result[name] = _numbers(name, table, [row[places[0]] for row in table.rows], unit, quantity)
+    return result
+
+
+def headings(text: str) -> dict[str, str]:
+    """Return the names of the columns of a CSV text with the texts of their units, "" for a column without one.
+
+    Raises
+    ------
+    TableError
+        If there is no header, or it cannot be read or has a name twice.
+
+    >>> headings("speed (mm/s), share\\n1, 2")
+    {'speed': 'mm/s', 'share': ''}
+    """
+    table = _cells(text)
+    units = _headings(f"line {table.lines[0]}", table.rows[0])
+    if len(dict(units)) < len(units):
+        raise TableError(f"line {table.lines[0]}: the header has a name twice; name each column once")
+    return dict(units)
+
+
+def matrix(text: str, quantity: Quantity, gaps: bool = False) -> Array:
+    """Return a plain rectangular block of SI numbers, separated as in ``columns`` or by blanks, shape (rows, columns).
+
+    With ``gaps`` numbers may be nan, and bounds are not checked.
+
+    Raises
+    ------
+    TableError
+        If it is empty or ragged, or a cell is no finite number within the bounds.
+    """
+    table = _cells(text)
+    cells = list(itertools.chain.from_iterable(table.rows))
+    return _numbers("value", table, cells, "", quantity, gaps).reshape(len(table.rows), -1)
+
+
+class _Cells(NamedTuple):
+    """Rows of cells with the numbers of their lines; ``comma`` if decimals may have a comma."""
+
+    lines: list[int]
+    rows: list[list[str]]
+    comma: bool
+
+
+def _cells(text: str) -> _Cells:
+    """Return the cells of all lines that are neither empty nor comments."""
+    texts = {number: line.strip(" ") for number, line in enumerate(text.removeprefix("\ufeff").splitlines(), 1)}
+    texts = {number: line for number, line in texts.items() if line.strip() and line[0] != "#"}
+    if not texts:
+        raise TableError("the table is empty; write a header of names and units, then rows of numbers")
+    lines, first = list(texts), next(iter(texts.values()))
+    blank = " " if all(map(_is_number, first.split())) else ","
+    sign = next((sign for sign in ";\t," if sign in first), blank)
+    try:
+        rows = list(csv.reader(texts.values(), delimiter=sign, skipinitialspace=True, strict=True))
+    except csv.Error as fault:
+        raise TableError(f"a line cannot be read as cells ({fault}); close quotes on the same line") from None
+    for line, row in zip(lines, rows, strict=False):
+        if len(row) != len(rows[0]):
+            cure = "separate cells by commas, write decimals with a point"
+            raise TableError(f"line {line}: {len(row)} cells where the first row has {len(rows[0])}; {cure}")
+    return _Cells(lines, rows, sign in ";\t")
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell.replace(",", "."))
+    except ValueError:
+        return False
+    return True
+
+
+def _headings(place: str, cells: Sequence[str]) -> list[tuple[str, str]]:
+    """Return the name and the text of the unit of each column, "" without one."""
+    matches = [_HEADING.fullmatch(cell.strip()) for cell in cells]
+    if not all(matches):
+        raise TableError(f"{place}: a heading cannot be read; write a name and its unit, such as time [s]")
+    return [(match["name"], match["unit"] or "") for match in matches if match]
+
+
+def _numbers(
+    name: str, table: _Cells, cells: Sequence[str], unit: str, quantity: Quantity, gaps: bool = False
+) -> Array:
+    """Return cells of a table as numbers in SI."""
+    if table.comma and any("," in cell for cell in cells):
+        if any("." in cell for cell in cells):
+            raise TableError(f'{name} has numbers with "." and with ","; write all decimals with a point')
+        cells = [cell.replace(",", ".") for cell in cells]
+    try:
+        numbers = quantity.scaled(np.fromiter(map(float, cells), float, len(cells)), unit)
+    except ValueError:
+        place = next(place for place, cell in enumerate(cells) if "," in cell or not _is_number(cell))
+        line = table.lines[place * len(table.lines) // len(cells)]
+        raise TableError(
+            f"line {line}: {name} is not a number; write decimals with a point, or leave the row out"
+        ) from None
+    for place in () if gaps else (numbers.argmin(), numbers.argmax()):  # the first nan is both
+        try:
+            quantity.read(float(numbers[place]))
+        except ValueError as fault:
+            line = table.lines[place * len(table.lines) // len(cells)]
+            reason = re.split("; |, not ", str(fault))[0]  # without the number, as a scenario may name any file
+            raise TableError(f"line {line}: {name} {reason}") from None
+    return numbers
+
+
+def at_once(quantity: Quantity) -> WrapValidator:
+    """Return a validator that checks an array of numbers as a whole, all else number by number."""
+
+    def check(values: Any, each: Callable[[Any], tuple[float, ...]]) -> tuple[float, ...]:
+        if isinstance(values, np.ndarray) and values.dtype == float and values.ndim == 1:
+            with contextlib.suppress(ValueError):
+                for extreme in (values.min(), values.max()):  # the first nan is both
+                    quantity.read(float(extreme))
+                return tuple(values.tolist())
+        return each(values)
+
+    return WrapValidator(check)
+
+
+def plain_text(path: Path) -> str:
+    """Return the text of a plain file of at most 256 MiB; no pipe or device is waited for."""
+    if not path.is_file():
+        raise OSError(errno.ENOENT, "there is none, or it is no plain file")
+    if path.stat().st_size > _MOST_BYTES:
+        raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
+    with path.open(encoding="utf-8-sig") as file:
+        return file.read(path.stat().st_size)
+
+
+@contextlib.contextmanager
+def blamed(name: str) -> Iterator[None]:
+    """Raise trouble with a file that a scenario names as a fault of the scenario.
+
+    Raises
+    ------
+    PydanticCustomError
+        With the file, the reason and a cure.
+    """
+    try:
+        yield
+        return
+    except PydanticCustomError:
+        raise
+    except UnicodeDecodeError:
+        reason = "is not UTF-8 text; save it as plain CSV in UTF-8"
+    except OSError as fault:
+        reason = f"cannot be read ({fault.strerror or fault}); give a path relative to the scenario"
+    except (ValueError, RuntimeError, EOFError, MemoryError) as fault:
+        reason = str(fault)
+    about = {"file": name[:200], "reason": reason.partition("\n")[0]}
+    raise PydanticCustomError("bad_table", "{file}: {reason}", about)
+
+
+def file_text(name: str, context: Any) -> str:
+    """Return the text of a file that a scenario names, for validators of its parts.
+
+    Parameters
+    ----------
+    name : str
+        Path, relative to the scenario.
+    context : dict or None
+        The validation's context; ``context["files"].text(name)`` reads beside the scenario. Without
+        it the path is relative to the current directory.
+    """
+    return context["files"].text(name) if context and "files" in context else plain_text(Path(name))
+
+
+def file_path(name: str, context: Any) -> Path:
+    """Return the path of a plain file that a scenario names; arguments as of ``file_text``."""
+    path = context["files"].path(name) if context and "files" in context else Path(name)
+    if not path.is_file():
+        raise OSError(errno.ENOENT, "there is none, or it is no plain file")
+    return path
+
+
+def file_columns(name: str, context: Any, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, Array]:
+    """Return columns of a CSV file that a scenario names; arguments as of ``file_text`` and ``columns``."""
+    with blamed(name):
+        return columns(file_text(name, context), wanted, header)
+
+
+# Courses: a value prescribed over the time of a run as a number, a course from one value to another, or a table.
+
+
+Indices = NDArray[np.int64]
+_TIME = Quantity("s", "time", "t")
+_CYCLES = Quantity("1", "cycles there and back; 0: one way", at_least=0, at_most=10**6, whole=True)
+#: Times nearer than this share of the run are meant to be the same.
+_SAME = 1e-9
+
+
+class Pieces(NamedTuple):
+    """Stretches of time, one after the other, in each of which a prescribed value changes smoothly: arrays (pieces,).
+
+    ``interval`` is the number of the interval in which a piece lies; each interval has one or more. ``start`` and
+    ``stop`` are the piece's ends [s], ``first`` and ``last`` the values there; ``integral`` is that of the value over
+    time, ``path`` that of its magnitude, ``unsteady`` that of the square of what the magnitude differs from its mean.
+    """
+
+    interval: Indices
+    start: Array
+    stop: Array
+    first: Array
+    last: Array
+    integral: Array
+    path: Array
+    unsteady: Array
+
+    @property
+    def joined(self) -> "Pieces":
+        """One piece for each interval, whose sums are rounded once."""
+        if len(self.interval) == 1:
+            return self
+        opening = np.flatnonzero(np.diff(self.interval, prepend=-1))
+        if len(opening) == len(self.interval):
+            return self
+        closing = np.append(opening[1:], len(self.interval)) - 1
+        squares = self.unsteady + _steady_square(self.path, self.stop - self.start)
+        integral, path, square = np.add.reduceat([self.integral, self.path, squares], opening, axis=1)
+        for k in np.flatnonzero(closing - opening > 1):
+            inside = slice(opening[k], closing[k] + 1)
+            integral[k], path[k] = math.fsum(self.integral[inside]), math.fsum(self.path[inside])
+        ends = self.start[opening], self.stop[closing], self.first[opening], self.last[closing]
+        unsteady = np.maximum(square - _steady_square(path, ends[1] - ends[0]), 0.0)
+        unsteady = np.where(closing > opening, unsteady, self.unsteady[opening])
+        return Pieces(self.interval[opening], *ends, integral, path, unsteady)
+
+
+def _steady_square(path: Array, span: Array) -> Array:
+    """Integral over time of the square of a value that stays and has this integral."""
+    return np.divide(path * path, span, out=np.zeros(path.shape), where=span > 0.0)
+
+
+def linear_pieces(interval: Indices, start: Array, stop: Array, first: Array, last: Array) -> Pieces:
+    """Pieces in which the value changes linearly."""
+    integral = 0.5 * (first + last) * (stop - start)
+    path, turns = np.abs(integral), first * last < 0.0
+    unsteady = (last - first) ** 2 * (stop - start) / 12.0
+    if turns.any():
+        one, other, span = first[turns], last[turns], (stop - start)[turns]
+        path[turns] = 0.5 * (one**2 + other**2) / np.abs(other - one) * span
+        unsteady[turns] = (one**2 + one * other + other**2) / 3.0 * span - _steady_square(path[turns], span)
+    return Pieces(interval, start, stop, first, last, integral, path, unsteady)
+
+
+def _within(ends: Array, times: Array, apart: float = 0.0) -> tuple[Array, Indices]:
+    """Times strictly between neighbouring ``ends``, further than ``apart`` from both; places where they belong."""
+    times = times[(ends[0] < times) & (times < ends[-1])]
+    places = np.searchsorted(ends, times, "right")
+    inside = (ends[places - 1] + apart < times) & (times < ends[places] - apart)
+    return times[inside], places[inside]
+
+
+def _intervals(ends: Array, places: Indices) -> Indices:
+    """The interval between ``ends`` of each piece, where times at these places cut some of them."""
+    count = len(ends) - 1
+    return np.repeat(np.arange(count), 1 + np.bincount(places - 1, minlength=count))
+
+
+class Number(NamedTuple):
+    """A value that stays.
+
+    As of every prescribed value ``changes`` is whether it depends on time, ``cycles`` counts its ways there and back,
+    and ``end`` [s] is the last time for which it is given.
+    """
+
+    value: float
+    changes: bool = False
+    cycles: int = 0
+    end: float = math.inf
+
+    @property
+    def extremes(self) -> tuple[float, ...]:
+        """Values among which are the least and the largest of the run."""
+        return (self.value,)
+
+    def at(self, time: Array, duration: float) -> Array:
+        """The value at times [s] of a run of ``duration`` [s]; where it jumps, that after the jump."""
+        return np.full(time.shape, self.value)
+
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        """The way through the intervals between some times [s], cut where the value turns or jumps."""
+        values = self.at(ends, duration)
+        return linear_pieces(np.arange(len(ends) - 1), ends[:-1], ends[1:], values[:-1], values[1:])
+
+
+@dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
+class Course:
+    """From one value to another over the run, or ``cycles`` times there and back, linearly or logarithmically.
+
+    Notes
+    -----
+    Logarithmic: v(t) = v0 r^(t/T) with r = v1/v0; its integral over dt is v(t) T/ln r (r^(dt/T) − 1), by expm1.
+    """
+
+    start: Annotated[float, Field(alias="from")]
+    stop: Annotated[float, Field(alias="to")]
+    scale: Annotated[Literal["linear", "log"], Field(description="how it goes from one end to the other")] = "linear"
+    changes: ClassVar[bool] = True
+    cycles: ClassVar[int] = 0
+    end: ClassVar[float] = math.inf
+
+    @model_validator(mode="after")
+    def _log_needs_one_sign(self) -> "Course":
+        if self.scale == "log" and self.start * self.stop <= 0.0:
+            said = 'a logarithmic course cannot reach or pass zero; give two values above zero or scale = "linear"'
+            raise PydanticCustomError("log_through_zero", said)
+        return self
+
+    @property
+    def extremes(self) -> tuple[float, ...]:
+        return self.start, self.stop
+
+    def at(self, time: Array, duration: float) -> Array:
+        part = time / duration if duration > 0.0 else np.zeros(time.shape)
+        if self.cycles:
+            turn = 2.0 * self.cycles * part % 2.0
+            part = np.where(turn <= 1.0, turn, 2.0 - turn)
+        if self.scale == "log":
+            # the library's scalar power: that of numpy differs between processors
+            ratio = self.stop / self.start
+            return self.start * np.array([ratio**share for share in part.ravel().tolist()]).reshape(part.shape)
+        value = self.start + (self.stop - self.start) * part
+        # a course that reaches zero but for rounding reaches it: there a free sphere touches
+        return np.where(np.abs(value) > 1e-13 * max(abs(self.start), abs(self.stop)), value, 0.0)
+
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        values, interval = self.at(ends, duration), np.arange(len(ends) - 1)
+        if self.cycles:
+            half = duration / (2.0 * self.cycles)
+            turns = np.arange(math.floor(ends[0] / half), math.ceil(ends[-1] / half) + 1) * half
+            turns, places = _within(ends, turns, _SAME * duration)
+            odd = np.round(turns / half) % 2.0 == 1.0
+            values, interval = np.insert(values, places, np.where(odd, self.stop, self.start)), _intervals(ends, places)
+            ends = np.insert(ends, places, turns)
+        pieces = linear_pieces(interval, ends[:-1], ends[1:], values[:-1], values[1:])
+        if self.scale == "linear":
+            return pieces
+        rate = math.log(self.stop / self.start) * max(1, 2 * self.cycles) / duration
+        if rate == 0.0:
+            return pieces
+        rates = np.copysign(rate, np.abs(pieces.last) - np.abs(pieces.first))
+        span = pieces.stop - pieces.start
+        growth, twice = ([math.expm1(n * share) for share in (rates * span).tolist()] for n in (1, 2))
+        integral = pieces.first * np.array(growth) / rates
+        square = pieces.first**2 * np.array(twice) / (2.0 * rates)
+        unsteady = np.maximum(square - _steady_square(integral, span), 0.0)
+        return pieces._replace(integral=integral, path=np.abs(integral), unsteady=unsteady)
+
+
+def table_pieces(times: Array, values: Array, ends: Array, duration: float) -> Pieces:
+    """Pieces of a table that is linear between its rows and keeps its last value; two rows at one time are a jump."""
+    ends = _snapped(times, ends, duration)
+    rows, places = _within(ends, np.unique(times[slice(*np.searchsorted(times, ends[[0, -1]], "right"))]))
+    edges = np.insert(ends, places, rows)
+    start, stop = edges[:-1], edges[1:]
+    row = np.searchsorted(times, 0.5 * (start + stop), "right") - 1
+    first, last = (_interpolated(times, values, row, edge) for edge in (start, stop))
+    return linear_pieces(_intervals(ends, places), start, stop, first, last)
+
+
+def _snapped(times: Array, ends: Array, duration: float) -> Array:
+    """Clock times, those of rows where they are meant to be the same but for rounding."""
+    after = np.searchsorted(times, ends).clip(max=len(times) - 1)
+    left, right = times[np.maximum(after - 1, 0)], times[after]
+    nearest = np.where(np.abs(left - ends) <= np.abs(right - ends), left, right)
+    return np.where(np.abs(nearest - ends) <= _SAME * duration, nearest, ends)
+
+
+def _interpolated(times: Array, values: Array, row: Indices, time: Array) -> Array:
+    """Values on the lines from some rows to the next, and beyond the last row its value."""
+    after = np.minimum(row + 1, len(times) - 1)
+    span, rise = times[after] - times[row], values[after] - values[row]
+    slope = np.divide(rise, span, out=np.zeros(span.shape), where=span > 0.0)
+    return np.where(time >= times[after], values[after], slope * (time - times[row]) + values[row])
+
+
+@dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+class Table:
+    """Values tabulated over time, linear between the rows; two rows at one time are a jump.
+
+    In a scenario file ``file`` names a CSV with the columns ``time`` and ``column``, each with its unit in brackets.
+    A subclass declares the field ``values_in``, in which it keeps the latter.
+    """
+
+    quantity: ClassVar[Quantity]
+    column: ClassVar[str]
+    values_in: ClassVar[str] = "value"
+    changes: ClassVar[bool] = True
+    cycles: ClassVar[int] = 0
+
+    time: Annotated[tuple[Annotated[float, _TIME], ...], at_once(_TIME)]
+    file: Annotated[str, Field(description="CSV with these columns, beside the scenario, in place of them")] = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _read_file(cls, given: Any, info: ValidationInfo) -> Any:
+        if not isinstance(given, dict) or not isinstance(given.get("file"), str) or "time" in given:
+            return given
+        found = file_columns(given["file"], info.context, {"time": _TIME, cls.column: cls.quantity})
+        return {**given, "time": found["time"], cls.values_in: found[cls.column]}
+
+    @model_validator(mode="after")
+    def _rows_in_order(self) -> "Table":
+        if len(self.time) != len(self.extremes):
+            raise PydanticCustomError("short_table", "a table needs as many values as times")
+        if len(self.time) < 2:
+            raise PydanticCustomError("short_table", "a table needs two rows or more")
+        if np.any(np.diff(self.time) < 0.0) or self.time[0] > 0.0:
+            raise PydanticCustomError("time_order", "times must start at 0 s or before and never decrease")
+        return self
+
+    @property
+    def extremes(self) -> tuple[float, ...]:
+        """The column beside the times."""
+        return tuple(getattr(self, self.values_in))
+
+    @cached_property
+    def _rows(self) -> tuple[Array, Array]:
+        return np.array(self.time), np.array(self.extremes)
+
+    @property
+    def end(self) -> float:
+        return self.time[-1]
+
+    def at(self, time: Array, duration: float) -> Array:
+        times, values = self._rows
+        time = _snapped(times, time, duration)
+        return _interpolated(times, values, np.searchsorted(times, time, "right") - 1, time)
+
+    def pieces(self, ends: Array, duration: float) -> Pieces:
+        return table_pieces(*self._rows, ends, duration)
+
+
+def _kind(value: Any) -> str:
+    if isinstance(value, Table) or (isinstance(value, dict) and ("file" in value or "time" in value)):
+        return "[table]"
+    return "[course]" if isinstance(value, dict | Course) else "[value]"
+
+
+def held(unit: Quantity, name: str) -> Any:
+    """Annotation of a prescribed quantity: a number, a course, or a table whose column has this name."""
+
+    @dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
+    class _Course(Course):
+        """From one value to another over the run, or ``cycles`` times there and back."""
+
+        start: Annotated[float, unit, Field(alias="from")]
+        stop: Annotated[float, unit, Field(alias="to")]
+        cycles: Annotated[int, _CYCLES] = 0  # type: ignore[misc]
+
+    @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
+    class _Table(Table):
+        """A value tabulated over time, linear between the rows; ``file`` names the CSV."""
+
+        quantity: ClassVar[Quantity] = unit
+        column: ClassVar[str] = name
+        value: Annotated[tuple[Annotated[float, unit], ...], at_once(unit)]
+        file: Annotated[str, Field(description=f"CSV with the columns `time` and `{name}`, in place of these")] = ""
+
+    number, course = Annotated[float, unit, Tag("[value]")], Annotated[_Course, Tag("[course]")]
+    return Annotated[number | course | Annotated[_Table, Tag("[table]")], Discriminator(_kind)]
+
+
+#: A value prescribed over a run.
+Prescribed = Number | Course | Table
+
+
+def prescribed(given: float | Course | Table) -> Prescribed:
+    """The course in time of what a scenario gives."""
+    return given if isinstance(given, Course | Table) else Number(given)
+
+
+# Tables of what was measured: CSV columns named as variables, with units, and beside them their errors.
+
+
+#: End of the names of columns with standard errors.
+ERROR = "_error"
+
+
+class Points(NamedTuple):
+    """Values of a column [SI] with their standard errors, None where unknown."""
+
+    values: Array
+    errors: Array | None
+
+
+def read(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
+    """Columns of a table of measured values.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``.
+    known : dict of str to Quantity
+        All names that a column may have.
+    outcomes : dict of str to Quantity
+        Those that may have a column of standard errors beside them, in the same dimension or in ``[%]``.
+
+    Raises
+    ------
+    BadInput
+        With one line.
+    """
+    try:
+        return _columns(plain_text(path), known, outcomes)
+    except UnicodeDecodeError:
+        raise BadInput([f"{path}: is not UTF-8 text; save it as plain CSV in UTF-8"]) from None
+    except OSError as fault:
+        raise BadInput([f"{path}: cannot be read ({fault.strerror}); name a CSV file"]) from None
+    except TableError as fault:
+        raise BadInput([f"{path}: {fault}"]) from None
+
+
+def given(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:
+    """Columns of measured values [SI] by name, beside some their errors.
+
+    Raises
+    ------
+    ValueError
+        For a name that is not known, or columns of different lengths.
+    """
+    found = {str(name): np.asarray(values, float) for name, values in columns.items()}
+    for name in found:
+        if name not in known and not (name.endswith(ERROR) and name.removesuffix(ERROR) in found):
+            raise ValueError(_unknown(name, known))
+    if len({values.shape for values in found.values()}) != 1 or next(iter(found.values())).ndim != 1:
+        raise ValueError("measured columns need the same number of rows; give arrays of one length")
+    return {name: Points(values, found.get(name + ERROR)) for name, values in found.items() if name in known}
+
+
+def _columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
+    units = headings(text)
+    wanted: dict[str, Quantity] = {}
+    for name, unit in units.items():
+        base = name.removesuffix(ERROR)
+        if name in known:
+            wanted[name] = known[name]
+        elif base in outcomes and base in units:
+            wanted[name] = Quantity("1" if _relative(unit, outcomes[base]) else outcomes[base].unit, name, above=0)
+        else:
+            raise TableError(_unknown(name, known))
+    bare = [name for name, quantity in wanted.items() if not units[name] and quantity.unit != "1"]
+    if bare and any(units.values()):
+        said = f'column "{bare[0]}" has no unit where others have one; write "{bare[0]} [{wanted[bare[0]].unit}]"'
+        raise TableError(f"{said} if that is its unit")
+    found = columns(text, wanted)
+    points = {}
+    for name in (name for name in found if name in known):
+        values, errors = found[name], found.get(name + ERROR)
+        if errors is not None and _relative(units[name + ERROR], known[name]):
+            errors = errors * np.abs(values)
+        if errors is not None and not np.all(errors > 0.0):
+            raise TableError(f'column "{name}" has a value of 0, whose relative error says nothing; give it in units')
+        points[name] = Points(values, errors)
+    return points
+
+
+def _relative(unit: str, quantity: Quantity) -> bool:
+    """Whether an error with this unit's text is a share of the value."""
+    return unit == "%" and quantity.unit != "1"
+
+
+def _unknown(name: str, known: Iterable[str]) -> str:
+    """What to do about a column that is neither a condition nor a variable."""
+    shown = name[:40]
+    if name.endswith(ERROR) and name.removesuffix(ERROR) in known:
+        return f'column "{shown}" is the error of a column that is missing; add it, or leave the error out'
+    near = difflib.get_close_matches(shown, [*known], 1, 0.6)
+    cure = f'did you mean "{near[0]}"?' if near else "leave it out, or give it the name of one (docs/dataset.md)"
+    return f'column "{shown}" is neither a variable of a dataset nor a number of the scenario; {cure}'
