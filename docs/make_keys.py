@@ -5,8 +5,8 @@ import sys
 import typing
 from pathlib import Path
 
-from sim.scenario.declared import all_tables, declaration, keys, model, tables
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import all_tables, declaration, keys, model, tables
 
 TARGET = Path(__file__).with_name("keys.md")
 HEAD = """# Every key of a scenario file

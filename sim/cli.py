@@ -432,9 +432,12 @@ def new(name: Path) -> None:
 @cli.command()
 def schema() -> None:
     """Print the JSON schema of scenario files."""
-    from sim.scenario.schema import as_text
+    import json
 
-    say(as_text())
+    from sim.scenario.scenario import Scenario
+    from sim.scenario.schema import json_schema
+
+    say(json.dumps(json_schema(Scenario), indent=2))
 
 
 @cli.command()

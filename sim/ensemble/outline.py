@@ -15,8 +15,8 @@ from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
 from sim.numerics import hdf5
 from sim.numerics.grid import Lattice
-from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import quantities
 from sim.scenario.sweep import Axis, written
 
 _FLAGS = "detached in_contact"

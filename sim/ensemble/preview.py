@@ -24,8 +24,8 @@ from sim.parts.drive import Spring
 from sim.parts.exchange import Array, Parts
 from sim.parts.shear.modes import ModalProcess
 from sim.scenario.clock import Record
-from sim.scenario.declared import distinct, entries
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import distinct, entries
 from sim.units.quantity import read_option
 from sim.units.terminal import duration
 

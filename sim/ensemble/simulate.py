@@ -32,8 +32,8 @@ from sim.parts.drive import READINGS
 from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.parts.shear.process import Fluctuation
-from sim.scenario.declared import files_read
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import files_read
 from sim.units.terminal import note
 
 Progress = Callable[[int], None]

@@ -1,4 +1,4 @@
-"""Results kept on disk between runs. A store that is broken, read-only or full costs time, never a run."""
+"""Results kept on disk between runs. A cache that is broken, read-only or full costs time, never a run."""
 
 import contextlib
 import functools
@@ -13,21 +13,27 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-#: What is found sooner is not kept [s].
+#: Results that took less time are not stored [s].
 _WORTH = 0.1
 
 
 def folder() -> Path:
-    """Folder of what is kept: ``SIM_CACHE_DIR``, else the user's cache."""
+    """Return the folder of the cache: ``SIM_CACHE_DIR``, else the user's cache."""
     base = os.environ.get("SIM_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or "~/.cache"
     try:
         return Path(base).expanduser() / "sliding-sim"
     except RuntimeError:  # there is no home
-        return Path(tempfile.gettempdir()) / f"sliding-sim-{os.getuid()}"
+        return _private_folder()
+
+
+@functools.cache
+def _private_folder() -> Path:
+    """Return a folder of this process alone, because one that others can write may hold their code."""
+    return Path(tempfile.mkdtemp(prefix="sliding-sim-"))
 
 
 def read(path: Path) -> bytes | None:
-    """Content of a file as it was stored; None where there is none, or where a byte of it has changed."""
+    """Return the content of a file as it was stored; None if there is none, or a byte of it has changed."""
     try:
         content = path.read_bytes()
     except OSError:
@@ -49,7 +55,7 @@ def store(path: Path, content: bytes) -> None:
 
 @functools.cache
 def sources() -> dict[str, bytes]:
-    """Texts of the package's modules by name."""
+    """Return the texts of the package's modules by name."""
     package = Path(__file__).parents[1]
     texts = {path.relative_to(package).with_suffix(""): path.read_bytes() for path in sorted(package.rglob("*.py"))}
     return {".".join((package.name, *path.parts)): text for path, text in texts.items()}
@@ -57,23 +63,23 @@ def sources() -> dict[str, bytes]:
 
 @functools.cache
 def digest() -> bytes:
-    """Hash of what any result may depend on: the sources, and the version of Python."""
-    found = hashlib.sha256(sys.version.encode())
+    """Return a hash of the sources and of the version of Python, on which any result may depend."""
+    result = hashlib.sha256(sys.version.encode())
     for text in sources().values():
-        found.update(text)
-    return found.digest()
+        result.update(text)
+    return result.digest()
 
 
-def found(key: Any, find: Callable[[], T]) -> T:
-    """What ``find`` gives: from the disk where an earlier run of the same sources has found it under the same key.
+def cached(key: Any, compute: Callable[[], T]) -> T:
+    """Return the result of ``compute``, from the disk if a run of the same sources has stored it under the same key.
 
-    The key holds all that the result depends on, versions of libraries and features of the processor included.
+    The key holds all that the result depends on, including versions of libraries and features of the processor.
     """
     path = folder() / "found" / hashlib.sha256(digest() + pickle.dumps(key)).hexdigest()[:32]
     with contextlib.suppress(Exception):
         return pickle.loads(read(path) or b"")
     began = time.process_time()
-    value = find()
+    value = compute()
     if time.process_time() - began > _WORTH:
         store(path, pickle.dumps(value))
     return value

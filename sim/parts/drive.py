@@ -25,8 +25,8 @@ from sim.units.tables import (
     Prescribed,
     Table as Rows,
     at_once,
-    held,
     linear_pieces,
+    over_time,
     prescribed,
     table_pieces,
 )
@@ -177,8 +177,8 @@ class Table(Rows, _Sliding):
 
 
 _STAGE_SPEED = Quantity("m/s", "speed of the stage", "V")
-_Stage = held(_STAGE_SPEED, "speed")
-_Force = held(Quantity("N", "tangential force on the body", "Q"), "force")
+_Stage = over_time(_STAGE_SPEED, "speed")
+_Force = over_time(Quantity("N", "tangential force on the body", "Q"), "force")
 _Stiffness = Annotated[float, Quantity("N/m", "stiffness of the spring", "K", above=0)]
 _Mass = Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)]
 _Damping = Annotated[float, Quantity("N s/m", "damping of the body", "c", at_least=0)]

@@ -245,8 +245,8 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
         If the scenario cannot be read or has no such figure, something is chosen of it, or the picture is not to be
         made.
     """
-    from sim.scenario.declared import files_read
     from sim.scenario.reader import load  # heavy: pydantic, where a dataset needs none
+    from sim.scenario.schema import files_read
 
     scene, target = load(source), path or Path("outputs") / f"{source.stem}-spectrum.png"
     if kind not in (None, "spectrum"):

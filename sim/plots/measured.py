@@ -13,7 +13,7 @@ from sim.analysis import sweep_dims
 from sim.analysis.scene import plain
 from sim.plots.style import BOTH, GUIDE, HOLLOW, legend
 from sim.units.quantity import Quantity
-from sim.units.tables import Points, given, read
+from sim.units.tables import Points, measured_points, read_measured
 
 #: Names of what is prescribed and of what is recorded of it.
 _SAME = (("speed", "drive_speed"), *((name, f"contact_{name}") for name in ("indentation", "displacement")))
@@ -85,7 +85,9 @@ class Measured:
         self.sweep = {*sweep_dims(dataset)}
         known = {name: Quantity(units, name) for name, units in self._units().items()}
         self.named = str(data) if isinstance(data, Path | str) else "data"
-        self.table = read(Path(data), known, known) if isinstance(data, Path | str) else given(data, known)
+        self.table = (
+            read_measured(Path(data), known, known) if isinstance(data, Path | str) else measured_points(data, known)
+        )
         self.shown: set[str] = set()
         self.residuals: list[Residuals] = []
 

@@ -18,7 +18,7 @@ _MOST_STEPS = 10**9
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Clock:
-    """How long, in which steps, and how often a step is recorded; the first record is t = 0."""
+    """Duration, clock step and time between records; the first record is t = 0."""
 
     duration: _Duration
     step: Annotated[float, Quantity("s", "clock step", "dt", above=0)]
@@ -28,8 +28,8 @@ class Clock:
     def _whole_multiples(self) -> "Clock":
         for name in ("record", "step"):
             if (getattr(self, name) or 0.0) > self.duration * (1.0 + 1e-9):
-                said = f"{name} ({getattr(self, name):g} s) is longer than duration ({self.duration:g} s)"
-                raise PydanticCustomError("clock", f"{said}; shorten it, or lengthen the run")
+                message = f"{name} ({getattr(self, name):g} s) is longer than duration ({self.duration:g} s)"
+                raise PydanticCustomError("clock", f"{message}; shorten it, or lengthen the run")
         if self.record is not None:
             _require_multiple("record", self.record, "step", self.step)
         word = "step" if self.record is None else "record"
@@ -72,8 +72,8 @@ def _require_multiple(name: str, long: float, other: str, short: float) -> None:
         return
     below, above = max(math.floor(ratio), 1) * short, (math.floor(ratio) + 1) * short
     cure = f"{above:g} s" if ratio < 1.0 else f"{below:g} s or {above:g} s"
-    said = f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s)"
-    raise PydanticCustomError("clock", f"{said}, such as {cure}")
+    message = f"{name} ({long:g} s) must be a whole multiple of {other} ({short:g} s)"
+    raise PydanticCustomError("clock", f"{message}, such as {cure}")
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -85,7 +85,7 @@ class Ensemble:
 
 @dataclass(frozen=True, config={"extra": "forbid"})
 class Record:
-    """What is kept: each member or the ensemble's mean, spread and standard error; maps at given times."""
+    """Content of the dataset: each member or the ensemble's mean, spread and standard error; maps at given times."""
 
     per_member: Annotated[
         bool | None,
@@ -105,5 +105,5 @@ class Record:
     ] = "zlib"
 
     def keeps(self, name: str) -> bool:
-        """Whether a quantity is recorded; the contact radius always is."""
+        """Return True if a quantity is recorded; the contact radius always is."""
         return self.quantities is None or name in ("contact_radius", *self.quantities)

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
-from sim.scenario.declared import all_tables, declaration, keys, model, tables, with_models
+from sim.scenario.schema import all_tables, declaration, keys, model, tables, with_models
 from sim.units.errors import BadInput
 from sim.units.terminal import one_line
 

@@ -8,9 +8,9 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from sim.scenario.declared import with_models
 from sim.scenario.messages import Fault, faults, problems
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import with_models
 from sim.scenario.source import Files, Source
 from sim.scenario.toml_text import parse, put, read_text
 from sim.units.errors import BadInput

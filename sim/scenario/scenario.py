@@ -25,8 +25,8 @@ from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
 from sim.scenario.clock import Clock, Ensemble, Record
-from sim.scenario.declared import as_html, entries, with_models
 from sim.scenario.messages import in_plain_words, plain_spoken
+from sim.scenario.schema import as_html, entries, with_models
 from sim.scenario.source import Files, Source
 from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
@@ -43,7 +43,7 @@ _MOST_FAULTS = 100
 
 @cache
 def _adapter(table: Any) -> TypeAdapter[Any]:
-    """What checks and dumps a table."""
+    """Return the adapter that checks and dumps a table."""
     return TypeAdapter(table)
 
 
@@ -89,7 +89,8 @@ class Scenario:
     source: Annotated[Any, Field(exclude=True)] = Source()
 
     def __repr__(self) -> str:
-        models = ", ".join(f"{name} {part.model}" for name, part in zip(Parts._fields, self.given, strict=True))
+        parts = self.drive, self.bonds, self.shear, self.contact
+        models = ", ".join(f"{name} {part.model}" for name, part in zip(Parts._fields, parts, strict=True))
         points = math.prod(len(axis.values) for axis in self.sweep)
         return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
 
@@ -176,7 +177,7 @@ class Scenario:
 
     @cached_property
     def bodies(self) -> Bodies:
-        """What touches."""
+        """Return the sphere and the half-space as the contact sees them."""
         return Bodies(self.sphere.radius, self.solid.contact_modulus, self.solid.effective[1])
 
     @cached_property
@@ -199,11 +200,6 @@ class Scenario:
         strength = float(self.population.steady(np.zeros(1)).strength[0])
         bodies = *self.solid.effective, self.solid.contact_modulus, self.sphere.radius
         return Setting(*bodies, self.adhesion.work, strength, self.rest_radius, self._square, self.times)
-
-    @property
-    def given(self) -> tuple[Drive, Bonds, Shear, Contact]:
-        """The four parts as given, in the order in which they act."""
-        return self.drive, self.bonds, self.shear, self.contact
 
     @property
     def chosen(self) -> tuple[Drive, BondModel, Model, Contact]:
@@ -247,19 +243,19 @@ class Scenario:
         return any(part.feeds_back for part in self.chosen[1:]) or (self.drive.solves_motion and alone)
 
     def remarks(self) -> list[str]:
-        """What to know before a run, one sentence each: assumptions, errors of the cell, what is implausible."""
-        said = [remark for part in self.chosen for remark in part.remarks(self.setting)]
-        said += remarks_between(*self.chosen[1:], self.setting, self.speeds(41), self.varies["shear"])
+        """Return one sentence for each assumption, error of the cell and implausible value."""
+        remarks = [remark for part in self.chosen for remark in part.remarks(self.setting)]
+        remarks += remarks_between(*self.chosen[1:], self.setting, self.speeds(41), self.varies["shear"])
         if self.ensemble.members > 1 and self.fluctuations.measured and not any(self.varies.values()):
-            said.append(
+            remarks.append(
                 "the map is the same for all members and seeds, and nothing else is random: one member is enough"
             )
         if self.solid.poisson_ratio != 0.5:
-            said.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
+            remarks.append("poisson_ratio is not 0.5: the normal-tangential coupling is neglected")
         off = (abs(value) for name, value in self.process.known_errors().items() if name.startswith("cell_error"))
         if max(off, default=0.0) > _CELL_ERROR:
-            said.append(f"the cell is off by more than {_CELL_ERROR:.0%}: a larger cell or more points bring it closer")
-        return list(dict.fromkeys(said))
+            remarks.append(f"the cell is off by more than {_CELL_ERROR:.0%}: give a larger cell or more points")
+        return list(dict.fromkeys(remarks))
 
     def with_values(self, values: dict[str, Any]) -> "Scenario":
         """Return this scenario without its sweep and with some keys changed, ``{"contact.load": 1e-3}``.

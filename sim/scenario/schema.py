@@ -1,20 +1,175 @@
-"""JSON schema of scenario files, and a starter."""
+"""Keys of a scenario: tables, models, values with their units, the JSON schema, a starter file."""
 
-import json
+import functools
+import html
+from collections.abc import Hashable, Iterable, Iterator
+from dataclasses import fields, is_dataclass
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, cast, get_args
 
-from pydantic import TypeAdapter
+from pydantic import Tag, TypeAdapter
+from pydantic.fields import FieldInfo
+from pydantic.json_schema import SkipJsonSchema
 
 from sim.numerics.files import OutputExists
-from sim.parts.contact import Equilibrium
-from sim.scenario.declared import all_tables, keys, model
-from sim.scenario.scenario import Scenario
+from sim.scenario.source import Source
+from sim.units.quantity import Quantity
+
+
+@functools.cache
+def keys(table: type) -> dict[str, FieldInfo]:
+    """Return the keys of a table as they are written in a file, with their declarations."""
+    declared: dict[str, FieldInfo] = getattr(table, "__pydantic_fields__", {})
+    return {field.alias or name: field for name, field in declared.items() if not (field.exclude or _is_read(field))}
+
+
+def _is_read(field: FieldInfo) -> bool:
+    """Return True if a field is read from a file that a table names; it is no key of a scenario."""
+    return any(isinstance(note, cast(type, SkipJsonSchema)) for note in field.metadata)
+
+
+@functools.cache
+def model(table: type) -> str | None:
+    """Return the name of a table's model; None if there is only one."""
+    return keys(table)["model"].default if "model" in keys(table) else None
+
+
+def tables(annotation: Any, tag: str = "") -> dict[str, type]:
+    """Return the tables that an annotation admits, by the name that pydantic gives each; "" if there is only one."""
+    tag = next((note.tag for note in getattr(annotation, "__metadata__", ()) if isinstance(note, Tag)), tag)
+    if isinstance(annotation, type) and is_dataclass(annotation):
+        return {tag or model(annotation) or "": annotation}
+    return {name: table for option in get_args(annotation) for name, table in tables(option, tag).items()}
+
+
+@functools.cache
+def _inner(table: type) -> dict[str, list[type]]:
+    """Return the tables that the keys of a table admit."""
+    admitted = {key: list(tables(field.annotation).values()) for key, field in keys(table).items()}
+    return {key: options for key, options in admitted.items() if options}
+
+
+@functools.cache
+def all_tables(root: type) -> list[tuple[tuple[str, ...], FieldInfo]]:
+    """Return the path and declaration of every table in a scenario, outer ones first."""
+    result: list[tuple[tuple[str, ...], FieldInfo]] = [((), FieldInfo(annotation=root))]
+    for path, field in result:  # grows on the way
+        inner = {key: keys(table)[key] for table in tables(field.annotation).values() for key in _inner(table)}
+        result += [((*path, key), declared) for key, declared in inner.items()]
+    return result
+
+
+def with_models(table: type, document: Any) -> Any:
+    """Return the document of a table, with the simplest model in each inner table that omits its model.
+
+    No model is added to an inner table with a key that belongs to other models only: no model is guessed from keys.
+    """
+    if not isinstance(document, dict):
+        return document
+    result = dict(document)
+    for key, admitted in _inner(table).items():
+        inner, simplest = document.get(key), keys(table)[key].default_factory
+        if not isinstance(inner, dict):
+            continue
+        if len(admitted) > 1 and "model" not in inner and isinstance(simplest, type) and simplest in admitted:
+            others = {word for option in admitted for word in keys(option)} - keys(simplest).keys()
+            inner = inner if others & inner.keys() else {"model": model(simplest), **inner}
+        chosen = [option for option in admitted if model(option) == inner.get("model")]
+        result[key] = with_models(chosen[0], inner) if chosen else inner
+    return result
+
+
+class Entry(NamedTuple):
+    """A value of a scenario by its dotted ``key``, with its declaration if it is a number or a column of them."""
+
+    key: str
+    value: Any
+    quantity: Quantity | None
+
+
+def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
+    """Yield every value of a scenario or one of its parts, table by table; the model of a table comes first."""
+    for name, key, quantity in _listed(cast(Hashable, type(part))):
+        value = getattr(part, name)
+        if is_dataclass(value):
+            yield from () if isinstance(value, Source) else entries(value, f"{prefix}{key}.")
+        elif quantity is not None:
+            number = value[0] if isinstance(value, tuple) and value else value
+            number = isinstance(number, int | float) and not isinstance(number, bool)
+            yield Entry(prefix + key, value, quantity if number else None)
+
+
+def distinct(points: Iterable[Any]) -> Iterator[tuple[str, Any]]:
+    """Yield name and table of each scenario among points of a sweep; a table that points share comes once."""
+    shared: dict[int, Any] = {}  # keeps each alive, so that no other gets its number
+    for point in points:
+        for name in _inner(cast(Hashable, type(point))):
+            part = getattr(point, name)
+            if id(part) not in shared:
+                shared[id(part)] = part
+                yield name, part
+
+
+@functools.cache
+def _listed(table: type) -> list[tuple[str, str, Quantity | None]]:
+    """Return name, key and declaration as a number of each field of a table, None for one that no file gives."""
+    listed = []
+    for item in sorted(fields(table), key=lambda item: item.name != "model"):
+        field = getattr(table, "__pydantic_fields__", {}).get(item.name)
+        meaning = (field and field.description) or item.name.replace("_", " ")
+        quantity = None if field is None or _is_read(field) else declaration(field) or Quantity("1", meaning)
+        listed.append((item.name, (field and field.alias) or item.name, quantity))
+    return listed
+
+
+def files_read(scenario: Any) -> list[Path]:
+    """Return the file of a scenario and all files that it and its sweep name."""
+    values = [(key, value) for key, value, _ in entries(scenario)]
+    for axis in scenario.sweep:
+        values += [pair for row in axis.values for pair in zip(axis.keys, row, strict=True)]
+    for key, value in values:  # grows on the way
+        values += [(f"{key}.{name}", inner) for name, inner in value.items()] if isinstance(value, dict) else []
+    names = {value for key, value in values if key.rpartition(".")[2] == "file" and isinstance(value, str) and value}
+    path = Path(scenario.source.path)
+    files = [path.parent / name for name in sorted(names.union(scenario.source.files))]
+    return [path, *files] if scenario.source.path else files
+
+
+def as_html(title: str, listed: Iterable[Entry]) -> str:
+    """Return an HTML table of keys with their values, units and meanings."""
+    rows = []
+    for key, value, quantity in listed:
+        unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
+        shown = f"{len(value)} values" if isinstance(value, tuple) else f"{value} {unit}"
+        if value not in (None, "", ()):
+            cells = (key, shown, quantity.meaning if quantity else "")
+            rows.append("".join(f"<td style='text-align:left'>{html.escape(cell)}</td>" for cell in cells))
+    return f"<b>{html.escape(title)}</b><table>{''.join(f'<tr>{row}</tr>' for row in rows)}</table>"
+
+
+def quantities(part: Any) -> dict[str, tuple[Quantity, float]]:
+    """Return every number of a scenario with its declaration, by its dotted key in a scenario file."""
+    listed = entries(part)
+    return {key: (quantity, value) for key, value, quantity in listed if quantity and not isinstance(value, tuple)}
+
+
+def declaration(declared: Any) -> Quantity | None:
+    """Return the declaration of a key as a quantity; None if it is none."""
+    notes = (*declared.metadata, *_noted(declared.annotation))
+    return next((item for item in notes if isinstance(item, Quantity)), None)
+
+
+def _noted(annotation: Any) -> Iterator[Any]:
+    """Yield the notes of the alternatives of an annotation; a number comes before tables."""
+    yield from getattr(annotation, "__metadata__", ())
+    for option in getattr(annotation, "__args__", ()):
+        if not is_dataclass(option):
+            yield from _noted(option)
 
 
 def write_starter(name: Path) -> Path:
-    """Write a commented starter scenario where no file is; its path."""
+    """Write a commented starter scenario, if there is no such file yet; return its path."""
     target = name if name.suffix else name.with_suffix(".toml")
     text = files("sim").joinpath("starter.toml").read_text(encoding="utf-8")
     try:
@@ -25,23 +180,18 @@ def write_starter(name: Path) -> Path:
     return target
 
 
-def as_text() -> str:
-    """The JSON schema as text."""
-    return json.dumps(scenario_schema(), indent=2)
-
-
-def scenario_schema() -> dict[str, Any]:
-    """The JSON schema of a scenario file."""
-    schema = TypeAdapter(Scenario).json_schema(by_alias=True, mode="validation")
+def json_schema(root: type) -> dict[str, Any]:
+    """Return the JSON schema of a scenario file; ``root`` is the class of scenarios."""
+    schema = TypeAdapter(root).json_schema(by_alias=True, mode="validation")
     for table in schema["$defs"].values():
         if "file" in table["properties"] and "file" not in table.get("required", ()):
             table["anyOf"] = [{"required": ["file"]}, {"required": table.pop("required")}]
-    simplest = [field.default_factory or Equilibrium for _, field in all_tables(Scenario)]
+    simplest = [field.default_factory or next(iter(tables(field.annotation).values())) for _, field in all_tables(root)]
     optional = [(model(table), keys(table).keys()) for table in simplest if isinstance(table, type)]
     for name in _in_unions(schema):  # there the model tells the tables apart; only the simplest may leave it out
         table = schema["$defs"][name]
-        own = table["properties"].get("model", {}).get("const")
-        if own is not None and (own, table["properties"].keys()) not in optional:
+        name_of_model = table["properties"].get("model", {}).get("const")
+        if name_of_model is not None and (name_of_model, table["properties"].keys()) not in optional:
             table["required"] = ["model", *table.get("required", ())]
     schema["properties"].pop("source", None)
     schema["properties"]["sweep"] = {
@@ -52,11 +202,10 @@ def scenario_schema() -> dict[str, Any]:
 
 
 def _in_unions(node: Any) -> set[str]:
-    """Names of the tables that a schema tells apart by their model."""
+    """Return the names of the tables that a schema tells apart by their model."""
     if isinstance(node, list):
         return set().union(*map(_in_unions, node))
     if not isinstance(node, dict):
         return set()
-    found = set().union(*map(_in_unions, node.values()))
     options = [option["$ref"] for option in node.get("oneOf", ()) if "$ref" in option]
-    return found | {reference.rsplit("/", 1)[-1] for reference in options}
+    return set().union(*map(_in_unions, node.values())) | {reference.rsplit("/", 1)[-1] for reference in options}

@@ -23,8 +23,8 @@ class Source:
     def changed(self, values: dict[str, Any]) -> "Source":
         """The source of the same text with more overrides, which replace those of the keys inside theirs."""
         inside = tuple(f"{key}." for key in values)
-        kept = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
-        return Source(self.path, self.text, kept | values, self.files)
+        others = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
+        return Source(self.path, self.text, others | values, self.files)
 
     @property
     def written(self) -> dict[str, Any]:
@@ -44,7 +44,7 @@ class Files:
         return self.folder / name
 
     def text(self, name: str) -> str:
-        """The file's text, kept for the dataset's provenance."""
+        """The file's text, others for the dataset's provenance."""
         if name not in self.texts:
             self.texts[name] = plain_text(self.path(name))
         return self.texts[name]

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from sim.analysis import engineering
 from sim.numerics import files
-from sim.scenario.declared import files_read, quantities
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import files_read, quantities
 from sim.study.exact_law import QUANTITIES, STATISTICS, Walk, cell_gammas, memory
 from sim.study.figure import figure
 from sim.study.samples import Array, Estimates, affordable, coupled, estimates, fluctuates, sampled, timed

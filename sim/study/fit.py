@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
-from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import quantities
 from sim.study.fitting import Free, Interval, Minimum, Problem, entangled, idle, interval, problem_of, with_errors
 from sim.study.measured import read
 from sim.study.predicted import groups

@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 from sim.ensemble.outline import scenario_json
 from sim.numerics import files
 from sim.plots.style import in_units
-from sim.scenario.declared import files_read
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import files_read
 from sim.scenario.toml_text import parse, put, written
 from sim.study.fit import POOR, Fit, Found, fit
 from sim.study.fit_figure import figure, refuse_units

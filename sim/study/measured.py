@@ -8,11 +8,11 @@ from numpy.typing import NDArray
 
 from sim.ensemble.outline import variable_name
 from sim.ensemble.recorded import VARIABLES
-from sim.scenario.declared import quantities
 from sim.scenario.scenario import Scenario
-from sim.units import tables as table
+from sim.scenario.schema import quantities
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
+from sim.units.tables import read_measured
 
 Array = NDArray[np.float64]
 
@@ -78,7 +78,7 @@ def read(path: Path, scenario: Scenario) -> Measured:
     """
     at, outcomes = _conditions(scenario), _outcomes(scenario)
     known = {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}
-    found = table.read(path, known, outcomes)
+    found = read_measured(path, known, outcomes)
     conditions = {at[name][0]: points.values for name, points in found.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in found.items() if name not in at)
     unclear = _unclear(scenario, conditions)

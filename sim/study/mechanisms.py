@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.scenario.declared import quantities
+from sim.scenario.schema import quantities
 from sim.study.fitting import Free, Minimum, Problem, idle, minimum
 from sim.units.quantity import Quantity
 

@@ -15,8 +15,8 @@ from pydantic import TypeAdapter
 from sim.analysis import engineering
 from sim.parts.bonds import Cohort, Counted, FirstMoment, Rate, Steady, Tracked
 from sim.parts.shear import Banded, Mapped, Mean, Modal
-from sim.scenario.declared import keys
 from sim.scenario.scenario import Scenario
+from sim.scenario.schema import keys
 
 #: Tolerance of cohorts whose answer stands for the exact one.
 REFERENCE = 1e-6

@@ -64,7 +64,7 @@ def columns(text: str, wanted: dict[str, Quantity], header: str | None = None) -
     >>> table["speed"].tolist()
     [0.001, 0.005]
     """
-    example = ", ".join(name if one.unit == "1" else f"{name} [{one.unit}]" for name, one in wanted.items())
+    example = ", ".join(name if wanted[name].unit == "1" else f"{name} [{wanted[name].unit}]" for name in wanted)
     table, place = _cells(text), "header"
     if header is None or not all(map(_is_number, table.rows[0])):
         place = f"line {table.lines[0]}"
@@ -285,11 +285,12 @@ _SAME = 1e-9
 
 
 class Pieces(NamedTuple):
-    """Stretches of time, one after the other, in each of which a prescribed value changes smoothly: arrays (pieces,).
+    """Stretches of time, in each of which a prescribed value changes smoothly: arrays (pieces,).
 
     ``interval`` is the number of the interval in which a piece lies; each interval has one or more. ``start`` and
-    ``stop`` are the piece's ends [s], ``first`` and ``last`` the values there; ``integral`` is that of the value over
-    time, ``path`` that of its magnitude, ``unsteady`` that of the square of what the magnitude differs from its mean.
+    ``stop`` are the piece's ends [s], ``first`` and ``last`` the values there. ``integral`` is that of the value over
+    time, ``path`` that of its magnitude, ``unsteady`` that of the squared difference of the magnitude from its mean.
+    All are closed forms of a piece: differences of an antiderivative (scipy's PPoly) lose up to 1e-12 of the path.
     """
 
     interval: Indices
@@ -303,7 +304,7 @@ class Pieces(NamedTuple):
 
     @property
     def joined(self) -> "Pieces":
-        """One piece for each interval, whose sums are rounded once."""
+        """Return one piece for each interval; its sums are rounded once."""
         if len(self.interval) == 1:
             return self
         opening = np.flatnonzero(np.diff(self.interval, prepend=-1))
@@ -322,24 +323,24 @@ class Pieces(NamedTuple):
 
 
 def _steady_square(path: Array, span: Array) -> Array:
-    """Integral over time of the square of a value that stays and has this integral."""
+    """Return the integral over time of the square of a constant value with this integral."""
     return np.divide(path * path, span, out=np.zeros(path.shape), where=span > 0.0)
 
 
 def linear_pieces(interval: Indices, start: Array, stop: Array, first: Array, last: Array) -> Pieces:
-    """Pieces in which the value changes linearly."""
+    """Return pieces in which the value changes linearly."""
     integral = 0.5 * (first + last) * (stop - start)
     path, turns = np.abs(integral), first * last < 0.0
     unsteady = (last - first) ** 2 * (stop - start) / 12.0
     if turns.any():
-        one, other, span = first[turns], last[turns], (stop - start)[turns]
-        path[turns] = 0.5 * (one**2 + other**2) / np.abs(other - one) * span
-        unsteady[turns] = (one**2 + one * other + other**2) / 3.0 * span - _steady_square(path[turns], span)
+        v0, v1, span = first[turns], last[turns], (stop - start)[turns]
+        path[turns] = 0.5 * (v0**2 + v1**2) / np.abs(v1 - v0) * span
+        unsteady[turns] = (v0**2 + v0 * v1 + v1**2) / 3.0 * span - _steady_square(path[turns], span)
     return Pieces(interval, start, stop, first, last, integral, path, unsteady)
 
 
 def _within(ends: Array, times: Array, apart: float = 0.0) -> tuple[Array, Indices]:
-    """Times strictly between neighbouring ``ends``, further than ``apart`` from both; places where they belong."""
+    """Return the times strictly between ``ends``, further than ``apart`` from them, and their places among these."""
     times = times[(ends[0] < times) & (times < ends[-1])]
     places = np.searchsorted(ends, times, "right")
     inside = (ends[places - 1] + apart < times) & (times < ends[places] - apart)
@@ -347,16 +348,16 @@ def _within(ends: Array, times: Array, apart: float = 0.0) -> tuple[Array, Indic
 
 
 def _intervals(ends: Array, places: Indices) -> Indices:
-    """The interval between ``ends`` of each piece, where times at these places cut some of them."""
+    """Return the number of the interval of each piece, if times at these places cut some intervals."""
     count = len(ends) - 1
     return np.repeat(np.arange(count), 1 + np.bincount(places - 1, minlength=count))
 
 
 class Number(NamedTuple):
-    """A value that stays.
+    """A constant value.
 
-    As of every prescribed value ``changes`` is whether it depends on time, ``cycles`` counts its ways there and back,
-    and ``end`` [s] is the last time for which it is given.
+    Every prescribed value has ``changes``, true if it depends on time, ``cycles``, the number of ways there and back,
+    and ``end`` [s], the last time for which it is given.
     """
 
     value: float
@@ -366,15 +367,15 @@ class Number(NamedTuple):
 
     @property
     def extremes(self) -> tuple[float, ...]:
-        """Values among which are the least and the largest of the run."""
+        """Return values among which are the least and the largest of the run."""
         return (self.value,)
 
     def at(self, time: Array, duration: float) -> Array:
-        """The value at times [s] of a run of ``duration`` [s]; where it jumps, that after the jump."""
+        """Return the value at times [s] of a run of ``duration`` [s]; at a jump that after the jump."""
         return np.full(time.shape, self.value)
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
-        """The way through the intervals between some times [s], cut where the value turns or jumps."""
+        """Return the pieces of the intervals between some times [s], cut where the value turns or jumps."""
         values = self.at(ends, duration)
         return linear_pieces(np.arange(len(ends) - 1), ends[:-1], ends[1:], values[:-1], values[1:])
 
@@ -398,8 +399,8 @@ class Course:
     @model_validator(mode="after")
     def _log_needs_one_sign(self) -> "Course":
         if self.scale == "log" and self.start * self.stop <= 0.0:
-            said = 'a logarithmic course cannot reach or pass zero; give two values above zero or scale = "linear"'
-            raise PydanticCustomError("log_through_zero", said)
+            message = 'a logarithmic course cannot reach or pass zero; give two values above zero or scale = "linear"'
+            raise PydanticCustomError("log_through_zero", message)
         return self
 
     @property
@@ -444,7 +445,7 @@ class Course:
 
 
 def table_pieces(times: Array, values: Array, ends: Array, duration: float) -> Pieces:
-    """Pieces of a table that is linear between its rows and keeps its last value; two rows at one time are a jump."""
+    """Return pieces of a table, linear between rows and constant after the last; two rows at one time are a jump."""
     ends = _snapped(times, ends, duration)
     rows, places = _within(ends, np.unique(times[slice(*np.searchsorted(times, ends[[0, -1]], "right"))]))
     edges = np.insert(ends, places, rows)
@@ -455,7 +456,7 @@ def table_pieces(times: Array, values: Array, ends: Array, duration: float) -> P
 
 
 def _snapped(times: Array, ends: Array, duration: float) -> Array:
-    """Clock times, those of rows where they are meant to be the same but for rounding."""
+    """Return times, replaced by the nearest time of a row if they differ by rounding only."""
     after = np.searchsorted(times, ends).clip(max=len(times) - 1)
     left, right = times[np.maximum(after - 1, 0)], times[after]
     nearest = np.where(np.abs(left - ends) <= np.abs(right - ends), left, right)
@@ -463,7 +464,7 @@ def _snapped(times: Array, ends: Array, duration: float) -> Array:
 
 
 def _interpolated(times: Array, values: Array, row: Indices, time: Array) -> Array:
-    """Values on the lines from some rows to the next, and beyond the last row its value."""
+    """Return values on the lines from some rows to the next; after the last row its value."""
     after = np.minimum(row + 1, len(times) - 1)
     span, rise = times[after] - times[row], values[after] - values[row]
     slope = np.divide(rise, span, out=np.zeros(span.shape), where=span > 0.0)
@@ -489,11 +490,11 @@ class Table:
 
     @model_validator(mode="before")
     @classmethod
-    def _read_file(cls, given: Any, info: ValidationInfo) -> Any:
-        if not isinstance(given, dict) or not isinstance(given.get("file"), str) or "time" in given:
-            return given
-        found = file_columns(given["file"], info.context, {"time": _TIME, cls.column: cls.quantity})
-        return {**given, "time": found["time"], cls.values_in: found[cls.column]}
+    def _read_file(cls, table: Any, info: ValidationInfo) -> Any:
+        if not isinstance(table, dict) or not isinstance(table.get("file"), str) or "time" in table:
+            return table
+        result = file_columns(table["file"], info.context, {"time": _TIME, cls.column: cls.quantity})
+        return {**table, "time": result["time"], cls.values_in: result[cls.column]}
 
     @model_validator(mode="after")
     def _rows_in_order(self) -> "Table":
@@ -507,7 +508,7 @@ class Table:
 
     @property
     def extremes(self) -> tuple[float, ...]:
-        """The column beside the times."""
+        """Return the column beside the times."""
         return tuple(getattr(self, self.values_in))
 
     @cached_property
@@ -533,8 +534,8 @@ def _kind(value: Any) -> str:
     return "[course]" if isinstance(value, dict | Course) else "[value]"
 
 
-def held(unit: Quantity, name: str) -> Any:
-    """Annotation of a prescribed quantity: a number, a course, or a table whose column has this name."""
+def over_time(unit: Quantity, name: str) -> Any:
+    """Return the annotation of a prescribed quantity: a number, a course, or a table whose column has this name."""
 
     @dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
     class _Course(Course):
@@ -561,9 +562,9 @@ def held(unit: Quantity, name: str) -> Any:
 Prescribed = Number | Course | Table
 
 
-def prescribed(given: float | Course | Table) -> Prescribed:
-    """The course in time of what a scenario gives."""
-    return given if isinstance(given, Course | Table) else Number(given)
+def prescribed(value: float | Course | Table) -> Prescribed:
+    """Return the course in time of a value of a scenario."""
+    return value if isinstance(value, Course | Table) else Number(value)
 
 
 # Tables of what was measured: CSV columns named as variables, with units, and beside them their errors.
@@ -580,8 +581,8 @@ class Points(NamedTuple):
     errors: Array | None
 
 
-def read(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
-    """Columns of a table of measured values.
+def read_measured(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
+    """Return the columns of a table of measured values.
 
     Parameters
     ----------
@@ -598,7 +599,7 @@ def read(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quant
         With one line.
     """
     try:
-        return _columns(plain_text(path), known, outcomes)
+        return _measured_columns(plain_text(path), known, outcomes)
     except UnicodeDecodeError:
         raise BadInput([f"{path}: is not UTF-8 text; save it as plain CSV in UTF-8"]) from None
     except OSError as fault:
@@ -607,24 +608,24 @@ def read(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[str, Quant
         raise BadInput([f"{path}: {fault}"]) from None
 
 
-def given(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:
-    """Columns of measured values [SI] by name, beside some their errors.
+def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:
+    """Return columns of measured values [SI] by name, some with their errors.
 
     Raises
     ------
     ValueError
         For a name that is not known, or columns of different lengths.
     """
-    found = {str(name): np.asarray(values, float) for name, values in columns.items()}
-    for name in found:
-        if name not in known and not (name.endswith(ERROR) and name.removesuffix(ERROR) in found):
+    arrays = {str(name): np.asarray(values, float) for name, values in columns.items()}
+    for name in arrays:
+        if name not in known and not (name.endswith(ERROR) and name.removesuffix(ERROR) in arrays):
             raise ValueError(_unknown(name, known))
-    if len({values.shape for values in found.values()}) != 1 or next(iter(found.values())).ndim != 1:
+    if len({values.shape for values in arrays.values()}) != 1 or next(iter(arrays.values())).ndim != 1:
         raise ValueError("measured columns need the same number of rows; give arrays of one length")
-    return {name: Points(values, found.get(name + ERROR)) for name, values in found.items() if name in known}
+    return {name: Points(values, arrays.get(name + ERROR)) for name, values in arrays.items() if name in known}
 
 
-def _columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
+def _measured_columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Quantity]) -> dict[str, Points]:
     units = headings(text)
     wanted: dict[str, Quantity] = {}
     for name, unit in units.items():
@@ -637,12 +638,12 @@ def _columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Qu
             raise TableError(_unknown(name, known))
     bare = [name for name, quantity in wanted.items() if not units[name] and quantity.unit != "1"]
     if bare and any(units.values()):
-        said = f'column "{bare[0]}" has no unit where others have one; write "{bare[0]} [{wanted[bare[0]].unit}]"'
-        raise TableError(f"{said} if that is its unit")
-    found = columns(text, wanted)
+        cure = f'write "{bare[0]} [{wanted[bare[0]].unit}]" if that is its unit'
+        raise TableError(f'column "{bare[0]}" has no unit where others have one; {cure}')
+    arrays = columns(text, wanted)
     points = {}
-    for name in (name for name in found if name in known):
-        values, errors = found[name], found.get(name + ERROR)
+    for name in (name for name in arrays if name in known):
+        values, errors = arrays[name], arrays.get(name + ERROR)
         if errors is not None and _relative(units[name + ERROR], known[name]):
             errors = errors * np.abs(values)
         if errors is not None and not np.all(errors > 0.0):
@@ -652,12 +653,12 @@ def _columns(text: str, known: Mapping[str, Quantity], outcomes: Mapping[str, Qu
 
 
 def _relative(unit: str, quantity: Quantity) -> bool:
-    """Whether an error with this unit's text is a share of the value."""
+    """Return True if an error with this unit is a share of the value."""
     return unit == "%" and quantity.unit != "1"
 
 
 def _unknown(name: str, known: Iterable[str]) -> str:
-    """What to do about a column that is neither a condition nor a variable."""
+    """Return the fault of a column that is neither a condition nor a variable."""
     shown = name[:40]
     if name.endswith(ERROR) and name.removesuffix(ERROR) in known:
         return f'column "{shown}" is the error of a column that is missing; add it, or leave the error out'

@@ -27,8 +27,8 @@ from sim.parts.drive import READINGS
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Slip
 from sim.scenario.clock import Clock, Record
-from sim.scenario.declared import all_tables, keys, quantities, tables
 from sim.scenario.scenario import Scenario, read_sweep
+from sim.scenario.schema import all_tables, keys, quantities, tables
 from sim.units.notation import Recorded
 
 MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=CELL, points=12, correlation=Slip(length=3e-6))

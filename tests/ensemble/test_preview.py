@@ -16,8 +16,8 @@ from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Constant
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Slip
-from sim.scenario.declared import quantities
 from sim.scenario.reader import load
+from sim.scenario.schema import quantities
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 WIDE = {"model": "gaussian", "rms": "10 kPa", "length": "4 mm"}

@@ -17,17 +17,17 @@ def test_a_result_is_cached_for_each_key_and_only_if_it_took_long(tmp_path, monk
     monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path))
     computed = []
     for key in ("a", "a", "b"):
-        disk_cache.found(key, lambda key=key: computed.append(key))
+        disk_cache.cached(key, lambda key=key: computed.append(key))
     assert computed == ["a", "a", "b"]
     monkeypatch.setattr(disk_cache, "_WORTH", -1.0)
     for key in ("a", "a", "b", "a"):
-        assert disk_cache.found(key, lambda key=key: computed.append(key) or f"of {key}") == f"of {key}"
+        assert disk_cache.cached(key, lambda key=key: computed.append(key) or f"of {key}") == f"of {key}"
     assert computed[3:] == ["a", "b"]
     for path in tmp_path.rglob("found/*"):
         path.write_bytes(path.read_bytes()[:-1])
-    assert disk_cache.found("a", lambda: "anew") == "anew"
+    assert disk_cache.cached("a", lambda: "anew") == "anew"
     monkeypatch.setattr(disk_cache, "digest", lambda: b"of other sources")
-    assert disk_cache.found("a", lambda: "of others") == "of others"
+    assert disk_cache.cached("a", lambda: "of others") == "of others"
     (tmp_path / "file").write_text("no folder")
     monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path / "file"))
-    assert disk_cache.found("a", lambda: "in no folder") == "in no folder"
+    assert disk_cache.cached("a", lambda: "in no folder") == "in no folder"

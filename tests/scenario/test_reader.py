@@ -16,10 +16,9 @@ from helpers.commands import LENS
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.shear import models as shear
-from sim.scenario.declared import all_tables, declaration, distinct, keys, quantities, tables
 from sim.scenario.reader import BadInput, load
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import scenario_schema
+from sim.scenario.schema import all_tables, declaration, distinct, json_schema, keys, quantities, tables
 
 FOLDER = Path(__file__).parents[2] / "scenarios"
 STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
@@ -64,7 +63,7 @@ def test_a_model_left_out_is_the_simplest(scene):
     assert scenario.drive == drive.Steady(speed=1e-3)
     assert scenario.bonds == bonds.Unbroken(stress=1e3)
     assert scenario.shear.amplitude.model == "constant"
-    schema = scenario_schema()
+    schema = json_schema(Scenario)
     assert fits(schema, schema, tomllib.loads(LENS + "[drive]\nspeed = 1\n[bonds]\n"))
     assert not fits(schema, schema, tomllib.loads(LENS + "[bonds]\ncritical_speed = 1\n"))
 
@@ -205,7 +204,7 @@ def test_a_sweep_beside_a_file_reads_it_once(scene, tmp_path):
 
 def test_the_starter_shows_every_table_key_and_model():
     text = STARTER.read_text(encoding="utf-8")
-    schema = scenario_schema()
+    schema = json_schema(Scenario)
     for name in schema["properties"]:
         assert re.search(rf"(?m)^(# )?(\[{name}\]|{name} = )", text), name
     columns = {"time", "speed", "wavenumbers", "densities", "variable", "value"}  # of files, not written by hand
@@ -297,7 +296,7 @@ def fits(schema, node, value):
 @functools.cache
 def read_schema():
     """The schema as read from its text."""
-    return json.loads(json.dumps(scenario_schema()))
+    return json.loads(json.dumps(json_schema(Scenario)))
 
 
 @pytest.mark.parametrize("path", [*sorted(FOLDER.glob("*.toml")), STARTER], ids=lambda path: path.stem)
@@ -311,7 +310,7 @@ def test_every_scenario_fits_the_schema(path):
 
 
 def test_a_table_may_name_a_file_or_hold_its_columns_by_the_schema():
-    schema = scenario_schema()
+    schema = json_schema(Scenario)
     steady = tomllib.loads(LENS)
     assert fits(schema, schema, {**steady, "drive": {"model": "table", "file": "speeds.csv"}})
     assert fits(schema, schema, {**steady, "drive": {"model": "table", "time": [0, 1], "speed": [0, 1]}})
@@ -329,7 +328,7 @@ def test_every_number_of_the_schema_says_its_meaning_and_unit():
             for inner in node:
                 yield from numbers(inner)
 
-    found = list(numbers(scenario_schema()))
+    found = list(numbers(json_schema(Scenario)))
     assert len(found) > 30
     assert all(node["description"].endswith("]") and node["examples"] for node in found)
 

@@ -11,7 +11,7 @@ from pydantic import TypeAdapter
 from scipy.integrate import quad
 
 from sim.units.quantity import Quantity
-from sim.units.tables import Pieces, held, prescribed, table_pieces
+from sim.units.tables import Pieces, over_time, prescribed, table_pieces
 
 DURATION = 1.2
 COURSES = {
@@ -28,7 +28,7 @@ TURNS = sorted({turn for _, turns in COURSES.values() for turn in turns})
 
 @functools.cache  # which an integrand evaluates thousands of times
 def course(name):
-    kind = held(Quantity("N", "load", "P"), "load")
+    kind = over_time(Quantity("N", "load", "P"), "load")
     return prescribed(TypeAdapter(kind).validate_python(COURSES[name][0]))
 
 

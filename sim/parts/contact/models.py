@@ -30,7 +30,7 @@ from sim.parts.contact.balance import (
 from sim.parts.contact.front import Kinetics, follow as follow_front
 from sim.parts.exchange import Array, ContactState, Flags, Motion, Motions, Setting, during
 from sim.units.quantity import Quantity
-from sim.units.tables import Prescribed, held, prescribed
+from sim.units.tables import Prescribed, over_time, prescribed
 
 _SHEAR = Quantity("Pa", "shear modulus", "G", above=0)
 _YOUNG = Quantity("Pa", "Young's modulus", "E", above=0)
@@ -162,9 +162,9 @@ class Adhesion:
 _LARGEST_SHARE = 0.3
 _KINDS = ("load", "indentation", "displacement")
 
-_Load = held(Quantity("N", "normal load, compression positive", "P"), "load")
-_Indentation = held(Quantity("m", "indentation of the sphere", "delta"), "indentation")
-_Displacement = held(Quantity("m", "displacement of the base that holds the sphere", "Delta"), "displacement")
+_Load = over_time(Quantity("N", "normal load, compression positive", "P"), "load")
+_Indentation = over_time(Quantity("m", "indentation of the sphere", "delta"), "indentation")
+_Displacement = over_time(Quantity("m", "displacement of the base that holds the sphere", "Delta"), "displacement")
 _Stiffness = Annotated[float, Quantity("N/m", "stiffness between base and sphere", "k", above=0)]
 _Reversible = Annotated[
     float, Quantity("1", "share of the mean stress's energy that adhesion pays", "alpha", at_least=0, at_most=1)

@@ -351,7 +351,7 @@ def _of_unit_size(spectrum: Family) -> tuple[Family, float]:
 def _grouped(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
     """Return ``_grouped_anew``, from the disk if an earlier run has grouped the same modes."""
     key = jit.machine(), scipy.__version__, astuple(spectrum), cell_of  # type: ignore[call-overload]
-    return disk_cache.found(key, lambda: _grouped_anew(spectrum, cell_of))
+    return disk_cache.cached(key, lambda: _grouped_anew(spectrum, cell_of))
 
 
 def _grouped_anew(spectrum: Family, cell_of: _CellOf) -> tuple[Bands, dict[str, float]]:
