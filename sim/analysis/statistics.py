@@ -20,9 +20,9 @@ from sim.analysis.observables import (
     share_observables,
 )
 from sim.analysis.scene import MEMBERS, in_pieces, of_dataset, sweep_dims
+from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option
-from sim.units.refusals import BadInput
 
 QUANTILES = (0.05, 0.5, 0.95)
 
