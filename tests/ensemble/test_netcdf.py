@@ -1,6 +1,5 @@
 """From parts to a dataset: names and units, equal bytes, and trouble with the disk."""
 
-import json
 import pickle
 import sys
 import typing
@@ -105,25 +104,24 @@ def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
         assert_allclose(pooled[f"{name}_std"], values.std(0, ddof=1), rtol=1e-11)
         assert_allclose(pooled[f"{name}_sem"], values.std(0, ddof=1) / np.sqrt(5), rtol=1e-11)
     assert pooled["bond_fraction"].dims == ("t",)
+    assert "member" not in ensemble.run(sample(members=64, shear=shear.Uniform())).dims  # members do not differ
 
 
 def test_names_that_may_be_recorded_are_the_quantities():
     assert typing.get_args(Recorded) == tuple(variable.name for variable in VARIABLES + LARGEST)
 
 
-@pytest.mark.parametrize("per_member", [True, False])
-def test_a_quantity_that_is_kept_alone_has_the_bits_of_the_whole_run(per_member):
+def test_a_quantity_that_is_kept_alone_has_the_bits_of_the_whole_run():
     chosen = ("fluctuation_energy", "jkr_radius", "peak_stress", "applied_load")  # the last is not of this scene
-    whole = ensemble.run(sample(record=Record(per_member=per_member)))
-    reduced = sample(record=Record(per_member=per_member, quantities=chosen))
-    some, names = ensemble.run(reduced), {variable.name for variable in VARIABLES + LARGEST}
-    xr.testing.assert_equal(some, whole.drop_vars("speed")[list(some.variables)])
-    assert names & {str(name).removesuffix("_mean") for name in some} == {"contact_radius", *chosen[:-1]}
-    kept = [variable.name for variable in Plan.of(reduced).variables + Plan.of(reduced).largest]
-    assert sorted(kept) == sorted(("contact_radius", *chosen[:-1]))
+    names = {variable.name for variable in VARIABLES + LARGEST}
+    for per_member in (True, False):
+        whole = ensemble.run(sample(record=Record(per_member=per_member)))
+        some = ensemble.run(sample(record=Record(per_member=per_member, quantities=chosen)))
+        xr.testing.assert_equal(some, whole.drop_vars("speed")[list(some.variables)])
+        assert names & {str(name).removesuffix("_mean") for name in some} == {"contact_radius", *chosen[:-1]}
 
 
-def test_maps_are_those_of_the_members_and_times_asked_for():
+def test_maps_are_those_of_the_members_and_times_asked_for(tmp_path):
     scenario = sample(shear=MAPPED, record=Record(maps=(4e-3, 1e-3), map_members=2))
     dataset = ensemble.run(scenario)
     assert dataset["shear_map"].dims == ("map_member", "map_time", "x", "y")
@@ -132,6 +130,8 @@ def test_maps_are_those_of_the_members_and_times_asked_for():
     for snapshot, step in enumerate((1, 4)):
         maps = scenario.process.maps(states[step].shear, np.full(2, states[step].drive.position[0]), 2)
         assert np.array_equal(dataset["shear_map"].isel(map_time=snapshot).values, maps)
+    with netCDF4.Dataset(ensemble.run(scenario, tmp_path / "out.nc")) as file:  # reading one map reads one map
+        assert file["shear_map"].chunking() == [1, 1, 12, 12]
 
 
 def test_a_detached_contact_is_zero_and_not_in_contact():
@@ -141,11 +141,6 @@ def test_a_detached_contact_is_zero_and_not_in_contact():
     for name in ("contact_radius", "contact_area", "friction_force", "in_contact", "normal_load"):
         assert np.all(dataset[name] == 0), name
     assert np.all(np.isnan(dataset["indentation"]))
-
-
-def test_members_that_do_not_differ_are_computed_once():
-    dataset = ensemble.run(sample(members=64, shear=shear.Uniform()))
-    assert "member" not in dataset.dims
 
 
 def test_swept_models_are_labelled():
@@ -176,17 +171,10 @@ def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
     assert_allclose(dataset["contact_load"], [1e-3, 4e-3])
     assert dataset["sphere_radius"].dims == ("contact_load",)
     assert_allclose(dataset["sphere_radius"], [1e-3, 2e-3])
-
-
-def test_the_scenario_can_be_run_again_from_its_dataset():
-    from pydantic import TypeAdapter
-
-    from sim.scenario.scenario import Scenario
-
-    scenario = sample()
-    dataset = ensemble.run(scenario)
-    again = TypeAdapter(Scenario).validate_python(json.loads(dataset.attrs["scenario_resolved"]))
-    xr.testing.assert_identical(ensemble.run(again), dataset)
+    rows = [{"sphere.radius": 2e-3, "contact.load": load} for load in (1e-3, 4e-3)]  # a key may keep one value
+    dataset = ensemble.run(replace(sample(), sweep=read_sweep(rows)))
+    assert dataset["contact_radius"].dims == ("sphere_radius", "member", "t")
+    assert_allclose(dataset["sphere_radius"], [2e-3, 2e-3])
 
 
 def test_an_existing_output_is_kept(tmp_path):
@@ -223,13 +211,6 @@ def test_a_full_disk_is_told_with_its_reason(tmp_path, room, monkeypatch, capsys
     assert "File too large" in said
     assert len(said.splitlines()) == 1
     assert not output.exists()
-
-
-def test_a_swept_key_may_keep_one_value():
-    rows = [{"sphere.radius": 2e-3, "contact.load": load} for load in (1e-3, 4e-3)]
-    dataset = ensemble.run(replace(sample(), sweep=read_sweep(rows)))
-    assert dataset["contact_radius"].dims == ("sphere_radius", "member", "t")
-    assert_allclose(dataset["sphere_radius"], [2e-3, 2e-3])
 
 
 def test_threads_give_the_datasets_of_one_after_the_other(tmp_path, written_apart):
@@ -316,12 +297,6 @@ def test_a_flipped_byte_of_any_variable_with_a_dimension_is_an_error(tmp_path):
                 file[other][:]
         with sim.open(path) as dataset, pytest.raises(RuntimeError, match=r"variable \w+ is damaged"):
             dataset.load()
-
-
-def test_reading_one_map_reads_one_map(tmp_path):
-    path = ensemble.run(sample(shear=MAPPED, record=Record(maps=(2e-3, 4e-3), map_members=2)), tmp_path / "out.nc")
-    with netCDF4.Dataset(path) as file:
-        assert file["shear_map"].chunking() == [1, 1, 12, 12]
 
 
 def test_a_variable_is_there_where_its_condition_holds():
