@@ -26,24 +26,25 @@ from sim.parts.coupled.row import (
     ROW,
     SLIP,
     SOME,
+    Contact,
     Slider,
-    Solid,
     area_kept,
     compliance,
     contact_area,
-    contact_from,
+    contact_at,
     driven,
     elastic,
     later,
-    piece_of,
+    next_step,
     pieces_to,
     pull_on,
     put_down,
     run_away,
+    slider_in,
     slip_free,
     slips_free,
     take_up,
-)  # fmt: skip
+)
 from sim.parts.drive import ENERGY
 
 GAMMA = 2.0 - math.sqrt(2.0)
@@ -148,6 +149,15 @@ def start_of(row, node, yields, slider):
     return speed, body, row.spring_force - damping * body - force if mass > 0.0 else 0.0
 
 
+@device
+def set_out(row, node, start, slider, contact):
+    """Lay out the start of a sub-step, whose bonds are known, and return ``start_of`` it."""
+    node.radius, node.area, _, _ = contact_area(node.bound, node.moment, start, row.radius, contact)
+    node.sheared = row.sheared
+    yields, _ = compliance(node.radius, slider)
+    return start_of(row, node, yields, slider)
+
+
 class Approach(NamedTuple):
     """Way to a node: its duration and end; speeds as ``rate`` times a displacement less an offset; a first guess.
 
@@ -180,7 +190,7 @@ def before_node(place, nodes, at_start, start, step, row, slider):
 
 
 @device
-def balance(way, bound, moment, before, after, approach, start, row, slider, contact, piece):
+def balance(way, bound, moment, before, after, approach, start, row, slider, contact):
     """Force in excess at a node with these bonds, its slope if they stay, how small a slip is none; nan without any.
 
     What belongs to the slip is written to the node.
@@ -195,7 +205,7 @@ def balance(way, bound, moment, before, after, approach, start, row, slider, con
     stress = moment + viscosity * (rate * slip - approach.offset)
     force = area * stress
     body = slip + yields * force - row.sheared
-    pull = pull_on(time, start, body, row, slider, piece)
+    pull = pull_on(time, start, body, row, slider)
     over = force + (damping + mass * rate) * (rate * body - approach.body_offset) - momentum - pull
     grows = area * (bound + viscosity * rate) + by_moment * stress * bound
     loads = stiffness + rate * (damping + mass * rate)
@@ -212,7 +222,7 @@ def balance(way, bound, moment, before, after, approach, start, row, slider, con
 
 
 @device
-def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, contact, piece, unit, rules):
+def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules):
     """Find the slip to a node and take the bonds there; their number, and the factor of the step for births.
 
     A number below zero where there is no balance of forces or its slope is not that of a short sub-step.
@@ -231,7 +241,7 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
             steepen(pool, count, way, off, rules)
         bound, moment, one, two, factor = _tried(pool, count, unit * way, duration, off, free, rules)
         over, elasticity, none = balance(
-            way, bound, moment / unit, before, after, approach, start, row, slider, contact, piece
+            way, bound, moment / unit, before, after, approach, start, row, slider, contact
         )
         if turn == 0:
             slope = elasticity
@@ -250,7 +260,7 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
 
 
 @device
-def book_nodes(row, nodes, start, step, slider, piece, limit, energy):
+def book_nodes(row, nodes, start, step, slider, limit, energy):
     """Take an accepted sub-step: integrals of the powers over it, and the row at its end."""
     damping, viscosity = slider.damping, slider.viscosity
     firms = np.empty(3)
@@ -263,8 +273,8 @@ def book_nodes(row, nodes, start, step, slider, piece, limit, energy):
     firmer = slopes(firms[0], firms[1], firms[2], step)
     for i in range(3):
         node, share, time = nodes[i], PARTS[i] * step, start + PLACES[i] * step
-        pull = pull_on(time, start, node.body, row, slider, piece)
-        energy.work += share * pull * (bodies[i] if slider.forced > 0.0 else driven(time, piece)[1])
+        pull = pull_on(time, start, node.body, row, slider)
+        energy.work += share * pull * (bodies[i] if slider.forced > 0.0 else driven(time, slider)[1])
         energy.damping += share * damping * bodies[i] * bodies[i]
         energy.viscosity += share * node.area * viscosity * speeds[i] * speeds[i]
         energy.rupture += share * 0.5 * node.area * node.lost
@@ -275,7 +285,7 @@ def book_nodes(row, nodes, start, step, slider, piece, limit, energy):
                 energy.rupture += 0.25 * (nodes[i - 1].area + node.area) * node.cut * limit * limit
             row.path += math.fabs(node.slip - nodes[i - 1].slip)
     last = nodes[2]
-    row.spring_force = pull_on(start + step, start, last.body, row, slider, piece)
+    row.spring_force = pull_on(start + step, start, last.body, row, slider)
     row.speed, row.sheared, row.radius = speeds[2], last.sheared, last.radius
     row.body_speed = last.body_speed if slider.mass > 0.0 else bodies[2]
     row.bound, row.moment = last.bound, last.moment
@@ -316,7 +326,7 @@ def stored_energy(row, square, time, slider, contact):
     stiffness, mass, viscosity = slider.stiffness, slider.mass, slider.viscosity
     _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
     if not area >= 0.0:  # equilibrium was lost on the way
-        area = math.pi * row.radius * row.radius / contact.solid.area
+        area = math.pi * row.radius * row.radius / contact.area
     energy = 0.5 * mass * row.body_speed * row.body_speed + 0.5 * area * square
     energy += 0.5 * row.sheared * area * (row.moment + viscosity * row.speed)
     return energy + 0.5 * row.spring_force * row.spring_force / stiffness if stiffness > 0.0 else energy
@@ -452,21 +462,19 @@ def _let_go(row, pool, time, brief, slider, contact, unit, rules, node, energy):
 
 
 @device
-def _piece(row, bonds, slider, contact, piece, unit, rules, room, energy):
+def _piece(row, bonds, slider, contact, unit, rules, room, energy):
     """Go through one piece of a clock step; the time after which it ends or there is no way on, and the bonds.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
     pool, saved, nodes = room
     count, travelled, settled = bonds
-    start, length = 0.0, piece.length
+    start, length = 0.0, slider.length
     brittle = slider.mass + slider.damping + slider.viscosity == 0.0
     sums_at(pool, count, unit, rules, nodes[0])
     for _ in range(MOST_STEPS):
         left = length - start
-        step = row.next_step if row.next_step > 0.0 else 1e-3 * length
-        step = min(step, longest(row, unit, rules))
-        step = left if step > 0.999 * left else min(step, 0.5 * left)
+        step = next_step(row, left, length, longest(row, unit, rules))
         if left <= LEAST * length:
             return length, count, travelled, settled
         if not step > LEAST * length:
@@ -481,17 +489,10 @@ def _piece(row, bonds, slider, contact, piece, unit, rules, room, energy):
             continue
         saved[:, :count] = pool[:3, :count]
         first = nodes[0]
-        first.radius, first.area, _, _ = contact_area(first.bound, first.moment, start, row.radius, contact)
-        first.sheared = row.sheared
-        yields, _ = compliance(first.radius, slider)
-        at_start = start_of(row, first, yields, slider)
-        found, factor = go_to_node(
-            1, nodes, at_start, pool, count, start, step, row, slider, contact, piece, unit, rules
-        )
+        at_start = set_out(row, first, start, slider, contact)
+        found, factor = go_to_node(1, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules)
         if found >= 0:
-            found, other = go_to_node(
-                2, nodes, at_start, pool, found, start, step, row, slider, contact, piece, unit, rules
-            )
+            found, other = go_to_node(2, nodes, at_start, pool, found, start, step, row, slider, contact, unit, rules)
             factor = min(factor, other)
         way, bend, error = nodes[2].slip, 0.0, math.inf
         if found >= 0:
@@ -511,7 +512,7 @@ def _piece(row, bonds, slider, contact, piece, unit, rules, room, energy):
                     count, row.next_step = found, 1e-6 * length
                     travelled += unit * (row.slip - slid)
             continue
-        book_nodes(row, nodes, start, step, slider, piece, rules.limit / unit, energy)
+        book_nodes(row, nodes, start, step, slider, rules.limit / unit, energy)
         count, row.acceleration = found, bend
         travelled += unit * way
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:
@@ -532,20 +533,16 @@ def _piece(row, bonds, slider, contact, piece, unit, rules, room, energy):
 def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, room):
     """Take a row and its cohorts through the pieces of a clock step; the time reached, whether something holds."""
     (weight, stretch, width, lattice), (pool, _, nodes) = bonds, room
-    is_open = not row.radius > 0.0
-    row.radius = 0.0 if is_open else row.radius
-    now, time, going = later(contact, 0.0, 1.0 if is_open else contact.stays), 0.0, True
     count = read_row(pool, weight, stretch, width, share)
-    travelled, settled = lattice[0], lattice[1]
+    time, going, travelled, settled = 0.0, True, lattice[0], lattice[1]
     for p in range(len(pieces)):
-        piece = piece_of(pieces, p)
-        from_here, reached, worked, slid = later(now, time, now.stays), 0.0, energy.work, row.slip
-        before = energy.stored
+        slider, from_here = slider_in(slider, pieces[p]), later(contact, time, contact.stays)
+        reached, worked, slid, before = 0.0, energy.work, row.slip, energy.stored
         sums_at(pool, count, unit, rules, nodes[0])
         if p > 0:
             before = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
         row.bound, row.moment = nodes[0].bound, nodes[0].moment
-        going = elastic(row, 0.0, slider, from_here, piece, energy)
+        going = elastic(row, 0.0, slider, from_here, energy)
         if going:
             for i in range(count):
                 pool[1, i] += unit * (row.slip - slid)
@@ -554,15 +551,15 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
             left = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
             energy.area += energy.work - worked - left + before
             reached, count, travelled, settled = _piece(
-                row, (count, travelled, settled), slider, from_here, piece, unit, rules, room, energy
+                row, (count, travelled, settled), slider, from_here, unit, rules, room, energy
             )
         time += reached
-        going = going and reached == piece.length
+        going = going and reached == slider.length
         if not going:
             break
     if going:
         sums_at(pool, count, unit, rules, nodes[0])
-        energy.stored = stored_energy(row, nodes[0].square, time, slider, now)
+        energy.stored = stored_energy(row, nodes[0].square, time, slider, contact)
     if count > weight.size:
         count = settle(pool[0], pool[1], pool[2], count, 1.0 if row.slip >= 0.0 else -1.0, travelled, rules)
         settled = count
@@ -584,7 +581,7 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
     as in ``mean_field.advance_rows``.
     """
     rows, energies, bare, pieces, clock, units, work = inputs
-    slider, solid, stays, reached, spent = Slider(*numbers[0]), Solid(*numbers[2]), numbers[3], outputs[0], outputs[1]
+    slider, contact, (reached, spent) = Slider(*numbers[0]), Contact(*numbers[2]), outputs
     rules, most, unit = rules_of(rules), weight.shape[1] + 520, units[SLIP]
     columns, booked, nodes = np.empty(COLUMNS), np.empty(ENERGIES), np.zeros(3, NODE)
     row, energy, room = columns.view(ROW)[0], booked.view(ENERGY)[0], (np.empty((9, most)), np.empty((3, most)), nodes)
@@ -595,8 +592,8 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
             start, stop = stop, pieces_to(k, stop, pieces)
             take_up(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(row.runaway_time):
-                contact = contact_from(solid, stays, bare[m], clock[k])
-                time, going = _through(row, energy, pieces[start:stop], slider, contact, unit, left, rules, bonds, room)
+                now = contact_at(contact, bare[m], clock[k], row)
+                time, going = _through(row, energy, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
                 if not going:
                     run_away(row, booked, clock[k, 0] + time)
                 left = 1.0

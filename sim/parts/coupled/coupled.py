@@ -28,7 +28,7 @@ from sim.parts.bonds.models import (
 from sim.parts.bonds.tracked import AGAIN, Tracks
 from sim.parts.coupled.cohorts import advance_cohorts
 from sim.parts.coupled.mean_field import advance_rows
-from sim.parts.coupled.row import COLUMNS, ROW, Inputs, Law, Slider, Solid
+from sim.parts.coupled.row import COLUMNS, ROW, Contact, Inputs, Law, Slider
 from sim.parts.coupled.tracked import advance_tracks
 from sim.parts.drive import ENERGY, Driven, Force, Spring
 from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sliding, Times
@@ -39,12 +39,12 @@ _STRETCH = 1e-9
 _STRETCHED = ["body_speed", "sheared", "moment", "speed", "position", "slip", "path", "acceleration"]
 #: Relative difference up to which two radii are the same equilibrium, found on two ways.
 _SAME = 1e-9
-#: Numbers of slider, bonds and solid, and 1.0 if the radius stays.
-_Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...], float]
+#: Numbers of slider, bonds and contact.
+_Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
 
 
 class StepContact(NamedTuple):
-    """Contact and half-space contact slider and bonds during some clock steps.
+    """Contact and half-space around slider and bonds during some clock steps.
 
     Attributes
     ----------
@@ -86,24 +86,18 @@ _Driven = FirstMoment | Cohort | Tracked | Unbroken | Steady | Rate | Counted
 _WITH_STRETCH = FirstMoment | Cohort | Tracked
 
 
-class _Units(NamedTuple):
-    """Units in which a step is made: a stretch b [m], and a force over the area at rest [N].
+def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: float) -> tuple[float, float]:
+    """Return the units in which a step is computed: a stretch b [m], and a force over the area at rest [N].
 
-    That of all sites at the stretch b, n κ b A0; of bonds without a stretch their strength, τ A0, b being the way on
-    which it loads the spring or on which sliding renews the bonds.
+    The force is that of all sites at the stretch b, n κ b A0. In models without stretch it is their strength, τ A0, and
+    b is the displacement on which that loads the spring or on which sliding renews the bonds.
     """
-
-    stretch: float
-    force: float
-
-
-def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: float) -> _Units:
     most = max(map(abs, drive.course.extremes))
     if not isinstance(bonds, _WITH_STRETCH):
         force = bonds.stress * contact.area
         slow = drive.mass / step + drive.damping + drive.viscosity * contact.area
         way = force / drive.spring if drive.spring else max(most, force) * step / slow
-        return _Units(min(way, _renewing(bonds)), force)
+        return min(way, _renewing(bonds)), force
     law, bears = bonds.law, bonds.site_density * bonds.bond_stiffness * contact.area
     if law.softness > 0.0:
         stretch = 1.0 / law.softness
@@ -111,7 +105,7 @@ def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: fl
         stretch = law.limit
     else:
         stretch = most / (law.rate if drive.spring else bears * bonds.bound_at_rest) or _STRETCH
-    return _Units(stretch, bears * stretch)
+    return stretch, bears * stretch
 
 
 def _renewing(bonds: _Driven) -> float:
@@ -172,11 +166,9 @@ def advance(
     pieces, duration = drive.driven(ends, times.duration), ends[1:] - ends[:-1]
     scale = 1.0 / (stretch if drive.spring else force)
     course = np.stack([pieces.interval, pieces.stop - pieces.start, *(scale * np.array(pieces[3:6]))], axis=1)
-    bare = contact.bare + np.zeros(members)
-    table = rows.view(float).reshape(members, COLUMNS)
-    inputs = Inputs(
-        table, slider.energies.copy(), bare, course, _clock(contact, ends), scales.view(float), stretch * force
-    )
+    state, bare = rows.view(float).reshape(members, COLUMNS), contact.bare + np.zeros(members)
+    clock, work = _clock(contact, ends), stretch * force
+    inputs = Inputs(state, slider.energies.copy(), bare, course, clock, scales.view(float), work)
     columns, energies = np.empty((COLUMNS, len(steps), members)), np.empty((len(steps), *slider.energies.shape))
     numbers = _numbers(drive, bonds, contact, units)
     end, bonding = _advanced(bonds, population, contact.radius, inputs, numbers, (columns, energies), noise)
@@ -187,8 +179,8 @@ def advance(
         stage[:], stage_speed[:] = whole.integral[:, np.newaxis], whole.last[:, np.newaxis]
         stage[0] += slider.stage_position
         np.add.accumulate(stage, out=stage)
-    state = reached | {"stage_position": stage, "stage_speed": stage_speed, "energies": energies}
-    after = Driven(*(state[name] for name in Driven._fields))
+    of_drive = {"stage_position": stage, "stage_speed": stage_speed, "energies": energies}
+    after = Driven(*((reached | of_drive)[name] for name in Driven._fields))
     first = np.concatenate([slider.speed[np.newaxis], after.speed[:-1]])
     path, spans = reached["path"], duration[:, np.newaxis]
     unsteady = np.maximum(reached["squared_speed"] - path**2 / spans, 0.0)  # slip at once is spread over the step
@@ -263,13 +255,13 @@ def _agree(own: Array, radius: Array) -> Flags:
     return same
 
 
-def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units: _Units) -> _Numbers:
+def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units: tuple[float, float]) -> _Numbers:
     """The numbers of slider, bonds and contact, but for what holds the sphere, in their units."""
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * contact.area)
     yields, slope = (stiff * value for value in drive.yields(contact.shear_modulus, contact.poisson_ratio))
     body = drive.spring / stiff, drive.mass / stiff, drive.damping / stiff, drive.viscosity / density
-    slider = Slider(*body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
+    slider = Slider(0.0, 0.0, 0.0, 0.0, *body, 0.0 if drive.spring else 1.0, yields, slope, drive.tolerance)
     if isinstance(bonds, _WITH_STRETCH):
         law, of_rest = bonds.law, bonds.bound_at_rest
         breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, stretch / law.limit, bonds.rebinding_rate, 1.0)
@@ -281,11 +273,9 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
     if contact.reversible:
         stress = density * stretch
         taken = contact.reversible * float(mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio))
-    solid = Solid(
-        contact.bonded / of_rest, taken, contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus,
-        contact.area,
-    )  # fmt: skip
-    return tuple(slider), tuple(breaking), tuple(solid), float(contact.stays)
+    still = 0.0, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, taken
+    solid = contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus, contact.area
+    return tuple(slider), tuple(breaking), tuple(Contact(*still, *solid))
 
 
 def _clock(contact: StepContact, ends: Array) -> Array:

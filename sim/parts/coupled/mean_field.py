@@ -15,26 +15,28 @@ from sim.parts.coupled.row import (
     NUMBERS,
     OUTPUTS,
     ROW,
+    Contact,
     Law,
     Slider,
-    Solid,
     area_kept,
     compliance,
     contact_area,
-    contact_from,
+    contact_at,
+    displace,
     driven,
     elastic,
     free_ways,
     later,
-    piece_of,
+    next_step,
     pieces_to,
     pull_on,
     put_down,
     run_away,
+    slider_in,
     slip_free,
     slips_free,
     take_up,
-)  # fmt: skip
+)
 from sim.parts.drive import ENERGY
 
 #: Way over the cut-off stretch on which bonds are tried, and that within which they may snap.
@@ -115,10 +117,7 @@ def snap(row, time, reach, slider, law, contact, energy):
     broken = 0.25 * (first + area) * (1.0 - left) * (mean * mean + mean * later + later * later) / row.bound
     before = stored_in(row, time, slider, law, contact)
     row.bound, row.moment, row.radius, row.sheared = bound, moment, radius, sheared
-    row.spring_force -= slider.stiffness * body
-    row.position += body
-    row.slip += sense * high
-    row.path += high
+    displace(row, sense * high, body, slider)
     energy.rupture += broken
     energy.snaps += before - stored_in(row, time, slider, law, contact) - broken
     return True
@@ -154,18 +153,17 @@ _FEW_TURNS = 20
 
 
 @device
-def _piece(row, slider, law, contact, piece, nodes, energy):
+def _piece(row, slider, law, contact, nodes, energy):
     """Go through one piece of a clock step; the time after which it ends or there is no way on.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
-    start, length = 0.0, piece.length
+    start, length = 0.0, slider.length
     yields, _ = compliance(row.radius, slider)
     brittle = law.cuts > 0.0 and slider.viscosity == 0.0 and (slider.mass + slider.damping == 0.0 or yields > 0.0)
     for _ in range(MOST_STEPS):
         left = length - start
-        step = row.next_step if row.next_step > 0.0 else 1e-3 * length
-        step = left if step > 0.999 * left else min(step, 0.5 * left)
+        step = next_step(row, left, length, math.inf)
         if not step > LEAST * length:
             gone = let_go(row, start, _BRIEF * length, slider, law, contact, energy)
             if contact.stays > 0.0 and not gone:
@@ -173,13 +171,13 @@ def _piece(row, slider, law, contact, piece, nodes, energy):
             contact, nodes.last_step = (contact, 0.0) if gone else (later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
-        grows, stands = tried(row, start, step, slider, law, contact, piece, nodes)
+        grows, stands = tried(row, start, step, slider, law, contact, nodes)
         if not stands:
             row.next_step = step * grows
             if brittle and step < _BRIEF * length and snap(row, start, NEAR, slider, law, contact, energy):
                 row.next_step, nodes.last_step = 1e-6 * length, 0.0
             continue
-        book(row, start, step, slider, law, contact, piece, nodes, energy)
+        book(row, start, step, slider, law, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         if brittle and snap(row, start + step, 0.0, slider, law, contact, energy):
             row.next_step, nodes.last_step = 1e-6 * length, 0.0
@@ -190,34 +188,34 @@ def _piece(row, slider, law, contact, piece, nodes, energy):
 
 
 @device
-def _slips(time, start, row, slider, law, contact, piece):
+def _slips(time, start, row, slider, law, contact):
     """Pull beyond what the bonds bear at a time if nothing has moved since the start, over the unit of force."""
     share = rested(row.bound, time - start, law)
     _, area, _, _ = area_kept(share, share, time, row, contact)
-    return math.fabs(pull_on(time, start, 0.0, row, slider, piece)) - area * share
+    return math.fabs(pull_on(time, start, 0.0, row, slider)) - area * share
 
 
 @device
-def _rest(row, start, settles, slider, law, contact, piece, energy):
+def _rest(row, start, settles, slider, law, contact, energy):
     """Stay at rest until the pull is more than bonds bear; the time at which it is, or the end of the piece.
 
     A slip that ``settles`` has come to rest where pull and strength are equal, and the strength grows faster.
     """
-    length = piece.length
+    length = slider.length
     end, before = length, start
     for k in range(1 if settles else 0, _PLACES + 1):
         time = start + (length - start) * (k / _PLACES)
-        if _slips(time, start, row, slider, law, contact, piece) > 0.0:
+        if _slips(time, start, row, slider, law, contact) > 0.0:
             low, end = before, time
             for _ in range(_HALVINGS):
                 middle = 0.5 * (low + end)
-                if _slips(middle, start, row, slider, law, contact, piece) > 0.0:
+                if _slips(middle, start, row, slider, law, contact) > 0.0:
                     end = middle
                 else:
                     low = middle
             break
         before = time
-    first, last = row.spring_force, pull_on(end, start, 0.0, row, slider, piece)
+    first, last = row.spring_force, pull_on(end, start, 0.0, row, slider)
     if slider.forced == 0.0:
         energy.work += 0.5 * (last - first) * (last + first) / slider.stiffness
     moment, share = 0.0, rested(row.bound, end - start, law)
@@ -254,13 +252,12 @@ def _jump(row, time, slider, law, contact):
 
 
 @device
-def _slide(row, start, slider, along, contact, piece, nodes, energy):
+def _slide(row, start, slider, along, contact, nodes, energy):
     """Slip until the speed comes to zero or the piece ends; the time reached, negative where there is no way on."""
-    length, sense = piece.length, along.sense
+    length, sense = slider.length, along.sense
     for _ in range(MOST_STEPS):
         left = length - start
-        step = row.next_step if row.next_step > 0.0 else 1e-3 * length
-        step = left if step > 0.999 * left else min(step, 0.5 * left)
+        step = next_step(row, left, length, math.inf)
         if not step > LEAST * length:
             row.next_step = 0.0
             left = row.bound * (1.0 - _NEXT_TO), start + _NEXT_TO * length
@@ -269,7 +266,7 @@ def _slide(row, start, slider, along, contact, piece, nodes, energy):
                 contact = later(contact, 0.0, 1.0)
                 continue
             return start if slider.mass == 0.0 or row.speed == 0.0 else -1.0
-        grows, stands = tried(row, start, step, slider, along, contact, piece, nodes)
+        grows, stands = tried(row, start, step, slider, along, contact, nodes)
         if not stands:
             row.next_step = step * grows
             continue
@@ -282,7 +279,7 @@ def _slide(row, start, slider, along, contact, piece, nodes, energy):
             near, above, far, below, side = 0.0, row.speed * sense, step, speed, 0
             for _ in range(100):
                 step = near + (far - near) * (above / (above - below))
-                if not newton(row, start, step, slider, along, contact, piece, nodes):
+                if not newton(row, start, step, slider, along, contact, nodes):
                     break
                 speed = _last_speed(nodes, step) * sense
                 if math.fabs(speed) <= 1e-13 * math.fabs(row.speed) or far - near <= 1e-15 * far:
@@ -295,7 +292,7 @@ def _slide(row, start, slider, along, contact, piece, nodes, energy):
                     far, below = step, speed
                     above *= 0.5 if side < 0 else 1.0
                     side = -1
-        book(row, start, step, slider, along, contact, piece, nodes, energy)
+        book(row, start, step, slider, along, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         start = length if step == left else start + step
         if stops:
@@ -312,9 +309,9 @@ def _last_speed(nodes, step):
 
 
 @device
-def _sticking_piece(row, slider, law, contact, piece, nodes, energy):
+def _sticking_piece(row, slider, law, contact, nodes, energy):
     """Go through one piece with bonds that bear any pull up to their strength at rest; the time reached."""
-    start, length = 0.0, piece.length
+    start, length = 0.0, slider.length
     stuck, sense = 0, 0.0
     for _ in range(_CHANGES):
         if start >= length:
@@ -323,7 +320,7 @@ def _sticking_piece(row, slider, law, contact, piece, nodes, energy):
         if rests:
             before = start
             settles = law.binding > 0.0 and sense * row.spring_force > 0.0
-            start = _rest(row, start, settles, slider, law, contact, piece, energy)
+            start = _rest(row, start, settles, slider, law, contact, energy)
             if start >= length:
                 return length
             stuck = stuck + 1 if start == before else 0
@@ -336,7 +333,7 @@ def _sticking_piece(row, slider, law, contact, piece, nodes, energy):
             row.speed = row.body_speed = speed
             row.bound *= share_left(speed, along)
             row.moment = sense * row.bound
-        start = _slide(row, start, slider, along, contact, piece, nodes, energy)
+        start = _slide(row, start, slider, along, contact, nodes, energy)
         if start < 0.0:
             return 0.0
         if start < length:
@@ -345,42 +342,34 @@ def _sticking_piece(row, slider, law, contact, piece, nodes, energy):
 
 
 @device
-def _goes_along(row, slider, law, piece):
-    """Go to where the spring is free, and along with the stage, as nothing else holds an open contact."""
-    way, _ = free_ways(row, slider)
-    row.speed = row.body_speed = driven(0.0, piece)[1]
-    row.spring_force, row.bound = 0.0, row.bound if law.slows == 0.0 else 1.0 / (1.0 + law.slows * math.fabs(row.speed))
-    row.position += way
-    row.slip += way
-    row.path += math.fabs(way)
-
-
-@device
 def _clock_step(row, slider, law, contact, pieces, nodes, energy):
     """Go through the pieces of a clock step; the time reached, and whether something holds the body still."""
-    is_open = not row.radius > 0.0
-    row.radius = 0.0 if is_open else row.radius
-    now, time, worked, going = later(contact, 0.0, 1.0 if is_open else contact.stays), 0.0, energy.work, True
+    is_open, time, worked, going = row.radius == 0.0, 0.0, energy.work, True
     for p in range(len(pieces)):
-        piece = piece_of(pieces, p)
+        slider = slider_in(slider, pieces[p])
         nodes.last_step = 0.0
         if is_open and law.sense != 0.0 and slider.mass + slider.damping + slider.forced == 0.0:
-            _goes_along(row, slider, law, piece)
+            slip, _ = free_ways(row, slider)  # as nothing else holds an open contact, it goes along with the stage
+            displace(row, slip, slip, slider)
+            row.speed = row.body_speed = driven(0.0, slider)[1]
+            row.spring_force = 0.0
+            if law.slows != 0.0:
+                row.bound = 1.0 / (1.0 + law.slows * math.fabs(row.speed))
         if p == 0:
             if law.sense == 0.0:
-                going = elastic(row, 0.0, slider, now, piece, energy)
+                going = elastic(row, 0.0, slider, contact, energy)
             elif slider.forced > 0.0:
-                row.spring_force = driven(0.0, piece)[1]
-            energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, now) + energy.stored
-        ahead, reached = later(now, time, now.stays), 0.0
+                row.spring_force = driven(0.0, slider)[1]
+            energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, contact) + energy.stored
+        ahead, reached = later(contact, time, contact.stays), 0.0
         if going and law.sense == 0.0:
-            reached = _piece(row, slider, law, ahead, piece, nodes, energy)
+            reached = _piece(row, slider, law, ahead, nodes, energy)
         elif going:
-            reached = _sticking_piece(row, slider, law, ahead, piece, nodes, energy)
+            reached = _sticking_piece(row, slider, law, ahead, nodes, energy)
         time += reached
-        if not (going and reached == piece.length):
+        if not (going and reached == slider.length):
             return time, False
-    energy.stored = stored_in(row, time, slider, law, now)
+    energy.stored = stored_in(row, time, slider, law, contact)
     return time, True
 
 
@@ -388,12 +377,12 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
 def advance_rows(inputs, numbers, outputs):
     """Advance all rows and their energies through some clock steps, each row by itself.
 
-    ``numbers``: those of ``Slider``, ``Law`` and ``Solid``, and 1 if the radius stays. ``outputs``: columns and
+    ``numbers``: those of ``Slider``, ``Law`` and ``Contact``. ``outputs``: columns and
     energies at the end of each step, shape (columns, steps, rows) and (steps, rows, energies). A row that nothing holds
     any longer ends there.
     """
     rows, energies, bare, pieces, clock, units, work = inputs
-    slider, law, solid, stays = Slider(*numbers[0]), Law(*numbers[1]), Solid(*numbers[2]), numbers[3]
+    slider, law, contact = Slider(*numbers[0]), Law(*numbers[1]), Contact(*numbers[2])
     reached, spent = outputs
     columns, booked, nodes = np.empty(COLUMNS), np.empty(ENERGIES), np.empty(1, NODE_VALUES)
     row, energy = columns.view(ROW)[0], booked.view(ENERGY)[0]
@@ -405,8 +394,8 @@ def advance_rows(inputs, numbers, outputs):
             if law.sense != 0.0:
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
             if math.isnan(row.runaway_time):
-                contact = contact_from(solid, stays, bare[m], clock[k])
-                time, going = _clock_step(row, slider, law, contact, pieces[start:stop], nodes[0], energy)
+                now = contact_at(contact, bare[m], clock[k], row)
+                time, going = _clock_step(row, slider, law, now, pieces[start:stop], nodes[0], energy)
                 if not going:
                     run_away(row, booked, clock[k, 0] + time)
             put_down(columns, booked, rows[m], energies[m], units, work)

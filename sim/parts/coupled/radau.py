@@ -19,7 +19,6 @@ import numpy as np
 
 from sim.numerics.jit import device, inlined
 from sim.parts.coupled.row import FEW, SOME, compliance, contact_area, driven, pull_on
-from sim.parts.exchange import Array
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -36,35 +35,24 @@ BENDS = np.array([[sum(row[k] * RATES[k, j] for k in range(3)) for j in range(3)
 _OFF = np.array([sum(row) for row in RATES])
 
 
-def _modes() -> tuple[float, complex, Array, Array]:
-    """Eigenvalues of ``RATES``, one real and one of the complex pair; matrices that lead back to nodes and from them.
-
-    The last two columns are the real part and minus the imaginary part of the vector of the complex one. In closed form
-    (Hairer & Wanner 1996, IV.8), as numbers of a linear-algebra library depend on the machine.
-    """
-    root = 3.0 ** (1.0 / 3.0)
-    real = 3.0 + root * root - root
-    pair = 3.0 + 0.5 * (root - root * root) + 0.5j * math.sqrt(3.0) * (root + root * root)
-    turning = _mode(pair)
-    forth = np.array([[one.real for one in _mode(real)], [x.real for x in turning], [-x.imag for x in turning]])
-    a, b, c = forth.tolist()
-    back = np.array([_cross(b, c), _cross(c, a), _cross(a, b)])
-    return real, pair, np.ascontiguousarray(forth.T), back / sum(x * y for x, y in zip(a, _cross(b, c), strict=True))
-
-
-def _mode(value: complex) -> list[complex]:
-    """The vector that ``RATES`` multiplies by a value."""
-    (a, b, c), (d, e, f), _ = RATES.tolist()
-    a, e = a - value, e - value
-    return [(b * f - c * e) / (a * e - b * d), (c * d - a * f) / (a * e - b * d), 1.0]
-
-
-def _cross(a: list[float], b: list[float]) -> list[float]:
-    """Cross product of two vectors."""
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-PACE, TURNING, FORTH, BACK = _modes()
+#: Eigenvalues of ``RATES``, one real and one of the complex pair; matrices that lead back to nodes and from them. The
+#: last two columns are the real part and minus the imaginary part of the vector of the complex one (Hairer & Wanner
+#: 1996, IV.8). Literal, as numbers of a linear-algebra library depend on the machine.
+PACE, TURNING = 3.637834252744496, 2.6810828736277523 + 3.05043019924741j
+FORTH = np.array(
+    [
+        [0.09443876248897526, -0.14125529502095427, -0.030029194105147337],
+        [0.2502131229653332, 0.20412935229380014, 0.38294211275726203],
+        [1.0, 1.0, -0.0],
+    ]
+)
+BACK = np.array(
+    [
+        [4.178718591551904, 0.3276828207610613, 0.5233764454994498],
+        [-4.178718591551904, -0.3276828207610613, 0.4766235545005501],
+        [-0.5028726349457834, 2.571926949855605, -0.5960392048282249],
+    ]
+)
 _THREE = ("f8", 3)
 #: Three nodes of a sub-step: the unknowns slip, u, N, M as ``values`` and by their names, their residuals, their values
 #: in the last sub-step; contact radii, forces on a body that stays, areas, k_t; length and root of the error of the
@@ -126,7 +114,7 @@ def equations(row, nodes, start, step, slider, law, contact):
     over, gives = 1.0 / step, slider.yielding + slider.yielding_radius > 0.0
     radius, area, by_bound, by_moment = row.radius, 0.0, 0.0, 0.0
     if contact.stays > 0.0:
-        area = math.pi * radius * radius / contact.solid.area
+        area = math.pi * radius * radius / contact.area
     of_balance, of_u = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     of_bonds = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for i in range(3):
@@ -165,7 +153,7 @@ def equations(row, nodes, start, step, slider, law, contact):
         if i == 1:
             of_balance = by_bound * stress, area + by_moment * stress, area * viscosity
             if yields > 0.0:
-                softer *= contact.solid.area / (2.0 * math.pi * radius) * area * stress
+                softer *= contact.area / (2.0 * math.pi * radius) * area * stress
                 of_u = (
                     -yields * of_balance[0] - softer * by_bound,
                     -yields * of_balance[1] - softer * by_moment,
@@ -182,8 +170,9 @@ def _over(number):
 
 @device
 def _resolved(rate, slopes, slider, law):
-    """How slip, u, N, M take away residuals of a mode of the method, in which a derivative is a ``rate``.
+    """Return how slip, u, N, M take away residuals of a mode of the method, in which a derivative is a ``rate``.
 
+    With the same slopes at all nodes each mode is solved by itself (Hairer & Wanner II, IV.8). The result has
     N and M over their residuals, and over the slip; u over the slip; the slip over all residuals.
     """
     to_bound, to_moment, thick, u_bound, u_moment, u_speed = slopes[:6]
@@ -199,16 +188,6 @@ def _resolved(rate, slopes, slider, law):
     by_n, by_m = firm * u_bound - to_bound, firm * u_moment - to_moment
     slip = yields, -firm * yields, (by_n * nn + by_m * mn) * yields, (by_n * nm + by_m * mm) * yields
     return (nn, nm, mn, mm, n_slip, m_slip, u_slip) + slip
-
-
-@inlined
-def resolved(slopes, step, slider, law):
-    """Solutions of the method's modes, one real and two complex, with the same slopes at all nodes.
-
-    So they are on their own (Hairer & Wanner II, IV.8).
-    """
-    turning = complex(TURNING.real / step, TURNING.imag / step)
-    return _resolved(PACE / step, slopes, slider, law), _resolved(turning, slopes, slider, law)
 
 
 @device
@@ -242,22 +221,11 @@ def _turned(residuals):
     return complex(_sum(BACK, 1, residuals), _sum(BACK, 2, residuals))
 
 
-#: Share of a sub-step after which the defect of the equations is measured, between the first two nodes.
-_BETWEEN = 0.4
-
-
-def _between() -> tuple[Array, Array]:
-    """Values and slopes of the polynomials through start and nodes at ``_BETWEEN``, that of the start last."""
-    places = np.append(NODES, 0.0)
-    values, slopes = np.empty(4), np.empty(4)
-    for j in range(4):
-        others = np.delete(places, j)
-        lagrange = np.poly1d(others, r=True) / np.prod(places[j] - others)
-        values[j], slopes[j] = lagrange(_BETWEEN), lagrange.deriv()(_BETWEEN)
-    return values, slopes
-
-
-_VALUES, _SLOPES = _between()
+#: Share of a sub-step after which the defect of the equations is measured, between the first two nodes; there values
+#: and slopes of the polynomials through the nodes and the start, that of the start last.
+BETWEEN = 0.4
+VALUES = np.array([0.915959179422654, 0.5240408205773457, -0.07999999999999999, -0.3599999999999999])
+SLOPES = np.array([-2.9760883751542693, 2.576088375154268, -0.19999999999999984, 0.5999999999999996])
 #: Most turns of Newton's method.
 _TURNS = 12
 #: Slopes, and solutions of the modes, before the first ones are known.
@@ -292,7 +260,7 @@ def _ahead(row, nodes, step, law):
 
 
 @device
-def newton(row, start, step, slider, law, contact, piece, nodes):
+def newton(row, start, step, slider, law, contact, nodes):
     """Solve for slip, u, N, M at the nodes, by Newton's method with the middle one's slopes; whether that worked.
 
     It ends where the next correction would be small, at the pace of the last two.
@@ -300,7 +268,7 @@ def newton(row, start, step, slider, law, contact, piece, nodes):
     _ahead(row, nodes, step, law)
     for i in range(3):
         nodes.radii[i] = row.radius
-        nodes.pulls[i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider, piece)
+        nodes.pulls[i] = pull_on(start + NODES[i] * step, start, 0.0, row, slider)
     bound = min(row.bound, row.bound + nodes.bound[2]) + FEW
     moment = min(math.fabs(row.moment), math.fabs(row.moment + nodes.moment[2]))
     of_slip, of_bound, of_moment = (
@@ -317,7 +285,8 @@ def newton(row, start, step, slider, law, contact, piece, nodes):
             return False
         if shrinks > _SLOW:
             slopes = latest
-            modes = resolved(slopes, step, slider, law)
+            turning = complex(TURNING.real / step, TURNING.imag / step)
+            modes = _resolved(PACE / step, slopes, slider, law), _resolved(turning, slopes, slider, law)
         correct(modes, slopes, slider, nodes)
         part, change = 1.0, 0.0
         for i in range(3):
@@ -341,7 +310,7 @@ def newton(row, start, step, slider, law, contact, piece, nodes):
 
 
 @inlined
-def error_of(row, start, step, slider, law, contact, piece, nodes):
+def error_of(row, start, step, slider, law, contact, nodes):
     """Defect of the equations between nodes, as an error of a stretch: of order 4 in the sub-step, over its scale.
 
     The polynomials through start and nodes solve the equations at the nodes alone. What is missing between them of the
@@ -350,29 +319,29 @@ def error_of(row, start, step, slider, law, contact, piece, nodes):
     stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
     slip, body, bound, moment = 0.0, 0.0, row.bound, row.moment
     speed, to_bound, to_moment, going = 0.0, 0.0, 0.0, 0.0
-    pace, bend = _VALUES[3] * row.body_speed, _SLOPES[3] * row.body_speed / step
+    pace, bend = VALUES[3] * row.body_speed, SLOPES[3] * row.body_speed / step
     for j in range(3):
         at_node = 0.0
         for k in range(3):
             at_node += RATES[j, k] * (nodes.slip[k] + nodes.sheared[k]) / step
-        pace += _VALUES[j] * at_node
-        bend += _SLOPES[j] * at_node / step
-        slip += _VALUES[j] * nodes.slip[j]
-        body += _VALUES[j] * (nodes.slip[j] + nodes.sheared[j])
-        going += _SLOPES[j] * (nodes.slip[j] + nodes.sheared[j]) / step
-        speed += _SLOPES[j] * nodes.slip[j] / step
-        bound += _VALUES[j] * nodes.bound[j]
-        moment += _VALUES[j] * nodes.moment[j]
-        to_bound += _SLOPES[j] * nodes.bound[j]
-        to_moment += _SLOPES[j] * nodes.moment[j]
-    time = start + _BETWEEN * step
+        pace += VALUES[j] * at_node
+        bend += SLOPES[j] * at_node / step
+        slip += VALUES[j] * nodes.slip[j]
+        body += VALUES[j] * (nodes.slip[j] + nodes.sheared[j])
+        going += SLOPES[j] * (nodes.slip[j] + nodes.sheared[j]) / step
+        speed += SLOPES[j] * nodes.slip[j] / step
+        bound += VALUES[j] * nodes.bound[j]
+        moment += VALUES[j] * nodes.moment[j]
+        to_bound += SLOPES[j] * nodes.bound[j]
+        to_moment += SLOPES[j] * nodes.moment[j]
+    time = start + BETWEEN * step
     radius, area, _, _ = contact_area(bound, moment, time, nodes.radii[0], contact)
     if not (area >= 0.0 and bound >= 0.0):
         return math.inf
     of_bound, of_moment, on, _, _, _ = kinetics(bound, moment, speed, law)
     pace = pace if mass > 0.0 else going
     balance = area * (moment + viscosity * speed) + damping * pace + mass * bend
-    balance -= pull_on(time, start, body, row, slider, piece)
+    balance -= pull_on(time, start, body, row, slider)
     bears = area * bound + (damping + area * viscosity) / step + mass / (step * step)
     scale = law.scale * (bound + FEW) + math.fabs(moment)
     if law.sense != 0.0:
@@ -393,16 +362,16 @@ def error_of(row, start, step, slider, law, contact, piece, nodes):
 
 
 @inlined
-def tried(row, start, step, slider, law, contact, piece, nodes):
+def tried(row, start, step, slider, law, contact, nodes):
     """Solve for a sub-step: length of the next over that of this one, and whether this one stands.
 
     The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
     tolerance. It goes with the sixth power of the length; where it has grown since the last sub-step, the same growth
     is expected of the next (Gustafsson 1994).
     """
-    if not newton(row, start, step, slider, law, contact, piece, nodes):
+    if not newton(row, start, step, slider, law, contact, nodes):
         return 0.25, False
-    error = error_of(row, start, step, slider, law, contact, piece, nodes)
+    error = error_of(row, start, step, slider, law, contact, nodes)
     error *= math.sqrt(error) / slider.tolerance
     if not error < math.inf:
         return 0.25, False
@@ -417,12 +386,12 @@ def tried(row, start, step, slider, law, contact, piece, nodes):
 
 
 @inlined
-def book(row, start, step, slider, law, contact, piece, nodes, energy):
+def book(row, start, step, slider, law, contact, nodes, energy):
     """Take an accepted sub-step: integrals of the powers by the method's own shares, and the row at its end."""
     damping, viscosity = slider.damping, slider.viscosity
     way, speed, body = 0.0, 0.0, 0.0
     follows = contact.stays == 0.0
-    first, firm = math.pi * row.radius * row.radius / contact.solid.area, 0.0
+    first, firm = math.pi * row.radius * row.radius / contact.area, 0.0
     if follows:
         _, first, _, _ = contact_area(row.bound, row.moment, start, row.radius, contact)
         yields, _ = compliance(row.radius, slider)
@@ -448,7 +417,7 @@ def book(row, start, step, slider, law, contact, piece, nodes, energy):
             row.sheared + nodes.sheared[i],
             nodes.pulls[i] - slider.stiffness * (nodes.slip[i] + nodes.sheared[i]),
         )
-        given = body if slider.forced > 0.0 else driven(start + NODES[i] * step, piece)[1]
+        given = body if slider.forced > 0.0 else driven(start + NODES[i] * step, slider)[1]
         _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
         square = moment * moment / bound if bound > 0.0 and law.sense == 0.0 else 0.0
         fresh = law.binding * (1.0 - bound) * square / bound if bound > 0.0 else 0.0

@@ -29,13 +29,20 @@ _STORED = (ENERGY.names or ()).index("stored")
 INPUTS = (
     "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64))"
 )
-NUMBERS = "Tuple((UniTuple(float64, 8), UniTuple(float64, 7), UniTuple(float64, 6), float64))"
+NUMBERS = "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 12)))"
 OUTPUTS = "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 
 
 class Slider(NamedTuple):
-    """Numbers of a drive: K, m, c, η, 1 if it prescribes the force, 1/k_t as constant + slope/a, tolerance."""
+    """Numbers of a drive during a piece: its length, the value prescribed at both ends, and the integral of it.
 
+    Then K, m, c, η, 1 if the force is prescribed, 1/k_t as constant + slope/a, tolerance.
+    """
+
+    length: float
+    first: float
+    last: float
+    integral: float
     stiffness: float
     mass: float
     damping: float
@@ -62,25 +69,11 @@ class Law(NamedTuple):
     slows: float = 0.0
 
 
-class Solid(NamedTuple):
-    """Numbers of the contact that stay: work of adhesion per bond share N, ``mean_stress``, stiffness behind the base,
-    curvature, modulus, reference area.
-
-    ``mean_stress`` is the energy that the mean stress takes, over radius and M².
-    """
-
-    bonded: float
-    mean_stress: float
-    stiffness: float
-    curvature: float
-    modulus: float
-    area: float
-
-
 class Contact(NamedTuple):
-    """Numbers of the contact from some time on.
+    """Numbers of the contact: work of adhesion without bonds; load and base with their rates; 1 if its radius stays.
 
-    Work of adhesion without bonds; load and base with their rates; 1 if the radius stays during the step, else 0.
+    Then work of adhesion per bond share N; energy that the mean stress takes, over radius and M²; stiffness behind the
+    base; curvature, modulus, reference area.
     """
 
     bare: float
@@ -89,24 +82,21 @@ class Contact(NamedTuple):
     base: float
     base_rate: float
     stays: float
-    solid: Solid
-
-
-class Piece(NamedTuple):
-    """Piece of a clock step: length, value of the drive at both ends, and its integral."""
-
-    length: float
-    first: float
-    last: float
-    integral: float
+    bonded: float
+    mean_stress: float
+    stiffness: float
+    curvature: float
+    modulus: float
+    area: float
 
 
 class Inputs(NamedTuple):
     """State and course of some clock steps, for all rows.
 
     ``rows`` and ``energies`` have the columns of ``ROW`` and ``ENERGY`` and are advanced in place; ``bare`` is the work
-    of adhesion of each row without bonds. ``pieces``: number of the clock step and a ``Piece``. ``clock``: beginning of
-    each step, load and its rate, base and its rate. ``units`` of the columns and of ``work``: the equations have none.
+    of adhesion of each row without bonds. ``pieces``: number of the clock step, then the first four of ``Slider``.
+    ``clock``: beginning of each step, load and its rate, base and its rate. ``units`` of the columns and of ``work``:
+    the equations have none.
     """
 
     rows: Array
@@ -119,9 +109,9 @@ class Inputs(NamedTuple):
 
 
 @device
-def _missing(a, load, base, solid):
+def _missing(a, load, base, contact):
     """Depth of a contact of Hertz of this radius beyond what holds the sphere, and its slope over the radius."""
-    stiffness, curvature, modulus = solid.stiffness, solid.curvature, solid.modulus
+    stiffness, curvature, modulus = contact.stiffness, contact.curvature, contact.modulus
     hertz = a * a * curvature
     if stiffness == math.inf:
         return hertz - base, 2.0 * a * curvature
@@ -137,16 +127,15 @@ def contact_area(bound, moment, time, radius, contact):
     Newton's method on the energy release rate, convex in the radius, from the last one: from the right of the root
     it goes left. nan where there is none; Hertz's radius where adhesion does not pay for the mean stress there.
     """
-    solid = contact.solid
     if contact.stays > 0.0:
-        return radius, math.pi * radius * radius / solid.area, 0.0, 0.0
-    bonded, taken, unit, modulus = solid.bonded, solid.mean_stress, solid.area, solid.modulus
+        return radius, math.pi * radius * radius / contact.area, 0.0, 0.0
+    bonded, taken, unit, modulus = contact.bonded, contact.mean_stress, contact.area, contact.modulus
     work, tilt = contact.bare + bonded * bound, taken * moment * moment
     load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
     a, slope = radius, 1.0
     if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
         for _ in range(60):
-            missing, growth = _missing(a, load, base, solid)
+            missing, growth = _missing(a, load, base, contact)
             a -= min(missing / growth, 0.5 * a)
             if math.fabs(missing) <= 1e-14 * growth * a:
                 break
@@ -154,7 +143,7 @@ def contact_area(bound, moment, time, radius, contact):
             return a, math.pi * a * a / unit, 0.0, 0.0
         a = max(a, radius)
     for _ in range(60):
-        missing, growth = _missing(a, load, base, solid)
+        missing, growth = _missing(a, load, base, contact)
         if work > 0.0:
             over = 0.5 / math.pi * modulus * missing * missing / a - work + tilt * a
             slope = 0.5 / math.pi * modulus * missing / a * (2.0 * growth - missing / a) + tilt
@@ -183,9 +172,9 @@ def compliance(radius, slider):
 
 
 @device
-def driven(time, piece):
+def driven(time, slider):
     """A prescribed value's integral from the start of its piece, and the value: a cubic through both ends."""
-    length, first, last, integral = piece.length, piece.first, piece.last, piece.integral
+    length, first, last, integral = slider.length, slider.first, slider.last, slider.integral
     share = time / length
     cubic = (first + last) * length - 2.0 * integral
     square = integral - first * length - cubic
@@ -194,11 +183,11 @@ def driven(time, piece):
 
 
 @device
-def pull_on(time, start, way, row, slider, piece):
+def pull_on(time, start, way, row, slider):
     """Spring force when the body has gone ``way`` since the ``start`` of a sub-step, or the force prescribed."""
     if slider.forced > 0.0:
-        return driven(time, piece)[1]
-    return row.spring_force + slider.stiffness * (driven(time, piece)[0] - driven(start, piece)[0] - way)
+        return driven(time, slider)[1]
+    return row.spring_force + slider.stiffness * (driven(time, slider)[0] - driven(start, slider)[0] - way)
 
 
 #: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
@@ -209,22 +198,41 @@ MOST_STEPS = 2_000_000
 
 
 @device
-def contact_from(solid, stays, bare, clock):
-    """Return the numbers of the contact from the beginning of a clock step on."""
-    return Contact(bare, clock[1], clock[2], clock[3], clock[4], stays, solid)
+def contact_at(contact, bare, clock, row):
+    """Return the numbers of the contact from the beginning of a clock step on; an open one stays open during it."""
+    is_open = not row.radius > 0.0
+    if is_open:
+        row.radius = 0.0
+    return Contact(bare, clock[1], clock[2], clock[3], clock[4], 1.0 if is_open else contact.stays, *contact[6:])
 
 
 @device
 def later(contact, time, stays):
     """Return the numbers of the contact some time later; its radius is fixed from there on if it ``stays``."""
     load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
-    return Contact(contact.bare, load, contact.load_rate, base, contact.base_rate, stays, contact.solid)
+    return Contact(contact.bare, load, contact.load_rate, base, contact.base_rate, stays, *contact[6:])
 
 
 @device
-def piece_of(pieces, p):
-    """Return a piece of a clock step."""
-    return Piece(pieces[p, 1], pieces[p, 2], pieces[p, 3], pieces[p, 4])
+def slider_in(slider, piece):
+    """Return the numbers of the drive during a piece of a clock step."""
+    return Slider(piece[1], piece[2], piece[3], piece[4], *slider[4:])
+
+
+@device
+def next_step(row, left, length, most):
+    """Return the next sub-step: at most ``most``, and all or at most half of what is ``left`` of a piece."""
+    step = min(row.next_step if row.next_step > 0.0 else 1e-3 * length, most)
+    return left if step > 0.999 * left else min(step, 0.5 * left)
+
+
+@device
+def displace(row, slip, body, slider):
+    """Move the interface and the body at once against the spring."""
+    row.spring_force -= slider.stiffness * body
+    row.position += body
+    row.slip += slip
+    row.path += math.fabs(slip)
 
 
 @device
@@ -271,11 +279,11 @@ def area_kept(bound, moment, time, row, contact):
     radius, area, by_bound, by_moment = contact_area(bound, moment, time, row.radius, contact)
     if area >= 0.0:
         return radius, area, by_bound, by_moment
-    return row.radius, math.pi * row.radius * row.radius / contact.solid.area, 0.0, 0.0
+    return row.radius, math.pi * row.radius * row.radius / contact.area, 0.0, 0.0
 
 
 @device
-def elastic(row, time, slider, contact, piece, energy):
+def elastic(row, time, slider, contact, energy):
     """Slip at once where the area or the force has jumped and neither mass, damping nor viscosity delays it.
 
     Behind a contact that yields the interface alone slips if the body cannot. What the elastic energies do not give
@@ -283,7 +291,7 @@ def elastic(row, time, slider, contact, piece, energy):
     """
     stiffness, forced, held_back = slider.stiffness, slider.forced, slider.mass + slider.damping > 0.0
     yields, _ = compliance(row.radius, slider)
-    row.spring_force = driven(time, piece)[1] if forced > 0.0 else row.spring_force
+    row.spring_force = driven(time, slider)[1] if forced > 0.0 else row.spring_force
     if (slider.viscosity > 0.0 and row.radius > 0.0) or (held_back and yields == 0.0):
         return True
     slip, bound, moment, way, radius, area = 0.0, row.bound, row.moment, 0.0, row.radius, 0.0
@@ -332,7 +340,4 @@ def slip_free(row, time, slider, contact):
     slip, body = free_ways(row, slider)
     radius, area, _, _ = contact_area(FEW, 0.0, time, row.radius, contact)
     row.bound, row.moment, row.sheared, row.radius = FEW, 0.0, 0.0, radius if area >= 0.0 else row.radius
-    row.spring_force -= slider.stiffness * body
-    row.position += body
-    row.slip += slip
-    row.path += math.fabs(slip)
+    displace(row, slip, body, slider)

@@ -34,9 +34,9 @@ from sim.parts.coupled.cohorts import (
     bend_of,
     book_nodes,
     error_of_way,
-    start_of,
+    set_out,
     stored_energy,
-)  # fmt: skip
+)
 from sim.parts.coupled.row import (
     COLUMNS,
     ENERGIES,
@@ -47,19 +47,20 @@ from sim.parts.coupled.row import (
     OUTPUTS,
     ROW,
     SLIP,
+    Contact,
     Slider,
-    Solid,
     compliance,
     contact_area,
-    contact_from,
+    contact_at,
     elastic,
     later,
-    piece_of,
+    next_step,
     pieces_to,
     put_down,
     run_away,
+    slider_in,
     take_up,
-)  # fmt: skip
+)
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array
 
@@ -109,7 +110,7 @@ def _same(node, bound, total):
 
 
 @device
-def _set_right(line, time, tracks, slider, contact, piece, ground, energy, node):
+def _set_right(line, time, tracks, slider, contact, ground, energy, node):
     """Slip at once to where bonds bear the pull, as far as nothing delays it; whether there is such a place."""
     row, trial, worked, unit, limit = line[0], np.empty(1, ROW), energy.work, ground.unit, ground.law[2]
     for _ in range(MOST_STEPS):
@@ -117,7 +118,7 @@ def _set_right(line, time, tracks, slider, contact, piece, ground, energy, node)
         _sums(tracks, ground, node)
         row.bound, row.moment = node.bound, node.moment
         trial[0] = row
-        if not elastic(trial[0], time, slider, contact, piece, energy):
+        if not elastic(trial[0], time, slider, contact, energy):
             return False
         slip, square = trial[0].slip - row.slip, node.square
         if not math.fabs(slip) > _ROUNDING * (math.fabs(node.moment) + node.bound):
@@ -126,7 +127,7 @@ def _set_right(line, time, tracks, slider, contact, piece, ground, energy, node)
         nearest = next_cut(tracks, slip, limit) / unit if limit < math.inf else math.inf
         whole = nearest >= math.fabs(slip)
         slip = slip if whole else math.copysign(nearest * (1.0 + 1e-12) + 1e-12 * limit / unit, slip)
-        _go(tracks, slip, _AT_ONCE * piece.length, ground)
+        _go(tracks, slip, _AT_ONCE * slider.length, ground)
         total, expected = row.moment + row.bound * slip, square + slip * (2.0 * row.moment + row.bound * slip)
         _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
         _sums(tracks, ground, node)
@@ -146,7 +147,7 @@ def _set_right(line, time, tracks, slider, contact, piece, ground, energy, node)
 
 
 @device
-def _try(nodes, at_start, start, step, row, slider, contact, piece):
+def _try(nodes, at_start, start, step, row, slider, contact):
     """Find the nodes of a sub-step in which no bond breaks or is made; whether there are any.
 
     The first guess is never taken: on the way to the next event, which may be as short as any, what is no slip may
@@ -158,7 +159,7 @@ def _try(nodes, at_start, start, step, row, slider, contact, piece):
         way, bound, found = approach.slip, before.bound, False
         for turn in range(_TURNS):
             total = before.moment + bound * way
-            over, slope, none = balance(way, bound, total, before, after, approach, start, row, slider, contact, piece)
+            over, slope, none = balance(way, bound, total, before, after, approach, start, row, slider, contact)
             if not slope > 0.0:
                 return False
             if turn > 0 and math.fabs(over / slope) <= none:
@@ -173,7 +174,7 @@ def _try(nodes, at_start, start, step, row, slider, contact, piece):
 
 
 @device
-def _after_event(line, time, tracks, slider, contact, piece, ground, energy, nodes):
+def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
     """Set right what a bond made or broken has changed; whether there is a way, with what holds the contact then."""
     row, node, area_before = line[0], nodes[0], nodes[2].area
     row.acceleration = 0.0
@@ -184,22 +185,22 @@ def _after_event(line, time, tracks, slider, contact, piece, ground, energy, nod
     yields, _ = compliance(row.radius, slider)
     if yields > 0.0 and slider.viscosity == 0.0:  # it is sheared as by the bonds before
         before += 0.5 * row.sheared * (row.sheared / yields - area * row.moment)
-    there = _set_right(line, time, tracks, slider, contact, piece, ground, energy, node)
+    there = _set_right(line, time, tracks, slider, contact, ground, energy, node)
     if not there and contact.stays == 0.0:
         contact = later(contact, 0.0, 1.0)
-        there = _set_right(line, time, tracks, slider, contact, piece, ground, energy, node)
+        there = _set_right(line, time, tracks, slider, contact, ground, energy, node)
     after = stored_energy(row, node.square, time, slider, contact)
     energy.snaps += before - after + energy.work - worked - (energy.rupture - lost)
     return there, contact
 
 
 @device
-def _piece(line, tracks, slider, contact, piece, ground, nodes, energy):
+def _piece(line, tracks, slider, contact, ground, nodes, energy):
     """Go through one piece of a clock step; the time after which it ends or there is no way on.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
-    start, length, unit, law = 0.0, piece.length, ground.unit, ground.law
+    start, length, unit, law = 0.0, slider.length, ground.unit, ground.law
     row, first, last = line[0], nodes[0], nodes[2]
     for _ in range(MOST_STEPS):
         left = length - start
@@ -207,17 +208,13 @@ def _piece(line, tracks, slider, contact, piece, ground, nodes, energy):
             return length
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
-        first.radius, first.area, _, _ = contact_area(first.bound, first.moment, start, row.radius, contact)
-        first.sheared = row.sheared
-        yields, _ = compliance(first.radius, slider)
-        at_start = start_of(row, first, yields, slider)
-        step = row.next_step if row.next_step > 0.0 else 1e-3 * length
-        step = left if step > 0.999 * left else min(step, 0.5 * left)
+        at_start = set_out(row, first, start, slider, contact)
+        step = next_step(row, left, length, math.inf)
         whole, bend, grows, cut, turns = step, 0.0, 0.0, False, 0
         for _ in range(_TRIALS):
             if not step > LEAST * length:
                 break
-            if not _try(nodes, at_start, start, step, row, slider, contact, piece):
+            if not _try(nodes, at_start, start, step, row, slider, contact):
                 step, cut = 0.25 * step, False
                 continue
             bend = bend_of(nodes, step)
@@ -239,7 +236,7 @@ def _piece(line, tracks, slider, contact, piece, ground, nodes, energy):
             contact = later(contact, 0.0, 1.0)
             row.next_step = 0.0
             continue
-        book_nodes(row, nodes, start, step, slider, piece, math.inf, energy)
+        book_nodes(row, nodes, start, step, slider, math.inf, energy)
         row.next_step = max(row.next_step, step * grows) if cut or step == left else step * grows
         start = length if step == left else start + step
         _go(tracks, last.slip, step, ground)
@@ -247,7 +244,7 @@ def _piece(line, tracks, slider, contact, piece, ground, nodes, energy):
         row.bound, row.moment, row.acceleration = first.bound, first.moment, bend
         energy.rupture += 0.5 * last.area * (last.square - first.square)
         if cut or not _same(first, last.bound, last.moment):
-            there, contact = _after_event(line, start, tracks, slider, contact, piece, ground, energy, nodes)
+            there, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
             if not there:
                 return start
         if start == length:
@@ -258,28 +255,25 @@ def _piece(line, tracks, slider, contact, piece, ground, nodes, energy):
 @device
 def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
     """Take a row and its bonds through the pieces of a clock step; the time reached, whether something holds."""
-    row = line[0]
-    is_open = not row.radius > 0.0
-    row.radius = 0.0 if is_open else row.radius
-    now, time, first = later(contact, 0.0, 1.0 if is_open else contact.stays), 0.0, nodes[0]
+    row, time, first = line[0], 0.0, nodes[0]
     for p in range(len(pieces)):
-        piece = piece_of(pieces, p)
-        from_here, worked, before, lost = later(now, time, now.stays), energy.work, energy.stored, energy.rupture
+        slider, from_here = slider_in(slider, pieces[p]), later(contact, time, contact.stays)
+        worked, before, lost = energy.work, energy.stored, energy.rupture
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         if p > 0:
             before = stored_energy(row, first.square, 0.0, slider, from_here)
-        if not _set_right(line, 0.0, tracks, slider, from_here, piece, ground, energy, first):
+        if not _set_right(line, 0.0, tracks, slider, from_here, ground, energy, first):
             return time, False
         after = stored_energy(row, first.square, 0.0, slider, from_here)
         energy.area += energy.work - worked - after + before - (energy.rupture - lost)
-        reached = _piece(line, tracks, slider, from_here, piece, ground, nodes, energy)
+        reached = _piece(line, tracks, slider, from_here, ground, nodes, energy)
         time += reached
-        if reached != piece.length:
+        if reached != slider.length:
             return time, False
     _sums(tracks, ground, first)
     row.bound, row.moment = first.bound, first.moment
-    energy.stored = stored_energy(row, first.square, time, slider, now)
+    energy.stored = stored_energy(row, first.square, time, slider, contact)
     return time, True
 
 
@@ -292,7 +286,7 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
     zero, or ``SPENT`` if the bonds have been advanced already.
     """
     rows, energies, bare, pieces, clock, units, work = inputs
-    slider, solid, stays, reached, spent = Slider(*numbers[0]), Solid(*numbers[2]), numbers[3], outputs[0], outputs[1]
+    slider, contact, (reached, spent) = Slider(*numbers[0]), Contact(*numbers[2]), outputs
     birth, due, life, soonest, stamp, frame = tracks
     for m in range(len(rows)):
         if stamp[m] != np.int64(frame[m, STEPS]):
@@ -307,8 +301,8 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
             start, stop = stop, pieces_to(k, stop, pieces)
             take_up(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(line[0].runaway_time):
-                contact = contact_from(solid, stays, bare[m], clock[k])
-                time, going = _through(line, energy, pieces[start:stop], slider, contact, bonds, ground, nodes)
+                now = contact_at(contact, bare[m], clock[k], line[0])
+                time, going = _through(line, energy, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
                     run_away(line[0], booked, clock[k, 0] + time)
             put_down(columns, booked, rows[m], energies[m], units, work)
