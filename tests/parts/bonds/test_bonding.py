@@ -1,9 +1,9 @@
 """What all bonds hand on: the sign of the friction, its slope over slip, and states that stay good."""
 
 from copy import deepcopy
+from itertools import product
 
 import numpy as np
-import pytest
 from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -40,100 +40,97 @@ def records(names, members=3, steps=16, **parts):
     return [np.array([READ[name](scenario, trajectory_of(scenario, state))[0] for state in states]) for name in names]
 
 
-@pytest.mark.parametrize("motion", MOTIONS)
-@pytest.mark.parametrize("name", BONDS)
-def test_friction_is_odd_and_energies_are_even_in_the_speed(name, motion):
-    parts = {"shear": SHEARS["modal, wave, relaxing stress"], "contact": CONTACTS["partly reversible"]}
-    odd, even = ["shear_stress", "friction_force"], ["bond_fraction", "fluctuation_energy", "contact_radius"]
-    one, other = (
-        records(odd + even, bonds=BONDS[name], drive=moved, **parts)
-        for moved in (MOTIONS[motion], mirrored(MOTIONS[motion]))
-    )
-    assert np.any(one[0] != 0.0)
-    for kind, there, back in zip(odd + even, one, other, strict=True):
-        expected = -there if kind in odd else there
-        # mirrored arithmetic is the same, but cohorts are merged on a lattice that starts elsewhere
-        off = getattr(BONDS[name], "tolerance", 0.0) if BONDS[name].model == "cohort" else 1e-11
-        assert_allclose(back, expected, rtol=1e-11, atol=off * np.abs(there).max(), err_msg=kind)
+def test_friction_is_odd_and_energies_are_even_in_the_speed():
+    for motion, name in product(MOTIONS, BONDS):
+        parts = {"shear": SHEARS["modal, wave, relaxing stress"], "contact": CONTACTS["partly reversible"]}
+        odd, even = ["shear_stress", "friction_force"], ["bond_fraction", "fluctuation_energy", "contact_radius"]
+        one, other = (
+            records(odd + even, bonds=BONDS[name], drive=moved, **parts)
+            for moved in (MOTIONS[motion], mirrored(MOTIONS[motion]))
+        )
+        assert np.any(one[0] != 0.0)
+        for kind, there, back in zip(odd + even, one, other, strict=True):
+            expected = -there if kind in odd else there
+            # mirrored arithmetic is the same, but cohorts are merged on a lattice that starts elsewhere
+            off = getattr(BONDS[name], "tolerance", 0.0) if BONDS[name].model == "cohort" else 1e-11
+            assert_allclose(back, expected, rtol=1e-11, atol=off * np.abs(there).max(), err_msg=kind)
 
 
-@pytest.mark.parametrize("name", BONDS)
-def test_a_friction_loop_takes_work(name):
-    # the trapezoidal sum over the second cycle; 200 members where bonds are counted or tracked
-    members = 200 if BONDS[name].model in ("counted", "tracked", "auto") else 1
-    force, place = records(["friction_force", "slider_position"], members, bonds=BONDS[name], drive=FORTH_AND_BACK)
-    last = slice(8, 17)
-    work = np.trapezoid(force[last].mean(axis=1), place[last, 0])
-    assert_allclose(place[16], place[8], atol=1e-18)
-    assert work > 0.0
-    towards_minus = records(
-        ["friction_force", "slider_position"], members, bonds=BONDS[name], drive=mirrored(FORTH_AND_BACK)
-    )
-    assert np.trapezoid(towards_minus[0][last].mean(axis=1), towards_minus[1][last, 0]) > 0.0
+def test_a_friction_loop_takes_work():
+    for name in BONDS:
+        # the trapezoidal sum over the second cycle; 200 members where bonds are counted or tracked
+        members = 200 if BONDS[name].model in ("counted", "tracked", "auto") else 1
+        force, place = records(["friction_force", "slider_position"], members, bonds=BONDS[name], drive=FORTH_AND_BACK)
+        last = slice(8, 17)
+        work = np.trapezoid(force[last].mean(axis=1), place[last, 0])
+        assert_allclose(place[16], place[8], atol=1e-18)
+        assert work > 0.0
+        force, place = records(
+            ["friction_force", "slider_position"], members, bonds=BONDS[name], drive=mirrored(FORTH_AND_BACK)
+        )
+        assert np.trapezoid(force[last].mean(axis=1), place[last, 0]) > 0.0
 
 
-@pytest.mark.parametrize("name", BONDS)
-@pytest.mark.parametrize("speed", [2e-3, -2e-3])
-def test_friction_in_steady_sliding_is_along_the_speed(name, speed):
-    # along +x positive: the force that the slider exerts on the half-space
-    (force,) = records(["friction_force"], 20, bonds=BONDS[name], drive=drive.Steady(speed=speed))
-    assert np.all(force[1:].mean(axis=1) * speed > 0.0)
+def test_friction_in_steady_sliding_is_along_the_speed():
+    for name, speed in product(BONDS, [2e-3, -2e-3]):
+        # along +x positive: the force that the slider exerts on the half-space
+        (force,) = records(["friction_force"], 20, bonds=BONDS[name], drive=drive.Steady(speed=speed))
+        assert np.all(force[1:].mean(axis=1) * speed > 0.0)
 
 
-@pytest.mark.parametrize("name", ["none", "steady", "rate", "counted"])
-def test_bonds_without_a_stretch_bear_the_sign_of_the_last_slip(name):
-    def signs(motion, steps=16):
-        stress, speed = records(["shear_stress", "speed"], 1, steps, bonds=BONDS[name], drive=motion)
+def test_bonds_without_a_stretch_bear_the_sign_of_the_last_slip():
+    def signs(part, motion, steps=16):
+        stress, speed = records(["shear_stress", "speed"], 1, steps, bonds=part, drive=motion)
         return np.sign(stress[:, 0]).astype(int).tolist(), speed[:, 0]
 
-    assert signs(drive.Steady(speed=0.0))[0] == [0] * 17  # nothing has slid
-    assert signs(drive.Steady(speed=-1e-3))[0] == [-1] * 17  # at t = 0 that of the speed at the start
-    assert signs(MOTIONS["started"], 8)[0] == [0, 0, 0, 0, 1, 1, 1, 1, 1]
-    assert signs(MOTIONS["stopped"], 8)[0] == [1] * 9  # it keeps the sign at rest
-    turned, speed = signs(MOTIONS["through zero"], 8)
-    assert turned == np.sign(np.where(speed == 0.0, -1.0, speed)).astype(int).tolist()
-    # a step that ends at rest: the sign of its slip
-    halting = drive.Table(time=(0.0, 1e-3, 1e-3, 2e-3), speed=(3e-3, 3e-3, -3e-3, 0.0))
-    assert signs(halting, 2)[0] == [1, 1, -1]
+    for part in (BONDS[name] for name in ("none", "steady", "rate", "counted")):
+        assert signs(part, drive.Steady(speed=0.0))[0] == [0] * 17  # nothing has slid
+        assert signs(part, drive.Steady(speed=-1e-3))[0] == [-1] * 17  # at t = 0 that of the speed at the start
+        assert signs(part, MOTIONS["started"], 8)[0] == [0, 0, 0, 0, 1, 1, 1, 1, 1]
+        assert signs(part, MOTIONS["stopped"], 8)[0] == [1] * 9  # it keeps the sign at rest
+        turned, speed = signs(part, MOTIONS["through zero"], 8)
+        assert turned == np.sign(np.where(speed == 0.0, -1.0, speed)).astype(int).tolist()
+        # a step that ends at rest: the sign of its slip
+        halting = drive.Table(time=(0.0, 1e-3, 1e-3, 2e-3), speed=(3e-3, 3e-3, -3e-3, 0.0))
+        assert signs(part, halting, 2)[0] == [1, 1, -1]
 
 
-@pytest.mark.parametrize("name", [name for name in BONDS if name not in ("steady", "cohort, cut-off")])
-@pytest.mark.parametrize("speed", [4e-3, -4e-3])
-def test_the_stiffness_is_the_slope_of_the_stress_over_slip_at_frozen_time(name, speed):
-    # 0.1 nm within 1 as: rounding of the difference and the curvature over 1e-10/20e-6 of the cut-off are within 3e-5
-    scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=speed))
-    *_, state = march(scenario, np.arange(3))
-    part, slip = scenario.population, np.array([np.copysign(1e-10, speed)])
-    motions = one_step(41, 41e-3, 1e-18, slip, np.abs(slip), slip / 1e-18, slip / 1e-18)
-    noise = Noise(5, "bonds", np.arange(3))
-    after = part.advance(deepcopy(state.bonds), motions, state.contact.radius, noise)[1].at(0)
-    slope = (after.stress - state.bonding.stress) / slip
-    assert_allclose(np.broadcast_to(state.bonding.stiffness, slope.shape), slope, rtol=3e-5)
+def test_the_stiffness_is_the_slope_of_the_stress_over_slip_at_frozen_time():
+    for name, speed in product([name for name in BONDS if name not in ("steady", "cohort, cut-off")], [4e-3, -4e-3]):
+        # 0.1 nm within 1 as: rounding of the difference and the curvature over 1e-10/20e-6 of the cut-off
+        scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=speed))
+        *_, state = march(scenario, np.arange(3))
+        part, slip = scenario.population, np.array([np.copysign(1e-10, speed)])
+        motions = one_step(41, 41e-3, 1e-18, slip, np.abs(slip), slip / 1e-18, slip / 1e-18)
+        noise = Noise(5, "bonds", np.arange(3))
+        after = part.advance(deepcopy(state.bonds), motions, state.contact.radius, noise)[1].at(0)
+        slope = (after.stress - state.bonding.stress) / slip
+        assert_allclose(np.broadcast_to(state.bonding.stiffness, slope.shape), slope, rtol=3e-5)
 
 
-@pytest.mark.parametrize(
-    "name", ["rate, bell", "rate, cut-off, carried", "cohort", "cohort, cut-off", "cohort, carried"]
-)
-def test_the_relaxation_is_the_rate_of_the_stress_at_frozen_slip(name):
-    # 1 ns: of the lives that rupture leaves, some 1e-6 pass, and rounding of the difference is 1e-10 of it or less
-    scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=4e-3))
-    *_, state = march(scenario, np.arange(3))
-    part, still = scenario.population, np.zeros(1)
-    motions = one_step(41, 41e-3, 1e-9, still, still, still, still)
-    after = part.advance(state.bonds, motions, state.contact.radius, Noise(5, "bonds", np.arange(3)))[1].at(0)
-    rate = (after.stress - state.bonding.stress) / 1e-9
-    assert_allclose(np.broadcast_to(state.bonding.relaxation, rate.shape), rate, rtol=3e-5)
+def test_the_relaxation_is_the_rate_of_the_stress_at_frozen_slip():
+    for name in ["rate, bell", "rate, cut-off, carried", "cohort", "cohort, cut-off", "cohort, carried"]:
+        # 1 ns: of the lives that rupture leaves, some 1e-6 pass, and rounding of the difference is below 1e-10
+        scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=4e-3))
+        *_, state = march(scenario, np.arange(3))
+        part, still = scenario.population, np.zeros(1)
+        motions = one_step(41, 41e-3, 1e-9, still, still, still, still)
+        after = part.advance(state.bonds, motions, state.contact.radius, Noise(5, "bonds", np.arange(3)))[1].at(0)
+        rate = (after.stress - state.bonding.stress) / 1e-9
+        assert_allclose(np.broadcast_to(state.bonding.relaxation, rate.shape), rate, rtol=3e-5)
 
 
-@pytest.mark.parametrize("speed", [1e-3, 4e-3, -4e-3])
-def test_cohorts_at_a_cut_off_lose_stiffness_to_the_bonds_that_break(speed):
-    # steady: a density k_on (1 − N)/V e^(−k x/V) up to the limit l; the mean over a cell of l/1000 stands for its edge
-    part, limit = bonds.Cohort(rupture=CUT_OFF, **STRETCHED, tolerance=1e-6), CUT_OFF.stretch
-    found = part.steady(np.array([speed]))
-    bound, pace = found.fraction * part.bound_at_rest, CUT_OFF.rate * limit / abs(speed)
-    breaking = STRETCHED["rebinding_rate"] * float(1.0 - bound[0]) * limit / abs(speed) * np.exp(-pace)
-    scale = STRETCHED["site_density"] * STRETCHED["bond_stiffness"]
-    assert_allclose(found.stiffness, scale * (bound - breaking), rtol=0, atol=scale * breaking * (1e-3 * pace + 1e-5))
+def test_cohorts_at_a_cut_off_lose_stiffness_to_the_bonds_that_break():
+    for speed in [1e-3, 4e-3, -4e-3]:
+        # steady: a density k_on (1 − N)/V e^(−k x/V) up to the limit l, by its mean over a cell of l/1000
+        part, limit = bonds.Cohort(rupture=CUT_OFF, **STRETCHED, tolerance=1e-6), CUT_OFF.stretch
+        found = part.steady(np.array([speed]))
+        bound, pace = found.fraction * part.bound_at_rest, CUT_OFF.rate * limit / abs(speed)
+        breaking = STRETCHED["rebinding_rate"] * float(1.0 - bound[0]) * limit / abs(speed) * np.exp(-pace)
+        scale = STRETCHED["site_density"] * STRETCHED["bond_stiffness"]
+        assert_allclose(
+            found.stiffness, scale * (bound - breaking), rtol=0, atol=scale * breaking * (1e-3 * pace + 1e-5)
+        )
 
 
 def test_the_steady_state_has_the_sign_of_its_speed():

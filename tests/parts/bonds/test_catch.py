@@ -53,10 +53,10 @@ def by_quadrature(speed):
     return np.array([life, pull * lag, pull**2 * square]) / cycle
 
 
-@pytest.mark.parametrize("speed", SPEEDS)
-def test_the_law_is_the_renewal_integral(speed):
-    assert_allclose(np.array(catch_moments(speed, *RATES, STIFFNESS, BINDING)), by_quadrature(speed), rtol=1e-10)
-    assert_allclose(CATCH.closed_form(speed, STIFFNESS, BINDING), by_quadrature(speed), rtol=1e-10)
+def test_the_law_is_the_renewal_integral():
+    for speed in SPEEDS:
+        assert_allclose(np.array(catch_moments(speed, *RATES, STIFFNESS, BINDING)), by_quadrature(speed), rtol=1e-10)
+        assert_allclose(CATCH.closed_form(speed, STIFFNESS, BINDING), by_quadrature(speed), rtol=1e-10)
 
 
 def test_the_law_has_bells_and_the_constant_rate_as_limits():
@@ -73,25 +73,24 @@ def test_force_holds_catch_bonds_before_it_breaks_them():
     assert bound[1] > 1.1 * bound[0] and bound[2] < 0.5 * bound[0]
 
 
-@pytest.mark.parametrize("speed", SPEEDS)
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
-def test_cohorts_in_steady_sliding_obey_the_law(speed, tolerance):
-    part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=tolerance)
-    found, (bound, force, square) = part.steady(np.array([speed])), by_quadrature(speed)
-    assert_allclose(found.fraction * part.bound_at_rest, bound, rtol=tolerance)
-    assert_allclose(found.stress, STRETCHED["site_density"] * force, rtol=tolerance)
-    assert_allclose(found.frozen + found.varying, STRETCHED["site_density"] * square, rtol=10.0 * tolerance)
+def test_cohorts_in_steady_sliding_obey_the_law():
+    for speed, tolerance in product(SPEEDS, [1e-3, 1e-5]):
+        part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=tolerance)
+        found, (bound, force, square) = part.steady(np.array([speed])), by_quadrature(speed)
+        assert_allclose(found.fraction * part.bound_at_rest, bound, rtol=tolerance)
+        assert_allclose(found.stress, STRETCHED["site_density"] * force, rtol=tolerance)
+        assert_allclose(found.frozen + found.varying, STRETCHED["site_density"] * square, rtol=10.0 * tolerance)
 
 
-@pytest.mark.parametrize("speed", [1e-3, -4e-3, 2e-2])
-def test_cohorts_that_start_empty_come_to_the_law(speed):
-    part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=1e-4, start_from="empty")
-    life = catch_lives(speed, *RATES, STIFFNESS).mean
-    clock = Clock(duration=60.0 * life, step=60.0 * life / 200)
-    *_, state = march(scene(bonds=part, drive=drive.Steady(speed=speed), clock=clock), np.arange(1))
-    bound, force, _ = by_quadrature(speed)
-    assert_allclose(state.bonding.fraction * part.bound_at_rest, bound, rtol=2e-4)
-    assert_allclose(state.bonding.stress, STRETCHED["site_density"] * force, rtol=2e-4)
+def test_cohorts_that_start_empty_come_to_the_law():
+    for speed in [1e-3, -4e-3, 2e-2]:
+        part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=1e-4, start_from="empty")
+        life = catch_lives(speed, *RATES, STIFFNESS).mean
+        clock = Clock(duration=60.0 * life, step=60.0 * life / 200)
+        *_, state = march(scene(bonds=part, drive=drive.Steady(speed=speed), clock=clock), np.arange(1))
+        bound, force, _ = by_quadrature(speed)
+        assert_allclose(state.bonding.fraction * part.bound_at_rest, bound, rtol=2e-4)
+        assert_allclose(state.bonding.stress, STRETCHED["site_density"] * force, rtol=2e-4)
 
 
 def test_cohorts_do_not_depend_on_the_clock_step():
@@ -112,25 +111,26 @@ def test_cohorts_do_not_depend_on_the_clock_step():
     assert np.all(off < 1e-4)  # ten times the tolerance: one for each of the eight steps
 
 
-@pytest.mark.parametrize(("stretch", "speed"), list(product([-1.7, -0.3, 0.0, 0.2, 2.1], [-3.0, -0.4, 0.0, 0.7, 2.5])))
-def test_the_device_functions_are_the_integral_of_the_rate_and_its_inverse(stretch, speed):
-    time = 0.013
-    crossing = -stretch / speed if speed else 0.5 * time
-    cuts = sorted({0.0, min(max(crossing, 0.0), time), time})
-    exact = sum(
-        quad(lambda t: rate(stretch + speed * t), *ends, epsabs=0.0, epsrel=1e-12)[0] for ends in pairwise(cuts)
-    )
-    assert_allclose(hazard_integral(stretch, speed * time, time, LAW), exact, rtol=1e-12)
-    assert_allclose(hazard_time(stretch, speed, exact, LAW), time, rtol=1e-12)
-    if stretch == 0.0:
-        assert_allclose(fresh_integral(time, speed, LAW), exact, rtol=1e-12)
-    assert growth(stretch, speed, LAW) == 0.0  # no factor for all motions, unlike Bell's
+def test_the_device_functions_are_the_integral_of_the_rate_and_its_inverse():
+    for stretch, speed in list(product([-1.7, -0.3, 0.0, 0.2, 2.1], [-3.0, -0.4, 0.0, 0.7, 2.5])):
+        time = 0.013
+        crossing = -stretch / speed if speed else 0.5 * time
+        cuts = sorted({0.0, min(max(crossing, 0.0), time), time})
+        exact = sum(
+            quad(lambda t, x=stretch, v=speed: rate(x + v * t), *ends, epsabs=0.0, epsrel=1e-12)[0]
+            for ends in pairwise(cuts)
+        )
+        assert_allclose(hazard_integral(stretch, speed * time, time, LAW), exact, rtol=1e-12)
+        assert_allclose(hazard_time(stretch, speed, exact, LAW), time, rtol=1e-12)
+        if stretch == 0.0:
+            assert_allclose(fresh_integral(time, speed, LAW), exact, rtol=1e-12)
+        assert growth(stretch, speed, LAW) == 0.0  # no factor for all motions, unlike Bell's
 
 
-@pytest.mark.parametrize("model", [bonds.FirstMoment, functools.partial(bonds.Tracked, sites=10)])
-def test_models_with_one_clock_for_all_bonds_refuse_catch_bonds(model):
-    with pytest.raises(ValueError, match=r'"catch" needs .*"cohort"'):
-        model(rupture=CATCH, **STRETCHED)
+def test_models_with_one_clock_for_all_bonds_refuse_catch_bonds():
+    for model in [bonds.FirstMoment, functools.partial(bonds.Tracked, sites=10)]:
+        with pytest.raises(ValueError, match=r'"catch" needs .*"cohort"'):
+            model(rupture=CATCH, **STRETCHED)
 
 
 def test_bonds_left_open_are_cohorts_however_few():

@@ -1,11 +1,11 @@
 """Bonds with a stretch in whole scenes: static peaks, ageing, reversal, area, and the field that they make."""
 
-import functools
 import math
 
 import numpy as np
 import pytest
 from helpers.fields import complex_amplitudes
+from helpers.renewal import volterra
 from helpers.scenes import BELL, BONDS, CELL, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose
 
@@ -15,7 +15,6 @@ from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start
 from sim.numerics.noise import Noise
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
-from sim.parts.bonds.models import share_kept
 from sim.parts.bonds.rupture import Constant
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Time
@@ -50,104 +49,64 @@ def last(members=1, **parts):
 # --- static peaks and ageing
 
 
-@pytest.mark.parametrize("eps", [3.0, 100.0, 1e4])
-def test_the_start_of_a_rested_contact_is_the_closed_form_plus_what_rebinds(eps):
-    # fewer than k_on sites bind a second, and each bears the force of its age: k_on kappa V <T^2>/2 at the most
-    speed = eps * PACE
-    times = start_up_peak(speed, *RATES).time * np.arange(41) / 20.0
-    rested = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
-    found = marched(
-        "shear_stress", bonds=rested, drive=drive.Steady(speed=speed), clock=Clock(duration=times[-1], step=times[1])
-    )[:, 0]
-    held = SITES * REST * start_up_force(times, speed, *RATES)
-    reborn = SITES * BINDING * STRETCHED["bond_stiffness"] * speed * bell_lives(speed, *RATES).half_square
-    assert np.all(found >= held * (1.0 - 1e-4))
-    assert np.all(found <= (held + reborn) * (1.0 + 1e-4))
-    if eps == 1e4:  # where rebinding is negligible, the peak is that of the closed form, and at its time
-        assert reborn < 2e-3 * held.max()
-        assert_allclose(found[20], SITES * REST * start_up_peak(speed, *RATES).force, rtol=2e-3)
-        assert abs(np.argmax(found) - 20) <= 1
-
-
-@functools.cache
-def volterra(first, beta, eps, end, points=400):
-    """Stress over n f_b a time ``end`` (in lives at rest) after a start with a share ``first`` bound, unstretched.
-
-    The renewal equation F = 1 - first S - beta ∫F S by the trapezoidal rule, extrapolated twice.
-    """
-
-    def solve(n):
-        age = np.linspace(0.0, end, n + 1)
-        alive, h = np.exp(-np.expm1(eps * age) / eps), end / n
-        free = np.empty(n + 1)
-        free[0] = 1.0 - first
-        for i in range(1, n + 1):
-            past = 0.5 * free[0] * alive[i] + np.dot(free[1:i], alive[i - 1 : 0 : -1])
-            free[i] = (1.0 - first * alive[i] - beta * h * past) / (1.0 + 0.5 * beta * h)
-        young = np.dot(free[1:-1], (age * alive)[-2:0:-1]) + 0.5 * free[0] * age[-1] * alive[-1]
-        return eps * (first * end * alive[-1] + beta * h * young)
-
-    coarse, middle, fine = (solve(points * k) for k in (1, 2, 4))
-    return (16 * (4 * fine - middle) / 3 - (4 * middle - coarse) / 3) / 15
-
-
-@pytest.mark.parametrize("rest", [0.5e-3, 2e-3, 8e-3, 40e-3])
-def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate(rest):
-    # at rest the share is REST (1 - exp(-(k_on + k_0) t)), all unstretched: the renewal equation from there
-    speed, sliding = 10.0 * PACE, 1e-3
-    empty = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="empty")
-    steps = round((rest + sliding) / 0.25e-3)
-    parts = {"bonds": empty, "drive": drive.Start(rest=rest, speed=speed)}
-    parts["clock"] = Clock(duration=rest + sliding, step=(rest + sliding) / steps)
-    fraction, stress = (marched(name, **parts)[:, 0] for name in ("bond_fraction", "shear_stress"))
-    started = steps - 4
-    aged = -math.expm1(-(BINDING + BELL.zero_force_rate) * rest)
-    assert_allclose(fraction[started], aged, rtol=1e-4)
-    assert np.all(stress[: started + 1] == 0.0)
-    for k in (1, 2, 4):
-        exact = volterra(REST * aged, BINDING / RATES[0], 10.0, RATES[0] * k * 0.25e-3)
-        assert_allclose(stress[started + k], SITES * BELL.bell_force * exact, rtol=1e-4)
-
-
-def test_static_peaks_grow_with_the_logarithm_of_the_speed():
-    # d ln W / d ln eps = 1/(1 + W): dF/d ln eps = f_b (W + 1 - ...)/(1 + W) e^(1/eps - 1/W), one f_b for each factor e
-    speeds = PACE * np.array([1e4, 1e5, 1e6])
-    peaks = []
-    for speed in speeds:
-        time = start_up_peak(speed, *RATES).time
+def test_the_start_of_a_rested_contact_is_the_closed_form_plus_what_rebinds():
+    for eps in [3.0, 100.0, 1e4]:
+        # fewer than k_on sites bind a second, and each bears the force of its age: k_on kappa V <T^2>/2 at the most
+        speed = eps * PACE
+        times = start_up_peak(speed, *RATES).time * np.arange(41) / 20.0
         rested = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="bonded")
         found = marched(
             "shear_stress",
             bonds=rested,
             drive=drive.Steady(speed=speed),
-            clock=Clock(duration=1.5 * time, step=0.05 * time),
-        )
-        peaks.append(found.max() / (SITES * REST * BELL.bell_force))
-    slopes = np.diff(peaks) / math.log(10.0)
-    closed = np.diff(start_up_peak(speeds, *RATES).force) / BELL.bell_force / math.log(10.0)
-    # rebinding adds less than 0.002 at the lowest speed; a peak is flat, so the record nearest to it is good to 1e-4
-    assert_allclose(slopes, closed, atol=1e-3)
-    assert np.all(slopes > 0.8) and np.all(slopes < 1.0) and slopes[1] > slopes[0]
+            clock=Clock(duration=times[-1], step=times[1]),
+        )[:, 0]
+        held = SITES * REST * start_up_force(times, speed, *RATES)
+        reborn = SITES * BINDING * STRETCHED["bond_stiffness"] * speed * bell_lives(speed, *RATES).half_square
+        assert np.all(found >= held * (1.0 - 1e-4))
+        assert np.all(found <= (held + reborn) * (1.0 + 1e-4))
+        if eps == 1e4:  # where rebinding is negligible, the peak is that of the closed form, and at its time
+            assert reborn < 2e-3 * held.max()
+            assert_allclose(found[20], SITES * REST * start_up_peak(speed, *RATES).force, rtol=2e-3)
+            assert abs(np.argmax(found) - 20) <= 1
+
+
+def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate():
+    for rest in [0.5e-3, 2e-3, 8e-3, 40e-3]:
+        # at rest the share is REST (1 - exp(-(k_on + k_0) t)), all unstretched: the renewal equation from there
+        speed, sliding = 10.0 * PACE, 1e-3
+        empty = bonds.Cohort(rupture=BELL, **STRETCHED, start_from="empty")
+        steps = round((rest + sliding) / 0.25e-3)
+        parts = {"bonds": empty, "drive": drive.Start(rest=rest, speed=speed)}
+        parts["clock"] = Clock(duration=rest + sliding, step=(rest + sliding) / steps)
+        fraction, stress = (marched(name, **parts)[:, 0] for name in ("bond_fraction", "shear_stress"))
+        started = steps - 4
+        aged = -math.expm1(-(BINDING + BELL.zero_force_rate) * rest)
+        assert_allclose(fraction[started], aged, rtol=1e-4)
+        assert np.all(stress[: started + 1] == 0.0)
+        for k in (1, 2, 4):
+            exact = volterra(REST * aged, BINDING / RATES[0], 10.0, RATES[0] * k * 0.25e-3, 400)[1]
+            assert_allclose(stress[started + k], SITES * BELL.bell_force * exact, rtol=1e-4)
 
 
 # --- reversal
 
 
-@pytest.mark.parametrize("name", ["rate, bell", "cohort", "cohort, cut-off", "tracked"])
-def test_friction_turns_with_the_slider_and_back(name):
-    forth, back = 2e-3, -2e-3
-    turns = drive.Table(time=(0.0, 0.04, 0.04, 0.08, 0.08, 0.12), speed=(forth, forth, back, back, forth, forth))
-    members = 200 if name == "tracked" else 1
-    parts = {"bonds": BONDS[name], "drive": turns, "clock": Clock(duration=0.12, step=1e-3)}
-    force = marched("friction_force", members, **parts).mean(axis=1)
-    one, other, again = force[40], force[80], force[120]
-    assert one > 0.0 and other < 0.0 and again > 0.0
-    for begin, sense in ((40, 1.0), (80, -1.0)):  # it passes zero once: bonds are unloaded before they are loaded
-        after = sense * force[begin : begin + 41]
-        assert np.sum(np.diff(np.sign(after[:21])) != 0) == 1
-    if members == 1:
-        tolerance = getattr(BONDS[name], "tolerance", 1e-6)
-        assert_allclose([-other, again], one, rtol=2.0 * tolerance)
+def test_friction_turns_with_the_slider_and_back():
+    for name in ["rate, bell", "cohort", "cohort, cut-off", "tracked"]:
+        forth, back = 2e-3, -2e-3
+        turns = drive.Table(time=(0.0, 0.04, 0.04, 0.08, 0.08, 0.12), speed=(forth, forth, back, back, forth, forth))
+        members = 200 if name == "tracked" else 1
+        parts = {"bonds": BONDS[name], "drive": turns, "clock": Clock(duration=0.12, step=1e-3)}
+        force = marched("friction_force", members, **parts).mean(axis=1)
+        one, other, again = force[40], force[80], force[120]
+        assert one > 0.0 and other < 0.0 and again > 0.0
+        for begin, sense in ((40, 1.0), (80, -1.0)):  # it passes zero once: bonds are unloaded before they are loaded
+            after = sense * force[begin : begin + 41]
+            assert np.sum(np.diff(np.sign(after[:21])) != 0) == 1
+        if members == 1:
+            tolerance = getattr(BONDS[name], "tolerance", 1e-6)
+            assert_allclose([-other, again], one, rtol=2.0 * tolerance)
 
 
 # --- bonds and the clock
@@ -188,48 +147,43 @@ def over(part, state, radius):
     return part.advance(state, motions, np.array([radius]), Noise(5, "bonds", np.arange(1)))[0]
 
 
-@pytest.mark.parametrize("name", CARRIED)
-def test_amplitude_dilutes_bonds_and_shrinkage_takes_them_along(name):
-    part = CARRIED[name]
-    _, state = last(1, steps=1, bonds=part, drive=drive.Steady(speed=1e-3))
-    full, stress, *_ = state.bonding
-    held = over(part, state.bonds, 1e-4)
-    before = part.bonding(held).fraction
-    for radius in (1.1e-4, 1.7e-4, 1.7e-4, 5e-4):
-        held = over(part, held, radius)
-        diluted = part.bonding(held)
-        assert_allclose(diluted.fraction * radius**2, before * 1e-8, rtol=1e-14)  # n A phi
-        assert_allclose(diluted.stress / stress, diluted.fraction / full, rtol=1e-14)
-    shrunk = over(part, held, 2e-4)
-    assert np.array_equal(part.bonding(shrunk).fraction, diluted.fraction)
-    opened = over(part, shrunk, np.nan)
-    assert part.bonding(opened).fraction == 0.0  # an open contact has no bonds
-    assert part.bonding(over(part, opened, 1e-4)).fraction == 0.0
+def test_amplitude_dilutes_bonds_and_shrinkage_takes_them_along():
+    for name in CARRIED:
+        part = CARRIED[name]
+        _, state = last(1, steps=1, bonds=part, drive=drive.Steady(speed=1e-3))
+        full, stress, *_ = state.bonding
+        held = over(part, state.bonds, 1e-4)
+        before = part.bonding(held).fraction
+        for radius in (1.1e-4, 1.7e-4, 1.7e-4, 5e-4):
+            held = over(part, held, radius)
+            diluted = part.bonding(held)
+            assert_allclose(diluted.fraction * radius**2, before * 1e-8, rtol=1e-14)  # n A phi
+            assert_allclose(diluted.stress / stress, diluted.fraction / full, rtol=1e-14)
+        shrunk = over(part, held, 2e-4)
+        assert np.array_equal(part.bonding(shrunk).fraction, diluted.fraction)
+        opened = over(part, shrunk, np.nan)
+        assert part.bonding(opened).fraction == 0.0  # an open contact has no bonds
+        assert part.bonding(over(part, opened, 1e-4)).fraction == 0.0
 
 
-def test_the_share_that_amplitude_keeps_is_that_of_the_areas():
-    kept = share_kept(np.array([1.0, 3.0, 2.0, 0.0, np.nan]), np.array([3.0, 1.0, 2.0, 0.0, 5.0]))
-    assert_allclose(kept, [1.0 / 9.0, 1.0, 1.0, 1.0, 1.0], rtol=1e-15)
-
-
-@pytest.mark.parametrize("name", [*CARRIED, "present"])
-def test_in_a_contact_that_breathes_the_bonds_thin_with_every_amplitude(name):
-    # nothing binds or breaks: the share that is left is that of all growths, which follow the radius by one step
-    part = CARRIED.get(name, bonds.FirstMoment(rupture=DEAD, **LASTING, start_from="bonded"))
-    breathing = shear.Modal(
-        spectrum=Band(rms=50e3, longest=120e-6, shortest=60e-6), cell=CELL, correlation=Time(time=2e-3)
-    )
-    scenario = scene(5, steps=12, bonds=part, shear=breathing)
-    states = list(march(scenario, np.arange(5)))
-    radii = np.array([state.contact.radius for state in states])
-    assert np.sum(np.diff(radii, axis=0) > 1e-8) > 10
-    grown = np.maximum(radii[1:-1] / radii[:-2], 1.0)
-    expected = np.concatenate([np.ones((2, 5)), 1.0 / np.cumprod(grown, axis=0) ** 2])
-    found = np.array([state.bonding.fraction for state in states])
-    if name == "present":
-        assert found.shape == (13, 1)
-        expected = np.ones((13, 1))
-    assert_allclose(found, expected, rtol=1e-10)
+def test_in_a_contact_that_breathes_the_bonds_thin_with_every_amplitude():
+    for name in [*CARRIED, "present"]:
+        # nothing binds or breaks: the share that is left is that of all growths, which follow the radius by one step
+        part = CARRIED.get(name, bonds.FirstMoment(rupture=DEAD, **LASTING, start_from="bonded"))
+        breathing = shear.Modal(
+            spectrum=Band(rms=50e3, longest=120e-6, shortest=60e-6), cell=CELL, correlation=Time(time=2e-3)
+        )
+        scenario = scene(5, steps=12, bonds=part, shear=breathing)
+        states = list(march(scenario, np.arange(5)))
+        radii = np.array([state.contact.radius for state in states])
+        assert np.sum(np.diff(radii, axis=0) > 1e-8) > 10
+        grown = np.maximum(radii[1:-1] / radii[:-2], 1.0)
+        expected = np.concatenate([np.ones((2, 5)), 1.0 / np.cumprod(grown, axis=0) ** 2])
+        found = np.array([state.bonding.fraction for state in states])
+        if name == "present":
+            assert found.shape == (13, 1)
+            expected = np.ones((13, 1))
+        assert_allclose(found, expected, rtol=1e-10)
 
 
 # --- the field that bonds make
@@ -282,19 +236,10 @@ def test_a_few_bonds_give_each_member_its_own_field():
     assert_allclose(state.shear.energy, (bonding.frozen + bonding.varying) * FIELD.surface_energy(1.6e6), rtol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("population", "said"),
-    [
-        (BONDS["none"], "needs the force of each bond"),
-        (BONDS["rate"], "needs the force of each bond"),
-        (BONDS["counted"], "needs the force of each bond"),
-        (BONDS["rate, bell"], "needs the force of each bond"),
-    ],
-    ids=["none", "rate", "counted", "first moment"],
-)
-def test_a_field_of_bonds_without_forces_is_refused(population, said):
-    with pytest.raises(BadInput, match=said):
-        scene(bonds=population, shear=shear.Mean(spectrum=FIELD))
+def test_a_field_of_bonds_without_forces_is_refused():
+    for name in ("none", "rate", "counted", "rate, bell"):
+        with pytest.raises(BadInput, match="force of each bond"):
+            scene(bonds=BONDS[name], shear=shear.Mean(spectrum=FIELD))
 
 
 def test_a_bond_stiffer_than_the_half_space_under_it_is_refused_with_the_number():
