@@ -57,38 +57,23 @@ def test_standard_error_of_a_share_is_that_of_its_members(ramp):
     np.testing.assert_allclose(found["lost_to_bonds_sem"], 0.0, rtol=0, atol=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("contact", "sweep"),
-    [
+def test_shares_of_a_sweep_are_those_of_its_points():
+    for contact, sweep in [
         (Equilibrium(load=LOAD), {"contact.load": [1e-3, 1.6e-2]}),
         (Equilibrium(indentation=1e-6), {"contact.indentation": [1e-6, 4e-6]}),
-        (Equilibrium(load=LOAD), [{"sphere.radius": 1e-3, "contact.load": 1e-3},
-                                  {"sphere.radius": 4e-3, "contact.load": 8e-3}]),
+        (
+            Equilibrium(load=LOAD),
+            [{"sphere.radius": 1e-3, "contact.load": 1e-3}, {"sphere.radius": 4e-3, "contact.load": 8e-3}],
+        ),
         (Equilibrium(load=LOAD), {"adhesion.work": [2e-2, 8e-2], "adhesion.bond_share": [0.3, 1.0]}),
-    ],
-    ids=["load", "indentation", "zipped", "product"],
-)  # fmt: skip
-def test_shares_of_a_sweep_are_those_of_its_points(contact, sweep):
-    swept = scene(contact=contact, sweep=sweep)
-    together = analysis.shares(run(swept))
-    for k, point in enumerate(swept.points()):
-        alone, dims = analysis.shares(run(point)), together["radius_jkr"].dims
-        where = dict(zip(dims, np.unravel_index(k, [together.sizes[name] for name in dims]), strict=True))
-        for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "lost_to_fluctuations_sem", "radius_jkr"):
-            np.testing.assert_array_equal(together[name].isel(where), alone[name])
-
-
-def test_a_contact_that_its_bonds_let_go_stays_their_loss():
-    """Pulled at half of its pull-off load, run up and stopped: it stays open though its bonds heal."""
-    there_and_back = drive.Table(time=(0.0, 0.2, 0.4), speed=(0.0, 0.1, 0.0))
-    lifted = Equilibrium(load=0.5 * float(jkr.pull_off_load(WORK, RADIUS)))
-    dataset = run(scene(contact=lifted, drive=there_and_back, shear=shear.Uniform()))
-    assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
-    assert float(dataset["bond_fraction"].min()) < 0.5 < float(dataset["bond_fraction"][-1])
-    found = analysis.shares(dataset)
-    np.testing.assert_array_equal(found["lost_to_fluctuations_mean"], 0.0)
-    assert float(found["lost_to_bonds_mean"][-1]) == 1.0
-    assert float(analysis.statistics(dataset)["fraction_detached_mean"][-1]) == 1.0
+    ]:
+        swept = scene(contact=contact, sweep=sweep)
+        together = analysis.shares(run(swept))
+        for k, point in enumerate(swept.points()):
+            alone, dims = analysis.shares(run(point)), together["radius_jkr"].dims
+            where = dict(zip(dims, np.unravel_index(k, [together.sizes[name] for name in dims]), strict=True))
+            for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "lost_to_fluctuations_sem", "radius_jkr"):
+                np.testing.assert_array_equal(together[name].isel(where), alone[name])
 
 
 def test_shares_are_unknown_where_there_is_no_contact_at_rest():
@@ -133,21 +118,21 @@ HELD = {
 }
 
 
-@pytest.mark.parametrize("control", HELD)
-def test_mean_stress_is_charged_after_bonds_and_fluctuations(control):
-    part, held, law = HELD[control]
-    field = shear.Mean(spectrum=Band(rms=80e3, longest=60e-6, shortest=24e-6))
-    population = bonds.Steady(critical_speed=1e-2, stress=1e5)
-    dataset = run(scene(contact=part(**held, reversible=0.03), bonds=population, shear=field))
-    found = analysis.shares(dataset)
-    bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
-    areas = [law(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
-    areas.append((dataset["contact_radius"].to_numpy()) ** 2)
-    names = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
-    for name, before, after in zip(names, areas[:-1], areas[1:], strict=True):
-        # the work is put together again from its parts, near the fluctuations' onset of masking to 1e-12 of itself
-        np.testing.assert_allclose(found[f"{name}_mean"], (before - after) / areas[0], rtol=1e-9, atol=1e-12)
-    assert 0.01 < float(found["lost_to_mean_stress_mean"].max()) < 0.5
+def test_mean_stress_is_charged_after_bonds_and_fluctuations():
+    for control in HELD:
+        part, held, law = HELD[control]
+        field = shear.Mean(spectrum=Band(rms=80e3, longest=60e-6, shortest=24e-6))
+        population = bonds.Steady(critical_speed=1e-2, stress=1e5)
+        dataset = run(scene(contact=part(**held, reversible=0.03), bonds=population, shear=field))
+        found = analysis.shares(dataset)
+        bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
+        areas = [law(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
+        areas.append((dataset["contact_radius"].to_numpy()) ** 2)
+        names = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
+        for name, before, after in zip(names, areas[:-1], areas[1:], strict=True):
+            # the work is put together again from its parts, near the fluctuations' onset of masking to 1e-12 of itself
+            np.testing.assert_allclose(found[f"{name}_mean"], (before - after) / areas[0], rtol=1e-9, atol=1e-12)
+        assert 0.01 < float(found["lost_to_mean_stress_mean"].max()) < 0.5
 
 
 def test_mean_stress_alone_takes_what_the_reversible_law_says():
@@ -197,13 +182,11 @@ def test_an_edge_that_has_still_to_close_is_its_lags_loss():
     np.testing.assert_array_equal(lost["lost_to_fluctuations"][10:], 0.0)
 
 
-@pytest.mark.parametrize(
-    "contact", [Equilibrium(load=LOAD, reversible=0.02), RateDependent(load=LOAD, front_speed=1e-3)]
-)
-def test_shares_of_a_contact_that_lags_or_pays_for_its_stress_need_its_members(contact):
-    few = scene(contact=contact, record=Record(per_member=False))
-    with pytest.raises(ValueError, match="per_member = true"):
-        analysis.shares(run(few))
+def test_shares_of_a_contact_that_lags_or_pays_for_its_stress_need_its_members():
+    for contact in [Equilibrium(load=LOAD, reversible=0.02), RateDependent(load=LOAD, front_speed=1e-3)]:
+        few = scene(contact=contact, record=Record(per_member=False))
+        with pytest.raises(ValueError, match="per_member = true"):
+            analysis.shares(run(few))
 
 
 # -- a sphere that is moved -----------------------------------------------------------------------
@@ -217,15 +200,15 @@ MOVED = {
 }
 
 
-@pytest.mark.parametrize("control", MOVED)
-def test_a_moved_sphere_with_all_its_adhesion_loses_nothing(control):
-    dataset = run(scene(contact=Equilibrium(**MOVED[control]), bonds=bonds.Unbroken(), shear=shear.Uniform()))
-    assert np.ptp(dataset["contact_area"].to_numpy()) > 0.5 * float(dataset["contact_area"].max())
-    np.testing.assert_allclose(analysis.observables(dataset)["area_ratio"], 1.0, rtol=1e-13)
-    found = analysis.shares(dataset)
-    for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
-        np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(found["radius_jkr"], dataset["contact_radius"], rtol=1e-13)
+def test_a_moved_sphere_with_all_its_adhesion_loses_nothing():
+    for control in MOVED:
+        dataset = run(scene(contact=Equilibrium(**MOVED[control]), bonds=bonds.Unbroken(), shear=shear.Uniform()))
+        assert np.ptp(dataset["contact_area"].to_numpy()) > 0.5 * float(dataset["contact_area"].max())
+        np.testing.assert_allclose(analysis.observables(dataset)["area_ratio"], 1.0, rtol=1e-13)
+        found = analysis.shares(dataset)
+        for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
+            np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(found["radius_jkr"], dataset["contact_radius"], rtol=1e-13)
 
 
 @pytest.mark.parametrize("control", MOVED)
@@ -283,15 +266,6 @@ def test_a_swept_course_has_the_shares_of_its_points():
     np.testing.assert_allclose(analysis.shares(run(whole))["radius_jkr"], together["radius_jkr"], rtol=1e-12)
 
 
-def test_shares_of_a_moved_sphere_follow_from_its_statistics():
-    moved = {"contact": Equilibrium(load={"from": 4e-3, "to": 1e-3, "cycles": 1})}
-    few, all_of_them = run(scene(record=Record(per_member=False), **moved)), run(scene(**moved))
-    for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "lost_to_fluctuations_sem"):
-        np.testing.assert_allclose(
-            analysis.shares(few)[name], analysis.shares(all_of_them)[name], rtol=1e-9, atol=1e-13
-        )
-
-
 def test_shares_end_where_a_trajectory_stops():
     part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, after_pull_off="stop")
     dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
@@ -304,21 +278,21 @@ def test_shares_end_where_a_trajectory_stops():
         )
 
 
-@pytest.mark.parametrize("record", [Record(), Record(per_member=False)], ids=["members", "statistics"])
-def test_the_load_of_an_open_contact_stands_in_the_table(record):
-    pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.5e-3})
-    dataset = run(scene(contact=pulled, shear=shear.Uniform(), record=record))
-    np.testing.assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.5e-3, 21), rtol=1e-12)
-    assert int(dataset["in_contact"][-1]) == 0
-    rows = analysis.table(dataset, 3)
-    (name,) = (name for name in rows[0] if name.startswith("P\n"))
-    assert [float(row[name]) for row in rows] == [-100.0, -300.0, -500.0]
+def test_the_load_of_an_open_contact_stands_in_the_table():
+    for record in [Record(), Record(per_member=False)]:
+        pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.5e-3})
+        dataset = run(scene(contact=pulled, shear=shear.Uniform(), record=record))
+        np.testing.assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.5e-3, 21), rtol=1e-12)
+        assert int(dataset["in_contact"][-1]) == 0
+        rows = analysis.table(dataset, 3)
+        (name,) = (name for name in rows[0] if name.startswith("P\n"))
+        assert [float(row[name]) for row in rows] == [-100.0, -300.0, -500.0]
 
 
-@pytest.mark.parametrize("control", ["load", "indentation", "displacement"])
-def test_control_is_that_of_the_scene(control):
-    held = {control: {"from": 1e-6, "to": 3e-6}} | ({"stiffness": 2e3} if control == "displacement" else {})
-    dataset = run(scene(contact=Equilibrium(**held), clock=Clock(duration=0.4, step=0.02)))
-    found = analysis.control(dataset)
-    assert found.kind == control and math.isinf(found.stiffness) == (control != "displacement")
-    assert not analysis.is_stationary(dataset)
+def test_control_is_that_of_the_scene():
+    for control in ["load", "indentation", "displacement"]:
+        held = {control: {"from": 1e-6, "to": 3e-6}} | ({"stiffness": 2e3} if control == "displacement" else {})
+        dataset = run(scene(contact=Equilibrium(**held), clock=Clock(duration=0.4, step=0.02)))
+        found = analysis.control(dataset)
+        assert found.kind == control and math.isinf(found.stiffness) == (control != "displacement")
+        assert not analysis.is_stationary(dataset)

@@ -38,15 +38,15 @@ def process(kind=SiteModes, poisson_ratio=0.5):
     return kind(lattice, G, poisson_ratio, Time(time=1.0), Constant())
 
 
-@pytest.mark.parametrize("poisson_ratio", [0.5, 0.3])
-def test_the_energy_of_discs_is_the_published_closed_form(poisson_ratio):
-    # the half-space's compliance under each bond: twice the energy of one disc of unit force
-    exact = (2.0 - poisson_ratio) / (1.5 * math.pi**2 * G * B)
-    assert_allclose(SPECTRUM.surface_energy(G, poisson_ratio), exact, rtol=1e-14)
-    if poisson_ratio == 0.5:
-        assert_allclose(exact, 1.0 / (math.pi**2 * G * B), rtol=1e-15)
-    # work of a unit force on its own mean displacement, ½ f u = ½ f²/stiffest
-    assert_allclose(0.5 / SPECTRUM.stiffest(G, poisson_ratio), exact, rtol=1e-14)
+def test_the_energy_of_discs_is_the_published_closed_form():
+    for poisson_ratio in [0.5, 0.3]:
+        # the half-space's compliance under each bond: twice the energy of one disc of unit force
+        exact = (2.0 - poisson_ratio) / (1.5 * math.pi**2 * G * B)
+        assert_allclose(SPECTRUM.surface_energy(G, poisson_ratio), exact, rtol=1e-14)
+        if poisson_ratio == 0.5:
+            assert_allclose(exact, 1.0 / (math.pi**2 * G * B), rtol=1e-15)
+        # work of a unit force on its own mean displacement, ½ f u = ½ f²/stiffest
+        assert_allclose(0.5 / SPECTRUM.stiffest(G, poisson_ratio), exact, rtol=1e-14)
 
 
 def test_the_stiffest_bond_is_half_pi_squared_g_b():

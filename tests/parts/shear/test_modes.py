@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from itertools import product
 
 import mpmath
 import numpy as np
@@ -80,65 +81,65 @@ def test_a_pixel_cut_by_the_cut_offs_has_the_integral_of_the_density(name, pixel
         assert_allclose(found[reach + ix, iy], exact, rtol=1e-9, atol=1e-13 * spectrum.variance)
 
 
-@pytest.mark.parametrize("name", SMOOTH)
-def test_a_pixel_of_a_smooth_spectrum_has_the_integral_of_the_density(name):
-    spectrum = SMOOTH[name]
-    found = spectrum.pixels(TURN, 7)
-    for ix, iy in [(0, 0), (1, 0), (-1, 1), (0, 2), (-3, 2), (7, 7), (-7, 6)]:
-        exact = pixel_by_quadrature(spectrum, ix, iy)
-        assert_allclose(found[7 + ix, iy], exact, rtol=1e-9, atol=1e-14 * spectrum.variance)
+def test_a_pixel_of_a_smooth_spectrum_has_the_integral_of_the_density():
+    for name in SMOOTH:
+        spectrum = SMOOTH[name]
+        found = spectrum.pixels(TURN, 7)
+        for ix, iy in [(0, 0), (1, 0), (-1, 1), (0, 2), (-3, 2), (7, 7), (-7, 6)]:
+            exact = pixel_by_quadrature(spectrum, ix, iy)
+            assert_allclose(found[7 + ix, iy], exact, rtol=1e-9, atol=1e-14 * spectrum.variance)
 
 
-@pytest.mark.parametrize("length", [0.03, 0.3, 1.0, 3.0, 30.0])
-def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions(length):
-    reach = 6
-    pixels = Gaussian(1.3, length).pixels(TURN, reach)
-    edges = TURN * length / 2 * (np.arange(-reach, reach + 2) - 0.5)
-    across = np.where(edges[:-1] > 0, -np.diff(special.erfc(edges)), np.diff(special.erf(edges))) / 2
-    exact = 1.3**2 * across[:, None] * across[reach:]
-    assert_allclose(pixels, exact, rtol=0, atol=1e-15)
-    # where erfc keeps its digits: sums differ by 2e-16 of the variance from halved ones, which are 4096 times better
-    positive = edges[:-1] > 0
-    assert_allclose(pixels[positive], exact[positive], rtol=1e-11, atol=1e-18)
+def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions():
+    for length in [0.03, 0.3, 1.0, 3.0, 30.0]:
+        reach = 6
+        pixels = Gaussian(1.3, length).pixels(TURN, reach)
+        edges = TURN * length / 2 * (np.arange(-reach, reach + 2) - 0.5)
+        across = np.where(edges[:-1] > 0, -np.diff(special.erfc(edges)), np.diff(special.erf(edges))) / 2
+        exact = 1.3**2 * across[:, None] * across[reach:]
+        assert_allclose(pixels, exact, rtol=0, atol=1e-15)
+        # where erfc keeps its digits: sums differ by 2e-16 of the variance from halved ones
+        positive = edges[:-1] > 0
+        assert_allclose(pixels[positive], exact[positive], rtol=1e-11, atol=1e-18)
 
 
-@pytest.mark.parametrize("spectrum", CUT_OFF.values(), ids=CUT_OFF)
-def test_all_pixels_together_hold_the_variance_of_a_spectrum_that_ends(spectrum):
-    pixels = spectrum.pixels(TURN, 10)
-    assert_allclose(whole_plane(pixels), spectrum.variance, rtol=1e-13, atol=0)
+def test_all_pixels_together_hold_the_variance_of_a_spectrum_that_ends():
+    for spectrum in CUT_OFF.values():
+        pixels = spectrum.pixels(TURN, 10)
+        assert_allclose(whole_plane(pixels), spectrum.variance, rtol=1e-13, atol=0)
 
 
 def whole_plane(pixels):
     return math.fsum(pixels[:, 1:].ravel()) * 2 + math.fsum(pixels[:, 0])
 
 
-@pytest.mark.parametrize("name", ["gaussian", "anisotropic"])
-def test_all_pixels_together_hold_the_share_of_a_gaussian_inside_the_square(name):
-    spectrum, reach = SMOOTH[name], 3
-    pixels = spectrum.pixels(TURN, reach)
-    edge = TURN * (reach + 0.5) / 2
-    lengths = (spectrum.length,) * 2 if name == "gaussian" else (spectrum.length_x, spectrum.length_y)
-    share = math.prod(special.erf(edge * length) for length in lengths)
-    assert_allclose(whole_plane(pixels), spectrum.variance * share, rtol=1e-13, atol=0)
+def test_all_pixels_together_hold_the_share_of_a_gaussian_inside_the_square():
+    for name in ["gaussian", "anisotropic"]:
+        spectrum, reach = SMOOTH[name], 3
+        pixels = spectrum.pixels(TURN, reach)
+        edge = TURN * (reach + 0.5) / 2
+        lengths = (spectrum.length,) * 2 if name == "gaussian" else (spectrum.length_x, spectrum.length_y)
+        share = math.prod(special.erf(edge * length) for length in lengths)
+        assert_allclose(whole_plane(pixels), spectrum.variance * share, rtol=1e-13, atol=0)
 
 
-@pytest.mark.parametrize("spectrum", (CUT_OFF | SMOOTH).values(), ids=CUT_OFF | SMOOTH)
-def test_pixels_add_up_to_the_one_large_pixel_that_they_fill(spectrum):
-    reach = 4
-    pixels = spectrum.pixels(TURN, reach)
-    large = spectrum.pixels(TURN * (2 * reach + 1), 0)
-    assert_allclose(whole_plane(pixels), large[0, 0], rtol=1e-12, atol=0)
+def test_pixels_add_up_to_the_one_large_pixel_that_they_fill():
+    for spectrum in (CUT_OFF | SMOOTH).values():
+        reach = 4
+        pixels = spectrum.pixels(TURN, reach)
+        large = spectrum.pixels(TURN * (2 * reach + 1), 0)
+        assert_allclose(whole_plane(pixels), large[0, 0], rtol=1e-12, atol=0)
 
 
-@pytest.mark.parametrize("name", ["gaussian", "von_karman"])
-def test_far_pixels_keep_their_relative_accuracy(name):
-    spectrum, reach = SMOOTH[name], 60
-    pixels = spectrum.pixels(TURN, reach)
-    node, weight = np.polynomial.legendre.leggauss(20)
-    for ix, iy in [(20, 5), (30, 0)]:
-        x, y = TURN * (ix + node[:, None] / 2), TURN * (iy + node / 2)
-        exact = weight @ spectrum.density(x, y) @ weight / 4
-        assert_allclose(pixels[reach + ix, iy], exact, rtol=1e-11, atol=0)
+def test_far_pixels_keep_their_relative_accuracy():
+    for name in ["gaussian", "von_karman"]:
+        spectrum, reach = SMOOTH[name], 60
+        pixels = spectrum.pixels(TURN, reach)
+        node, weight = np.polynomial.legendre.leggauss(20)
+        for ix, iy in [(20, 5), (30, 0)]:
+            x, y = TURN * (ix + node[:, None] / 2), TURN * (iy + node / 2)
+            exact = weight @ spectrum.density(x, y) @ weight / 4
+            assert_allclose(pixels[reach + ix, iy], exact, rtol=1e-11, atol=0)
 
 
 def test_modes_are_one_of_each_pair_sorted_by_length():
@@ -182,32 +183,24 @@ def test_energies_of_pairs_are_compliance_times_density_over_area():
     assert_allclose(found.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0)
 
 
-@pytest.mark.parametrize("poisson_ratio", [0.5, 0.3])
-@pytest.mark.parametrize(
-    "spectrum", [Gaussian(1.3, 1.0), AnisotropicGaussian(1.3, 1.0, 1.6, angle=0.7)], ids=["gaussian", "turned"]
-)
-def test_a_smooth_spectrum_loses_the_energy_around_zero(spectrum, poisson_ratio):
-    # -(2 - ν)/(8π) 3.900265 C(0)/(G L); the pixel's curvature adds a term in 1/L²
-    beta = (mpmath.zeta(0.5, 0.25) - mpmath.zeta(0.5, 0.75)) / 2
-    constant = float(-4 * mpmath.zeta(0.5) * beta)  # minus the lattice sum of 1/|n|
-    deficit = (2 - poisson_ratio) / (8 * math.pi) * constant * float(spectrum.density(0.0, 0.0))
-    rest = []
-    for cell in (40.0, 80.0):
-        found = modes(spectrum, cell, int(6 * cell))
-        exact = spectrum.surface_energy(1.0, poisson_ratio)
-        rest.append(np.sum(found.energies(1.0, poisson_ratio)) - exact + deficit / cell)
-        assert abs(rest[-1]) < 0.05 * deficit / cell * (40.0 / cell)
-        assert_allclose(found.error_energy(1.0, poisson_ratio), (rest[-1] - deficit / cell) / exact, rtol=1e-9, atol=0)
-    assert 3.5 < rest[0] / rest[1] < 4.5  # second order
-
-
-def test_the_curvature_of_a_pixel_costs_the_energy_that_its_laplacian_says():
-    cell, spectrum = 160.0, Gaussian(1.0, 1.0)
-    found = np.sum(modes(spectrum, cell, 960).energies(1.0))
-    bias = spectrum.surface_energy(1.0) - 0.23277991551983515 * math.pi / cell
-    curvature = -(math.pi**2.5) / 64 / cell**2  # (2π/L)²/24 of (1/8π²) ∫ G ∇²C d²q
-    rest = (found - bias) / curvature - 1
-    assert abs(rest) < 0.1
+def test_a_smooth_spectrum_loses_the_energy_around_zero():
+    for poisson_ratio, spectrum in product(
+        [0.5, 0.3], [Gaussian(1.3, 1.0), AnisotropicGaussian(1.3, 1.0, 1.6, angle=0.7)]
+    ):
+        # -(2 - ν)/(8π) 3.900265 C(0)/(G L); the pixel's curvature adds a term in 1/L²
+        beta = (mpmath.zeta(0.5, 0.25) - mpmath.zeta(0.5, 0.75)) / 2
+        constant = float(-4 * mpmath.zeta(0.5) * beta)  # minus the lattice sum of 1/|n|
+        deficit = (2 - poisson_ratio) / (8 * math.pi) * constant * float(spectrum.density(0.0, 0.0))
+        rest = []
+        for cell in (40.0, 80.0):
+            found = modes(spectrum, cell, int(6 * cell))
+            exact = spectrum.surface_energy(1.0, poisson_ratio)
+            rest.append(np.sum(found.energies(1.0, poisson_ratio)) - exact + deficit / cell)
+            assert abs(rest[-1]) < 0.05 * deficit / cell * (40.0 / cell)
+            assert_allclose(
+                found.error_energy(1.0, poisson_ratio), (rest[-1] - deficit / cell) / exact, rtol=1e-9, atol=0
+            )
+        assert 3.5 < rest[0] / rest[1] < 4.5  # second order
 
 
 def test_energy_of_a_spectrum_with_cut_offs_converges_with_the_cell():
@@ -226,19 +219,14 @@ def test_a_ripple_is_one_pair_of_its_own():
         assert_allclose(found.energies(1.7, nu).sum(), ripple.surface_energy(1.7, nu), rtol=1e-15, atol=0)
 
 
-@pytest.mark.parametrize("angle", [0.0, 0.3, 1.2, math.pi / 2, 2.5, -0.4, math.pi])
-def test_a_ripple_that_does_not_fit_keeps_its_own_energy_and_says_so(angle):
-    ripple = Ripple(3.0, 0.26, angle)
-    found = modes(ripple, 1.0)
-    assert not found.on_lattice
-    assert found.qy[0] > 0.0 or (found.qy[0] == 0.0 and found.qx[0] > 0.0)
-    assert_allclose(found.energies(1.7, 0.3).sum(), ripple.surface_energy(1.7, 0.3), rtol=1e-14, atol=0)
-    assert_allclose(np.abs(found.qx**2 + found.qy**2), (TURN / 0.26) ** 2, rtol=1e-14, atol=0)
-
-
-def test_a_ripple_along_the_diagonal_of_the_cell_is_on_its_lattice():
-    found = modes(Ripple(1.0, 1.0 / math.hypot(3, 4), math.atan2(4, -3)), 1.0)
-    assert (found.ix.tolist(), found.iy.tolist(), found.on_lattice) == ([-3], [4], True)
+def test_a_ripple_that_does_not_fit_keeps_its_own_energy_and_says_so():
+    for angle in [0.0, 0.3, 1.2, math.pi / 2, 2.5, -0.4, math.pi]:
+        ripple = Ripple(3.0, 0.26, angle)
+        found = modes(ripple, 1.0)
+        assert not found.on_lattice
+        assert found.qy[0] > 0.0 or (found.qy[0] == 0.0 and found.qx[0] > 0.0)
+        assert_allclose(found.energies(1.7, 0.3).sum(), ripple.surface_energy(1.7, 0.3), rtol=1e-14, atol=0)
+        assert_allclose(np.abs(found.qx**2 + found.qy**2), (TURN / 0.26) ** 2, rtol=1e-14, atol=0)
 
 
 def test_a_ripple_of_no_amplitude_is_still_a_pair_without_errors():
@@ -246,39 +234,33 @@ def test_a_ripple_of_no_amplitude_is_still_a_pair_without_errors():
     assert (found.error_variance, found.error_energy(), found.variance_spread) == (0.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("spectrum", [AFFINE, Band(1.0, 1 / 2, 1 / 8), Ripple(1.0, 0.25)])
-def test_without_points_the_grid_is_the_smallest_even_one_that_holds_the_spectrum(spectrum):
-    found = modes(spectrum, 1.0)
-    assert found.points % 2 == 0
-    reach = max(np.max(np.abs(found.ix)), np.max(found.iy))
-    assert reach == found.points // 2 - 1
-    smaller = modes(spectrum, 1.0, found.points - 1)  # odd, and just as far
-    assert np.array_equal(smaller.variance, found.variance)
-    with pytest.raises(ValueError, match=f"at least {found.points - 1} points"):
-        modes(spectrum, 1.0, found.points - 2)
+def test_without_points_the_grid_is_the_smallest_even_one_that_holds_the_spectrum():
+    for spectrum in [AFFINE, Band(1.0, 1 / 2, 1 / 8), Ripple(1.0, 0.25)]:
+        found = modes(spectrum, 1.0)
+        assert found.points % 2 == 0
+        reach = max(np.max(np.abs(found.ix)), np.max(found.iy))
+        assert reach == found.points // 2 - 1
+        smaller = modes(spectrum, 1.0, found.points - 1)  # odd, and just as far
+        assert np.array_equal(smaller.variance, found.variance)
+        with pytest.raises(ValueError, match=f"at least {found.points - 1} points"):
+            modes(spectrum, 1.0, found.points - 2)
 
 
-@pytest.mark.parametrize("points", [16, 17])
-def test_nyquist_and_zero_are_left_out(points):
-    found = modes(VonKarman(1.0, 0.2, 0.5), 1.0, points)
-    reach = (points - 1) // 2
-    assert len(found.ix) == ((2 * reach + 1) ** 2 - 1) // 2
-    assert np.max(np.abs(found.ix)) == np.max(found.iy) == reach
+def test_nyquist_and_zero_are_left_out():
+    for points in [16, 17]:
+        found = modes(VonKarman(1.0, 0.2, 0.5), 1.0, points)
+        reach = (points - 1) // 2
+        assert len(found.ix) == ((2 * reach + 1) ** 2 - 1) // 2
+        assert np.max(np.abs(found.ix)) == np.max(found.iy) == reach
 
 
-def test_a_grid_finer_than_needed_has_the_same_modes():
-    a, b = modes(AFFINE, 1.0), modes(AFFINE, 1.0, 101)
-    assert np.array_equal(a.ix, b.ix)
-    assert np.array_equal(a.variance, b.variance)
-
-
-@pytest.mark.parametrize("name", ["self_affine", "h0", "wider_than_the_cell"])
-def test_the_set_of_modes_does_not_depend_on_the_rms(name):
-    spectrum = CUT_OFF[name]
-    waves = spectrum.longest, spectrum.rolloff, spectrum.shortest
-    small, large = (modes(SelfAffine(rms, spectrum.hurst, *waves), 1.0) for rms in (1e-6, 1e9))
-    assert np.array_equal(small.ix, large.ix)
-    assert_allclose(small.variance, large.variance * 1e-30, rtol=1e-11, atol=0)
+def test_the_set_of_modes_does_not_depend_on_the_rms():
+    for name in ["self_affine", "h0", "wider_than_the_cell"]:
+        spectrum = CUT_OFF[name]
+        waves = spectrum.longest, spectrum.rolloff, spectrum.shortest
+        small, large = (modes(SelfAffine(rms, spectrum.hurst, *waves), 1.0) for rms in (1e-6, 1e9))
+        assert np.array_equal(small.ix, large.ix)
+        assert_allclose(small.variance, large.variance * 1e-30, rtol=1e-11, atol=0)
 
 
 def test_a_circle_that_only_touches_pixels_adds_none():
@@ -318,44 +300,43 @@ def realisations(found: Modes, grid: Grid, count: int, seed: int):
     return field_of(grid, half * grid.cell**2)
 
 
-@pytest.mark.parametrize("points", [21, 24])
-@pytest.mark.parametrize("name", ["self_affine", "h0", "turned"])
-def test_realisations_have_the_density_asked_for_in_every_ring_and_sector(name, points):
-    spectrum, count = (CUT_OFF | SMOOTH)[name], 200
-    grid = Grid(1.0, points)
-    found = modes(spectrum, grid.cell, points)
-    density = np.abs(grid.forward(realisations(found, grid, count, seed=5))) ** 2 / grid.cell**2
-    place = (slice(None), found.ix % points, found.iy)
-    relative = np.mean(density[place] / (found.variance * grid.cell**2 / 2), axis=0)
-    radius = np.hypot(found.ix, found.iy).astype(int)
-    sector = (np.arctan2(found.iy, found.ix) / math.pi * 8).astype(int)
-    for bins in (radius, sector):
-        for one in np.unique(bins):
-            inside = relative[bins == one]  # each the mean of ``count`` exponential variables of mean one
-            assert abs(np.mean(inside) - 1) < 5 / math.sqrt(count * len(inside))
-    power = np.sum(density[0] * grid.multiplicity)
-    density[place] = 0.0
-    density[:, -found.ix[found.iy == 0] % points, 0] = 0.0
-    assert np.max(density) < 1e-28 * power  # nothing anywhere else
+def test_realisations_have_the_density_asked_for_in_every_ring_and_sector():
+    for points, name in product([21, 24], ["self_affine", "h0", "turned"]):
+        spectrum, count = (CUT_OFF | SMOOTH)[name], 200
+        grid = Grid(1.0, points)
+        found = modes(spectrum, grid.cell, points)
+        density = np.abs(grid.forward(realisations(found, grid, count, seed=5))) ** 2 / grid.cell**2
+        place = (slice(None), found.ix % points, found.iy)
+        relative = np.mean(density[place] / (found.variance * grid.cell**2 / 2), axis=0)
+        radius = np.hypot(found.ix, found.iy).astype(int)
+        sector = (np.arctan2(found.iy, found.ix) / math.pi * 8).astype(int)
+        for bins in (radius, sector):
+            for one in np.unique(bins):
+                inside = relative[bins == one]  # each the mean of ``count`` exponential variables of mean one
+                assert abs(np.mean(inside) - 1) < 5 / math.sqrt(count * len(inside))
+        power = np.sum(density[0] * grid.multiplicity)
+        density[place] = 0.0
+        density[:, -found.ix[found.iy == 0] % points, 0] = 0.0
+        assert np.max(density) < 1e-28 * power  # nothing anywhere else
 
 
-@pytest.mark.parametrize("points", [21, 24])
-def test_mean_square_and_energy_of_realisations_scatter_as_foretold(points):
-    count = 2000
-    grid = Grid(1.0, points)
-    found = modes(AFFINE, grid.cell, points)
-    fields = realisations(found, grid, count, seed=6)
-    weights = found.energies(1.0)
-    power = np.abs(grid.forward(fields)[:, found.ix % points, found.iy]) ** 2 / grid.cell**4
-    for sample, share, spread in [
-        (np.mean(fields**2, axis=(1, 2)), found.variance, found.variance_spread),
-        (2 * power @ (weights / found.variance), weights, found.energy_spread()),
-    ]:
-        total = np.sum(share)
-        assert abs(np.mean(sample) / total - 1) < 5 * spread / math.sqrt(count)
-        excess = 6 * np.sum(share**4) / np.sum(share**2) ** 2  # Σ share · Exp(1)
-        error = math.sqrt((excess + 2) / count)
-        assert abs(np.var(sample) / (spread * total) ** 2 - 1) < 5 * error
+def test_mean_square_and_energy_of_realisations_scatter_as_foretold():
+    for points in [21, 24]:
+        count = 2000
+        grid = Grid(1.0, points)
+        found = modes(AFFINE, grid.cell, points)
+        fields = realisations(found, grid, count, seed=6)
+        weights = found.energies(1.0)
+        power = np.abs(grid.forward(fields)[:, found.ix % points, found.iy]) ** 2 / grid.cell**4
+        for sample, share, spread in [
+            (np.mean(fields**2, axis=(1, 2)), found.variance, found.variance_spread),
+            (2 * power @ (weights / found.variance), weights, found.energy_spread()),
+        ]:
+            total = np.sum(share)
+            assert abs(np.mean(sample) / total - 1) < 5 * spread / math.sqrt(count)
+            excess = 6 * np.sum(share**4) / np.sum(share**2) ** 2  # Σ share · Exp(1)
+            error = math.sqrt((excess + 2) / count)
+            assert abs(np.var(sample) / (spread * total) ** 2 - 1) < 5 * error
 
 
 def test_the_spread_is_that_of_the_number_of_equal_pairs():

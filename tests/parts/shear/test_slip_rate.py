@@ -1,6 +1,7 @@
 """The amplitude that unsteady sliding makes: closed forms, what is remembered, drives that feel the friction."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -57,24 +58,23 @@ def wave(mean, swing):
     return np.diff(path), np.diff(square)
 
 
-@pytest.mark.parametrize("floor", [0.0, 0.3])
-@pytest.mark.parametrize("swing", [0.0, 0.1, 0.7, 1.0])
-def test_a_modulated_speed_gives_half_the_square_of_its_swing_over_the_mean_square(swing, floor):
-    (last,) = amplitudes(law(floor=floor), moved(*wave(SPEED, swing * SPEED)))[-1:]
-    unsteady = 0.5 * swing**2 / (1.0 + 0.5 * swing**2)
-    assert_allclose(last**2, floor**2 + (1.0 - floor**2) * unsteady, rtol=2.0 * SHORT, atol=1e-14)
-    if swing == 1.0:
-        assert_allclose(unsteady, 1.0 / 3.0, rtol=1e-15)
+def test_a_modulated_speed_gives_half_the_square_of_its_swing_over_the_mean_square():
+    for floor, swing in product([0.0, 0.3], [0.0, 0.1, 0.7, 1.0]):
+        (last,) = amplitudes(law(floor=floor), moved(*wave(SPEED, swing * SPEED)))[-1:]
+        unsteady = 0.5 * swing**2 / (1.0 + 0.5 * swing**2)
+        assert_allclose(last**2, floor**2 + (1.0 - floor**2) * unsteady, rtol=2.0 * SHORT, atol=1e-14)
+        if swing == 1.0:
+            assert_allclose(unsteady, 1.0 / 3.0, rtol=1e-15)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.5])
-def test_stick_slip_at_one_speed_has_the_share_of_the_time_at_rest(share):
-    moves = np.tile(np.arange(STEPS) < share * STEPS, 3)
-    path = np.where(moves, SPEED * PERIOD / STEPS, 0.0)
-    motions = moved(path, path**2 / (PERIOD / STEPS))
-    ends = amplitudes(law(), motions, moved(path[:1], path[:1] ** 2 / (PERIOD / STEPS)))
-    moving = 3 * round(share * STEPS) + 1  # with the step that resumes the sliding
-    assert_allclose(ends[-1] ** 2, 1.0 - moving / (3 * STEPS + 1), rtol=6.0 * SHORT)
+def test_stick_slip_at_one_speed_has_the_share_of_the_time_at_rest():
+    for share in [0.1, 0.5]:
+        moves = np.tile(np.arange(STEPS) < share * STEPS, 3)
+        path = np.where(moves, SPEED * PERIOD / STEPS, 0.0)
+        motions = moved(path, path**2 / (PERIOD / STEPS))
+        ends = amplitudes(law(), motions, moved(path[:1], path[:1] ** 2 / (PERIOD / STEPS)))
+        moving = 3 * round(share * STEPS) + 1  # with the step that resumes the sliding
+        assert_allclose(ends[-1] ** 2, 1.0 - moving / (3 * STEPS + 1), rtol=6.0 * SHORT)
 
 
 def test_rest_holds_the_amplitude_and_counts_once_sliding_resumes():
