@@ -34,8 +34,7 @@ def course(name):
 
 def pieces(name, *ends):
     """The pieces of a course between some times, one after the other."""
-    found = course(name).pieces(np.array(ends), DURATION)
-    return [Pieces(*row) for row in zip(*found, strict=True)]
+    return [Pieces(*row) for row in zip(*course(name).pieces(np.array(ends), DURATION), strict=True)]
 
 
 def at(name, time):
@@ -43,23 +42,23 @@ def at(name, time):
 
 
 @pytest.mark.parametrize("name", COURSES)
-@pytest.mark.parametrize(("start", "stop"), [(0.0, DURATION), (0.13, 1.07), (0.31, 0.59)])
-def test_pieces_hold_the_integral_and_the_path_of_the_value(name, start, stop):
-    # the zeros of the linear courses, besides their turns, are kinks of the magnitude
-    kinks = [t for t in (*TURNS, 0.2, 0.4, 0.5 + 0.3 * 0.25, 0.8, 1.0) if start < t < stop]
-    exact = [
-        quad(lambda t, f=f: f(at(name, t)), start, stop, points=kinks, epsabs=0.0, epsrel=1e-12)[0]
-        for f in (float, abs, np.square)
-    ]
-    found = pieces(name, start, stop)
-    squares = [piece.unsteady + piece.path**2 / (piece.stop - piece.start) for piece in found]
-    sums = sum(piece.integral for piece in found), sum(piece.path for piece in found), sum(squares)
-    assert_allclose(sums, exact, rtol=1e-11)
-    assert name != "number" or found[0].unsteady == 0.0
-    whole = course(name).pieces(np.array([start, stop]), DURATION).joined
-    square = whole.unsteady + whole.path**2 / (stop - start)
-    assert_allclose([whole.integral, whole.path, square], np.transpose([exact]), rtol=1e-11)
-    assert (whole.start, whole.stop, whole.first) == (start, stop, found[0].first)
+def test_pieces_hold_the_integral_and_the_path_of_the_value(name):
+    for start, stop in [(0.0, DURATION), (0.13, 1.07), (0.31, 0.59)]:
+        # the zeros of the linear courses, besides their turns, are kinks of the magnitude
+        kinks = [t for t in (*TURNS, 0.2, 0.4, 0.5 + 0.3 * 0.25, 0.8, 1.0) if start < t < stop]
+        exact = [
+            quad(lambda t, f=f: f(at(name, t)), start, stop, points=kinks, epsabs=0.0, epsrel=1e-12)[0]
+            for f in (float, abs, np.square)
+        ]
+        parts = pieces(name, start, stop)
+        squares = [piece.unsteady + piece.path**2 / (piece.stop - piece.start) for piece in parts]
+        sums = sum(piece.integral for piece in parts), sum(piece.path for piece in parts), sum(squares)
+        assert_allclose(sums, exact, rtol=1e-11)
+        assert name != "number" or parts[0].unsteady == 0.0
+        whole = course(name).pieces(np.array([start, stop]), DURATION).joined
+        square = whole.unsteady + whole.path**2 / (stop - start)
+        assert_allclose([whole.integral, whole.path, square], np.transpose([exact]), rtol=1e-11)
+        assert (whole.start, whole.stop, whole.first) == (start, stop, parts[0].first)
 
 
 @pytest.mark.parametrize("name", COURSES)
