@@ -85,25 +85,22 @@ def test_the_profile_at_a_time_is_that_of_the_nearest_record():
 # -- axes -------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("x", "variable", "factor", "label"),
-    [
+def test_curves_are_drawn_over_what_was_chosen():
+    for x, variable, factor, label in [
         ("time", "t", 1e3, "time $t$ (ms)"),
         ("speed", "speed", 1e3, "sliding speed $V$ (mm/s)"),
         ("slider_position", "slider_position", 1e3, "displacement of the slider $X$ (mm)"),
         ("shear_stress", "shear_stress", 1e-3, r"mean shear stress at the interface $\tau_{0}$ (kPa)"),
-    ],
-)
-def test_curves_are_drawn_over_what_was_chosen(x, variable, factor, label):
-    dataset = simulated(shear=shear.Uniform())
-    figure = draw(dataset, "time", x=x)
-    if x == "shear_stress":  # the longest label
-        rendered(figure)
-    over, radius = drawn(figure.axes[0], pictures.BOTH)
-    assert_allclose(over, factor * dataset[variable], rtol=1e-14)
-    assert_allclose(radius, 1e6 * dataset["contact_radius"], rtol=1e-14)
-    assert figure.axes[-1].get_xlabel() == label
-    assert plots.draw(dataset, None, Choices(x=x)).axes[-1].get_xlabel() == label
+    ]:
+        dataset = simulated(shear=shear.Uniform())
+        figure = draw(dataset, "time", x=x)
+        if x == "shear_stress":  # the longest label
+            rendered(figure)
+        over, radius = drawn(figure.axes[0], pictures.BOTH)
+        assert_allclose(over, factor * dataset[variable], rtol=1e-14)
+        assert_allclose(radius, 1e6 * dataset["contact_radius"], rtol=1e-14)
+        assert figure.axes[-1].get_xlabel() == label
+        assert plots.draw(dataset, None, Choices(x=x)).axes[-1].get_xlabel() == label
 
 
 def test_a_swept_key_that_is_chosen_goes_along_the_axis_and_the_others_make_curves():
@@ -239,32 +236,26 @@ def test_a_contact_in_equilibrium_has_one_branch_of_radii_there_and_back(table):
     assert label.endswith(" of 2")
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
+def test_a_table_of_which_nothing_can_be_drawn_is_refused(ramp, table):
+    for text, said in [
         ("contact_area [mm^2]\n0.04\n", r'no column "speed", which the figure is drawn over; add it, or choose --x'),
         ("speed [mm/s], contact_aera [mm^2]\n1, 0.04\n", r'"contact_aera" is neither .* did you mean "contact_area"'),
         ("speed [mm/s], contact_area [mN]\n1, 0.04\n", r"contact_area.* not a unit of m\^2"),
         ("speed [mm/s], indentation [um]\n1, 1\n", "no row is of what is drawn.*speed, indentation"),
         ("speed [mm/s], contact_area [mm^2], contact_load [N]\n1, 0.04, 1\n", "no row is of what is drawn"),
-    ],
-)
-def test_a_table_of_which_nothing_can_be_drawn_is_refused(ramp, table, text, said):
-    with pytest.raises(ValueError, match=said):
-        draw(ramp, "curve", data=table(text))
+    ]:
+        with pytest.raises(ValueError, match=said):
+            draw(ramp, "curve", data=table(text))
 
 
-@pytest.mark.parametrize(
-    ("columns", "said"),
-    [
+def test_columns_that_are_no_table_are_refused(ramp):
+    for columns, said in [
         ({"speed": [1e-3], "contact_aera": [4e-8]}, 'did you mean "contact_area"'),
         ({"speed": [1e-3, 2e-3], "contact_area": [4e-8]}, "the same number of rows"),
         ({}, "the same number of rows"),
-    ],
-)
-def test_columns_that_are_no_table_are_refused(ramp, columns, said):
-    with pytest.raises(ValueError, match=said):
-        draw(ramp, "curve", data=columns)
+    ]:
+        with pytest.raises(ValueError, match=said):
+            draw(ramp, "curve", data=columns)
 
 
 # -- in Python and by the command -------------------------------------------------------------

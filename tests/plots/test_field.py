@@ -23,18 +23,18 @@ from sim.spectrum.stress_map import StressMap
 STARTER = Path(__file__).parents[2] / "sim" / "starter.toml"
 
 
-@pytest.mark.parametrize("points", [32, 33])
-def test_map_passes_through_every_sample(points):
-    dataset = mapped(points=points)
-    panels = plots.draw(dataset, "map").axes
-    stress = dataset["shear_map"][0, 0].to_numpy()
-    shown = panels[0].images[0].get_array().T / 1e-3  # kPa
-    fine = points * -(-field_figures.PIXELS // points) // points
-    half = shown.shape[0] // 2
-    # the middle of the picture is the corner of the cell's array; rounding of the transform of |stress|
-    at = half + fine * np.arange(points // 2)
-    rounding = 1e-13 * np.max(np.abs(stress))
-    np.testing.assert_allclose(shown[np.ix_(at, at)], stress[: points // 2, : points // 2], rtol=0, atol=rounding)
+def test_map_passes_through_every_sample():
+    for points in [32, 33]:
+        dataset = mapped(points=points)
+        panels = plots.draw(dataset, "map").axes
+        stress = dataset["shear_map"][0, 0].to_numpy()
+        shown = panels[0].images[0].get_array().T / 1e-3  # kPa
+        fine = points * -(-field_figures.PIXELS // points) // points
+        half = shown.shape[0] // 2
+        # the middle of the picture is the corner of the cell's array; rounding of the transform of |stress|
+        at = half + fine * np.arange(points // 2)
+        rounding = 1e-13 * np.max(np.abs(stress))
+        np.testing.assert_allclose(shown[np.ix_(at, at)], stress[: points // 2, : points // 2], rtol=0, atol=rounding)
 
 
 def test_map_of_a_ripple_and_its_displacement_have_the_closed_amplitudes():
@@ -56,58 +56,52 @@ def test_contact_circle_has_the_members_radius():
     np.testing.assert_allclose(circle.radius, 1e6 * dataset["contact_radius"][0, -1], rtol=1e-14)
 
 
-@pytest.mark.parametrize(
-    ("speed", "text"), [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]
-)
-def test_arrow_points_where_the_slider_goes(speed, text):
-    amplitude = Stress(reference=3e5)
-    dataset = simulated(
-        drive=drive.Steady(speed=speed),
-        shear=field(shear.Mapped, amplitude=amplitude),
-        record=Record(maps=(0.4,)),
-        ensemble=Ensemble(members=1),
-    )
-    panel = plots.draw(dataset, "map").axes[0]
-    assert text in [label.get_text() for label in panel.texts]
+def test_arrow_points_where_the_slider_goes():
+    for speed, text in [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]:
+        amplitude = Stress(reference=3e5)
+        dataset = simulated(
+            drive=drive.Steady(speed=speed),
+            shear=field(shear.Mapped, amplitude=amplitude),
+            record=Record(maps=(0.4,)),
+            ensemble=Ensemble(members=1),
+        )
+        panel = plots.draw(dataset, "map").axes[0]
+        assert text in [label.get_text() for label in panel.texts]
 
 
-@pytest.mark.parametrize(
-    ("spectrum", "amplitude"),
-    [
+def test_measured_spectrum_is_the_one_asked_for():
+    """Each ring within five of the standard errors that Gaussian modes have, whatever the amplitude."""
+    for spectrum, amplitude in [
         (Band(rms=150e3, longest=60e-6, shortest=16e-6), Onset(speed=2.5e-3, width=0.3)),
         (Gaussian(rms=1e5, length=20e-6), Stress(reference=1e5)),
         (AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), Onset(speed=2.5e-3, width=0.3)),
-    ],
-    ids=["band", "gaussian", "anisotropic"],
-)
-def test_measured_spectrum_is_the_one_asked_for(spectrum, amplitude):
-    """Each ring within five of the standard errors that Gaussian modes have, whatever the amplitude."""
-    members = 24
-    dataset = mapped(members, spectrum, amplitude=amplitude)
-    above, below = rendered(plots.draw(dataset, "spectrum")).axes
-    q, ratio = below.containers[0].lines[0].get_data()
-    cells = modes(spectrum, CELL, 32)
-    ring = np.floor(np.hypot(cells.ix, cells.iy) + 0.5)
-    shown = [cells.variance[ring == k] for k in np.rint(q * 1e6 * CELL / (2 * np.pi))]
-    # a mode's periodogram is exponentially distributed: its standard deviation is its mean
-    error = np.array([np.sqrt(np.sum(v**2)) / np.sum(v) for v in shown]) / np.sqrt(members)
-    assert len(q) > 5 and np.all(np.abs(ratio - 1.0) < 5.0 * error)
-    fine, asked = above.lines[0].get_data()
-    angle = 2 * np.pi * np.arange(360) / 360
-    density = np.mean(
-        spectrum.density(1e6 * fine[:, None] * np.cos(angle), 1e6 * fine[:, None] * np.sin(angle)), axis=1
-    )
-    raised = amplitude.factor(np.array([4e-3]), dataset["shear_stress"].to_numpy()[-1:])[0] ** 2
-    np.testing.assert_allclose(np.nan_to_num(asked), raised * density, rtol=1e-9)
+    ]:
+        members = 24
+        dataset = mapped(members, spectrum, amplitude=amplitude)
+        above, below = rendered(plots.draw(dataset, "spectrum")).axes
+        q, ratio = below.containers[0].lines[0].get_data()
+        cells = modes(spectrum, CELL, 32)
+        ring = np.floor(np.hypot(cells.ix, cells.iy) + 0.5)
+        shown = [cells.variance[ring == k] for k in np.rint(q * 1e6 * CELL / (2 * np.pi))]
+        # a mode's periodogram is exponentially distributed: its standard deviation is its mean
+        error = np.array([np.sqrt(np.sum(v**2)) / np.sum(v) for v in shown]) / np.sqrt(members)
+        assert len(q) > 5 and np.all(np.abs(ratio - 1.0) < 5.0 * error)
+        fine, asked = above.lines[0].get_data()
+        angle = 2 * np.pi * np.arange(360) / 360
+        density = np.mean(
+            spectrum.density(1e6 * fine[:, None] * np.cos(angle), 1e6 * fine[:, None] * np.sin(angle)), axis=1
+        )
+        raised = amplitude.factor(np.array([4e-3]), dataset["shear_stress"].to_numpy()[-1:])[0] ** 2
+        np.testing.assert_allclose(np.nan_to_num(asked), raised * density, rtol=1e-9)
 
 
-@pytest.mark.parametrize("points", [32, 33])
-def test_modes_laid_out_on_the_grid_hold_their_variance_both_ways(points):
-    cells = modes(AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), CELL, points)
-    grid = Grid(CELL, points)
-    density = field_figures.mode_density(cells, grid)
-    np.testing.assert_allclose(grid.mode_sum(density) / CELL**2, np.sum(cells.variance), rtol=1e-13)
-    np.testing.assert_array_equal(density[1:, 0], density[:0:-1, 0])  # q and -q alike
+def test_modes_laid_out_on_the_grid_hold_their_variance_both_ways():
+    for points in [32, 33]:
+        cells = modes(AnisotropicGaussian(rms=1e5, length_x=15e-6, length_y=25e-6, angle=0.4), CELL, points)
+        grid = Grid(CELL, points)
+        density = field_figures.mode_density(cells, grid)
+        np.testing.assert_allclose(grid.mode_sum(density) / CELL**2, np.sum(cells.variance), rtol=1e-13)
+        np.testing.assert_array_equal(density[1:, 0], density[:0:-1, 0])  # q and -q alike
 
 
 def test_spectrum_of_a_sweep_takes_the_swept_number():
@@ -120,10 +114,10 @@ def test_spectrum_of_a_sweep_takes_the_swept_number():
     np.testing.assert_allclose(np.nanmax(swept), np.nanmax(base) / 9.0, rtol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["map", "spectrum"])
-def test_a_dataset_without_maps_says_how_to_record_them(kind):
-    with pytest.raises(ValueError, match=r'\[record\] maps = \["1 s"\]'):
-        plots.draw(simulated(), kind)
+def test_a_dataset_without_maps_says_how_to_record_them():
+    for kind in ["map", "spectrum"]:
+        with pytest.raises(ValueError, match=r'\[record\] maps = \["1 s"\]'):
+            plots.draw(simulated(), kind)
 
 
 def test_a_spectrum_that_cannot_be_compared_says_why():

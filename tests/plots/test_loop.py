@@ -95,28 +95,28 @@ def test_behind_a_machine_the_axis_is_its_displacement(machine):
     assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
 
 
-@pytest.mark.parametrize(("which", "stiffness"), [("grips", np.inf), ("machine", 340.0)])
-def test_grey_are_all_equilibria_of_jkr_stable_or_not(which, stiffness, request):
-    dataset = request.getfixturevalue(which)
-    loads, radii, _ = plots.draw(dataset, "loop").axes
-    x, radius = drawn(radii, pictures.REFERENCE, "--")
-    again, load = drawn(loads, pictures.REFERENCE, "--")
-    a = 1e-6 * radius
-    exact = jkr.load_at_radius(a, *JKR)
-    assert_allclose(load, 1e6 * exact, rtol=1e-12, atol=1e-12)
-    # load and indentation cancel near their zeros: compared with what the contact has at most
-    assert_allclose(x, 1e6 * (jkr.indentation_at_radius(a, *JKR) + exact / stiffness), rtol=1e-12, atol=1e-14)
-    np.testing.assert_array_equal(x, again)
-    # down to no contact at all, up to the largest that was simulated
-    assert a[0] == 0.0
-    assert_allclose(a[-1], dataset["contact_radius"].max(), rtol=1e-14)
-    # every equilibrium that was simulated lies on it: the stable branch is that beyond the fold
-    stable = a >= a[np.argmin(x)]
-    simulated = dataset["contact_radius"].to_numpy()
-    closed = simulated > 0.0
-    between = np.interp(1e6 * dataset["displacement"].to_numpy()[closed], x[stable], radius[stable])
-    # a chord under the square root of a fold, over 600 points of which those next to it are 2/600 of a radius apart
-    assert_allclose(1e6 * simulated[closed], between, rtol=4e-3)
+def test_grey_are_all_equilibria_of_jkr_stable_or_not(request):
+    for which, stiffness in [("grips", np.inf), ("machine", 340.0)]:
+        dataset = request.getfixturevalue(which)
+        loads, radii, _ = plots.draw(dataset, "loop").axes
+        x, radius = drawn(radii, pictures.REFERENCE, "--")
+        again, load = drawn(loads, pictures.REFERENCE, "--")
+        a = 1e-6 * radius
+        exact = jkr.load_at_radius(a, *JKR)
+        assert_allclose(load, 1e6 * exact, rtol=1e-12, atol=1e-12)
+        # load and indentation cancel near their zeros: compared with what the contact has at most
+        assert_allclose(x, 1e6 * (jkr.indentation_at_radius(a, *JKR) + exact / stiffness), rtol=1e-12, atol=1e-14)
+        np.testing.assert_array_equal(x, again)
+        # down to no contact at all, up to the largest that was simulated
+        assert a[0] == 0.0
+        assert_allclose(a[-1], dataset["contact_radius"].max(), rtol=1e-14)
+        # every equilibrium that was simulated lies on it: the stable branch is that beyond the fold
+        stable = a >= a[np.argmin(x)]
+        simulated = dataset["contact_radius"].to_numpy()
+        closed = simulated > 0.0
+        between = np.interp(1e6 * dataset["displacement"].to_numpy()[closed], x[stable], radius[stable])
+        # a chord under the square root of a fold, over 600 points of which those next to it are 2/600 of a radius apart
+        assert_allclose(1e6 * simulated[closed], between, rtol=4e-3)
 
 
 def test_thin_lines_are_the_folds_of_a_dead_load_and_of_fixed_grips(grips):
@@ -200,26 +200,31 @@ def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
     assert not any("pi" in text.get_text() for text in panel.texts)
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
+def test_every_shape_of_dataset_can_be_drawn():
+    for changes in [
         {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50)},
-        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50),
-         "record": Record(per_member=False)},
+        {
+            "ensemble": Ensemble(members=4),
+            "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50),
+            "record": Record(per_member=False),
+        },
         {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})},
-        {"sweep": {"contact": [{"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}},
-                               {"model": "equilibrium", "load": "1 mN"}]}},
-    ],
-    ids=["members", "statistics only", "never closed", "whole tables"],
-)  # fmt: skip
-def test_every_shape_of_dataset_can_be_drawn(changes):
-    dataset = moved(**changes, clock=COARSE)
-    loads, radii, _ = plots.draw(dataset, "loop").axes
-    assert loads.get_ylabel().startswith("normal load") and radii.get_ylabel().startswith("contact radius")
-    closed = any(np.isfinite(y).any() for _, y in lines_of(radii))
-    assert closed == bool((recorded(dataset, "contact_radius") > 0.0).any())
-    base = plots.draw(dataset, "time").axes[-1]
-    assert base.get_ylabel().startswith("base") and lines_of(base)
+        {
+            "sweep": {
+                "contact": [
+                    {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}},
+                    {"model": "equilibrium", "load": "1 mN"},
+                ]
+            }
+        },
+    ]:
+        dataset = moved(**changes, clock=COARSE)
+        loads, radii, _ = plots.draw(dataset, "loop").axes
+        assert loads.get_ylabel().startswith("normal load") and radii.get_ylabel().startswith("contact radius")
+        closed = any(np.isfinite(y).any() for _, y in lines_of(radii))
+        assert closed == bool((recorded(dataset, "contact_radius") > 0.0).any())
+        base = plots.draw(dataset, "time").axes[-1]
+        assert base.get_ylabel().startswith("base") and lines_of(base)
 
 
 # -- which figure -----------------------------------------------------------------------------

@@ -73,21 +73,17 @@ def test_the_exact_law_and_the_mean_field_are_beside_the_simulated(ramp):
     assert_allclose(speed[[0, -1]], [1.0, 1e5], rtol=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("rupture", "law"),
-    [
+def test_every_rupture_has_its_own_law():
+    for rupture, law in [
         (CutOff(stretch=2e-8, rate=1e4), lambda v: schallamach.cut_off_stress(v, 1e4, 2e-8, 4e-4, 1e5, 9e16)),
         (CutOff(stretch=2e-8), lambda v: schallamach.cut_off_stress(v, 0.0, 2e-8, 4e-4, 1e5, 9e16)),
         (Constant(rate=1e4), lambda v: 9e16 * schallamach.constant_moments(v, 1e4, 4e-4, 1e5).force),
-    ],
-    ids=["cut off", "cut off without heat", "constant"],
-)
-def test_every_rupture_has_its_own_law(rupture, law):
-    dataset = ramped(bonds.FirstMoment(rupture=rupture, **SITES), clock=Clock(duration=1.0, step=0.1))
-    speed = np.array([1e-5, 1e-3])
-    (found,) = slider.steady_laws(dataset, {}, speed)
-    assert_allclose(found.stress, law(speed), rtol=1e-12)
-    plots.draw(dataset, "stress")
+    ]:
+        dataset = ramped(bonds.FirstMoment(rupture=rupture, **SITES), clock=Clock(duration=1.0, step=0.1))
+        speed = np.array([1e-5, 1e-3])
+        (found,) = slider.steady_laws(dataset, {}, speed)
+        assert_allclose(found.stress, law(speed), rtol=1e-12)
+        plots.draw(dataset, "stress")
 
 
 def test_a_swept_rupture_has_a_law_at_each_point():
@@ -141,9 +137,8 @@ def test_depths_side_by_side_each_tell_their_maximum():
     assert told == [f"rate: {most[0]} at 2 mm/s", f"cohort: {most[1]} at 2 mm/s", "steady sliding, exact", "mean field"]
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
+def test_every_kind_of_sliding_can_be_drawn():
+    for changes in [
         {"drive": drive.Ramp(start=-1e-3, stop=2e-3)},
         {"drive": drive.Ramp(start=0.0, stop=1e-2)},
         {"drive": drive.Table(time=(0.0, 0.5, 1.0), speed=(0.0, 0.02, 0.0))},
@@ -151,16 +146,15 @@ def test_depths_side_by_side_each_tell_their_maximum():
         {"bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5)},
         {"bonds": bonds.Unbroken(stress=3e5)},
         {"bonds": bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3)},
-        {"bonds": bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3),
-         "record": Record(per_member=False)},
-    ],
-    ids=["through zero", "from zero", "there and back", "steady speeds", "no stretch", "unbroken", "members",
-         "statistics only"],
-)  # fmt: skip
-def test_every_kind_of_sliding_can_be_drawn(changes):
-    figure = plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "stress")
-    stress = [line for line in figure.axes[0].lines if np.size(line.get_ydata()) > 2]
-    assert stress and all(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in stress)
+        {
+            "bonds": bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES),
+            "ensemble": Ensemble(members=3),
+            "record": Record(per_member=False),
+        },
+    ]:
+        figure = plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "stress")
+        stress = [line for line in figure.axes[0].lines if np.size(line.get_ydata()) > 2]
+        assert stress and all(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in stress)
 
 
 # -- rest and start ---------------------------------------------------------------------------
@@ -237,19 +231,16 @@ def test_peaks_of_members_are_those_of_their_mean_and_sliding_back_they_are_nega
     assert start.peak < 0.0
 
 
-@pytest.mark.parametrize(
-    ("sweep", "words"),
-    [
+def test_what_is_not_swept_is_not_an_axis():
+    for sweep, words in [
         ({}, ["time since the start (s)"]),
         ({"drive.rest": [0.2, 0.5]}, ["time since the start (s)", "time at rest (ms)"]),
         ({"contact.load": [1e-3, 4e-3]}, ["time since the start (s)"]),
-    ],
-)
-def test_what_is_not_swept_is_not_an_axis(sweep, words):
-    figure = plots.draw(started(sweep=sweep, clock=Clock(duration=2.0, step=0.02)))
-    assert [panel.get_xlabel() for panel in figure.axes] == words
-    if "contact.load" in sweep:
-        assert figure.axes[0].get_legend().get_title().get_text().startswith("$P$ = 1 mN, after 1 s")
+    ]:
+        figure = plots.draw(started(sweep=sweep, clock=Clock(duration=2.0, step=0.02)))
+        assert [panel.get_xlabel() for panel in figure.axes] == words
+        if "contact.load" in sweep:
+            assert figure.axes[0].get_legend().get_title().get_text().startswith("$P$ = 1 mN, after 1 s")
 
 
 # -- what cannot be drawn ---------------------------------------------------------------------

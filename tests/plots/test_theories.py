@@ -39,33 +39,29 @@ def curve_of(panel, name):
 # -- theories -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("contact", "law", "value"),
-    [
+def test_every_theory_is_drawn_as_far_as_adhesion_holds():
+    for contact, law, value in [
         (Equilibrium(load=4e-3), theories.compare_at_load, 4e-3),
         (Equilibrium(indentation=2e-6), theories.compare_at_indentation, 2e-6),
         (Equilibrium(load=-3e-4), theories.compare_at_load, -3e-4),
-    ],
-    ids=["load", "indentation", "pulled"],
-)
-def test_every_theory_is_drawn_as_far_as_adhesion_holds(contact, law, value):
-    stresses, forces = plots.draw(plain(contact=contact), "theories").axes
-    factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
-    drawn, _ = curve_of(stresses, "uncorrected")
-    radii = law(factor * drawn, value, *NUMBERS)
-    names = ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction")
-    for name in (*names, "scaled_angle", "shear_share", "scaled_tangent"):
-        stress, area = curve_of(stresses, name)
-        assert np.array_equal(stress, drawn)
-        held = np.isfinite(area)
-        assert held[0] and np.all(radii[name][held] > np.nan_to_num(radii["hertz"][held]))
-        per_area = {"mm²": 1e6, "µm²": 1e12}[stresses.get_ylabel()[-4:-1].strip("(")]
-        # rounding of the axis's unit, which a fold has the square root of
-        assert_allclose(area[held], per_area * np.pi * radii[name][held] ** 2, rtol=1e-6)
-        force, again = curve_of(forces, name)
-        assert_allclose(again, area, rtol=1e-14)
-        newton = {"mN": 1e3, "µN": 1e6}[forces.get_xlabel()[-3:-1]]
-        assert_allclose(force[held], newton * factor * stress[held] * area[held] / per_area, rtol=1e-12)
+    ]:
+        stresses, forces = plots.draw(plain(contact=contact), "theories").axes
+        factor = 1e3 if "kPa" in stresses.get_xlabel() else 1.0
+        drawn, _ = curve_of(stresses, "uncorrected")
+        radii = law(factor * drawn, value, *NUMBERS)
+        names = ("uncorrected", "savkoor_briggs", "reversible_force", "reversible_stress", "fraction")
+        for name in (*names, "scaled_angle", "shear_share", "scaled_tangent"):
+            stress, area = curve_of(stresses, name)
+            assert np.array_equal(stress, drawn)
+            held = np.isfinite(area)
+            assert held[0] and np.all(radii[name][held] > np.nan_to_num(radii["hertz"][held]))
+            per_area = {"mm²": 1e6, "µm²": 1e12}[stresses.get_ylabel()[-4:-1].strip("(")]
+            # rounding of the axis's unit, which a fold has the square root of
+            assert_allclose(area[held], per_area * np.pi * radii[name][held] ** 2, rtol=1e-6)
+            force, again = curve_of(forces, name)
+            assert_allclose(again, area, rtol=1e-14)
+            newton = {"mN": 1e3, "µN": 1e6}[forces.get_xlabel()[-3:-1]]
+            assert_allclose(force[held], newton * factor * stress[held] * area[held] / per_area, rtol=1e-12)
 
 
 def test_a_branch_ends_with_a_dot_where_its_force_is_largest():
@@ -125,21 +121,10 @@ def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
     assert len(stress) == 6
 
 
-def test_theories_are_named():
-    (legend,) = rendered(plots.draw(plain(), "theories")).legends
-    names = [text.get_text() for text in legend.get_texts()]
-    assert len(names) == len(set(names)) == 11
-    assert names[-1] == "simulated" and "a fraction 0.1 reversible" in names
-
-
-@pytest.mark.parametrize(
-    "contact",
-    [Equilibrium(displacement=1e-6, stiffness=100.0), Equilibrium(load={"from": 0.0, "to": 4e-3})],
-    ids=["behind a stiffness", "a course"],
-)
-def test_a_sphere_that_is_not_held_at_a_number_is_refused_with_the_cure(contact):
-    with pytest.raises(ValueError, match=r"load = .4 mN., or with an indentation; .*drawn as: .*time, profile"):
-        plots.draw(plain(contact=contact), "theories")
+def test_a_sphere_that_is_not_held_at_a_number_is_refused_with_the_cure():
+    for contact in [Equilibrium(displacement=1e-6, stiffness=100.0), Equilibrium(load={"from": 0.0, "to": 4e-3})]:
+        with pytest.raises(ValueError, match=r"load = .4 mN., or with an indentation; .*drawn as: .*time, profile"):
+            plots.draw(plain(contact=contact), "theories")
 
 
 def test_without_adhesion_or_contact_there_is_nothing_to_compare():
@@ -149,19 +134,15 @@ def test_without_adhesion_or_contact_there_is_nothing_to_compare():
         plots.draw(plain(contact=Equilibrium(load=-1.0)), "theories")
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [{"drive": RAMP}, {"bonds": bonds.Unbroken()}, {"drive": RAMP, "record": Record(per_member=False)}],
-    ids=["ramp", "no stress", "statistics only"],
-)
-def test_every_scene_at_a_load_can_be_compared(changes):
-    dataset = plain(**changes)
-    for panel in plots.draw(dataset, "theories").axes:
-        stress, area = rival_figures.points_of(dataset)
-        (points,) = (line.get_data() for line in panel.lines if line.get_label() == "simulated")
-        assert len(points[0]) == len(stress) > 0 and np.all((points[0] > 0.0) == (stress > 0.0))
-        assert_allclose(points[1] / points[1][0], area / area[0], rtol=1e-12)
-        assert panel.get_ylim()[0] < points[1].min() and points[1].max() < panel.get_ylim()[1]
+def test_every_scene_at_a_load_can_be_compared():
+    for changes in [{"drive": RAMP}, {"bonds": bonds.Unbroken()}, {"drive": RAMP, "record": Record(per_member=False)}]:
+        dataset = plain(**changes)
+        for panel in plots.draw(dataset, "theories").axes:
+            stress, area = rival_figures.points_of(dataset)
+            (points,) = (line.get_data() for line in panel.lines if line.get_label() == "simulated")
+            assert len(points[0]) == len(stress) > 0 and np.all((points[0] > 0.0) == (stress > 0.0))
+            assert_allclose(points[1] / points[1][0], area / area[0], rtol=1e-12)
+            assert panel.get_ylim()[0] < points[1].min() and points[1].max() < panel.get_ylim()[1]
 
 
 # -- profiles ---------------------------------------------------------------------------------
@@ -231,23 +212,23 @@ def test_a_contact_that_came_off_is_drawn_as_it_last_was():
         plots.draw(simulated(contact=Equilibrium(load=-1.0), shear=shear.Uniform()), "profile")
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
+def test_every_contact_has_profiles():
+    for changes in [
         {"contact": Equilibrium(indentation=-4e-7)},
         {"adhesion": Adhesion(work=0.0)},
         {"drive": drive.Ramp(start=-1e-3, stop=2e-3)},
         {"record": Record(per_member=False), "ensemble": Ensemble(members=3)},
         {"sweep": {"contact.load": [1e-3, 4e-3]}},
-    ],
-    ids=["lifted", "Hertz", "backwards", "statistics only", "sweep"],
-)
-def test_every_contact_has_profiles(changes):
-    dataset = plain(**changes)
-    radius = shapes_of(dataset)[0][0][0].radius
-    pressure, surfaces, *_ = plots.draw(dataset, "profile").axes
-    ((x, p),) = data_of(pressure, pictures.BOTH)
-    (_, low), (_, high) = data_of(surfaces, pictures.BOTH)
-    inside = np.abs(x) < 0.999e6 * radius
-    assert np.isfinite(p[inside]).all() and p[inside].any() and not np.nan_to_num(p[np.abs(x) > 1.001e6 * radius]).any()
-    assert np.all(low[inside] == high[inside]) and np.all(low <= high)
+    ]:
+        dataset = plain(**changes)
+        radius = shapes_of(dataset)[0][0][0].radius
+        pressure, surfaces, *_ = plots.draw(dataset, "profile").axes
+        ((x, p),) = data_of(pressure, pictures.BOTH)
+        (_, low), (_, high) = data_of(surfaces, pictures.BOTH)
+        inside = np.abs(x) < 0.999e6 * radius
+        assert (
+            np.isfinite(p[inside]).all()
+            and p[inside].any()
+            and not np.nan_to_num(p[np.abs(x) > 1.001e6 * radius]).any()
+        )
+        assert np.all(low[inside] == high[inside]) and np.all(low <= high)

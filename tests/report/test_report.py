@@ -140,17 +140,13 @@ def test_a_page_has_a_caption_for_each_figure_and_the_numbers_of_the_statistics(
 
 
 @pytest.mark.usefixtures("bare")
-@pytest.mark.parametrize(
-    "changes",
-    [
+def test_every_shape_of_dataset_has_its_page():
+    for changes in [
         {"sweep": {"contact.load": [1e-3, 4e-3]}, "record": Record(per_member=False)},
         {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform(), "ensemble": Ensemble(members=1)},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
-    ],
-    ids=["statistics of a sweep", "never closed", "two records"],
-)
-def test_every_shape_of_dataset_has_its_page(changes):
-    harmless(Page(html(simulated(**changes))))
+    ]:
+        harmless(Page(html(simulated(**changes))))
 
 
 @pytest.mark.usefixtures("unwritten")
