@@ -304,23 +304,23 @@ def plot(output: Path, kind: str | None, to: Path | None, chosen: tuple[str, ...
     """
     from sim.plots import kinds as plots
 
-    given = plots.Choices(**choices)
+    choice = plots.Choices(**choices)
     if output.suffix == ".toml":
-        say(str(plots.planned(output, kind, to, force, [*given.given, *chosen])))
+        say(str(plots.planned(output, kind, to, force, [*choice.chosen, *chosen])))
         return
     with _opened(output, chosen) as dataset:
-        say(str(plots.drawn(dataset, kind, output, to, force, given)))
+        say(str(plots.drawn(dataset, kind, output, to, force, choice)))
 
 
 @cli.command()
 @click.argument("output", type=_PATH)
 @click.option("-o", "--page", type=_PATH, help="The page; default beside the dataset.")
 @_WHERE
-@click.option("--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`; do they and the run agree?")
-@click.option("--fit", type=_PATH, help="What `sim fit` has found, STEM_fit.json.")
+@click.option("--data", type=_PATH, help="Measured points from a CSV, as of `sim plot`, with their chi^2.")
+@click.option("--fit", type=_PATH, help="The result of `sim fit`, STEM_fit.json.")
 @_FORCE
 def report(output: Path, page: Path | None, chosen: tuple[str, ...], force: bool, **beside: Any) -> None:
-    """One page of a run as HTML: question, answer, figures, tables, errors, cost, and how to repeat it."""
+    """One page of a run as HTML: question, figures, tables, errors, cost, and how to repeat it."""
     from sim.report import written
 
     with _opened(output, chosen) as dataset:

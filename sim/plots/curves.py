@@ -257,13 +257,13 @@ def _is_number(key: xr.DataArray) -> bool:
 
 
 def choice(dataset: xr.Dataset, dim: str) -> str:
-    """The cure for too many values of a swept key."""
+    """Return the cure for too many values of a swept key."""
     value = swept_value(dataset, dim, 0).rpartition("= ")[2].replace("−", "-")
     return f'choose by --where, such as --where {dim}="{value}"'
 
 
 def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
-    """A colour bar over the values of a swept number, and the colours of them."""
+    """Return a colour bar over the values of a swept number, and their colours."""
     values = key.to_numpy().astype(float)
     logarithmic = axis_scale(values) == "log"
     unit = Unit.of(values, key.attrs.get("units", "1"), logarithmic)
@@ -275,12 +275,12 @@ def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
 
 
 def _shades() -> mpl.colors.Colormap:
-    """Colours of many curves, none too light for paper."""
+    """Return the colours of many curves, none too light for paper."""
     return mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
 
 
 def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
-    """The colour bar beside panels, where the curves have one."""
+    """Draw the colour bar beside panels, if the curves have one."""
     if scene.bar:
         colours, words = scene.bar
         figure.colorbar(colours, ax=axes, label=words, aspect=45, pad=0.02)
@@ -326,21 +326,21 @@ def contact_curves(panel: Axes, scene: Scene, name: str, factor: float) -> None:
 
 
 def beside(panel: Axes, scene: Scene, name: str, factor: float) -> None:
-    """Measured points beside the curves of a variable, if there are any."""
+    """Draw measured points beside the curves of a variable, if there are any."""
     if scene.measured:
         curves = [_compared(scene, name, line, factor) for line in scene.lines]
         scene.measured.draw(panel, (scene.over, scene.unit.factor), (name, factor), curves, scene.scale == "log")
 
 
 def _compared(scene: Scene, name: str, line: Line, factor: float) -> Compared:
-    """A curve as measured points are compared with it."""
+    """Return a curve for the comparison with measured points."""
     mean, error = (factor * values for values in scene.drawn(name, line)[:2])
     full = np.pi * scene.values("jkr_radius_mean", line) ** 2
     return Compared(line.number, line.point, line.colour, scene.x[line.number], mean, error, full)
 
 
 def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, named: bool = True) -> None:
-    """A cross at each pull-off and a ring at each jump-in of a curve."""
+    """Draw a cross at each pull-off and a ring at each jump-in of a curve."""
     x, mean = scene.x[line.number], factor * scene.values(f"{name}_mean", line)
     for words, at, sign in zip(("pull-off", "jump-in"), scene.openings(line), (_CROSS, _RING), strict=True):
         if at.size:
@@ -348,7 +348,7 @@ def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, 
 
 
 def over_speed(dataset: xr.Dataset) -> Scene:
-    """Statistics over the sliding speed, of a ramp or of steady speeds."""
+    """Return statistics over the sliding speed, of a ramp or of steady speeds."""
     scene = scene_along(dataset, "t" if not is_steady(dataset) else str(speed_dim(dataset)))
     speeds = np.stack([scene.speeds(line) for line in scene.lines])
     words = "speed of the stage $V$" if "stage_speed" in dataset else "sliding speed $V$"
@@ -356,12 +356,12 @@ def over_speed(dataset: xr.Dataset) -> Scene:
 
 
 def over_time(dataset: xr.Dataset) -> Scene:
-    """Statistics over time."""
+    """Return statistics over time."""
     return scene_along(dataset, "t").placed("t", dataset["t"].to_numpy(), "time $t$", "s")
 
 
 def over_key(dataset: xr.Dataset, name: str) -> Scene:
-    """Statistics over a swept key, whose values are numbers or categories."""
+    """Return statistics over a swept key of numbers or categories."""
     key, scene = dataset[name], scene_along(dataset, name)
     words = f"{key.attrs.get('long_name', name).partition(',')[0]} {symbol(key)}".strip()
     if not _is_number(key):
@@ -375,7 +375,7 @@ def over_key(dataset: xr.Dataset, name: str) -> Scene:
 
 
 def over(dataset: xr.Dataset, name: str) -> Scene:
-    """Statistics over time, the speed, a swept key or anything else recorded of time.
+    """Return statistics over time, the speed, a swept key or any recorded variable.
 
     Raises
     ------
@@ -424,7 +424,7 @@ _SHADE = 0.35
 
 
 def series(name: str, words: str, si: str) -> Panel:
-    """A panel of one observable."""
+    """Return a panel of one observable."""
 
     def panel_of(panel: Axes, scene: Scene) -> None:
         contact_curves(panel, scene, name, style.in_unit(panel.yaxis, words, scene.all(f"{name}_mean"), si))
@@ -475,7 +475,7 @@ def _reference(panel: Axes, scene: Scene, curves: list[np.ndarray], dashes: str,
 
 
 def _broken(values: np.ndarray) -> np.ndarray:
-    """Without the zeros of an open contact; one beside a closed contact is where it begins."""
+    """Return values without the zeros of an open contact; a zero beside a closed contact begins a line."""
     none = ~(values > 0.0)
     alone = none & np.append(True, none[:-1]) & np.append(none[1:], True)
     return np.where(alone, np.nan, values)
@@ -512,12 +512,12 @@ def _energies(panel: Axes, scene: Scene, name: str, factor: float, colour: str, 
     """Draw the curves of an energy: a single one in its colour, one grey line if all are the same."""
     same = not scene.width and _same([scene.values(f"{name}_mean", line) for line in scene.lines])
     for line in scene.lines[:1] if same else scene.lines:
-        own = colour if scene.single else style.REFERENCE if same else line.colour
-        curve(panel, scene, name, line, factor, own, dashes)
+        shade = colour if scene.single else style.REFERENCE if same else line.colour
+        curve(panel, scene, name, line, factor, shade, dashes)
 
 
 def _small_fluctuations(scene: Scene) -> bool:
-    """Whether the fluctuation energy changes, but would be a line at zero beside the work left to the contact."""
+    """True if the fluctuation energy changes, but is much smaller than the work left to the contact."""
     most, work = (
         float(np.max(np.nan_to_num(scene.all(f"{n}_mean")))) for n in ("fluctuation_energy", "work_of_adhesion")
     )
@@ -533,7 +533,7 @@ def _fluctuation_panel(panel: Axes, scene: Scene) -> None:
 
 
 def share_panel(panel: Axes, scene: Scene) -> None:
-    """A/A_JKR; for a single curve what each mechanism takes, stacked from JKR's line down."""
+    """Draw A/A_JKR; for a single curve with the share of each mechanism, stacked from JKR's line down."""
     if scene.single:
         _stacked_shares(panel, scene)
     contact_curves(panel, scene, "area_ratio", 1.0)
@@ -548,7 +548,7 @@ def share_panel(panel: Axes, scene: Scene) -> None:
 
 
 def _stacked_shares(panel: Axes, scene: Scene) -> None:
-    """What each mechanism takes of JKR's area, as stacked shades."""
+    """Draw the share of JKR's area that each mechanism takes, as stacked shades."""
     line = scene.lines[0]
     bonds, ratio = 1.0 - scene.values("lost_to_bonds_mean", line), scene.values("area_ratio_mean", line)
     x, bonds, ratio = scene.parted(line, bonds, ratio)
@@ -566,7 +566,7 @@ def _stacked_shares(panel: Axes, scene: Scene) -> None:
 def stacked(
     scene: Scene, panels: list[tuple[float, Panel]], room: float | None = None, ax: Axes | None = None
 ) -> tuple[Figure, list[Axes]]:
-    """Panels of given heights [in] above each other with one x axis and its label, lettered; a colour bar if any.
+    """Return panels of given heights [in] above each other with one x axis, lettered, and a colour bar if there is one.
 
     Below them are residuals of measured points, if any. The panels of the first column are returned. With ``ax`` the
     first panel alone is drawn, there.
@@ -600,7 +600,7 @@ def stacked(
 
 
 def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
-    """Energies and friction, where they change."""
+    """Return panels of energies and friction that change."""
     panels: list[tuple[float, Panel]] = []
     if scene.varies("work_of_adhesion") or scene.varies("fluctuation_energy"):
         panels.append((1.6, energy_panel))
@@ -612,7 +612,7 @@ def further_panels(scene: Scene) -> list[tuple[float, Panel]]:
 
 
 def rest_of(dataset: xr.Dataset) -> xr.DataArray | None:
-    """Time at rest before the start [s], for a drive that rests and starts; else None."""
+    """Return the time at rest before a start [s]; None for a drive that does not rest."""
     with contextlib.suppress(KeyError):
         return setting(dataset, "drive.rest")
     return None
@@ -651,7 +651,7 @@ def time_figure(
 
 
 def coarse_slips(dataset: xr.Dataset) -> str:
-    """Remark where slips last hardly longer than the time between records, with the cure; "" elsewhere."""
+    """Return a remark on slips that are hardly longer than the time between records, with the cure."""
     with contextlib.suppress(ValueError, KeyError):
         lasting, apart = slips(dataset)["slip_duration"].median(), float(dataset["t"][1] - dataset["t"][0])
         if float(lasting) < _FINE * apart:
@@ -661,7 +661,7 @@ def coarse_slips(dataset: xr.Dataset) -> str:
 
 
 def turns(dataset: xr.Dataset) -> bool:
-    """Whether the speed does not only rise, or only fall, in time: a curve over it would lie on itself."""
+    """True if the speed both rises and falls in time, so that a curve over it would lie on itself."""
     change = speed_of(dataset).diff("t")
     return rest_of(dataset) is None and bool(((change > 0.0).any("t") & (change < 0.0).any("t")).any())
 
@@ -715,7 +715,7 @@ def sweep_figure(
 
 
 def _at_the_end(dataset: xr.Dataset, averaged: str) -> str:
-    """The last time and the speed then, which may differ between the points of the sweep, and what a mean is over."""
+    """Return words for the last time, the speed then, and the means."""
     words = [f"at the end: $t$ = {style.text_of(float(dataset['t'][-1]), 's')}"]
     if "speed" in dataset:
         speed = dataset["speed"].isel(t=-1)

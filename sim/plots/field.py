@@ -34,7 +34,7 @@ def needs_maps(dataset: xr.Dataset) -> None:
 
 
 def _maps_of(dataset: xr.Dataset, point: dict[str, int], at: float | None) -> xr.DataArray:
-    """The last maps at a point of the sweep, or those nearest to a time [s], of all members that have them."""
+    """Return the last maps at a point of the sweep, or those nearest to a time [s], of all members that have some."""
     number = -1 if at is None else int(np.abs(dataset["map_time"].to_numpy() - at).argmin())
     return dataset["shear_map"].isel(point).isel(map_time=number).transpose("map_member", "x", "y")
 
@@ -68,13 +68,13 @@ def map_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
 
 
 def _then(dataset: xr.Dataset, name: str, at: dict[str, int], stress: xr.DataArray) -> np.ndarray:
-    """A variable at the time of the maps, of the member that one map is of."""
+    """Return a variable at the time of the maps, of the member of a single map."""
     values = style.recorded(dataset, name).isel(at, missing_dims="ignore").sel(t=stress["map_time"], method="nearest")
     return (values.sel(member=stress["map_member"]) if "member" in values.dims else values).to_numpy()
 
 
 def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, about: tuple) -> None:
-    """One field around the contact, continued periodically where the contact is wider than the cell.
+    """Draw a field around the contact, continued periodically if the contact is wider than the cell.
 
     ``sizes`` are the two sides of the cell and the radius of the contact, ``about`` is what is shown.
     """
@@ -95,7 +95,7 @@ def _draw_map(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, abou
 
 
 def _draw_measured(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple, about: tuple) -> None:
-    """A measured field as it is, pixel by pixel, with the contact in its middle."""
+    """Draw a measured field pixel by pixel, with the contact in its middle."""
     ends = []
     for points, side in zip(field.shape, sizes, strict=False):
         first = -(points // 2 + 0.5) * side / points
@@ -105,7 +105,7 @@ def _draw_measured(figure: Figure, panel: Axes, field: np.ndarray, sizes: tuple,
 
 
 def _image(figure: Figure, panel: Axes, field: np.ndarray, extent: tuple, about: tuple) -> None:
-    """A field (x, y) with x to the right, and its colours; ``about`` are its SI unit, what it is, and the colours."""
+    """Draw a field (x, y) with x to the right, and a colour bar; ``about`` holds its SI unit, words and colour map."""
     si, words, colours = about
     unit = style.Unit.of(field, si)
     most = unit.factor * float(np.max(np.abs(field))) or 1.0
@@ -115,7 +115,7 @@ def _image(figure: Figure, panel: Axes, field: np.ndarray, extent: tuple, about:
 
 
 def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tuple[Any, float, str]:
-    """Spectrum at a point of the sweep, from the scenario of the dataset; the factor of its density; its name."""
+    """Return the spectrum at a point of the sweep, the factor of its density, and its name."""
     try:
         shear = resolved(dataset, "shear")
     except KeyError:
@@ -137,7 +137,7 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
 
 
 def _spectrum(table: dict[str, Any]) -> Any:
-    """The spectrum of a dataset's scenario; the rows of one from a file stand in the dataset."""
+    """Return the spectrum of a dataset's scenario, with the rows of a file that the dataset holds."""
     if table.get("file") and not table.get("wavenumbers"):
         raise ValueError("the spectrum names a file, whose rows the dataset lacks; run the scenario again")
     return TypeAdapter(Spectrum).validate_python(table)
@@ -155,7 +155,7 @@ def _grid_of(stress: xr.DataArray) -> Grid:
 
 
 def mode_density(cells: Modes, grid: Grid) -> np.ndarray:
-    """Density of the cell's modes on the half spectrum of its grid [Pa^2 m^2]."""
+    """Return the density of the cell's modes on the half spectrum of its grid [Pa^2 m^2]."""
     density = np.zeros((grid.points, grid.points // 2 + 1))
     each = 0.5 * cells.variance * grid.cell**2
     density[cells.ix % grid.points, cells.iy] = each
@@ -209,7 +209,7 @@ def spectrum_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
 
 
 def density_figure(scene: "Scenario") -> Figure:
-    """Spectral density of a scenario's fluctuations before any run, and which waves hold variance and energy.
+    """Draw the spectral density of a scenario before any run, and the waves that hold variance and energy.
 
     Raises
     ------

@@ -20,6 +20,9 @@ from sim.plots.style import STYLE, recorded, swept_value
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity
 
+if TYPE_CHECKING:
+    from sim.scenario.scenario import Scenario
+
 
 class Choices(NamedTuple):
     """Choices for a figure.
@@ -39,34 +42,33 @@ class Choices(NamedTuple):
     ax: Axes | None = None
 
     @property
-    def given(self) -> dict[str, Any]:
-        """What has been chosen, by name."""
-        unsaid = (value is None or value is False or (isinstance(value, str | tuple) and not value) for value in self)
-        return {name: value for (name, value), none in zip(self._asdict().items(), unsaid, strict=True) if not none}
+    def chosen(self) -> dict[str, Any]:
+        """Choices that are not the default, by name."""
+        return {name: value for name, value in self._asdict().items() if value != self._field_defaults[name]}
 
     def options(self, kind: str, takes: Collection[str], dataset: xr.Dataset) -> dict[str, Any]:
-        """Arguments for what draws a kind of figure.
+        """Return the arguments for the function that draws a kind of figure.
 
         Raises
         ------
         ValueError
             For a choice that the kind does not take, or that cannot be read.
         """
-        found = {name: value for name, value in self.given.items() if name not in ("member", "units")}
-        for name in (name for name in found if name not in takes):
+        options = {name: value for name, value in self.chosen.items() if name not in ("member", "units")}
+        if refused := [name for name in options if name not in takes]:
             words = f"it takes: {', '.join(takes)}" if takes else "it takes none but member and units"
-            raise ValueError(f'the figure "{kind}" has no choice of {name}; {words}')
-        if "at" in found:
+            raise ValueError(f'the figure "{kind}" has no choice of {refused[0]}; {words}')
+        if self.at is not None:
             try:
-                found["at"] = Quantity("s", "time").read(self.at)
+                options["at"] = Quantity("s", "time").read(self.at)
             except ValueError as fault:
                 raise ValueError(f"at {self.at}: {fault}") from None
-        if self.data is None:
-            return found
-        return found | {"data": self.data if isinstance(self.data, Measured) else Measured(self.data, dataset)}
+        if self.data is not None:
+            options["data"] = self.data if isinstance(self.data, Measured) else Measured(self.data, dataset)
+        return options
 
     def of_member(self, dataset: xr.Dataset) -> xr.Dataset:
-        """The dataset of the member chosen, or of all.
+        """Return the dataset of the chosen member, or of all.
 
         Raises
         ------
@@ -80,22 +82,15 @@ class Choices(NamedTuple):
             raise ValueError(f"there is no member {self.member}; there are members 0 to {members - 1}")
         if MEMBERS not in dataset.dims and any(str(name).endswith("_sem") for name in dataset.data_vars):
             raise ValueError("members were not recorded, only statistics; run again with [record] per_member = true")
-        own = dataset.isel({MEMBERS: [self.member]}, missing_dims="ignore")
-        if "map_member" in own.dims:
-            there = own["map_member"].to_numpy() == self.member
-            own = own.isel(map_member=there) if there.any() else own.drop_dims("map_member")
-        return own
-
-
-# The kinds of figures, each a module of its own, and the choice between them.
-
-
-if TYPE_CHECKING:
-    from sim.scenario.scenario import Scenario
+        dataset = dataset.isel({MEMBERS: [self.member]}, missing_dims="ignore")
+        if "map_member" in dataset.dims:
+            maps = dataset["map_member"].to_numpy() == self.member
+            dataset = dataset.isel(map_member=maps) if maps.any() else dataset.drop_dims("map_member")
+        return dataset
 
 
 class Kind(NamedTuple):
-    """A kind of figure: what draws it, what refuses a dataset, which datasets it fits best, and what it reads."""
+    """A kind of figure: its drawing function, its refusal of a dataset, whether it fits one best, and its variables."""
 
     draw: Callable[..., Figure]
     needs: Callable[[xr.Dataset], object] = lambda dataset: None
@@ -114,28 +109,36 @@ class Kind(NamedTuple):
 
     @property
     def takes(self) -> tuple[str, ...]:
-        """Choices that it takes beside a member and units."""
+        """Choices that the kind takes beside a member and units."""
         return tuple(inspect.signature(self.draw).parameters)[1:]
 
 
-_OF_FORCE = ("spring_force", "contact_area")
+def _always(dataset: xr.Dataset) -> bool:
+    return True
+
+
+def _rests(dataset: xr.Dataset) -> bool:
+    return curves.rest_of(dataset) is not None
+
+
+def _rises(dataset: xr.Dataset) -> bool:
+    return not curves.turns(dataset)
+
+
+_OF_THEORY = ("shear_stress", "contact_area")
 _OF_CURVE = ("speed", "contact_area", "jkr_radius", "hertz_radius")
-#: What can be drawn, by name; the first line of what draws it is its help. The default is the first kind that fits.
+#: All figures, by name. The default of a dataset is the first kind that fits it.
 KINDS: dict[str, Kind] = {
-    "loop": Kind(theories.loop_figure, theories.needs_course, lambda dataset: True, ("normal_load", "displacement")),
-    "theories": Kind(
-        theories.theories_figure, theories.case_of, theories.sweeps_theories, ("shear_stress", "contact_area")
-    ),
-    "stress": Kind(
-        slider.stress_figure, slider.needs_stress, lambda dataset: curves.rest_of(dataset) is not None, ("speed",)
-    ),
-    "stability": Kind(slider.stability_figure, slider.needs_map, lambda dataset: True, ("spring_force",)),
-    "creep": Kind(slider.creep_figure, slider.needs_force, lambda dataset: True, ("slider_position", "speed")),
+    "loop": Kind(theories.loop_figure, theories.needs_course, _always, ("normal_load", "displacement")),
+    "theories": Kind(theories.theories_figure, theories.case_of, theories.sweeps_theories, _OF_THEORY),
+    "stress": Kind(slider.stress_figure, slider.needs_stress, _rests, ("speed",)),
+    "stability": Kind(slider.stability_figure, slider.needs_map, _always, ("spring_force",)),
+    "creep": Kind(slider.creep_figure, slider.needs_force, _always, ("slider_position", "speed")),
     "friction": Kind(curves.friction_figure, curves.needs_friction, curves.turns, ("speed",)),
-    "curve": Kind(curves.curve_figure, curves.needs_speeds, lambda dataset: not curves.turns(dataset), _OF_CURVE),
-    "sweep": Kind(curves.sweep_figure, curves.needs_sweep, lambda dataset: True),
-    "time": Kind(curves.time_figure, fits=lambda dataset: True),
-    "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=_OF_FORCE),
+    "curve": Kind(curves.curve_figure, curves.needs_speeds, _rises, _OF_CURVE),
+    "sweep": Kind(curves.sweep_figure, curves.needs_sweep, _always),
+    "time": Kind(curves.time_figure, fits=_always),
+    "incipient": Kind(slider.incipient_figure, slider.needs_pull, reads=("spring_force", "contact_area")),
     "map": Kind(field.map_figure, field.needs_maps),
     "spectrum": Kind(field.spectrum_figure, field.needs_maps),
     "profile": Kind(theories.profile_figure, theories.shapes_of),
@@ -144,18 +147,18 @@ KINDS: dict[str, Kind] = {
 
 @of_dataset
 def default(dataset: xr.Dataset) -> str:
-    """The kind of figure that fits a dataset best."""
+    """Return the kind of figure that fits a dataset best."""
     return next(name for name, kind in KINDS.items() if not _missing(dataset, name) and kind.fits(dataset))
 
 
 @of_dataset
 def drawable(dataset: xr.Dataset) -> list[str]:
-    """Kinds of figures whose needs a dataset meets."""
+    """Return the kinds of figures that can be drawn of a dataset."""
     return [kind for kind in KINDS if not _missing(dataset, kind)]
 
 
 def _missing(dataset: xr.Dataset, kind: str) -> str:
-    """Lack of a dataset for a kind of figure, with the cure; "" for nothing."""
+    """Return the lack of a dataset for a kind of figure, with the cure; "" if it has none."""
     try:
         with answered():
             KINDS[kind].needs(dataset)
@@ -167,7 +170,7 @@ def _missing(dataset: xr.Dataset, kind: str) -> str:
 
 
 def _drawn_over(dataset: xr.Dataset, x: str) -> str:
-    """The kind of figure that is drawn over a variable or swept key, or by default."""
+    """Return the kind of figure that is drawn over a variable or swept key, or by default."""
     swept = {word for dim in style.swept(dataset) for word in (dim, dim.rpartition("_")[2], dim.replace("_", ".", 1))}
     return {"": default(dataset), "speed": "curve"}.get(x, "sweep" if x in swept else "time")
 
@@ -181,20 +184,20 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
     dataset : xarray.Dataset
         As ``sim run`` writes it; ``sim.analysis.where`` chooses values of its sweep.
     kind : str, optional
-        One of ``KINDS``, whose ``shows`` says what it is; without it the one that fits the dataset best.
+        One of ``KINDS``, whose ``shows`` describes it; by default the kind that fits the dataset best.
     choices : Choices, optional
-        What of it is drawn, over what and in which units.
+        The member, axes, units and measured points of the figure.
 
     Returns
     -------
     Picture
-        A matplotlib Figure, one column wide, pictures of two panels side by side two; save it by its
-        ``savefig``, as PNG, PDF or SVG. With axes to draw in, theirs.
+        A matplotlib Figure, one column wide, or two if panels are side by side. Save it by its ``savefig`` as PNG, PDF
+        or SVG. With axes to draw in, it is their figure.
 
     Raises
     ------
     ValueError
-        For an unknown kind, or one that the dataset cannot serve, with the cure and the kinds that it can.
+        For an unknown kind, or a kind that lacks data, with the cure and the kinds that can be drawn.
     """
     choices = choices or Choices()
     dataset = choices.of_member(dataset)
@@ -218,16 +221,17 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
 def drawn(
     dataset: xr.Dataset, kind: str | None, source: Path, path: Path | None, replace: bool, choices: Choices
 ) -> Path:
-    """Draw the dataset of a file into a picture, by default beside it; the picture's path.
+    """Draw the dataset of a file into a picture, by default beside it, and return the path of the picture.
 
     Raises
     ------
     BadInput
-        For an unknown kind or format of picture, or a picture that is not to be made.
+        For an unknown kind or format, or a path that must not be written.
     """
     try:
         target = path or source.with_name(f"{source.stem}{'-' + kind if kind else ''}.png")
-        claim(dataset, source, target, replace, *([Path(choices.data)] if isinstance(choices.data, Path | str) else []))
+        tables = [Path(choices.data)] if isinstance(choices.data, Path | str) else []
+        claim(dataset, source, target, replace, *tables)
         save(draw(dataset, kind, choices), target)
     except BadInput:
         raise
@@ -237,13 +241,12 @@ def drawn(
 
 
 def planned(source: Path, kind: str | None, path: Path | None, replace: bool, chosen: Collection[str] = ()) -> Path:
-    """Draw what a scenario file says of its fluctuations before any run, C(q); the picture's path.
+    """Draw the spectral density of a scenario file before any run, and return the path of the picture.
 
     Raises
     ------
     BadInput
-        If the scenario cannot be read or has no such figure, something is chosen of it, or the picture is not to be
-        made.
+        If the scenario cannot be read or has no such figure, anything is chosen, or the path must not be written.
     """
     from sim.scenario.reader import load  # heavy: pydantic, where a dataset needs none
     from sim.scenario.schema import files_read
@@ -252,23 +255,23 @@ def planned(source: Path, kind: str | None, path: Path | None, replace: bool, ch
     if kind not in (None, "spectrum"):
         raise BadInput([f'{source}: before a run only "spectrum" can be drawn; for "{kind}" run it: sim run {source}'])
     if chosen:
-        said = f"nothing can be chosen of what is drawn before a run ({', '.join(chosen)})"
-        raise BadInput([f"{source}: {said}; name the dataset that `sim run` makes of it"])
+        fault = f"nothing can be chosen of a figure before a run ({', '.join(chosen)})"
+        raise BadInput([f"{source}: {fault}; name the dataset that `sim run` writes"])
     claim_file(target, replace, files_read(scene))
     try:
         save(spectrum_of(scene), target)
-    except ValueError as fault:
-        raise BadInput([f"{source}: {fault}"]) from None
+    except ValueError as lack:
+        raise BadInput([f"{source}: {lack}"]) from None
     return target
 
 
 def spectrum_of(scene: "Scenario") -> Figure:
-    """Spectral density of a scene's fluctuations before any run; errors as of ``density_figure``."""
+    """Return the figure of the spectral density of a scene before any run."""
     with mpl.rc_context(STYLE):
         return field.density_figure(scene)
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure in the format that the ending of its name says, PNG without one, whole or not at all."""
+    """Write a figure in the format of the path's suffix, by default PNG, whole or not at all."""
     with output(path) as beside:
         figure.savefig(beside, format=path.suffix.removeprefix(".").lower() or "png")

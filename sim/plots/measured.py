@@ -1,4 +1,4 @@
-"""Measured points over the curves of a dataset, from a CSV table, and how far the curves are from them."""
+"""Measured points over the curves of a dataset, from a CSV table, and their residuals."""
 
 import itertools
 from collections.abc import Mapping, Sequence
@@ -15,21 +15,30 @@ from sim.plots.style import BOTH, GUIDE, HOLLOW, legend
 from sim.units.quantity import Quantity
 from sim.units.tables import Points, measured_points, read_measured
 
-#: Names of what is prescribed and of what is recorded of it.
-_SAME = (("speed", "drive_speed"), *((name, f"contact_{name}") for name in ("indentation", "displacement")))
-_SAME += (("normal_load", "contact_load"),)
-#: What is measured by another column: the power of it, and the factor.
+#: Groups of names of one variable, as prescribed and as recorded.
+_SAME = (
+    ("speed", "drive_speed"), ("normal_load", "contact_load"), ("indentation", "contact_indentation"),
+    ("displacement", "contact_displacement"),
+)  # fmt: skip
+#: Variables that follow from another column: its name, the power of it, and the factor.
 _BY = {"contact_radius": ("contact_area", 0.5, np.pi**-0.5), "contact_area": ("contact_radius", 2.0, np.pi)}
-#: How far a condition of a row may be from that of a curve, in parts of it.
+#: Largest relative difference between a condition of a row and that of its curve.
 _NEAR = 5e-3
-#: Errors by which branches of a curve that goes there and back are apart at least.
+#: Smallest distance between branches of a curve that goes back and forth, in errors.
 _ALIKE = 0.01
 _MARKS = "osD^v"
 
 
+def _names_of(name: str) -> tuple[str, ...]:
+    """Return all names of a variable."""
+    return next((names for names in _SAME if name in names), (name,))
+
+
 class Compared(NamedTuple):
-    """A curve that points may lie on: its number, point of the sweep and colour; over x in the unit of the axis the
-    mean and its standard error in that of the other, and JKR's area at the full work of adhesion [m^2].
+    """A curve that points may lie on: its number, point of the sweep and colour.
+
+    Over ``x`` in the unit of the axis it has the mean and its standard error in that of the other axis, and JKR's area
+    at the full work of adhesion [m^2].
     """
 
     number: int
@@ -41,25 +50,25 @@ class Compared(NamedTuple):
     full: np.ndarray
 
     def at(self, x: np.ndarray, *along: np.ndarray) -> list[np.ndarray]:
-        """Values along each branch of the curve at other places, shape (branches, places), nan beyond its ends.
+        """Return values along each branch of the curve, from turn to turn, at other places; nan beyond its ends.
 
-        A branch goes one way from turn to turn.
+        The shape is (branches, places).
         """
         way = np.sign(np.diff(self.x))
         ends = np.flatnonzero(np.diff(way)) + 1
         branches = [slice(a, b + 1) for a, b in itertools.pairwise([0, *ends, len(way)]) if way[a] != 0.0]
-        found = [[np.full(x.shape, np.nan)] for _ in along]
+        values: list[list[np.ndarray]] = [[] for _ in along]
         for branch in branches:
             order = np.argsort(self.x[branch])
-            for kept, values in zip(found, along, strict=True):
-                kept.append(np.interp(x, self.x[branch][order], values[branch][order], np.nan, np.nan))
-        return [np.array(kept[1:] or kept) for kept in found]
+            for column, curve in zip(values, along, strict=True):
+                column.append(np.interp(x, self.x[branch][order], curve[branch][order], np.nan, np.nan))
+        return [np.array(column or [np.full(x.shape, np.nan)]) for column in values]
 
 
 class Residuals(NamedTuple):
-    """How far points are from a curve, in standard errors of both: variables over and of it, number, colour and point.
+    """Distances of points from a curve of the variable ``name`` over another, in standard errors of both.
 
-    Of a curve of several ``branches``, there and back, it is the nearest of them: less than the errors would leave.
+    If the curve has several ``branches``, back and forth, they are those to the nearest one, which underestimates them.
     Branches that are nowhere a hundredth of an error apart count as one.
     """
 
@@ -74,58 +83,54 @@ class Residuals(NamedTuple):
 
 
 class Measured:
-    """A table of measured points, a CSV or columns in SI by name, and what of it a figure has drawn.
+    """A table of measured points, a CSV or columns in SI by name, with a record of those that a figure shows.
 
     Its columns are variables of a dataset with their units and errors, as those of ``sim fit``. A column that is a
-    number of the scenario, such as ``contact_load``, says of which curve of a sweep a row is.
+    number of the scenario, such as ``contact_load``, assigns a row to a curve of a sweep.
     """
 
     def __init__(self, data: Path | str | Mapping[str, Any], dataset: xr.Dataset) -> None:
         self.dataset = plain(dataset)
         self.sweep = {*sweep_dims(dataset)}
-        known = {name: Quantity(units, name) for name, units in self._units().items()}
-        self.named = str(data) if isinstance(data, Path | str) else "data"
-        self.table = (
-            read_measured(Path(data), known, known) if isinstance(data, Path | str) else measured_points(data, known)
-        )
+        units = {"area_ratio": "1", "contact_radius": "m", "contact_area": "m^2", "speed": "m/s", "t": "s"}
+        for name, variable in self.dataset.variables.items():
+            if variable.dtype.kind == "f" and "units" in variable.attrs:
+                units.setdefault(str(name).removesuffix("_mean"), variable.attrs["units"])
+        known = {name: Quantity(unit, name) for name, unit in units.items()}
+        if isinstance(data, Path | str):
+            self.source, self.table = str(data), read_measured(Path(data), known, known)
+        else:
+            self.source, self.table = "data", measured_points(data, known)
         self.shown: set[str] = set()
         self.residuals: list[Residuals] = []
-
-    def _units(self) -> dict[str, str]:
-        """Units of all numbers of the dataset that may be measured, by name."""
-        numbers = ((str(name), one) for name, one in self.dataset.variables.items() if one.dtype.kind == "f")
-        found = {name.removesuffix("_mean"): one.attrs["units"] for name, one in numbers if "units" in one.attrs}
-        return found | {"area_ratio": "1", "contact_radius": "m", "contact_area": "m^2", "speed": "m/s", "t": "s"}
 
     @property
     def has_errors(self) -> bool:
         return any(points.errors is not None for points in self.table.values())
 
     def column(self, name: str) -> Points | None:
-        """A column by any of the names of its variable."""
-        same = next((names for names in _SAME if name in names), (name,))
-        return next((self.table[one] for one in (name, *same) if one in self.table), None)
+        """Return a column by any of the names of its variable."""
+        return next((self.table[each] for each in (name, *_names_of(name)) if each in self.table), None)
 
-    def _of(self, point: dict[str, int], over: str) -> np.ndarray:
+    def _rows_of(self, point: dict[str, int], over: str) -> np.ndarray:
         """True for the rows whose conditions are those of a point of the sweep."""
         rows = np.ones(len(next(iter(self.table.values())).values), bool)
         for name, points in self.table.items():
-            same = next((names for names in _SAME if name in names), (name,))
-            numbers = [self.dataset[one] for one in same if one in self.dataset.variables]
-            numbers = [number for number in numbers if {*number.dims} <= self.sweep and over not in same]
-            for number in numbers:
-                value = float(number.isel(point, missing_dims="ignore"))
-                rows &= np.abs(points.values - value) <= _NEAR * abs(value)
+            for each in _names_of(name):
+                number = self.dataset.variables.get(each)
+                if number is not None and {*number.dims} <= self.sweep and over not in _names_of(name):
+                    value = float(number.isel(point, missing_dims="ignore"))
+                    rows &= np.abs(points.values - value) <= _NEAR * abs(value)
         return rows
 
     def _values(self, name: str, curve: Compared, x: np.ndarray) -> Points | None:
-        """What was measured of a variable, or what follows of it from another column, at places on the x axis."""
-        if (found := self.column(name)) is not None:
-            return found
+        """Return the measured values of a variable, or those that follow from another column, at places on the axis."""
+        if (points := self.column(name)) is not None:
+            return points
         if name == "area_ratio" and (area := self._values("contact_area", curve, x)) is not None:
             (branches,) = curve.at(x, curve.full)
-            several = np.full(x.shape, np.nan) if len(branches) > 1 else branches[0]
-            full = curve.full[0] if np.ptp(curve.full) == 0.0 else several
+            unique = branches[0] if len(branches) == 1 else np.full(x.shape, np.nan)
+            full = curve.full[0] if np.ptp(curve.full) == 0.0 else unique
             return Points(area.values / full, None if area.errors is None else area.errors / full)
         by, power, factor = _BY.get(name, ("", 1.0, 1.0))
         if by not in self.table:
@@ -137,47 +142,37 @@ class Measured:
     def draw(
         self, panel: Axes, over: tuple[str, float], shown: tuple[str, float], curves: Sequence[Compared], log: bool
     ) -> None:
-        """Points in a panel of a variable over another, each with its factor from SI, beside the curves there."""
+        """Draw points in a panel of a variable over another, each with its factor from SI, beside the curves."""
         across, (name, factor) = self.column(over[0]), shown
         if across is None:
             return
-        x, wide = (None if values is None else over[1] * values for values in across)
-        assert x is not None
-        told = any(name in self.table for name in self.sweep)
-        for curve in curves if told else curves[:1]:
-            points, rows = self._values(name, curve, x), self._of(curve.point, over[0])
+        x, wide = over[1] * across.values, None if across.errors is None else over[1] * across.errors
+        assigned = any(name in self.table for name in self.sweep)
+        for curve in curves if assigned else curves[:1]:
+            points, rows = self._values(name, curve, x), self._rows_of(curve.point, over[0])
             if points is None or not np.any(rows):
                 continue
             y, high = factor * points.values[rows], None if points.errors is None else factor * points.errors[rows]
-            words = ["measured"]
-            if high is not None and (told or len(curves) == 1):
-                placed = curve._replace(x=np.log(curve.x)) if log else curve
-                at = np.log(x[rows]) if log else x[rows]
-                means, errors = placed.at(at, curve.mean, curve.error)
-                branches = (y - means) / np.hypot(high, np.nan_to_num(errors))
-                nearest = np.argmin(np.nan_to_num(np.abs(branches), nan=np.inf), axis=0)
-                off = np.take_along_axis(branches, nearest[np.newaxis], 0)[0]
-                known = np.isfinite(off)
-                if np.any(known):
-                    apart = np.nanmax(branches[:, known], axis=0) - np.nanmin(branches[:, known], axis=0)
-                    several = len(branches) if np.max(apart) > _ALIKE else 1
-                    colour = curve.colour if told else BOTH
-                    own = over[0], name, curve.number, colour, x[rows], off, curve.point, several
-                    self.residuals.append(Residuals(*own))
-                    words.append(rf"$\chi^2$ = {np.sum(off[known] ** 2):.4g} of {np.sum(known)}")
-                    words[-1] += " (nearest branch)" * (several > 1)
-            look: Any = HOLLOW | {"color": curve.colour if told else BOTH, "elinewidth": 0.7, "zorder": 3}
-            side = None if wide is None else wide[rows]
-            panel.errorbar(x[rows], y, high, side, label=", ".join(words), **look)
+            colour, label = curve.colour if assigned else BOTH, "measured"
+            if high is not None and (assigned or len(curves) == 1):
+                values, branches = _residuals(curve, x[rows], y, high, log)
+                near = np.isfinite(values)
+                if np.any(near):
+                    parts = over[0], name, curve.number, colour, x[rows], values, curve.point, branches
+                    self.residuals.append(Residuals(*parts))
+                    label += rf", $\chi^2$ = {np.sum(values[near] ** 2):.4g} of {np.sum(near)}"
+                    label += " (nearest branch)" * (branches > 1)
+            look: Any = HOLLOW | {"color": colour, "elinewidth": 0.7, "zorder": 3}
+            panel.errorbar(x[rows], y, high, None if wide is None else wide[rows], label=label, **look)
             self.shown.add(name)
 
     def residual_panel(self, panel: Axes, numbers: set[int], over: str) -> None:
-        """How far the points are from curves of some numbers over a variable, in standard errors."""
-        own = [one for one in self.residuals if one.number in numbers and one.over == over]
-        names = list(dict.fromkeys(one.name for one in own))
-        for one in own:
-            look = HOLLOW | {"marker": _MARKS[names.index(one.name) % len(_MARKS)], "color": one.colour}
-            panel.plot(one.x, one.values, label=one.name.replace("_", " ") if len(names) > 1 else "", **look)
+        """Draw the residuals from curves of some numbers over a variable."""
+        residuals = [each for each in self.residuals if each.number in numbers and each.over == over]
+        names = list(dict.fromkeys(each.name for each in residuals))
+        for each in residuals:
+            look = HOLLOW | {"marker": _MARKS[names.index(each.name) % len(_MARKS)], "color": each.colour}
+            panel.plot(each.x, each.values, label=each.name.replace("_", " ") if len(names) > 1 else "", **look)
         panel.axhline(0.0, **GUIDE)
         panel.margins(y=0.15)
         panel.set_ylabel(r"residual ($\sigma$)")
@@ -189,11 +184,26 @@ class Measured:
         Raises
         ------
         ValueError
-            With what the figure has and the table lacks.
+            With the axis or the columns that the table lacks.
         """
         if self.column(over) is None:
-            raise ValueError(f'{self.named}: no column "{over}", which the figure is drawn over; add it, or choose --x')
+            raise ValueError(
+                f'{self.source}: no column "{over}", which the figure is drawn over; add it, or choose --x'
+            )
         if not self.shown:
+            lack = "no row is of what is drawn: its columns are no variables of this figure, or its conditions differ"
             columns = ", ".join(self.table)
-            said = "no row is of what is drawn: its columns are no variables of this figure, or its conditions others"
-            raise ValueError(f"{self.named}: {said} (columns: {columns}); choose another kind, --x or --where")
+            raise ValueError(f"{self.source}: {lack} (columns: {columns}); choose another kind, --x or --where")
+
+
+def _residuals(curve: Compared, x: np.ndarray, y: np.ndarray, errors: np.ndarray, log: bool) -> tuple[np.ndarray, int]:
+    """Return the distances of points from the nearest branch in standard errors, and the number of branches."""
+    if log:
+        curve, x = curve._replace(x=np.log(curve.x)), np.log(x)
+    means, sem = curve.at(x, curve.mean, curve.error)
+    branches = (y - means) / np.hypot(errors, np.nan_to_num(sem))
+    nearest = np.argmin(np.nan_to_num(np.abs(branches), nan=np.inf), axis=0)
+    values = np.take_along_axis(branches, nearest[np.newaxis], 0)[0]
+    known = branches[:, np.isfinite(values)]
+    apart = np.nanmax(known, axis=0) - np.nanmin(known, axis=0) if known.size else np.zeros(1)
+    return values, len(branches) if np.max(apart) > _ALIKE else 1

@@ -50,7 +50,7 @@ class Population(NamedTuple):
 
     @property
     def pathway(self) -> tuple[float, float, float] | tuple[()]:
-        """Rate [1/s], Bell force [N] and stiffness [N/m] where all rupture is by one pathway that force opens."""
+        """Rate [1/s], Bell force [N] and stiffness [N/m] if all rupture is by one pathway that force opens."""
         law = self.rupture.law(self.stiffness)
         return (law.rate, self.stiffness / law.softness, self.stiffness) if law.one_pathway else ()
 
@@ -60,13 +60,13 @@ class Population(NamedTuple):
         return float(schallamach.rest_share(self.rupture.law(self.stiffness).at_rest, self.rebinding))
 
     def start_peak(self, speed: np.ndarray) -> np.ndarray:
-        """Static peak at speeds [m/s] after a long rest, of bonds with one pathway of which none rebinds [Pa]."""
+        """Return the static peak [Pa] after a long rest, of bonds with one pathway that do not rebind."""
         peak = schallamach.start_up_peak(speed, *self.pathway)
         return self.density * self.at_rest * np.asarray(peak.force)
 
 
 def population_of(dataset: xr.Dataset, at: dict[str, int]) -> Population | None:
-    """Bonds at a point of the sweep; None where they do not stretch, or the dataset does not hold their numbers."""
+    """Return the bonds at a point of the sweep; None if they do not stretch or the dataset lacks their numbers."""
     keys = [str(name) for name in dataset.variables if str(name).startswith(_PREFIX)]
     with contextlib.suppress(KeyError, ValueError):
         rupture = _RUPTURE.validate_python({key.removeprefix(_PREFIX): number_at(dataset[key], at) for key in keys})
@@ -75,7 +75,7 @@ def population_of(dataset: xr.Dataset, at: dict[str, int]) -> Population | None:
 
 
 def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> list[Steady]:
-    """Closed forms of the dataset's bonds in steady sliding.
+    """Return closed forms of the dataset's bonds in steady sliding.
 
     Parameters
     ----------
@@ -135,7 +135,7 @@ def creep_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
 
 
 def _run(name: str, words: str, si: str) -> Panel:
-    """A panel of what grows, with a cross at the last record before a trajectory ends."""
+    """Return a panel of a growing quantity, with a cross at the last record before a trajectory ends."""
     curves = series(name, words, si)
 
     def panel_of(panel: Axes, scene: Scene) -> None:
@@ -143,10 +143,10 @@ def _run(name: str, words: str, si: str) -> Panel:
         panel.set_yscale("log")
         for k, line in enumerate(scene.lines):
             values, drawn = scene.values(f"{name}_mean", line), np.asarray(panel.lines[k].get_ydata())
-            there = np.flatnonzero(np.isfinite(values))
-            if 0 < there.size < values.size:
+            known = np.flatnonzero(np.isfinite(values))
+            if 0 < known.size < values.size:
                 look: Any = {"color": line.colour, "markersize": 4, "label": "runaway"}
-                panel.plot(scene.x[line.number][there[-1]], drawn[there[-1]], "x", **look)
+                panel.plot(scene.x[line.number][known[-1]], drawn[known[-1]], "x", **look)
         if name == "slider_position":
             style.legend(panel, scene.title)
 
@@ -167,7 +167,7 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
     speed = dataset["stage_speed"].isel({MEMBERS: 0, "drive_stiffness": 0}, missing_dims="ignore").to_numpy()
     stiffness = dataset["drive_stiffness"].to_numpy()
     turn = int(np.argmax(speed)) + 1
-    legs = {"faster and faster": slice(1, turn), "slower and slower": slice(turn - 1, None)}
+    legs = {"increasing speed": slice(1, turn), "decreasing speed": slice(turn - 1, None)}
     legs = {words: leg for words, leg in legs.items() if speed[leg].size > _CELLS}
     edges = np.geomspace(np.min(speed[1:]), np.max(speed), _CELLS + 1)
     pace, hard = style.Unit.of(edges, "m/s", True), style.Unit.of(stiffness, "N/m", True)
@@ -192,17 +192,17 @@ def stability_figure(dataset: xr.Dataset) -> Figure:
 
 
 def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Range of each row of forces over its largest, in each cell of the speed."""
+    """Return the range of each row of forces over its largest, in each cell of the speed."""
     place = np.clip(np.searchsorted(edges, speed, "right") - 1, 0, len(edges) - 2)
-    found = np.full((len(force), len(edges) - 1), np.nan)
+    swings = np.full((len(force), len(edges) - 1), np.nan)
     for cell in np.unique(place):
-        own = np.abs(force[:, place == cell])
-        found[:, cell] = 1.0 - own.min(axis=1) / own.max(axis=1)
-    return found
+        forces = np.abs(force[:, place == cell])
+        swings[:, cell] = 1.0 - forces.min(axis=1) / forces.max(axis=1)
+    return swings
 
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
-    """Stiffness below which steady sliding is unstable [N/m], for ``rate`` bonds in mean field; nan where unknown."""
+    """Return the stiffness below which steady sliding is unstable [N/m], in mean field for ``rate`` bonds; else nan."""
     at, bonds = dict.fromkeys(sweep_dims(dataset), 0), population_of(dataset, dict.fromkeys(sweep_dims(dataset), 0))
     if bonds is None:
         return np.full(speed.shape, np.nan)
@@ -212,15 +212,15 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
     if mean_field:
         bound = np.asarray(schallamach.first_moment_fraction(speed, *bonds.pathway, bonds.rebinding))
     less, area, more = (_area(dataset, at, bound * share) for share in (1.0 - _LITTLE, 1.0, 1.0 + _LITTLE))
-    growth, firm, own = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf), 0.0
+    growth, firm, contact_growth = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf), 0.0
     if str(word(dataset, "drive.contact_stiffness", "half_space").item()) == "half_space":
-        own = 0.5
+        contact_growth = 0.5
         modulus, ratio = (float(dataset[f"effective_{name}"].isel(at, missing_dims="ignore")) for name in _SOLID)
         firm = 0.75 * math.pi**2 * modulus * np.sqrt(area / math.pi) / (2.0 - ratio)
     with contextlib.suppress(KeyError):
         firm = np.full(speed.shape, style.number_at(setting(dataset, "drive.contact_stiffness"), at))
     mass, damping, viscosity = (style.number_at(setting(dataset, f"drive.{key}"), at) for key in _DELAYS)
-    body = Body(area, growth, 0.0, mass, damping, viscosity, firm, own)
+    body = Body(area, growth, 0.0, mass, damping, viscosity, firm, contact_growth)
     return np.asarray(onset(speed, bonds.stiffness, bonds.rebinding, bonds.density, body).stiffness)
 
 
@@ -229,7 +229,7 @@ _SOLID = ("shear_modulus", "poisson_ratio")
 
 
 def _area(dataset: xr.Dataset, at: dict[str, int], bound: np.ndarray) -> np.ndarray:
-    """Area of an equilibrium contact at a load, with these bonds over those at rest [m²]; nan under other controls."""
+    """Return the area of an equilibrium contact at a load at these bond fractions [m²]; nan under other controls."""
     try:
         keys = ("contact.load", "sphere.radius", "adhesion.work", "adhesion.bond_share")
         load, size, work, share = (style.number_at(setting(dataset, key), at) for key in keys)
@@ -256,7 +256,7 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     """
     scene = scene_along(dataset, "t")
     force, area = np.abs(scene.all("spring_force_mean")), scene.all("contact_area_mean")
-    tops = [incipient_law(*own)[0] for own in zip(force, area, strict=True)]
+    tops = [incipient_law(*curve)[0] for curve in zip(force, area, strict=True)]
     rises = np.arange(force.shape[1]) <= np.array(tops)[:, np.newaxis]
     unit = style.Unit.of(force, "N")
     figure, axes = style.rows([2.0, 1.8], shared=False)
@@ -264,16 +264,16 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     factor = style.in_unit(axes[0].yaxis, "contact area $A$", area, "m^2") if absolute else 1.0
     for line in scene.lines:
         up = rises[line.number]
-        pulled, own = force[line.number, up], area[line.number, up]
-        _, alpha = incipient_law(pulled, own)
-        law = alpha * pulled**2 / own[0]
+        pulled, areas = force[line.number, up], area[line.number, up]
+        _, alpha = incipient_law(pulled, areas)
+        law = alpha * pulled**2 / areas[0]
         words = rf"$\alpha$ = {1e6 * alpha:.3g} mm$^2$/N$^2$"
         name = f"{line.label}: {words}" if not scene.single else words
         look = style.GREY | ({} if scene.single else {"color": line.colour})
-        full = factor * own[0] if absolute else 1.0
-        axes[0].plot(unit.factor * pulled, full * own / own[0], color=line.colour, label=name)
+        full = factor * areas[0] if absolute else 1.0
+        axes[0].plot(unit.factor * pulled, full * areas / areas[0], color=line.colour, label=name)
         axes[0].plot(unit.factor * pulled, full * (1.0 - law), "--", **look)
-        axes[1].plot(unit.factor * pulled[1:], 1.0 - own[1:] / own[0], color=line.colour)
+        axes[1].plot(unit.factor * pulled[1:], 1.0 - areas[1:] / areas[0], color=line.colour)
         axes[1].plot(unit.factor * pulled[1:], law[1:], "--", **look)
     axes[0].plot([], [], "--", label=r"$A_0 - \alpha Q^2$", **style.GREY)
     axes[1].set(ylabel="lost area $1 - A/A_0$", yscale="log")
@@ -331,7 +331,7 @@ def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | 
             panel.plot(scene.unit.factor * speed, values(law), label=law.words, **_LAWS[law.style])
 
     def stress_panel(panel: Axes, scene: Scene) -> None:
-        """Shear stress of the dataset upon closed forms, with the maximum of each curve."""
+        """Draw the shear stress upon closed forms, with the maximum of each curve."""
         factor = style.in_unit(panel.yaxis, r"shear stress $\tau_0$", scene.all("shear_stress_mean"), "Pa")
         contact_curves(panel, scene._replace(lines=_marked(panel, scene, factor)), "shear_stress", factor)
         thin_lines(panel, scene, lambda law: factor * law.stress)
@@ -347,7 +347,7 @@ def stress_figure(dataset: xr.Dataset, data: Measured | None = None, ax: Axes | 
 
 
 def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.ndarray, Steady]]:
-    """Closed forms over the speeds of a curve, each with the speeds [m/s]."""
+    """Return closed forms over the speeds of a curve, each with the speeds [m/s]."""
     speeds = scene.speeds(line)
     low, high = float(np.min(speeds)), float(np.max(speeds))
     fine = np.linspace(low, high, _CURVE)
@@ -359,7 +359,7 @@ def _laws_of(dataset: xr.Dataset, scene: Scene, line: Line) -> list[tuple[np.nda
 
 
 def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
-    """Index of the friction maximum: where the size of the stress is largest; None at the ends of the speeds.
+    """Return the index of the largest size of the stress; None if it is at an end of the speeds.
 
     >>> maximum_of(np.array([1.0, 2.0, 3.0]), np.array([1.0, 4.0, 2.0]))
     1
@@ -376,8 +376,8 @@ def maximum_of(speed: np.ndarray, stress: np.ndarray) -> int | None:
 
 
 def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
-    """The curves, each with its maximum in its name; a ring marks it. Where the speed jumps there is none."""
-    named = []
+    """Mark the maximum of each curve by a ring and return the curves with the maxima in their names."""
+    labelled = []
     for line in scene.lines:
         speed, stress = scene.speeds(line), scene.values("shear_stress_mean", line)
         steps = scene.broken and jumps(speed, True).size  # their transients have no maximum over the speed
@@ -387,15 +387,15 @@ def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
             panel.plot(scene.x[line.number][at], factor * stress[at], color=line.colour, **_RING)
             most, fast = style.rounded(float(stress[at]), "Pa"), style.rounded(float(speed[at]), "m/s")
             words = words and f"{words}: {most} at {fast}"
-        named.append(line._replace(label=words))
-    return named
+        labelled.append(line._replace(label=words))
+    return labelled
 
 
 class Start(NamedTuple):
-    """One start: where in the sweep, rest [s], speed [m/s]; since it began times [s] and mean stresses [Pa].
+    """A start from rest: its point of the sweep, rest [s], speed [m/s], and since it began times [s] and stresses [Pa].
 
-    ``peak`` [Pa] is the largest stress, at the time ``when`` [s]; it is ``seen`` if the stress falls again and several
-    steps lead up to it.
+    ``peak`` [Pa] is the largest stress, at the time ``when`` [s]; it is ``resolved`` if the stress falls again and
+    more than three steps lead up to it.
     """
 
     at: dict[str, int]
@@ -406,21 +406,21 @@ class Start(NamedTuple):
     stress: np.ndarray
     peak: float
     when: float
-    seen: bool
+    resolved: bool
 
 
 def _varied(dataset: xr.Dataset) -> list[str]:
-    """Dimensions of the sweep along which the rest or the speed changes."""
+    """Return the dimensions of the sweep along which the rest or the speed changes."""
     dims = {*setting(dataset, "drive.rest").dims, *setting(dataset, "drive.speed").dims}
     return [name for name in sweep_dims(dataset) if name in dims]
 
 
 def starts_of(dataset: xr.Dataset) -> list[Start]:
-    """All starts of a sweep over rest and speed, at the first point of further swept keys.
+    """Return all starts of a sweep over rest and speed, at the first point of further swept keys.
 
     Peaks are those of the clock steps, or where members differ those of their mean over the records.
     """
-    varied, found, between = _varied(dataset), [], float(dataset["t"][1] - dataset["t"][0])
+    varied, starts, between = _varied(dataset), [], float(dataset["t"][1] - dataset["t"][0])
     means = [style.mean_of(dataset, name) for name in ("shear_stress", "bond_fraction")]
     for where in np.ndindex(*(dataset.sizes[name] for name in varied)):
         at = dict.fromkeys(sweep_dims(dataset), 0) | dict(zip(varied, where, strict=True))
@@ -437,13 +437,13 @@ def starts_of(dataset: xr.Dataset) -> list[Start]:
                 names = ("peak_stress", "peak_time", "clock_step")
                 peak, when, step = (style.number_at(dataset[name], at) for name in names)
                 when -= rest
-            seen = bool(abs(stress[-1]) < peak and when > _STEPS * step)
-            found.append(Start(at, rest, speed, before, time, stress, float(np.copysign(peak, speed)), when, seen))
-    return found
+            resolved = bool(abs(stress[-1]) < peak and when > _STEPS * step)
+            starts.append(Start(at, rest, speed, before, time, stress, float(np.copysign(peak, speed)), when, resolved))
+    return starts
 
 
 def start_figure(dataset: xr.Dataset) -> Figure:
-    """Stress since the start at the longest rest, one line a speed; peak stress over speed, one line a rest."""
+    """Draw the stress since the start at the longest rest, one line a speed, and the peak stress, one line a rest."""
     starts = starts_of(dataset)
     rests, speeds = ({start.rest for start in starts}, {abs(start.speed) for start in starts})
     longest = sorted((s for s in starts if s.rest == max(rests)), key=lambda s: abs(s.speed))
@@ -460,21 +460,21 @@ def start_figure(dataset: xr.Dataset) -> Figure:
 
 
 def _time_panel(panel: Axes, starts: list[Start], factor: float) -> None:
-    """Stress over the time since the start; a dot at each peak that is resolved."""
-    several = len(starts) > 1
+    """Draw the stress over the time since the start; a dot is a peak that is resolved."""
+    many = len(starts) > 1
     times = starts[0].time
-    length = style.Unit.of(times, "s", several)
+    length = style.Unit.of(times, "s", many)
     for start, colour in zip(starts, mpl.colormaps["viridis"](np.linspace(0.0, 0.88, len(starts))), strict=True):
         words = style.rounded(start.speed, "m/s")
         panel.plot(length.factor * start.time, factor * start.stress, color=colour, label=words)
-        if start.seen:
+        if start.resolved:
             panel.plot(length.factor * start.when, factor * start.peak, "o", markersize=3, color=colour)
-    ends = length.factor * np.array([times[0] if several else 0.0, times[-1]])
-    style.across(panel, ends, length.label("time since the start"), "log" if several else "linear")
+    ends = length.factor * np.array([times[0] if many else 0.0, times[-1]])
+    style.across(panel, ends, length.label("time since the start"), "log" if many else "linear")
 
 
 def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_speed: bool, factor: float) -> None:
-    """Peak stress over speed, one line a rest; over the rest where there is one speed only.
+    """Draw the peak stress over the speed, one line a rest; over the rest if there is only one speed.
 
     Beneath it what closed forms say of Bell bonds: their peak if none rebinds, and of any bonds steady sliding.
     """
@@ -483,14 +483,14 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_spee
     pace = style.Unit.of(places, "m/s" if over_speed else "s", logarithmic=True)
     lines = sorted({start.rest for start in starts}) if over_speed else [0.0]
     for number, rest in enumerate(lines):
-        own = [k for k in order if not over_speed or starts[k].rest == rest]
+        chosen = [k for k in order if not over_speed or starts[k].rest == rest]
         grey = mpl.colors.to_hex((0.65 * (1.0 - (number + 1) / len(lines)),) * 3)
         look: Any = {"color": grey, "marker": _MARKERS[number % len(_MARKERS)], "markersize": 3.5}
-        x, y = pace.factor * places[own], factor * np.array([starts[k].peak for k in own])
+        x, y = pace.factor * places[chosen], factor * np.array([starts[k].peak for k in chosen])
         panel.plot(x, y, label=f"{style.text_of(rest, 's')} at rest" if over_speed else "", **look)
-        risen = np.array([not starts[k].seen for k in own])
+        risen = np.array([not starts[k].resolved for k in chosen])
         panel.plot(x[risen], y[risen], **look | {"linestyle": "none", "mfc": "white"})
-    if not all(start.seen for start in starts):
+    if not all(start.resolved for start in starts):
         panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
     if over_speed:
         _closed_forms(panel, dataset, starts, pace.factor, factor)
@@ -501,7 +501,7 @@ def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_spee
 
 
 def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: float, factor: float) -> None:
-    """Thin lines of what is known in closed form."""
+    """Draw thin lines of closed forms."""
     speeds = np.array([abs(start.speed) for start in starts if start.speed != 0.0])
     fine = np.geomspace(speeds.min(), speeds.max(), _FEWER)
     thin: Any = style.GREY | {"linewidth": 0.7}

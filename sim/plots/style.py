@@ -56,7 +56,7 @@ STYLE: Any = {
 
 
 class Picture(Figure):
-    """A figure that is saved in the style in which it was drawn; equal pictures give equal bytes."""
+    """A figure that is saved in the style of its drawing; equal pictures give equal bytes."""
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """Save as PNG (200 dpi), PDF or SVG, by the extension; see ``matplotlib.figure.Figure.savefig``."""
@@ -65,20 +65,20 @@ class Picture(Figure):
             super().savefig(fname, **({"metadata": undated} | options))
 
     def _repr_png_(self) -> bytes:
-        """The picture as a notebook shows it."""
+        """Return the picture for a notebook."""
         shown = io.BytesIO()
         self.savefig(shown, format="png", dpi=_ON_SCREEN)
         return shown.getvalue()
 
 
 def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
-    """A picture of one column: panels of given heights [in] above each other, lettered; with one x axis if shared."""
+    """Return a picture of one column: lettered panels of given heights [in], with one x axis if shared."""
     figure, axes = grid(heights, 1, shared)
     return figure, list(axes[:, 0])
 
 
 def grid(heights: list[float], columns: int, shared: bool = True) -> tuple[Figure, Any]:
-    """A picture of rows of given heights [in], lettered, whose columns share y axes, and x axes if shared."""
+    """Return a picture of rows of given heights [in], lettered, whose columns share y axes, and x axes if shared."""
     size = COLUMN if columns == 1 else WIDE, 0.45 + sum(heights)
     count = len(heights), columns
     figure, axes = _panels(size, count, sharex=shared, sharey="row", height_ratios=heights)
@@ -87,12 +87,12 @@ def grid(heights: list[float], columns: int, shared: bool = True) -> tuple[Figur
 
 
 def pairs(height: float, count: int = 1, shared: bool = False) -> tuple[Figure, list[Axes]]:
-    """A picture of both columns and a height [in]: pairs of panels side by side, lettered; one y axis if shared."""
+    """Return a picture of two columns and a height [in]: lettered pairs of panels, with one y axis if shared."""
     return _panels((WIDE, height), (count, 2), sharey=shared)
 
 
 def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -> tuple[Figure, list[Axes]]:
-    """A picture of a size [in] with a canvas of its own, and its rows and columns of panels; several are lettered."""
+    """Return a picture of a size [in] with its own canvas, and its panels, with letters if there are more than one."""
     figure = Picture(figsize=size, dpi=200, layout="constrained")
     FigureCanvasAgg(figure)
     axes = list(figure.subplots(*count, squeeze=False, **options).flat)
@@ -103,7 +103,7 @@ def _panels(size: tuple[float, float], count: tuple[int, int], **options: Any) -
 
 
 def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
-    """A swept value with its symbol, ``P = 4 mN``, in the unit of the whole axis unless it is small there."""
+    """Return a swept value with its symbol, ``P = 4 mN``, in the unit of the whole axis unless it is small there."""
     coordinate = dataset[name]
     value = coordinate[at].item()
     if isinstance(value, str):
@@ -119,46 +119,46 @@ def swept_value(dataset: xr.Dataset, name: str, at: int) -> str:
 
 
 def swept(dataset: xr.Dataset) -> list[str]:
-    """Dimensions of the sweep with more than one value."""
+    """Return the dimensions of the sweep with more than one value."""
     return [name for name in sweep_dims(dataset) if dataset.sizes[name] > 1]
 
 
 def first_point(dataset: xr.Dataset) -> tuple[dict[str, int], str]:
-    """The first point of a sweep, by index and in words."""
+    """Return the first point of a sweep, by index and in words."""
     words = ", ".join(swept_value(dataset, name, 0) for name in swept(dataset))
     return dict.fromkeys(sweep_dims(dataset), 0), words
 
 
 def recorded(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """A variable of each member, or its mean where only that was recorded."""
+    """Return a variable of each member, or its mean if only statistics are recorded."""
     return dataset[name if name in dataset else f"{name}_mean"].astype(float)
 
 
 def mean_of(dataset: xr.Dataset, name: str) -> xr.DataArray:
-    """Mean of a variable over the members."""
+    """Return the mean of a variable over the members."""
     values = recorded(dataset, name)
     return values.mean("member") if "member" in values.dims else values
 
 
 def number_at(variable: xr.DataArray, at: dict[str, int]) -> float:
-    """A number at a point of the sweep, whether it is swept or not."""
+    """Return a number at a point of the sweep, whether it is swept or not."""
     return float(variable.isel(at, missing_dims="ignore"))
 
 
 def contact_circle(panel: Axes, radius: float) -> None:
-    """The edge of the contact on a map."""
+    """Draw the edge of the contact on a map."""
     circle = Circle((0.0, 0.0), radius, fill=False, linewidth=1.0, color=BOTH)
     circle.set_path_effects([withStroke(linewidth=2.4, foreground="white", alpha=0.8)])
     panel.add_patch(circle)
 
 
 def text_of(value: float, unit: str) -> str:
-    """A number with its unit: ``305.2 kPa``."""
+    """Return a number with its unit: ``305.2 kPa``."""
     return engineering(value, unit).replace("-", "−")
 
 
 def rounded(value: float, unit: str) -> str:
-    """A number with its unit in three digits: ``305 kPa``."""
+    """Return a number with its unit in three digits: ``305 kPa``."""
     return text_of(float(f"{value:.3g}"), unit)
 
 
@@ -166,7 +166,7 @@ _GREEK = re.compile(r"(?<![A-Za-z])(alpha|beta|tau|nu|chi|delta|sigma|xi|theta|l
 
 
 def symbol(variable: xr.DataArray) -> str:
-    """The variable's symbol as mathematics."""
+    """Return the variable's symbol as mathematics."""
     text = variable.attrs.get("symbol", "")
     text = re.sub(r"(?<=[^\W\d_])(\d+)$", r"_\1", text)
     text = _GREEK.sub(lambda m: r"\Delta\Gamma" if m[1] == "DeltaGamma" else rf"\{m[1]}", text)
@@ -175,18 +175,18 @@ def symbol(variable: xr.DataArray) -> str:
 
 
 class Unit(NamedTuple):
-    """A factor from SI and the unit it leads to."""
+    """A factor from SI and the unit that it leads to."""
 
     factor: float
     name: str
 
     def label(self, words: str) -> str:
-        """Words with the unit in brackets, if there is one."""
+        """Return words with the unit in brackets, if there is one."""
         return f"{words} ({self.name})" if self.name else words
 
     @classmethod
     def of(cls, values: Any, unit: str, logarithmic: bool = False) -> "Unit":
-        """The unit that suits the largest of some values, on a logarithmic axis the middle of them, or one chosen."""
+        """Return the chosen unit, or the unit of the largest value; on a logarithmic axis of their middle."""
         chosen = _CHOSEN.get({})
         for name in chosen:
             with contextlib.suppress(ValueError):
@@ -205,34 +205,34 @@ _CHOSEN: ContextVar[dict[str, bool]] = ContextVar("units of axes")
 
 @contextlib.contextmanager
 def in_units(units: Iterable[str]) -> Iterator[None]:
-    """A context in which axes have these units, such as ``"mm/s"``, each where it is of their dimension.
+    """Return a context in which axes of their dimension have these units, such as ``"mm/s"``.
 
     Raises
     ------
     ValueError
         For a unit that no axis can have.
     """
-    found = dict.fromkeys(units, False)
-    before = _CHOSEN.set(found)
+    chosen = dict.fromkeys(units, False)
+    before = _CHOSEN.set(chosen)
     try:
         yield
     finally:
         _CHOSEN.reset(before)
-    for name in (name for name, used in found.items() if not used):
+    for name in (name for name, used in chosen.items() if not used):
         raise ValueError(
             f'no axis of this figure can be in "{name[:40]}"; choose a unit of one, such as mm/s of a speed'
         )
 
 
 def in_unit(axis: Axis, words: str, values: Any, si: str) -> float:
-    """Label an axis with words and the unit that suits values [SI]; the factor to that unit."""
+    """Label an axis with words and the unit that suits values [SI], and return the factor to that unit."""
     unit = Unit.of(values, si)
     axis.set_label_text(unit.label(words))
     return unit.factor
 
 
 def axis_scale(values: np.ndarray) -> str:
-    """``log`` where values above zero span a decade or more, ``symlog`` where zero is among them, else ``linear``."""
+    """Return ``log`` if positive values span a decade or more, ``symlog`` if zero is among them, else ``linear``."""
     above = values[values > 0.0]
     if np.any(values < 0.0) or above.size < 2 or above.max() < 10.0 * above.min():
         return "linear"
@@ -242,7 +242,7 @@ def axis_scale(values: np.ndarray) -> str:
 
 
 def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any] = ()) -> None:
-    """A legend above the panel, where no data are: what carries a label, or handles; each label once."""
+    """Draw a legend above the panel, of all labels or of handles, each label once."""
     entries: dict[str, Any] = {}
     for handle in handles or panel.get_legend_handles_labels()[0]:
         entries.setdefault(str(handle.get_label()), handle)
@@ -257,7 +257,7 @@ def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any
 
 
 def legends_of_first(figure: Figure, axes: Any) -> None:
-    """One legend a row of panels (rows, columns), that of the first row above the whole picture and its titles."""
+    """Keep one legend a row of panels, and move that of the first row above the whole picture and its titles."""
     for panel in axes[:, 1:].flat:
         if panel.get_legend():
             panel.get_legend().remove()
@@ -269,15 +269,15 @@ def legends_of_first(figure: Figure, axes: Any) -> None:
 
 def moved_legend(panel: Axes, to: Figure | Axes, **look: Any) -> None:
     """Move the legend of a panel, if it has one, to another place."""
-    if own := panel.get_legend():
-        own.remove()
-        words = own.get_title().get_text() or None
-        handles: Any = own.legend_handles
-        to.legend(handles, [text.get_text() for text in own.get_texts()], title=words, **look)
+    if old := panel.get_legend():
+        old.remove()
+        words = old.get_title().get_text() or None
+        handles: Any = old.legend_handles
+        to.legend(handles, [text.get_text() for text in old.get_texts()], title=words, **look)
 
 
 def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: Any) -> None:
-    """A shaded band; there and back one for each way, as a polygon that turns back hides itself."""
+    """Draw a shaded band, one for each way back and forth, because a polygon that turns back hides itself."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1
     for first, last in itertools.pairwise([0, *turns, len(x) - 1]):
         part = slice(first, last + 1)
@@ -285,7 +285,7 @@ def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: 
 
 
 def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: float = 0.0) -> None:
-    """The x axis from the least to the largest value, with some ``room`` for markers at its ends, and its label."""
+    """Set the x axis from the least to the largest value, with some ``room`` for markers at its ends, and its label."""
     known = x[np.isfinite(x) & ((x > 0.0) | (scale != "log"))]
     low, high = known.min(), known.max()
     panel.set_xscale(scale, **({"linthresh": np.min(x[x > 0.0])} if scale == "symlog" else {}))
@@ -299,7 +299,7 @@ def across(panel: Axes, x: np.ndarray, words: str, scale: str = "linear", room: 
 
 
 def plain_ticks(axis: Axis) -> None:
-    """Numbers such as 0.1, 0.2, 0.5 on a logarithmic axis of few decades."""
+    """Set numbers such as 0.1, 0.2, 0.5 on a logarithmic axis of few decades."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 3.0, 5.0)))
     axis.set_major_formatter("{x:g}")
     axis.set_minor_formatter(NullFormatter())

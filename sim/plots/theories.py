@@ -52,7 +52,7 @@ _CONTROLS: Any = {"load": (compare_at_load, "$P$", "N"), "indentation": (compare
 
 
 class Case(NamedTuple):
-    """What the theories need of a scene: ``held`` is "load" [N] or "indentation" [m], rest as in ``laws.theories``."""
+    """The contact of the theories: ``held`` is "load" [N] or "indentation" [m], the others as in ``laws.theories``."""
 
     held: str
     value: float
@@ -63,13 +63,13 @@ class Case(NamedTuple):
     reversible: float
 
     def radii(self, stress: np.ndarray) -> dict[str, np.ndarray]:
-        """Contact radius at shear stresses [Pa] by theory [m]."""
-        found = _CONTROLS[self.held][0](stress, *self[1:], mixity=_MIXITY)
-        return {name: radius for name, radius in found.items() if name in _THEORIES}
+        """Return the contact radius at shear stresses [Pa] by theory [m]."""
+        radii = _CONTROLS[self.held][0](stress, *self[1:], mixity=_MIXITY)
+        return {name: radius for name, radius in radii.items() if name in _THEORIES}
 
     @property
     def scale(self) -> float:
-        """Stress whose energy, all of it, is the work of adhesion at JKR's radius: sqrt(pi E* w/(6 a)) [Pa]."""
+        """Stress whose whole energy is the work of adhesion at JKR's radius: sqrt(pi E* w/(6 a)) [Pa]."""
         radius = float(self.radii(np.zeros(1))["jkr"][0])
         return float(np.sqrt(np.pi * self.modulus * self.work / (6.0 * radius)))
 
@@ -81,52 +81,52 @@ def _fractions(dataset: xr.Dataset) -> np.ndarray:
 
 
 def sweeps_theories(dataset: xr.Dataset) -> bool:
-    """Whether the reversible fraction, on which the theories differ, is swept."""
+    """True if the reversible fraction, on which the theories differ, is swept."""
     return _fractions(dataset).size > 1
 
 
 def case_of(dataset: xr.Dataset) -> Case:
-    """The scene of the theories, with the first reversible fraction of the dataset that no other theory stands for.
+    """Return the contact of the theories, with the first reversible fraction that no other theory stands for.
 
     Raises
     ------
     ValueError
         If the sphere is not held at one load or indentation, with adhesion and in contact.
     """
-    found: dict[str, xr.DataArray] = {}
+    settings: dict[str, xr.DataArray] = {}
     with contextlib.suppress(KeyError):
         held = control(dataset).kind
-        found["value"] = setting(dataset, f"contact.{held}")
-    if not found or held not in _CONTROLS:
+        settings["value"] = setting(dataset, f"contact.{held}")
+    if not settings or held not in _CONTROLS:
         cure = 'run it with [contact] load = "4 mN", or with an indentation'
         raise ValueError(f"theories need a load or an indentation that stays; {cure}")
-    found |= {"work": setting(dataset, "adhesion.work"), "sphere_radius": setting(dataset, "sphere.radius")}
-    found |= {"modulus": dataset["contact_modulus"], "poisson_ratio": dataset["effective_poisson_ratio"]}
-    if not float(found["work"].max()) > 0.0:
+    settings |= {"work": setting(dataset, "adhesion.work"), "sphere_radius": setting(dataset, "sphere.radius")}
+    settings |= {"modulus": dataset["contact_modulus"], "poisson_ratio": dataset["effective_poisson_ratio"]}
+    if not float(settings["work"].max()) > 0.0:
         raise ValueError("there is no adhesion that theories could differ on; give [adhesion] a work above 0")
     if not bool((dataset["radius_at_rest"] > 0.0).any()):
         raise ValueError("there is no contact at rest; raise the load or the indentation")
-    for values in found.values():
+    for values in settings.values():
         if float(values.min()) < float(values.max()):
             raise ValueError(f"theories are of one contact; {choice(dataset, str(values.dims[0]))}")
     shares = [float(share) for share in _fractions(dataset) if 0.0 < share != 1.0]
-    numbers = {key: float(values.max()) for key, values in found.items()}
+    numbers = {key: float(values.max()) for key, values in settings.items()}
     return Case(held, reversible=(shares or [_FRACTION])[0], **numbers)
 
 
 @of_dataset
 def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """Shear stress [Pa] and contact area [m^2] of closed contacts, means over the members.
+    """Return shear stress [Pa] and contact area [m^2] of closed contacts, means over the members.
 
     Of steady sliding the mean over the second half of the run at each point of the sweep, else records
     spread evenly over the run.
     """
-    found = xr.Dataset({name: style.mean_of(dataset, name) for name in ("shear_stress", "contact_area")})
+    means = xr.Dataset({name: style.mean_of(dataset, name) for name in ("shear_stress", "contact_area")})
     if is_steady(dataset):
-        found = settled(found)
+        means = settled(means)
     else:
-        found = found.isel(t=np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int)))
-    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(found["shear_stress"], found["contact_area"]))
+        means = means.isel(t=np.unique(np.rint(np.linspace(0, dataset.sizes["t"] - 1, _POINTS)).astype(int)))
+    stress, area = (values.to_numpy().ravel() for values in xr.broadcast(means["shear_stress"], means["contact_area"]))
     closed = area > 0.0
     return np.abs(stress[closed]), area[closed]
 
@@ -165,7 +165,7 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
 
 
 def _panel(panel: Axes, case: Case, along: dict[str, np.ndarray], areas: dict[str, np.ndarray], factor: float) -> None:
-    """Every theory along its own x, as far as its adhesive branch goes."""
+    """Draw each theory along its own x, to the end of its adhesive branch."""
     for name, (words, colour, line) in _THEORIES.items():
         values, label = factor * areas[name], words.format(share=case.reversible, mixity=_MIXITY)
         if name in ("jkr", "hertz"):  # whatever the shear
@@ -179,7 +179,7 @@ def _panel(panel: Axes, case: Case, along: dict[str, np.ndarray], areas: dict[st
 
 
 def adhesive(areas: np.ndarray, hertz: np.ndarray) -> np.ndarray:
-    """Areas of a theory while adhesion still holds the contact; nan from where it has Hertz's on.
+    """Return the areas of an adhesive contact under a theory; nan where it has Hertz's area.
 
     >>> adhesive(np.array([3.0, 2.0, 1.0]), np.array([1.0, 1.0, 1.0]))
     array([ 3.,  2., nan])
@@ -198,7 +198,7 @@ _MAP = 201
 
 
 class Shape(NamedTuple):
-    """A contact: radius, indentation [m], shear stress [Pa], and the bodies that it is between."""
+    """A contact: radius, indentation [m], shear stress [Pa], and its bodies."""
 
     radius: float
     indentation: float
@@ -209,17 +209,17 @@ class Shape(NamedTuple):
     poisson_ratio: float
 
     def pressure(self, r: np.ndarray) -> np.ndarray:
-        """Normal stress at distances from the axis [Pa]."""
+        """Return the normal stress at distances from the axis [Pa]."""
         return np.asarray(halfspace.pressure(r, self.radius, self.indentation, self.sphere_radius, self.modulus))
 
     def surfaces(self, r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heights of half-space and sphere at distances from the axis [m]."""
-        given = r, self.radius, self.indentation, self.sphere_radius
-        low = -np.asarray(halfspace.normal_displacement(*given))
-        return low, low + np.asarray(halfspace.gap(*given))
+        """Return the heights of half-space and sphere at distances from the axis [m]."""
+        place = r, self.radius, self.indentation, self.sphere_radius
+        low = -np.asarray(halfspace.normal_displacement(*place))
+        return low, low + np.asarray(halfspace.gap(*place))
 
     def distances(self, reach: float) -> np.ndarray:
-        """Distances on both sides of the axis, crowded on both sides of the edge and with the edge itself [m]."""
+        """Return distances on both sides of the axis, dense on both sides of the edge, with the edge itself [m]."""
         near = np.geomspace(1e-6, 0.5, 200)
         r = np.concatenate([np.linspace(0.0, reach, _SIDE), self.radius * (1.0 - near), self.radius * (1.0 + near)])
         r = np.unique(np.append(r[r <= reach], self.radius))
@@ -236,7 +236,7 @@ _Shown = list[tuple[Shape, dict[str, Any]]]
 
 
 def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, float, float]:
-    """Contacts of the first member at the first point of the sweep: the last closed one, and any at rest.
+    """Return the last closed contact of the first member at the first point of the sweep, and any contact at rest.
 
     In place of the last one that of the record nearest to a time [s]. Also the time [s] and speed [m/s] of the former.
 
@@ -286,10 +286,10 @@ def profile_figure(dataset: xr.Dataset, at: float | None = None) -> Figure:
     if count == 2:
         _displacement_panel(axes[2], last, reach, length)
         _map_panel(figure, axes[3], last, reach, length)
-    told = [style.first_point(dataset)[1], f"$t$ = {style.text_of(time, 's')}"]
-    if "$V$" not in told[0]:
-        told.append(f"$V$ = {style.text_of(speed, 'm/s')}")
-    axes[0].lines[0].set_label(", ".join(filter(None, told)))
+    remarks = [style.first_point(dataset)[1], f"$t$ = {style.text_of(time, 's')}"]
+    if "$V$" not in remarks[0]:
+        remarks.append(f"$V$ = {style.text_of(speed, 'm/s')}")
+    axes[0].lines[0].set_label(", ".join(filter(None, remarks)))
     style.legend(axes[0])
     return figure
 
@@ -308,12 +308,12 @@ def _pressure_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit
 
 
 def _surface_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit) -> None:
-    """Sphere and half-space, cut along the axis; between them the gap."""
+    """Draw sphere and half-space, cut along the axis, with the gap between them."""
     x = [shape.distances(reach) for shape, _ in shown]
-    heights = [shape.surfaces(np.abs(own)) for (shape, _), own in zip(shown, x, strict=True)]
+    heights = [shape.surfaces(np.abs(place)) for (shape, _), place in zip(shown, x, strict=True)]
     factor = style.in_unit(panel.yaxis, "height $z$", np.concatenate([upper for _, upper in heights]), "m")
-    for (_, line), own, surfaces in zip(shown, x, heights, strict=True):
-        panel.plot(length.factor * own, factor * np.transpose(surfaces), **line)
+    for (_, line), place, surfaces in zip(shown, x, heights, strict=True):
+        panel.plot(length.factor * place, factor * np.transpose(surfaces), **line)
     low, ball = factor * np.array(heights[0])
     bottom = float(np.min(ball)) - 0.35 * float(np.ptp(ball))
     panel.fill_between(length.factor * x[0], bottom, low, color=style.LINES[6], alpha=0.18, linewidth=0)
@@ -323,12 +323,12 @@ def _surface_panel(panel: Axes, shown: _Shown, reach: float, length: style.Unit)
 
 
 def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
-    """Tangential displacement along and across the sliding direction; the edge as thin lines."""
+    """Draw the tangential displacement along and across the sliding direction; thin lines are the edge."""
     distance = reach * np.linspace(-1.0, 1.0, 801)
     bodies = shape.shear_modulus, shape.poisson_ratio
-    found = halfspace.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
-    factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(found), "m")
-    for values, line, words in zip(found, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
+    profiles = halfspace.tangential_profiles(distance, shape.radius, shape.stress, *bodies)
+    factor = style.in_unit(panel.yaxis, "tangential displacement $u_x$", np.concatenate(profiles), "m")
+    for values, line, words in zip(profiles, ("-", "--"), ("along $x$, the sliding", "across, along $y$"), strict=True):
         panel.plot(length.factor * distance, factor * values, line, color=style.BOTH, label=words)
     for edge in (-shape.radius, shape.radius):
         panel.axvline(length.factor * edge, **style.GUIDE)
@@ -336,7 +336,7 @@ def _displacement_panel(panel: Axes, shape: Shape, reach: float, length: style.U
 
 
 def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: style.Unit) -> None:
-    """Tangential displacement of the surface around the contact circle."""
+    """Draw the tangential displacement of the surface around the contact circle."""
     bodies = shape.shear_modulus, shape.poisson_ratio
     x, moved = halfspace.tangential_map(shape.radius, shape.stress, *bodies, points=_MAP, extent=reach / shape.radius)
     unit = style.Unit.of(moved, "m")
@@ -372,7 +372,7 @@ _DISPLACEMENTS = {"displacement": ("displacement", r"\Delta"), "": ("displacemen
 
 
 class Theory(NamedTuple):
-    """JKR's contact at rest as one curve of the figure has it: its equilibria and the loads of its folds."""
+    """JKR's contact at rest of one curve: its equilibria and the loads of its folds."""
 
     work: float
     sphere_radius: float
@@ -380,14 +380,14 @@ class Theory(NamedTuple):
     stiffness: float
 
     def equilibria(self, largest: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Displacement [m], load [N] and radius [m] of all equilibria, stable or not, up to a radius [m]."""
+        """Return displacement [m], load [N] and radius [m] of all equilibria up to a radius [m]."""
         radius = largest * np.linspace(0.0, 1.0, _RADII) ** 2  # dense at small radii, where the slopes are infinite
         load, depth = (law(radius, *self[:3]) for law in (jkr.load_at_radius, jkr.indentation_at_radius))
         return depth + load / self.stiffness, load, radius
 
 
 def needs_course(dataset: xr.Dataset) -> None:
-    """Refuse a dataset in which what holds the sphere stays."""
+    """Refuse a dataset in which the mount of the sphere does not move."""
     if bool(stays_held(dataset).all()):
         cure = '[contact] indentation = { from = "2 um", to = "-12 um", cycles = 1 }'
         raise ValueError(f"what holds the sphere stays the same, so that there is no loop; move it: {cure}")
@@ -417,9 +417,9 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     loaded.set_ylabel(radii.get_ylabel())
     of_load = scene.placed("normal_load", scene.all("normal_load_mean"), "normal load $P$", "N")
     (spent, loop), cycles = lost_energy(dataset), cycles_of(dataset)
-    named = scene._replace(lines=_named(scene, symbol, spent, loop))
+    labelled = scene._replace(lines=_named(scene, symbol, spent, loop))
     for panel, placed, name, factor in (
-        (loads, named, "normal_load", force),
+        (loads, labelled, "normal_load", force),
         (radii, scene, "contact_radius", length),
         (loaded, of_load, "contact_radius", length),
     ):
@@ -451,7 +451,7 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
 
 
 def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind: str, cycles: float) -> None:
-    """One curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle."""
+    """Draw one curve with its jumps: a cross at each pull-off, a ring at each jump-in; thin after its first cycle."""
     x, gone, loads = scene.x[line.number], scene.opened(line), name == "normal_load"
     mean, _, low, high = (np.where(gone, np.nan, factor * values) for values in scene.drawn(name, line))
     along_load = scene.over == "normal_load"
@@ -472,7 +472,7 @@ def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind
 
 
 def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:
-    """JKR's equilibria, each different curve once, as far as its contacts reached."""
+    """Draw JKR's equilibria up to the largest contact, each different curve once."""
     reached: dict[Theory, float] = {}
     for line, theory in zip(scene.lines, theories, strict=True):
         most = float(np.nanmax(np.nan_to_num(scene.values("contact_radius_mean", line))))
@@ -487,7 +487,7 @@ def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factor
 
 
 def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
-    """Loads at which a dead load and fixed grips lose JKR's contact, named where they are the same for all curves."""
+    """Draw the loads at which a dead load and fixed grips lose JKR's contact, with their names if all are the same."""
     pulls = {factor * float(jkr.pull_off_load(*theory[:2])) for theory in theories if theory.work > 0.0}
     for pull in pulls:
         for share in (1.0, _GRIPS):
@@ -507,7 +507,7 @@ def _levels(panel: Axes, theories: list[Theory], factor: float) -> None:
 
 
 def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]:
-    """Energy that opening and closing dissipate, and the closed integral of load over displacement, per cycle [J].
+    """Return the energy dissipated by opening and closing, and the integral of load over displacement, per cycle [J].
 
     Means over the members, with the sweep's dimensions. Where no cycles are made, or a run stopped on the way, the
     energy is that of the whole run, and there is no integral.
@@ -523,14 +523,14 @@ def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]
 
 
 def _named(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray | None) -> list[Line]:
-    """The curves, each named with its energies."""
+    """Return the curves, each with its energies in its name."""
     energies = {"$W$": spent} | ({} if loop is None else {rf"$\oint\,P\,\mathrm{{d}}{symbol}$": loop})
     unit = style.Unit.of(np.concatenate([np.ravel(values) for values in energies.values()]), "J")
-    named = []
+    labelled = []
     for line in scene.lines:
         known = {words: unit.factor * style.number_at(values, line.point) for words, values in energies.items()}
         known = {words: value for words, value in known.items() if value != 0.0}
         parts = [f"{words} = {value:.3g} {unit.name}" for words, value in known.items() if np.isfinite(value)]
         label = ": ".join(filter(None, [line.label, ", ".join(parts).replace("-", "−")])) if line.label else ""
-        named.append(line._replace(label=label))
-    return named
+        labelled.append(line._replace(label=label))
+    return labelled

@@ -92,7 +92,7 @@ class Drawing(NamedTuple):
 
 
 def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
-    """The figures of a dataset: the one that fits it best, then others that show more of it.
+    """Return the figures of a dataset: the one that fits it best, then others that show more of it.
 
     Measured points are in those that have their variables; if there is none, in another that has.
 
@@ -114,13 +114,13 @@ def drawings(dataset: xr.Dataset, data: Data | None = None) -> list[Drawing]:
     # time is no more than another axis for a speed that rises or for creep, and nothing happens in it where a run lasts
     less["time"] = best in ("curve", "creep", "stability") or (best != "time" and lasts and "incipient" not in could)
     shown = [best, *(kind for kind in others if not less.get(kind, False))]
-    found = [_drawing(dataset, kind, f"f{number}-", data) for number, kind in enumerate(dict.fromkeys(shown))]
-    if data is None or any(one.measured for one in found):
-        return found
+    drawings = [_drawing(dataset, kind, f"f{number}-", data) for number, kind in enumerate(dict.fromkeys(shown))]
+    if data is None or any(each.measured for each in drawings):
+        return drawings
     refusals = []
     for kind in (kind for kind in could if kind not in shown and "data" in kinds.KINDS[kind].takes):
         try:
-            return [_with_data(dataset, kind, "f-data-", data), *found]
+            return [_with_data(dataset, kind, "f-data-", data), *drawings]
         except ValueError as fault:
             refusals.append(str(fault))
     for kind in (kind for kind in shown if "data" in kinds.KINDS[kind].takes):
@@ -153,13 +153,13 @@ def _rupture(dataset: xr.Dataset) -> bool:
 
 
 def _steps(dataset: xr.Dataset) -> bool:
-    """Whether the speed is one of a few in the course of a run."""
+    """True if a run changes between a few speeds."""
     recorded = speed_name(dataset) in dataset and not is_steady(dataset)
     return recorded and np.unique(speed_of(dataset).to_numpy()).size <= _SPEEDS
 
 
 def svg_of(figure: Figure, prefix: str) -> str:
-    """A figure as an SVG element for a page of HTML.
+    """Return a figure as an SVG element for a page of HTML.
 
     All ids begin with ``prefix``. The element has no script, no namespaces and no address outside of itself. Black and
     white are the page's ink and paper.
@@ -189,11 +189,11 @@ def svg_of(figure: Figure, prefix: str) -> str:
             elif name == "href" and value.startswith("#"):
                 value = f"#{prefix}{value[1:]}"
             elif name in ("d", "x", "y"):
-                value = _NUMBER.sub(lambda found: f"{float(found[0]):.2f}", " ".join(value.split()))
+                value = _NUMBER.sub(lambda match: f"{float(match[0]):.2f}", " ".join(value.split()))
             elif name in ("style", "clip-path"):
                 value = _REFERENCE.sub(rf"url(#{prefix}\1)", value)
-                for ink, own in _INKS.items():
-                    value = value.replace(ink, own)
+                for ink, colour in _INKS.items():
+                    value = value.replace(ink, colour)
             element.set(name, value)
     width, height = 72.0 * figure.get_size_inches()
     root.attrib = {"viewBox": f"0 0 {width:g} {height:g}", "role": "img", "fill": "currentColor"}
@@ -202,14 +202,14 @@ def svg_of(figure: Figure, prefix: str) -> str:
 
 
 def _thin(panel: Axes) -> None:
-    """Leave out corners of shaded bands that no eye can tell apart, as matplotlib does of lines alone."""
+    """Leave out corners of shaded bands that look the same without them, as matplotlib does for lines alone."""
     for band in panel.collections:
         if isinstance(band, PolyCollection):
             band.set_verts([_thinned(np.asarray(path.vertices), panel) for path in band.get_paths()])
 
 
 def _thinned(corners: np.ndarray, panel: Axes) -> np.ndarray:
-    """Corners of a polygon, of many fewer that look the same."""
+    """Return fewer corners of a polygon that looks the same."""
     placed = panel.transData.transform(corners)
     if len(corners) < _CORNERS or not np.all(np.isfinite(placed)):
         return corners
@@ -398,7 +398,7 @@ _PROVENANCE = {
 
 
 class Known(NamedTuple):
-    """An error or a spread: in words, as known before the run, and as measured in it."""
+    """An error or a spread: in words, as estimated before the run, and as measured in it."""
 
     words: str
     before: str
@@ -406,10 +406,10 @@ class Known(NamedTuple):
 
 
 class Question(NamedTuple):
-    """Purpose of a scenario: its name, its question, and what else its first comment says, a paragraph each."""
+    """Purpose of a scenario: its name, its question, and further paragraphs of its first comment."""
 
     name: str
-    asked: str
+    text: str
     more: list[str]
 
 
@@ -417,7 +417,7 @@ def written(
     dataset: xr.Dataset, source: Path, path: Path | None, replace: bool,
     data: Path | None = None, fit: Path | None = None,
 ) -> Path:  # fmt: skip
-    """Write the page of the dataset of a file, by default beside it; the page's path.
+    """Write the page of a dataset, by default beside its file, and return the path of the page.
 
     Raises
     ------
@@ -442,7 +442,7 @@ def written(
 def html(
     dataset: xr.Dataset, source: Path | str = "OUT.nc", data: Data | None = None, fit: Path | str | None = None
 ) -> str:
-    """The page of a run as one text of HTML.
+    """Return the page of a run as one text of HTML.
 
     Parameters
     ----------
@@ -453,7 +453,7 @@ def html(
     data : path or dict of str to array, optional
         Measured points, a CSV table or columns in SI by name, as ``sim plot --data`` takes them.
     fit : path, optional
-        What ``sim fit`` has found of this scenario, ``<stem>_fit.json``.
+        The result of ``sim fit`` for this scenario, ``<stem>_fit.json``.
 
     Returns
     -------
@@ -501,24 +501,24 @@ def _cleaned(value: Any) -> Any:
 
 
 def question(dataset: xr.Dataset) -> Question:
-    """The question of a scenario: the first paragraph of its first comment, else its name."""
+    """Return the question of a scenario: the first paragraph of its first comment, else its name."""
     text, name = str(dataset.attrs.get("scenario_toml", "")), str(dataset.attrs.get("title", "")) or "A run of sim"
     lines = []
     for line in text.splitlines():
         if not line.startswith("#"):
             break
         lines.append(line[1:].strip())
-    asked, *more = [" ".join(part.split()) for part in "\n".join(lines).split("\n\n") if part.strip()] or [name]
-    return Question(name, asked, more)
+    question, *more = [" ".join(part.split()) for part in "\n".join(lines).split("\n\n") if part.strip()] or [name]
+    return Question(name, question, more)
 
 
 def changes(dataset: xr.Dataset) -> dict[str, str]:
-    """Values that took the place of the scenario's, by key, as TOML has them."""
+    """Return the values that replace the scenario's, by key, as TOML."""
     return {key: toml(value) for key, value in hdf5.tables(dataset.attrs.get("scenario_overrides")).items()}
 
 
 def scenario(dataset: xr.Dataset) -> str:
-    """The scenario's text; of one made in Python all of its keys, as JSON."""
+    """Return the scenario's text; for a scenario from Python all of its keys, as JSON."""
     text = str(dataset.attrs.get("scenario_toml", ""))
     if not text:
         text = json.dumps(hdf5.tables(dataset.attrs["scenario_resolved"]), indent=2, ensure_ascii=False)
@@ -526,17 +526,21 @@ def scenario(dataset: xr.Dataset) -> str:
 
 
 def commands(dataset: xr.Dataset, stem: str) -> list[str]:
-    """Commands that repeat a run, its scenario saved as ``<stem>.toml``, or ``<stem>.json`` where Python made it."""
+    """Return the commands that repeat a run of ``<stem>.toml``, or of ``<stem>.json`` for a scenario from Python."""
     if not dataset.attrs.get("scenario_toml"):
         return [f'sim.run(json.load(open("{stem}.json")), to="{stem}.nc")']
     words = [f"--set {shlex.quote(f'{key}={value}')}" for key, value in changes(dataset).items()]
     name = shlex.quote(f"{stem}.toml")
-    made = shlex.quote(f"{stem}.nc")
-    return [" ".join(["sim run", name, "-o", made, *words]), f"sim stats {made}", f"sim report {made}"]
+    dataset_name = shlex.quote(f"{stem}.nc")
+    return [
+        " ".join(["sim run", name, "-o", dataset_name, *words]),
+        f"sim stats {dataset_name}",
+        f"sim report {dataset_name}",
+    ]
 
 
 def cost(log: Path) -> dict[str, str]:
-    """Cost of the run by its log's last line: when it began, seconds in all and of each stage; nothing without."""
+    """Return the cost of the run from the last line of its log; nothing without a log."""
     try:
         entry = json.loads(log.read_text(encoding="utf-8").splitlines()[-1])
         stages = {f"of it {name}": float(seconds) for name, seconds in entry["stages"].items()}
@@ -547,7 +551,7 @@ def cost(log: Path) -> dict[str, str]:
 
 
 def known(dataset: xr.Dataset) -> Iterator[Known]:
-    """Errors known before the run, beside what the run itself says of them.
+    """Yield the error estimates before the run, beside the errors measured in it.
 
     The spread of the fluctuation energy between members is the largest over the sweep at the last record; its own
     standard error is that of the jackknife over the members.
@@ -568,13 +572,13 @@ def known(dataset: xr.Dataset) -> Iterator[Known]:
             if np.isfinite(most):
                 yield Known(str(variable.attrs.get("long_name", name)), _percent(most))
     times = np.unique(np.linspace(0, dataset.sizes["t"] - 1, _ROWS).round().astype(int))
-    found = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
-    if "area_ratio_sem" in found and (error := float(found["area_ratio_sem"].max())) > _ROUNDING:
+    ratios = over_members(dataset.isel(t=times), ["area_ratio"], quantiles=False)
+    if "area_ratio_sem" in ratios and (error := float(ratios["area_ratio_sem"].max())) > _ROUNDING:
         yield Known(f"largest standard error of the mean area over JKR's, of {times.size} times", "–", _percent(error))
 
 
 def _spreads(dataset: xr.Dataset) -> dict[str, str]:
-    """Standard deviation of ΔΓ over its mean, at the point of the sweep where it is largest, and of the mean."""
+    """Return the largest standard deviation of ΔΓ over its mean in the sweep, and that of the mean."""
     if "fluctuation_energy" not in dataset or "member" not in dataset["fluctuation_energy"].dims:
         return {}
     energy = dataset["fluctuation_energy"].isel(t=-1).astype(float).transpose(*sweep_dims(dataset), "member").to_numpy()
@@ -582,7 +586,7 @@ def _spreads(dataset: xr.Dataset) -> dict[str, str]:
     rows = [row for row in rows if np.mean(row) > 0.0]
     if not rows:
         return {}
-    row = max(rows, key=lambda one: np.std(one) / np.mean(one))
+    row = max(rows, key=lambda each: np.std(each) / np.mean(each))
     count, total, squares = len(row), np.sum(row), np.sum(row**2)
     spread = np.std(row, ddof=1) / np.mean(row)
     means = (total - row) / (count - 1)

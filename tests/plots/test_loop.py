@@ -83,14 +83,10 @@ def test_the_radius_stands_over_the_load_with_every_equilibrium_too(grips):
     assert_allclose(load, 1e6 * jkr.load_at_radius(1e-6 * radius, *JKR), rtol=1e-12, atol=1e-12)
 
 
-def test_cycles_after_the_first_are_thin(machine):
-    first, later = (x for x, _ in cycles_of(plots.draw(machine, "loop").axes[1]))
-    assert len(first) == len(later) == machine.sizes["t"] // 2 + 1 and first[-1] == later[0]
-    assert "later cycles" in legend_of(plots.draw(machine, "loop").axes[1])[0]
-
-
-def test_behind_a_machine_the_axis_is_its_displacement(machine):
+def test_behind_a_machine_the_axis_is_its_displacement_and_cycles_after_the_first_are_thin(machine):
     loads, radii, _ = plots.draw(machine, "loop").axes
+    first, later = (x for x, _ in cycles_of(radii))
+    assert len(first) == len(later) == machine.sizes["t"] // 2 + 1 and first[-1] == later[0]
     assert radii.get_xlabel() == r"displacement $\Delta$ (µm)"
     assert_allclose(thick(loads)[0], 1e6 * machine["displacement"], rtol=1e-14)
 

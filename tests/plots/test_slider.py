@@ -72,7 +72,7 @@ def test_a_map_of_stability_shows_both_ways_and_the_boundary_of_the_theory():
     figure = rendered(draw(dataset))
     up, down = figure.axes[:2]
     body = Body(scene(1).contact_area, damping=1e-2)
-    for panel, words in ((up, "faster"), (down, "slower")):
+    for panel, words in ((up, "increasing"), (down, "decreasing")):
         assert words in legend_of(panel)[1]
         ((speed, stiffness),) = lines_of(panel)
         firm = 0.5 * np.pi**2 * 1.6e6 * float(dataset["radius_at_rest"][0])
