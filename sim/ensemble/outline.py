@@ -176,7 +176,7 @@ def _derived_variables(made: Outline, plan: Plan) -> None:
     described |= {name: ("1", text, "") for name, text in KNOWN_ERRORS.items()}
     found: dict[str, list[float]] = {}
     for point in plan.points:
-        own = {number.name: number.read(point) for number in NUMBERS if number.there(point)}
+        own = {number.name: number.read(point) for number in NUMBERS if number.applies(point)}
         for name, value in (own | point.process.known_errors()).items():
             found.setdefault(name, []).append(float(value))
         point.release()

@@ -1,4 +1,4 @@
-"""Division of a run into points, groups of members and blocks of steps, by the scenario alone."""
+"""Division of a run into sweep points, groups of members and blocks of steps, by the scenario alone."""
 
 import itertools
 import math
@@ -15,23 +15,23 @@ from sim.scenario.scenario import Scenario
 _GROUP = 256
 _PART_NUMBERS = 2**22
 _STATE_NUMBERS = 2**23
-# Rough costs of one core [s]: a step of a batch, of one where a part feeds back; of a member, of a counted population,
-# an event of a bond that is followed.
+# Rough costs of one core [s]: a step of a batch, more if it is advanced step by step; of a member, of a counted
+# population, an event of a bond that is followed.
 _STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
-#: A dataset without its trajectories [byte]; statistics of each.
+#: A dataset without its trajectories [byte]; number of statistics of each pooled variable.
 _SCENARIO_BYTES, _STATISTICS = 1.2e5, 3
 #: Counted work [s of one core]: of a block at most, of a run that is cut into smaller groups for several cores, and of
 #: one for each process that is worth starting.
 _BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 5.0, 20.0, 4.0
 _SMALLEST_GROUP = 16
-#: What is left of trajectories by ``record.compression``, roughly, and of maps; and the largest file of trajectories
-#: that nobody asked for [byte].
-_LEFT, _LEFT_OF_MAPS = {"none": 1.0, "zlib": 0.4, "digits": 0.2}, 0.85
+#: Rough ratio of compression of trajectories, by ``record.compression``, and of maps; the largest file of trajectories
+#: in which every member is kept by default [byte].
+_PACKED, _PACKED_MAPS = {"none": 1.0, "zlib": 0.4, "digits": 0.2}, 0.85
 _MOST_BYTES = 20e9
 
 
 class Block(NamedTuple):
-    """Steps that are computed and kept as one: from after step ``start`` (-1 before a run) to ``end``."""
+    """Steps that are computed and stored together: from after step ``start`` (-1 before a run) to ``end``."""
 
     start: int
     end: int
@@ -39,11 +39,14 @@ class Block(NamedTuple):
 
     @property
     def records(self) -> range:
-        """Numbers of the records among the steps."""
+        """Return the numbers of the records among the steps."""
         return range(self.start // self.stride + 1, self.end // self.stride + 1)
 
     def pieces(self, most: int, snapshots: list[int]) -> Iterator[range]:
-        """Recorded steps, at most so many together and none after one at which maps are drawn; without any its end."""
+        """Yield ranges of recorded steps, of at most ``most`` steps; a step at which maps are drawn ends a range.
+
+        A block without records yields its end.
+        """
         records, stride = self.records, self.stride
         if not records:
             yield range(self.end, self.end + 1)
@@ -56,10 +59,10 @@ class Block(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Blocks of one group of members, one after the other, at one point of a sweep or at several whose run is short.
+    """Blocks of one group of members, one after the other, at one point of a sweep or at neighbours with short runs.
 
-    ``names`` are those of its parts, ``quantities`` those that are recorded; members differ in some (``each``), of
-    which only moments are kept where members are ``pooled``.
+    ``names`` are those of its parts, ``quantities`` those that are recorded. Members differ in the quantities of
+    ``each``; if members are ``pooled``, only moments of these are stored.
     """
 
     points: list[Scenario]
@@ -72,11 +75,11 @@ class Task(NamedTuple):
 
     @property
     def work(self) -> list[int]:
-        """Member-steps of each block."""
+        """Return the member-steps of each block."""
         return [len(self.points) * len(self.members) * (block.end - block.start) for block in self.blocks]
 
     def done(self, parts: Any) -> int:
-        """Member-steps of the blocks whose parts are there."""
+        """Return the member-steps of the blocks whose parts are stored."""
         return sum(steps for name, steps in zip(self.names, self.work, strict=True) if name in parts)
 
     def __str__(self) -> str:
@@ -86,7 +89,7 @@ class Task(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """Which parts a scenario's dataset is made of."""
+    """Parts of which the dataset of a scenario is made."""
 
     scenario: Scenario
     points: tuple[Scenario, ...]
@@ -97,34 +100,34 @@ class Plan:
 
     @cached_property
     def members(self) -> int:
-        """Members that are advanced: one where no part differs between members."""
+        """Return the number of members that are advanced: one if no part differs between members."""
         return self.scenario.ensemble.members if any(self._vary.values()) else 1
 
     @cached_property
     def _vary(self) -> dict[str, bool]:
-        """For each part whether members differ in it, at any point."""
+        """Map each part to True if members differ in it at any point."""
         return {part: any(point.varies[part] for point in self.points) for part in self.points[0].varies}
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
-        """Quantities that are recorded at each record."""
-        return self._there(VARIABLES)
+        """Return the quantities that are recorded at each record."""
+        return self._recorded(VARIABLES)
 
     @cached_property
     def largest(self) -> tuple[Variable, ...]:
-        """Quantities that are recorded of each whole run."""
-        return self._there(LARGEST)
+        """Return the quantities that are recorded once a run."""
+        return self._recorded(LARGEST)
 
-    def _there(self, variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
-        kept = [one for one in variables if self.scenario.record.keeps(one.name)]
-        return tuple(one for one in kept if any(one.there(point) for point in self.points))
+    def _recorded(self, variables: tuple[Variable, ...]) -> tuple[Variable, ...]:
+        wanted = (variable for variable in variables if self.scenario.record.keeps(variable.name))
+        return tuple(variable for variable in wanted if any(map(variable.applies, self.points)))
 
     @cached_property
     def _pieces(self) -> tuple[int, int]:
-        """Members of a group and most steps of a block, by the first and the last point of the sweep."""
+        """Return the members of a group and the most steps of a block, by the first and the last point of the sweep."""
         ends = self.points[0], self.points[-1]
         group = min(self.members, *(together(point) for point in ends))
-        if self._seconds(group) > _SHARED_SECONDS:  # smaller groups for more cores, where a batch costs little
+        if self._seconds(group) > _SHARED_SECONDS:  # smaller groups for more cores, if a batch costs little
             batch, whole = (max(seconds_a_step(point, rows) for point in ends) for rows in (0, group))
             group = min(group, max(_SMALLEST_GROUP, math.ceil(10.0 * batch * group / (whole - batch))))
         steps = min(int(_BLOCK_SECONDS / seconds_a_step(point, group)) for point in ends)
@@ -133,7 +136,7 @@ class Plan:
         return group, max(1, steps)
 
     def _seconds(self, group: int) -> float:
-        """Counted work of the whole run in groups of so many members, as time of one core [s]."""
+        """Return the counted work of the whole run in groups of so many members, as time of one core [s]."""
         runs = len(self.points) * self.members / group
         return runs * self.points[0].clock.steps * seconds_a_step(self.points[-1], group)
 
@@ -143,26 +146,25 @@ class Plan:
 
     @property
     def group(self) -> int:
-        """Members that are advanced together and kept in one part."""
+        """Return the number of members that are advanced together and stored in one part."""
         return self._pieces[0]
 
     def records_of_block(self, point: Scenario) -> int:
-        """Records of a block; 0 where a record's steps take longer than a block."""
-        return min(self._pieces[1] // point.clock.stride, self.most_records, point.clock.records)
+        """Return the records of a block; 0 if the steps of a record take longer than a block."""
+        return min(self._pieces[1] // point.clock.stride, self._most_records, point.clock.records)
 
     @property
-    def most_records(self) -> int:
-        """Records of a block that bounds its numbers."""
+    def _most_records(self) -> int:
         return max(1, _PART_NUMBERS // (self.group * len(VARIABLES)))
 
     def snapshots_of_block(self, point: Scenario) -> int:
-        """Times at most of one block at which maps are drawn."""
+        """Return the largest number of times in one block at which maps are drawn."""
         return max(1, int(8 * _PART_NUMBERS * len(point.record.maps) / map_bytes(point, self.group)))
 
     def blocks(self, point: Scenario) -> list[Block]:
-        """Blocks of a group: of whole records, or where one takes too long, of some steps between two records.
+        """Return the blocks of a group: of whole records, or of steps between two records if a record takes too long.
 
-        Where maps are large, each ends a block.
+        Large maps end a block.
         """
         clock, longest = point.clock, self._pieces[1]
         if records := self.records_of_block(point):
@@ -177,20 +179,21 @@ class Plan:
 
     @cached_property
     def packs(self) -> list[range]:
-        """Points of the sweep that are kept in one part: neighbours on its last axis whose whole runs are short."""
+        """Return ranges of points that are stored in one part: neighbours on the last axis with short runs."""
         first, along = self.points[0], len(self.scenario.sweep[-1].values) if self.scenario.sweep else 1
         together = 1
         alike = not first.record.maps and all(point.clock == first.clock for point in self.points)
         if alike and len(self.blocks(first)) == 1:
-            by_work, by_records = self._pieces[1] // (first.clock.steps + 1), self.most_records // first.clock.records
+            by_work, by_records = self._pieces[1] // (first.clock.steps + 1), self._most_records // first.clock.records
             together = min(along, max(1, min(by_work, by_records)))
         rows = range(0, len(self.points), along)
         return [range(a, min(a + together, row + along)) for row in rows for a in range(row, row + along, together)]
 
     def tasks(self) -> Iterator[Task]:
-        """All that is to be computed."""
+        """Yield all tasks of the run."""
         recorded = self.variables + self.largest
-        quantities, each = [one.name for one in recorded], {one.name for one in recorded if self.varies(one)}
+        quantities = [variable.name for variable in recorded]
+        each = {variable.name for variable in recorded if self.varies(variable)}
         for pack in self.packs:
             points = [self.points[number] for number in pack]
             blocks = self.blocks(points[0])
@@ -199,47 +202,44 @@ class Plan:
                 yield Task(points, members, blocks, names, quantities, each, not self.per_member)
 
     def share(self, number: int, of: int) -> Iterator[Task]:
-        """What one of several shards computes, each in turn."""
+        """Yield the tasks of one shard; the shards take turns."""
         return itertools.islice(self.tasks(), number - 1, None, of)
 
     def groups(self) -> list[np.ndarray]:
-        """The members of each group."""
+        """Return the members of each group."""
         return [np.arange(first, min(first + self.group, self.members)) for first in range(0, self.members, self.group)]
 
     @cached_property
     def bytes(self) -> float:
-        """Size of all that is recorded, before compression [byte]."""
+        """Return the size of the dataset before compression [byte]."""
         return _SCENARIO_BYTES + self.maps + self.trajectories
 
     @property
     def file_bytes(self) -> float:
-        """Size of the dataset, roughly [byte]."""
-        return _SCENARIO_BYTES + _LEFT_OF_MAPS * self.maps + self._left * self.trajectories
+        """Return the rough size of the dataset [byte]."""
+        ratio = _PACKED[self.scenario.record.compression]
+        return _SCENARIO_BYTES + _PACKED_MAPS * self.maps + ratio * self.trajectories
 
     @property
     def maps(self) -> float:
-        """Size of all maps, before compression [byte]."""
+        """Return the size of all maps before compression [byte]."""
         return len(self.points) * map_bytes(self.points[0], self.members)
 
     @property
     def trajectories(self) -> float:
-        """Size of all trajectories, before compression [byte]."""
+        """Return the size of all trajectories before compression [byte]."""
         return self._trajectories(self.per_member)
-
-    @property
-    def _left(self) -> float:
-        return _LEFT[self.scenario.record.compression]
 
     @cached_property
     def per_member(self) -> bool:
-        """Whether every member is kept; where the scenario leaves it open, unless they would make too large a file."""
+        """True if every member is recorded. By default that is so unless the file would be too large."""
         record = self.scenario.record
         if record.per_member is not None:
             return record.per_member
-        return self._left * self._trajectories(True) <= _MOST_BYTES
+        return _PACKED[record.compression] * self._trajectories(True) <= _MOST_BYTES
 
     def _trajectories(self, per_member: bool) -> float:
-        """Size of the trajectories before compression [byte]."""
+        """Return the size of the trajectories before compression [byte]."""
         each, total = 4.0 if self.scenario.record.precision == "float32" else 8.0, 0.0
         for variable in self.variables:
             rows, size = 1, each
@@ -249,30 +249,30 @@ class Plan:
         return total
 
     def varies(self, variable: Variable) -> bool:
-        """Whether the variable has the member dimension."""
+        """True if members differ in the variable."""
         return self._vary[variable.part]
 
 
 def together(scenario: Scenario) -> int:
-    """Members that are best advanced together: as many as keep their state below 64 MB, 256 at the most."""
+    """Return the members that are best advanced together: their state stays below 64 MB, and they are at most 256."""
     return min(_GROUP, max(1, _STATE_NUMBERS // state_numbers(scenario)))
 
 
 def snapshots(point: Scenario) -> list[int]:
-    """Clock steps at which maps are drawn."""
+    """Return the clock steps at which maps are drawn."""
     clock = point.clock
     return [round(time / clock.duration * (clock.records - 1)) * clock.stride for time in sorted(point.record.maps)]
 
 
 def state_numbers(point: Scenario) -> int:
-    """Numbers that the state of a member holds."""
+    """Return the count of numbers in the state of a member."""
     return 2 * point.process.pairs + point.population.numbers
 
 
 def seconds_a_step(point: Scenario, members: int, speeds: np.ndarray | None = None) -> float:
-    """Rough time of one core for a step of a batch [s], which does not depend on the machine; on average over the run.
+    """Return the rough time of one core for a step of a batch [s], the same on any machine.
 
-    Given ``speeds`` [m/s] it is that of steps at these.
+    It is an average over the run, or over some ``speeds`` [m/s].
     """
     bonds, batch = point.population, _STEP + _ALONE * point.by_steps + point.population.step_seconds
     member = _OF_MEMBER + point.process.pairs * point.fluctuations.pair_seconds + point.contact.edge_seconds
@@ -282,17 +282,17 @@ def seconds_a_step(point: Scenario, members: int, speeds: np.ndarray | None = No
 
 
 def map_bytes(point: Scenario, members: int) -> float:
-    """Size of the maps of some members at one point of a sweep [byte]."""
+    """Return the size of the maps of some members at one point of a sweep [byte]."""
     if point.map_lattice is None:
         return 0.0
     return 8.0 * min(point.record.map_members, members) * len(point.record.maps) * math.prod(point.map_lattice.shape)
 
 
 def work(plan: Plan, number: int = 1, of: int = 1) -> int:
-    """Member-steps that a plan takes, or one of several shards."""
+    """Return the member-steps of a plan, or of one shard of it."""
     return sum(sum(task.work) for task in plan.share(number, of))
 
 
 def part_name(point: int, group: int, block: int) -> str:
-    """Name of a part, the same in every run of a scenario."""
+    """Return the name of a part, the same in every run of a scenario."""
     return f"point{point:06d}-group{group:06d}-block{block:06d}"

@@ -30,7 +30,7 @@ class Variable(NamedTuple):
     ``read`` takes the scenario and what a batch went through, a ``Trajectory``, and gives an array that broadcasts to
     shape (times, members); that of a quantity of the whole run takes the state at its end, that of a number the
     scenario alone.
-    ``there`` says for which scenes it is recorded, with ``condition`` in words.
+    ``applies`` is True for the scenes of which it is recorded, with ``condition`` in words.
     """
 
     name: str
@@ -39,12 +39,12 @@ class Variable(NamedTuple):
     symbol: str
     part: str
     read: Callable[..., Any]
-    there: Callable[[Scenario], bool] = lambda scene: True
+    applies: Callable[[Scenario], bool] = lambda scene: True
     condition: str = ""
 
 
 def _until_stopped(read: Callable[[Scenario, Trajectory], np.ndarray]) -> Callable[[Scenario, Trajectory], np.ndarray]:
-    """A reading that is nan once a member's trajectory has stopped at its pull-off."""
+    """Return a reading that is nan once a member's trajectory has stopped at its pull-off."""
 
     def running(scene: Scenario, course: Trajectory) -> np.ndarray:
         return np.where(scene.contact.stopped(course.radius, course.detached), np.nan, read(scene, course))
@@ -118,7 +118,7 @@ def _equilibrium_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
 
 
 def _pulled(state: State, column: int, sign: float) -> np.ndarray:
-    """A column of the largest pull; nan for a contact that was never pulled."""
+    """Return a column of the largest pull; nan for a contact that was never pulled."""
     pull = state.extremes.pull
     return np.where(pull[:, extremes.LARGEST] > 0.0, sign * pull[:, column], np.nan)
 
@@ -188,12 +188,12 @@ VARIABLES: tuple[Variable, ...] = (
 
 
 def _driven(name: str, unit: str, long_name: str, symbol: str) -> Variable:
-    """A quantity of a drive that feels the friction, the stage's of one with a spring."""
+    """Return a quantity of a drive that solves the motion of the slider; those of the stage need a spring."""
     column, sprung = READINGS.index(name), name.startswith("stage_")
-    found = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., column]
+    described = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., column]
     if sprung:
-        return Variable(*found, lambda scene: scene.drive.model == "spring", 'drive.model = "spring"')
-    return Variable(*found, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"')
+        return Variable(*described, lambda scene: scene.drive.model == "spring", 'drive.model = "spring"')
+    return Variable(*described, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"')
 
 
 VARIABLES += (

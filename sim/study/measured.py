@@ -122,7 +122,7 @@ def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
 def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
     """Declaration of each variable that can be measured."""
     of_slider = _OF_SLIDER if scenario.drive.solves_motion else ()
-    there = (one for one in VARIABLES if (one.part != "drive" or one.name in of_slider) and one.there(scenario))
+    there = (one for one in VARIABLES if (one.part != "drive" or one.name in of_slider) and one.applies(scenario))
     sizes = {name: Quantity(unit, name, at_least=0) for name, unit in _SIZES.items()}
     return {one.name: sizes.get(one.name, Quantity(one.unit, one.long_name))
             for one in there if one.name not in _NOT_MEASURED}  # fmt: skip
