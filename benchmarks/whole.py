@@ -15,8 +15,8 @@ from benchmarks.compare import BANDED, LOAD, RAMP, RATE, STEADY
 from benchmarks.scenes import field, loaded, scene, tiled
 from benchmarks.timing import Bench, Beside, Row, absolute, middle, spent, told
 from sim.ensemble import preview, simulate
-from sim.ensemble.part_files import MemoryParts, PartFiles
 from sim.ensemble.plan import Plan
+from sim.ensemble.store import BlockFiles, MemoryBlocks
 
 #: What a command cannot do without now, and what else none could in 0.1.0, when the goals were set.
 CHECKED, OLDER = "tomllib, click, numpy, numba, pydantic", ", scipy.special, pint"
@@ -153,12 +153,12 @@ def parts(bench: Bench) -> list[Row]:
 
         def kept(plan: Plan = plan) -> None:
             with tempfile.TemporaryDirectory() as folder:
-                simulate.simulate(plan, PartFiles(Path(folder)))
+                simulate.simulate(plan, BlockFiles(Path(folder)))
 
         often = "every step" if every == 1 else f"each {every}th step"
         beside = Beside(
             "the same without the disk",
-            lambda plan=plan: simulate.simulate(plan, MemoryParts()),
+            lambda plan=plan: simulate.simulate(plan, MemoryBlocks()),
             goal=1.02 if every > 1 else None,
             bound=True,
         )

@@ -111,8 +111,6 @@ def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
 def open(path: Path) -> "xarray.Dataset":
     """Open the dataset of a run lazily, with named dimensions and units.
 
-    Of a run that is not done it holds what is computed so far, nan elsewhere, and ``attrs["share_done"]``.
-
     Raises
     ------
     BadInput
@@ -120,10 +118,6 @@ def open(path: Path) -> "xarray.Dataset":
     """
     from sim.analysis import scene
 
-    if os.path.isdir(f"{os.fspath(path)}.parts") and not os.path.exists(path):
-        from sim.ensemble import unfinished
-
-        return unfinished.dataset(pathlib.Path(path))
     return scene.open(path)
 
 

@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 
 import click
 
-from sim.units.terminal import Stages, note, print_rows, print_table, progress_bar, say, slow_stage, while_read
+from sim.units.terminal import Stages, note, print_rows, print_table, progress_bar, say, signals, slow_stage, while_read
 
 DONE, FAILED, BAD_INPUT, EXISTS, TROUBLE, INTERRUPTED = 0, 1, 2, 73, 74, 130
 
@@ -42,7 +42,8 @@ def main() -> None:
     gc.set_threshold(500_000)  # imports make many objects that stay: looking through them is a tenth of a start,
     atexit.register(gc.freeze)  # and as much of the end
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # else what all packages declare is looked through
-    signal.signal(signal.SIGTERM, signal.default_int_handler)  # schedulers stop a run by it
+    for order in signals("SIGTERM", "SIGHUP"):  # schedulers stop a run by these
+        signal.signal(order, signal.default_int_handler)
     if isinstance(sys.stdout, io.TextIOWrapper):  # letters that the terminal's encoding lacks end no command
         sys.stdout.reconfigure(errors="replace")
     try:
@@ -140,7 +141,7 @@ def cli() -> None:
 @click.option("--scheduler", default="", metavar="ADDRESS", help="Work on the cluster of this scheduler of dask.")
 @click.option("--max-memory", metavar="SIZE", help="Memory for all processes, such as 4 GB; less of it means fewer.")
 @click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
-@click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; `sim merge` makes the file of all.")
+@click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; the last one makes the file.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
 @click.option("--resume", is_flag=True, help="Go on with an unfinished run, bit for bit as if nothing had happened.")
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
@@ -152,7 +153,7 @@ def run(
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
-    from sim.ensemble.part_files import PartFiles, folder_of, shard_of
+    from sim.ensemble.store import BlockFiles, parts_of, shard_of
 
     began, stages, share = time.time(), Stages(), shard_of("1/1" if shard is None else shard)
     from sim.units.quantity import read_option
@@ -168,10 +169,10 @@ def run(
     from sim.ensemble import plan as plans, preview, simulate
 
     simulate.claim(target, force or resume, simulate.files_read(scene), simulate.BESIDE)
-    from sim.ensemble.workers import orders
+    from sim.ensemble.execute import orders
 
     plan = plans.Plan.of(scene)
-    kept: Any = PartFiles(folder_of(target, share)) if resume else ()
+    kept: Any = BlockFiles(parts_of(target)) if resume else ()
     jobs, said = preview.announced(plan, jobs, memory, share, kept)
     for line in [] if quiet else said:
         note(line)
@@ -193,7 +194,7 @@ def run(
     if tabulated:
         _print_tables(*tables)
     if not quiet:
-        say(f"shard {shard} is done; when all are: sim merge {target}" if shard else str(target))
+        say(str(target) if target.exists() else f"shard {shard} is done; the last shard that is done makes {target}")
 
 
 def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]], list[str]]:
@@ -253,25 +254,6 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, 
         _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
         if csv is not None:
             say(str(csv))
-
-
-@cli.command()
-@click.argument("output", type=_PATH)
-def verify(output: Path) -> None:
-    """Compare a dataset byte by byte with the checksums of its run; exit 1 where it has changed."""
-    from sim.ensemble import checksums
-
-    say(checksums.verify(output))
-
-
-@cli.command()
-@click.argument("output", type=_PATH)
-@click.option("--force", is_flag=True, help="Replace an existing output.")
-def merge(output: Path, force: bool) -> None:
-    """Make the dataset of a run whose shards are all done, of `sim run --shard`."""
-    from sim.ensemble import unfinished
-
-    say(str(unfinished.merge(output, force)))
 
 
 class _Plot(click.Command):
@@ -346,13 +328,7 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     from sim import analysis
     from sim.analysis import scene
 
-    opened: Any = scene.open
-    if not path.exists() and path.with_name(f"{path.name}.parts").is_dir():
-        from sim.ensemble.unfinished import dataset as opened
-    with opened(path) as dataset:
-        if "share_done" in dataset.attrs:
-            done = f"{100 * dataset.attrs['share_done']:.0f} % is computed, the rest is nan"
-            say(f"note: {path} is of a run that is not done: {done}", err=True)
+    with scene.open(path) as dataset:
         yield analysis.where(dataset, _values(chosen, "--where"))
 
 

@@ -1,12 +1,12 @@
 """A netCDF file, or arrays in memory, from an outline of variables and the parts of a run, each read once.
 
-The outline fixes names, shapes, chunks and the order of the parts, so equal runs give equal bytes. netCDF is written
-only once all parts are there: a file that HDF5 is still writing is lost when the run is killed, a renamed part is not.
-It is written in a process of its own, which loads nothing of the simulator: HDF5 crashes where the last bytes of a
-file cannot be written.
+The outline fixes names, shapes, chunks and the order of the blocks. netCDF is written only once all blocks are there: a
+file that HDF5 is still writing is lost when the run is killed, a renamed block is not.
 """
 
+import concurrent.futures
 import contextlib
+import math
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -16,11 +16,13 @@ from typing import Any, NamedTuple
 import netCDF4
 import numpy as np
 
-from sim.ensemble.part_files import Parts
-from sim.ensemble.workers import in_process
+from sim.ensemble.execute import WorkerDied, pool
+from sim.ensemble.store import Blocks
 from sim.numerics.files import HDF5
 from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened
 
+#: A dataset of more bytes is not built in memory.
+_IN_MEMORY = 256 * 2**20
 #: How netCDF packs a variable, by ``record.compression``; six digits are within 5e-7, 20 bits and
 #: the leading one, rounded to nearest, so that flags stay flags and what was equal stays so.
 _ZLIB: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
@@ -78,7 +80,7 @@ class Outline:
     pieces: list[Piece] = field(default_factory=list)
 
 
-def in_memory(outline: Outline, parts: Parts) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+def in_memory(outline: Outline, parts: Blocks) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Dimensions, values and attributes of each variable, by name."""
     arrays = {}
     for name, one in outline.variables.items():
@@ -90,18 +92,39 @@ def in_memory(outline: Outline, parts: Parts) -> dict[str, tuple[tuple[str, ...]
     return {name: (one.dimensions, arrays[name], one.attributes) for name, one in outline.variables.items()}
 
 
-def write(outline: Outline, parts: Parts, path: Path) -> None:
-    """Make the netCDF file in a process of its own."""
-    in_process(_write, outline, parts, path)
+def write(outline: Outline, parts: Blocks, path: Path) -> None:
+    """Write the netCDF file: from memory at once, or if it is large part by part in a process that may crash by itself.
+
+    HDF5 crashes at some limits of the size of files if it writes part by part, and gives no reason for its trouble.
+    """
+    sizes = [math.prod(outline.sizes[size] for size in one.dimensions) for one in outline.variables.values()]
+    try:
+        if 8 * sum(sizes) <= _IN_MEMORY:
+            _write(outline, parts, path, diskless=True, persist=True)
+            return
+        executor = pool(1)
+        try:
+            executor.submit(_write, outline, parts, path).result()
+        except concurrent.futures.BrokenExecutor:
+            raise WorkerDied(f"the process that writes {path} died: the disk may be full, or memory short") from None
+        finally:
+            executor.shutdown(kill_workers=True)
+    except RuntimeError:
+        with path.open("ab") as file:  # which raises what HDF5 does not tell
+            file.write(bytes(2**20))
+        raise
 
 
-def _write(outline: Outline, parts: Parts, path: Path) -> None:
-    with netCDF4.Dataset(path, "w", format="NETCDF4") as file:
-        for name, size in outline.sizes.items():
-            file.createDimension(name, size)
-        file.setncatts(outline.attributes)
-        made = {name: _variable(file, name, one) for name, one in outline.variables.items()}
-        fill(outline, parts, made)
+def _write(outline: Outline, parts: Blocks, path: Path, **how: Any) -> None:
+    with HDF5, netCDF4.Dataset(path, "w", format="NETCDF4", **how) as file:
+        _put(outline, parts, file)
+
+
+def _put(outline: Outline, parts: Blocks, file: netCDF4.Dataset) -> None:
+    for name, size in outline.sizes.items():
+        file.createDimension(name, size)
+    file.setncatts(outline.attributes)
+    fill(outline, parts, {name: _variable(file, name, one) for name, one in outline.variables.items()})
 
 
 def _variable(file: netCDF4.Dataset, name: str, one: Described) -> netCDF4.Variable:

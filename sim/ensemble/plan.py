@@ -22,7 +22,7 @@ _STEP, _ALONE, _OF_MEMBER, _COUNTED, _EVENT = 5e-6, 150e-6, 5e-8, 3e-7, 1e-7
 _SCENARIO_BYTES, _STATISTICS = 1.2e5, 3
 #: Counted work [s of one core]: of a block at most, of a run that is cut into smaller groups for several cores, and of
 #: one for each process that is worth starting.
-_BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 5.0, 20.0, 4.0
+_BLOCK_SECONDS, _SHARED_SECONDS, _PROCESS_SECONDS = 2.0, 20.0, 4.0
 _SMALLEST_GROUP = 16
 #: Rough ratio of compression of trajectories, by ``record.compression``, and of maps; the largest file of trajectories
 #: in which every member is kept by default [byte].

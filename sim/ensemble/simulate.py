@@ -2,7 +2,6 @@
 
 import contextlib
 import datetime
-import functools
 import json
 import math
 import os
@@ -10,23 +9,34 @@ import platform
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 
-from sim.engine import MemberNoise, State, Trajectory, follow, pack, unpack
-from sim.ensemble import cluster
+from sim.engine import MemberNoise, State, Trajectory, follow
+from sim.ensemble.execute import compute
 from sim.ensemble.netcdf import attributes_of, in_memory, write
 from sim.ensemble.outline import attributes, identity, moments, outline
-from sim.ensemble.part_files import WHOLE, MemoryParts, OutputExists, PartFiles, Parts, Shard, Stopped, held
 from sim.ensemble.plan import Block, Plan, Task, snapshots
 from sim.ensemble.preview import fitting, refuse_full_disk
 from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
-from sim.ensemble.workers import share_out
+from sim.ensemble.store import (
+    WHOLE,
+    Arrays,
+    BlockFiles,
+    Blocks,
+    MemoryBlocks,
+    OutputBusy,
+    Shard,
+    Stopped,
+    Unfinished,
+    lock_of,
+)  # fmt: skip
 from sim.laws.halfspace import cross_energy_of_map, disc_energy_of_map
-from sim.numerics.files import DiskFull, StoreTrouble, claim, explained
+from sim.numerics.files import DiskFull, OutputExists, StoreTrouble, claim, explained
+from sim.numerics.grid import Lattice
 from sim.numerics.hdf5 import located
 from sim.parts.drive import READINGS
 from sim.parts.shear.maps import CarriedProcess
@@ -44,9 +54,12 @@ def ignore(done: int) -> None:
 
 
 #: Ends of the names of what a run makes beside its output.
-BESIDE = (".parts", ".log", ".sha256")
-#: Steps after which progress is reported, at the next record.
+BESIDE = (".parts", ".log")
+#: Shards of which a run holds the locks at once: systems limit the number of open files.
+_LOCKS = 100
+#: Steps that are computed together at most, up to the next record.
 _STEPS = 1024
+_LARGEST = {variable.name for variable in LARGEST}
 
 
 def run(
@@ -73,13 +86,13 @@ def run(
     stage : callable
         Called with the name of each stage as it begins: "simulating", "writing".
     stop : callable
-        Asked before every block of steps whether to end there.
+        True if no other block is to be begun.
     shard : (int, int)
-        Number of a share of the run, from 1, and how many there are; ``merge`` makes the file of all.
+        Number of a share of the run, from 1, and how many there are; the last one to be done makes the file.
     scheduler : str
-        Address of a scheduler of dask, whose workers take the place of processes.
+        Address of a dask scheduler, whose workers take the place of processes.
     memory : float
-        Memory that all processes together may take [byte]: fewer of them share the work where it is little.
+        Memory that all processes together may take [byte]: fewer of them share the work if it is little.
 
     Returns
     -------
@@ -89,114 +102,140 @@ def run(
     Raises
     ------
     OutputExists
-        If the file or an unfinished run of it is there and is neither to be replaced nor gone on with.
+        If the file or an unfinished run of it is there and is neither to be replaced nor to be resumed.
     OutputBusy
-        If another run holds the output.
+        If another run holds the output, or some of its shards.
     BadInput
-        If what is to be gone on with is of another scenario or of other versions.
+        If what is to be resumed is of another scenario or of other versions.
     Stopped
         If it was to end early; what is computed is kept.
     StoreTrouble
-        If the disk has too little room or a file makes trouble; what the disk holds of an older output stays.
+        If the disk has too little room or a file makes trouble; an older output stays.
     NoRoom
         If there is too little memory, before anything is computed.
     WorkerDied
-        If processes died at the same work three times.
+        If processes died again and again at the same block.
     """
     plan = Plan.of(scenario)
     jobs = fitting(plan, jobs, memory, kept=to is None)
+    how: dict[str, Any] = {"progress": progress, "stop": stop, "jobs": jobs, "scheduler": scheduler}
     stage("simulating")
     if to is None:
-        import xarray  # heavy
+        import xarray  # slow to import
 
-        with contextlib.nullcontext() if jobs == 1 and not scheduler else tempfile.TemporaryDirectory() as folder:
-            kept = MemoryParts() if folder is None else PartFiles(Path(folder))
-            simulate(plan, kept, progress, jobs, stop, scheduler=scheduler)
+        with contextlib.nullcontext() if jobs == 1 or scheduler else tempfile.TemporaryDirectory() as folder:
+            blocks = MemoryBlocks() if folder is None else BlockFiles(Path(folder))
+            simulate(plan, blocks, **how)
             stage("writing")
-            made = outline(plan)
-            return located(xarray.Dataset(in_memory(made, kept), attrs=made.attributes))
+            content = outline(plan)
+            return located(xarray.Dataset(in_memory(content, blocks), attrs=content.attributes))
     claim(Path(to), replace or resume, files_read(scenario), BESIDE)
     target = Path(to).resolve() if Path(to).is_symlink() else Path(to)
     if target.exists() and not target.is_file():
         raise OutputExists(f"{target} is no plain file; name another output")
     with explained(target.parent):
         target.parent.mkdir(parents=True, exist_ok=True)
-    order = [axis.keys[0] for axis in scenario.sweep]
-    wanted, source = identity(attributes(plan)), scenario.origin.written | {"sweep": order}
     if replace or not target.exists():
         refuse_full_disk(plan, target, shard[1])
+    is_done = False
     try:
-        with held(target, wanted, source, resume, replace, lambda path: identity(attributes_of(path)), shard) as parts:
-            if parts is not None:
-                simulate(plan, parts, progress, jobs, stop, shard, scheduler)
-            if parts is not None and shard == WHOLE:
-                stage("writing")
-                parts.publish(target, functools.partial(write, outline(plan), parts))
+        while not is_done:
+            is_done = _run(plan, target, shard, resume, replace, stage, how)
+            resume, replace = True, False  # of another run that published meanwhile
     except DiskFull as trouble:
         raise DiskFull(f"{trouble}; make room, and the same command with --resume goes on") from trouble
     return target
 
 
+def _run(
+    plan: Plan, target: Path, shard: Shard, resume: bool, replace: bool, stage: Callable[[str], None],
+    how: dict[str, Any],
+) -> bool:  # fmt: skip
+    """Compute what no other process does, and publish the output if all is there; False to begin anew."""
+    order = [axis.keys[0] for axis in plan.scenario.sweep]
+    folder = Unfinished(target, identity(attributes(plan)), order, lambda path: identity(attributes_of(path)))
+    tasks = list(plan.tasks())
+    names = [name for task in tasks for name in task.names]
+    own = [name for task in plan.share(*shard) for name in task.names]
+    if not (of := folder.begin(shard, resume, replace, own)):
+        return True
+    wanted = list(range(1, of + 1)) if shard == WHOLE else [shard[0]]
+    busy: list[int] = []
+    for first in range(0, len(wanted), _LOCKS):
+        some = wanted[first : first + _LOCKS]
+        with folder.shards_locked(some, of) as numbers:
+            if numbers is None:
+                return False
+            busy += [number for number in some if number not in numbers]
+            for number in numbers if resume else ():
+                for task in tasks[number - 1 :: of]:
+                    for name, shapes in zip(task.names, _shapes(task), strict=True):
+                        folder.blocks.drop_damaged(name, shapes)
+            simulate(plan, folder.blocks, of=of, shards=numbers, **how)
+    if busy and (shard != WHOLE or of == 1):
+        raise folder.refusal(lock_of(busy[0], of))
+    stage("writing")
+    is_done = folder.publish(names, of, lambda path: write(outline(plan), folder.blocks, path))
+    if is_done is False and shard == WHOLE:
+        shards = ", ".join(f"{number}/{of}" for number in busy) or "some"
+        raise OutputBusy(f"other processes run the shards {shards} of {target}; when they are done, --resume goes on")
+    return is_done is not None
+
+
 def simulate(
-    plan: Plan, parts: Parts, progress: Progress = ignore, jobs: int = 1, stop: Callable[[], bool] = lambda: False,
-    shard: Shard = WHOLE, scheduler: str = "",
+    plan: Plan, blocks: Blocks, progress: Progress = ignore, stop: Callable[[], bool] = lambda: False, jobs: int = 1,
+    scheduler: str = "", shards: Iterable[int] = (1,), of: int = 1,
 ) -> None:  # fmt: skip
-    """Advance every group of members at every point of the sweep, and save a part for each block of steps.
+    """Advance every group of members at every point of the sweep, or those of some shards, and save each block.
 
     Raises
     ------
     Stopped
-        If parts are missing at the end, since it was to stop.
+        If blocks are missing at the end, since it was to stop.
     """
-    tasks = []
-    for task in plan.share(*shard):
-        if all(name in parts for name in task.names):
-            progress(sum(task.work))
-        else:
-            tasks.append(task)
-    if scheduler:
-        cluster.share_out(advance_group, parts, tasks, scheduler, progress, stop)
-    elif jobs > 1 and len(tasks) > 1:
-        share_out(functools.partial(advance_group, parts), tasks, jobs, progress, stop)
-    else:
-        for task in tasks:
-            advance_group(parts, task, progress, stop)
-            for point in task.points:
-                point.release()
-    if any(name not in parts for task in tasks for name in task.names):
+    missing = []
+    for number in shards:
+        for task in plan.share(number, of):
+            lacking = [place for place, name in enumerate(task.names) if name not in blocks]
+            if len(lacking) < len(task.names):
+                progress(task.done(blocks))
+            if lacking:
+                missing.append((task, lacking))
+    compute(advance, blocks, missing, progress, stop, jobs, scheduler)
+    if any(name not in blocks for task, _ in missing for name in task.names):
         raise Stopped("stopped; what was computed is kept")
 
 
-def advance_group(parts: Parts, task: Task, progress: Progress, stop: Callable[[], bool]) -> None:
-    """Advance one group of members from the last part that is there to the end of the run, or until it is to stop."""
-    state, before = None, ""
-    for block, name, steps in zip(task.blocks, task.names, task.work, strict=True):
-        if name in parts:
-            progress(steps)
-            state = None
-        else:
-            if stop():
-                return
-            if state is None and before:
-                state = unpack(task.points[0], parts.state(before))
-            found = []
-            for point in task.points:  # several only where the run is one block
-                end, arrays = _record(task, point, state, block, progress)
-                found.append(arrays)
-            state = end
-            kept = {} if name == task.names[-1] else pack(end)
-            parts.save(name, {key: _stacked([arrays[key] for arrays in found]) for key in found[0]}, kept)
-        before = name
+def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays]:
+    """Advance a group of members by one block from the state before; return the state at its end and the records."""
+    recorded = []
+    for point in task.points:  # several only if the run is one block
+        end, arrays = _record(task, point, state, task.blocks[number])
+        recorded.append(arrays)
+    return end, {key: np.stack([arrays[key] for arrays in recorded]) for key in recorded[0]}
 
 
-def _stacked(arrays: list[np.ndarray]) -> np.ndarray:
-    """Arrays along a new first axis; one alone is not copied."""
-    return np.stack(arrays) if len(arrays) > 1 else arrays[0][np.newaxis]
+def _shapes(task: Task) -> Iterator[dict[str, tuple[int, ...]]]:
+    """Names and shapes of what each block of a task records, as ``advance`` makes them."""
+    point, members = task.points[0], len(task.members)
+    rows = {name: ((3 if task.pooled else members) if name in task.each else 1) for name in task.quantities}
+    drawn = int(np.sum(task.members < point.record.map_members))
+    for block in task.blocks:
+        shapes: dict[str, tuple[int, ...]] = {}
+        for name in task.quantities:
+            if name not in _LARGEST:
+                shapes[name] = (len(task.points), rows[name], len(block.records))
+            elif block.end == point.clock.steps:
+                shapes[name] = (len(task.points), rows[name])
+        for place, step in enumerate(snapshots(point)):
+            if drawn and block.start < step <= block.end:
+                shapes[f"{MAP[0]}@{place}"] = (1, drawn, *cast(Lattice, point.map_lattice).shape)
+                if point.margin is not None:
+                    shapes |= {f"{name}@{place}": (1, drawn) for name, *_ in DISC_ENERGIES}
+        yield shapes
 
 
-def _record(
-    task: Task, point: Scenario, state: State | None, block: Block, progress: Progress
-) -> tuple[State, dict[str, np.ndarray]]:
+def _record(task: Task, point: Scenario, state: State | None, block: Block) -> tuple[State, dict[str, np.ndarray]]:
     """One part: every variable over a block and the maps in it; and the state at its end."""
     clock, members, records, noise = point.clock, task.members, block.records, MemberNoise.of(point.seed, task.members)
     variables = [one for one in VARIABLES if one.name in task.quantities]
@@ -205,7 +244,6 @@ def _record(
     maps: dict[str, np.ndarray] = {}
     drawn, drawn_at = int(np.sum(members < point.record.map_members)), snapshots(point)
     for steps in block.pieces(max(1, _STEPS // clock.stride), drawn_at):
-        before = -1 if state is None else state.step
         state, course = follow(point, noise, state, steps)
         if steps[-1] % clock.stride == 0:
             first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]
@@ -215,7 +253,6 @@ def _record(
         if drawn and steps[-1] in drawn_at:
             for name, values in _maps(point, state, drawn).items():
                 maps[f"{name}@{drawn_at.index(steps[-1])}"] = values
-        progress(len(members) * (state.step - before))
     end = cast(State, state)
     if block.end == clock.steps:
         for largest in LARGEST:
@@ -263,9 +300,11 @@ def log(target: Path, began: float, stages: dict[str, float]) -> None:
         when = datetime.datetime.fromtimestamp(began, datetime.UTC).isoformat(timespec="seconds")
     machine = {"host": platform.node(), "platform": platform.platform(), "arguments": sys.argv[1:]}
     entry = {"began": when, "seconds": round(time.time() - began, 2), "stages": stages, **machine}
-    how = os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK
+    path = target.with_name(f"{target.name}.log")
     try:
-        with explained(target.parent), open(os.open(f"{target}.log", how, 0o666), "a", encoding="utf-8") as file:
+        if path.is_symlink() or (path.exists() and not path.is_file()):
+            raise StoreTrouble("it is no plain file")
+        with explained(target.parent), path.open("a", encoding="utf-8") as file:
             file.write(json.dumps(entry) + "\n")
     except StoreTrouble as trouble:
         note(f"note: {target}.log was not written: {trouble}")

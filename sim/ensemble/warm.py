@@ -1,11 +1,11 @@
 """All kernels and laws compiled at once, in parallel processes: the first job of a cluster."""
 
+import concurrent.futures
 import importlib
-import os
 import time
 from collections.abc import Callable
 
-from sim.ensemble.workers import share_out
+from sim.ensemble.execute import pool
 from sim.numerics import jit
 from sim.numerics.files import StoreTrouble
 from sim.units.terminal import progress_bar
@@ -40,13 +40,20 @@ def compile_missing(jobs: int | None) -> str:
 
 def compile_all(names: list[str], jobs: int | None, progress: Callable[[int], None]) -> None:
     """Compile kernels and laws into the cache in some processes, by default one a core."""
-    share_out(_compile, names, jobs or os.cpu_count() or 1, progress, lambda: False)
+    import loky  # slow to import
+
+    executor = pool(min(jobs or loky.cpu_count(), len(names)))
+    try:
+        for future in concurrent.futures.as_completed([executor.submit(_compile, name) for name in names]):
+            future.result()
+            progress(1)
+    finally:
+        executor.shutdown(kill_workers=True)
 
 
-def _compile(name: str, progress: Callable[[int], None], stop: Callable[[], bool]) -> None:
+def _compile(name: str) -> None:
     importlib.import_module(_module(name))
     jit.compiled[name]()
-    progress(1)
 
 
 def _module(name: str) -> str:

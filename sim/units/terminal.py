@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import signal
 import sys
 import threading
 import time
@@ -150,3 +151,8 @@ def slow_stage(stage: str, quiet: bool) -> Iterator[None]:
     finally:
         timer.cancel()
         timer.join()
+
+
+def signals(*names: str) -> list[signal.Signals]:
+    """Return those of the named signals that this system has: schedulers stop a run by signals that Windows lacks."""
+    return [getattr(signal, name) for name in names if hasattr(signal, name)]

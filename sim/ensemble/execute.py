@@ -1,0 +1,352 @@
+"""Blocks of a run given to workers: this process, several processes, or a dask cluster, all by one interface.
+
+A task is the next block of one group of members at one point of the sweep. The blocks of a group form a chain: the next
+is given out when the one before is done. A worker keeps its last group in memory, so that modes are not made again;
+another worker goes on from the state that was stored with the block before.
+"""
+
+import concurrent.futures
+import contextlib
+import functools
+import os
+import pickle
+import signal
+import sys
+import threading
+import time
+import uuid
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any, NamedTuple
+
+from sim.engine import State, pack, unpack
+from sim.ensemble.plan import Task
+from sim.ensemble.store import Arrays, Blocks
+from sim.numerics.disk_cache import digest
+from sim.units.errors import BadInput
+from sim.units.terminal import signals
+
+#: Broken pools after which a block is given up.
+_TRIES = 3
+#: Seconds after which a wait looks whether the run is to stop, and for which a scheduler may be silent.
+_LOOK, _PATIENCE = 0.2, "20 s"
+#: Blocks that are given out for each thread of a cluster.
+_AHEAD = 2
+#: Each process has one core: libraries of linear algebra are not to start threads of their own.
+_ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "OPENBLAS", "MKL", "VECLIB_MAXIMUM", "NUMEXPR", "NUMBA")}
+#: Signals by which a terminal or a scheduler stops a run.
+_STOPPING = "SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK", "SIGUSR1", "SIGXCPU"
+#: The ``group`` of which this thread computed the last block.
+_last = threading.local()
+
+#: Computes a block of a task from the state before it; returns the state at its end and what is recorded.
+Advance = Callable[[Task, int, State | None], tuple[State, Arrays]]
+
+
+class WorkerDied(RuntimeError):
+    """A process ended without an answer: it was killed, or crashed inside a library."""
+
+    exit_code = 1
+
+
+@dataclass
+class _Chain:
+    """The blocks of a task that are missing, the next one last; ``broken`` counts the pools that broke under it."""
+
+    key: str
+    task: Task
+    missing: list[int]
+    state: Arrays | None = None
+    is_known: bool = False
+    broken: int = 0
+
+    @functools.cached_property
+    def pickled(self) -> bytes:
+        return pickle.dumps(self.task)
+
+
+@dataclass
+class _Chains:
+    """The chains of a run that are not given out: waiting, at the last try of a block, given up."""
+
+    waiting: list[_Chain]
+    suspects: list[_Chain] = field(default_factory=list)
+    lost: list[_Chain] = field(default_factory=list)
+
+    def __bool__(self) -> bool:
+        return bool(self.waiting or self.suspects)
+
+    def take(self, running: Iterable[_Chain]) -> _Chain | None:
+        """Return the chain whose block is given out next: a suspect runs alone, so that no other block is blamed."""
+        running = list(running)
+        if any(chain.broken == _TRIES - 1 for chain in running) or (self.suspects and running):
+            return None
+        chains = self.suspects or self.waiting
+        return chains.pop() if chains else None
+
+    def put(self, chain: _Chain) -> None:
+        """Take a chain back."""
+        {_TRIES: self.lost, _TRIES - 1: self.suspects}.get(chain.broken, self.waiting).append(chain)
+
+
+@dataclass
+class _Group:
+    """A task in a worker, the number of its last block, and the state at the end of that block."""
+
+    key: str
+    task: Task
+    number: int = -1
+    state: State | None = None
+
+
+class _Team(NamedTuple):
+    """An executor with the number of blocks that it takes at once; ``far`` if it does not reach the store."""
+
+    executor: Any
+    room: Callable[[], int]
+    far: bool = False
+
+
+class _Here(concurrent.futures.Executor):
+    """An executor that computes at once, in the process and thread that asks for it."""
+
+    def submit(self, function: Callable[..., Any], /, *arguments: Any, **keywords: Any) -> Any:
+        future: Any = concurrent.futures.Future()
+        try:
+            future.set_result(function(*arguments, **keywords))
+        except Exception as trouble:
+            future.set_exception(trouble)
+        return future
+
+
+def compute(
+    advance: Advance, store: Blocks, tasks: Sequence[tuple[Task, list[int]]], progress: Callable[[int], None],
+    stop: Callable[[], bool], jobs: int = 1, scheduler: str = "",
+) -> None:  # fmt: skip
+    """Compute the missing blocks of tasks and save them.
+
+    Parameters
+    ----------
+    advance : callable
+        Computes a block; a worker must be able to import it.
+    store : MemoryBlocks or BlockFiles
+        Takes the blocks; with several processes it is in files.
+    tasks : sequence
+        Each task with the numbers of its missing blocks.
+    progress : callable
+        Takes the member-steps of each block that is done.
+    stop : callable
+        True if no other block is to be begun.
+    jobs : int
+        Number of processes.
+    scheduler : str
+        Address of a dask scheduler, such as ``tcp://10.0.0.1:8786``, whose workers take the place of processes.
+
+    Raises
+    ------
+    BadInput
+        If dask is not installed here, or the workers have another version.
+    WorkerDied
+        If no scheduler answers, or, when all else is done, if processes died again and again at the same block.
+    Exception
+        As raised by the first block that fails.
+    """
+    run = uuid.uuid4().hex
+    chains = _Chains([_Chain(f"{run}-{place}", *each) for place, each in enumerate(tasks)][::-1])
+    for chain in chains.waiting:
+        chain.missing = chain.missing[::-1]
+    if scheduler:
+        with _cluster(scheduler) as team:
+            _work_off(team, advance, store, chains, progress, stop)
+    elif jobs > 1 and len(tasks) > 1:
+        while chains and not stop():  # a broken pool is replaced
+            executor = pool(min(jobs, len(tasks)))
+            try:
+                _work_off(_Team(executor, lambda: jobs), advance, store, chains, progress, stop)
+            finally:
+                executor.shutdown(kill_workers=True)
+    else:
+        try:
+            _work_off(_Team(_Here(), lambda: 1), advance, store, chains, progress, stop)
+        finally:
+            _last.__dict__.clear()
+    if chains.lost:
+        names = "; ".join(str(chain.task) for chain in chains.lost)
+        cure = "the likely reason is too little memory; all other blocks are kept, --resume tries these again"
+        raise WorkerDied(f"given up after processes died again and again: {names}; {cure}")
+
+
+def _work_off(
+    team: _Team, advance: Advance, store: Blocks, chains: _Chains, progress: Callable[[int], None],
+    stop: Callable[[], bool],
+) -> None:  # fmt: skip
+    """Give out the blocks of chains until none is left, a stop is asked for, or the pool breaks."""
+    running: dict[Any, _Chain] = {}
+    is_broken = False
+    try:
+        while True:
+            while not is_broken and len(running) < team.room() and not (chains and stop()):
+                if not (chain := chains.take(running.values())):
+                    break
+                try:
+                    running[_submitted(team, advance, store, chain)] = chain
+                except concurrent.futures.BrokenExecutor:
+                    is_broken = True
+                    chain.broken += not running  # the pool broke under this chain, or does not start
+                    chains.put(chain)
+            if not running:
+                break
+            when = concurrent.futures.ALL_COMPLETED if is_broken else concurrent.futures.FIRST_COMPLETED
+            for future in concurrent.futures.wait(running, _LOOK, when).done:
+                chain = running.pop(future)
+                try:
+                    result = future.result()
+                except concurrent.futures.BrokenExecutor:
+                    is_broken, chain.is_known = True, False
+                    chain.broken += 1
+                    chains.put(chain)
+                    continue
+                except _killed_on_cluster():
+                    chains.lost.append(chain)
+                    continue
+                chain.is_known = result is not None
+                if chain.is_known:
+                    number, chain.broken = chain.missing.pop(), 0
+                    if team.far:
+                        arrays, state = result
+                        store.save(chain.task.names[number], arrays, state)
+                        chain.state = state if number + 1 in chain.missing[-1:] else None
+                    progress(chain.task.work[number])
+                if chain.missing:
+                    chains.put(chain)
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _submitted(team: _Team, advance: Advance, store: Blocks, chain: _Chain) -> Any:
+    """The future of the next block of a chain."""
+    number, state = chain.missing[-1], chain.state
+    task: Task | bytes | None = None
+    if isinstance(team.executor, _Here):
+        task = chain.task
+    elif team.far or not chain.is_known:
+        task = chain.pickled
+    if team.far and number and state is None:
+        state = store.state(chain.task.names[number - 1])
+    with warnings.catch_warnings():  # of dask: a state may be large
+        warnings.filterwarnings("ignore", "Sending large graph")
+        reached = None if team.far else store
+        return team.executor.submit(_block, advance, chain.key, task, number, state, reached, _code())
+
+
+def _block(
+    advance: Advance, key: str, task: Task | bytes | None, number: int, state: Arrays | None, store: Blocks | None,
+    code: tuple[str, ...],
+) -> tuple[Arrays, Arrays] | bool | None:  # fmt: skip
+    """Compute a block in a worker and save it, or return it if there is no store; None if the task is not known."""
+    if code != _code():
+        raise BadInput(["a worker has another version of sim, numpy, scipy or numba; install the same"])
+    group: _Group | None = _last.__dict__.pop("group", None)
+    if group is None or group.key != key:
+        if task is None:
+            return None
+        group = _Group(key, pickle.loads(task) if isinstance(task, bytes) else task)
+    names, points = group.task.names, group.task.points
+    if group.number != number - 1:
+        before = state if store is None else store.state(names[number - 1])
+        group.state = unpack(points[0], before or {})
+    group.state, arrays = advance(group.task, number, group.state)
+    group.number, is_last = number, number == len(names) - 1
+    packed = {} if is_last else pack(group.state)
+    if store is not None:
+        store.save(names[number], arrays, packed)
+    if is_last:
+        for point in points:
+            point.release()
+    else:
+        _last.group = group
+    return (arrays, packed) if store is None else True
+
+
+@functools.cache
+def _code() -> tuple[str, ...]:
+    """What decides the numbers: sources and versions."""
+    return digest().hex(), *(version(name) for name in ("numpy", "scipy", "numba"))
+
+
+def pool(jobs: int) -> Any:
+    """Return an executor of new processes, which end with this one; scripts, threads and notebooks may start them."""
+    import loky  # slow to import
+    from loky.backend import get_context
+
+    # the modules that this process would import, and none of the present folder beside
+    environment = {"PYTHONPATH": os.pathsep.join(folder or os.getcwd() for folder in sys.path), "PYTHONSAFEPATH": "1"}
+    environment |= _ONE_THREAD | {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e18"}
+    how: dict[str, Any] = {"initializer": _begin, "initargs": (os.getpid(),), "env": environment}
+    return loky.ProcessPoolExecutor(jobs, context=get_context("loky"), **how)
+
+
+def _begin(parent: int) -> None:
+    """Prepare a process of a pool: the parent alone decides about a stop, and the process does not outlive it."""
+    for order in signals(*_STOPPING):
+        signal.signal(order, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+
+
+def _end_with(parent: int) -> None:
+    import psutil
+
+    with contextlib.suppress(psutil.Error):
+        process = psutil.Process(parent)
+        while process.is_running() and process.status() != psutil.STATUS_ZOMBIE:  # for which `wait` would wait
+            time.sleep(_LOOK)
+    os._exit(1)
+
+
+@contextlib.contextmanager
+def _cluster(address: str) -> Iterator[_Team]:
+    """The workers of a dask scheduler; that the scheduler goes away is one message."""
+    try:
+        from distributed import CancelledError, Client  # slow to import
+        from distributed.comm import CommClosedError, resolve_address
+    except ImportError:
+        raise BadInput(["--scheduler needs dask.distributed; install sliding-sim[cluster]"]) from None
+    try:
+        resolve_address(address)  # a client that fails at it is not closed within its patience
+        client = Client(address, timeout=_PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as trouble:
+        raise WorkerDied(f"no scheduler of dask answers at {address}: {trouble}") from None
+    with client, client.as_current():
+        try:
+            yield _Team(client.get_executor(pure=False), lambda: _AHEAD * max(1, sum(client.nthreads().values())), True)
+        except (CancelledError, concurrent.futures.CancelledError, CommClosedError):
+            raise WorkerDied(f"the scheduler at {address} went away; what is computed is kept") from None
+
+
+def _killed_on_cluster() -> tuple[type[Exception], ...]:
+    """The exception by which dask gives up a block whose workers died again and again, if dask is loaded."""
+    distributed = sys.modules.get("distributed")
+    return (distributed.KilledWorker,) if distributed else ()
+
+
+@contextlib.contextmanager
+def orders() -> Iterator[Callable[[], bool]]:
+    """Give whether a stop was ordered by a signal: the first order lets running blocks end, the second does not."""
+    received: list[int] = []
+
+    def order(number: int, frame: object) -> None:
+        if received:
+            raise KeyboardInterrupt
+        received.append(number)
+        with contextlib.suppress(OSError):  # of a terminal that is gone
+            os.write(2, b"stopping when the running blocks end; once more stops at once\n")
+
+    before = {number: signal.signal(number, order) for number in signals(*_STOPPING)}
+    try:
+        yield lambda: bool(received)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

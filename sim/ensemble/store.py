@@ -1,0 +1,388 @@
+"""Blocks of a run that is not done, in the folder ``OUT.nc.parts``, and their way to the output.
+
+The folder holds ``manifest.json``, which says what is run, by which versions and in how many shards; a file ``.npz``
+for each block that was computed, written beside its place and renamed; and the locks. Each shard has a lock, held while
+the shard is computed. The output has another one, held while a run begins and while the output is published. A folder
+without a manifest of ours is not touched, nor is any file in it that a run did not make.
+"""
+
+import contextlib
+import errno
+import json
+import os
+import re
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim.numerics.disk_cache import digest
+from sim.numerics.files import OutputExists, StoreTrouble, explained, move, read_whole, whole
+from sim.units.errors import BadInput
+
+Arrays = dict[str, np.ndarray]
+Manifest = dict[str, Any]
+#: Names and shapes of what a block records.
+Shapes = Mapping[str, tuple[int, ...]]
+
+#: Number of a shard, from 1, and how many there are.
+Shard = tuple[int, int]
+WHOLE: Shard = (1, 1)
+
+_MANIFEST, _DATASET, _LOCK, _STATE, _STATES = "manifest.json", "dataset.nc", "output.lock", "state.", "states"
+_SHARD = re.compile(r"([1-9][0-9]{0,5})/([1-9][0-9]{0,5})")
+#: Names of the files that a run makes in its folder, whole or on the way.
+_OURS = re.compile(r"manifest\.json|dataset\.nc|.*\.(lock|held)|point\d+-group\d+-block\d+\.npz|\..*\.tmp")
+_FORMAT, _OLDER = "parts of a run of sim, 3", "parts of a run of sim, 2"
+#: Seconds for which a run that begins waits while another one begins.
+_PATIENCE = 10.0
+_MOST_NAMED, _LONGEST = 5, 40
+#: Errors of a file system without locks.
+_NO_LOCKS = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
+
+
+class OutputBusy(RuntimeError):
+    """Another run is writing this output."""
+
+    exit_code = 75
+
+
+class Stopped(RuntimeError):
+    """The run was to stop; what is computed is kept."""
+
+    exit_code = 75
+
+
+def shard_of(text: str) -> Shard:
+    """Return the number of a shard and how many there are, of "I/N"."""
+    match = _SHARD.fullmatch(text)
+    if not match or int(match[1]) > int(match[2]):
+        raise BadInput([f"--shard takes I/N with I from 1 to N, such as 3/64, not {text[:_LONGEST]}"])
+    return int(match[1]), int(match[2])
+
+
+def parts_of(target: Path) -> Path:
+    """Return the folder of the blocks of a run that is not done."""
+    return target.with_name(f"{target.name}.parts")
+
+
+def lock_of(number: int, of: int) -> str:
+    """Return the name of the lock of a shard."""
+    return f"shard-{number}-of-{of}.lock"
+
+
+class MemoryBlocks(dict[str, Arrays]):
+    """Blocks in memory, without the states that only a resumed run needs."""
+
+    def save(self, name: str, arrays: Arrays, state: Arrays) -> None:
+        self[name] = arrays
+
+    def load(self, name: str) -> Arrays:
+        return self[name]
+
+    def state(self, name: str) -> Arrays:
+        raise KeyError(f"{name} was kept without its state")
+
+
+@dataclass(frozen=True)
+class BlockFiles:
+    """Blocks as files of a folder, each with the state at its end."""
+
+    folder: Path
+
+    def path(self, name: str) -> Path:
+        return self.folder / f"{name}.npz"
+
+    def __contains__(self, name: str) -> bool:
+        return self.path(name).exists()
+
+    def save(self, name: str, arrays: Arrays, state: Arrays) -> None:
+        """Write a block, whole or not at all."""
+        states: dict[str, Any] = {f"{_STATE}{key}": values for key, values in state.items()}
+        with explained(self.folder), whole(self.path(name)) as aside, aside.open("wb") as file:
+            np.savez(file, **{**arrays, **states, _STATES: np.array(len(states))})
+
+    def load(self, name: str) -> Arrays:
+        """Return what a block recorded."""
+        return self._read(name, lambda key: key != _STATES and not key.startswith(_STATE))
+
+    def state(self, name: str) -> Arrays:
+        """Return the state at the end of a block."""
+        states = self._read(name, lambda key: key.startswith(_STATE))
+        return {key.removeprefix(_STATE): values for key, values in states.items()}
+
+    def drop_damaged(self, name: str, shapes: Shapes) -> None:
+        """Remove a block that is not readable to its last byte, or has other names or shapes than those of the plan."""
+        try:
+            with self._opened(name) as file:
+                count = sum(key.startswith(_STATE) for key in file)
+                damaged = file.zip.testzip() is not None or int(file[_STATES]) != count
+            recorded = self.load(name)
+            damaged = damaged or {key: values.shape for key, values in recorded.items()} != dict(shapes)
+        except FileNotFoundError:
+            return
+        except Exception:  # a damaged file raises whatever its reader meets
+            damaged = True
+        if damaged:
+            with explained(self.folder):
+                self.path(name).unlink()
+
+    @contextlib.contextmanager
+    def _opened(self, name: str) -> Iterator[Any]:
+        with self.path(name).open("rb") as file, np.load(file, allow_pickle=False) as arrays:
+            yield arrays
+
+    def _read(self, name: str, wanted: Callable[[str], bool]) -> Arrays:
+        try:
+            with self._opened(name) as file:
+                return {key: file[key] for key in file if wanted(key)}
+        except Exception as trouble:
+            cure = "go on with --resume, which computes it anew"
+            raise StoreTrouble(f"{self.path(name)} is damaged; {cure}") from trouble
+
+
+Blocks = MemoryBlocks | BlockFiles
+
+
+class Unfinished:
+    """The folder of the run of an output, from its beginning until the output is published.
+
+    Parameters
+    ----------
+    target : Path
+        The netCDF file to be.
+    run : dict
+        Scenario and versions, which decide the numbers.
+    order : list of str
+        Swept keys in their order.
+    read : callable
+        Returns the ``run`` of an output.
+    """
+
+    def __init__(self, target: Path, run: Manifest, order: list[str], read: Callable[[Path], Manifest]) -> None:
+        self.target, self.folder, self.blocks = target, parts_of(target), BlockFiles(parts_of(target))
+        self.run, self.order, self.read = run, order, read
+
+    def begin(self, shard: Shard, resume: bool, replace: bool, names: Iterable[str]) -> int:
+        """Begin a run or take up one; return the number of its shards, 0 if the output is there already.
+
+        ==========  ====================================  ===========  =======
+        there is    ``resume``                            ``replace``  neither
+        ==========  ====================================  ===========  =======
+        nothing     begins                                begins       begins
+        an output   0 if it is of this run, else refused  begins       refused
+        blocks      goes on if they are of this run,      begins anew  refused
+                    else refused
+        ==========  ====================================  ===========  =======
+
+        A shard joins the blocks of other shards of its run; ``names`` are those of its own.
+        """
+        with self._output_locked(_PATIENCE):
+            older, exists = self._manifest(), self.target.exists()
+            finished = self.read(self.target) if resume and exists else {}
+            manifest = {"format": _FORMAT, "replace": exists, "shards": shard[1]}
+            manifest |= {"run": self.run, "code": digest().hex(), "sweep": self.order}
+            if resume and finished == self.run and not older:
+                return 0
+            if resume and older:
+                refuse_other(self.folder, older, manifest | ({"shards": older["shards"]} if shard == WHOLE else {}))
+            elif resume and exists:
+                refuse_other(self.target, {"run": finished}, {"run": self.run})
+            joins = shard != WHOLE and older and not _changed(older, manifest)
+            if older and not (resume or replace or (joins and not any(name in self.blocks for name in names))):
+                cure = "go on with --resume, or begin anew with --force"
+                raise OutputExists(f"{self.folder} holds an unfinished run; {cure}")
+            if exists and finished != self.run and not (replace or older.get("replace")):
+                raise OutputExists(f"{self.target} exists; replace it with --force or name another output")
+            if (resume or joins) and older:
+                for name in names if replace else ():
+                    self.blocks.path(name).unlink(missing_ok=True)
+                return int(older["shards"])
+            if older and self._busy(range(1, older["shards"] + 1), older["shards"]):
+                raise self.refusal()
+            with explained(self.folder):
+                self._clean()
+                with whole(self.folder / _MANIFEST) as aside:
+                    aside.write_text(json.dumps(manifest, sort_keys=True, default=str), encoding="utf-8")
+            return shard[1]
+
+    @contextlib.contextmanager
+    def shards_locked(self, numbers: Iterable[int], of: int) -> Iterator[list[int] | None]:
+        """Lock those of some shards that no other process holds, and give their numbers; None if the run is done."""
+        locks: dict[int, Any] = {}
+        with contextlib.ExitStack() as held:
+            with self._output_locked(None):
+                gone = not self._manifest()
+                for number in () if gone else numbers:
+                    if lock := _lock(self.folder / lock_of(number, of)):
+                        held.callback(self._unlock, lock)
+                        locks[number] = lock
+            yield None if gone else list(locks)
+
+    def publish(self, names: Iterable[str], of: int, write: Callable[[Path], None]) -> bool | None:
+        """Make the output; False if blocks are missing or another process holds a shard, None if it did so itself."""
+        with self._output_locked(None):
+            manifest = self._manifest()
+            if not manifest:
+                return None
+            if not all(name in self.blocks for name in names) or self._busy(range(1, of + 1), of):
+                return False
+            dataset = self.folder / _DATASET
+            with explained(self.folder), whole(dataset) as aside:
+                write(aside)
+            if self.target.exists() and not manifest["replace"] and self.read(self.target) != self.run:
+                cure = "move it away, and the same command with --resume goes on"
+                raise OutputExists(f"{self.target} has come during the run, which does not replace it: {cure}")
+            try:
+                move(dataset, self.target)
+            except StoreTrouble as trouble:
+                cure = "then the same command with --resume puts the output there"
+                raise StoreTrouble(f"{trouble}; {cure}") from trouble
+            with contextlib.suppress(OSError):  # the output is there
+                self._clean()
+            return True
+
+    def refusal(self, name: str = _LOCK) -> OutputBusy:
+        """Return the error for a lock that another process holds; one that a file stands in for may be abandoned."""
+        text = f"another run is writing {self.target}; wait for it or name another output"
+        for path in (self.folder / name, (self.folder / name).with_suffix(".held")):
+            if path.exists() and path.stat().st_size:  # such a file names its process
+                text += f"; if that process was killed on another computer, delete {path}"
+        return OutputBusy(text)
+
+    def _busy(self, numbers: Iterable[int], of: int) -> list[int]:
+        """Numbers of those shards that another process holds."""
+        busy = []
+        for number in numbers:
+            path = self.folder / lock_of(number, of)
+            if path.exists():
+                if lock := _lock(path):
+                    lock.release()
+                else:
+                    busy.append(number)
+        return busy
+
+    def _manifest(self) -> Manifest:
+        """The manifest of the folder; empty if there is none, or a damaged one."""
+        try:
+            manifest = json.loads(read_whole(self.folder / _MANIFEST))
+        except (FileNotFoundError, RecursionError, ValueError):
+            return {}
+        known = isinstance(manifest, dict) and manifest.get("format") == _FORMAT
+        return manifest if known and manifest.keys() >= {"run", "shards", "replace"} else {}
+
+    def _refuse_foreign(self) -> None:
+        """Refuse a folder that no run made, or a run of an older version."""
+        for path in (self.folder / _MANIFEST, *self.folder.glob(f"*-of-*/{_MANIFEST}")):
+            version = None
+            with contextlib.suppress(OSError, ValueError, TypeError, LookupError):
+                older = json.loads(read_whole(path))
+                version = older["run"]["version"]["sim"] if older["format"] == _OLDER else None
+            if version:
+                raise OutputExists(_older(self.folder, version))
+        inside = os.listdir(self.folder)
+        foreign = [name for name in inside if not _OURS.fullmatch(name)]
+        if self.folder.is_symlink() or (not self._manifest() if _MANIFEST in inside else foreign):
+            raise OutputExists(f"{self.folder} is not the folder of a run; move it away or name another output")
+
+    def _clean(self) -> None:
+        """Remove what a run made in the folder, first the manifest, without which no run goes on; a held lock stays."""
+        for path in sorted(self.folder.iterdir(), key=lambda path: path.name != _MANIFEST):
+            if _OURS.fullmatch(path.name) and path.stem != "output":
+                path.unlink()
+
+    @contextlib.contextmanager
+    def _output_locked(self, patience: float | None) -> Iterator[None]:
+        """Hold the lock of the output; a folder without a manifest goes when the lock is released."""
+        began, path, lock = time.monotonic(), self.folder / _LOCK, None
+        while not lock:
+            with explained(self.folder.parent):
+                self.folder.mkdir(parents=True, exist_ok=True)
+            self._refuse_foreign()
+            with contextlib.suppress(FileNotFoundError):  # the folder of a run that was done meanwhile
+                lock = _lock(path, 1.0)
+            if not lock and patience is not None and time.monotonic() - began > patience:
+                raise self.refusal()
+        try:
+            yield
+        finally:
+            if not (self.folder / _MANIFEST).exists():  # of a run that was killed on its way out
+                with contextlib.suppress(OSError):
+                    self._clean()
+            self._unlock(lock)
+
+    def _unlock(self, lock: Any) -> None:
+        """Release a lock; its file and the folder go with it if there is no manifest any more."""
+        path, is_done = Path(lock.lock_file), not (self.folder / _MANIFEST).exists()
+        left = [path.with_suffix(".lock"), path] if is_done else []
+        with contextlib.suppress(OSError):  # Windows keeps open files
+            while left:  # before the release: who waits for a file that is gone begins anew
+                left[-1].unlink(missing_ok=True)
+                left.pop()
+        lock.release()
+        if is_done:
+            with contextlib.suppress(OSError):  # with a lock of another process, or files of others
+                for file in left:
+                    file.unlink(missing_ok=True)
+                self.folder.rmdir()
+
+
+def _lock(path: Path, wait: float = 0.0) -> Any:
+    """A lock that is held; None if another process has it. On a file system without locks a file stands in for it."""
+    from filelock import FileLock, SoftFileLock, Timeout  # slow to import
+
+    with warnings.catch_warnings():  # of filelock, if it falls back by itself
+        warnings.simplefilter("ignore", UserWarning)
+        for lock in (FileLock(path), SoftFileLock(path.with_suffix(".held"))):
+            try:
+                lock.acquire(timeout=wait, poll_interval=0.05)
+                return lock
+            except Timeout:
+                return None
+            except FileNotFoundError:
+                raise
+            except OSError as trouble:
+                if trouble.errno not in _NO_LOCKS:
+                    raise StoreTrouble(f"{path}: {trouble.strerror}") from trouble
+    raise StoreTrouble(f"{path}: the file system has no locks")
+
+
+def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
+    """Refuse to go on with another scenario, other versions or other code, naming what differs."""
+    changed = _changed(older, wanted)
+    if "version.sim" in changed:
+        raise BadInput([_older(path, changed["version.sim"][0])])
+    if changed:
+        some = [f"{key} was {_short(was)}, is {_short(now)}" for key, (was, now) in changed.items()]
+        more = f" and {len(some) - _MOST_NAMED} more" if len(some) > _MOST_NAMED else ""
+        cure = "run what was begun, or begin anew with --force"
+        raise BadInput([f"{path} is of another run: {'; '.join(some[:_MOST_NAMED])}{more}; {cure}"])
+
+
+def _changed(older: Manifest, wanted: Manifest) -> dict[str, tuple[Any, Any]]:
+    """What decides the numbers and differs between two manifests, by dotted key: before and now."""
+    was, now = (
+        _flat(manifest.get("run")) | {key: manifest.get(key) for key in ("code", "shards", "sweep") if key in manifest}
+        for manifest in (older, wanted)
+    )
+    return {key: (was.get(key), now.get(key)) for key in sorted({*was, *now}) if was.get(key) != now.get(key)}
+
+
+def _older(path: Path, version: Any) -> str:
+    return f"{path} was made by sim {_short(version)}: finish it there, or move it away and run anew"
+
+
+def _short(value: Any) -> str:
+    text = "left out" if value is None else str(value)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
+
+
+def _flat(tree: Any, path: str = "") -> dict[str, Any]:
+    """The values of nested tables by dotted key."""
+    if not isinstance(tree, dict):
+        return {path: tree}
+    return {k: v for name, inner in tree.items() for k, v in _flat(inner, f"{path}.{name}".lstrip(".")).items()}

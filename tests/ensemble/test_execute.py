@@ -1,0 +1,309 @@
+"""Workers that share a run, processes or a dask cluster: the numbers of one process, whatever dies on the way."""
+
+import concurrent.futures
+import functools
+import itertools
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+import psutil
+import pytest
+import xarray as xr
+from helpers import deadly, scenes
+from helpers.scenes import LOADS
+
+import sim
+from sim.ensemble import execute, plan as plans, simulate as ensemble
+from sim.ensemble.execute import WorkerDied, compute
+from sim.ensemble.plan import Plan
+from sim.ensemble.store import BlockFiles, MemoryBlocks, Stopped
+from sim.units.errors import BadInput
+
+sample = functools.partial(scenes.sample, sweep=LOADS)
+
+
+def never():
+    return False
+
+
+def numbers(path):
+    with xr.open_dataset(path, decode_times=False, decode_coords=False) as dataset:
+        return dataset.load()
+
+
+def same(path, scenario=None):
+    """True if a file has the numbers of one process, and nothing lies beside it."""
+    assert [each.name for each in path.parent.iterdir()] == [path.name]
+    return numbers(path).reset_coords().equals(ensemble.run(scenario or sample()).reset_coords())
+
+
+def workers(parent=None):
+    """The processes of pools that a process has started."""
+    found = []
+    for child in psutil.Process(parent).children(recursive=True):
+        try:
+            if any("LokyProcess" in word for word in child.cmdline()):
+                found.append(child)
+        except psutil.Error:  # one that ends now
+            continue
+    return found
+
+
+@pytest.mark.parametrize("jobs", [2, *(pytest.param(jobs, marks=pytest.mark.verify) for jobs in (3, 5))])
+def test_any_number_of_processes_gives_the_same_numbers(tmp_path, many_parts, jobs):
+    counted = []
+    ensemble.run(sample(), tmp_path / "out.nc", jobs=jobs, progress=counted.append)
+    assert sum(counted) == plans.work(Plan.of(sample()))
+    assert same(tmp_path / "out.nc")
+    assert ensemble.run(sample(), jobs=jobs).identical(ensemble.run(sample()))
+
+
+def test_a_worker_that_dies_costs_its_blocks_alone(tmp_path, many_parts):
+    counted, killed = [], set()
+
+    def kill(done):
+        counted.append(done)
+        alive = [worker for worker in workers() if worker.pid not in killed]
+        if len(killed) < 2 and alive:
+            killed.add(alive[0].pid)
+            alive[0].kill()
+
+    scenario = sample(members=8, steps=40)
+    ensemble.run(scenario, tmp_path / "out.nc", jobs=2, progress=kill)
+    assert len(killed) == 2
+    assert sum(counted) == plans.work(Plan.of(scenario))
+    assert same(tmp_path / "out.nc", scenario)
+    assert not workers()
+
+
+def test_a_block_that_breaks_three_pools_is_given_up_and_the_others_are_kept(tmp_path, many_parts):
+    tasks = [(task, list(range(len(task.names)))) for task in Plan.of(sample()).tasks()]
+    blocks, lost = BlockFiles(tmp_path), deadly.DEADLY.partition("-block")[0]
+    with pytest.raises(WorkerDied, match=r"members 0 to 1 of point000001; .*--resume"):
+        compute(deadly.advance, blocks, tasks, print, never, 2)
+    for name in (name for task, _ in tasks for name in task.names):
+        assert (name in blocks) == (not name.startswith(lost) or name < deadly.DEADLY)
+    ensemble.simulate(Plan.of(sample()), blocks)
+    assert all(name in blocks for task, _ in tasks for name in task.names)
+
+
+def test_what_a_block_raises_is_raised(tmp_path, many_parts):
+    task = next(Plan.of(sample()).tasks())
+    with pytest.raises(OSError, match="out"):
+        compute(ensemble.advance, BlockFiles(tmp_path / "out"), [(task, [0])] * 2, print, never, 2)
+    assert not workers()
+
+
+def test_a_run_that_is_stopped_again_and_again_gives_the_same_numbers(tmp_path, many_parts):
+    path, stops = tmp_path / "out.nc", 0
+    while not path.exists():
+        count = itertools.count()
+        try:
+            how = {"jobs": 1 + stops % 2, "stop": lambda count=count: next(count) > 1}
+            ensemble.run(sample(), path, resume=True, **how)
+        except Stopped:
+            stops += 1
+    assert stops > 2
+    assert same(path)
+
+
+SCRIPT = """
+import sys
+sys.path.insert(0, {tests!r})
+from helpers import scenes
+import sim
+from sim.ensemble import plan
+plan._GROUP, plan._BLOCK_SECONDS = 2, 4.5e-5
+print("begun", flush=True)
+scene = scenes.sample(members={members}, steps={steps}, sweep=scenes.LOADS)
+sim.run(scene, {path!r}, jobs=2, resume=True, progress=lambda done: print(done, flush=True))
+"""
+
+
+def script(path, members=3, steps=9):
+    return SCRIPT.format(tests=str(Path(__file__).parents[1]), path=str(path), members=members, steps=steps)
+
+
+@pytest.mark.parametrize("way", ["unguarded", "standard input", pytest.param("notebook", marks=pytest.mark.verify)])
+def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_present_folder(tmp_path, way):
+    folder, path = tmp_path / "present", tmp_path / "own" / "out.nc"
+    folder.mkdir()
+    for name in ("queue", "numpy", "loky"):
+        (folder / f"{name}.py").write_text("raise SystemExit('wrong')")
+    (tmp_path / "script.py").write_text(script(path))
+    if way == "notebook":
+        nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+        cell = nbformat.v4.new_code_cell(script(path))
+        nbclient.NotebookClient(nbformat.v4.new_notebook(cells=[cell]), timeout=300).execute()
+    else:
+        with (tmp_path / "script.py").open() as file:
+            words = [sys.executable, "-P"] + ([tmp_path / "script.py"] if way == "unguarded" else ["-"])
+            how = {"cwd": folder, "stdin": file, "capture_output": True, "text": True, "check": True}
+            assert subprocess.run(words, **how).stdout.count("begun") == 1
+    assert same(path)
+
+
+def test_a_thread_may_start_processes(tmp_path, many_parts):
+    done = []
+    thread = threading.Thread(target=lambda: done.append(sim.run(sample(), tmp_path / "out.nc", jobs=2)))
+    thread.start()
+    thread.join()
+    assert done
+    assert same(tmp_path / "out.nc")
+
+
+@pytest.mark.parametrize("kills", [2, pytest.param(50, marks=pytest.mark.verify)])
+def test_a_run_whose_processes_are_killed_goes_on_to_the_same_numbers_and_leaves_none(tmp_path, many_parts, kills):
+    path, scenario, dice = tmp_path / "out.nc", sample(members=8, steps=40 * kills), np.random.default_rng(3)
+    for kill in range(kills):
+        run = subprocess.Popen(
+            [sys.executable, "-c", script(path, 8, 40 * kills)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+        )
+        for _ in range(dice.integers(2, 12)):
+            run.stdout.readline()
+        started, parent = workers(run.pid), psutil.Process(run.pid)
+        victims = [[parent], started[:1], [*started, parent]][kill % 3]
+        for victim in victims:
+            victim.kill()
+        if parent not in victims:  # a new pool goes on
+            for _ in range(2):
+                run.stdout.readline()
+            started += workers(run.pid)
+            parent.kill()
+        run.communicate()
+        assert not psutil.wait_procs(started, timeout=5)[1]
+    ensemble.run(scenario, path, resume=True)
+    assert same(path, scenario)
+
+
+@pytest.fixture(scope="module")
+def threads():
+    """A cluster of two threads of this process."""
+    distributed = pytest.importorskip("distributed")
+    how = {"processes": False, "n_workers": 1, "threads_per_worker": 2, "dashboard_address": ":0"}
+    with distributed.LocalCluster(**how) as cluster:
+        yield cluster
+
+
+def test_a_cluster_gives_the_numbers_of_one_process(tmp_path, many_parts, threads):
+    counted = []
+    how = {"scheduler": threads.scheduler_address, "progress": counted.append}
+    ensemble.run(sample(), tmp_path / "out.nc", **how)
+    assert sum(counted) == plans.work(Plan.of(sample()))
+    assert same(tmp_path / "out.nc")
+    assert ensemble.run(sample(), scheduler=threads.scheduler_address).identical(ensemble.run(sample()))
+
+
+def test_a_run_on_a_cluster_is_stopped_and_goes_on_anywhere(tmp_path, many_parts, threads):
+    path, stops, scenario = tmp_path / "out.nc", 0, sample(members=7)
+    where = itertools.cycle((threads.scheduler_address, ""))
+    while not path.exists():
+        count, counted = itertools.count(), []
+        how = {"scheduler": next(where), "progress": counted.append}
+        try:
+            ensemble.run(scenario, path, resume=True, stop=lambda count=count: next(count) > 4, **how)
+        except Stopped:
+            stops += 1
+    assert stops > 1
+    assert sum(counted) == plans.work(Plan.of(scenario))
+    assert same(path, scenario)
+
+
+def test_what_a_block_raises_on_a_cluster_is_raised_and_what_is_computed_stays(
+    tmp_path, many_parts, threads, monkeypatch
+):
+    path, follow, count = tmp_path / "out.nc", ensemble.follow, itertools.count()
+    monkeypatch.setattr(ensemble, "follow", lambda *given: 1 / 0 if next(count) == 5 else follow(*given))
+    with pytest.raises(ZeroDivisionError):
+        ensemble.run(sample(), path, scheduler=threads.scheduler_address)
+    assert list(path.with_name("out.nc.parts").glob("*.npz"))
+
+
+def test_workers_of_another_version_and_schedulers_that_do_not_answer_are_told(tmp_path, threads, monkeypatch):
+    ours = threading.current_thread()
+    with monkeypatch.context() as patched, pytest.raises(BadInput, match="another version of sim"):
+        patched.setattr(execute, "_code", lambda: (str(threading.current_thread() is ours),))
+        ensemble.run(sample(), tmp_path / "out.nc", scheduler=threads.scheduler_address)
+    monkeypatch.setattr(execute, "_PATIENCE", "0.1 s")
+    for address in ("tcp://127.0.0.1:1", "nonsense://x", "nowhere", "tcp://127.0.0.1:x"):
+        with pytest.raises(WorkerDied, match=f"no scheduler of dask answers at {address}"):
+            compute(ensemble.advance, MemoryBlocks(), [], print, never, scheduler=address)
+
+
+def test_scenes_are_mapped_over_a_cluster(threads):
+    from distributed import Client
+
+    scenarios = [sample(seed=seed) for seed in (1, 2, 3)]
+    with Client(threads) as client:
+        results = client.gather(client.map(sim.run, scenarios))
+    for dataset, scenario in zip(results, scenarios, strict=True):
+        assert dataset.identical(ensemble.run(scenario))
+
+
+@pytest.mark.verify
+def test_a_cluster_whose_workers_are_killed_gives_the_same_numbers(tmp_path, monkeypatch):
+    from distributed import LocalCluster
+
+    monkeypatch.setattr(plans, "_GROUP", 2)
+    monkeypatch.setattr(plans, "_BLOCK_SECONDS", 2e-2)
+    scenario, killed, counted = sample(members=20, steps=4000), [], itertools.count()
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=":0") as cluster:
+
+        def kill(done):
+            if next(counted) % 10 == 5 and len(killed) < 3:
+                worker = next(iter(cluster.workers.values()))
+                killed.append(worker.pid)
+                psutil.Process(worker.pid).kill()
+
+        ensemble.run(scenario, tmp_path / "out.nc", scheduler=cluster.scheduler_address, progress=kill)
+    assert len(set(killed)) == 3
+    assert same(tmp_path / "out.nc", scenario)
+
+
+@pytest.mark.verify
+def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path, many_parts):
+    from distributed import LocalCluster
+
+    cluster, path = LocalCluster(processes=False, n_workers=1, dashboard_address=":0"), tmp_path / "out.nc"
+    with pytest.raises(WorkerDied, match="went away"), cluster:
+        how = {"progress": lambda done: cluster.close(), "scheduler": cluster.scheduler_address}
+        ensemble.run(sample(members=20), path, **how)
+    ensemble.run(sample(members=20), path, resume=True)
+    assert same(path, sample(members=20))
+
+
+def test_a_suspect_runs_alone_so_that_no_other_block_is_blamed():
+    chains = execute._Chains([execute._Chain(str(place), None, [0]) for place in range(3)])
+    suspect = chains.take([])
+    suspect.broken = 2
+    chains.put(suspect)
+    other = chains.waiting.pop()
+    assert chains.take([other]) is None
+    assert chains.take([]) is suspect
+    assert chains.take([suspect]) is None
+    suspect.broken = 3
+    chains.put(suspect)
+    assert chains.lost == [suspect]
+    assert chains.take([other]) is not None
+
+
+def test_an_executor_that_does_not_start_is_no_endless_loop(monkeypatch, many_parts):
+    class Broken(concurrent.futures.Executor):
+        def submit(self, *given):
+            raise concurrent.futures.BrokenExecutor
+
+        def shutdown(self, **how):
+            made.append(self)
+
+    made = []
+    monkeypatch.setattr(execute, "pool", lambda jobs: Broken())
+    tasks = [(task, [0]) for task in Plan.of(sample()).tasks()]
+    with pytest.raises(WorkerDied):
+        compute(ensemble.advance, MemoryBlocks(), tasks, print, never, 2)
+    assert len(made) < 100

@@ -1,0 +1,426 @@
+"""Blocks of a run: killed at any file operation it goes on as if nothing had happened; files of others stay."""
+
+import errno
+import functools
+import itertools
+import json
+import os
+import signal
+import sys
+import threading
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from click.testing import CliRunner
+from helpers import scenes
+from helpers.scenes import CELL, LOADS, LOADS_AND_SHARES, SPECTRUM, scene
+
+from sim.cli import cli
+from sim.ensemble import plan as plans, simulate as ensemble, store
+from sim.ensemble.plan import Plan
+from sim.ensemble.store import BlockFiles, OutputBusy, OutputExists, Stopped, Unfinished
+from sim.numerics.files import DiskFull, StoreTrouble
+from sim.parts.shear import models as shear
+from sim.parts.shear.process import Slip
+from sim.scenario.clock import Clock, Record
+from sim.units.errors import BadInput
+
+pytestmark = pytest.mark.usefixtures("many_parts")
+sample = functools.partial(scenes.sample, sweep=LOADS)
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def same(path, scenario=None):
+    """True if a file holds the numbers of an undivided run, and nothing lies beside it."""
+    assert names(path.parent) == [path.name]
+    with xr.open_dataset(path, decode_times=False, decode_coords=False) as dataset:
+        whole = ensemble.run(scenario or sample()).reset_coords()
+        return dataset.reset_coords().equals(whole)
+
+
+def stopped(path, scenario=None, after=2, **how):
+    """The folder of a run that was stopped after some blocks."""
+    count = itertools.count()
+    with pytest.raises(Stopped):
+        ensemble.run(scenario or sample(), path, stop=lambda: next(count) >= after, **how)
+    return path.with_name(f"{path.name}.parts")
+
+
+def test_blocks_hold_every_step_once_and_end_at_records_or_between_them(monkeypatch):
+    for stride, most in itertools.product((1, 2, 5, 20), (1, 2, 3, 4, 7, 100)):
+        monkeypatch.setattr(Plan, "_pieces", (2, most))
+        plan = Plan.of(scene(3, clock=Clock(duration=20e-3, step=1e-3, record=stride * 1e-3)))
+        blocks = plan.blocks(plan.points[0])
+        assert [block.start for block in blocks] == [-1, *(block.end for block in blocks[:-1])]
+        assert blocks[-1].end == 20
+        assert [record for block in blocks for record in block.records] == list(range(20 // stride + 1))
+        assert max(block.end - block.start for block in blocks) <= max(most, 1)
+        if most >= stride:
+            assert all(block.end % stride == 0 for block in blocks)
+
+
+def test_a_record_that_takes_longer_than_a_block_gives_the_same_dataset(monkeypatch):
+    scenario = sample(clock=Clock(duration=12e-3, step=1e-4, record=6e-3))
+    many = ensemble.run(scenario)
+    plan = Plan.of(scenario)
+    assert plan.records_of_block(plan.points[0]) == 0
+    assert len(plan.blocks(plan.points[0])) > 4
+    monkeypatch.undo()
+    xr.testing.assert_identical(ensemble.run(scenario), many)
+
+
+def killed(operation, path, **how):
+    """Run in a process of its own that is killed at one of its file operations; return how it ended."""
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    count, events = itertools.count(1), {"open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.scandir"}
+
+    def step(event, *rest):
+        if event in events and next(count) == operation:
+            os.kill(os.getpid(), signal.SIGKILL)
+
+    status = 1
+    try:
+        sys.addaudithook(step)
+        ensemble.run(sample(), path, **how)
+        status = 0
+    finally:
+        os._exit(status)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills copies of this process")
+@pytest.mark.parametrize("some", [11, pytest.param(1, marks=pytest.mark.verify)])
+def test_a_run_that_was_killed_at_a_file_operation_goes_on_to_the_same_numbers(tmp_path, some):
+    path, operation, ended = tmp_path / "killed" / "out.nc", 1, -signal.SIGKILL
+    path.parent.mkdir()
+    while ended:
+        ended = killed(operation, path)
+        assert ended in (0, -signal.SIGKILL)
+        kept = {block.name: block.read_bytes() for block in path.parent.glob("*/*.npz")}
+        assert killed(operation // 2, path, resume=True) in (0, -signal.SIGKILL)  # and a second time
+        for block in path.parent.glob("*/*.npz"):
+            assert block.read_bytes() == kept.get(block.name, block.read_bytes())
+        ensemble.run(sample(), path, resume=True)
+        assert same(path)
+        path.unlink()
+        operation += some
+    assert operation > 60
+
+
+def test_a_run_goes_on_only_when_asked_and_only_as_it_was_begun(tmp_path, monkeypatch):
+    path = tmp_path / "out.nc"
+    folder = stopped(path)
+    kept = {block: block.read_bytes() for block in folder.glob("*.npz")}
+    assert len(kept) == 2
+    with pytest.raises(OutputExists, match="--resume"):
+        ensemble.run(sample(), path)
+    with pytest.raises(BadInput, match=r"is of another run: scenario.ensemble.members was 3, is 4"):
+        ensemble.run(sample(members=4), path, resume=True)
+    with pytest.raises(BadInput, match=r"is of another run: sweep was \['contact.load"):
+        turned = replace(sample(sweep=LOADS_AND_SHARES), sweep=sample(sweep=LOADS_AND_SHARES).sweep[::-1])
+        stopped(tmp_path / "two.nc", sample(sweep=LOADS_AND_SHARES))
+        ensemble.run(turned, tmp_path / "two.nc", resume=True)
+    with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"code was .*, is 6f74686572"):
+        patched.setattr(store, "digest", lambda: b"other")
+        ensemble.run(sample(), path, resume=True)
+    assert {block: block.read_bytes() for block in folder.glob("*.npz")} == kept
+    ensemble.run(sample(members=4), path, replace=True)
+    assert not folder.exists()
+
+
+def test_blocks_that_are_there_are_not_computed_again(tmp_path, monkeypatch):
+    stopped(tmp_path / "out.nc", after=3)
+    done, counted, advance = [], [], ensemble.advance
+    monkeypatch.setattr(ensemble, "advance", lambda *given: done.append(given[1]) or advance(*given))
+    ensemble.run(sample(), tmp_path / "out.nc", resume=True, progress=counted.append)
+    assert sum(counted) == plans.work(Plan.of(sample()))
+    assert len(done) == sum(len(task.names) for task in Plan.of(sample()).tasks()) - 3
+
+
+MAPPED = shear.Mapped(spectrum=SPECTRUM, cell=2 * CELL, points=24, correlation=Slip(length=3e-6), contact="disc")
+SCENES = {
+    "members": sample(),
+    "pooled": sample(record=Record(per_member=False)),
+    "short runs together": sample(steps=1),
+    "maps": sample(shear=MAPPED, record=Record(maps=(8e-3, 1e-3), map_members=3)),
+    "blocks in a record": sample(clock=Clock(duration=9e-3, step=1e-3, record=9e-3)),
+}
+
+
+@pytest.mark.parametrize("scenario", SCENES.values(), ids=SCENES)
+def test_the_plan_knows_names_and_shapes_of_every_block(tmp_path, scenario):
+    blocks = BlockFiles(tmp_path)
+    ensemble.simulate(Plan.of(scenario), blocks)
+    for task in Plan.of(scenario).tasks():
+        for name, shapes in zip(task.names, ensemble._shapes(task), strict=True):
+            blocks.drop_damaged(name, shapes)
+            assert name in blocks
+
+
+def harmed(block, how):
+    """Harm a block: bytes changed or cut, a name or a shape changed, a state lost."""
+    content = block.read_bytes()
+    with np.load(block) as file:
+        arrays = dict(file)
+    first, state = next(iter(arrays)), next(key for key in arrays if key.startswith("state."))
+    if how == "shape":
+        arrays[first] = arrays[first][..., :-1]
+    elif how in ("name", "state"):
+        del arrays[state if how == "state" else first]
+    elif how == "pickle":
+        arrays[first] = np.array([{}], object)
+    if how in ("cut", "empty", "changed"):
+        middle = len(content) // 2
+        harms = {"cut": content[:-9], "empty": b""}
+        block.write_bytes(harms.get(how, content[:middle] + b"xyz" + content[middle + 3 :]))
+    else:
+        np.savez(block, **arrays)
+
+
+@pytest.mark.parametrize("how", ["cut", "empty", "changed", "shape", "name", "state", "pickle"])
+def test_a_damaged_block_is_computed_anew(tmp_path, how):
+    path = tmp_path / "out.nc"
+    folder = stopped(path, after=3)
+    first = min(folder.glob("*.npz"))
+    harmed(first, how)
+    if how in ("cut", "empty", "pickle"):
+        with pytest.raises(StoreTrouble, match="--resume"):
+            BlockFiles(folder).load(first.stem)
+    ensemble.run(sample(), path, resume=True)
+    assert same(path)
+
+
+def test_no_flipped_byte_of_a_block_is_silent(tmp_path):
+    blocks, task = BlockFiles(tmp_path), next(Plan.of(sample()).tasks())
+    ensemble.simulate(Plan.of(sample()), blocks)
+    path, shapes = blocks.path(task.names[0]), next(ensemble._shapes(task))
+    content, numbers = path.read_bytes(), blocks.load(task.names[0]) | blocks.state(task.names[0])
+    for place in range(0, len(content), 23):
+        path.write_bytes(content[:place] + bytes([content[place] ^ 1 << place % 8]) + content[place + 1 :])
+        blocks.drop_damaged(task.names[0], shapes)
+        if task.names[0] in blocks:  # such as a flip in the time of an entry
+            read = blocks.load(task.names[0]) | blocks.state(task.names[0])
+            assert read.keys() == numbers.keys()
+            assert all(np.array_equal(read[key], numbers[key], equal_nan=True) for key in numbers)
+
+
+def test_a_full_disk_is_told_with_what_a_run_takes_and_the_run_goes_on(tmp_path, room):
+    size = ensemble.run(sample(), tmp_path / "whole" / "out.nc").stat().st_size
+    path = tmp_path / "own" / "out.nc"
+    for limit in (3_000, size // 2):  # a block has no room, then the dataset alone
+        with room(limit), pytest.raises(DiskFull, match=r"out.nc.parts: File too large; .*--resume"):
+            ensemble.run(sample(), path, resume=True)
+        assert not path.exists()
+    ensemble.run(sample(), path, resume=True)
+    assert same(path)
+
+
+def test_an_output_that_is_open_in_another_program_is_published_by_resume(tmp_path, monkeypatch):
+    path, move = tmp_path / "out.nc", os.replace
+
+    def windows(source, target):
+        if Path(target) == path:
+            raise PermissionError(errno.EACCES, "Access is denied")
+        move(source, target)
+
+    with monkeypatch.context() as patched, pytest.raises(StoreTrouble, match=r"close the program .*--resume"):
+        patched.setattr(os, "replace", windows)
+        ensemble.run(sample(), path)
+    ensemble.run(sample(), path, resume=True)
+    assert same(path)
+
+
+def test_nothing_stays_on_a_system_that_removes_no_open_file(tmp_path, monkeypatch):
+    unlink = Path.unlink
+
+    def windows(path, **how):
+        if path.exists() and any(
+            os.path.samefile(path, link) for link in Path("/proc/self/fd").iterdir() if link.exists()
+        ):
+            raise PermissionError(errno.EACCES, "Access is denied")
+        unlink(path, **how)
+
+    if not Path("/proc/self/fd").exists():
+        pytest.skip("open files are looked up in /proc")
+    for shard in ((1, 2), (2, 2)):
+        with monkeypatch.context() as patched:
+            patched.setattr(Path, "unlink", windows)
+            ensemble.run(sample(), tmp_path / "out.nc", shard=shard)
+    assert same(tmp_path / "out.nc")
+
+
+def test_a_file_that_comes_during_a_run_is_not_replaced(tmp_path):
+    path = tmp_path / "out.nc"
+    with pytest.raises(OutputExists, match="has come during the run"):
+        ensemble.run(sample(), path, progress=lambda done: path.write_text("precious"))
+    assert path.read_text() == "precious"
+    path.unlink()
+    ensemble.run(sample(), path, resume=True)
+    assert same(path)
+
+
+def test_a_finished_run_is_left_as_it_is(tmp_path):
+    path = ensemble.run(sample(), tmp_path / "out.nc")
+    before = path.stat()
+    assert ensemble.run(sample(), path, resume=True) == path
+    assert path.stat().st_mtime_ns == before.st_mtime_ns
+    with pytest.raises(BadInput, match=r"out.nc is of another run: scenario.seed was 5, is 6"):
+        ensemble.run(sample(seed=6), path, resume=True)
+    assert names(tmp_path) == ["out.nc"]
+
+
+def test_a_run_that_replaces_an_output_and_is_stopped_goes_on_to_replace_it(tmp_path):
+    path = ensemble.run(sample(seed=6), tmp_path / "out.nc")
+    older = path.read_bytes()
+    stopped(path, replace=True)
+    assert path.read_bytes() == older
+    ensemble.run(sample(), path, resume=True)
+    assert same(path)
+
+
+def test_runs_of_an_older_version_are_named(tmp_path, monkeypatch):
+    path = ensemble.run(sample(), tmp_path / "out.nc")
+    with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"made by sim .*: finish it there"):
+        patched.setattr("sim.ensemble.outline._version", lambda name: "9.9")
+        ensemble.run(sample(), path, resume=True)
+    for folder in ("old.nc.parts", "shards.nc.parts/1-of-2"):
+        (tmp_path / folder).mkdir(parents=True)
+        manifest = {"format": store._OLDER, "run": {"version": {"sim": "0.2.0"}}}
+        (tmp_path / folder / "manifest.json").write_text(json.dumps(manifest))
+    for name in ("old.nc", "shards.nc"):
+        with pytest.raises(OutputExists, match=r"made by sim 0.2.0: finish it there"):
+            ensemble.run(sample(), tmp_path / name, resume=True)
+
+
+def test_a_folder_that_no_run_made_is_not_touched(tmp_path):
+    other, folder = tmp_path / "precious", tmp_path / "out.nc.parts"
+    other.mkdir()
+    (other / "thesis.txt").write_text("years")
+    folder.symlink_to(other)
+    for _ in range(2):
+        with pytest.raises(OutputExists, match="is not the folder of a run; move it away"):
+            ensemble.run(sample(), tmp_path / "out.nc", replace=True)
+        assert names(folder) == ["thesis.txt"]
+        if folder.is_symlink():
+            folder.unlink()
+            other.rename(folder)
+
+
+def test_files_that_others_put_into_the_folder_stay(tmp_path):
+    path = tmp_path / "out.nc"
+    folder = stopped(path)
+    (folder / "notes.txt").write_text("do not forget")
+    ensemble.run(sample(), path, resume=True)
+    assert names(folder) == ["notes.txt"]
+
+
+@pytest.mark.parametrize("trouble", [None, errno.ENOSYS, errno.ENOLCK])
+def test_two_runs_do_not_share_an_output_even_on_a_file_system_without_locks(tmp_path, monkeypatch, trouble):
+    def none(*arguments):
+        raise OSError(trouble, os.strerror(trouble))
+
+    path = tmp_path / "out.nc"
+    with monkeypatch.context() as patched:
+        if trouble:
+            patched.setattr("fcntl.flock", none)
+        busy = "another run is writing" if trouble is None else "if that process was killed .*, delete .*shard-1-of-1"
+        with pytest.raises(OutputBusy, match=busy):
+            ensemble.run(sample(), path, progress=lambda done: ensemble.run(sample(), path, resume=True))
+        ensemble.run(sample(), path, resume=True)
+    assert same(path)
+
+
+def test_a_waiter_that_finds_the_folder_gone_begins_anew(tmp_path):
+    path, other = tmp_path / "out.nc", []
+    folder = Unfinished(path, {"scenario": {}}, [], lambda path: {})
+    waiter = threading.Thread(target=lambda: other.append(folder.publish([], 1, Path.touch)))
+    folder.begin((1, 1), False, False, [])
+
+    def write(dataset):
+        waiter.start()  # waits for the lock of the output, which this run holds
+        dataset.touch()
+
+    assert folder.publish([], 1, write)
+    waiter.join()
+    assert other == [None]
+    assert names(tmp_path) == ["out.nc"]
+
+
+shared = functools.partial(scenes.sample, members=7, sweep=LOADS_AND_SHARES)
+
+
+@pytest.mark.parametrize("of", [1, 2, 3, 5, 20])
+def test_every_task_is_in_one_shard(of):
+    plan = Plan.of(shared())
+    shares = [[task.names[0] for task in plan.share(number, of)] for number in range(1, of + 1)]
+    assert sorted(itertools.chain(*shares)) == sorted(task.names[0] for task in plan.tasks())
+    assert sum(plans.work(plan, number, of) for number in range(1, of + 1)) == plans.work(plan) == 7 * 10 * 4
+
+
+def test_the_last_shard_that_is_done_publishes_the_numbers_of_an_undivided_run(tmp_path):
+    path, done = tmp_path / "out.nc", []
+    for number in (3, 1, 2):
+        assert not path.exists()
+        done.append([])
+        ensemble.run(shared(), path, shard=(number, 3), progress=done[-1].append)
+    assert [sum(each) for each in done] == [plans.work(Plan.of(shared()), number, 3) for number in (3, 1, 2)]
+    assert same(path, shared())
+    for how in ({"shard": (2, 3)}, {}):  # all is done
+        assert ensemble.run(shared(), path, resume=True, **how) == path
+
+
+def test_a_run_without_shard_computes_what_no_shard_holds_and_names_the_others(tmp_path):
+    path, codes = tmp_path / "out.nc", []
+    stopped(path, shared(), after=1, shard=(1, 3))
+
+    def others(done):
+        if not codes:
+            with pytest.raises(OutputBusy, match="the shards 2/3 of"):
+                ensemble.run(shared(), path, resume=True)
+            with pytest.raises(OutputBusy, match="another run"):
+                ensemble.run(shared(), path, shard=(2, 3), resume=True)
+            for how in ({"shard": (2, 3)}, {"shard": (1, 2), "replace": True}, {}):
+                with pytest.raises((OutputBusy, OutputExists)):
+                    ensemble.run(shared(), path, **how)
+            codes.append(75)
+
+    ensemble.run(shared(), path, shard=(2, 3), progress=others)
+    assert codes
+    assert same(path, shared())
+
+
+def test_a_shard_that_was_stopped_goes_on(tmp_path):
+    path = tmp_path / "out.nc"
+    folder = stopped(path, shared(), shard=(1, 2))
+    ensemble.run(shared(), path, shard=(2, 2))
+    with pytest.raises(OutputExists, match="--resume"):
+        ensemble.run(shared(), path, shard=(1, 2))
+    with pytest.raises(OutputExists, match="--resume"):
+        ensemble.run(shared(seed=6), path, shard=(2, 2))
+    with pytest.raises(BadInput, match="shards was 2, is 3"):
+        ensemble.run(shared(), path, shard=(1, 3), resume=True)
+    first = min(folder.glob("*.npz"))
+    first.write_bytes(first.read_bytes()[:-1])
+    ensemble.run(shared(), path, shard=(1, 2), resume=True)
+    assert same(path, shared())
+
+
+def test_a_shard_that_replaces_begins_only_its_own_blocks_anew(tmp_path):
+    path = ensemble.run(shared(seed=6), tmp_path / "out.nc")
+    for number in (1, 2, 1, 3):
+        ensemble.run(shared(), path, shard=(number, 3), replace=True)
+    assert same(path, shared())
+
+
+@pytest.mark.parametrize("shard", ["0/3", "4/3", "3", "a/b", "1/3/4", "-1/3", "", f"1/{'9' * 5000}", "1/0"])
+def test_a_wrong_shard_is_told(tmp_path, monkeypatch, shard):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadInput, match="--shard"):
+        CliRunner().invoke(cli, ["run", "scene.toml", "--shard", shard], catch_exceptions=False)
