@@ -82,17 +82,6 @@ def test_cohorts_in_steady_sliding_obey_the_law():
         assert_allclose(found.frozen + found.varying, STRETCHED["site_density"] * square, rtol=10.0 * tolerance)
 
 
-def test_cohorts_that_start_empty_come_to_the_law():
-    for speed in [1e-3, -4e-3, 2e-2]:
-        part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=1e-4, start_from="empty")
-        life = catch_lives(speed, *RATES, STIFFNESS).mean
-        clock = Clock(duration=60.0 * life, step=60.0 * life / 200)
-        *_, state = march(scene(bonds=part, drive=drive.Steady(speed=speed), clock=clock), np.arange(1))
-        bound, force, _ = by_quadrature(speed)
-        assert_allclose(state.bonding.fraction * part.bound_at_rest, bound, rtol=2e-4)
-        assert_allclose(state.bonding.stress, STRETCHED["site_density"] * force, rtol=2e-4)
-
-
 def test_cohorts_do_not_depend_on_the_clock_step():
     part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=1e-5)
     turning = drive.Table(time=(0.0, 4e-3, 4e-3, 8e-3), speed=(8e-3, 8e-3, -6e-3, -6e-3))

@@ -100,14 +100,6 @@ def test_seven_linear_steps_are_one():
         assert_allclose(often, once, rtol=1e-12, atol=0)
 
 
-def test_a_linear_step_is_even_in_speed_but_for_the_sign_of_the_stretch():
-    rupture = RuptureRate(2.0, 0.0, 3e-9)
-    bound, moment = advance(0.3, 4e-10, 5e-9, 5e-9, 0.1, rupture, 5.0)
-    other, back = advance(0.3, -4e-10, -5e-9, 5e-9, 0.1, rupture, 5.0)
-    assert other == bound
-    assert back == -moment
-
-
 def test_no_more_than_all_sites_are_bound():
     for exponent in np.linspace(0.01, 40.0, 3000):
         assert advance(1.0, 0.0, 0.1, 0.1, 1.0, RuptureRate(0.0, 0.0, math.inf), exponent)[0] <= 1.0
@@ -168,18 +160,6 @@ def test_a_steady_state_is_a_fixed_point_of_any_step():
         # a stretch W known to one ulp leaves the rate e^W an error of W ulp
         stretch = np.max(lambertw(np.abs(eps)).real)
         assert_allclose(slide(state, eps, duration, BELL, beta), state, rtol=8.0 * ULP * (1.0 + stretch), atol=0)
-
-
-def test_the_largest_mean_field_friction():
-    for beta, largest, eps in [
-        (0.1, 0.035504713848791766, 2.9165274173418823),
-        (1.0, 0.2784645427610738, 4.591121476668623),
-        (10.0, 1.1568683966150044, 18.644025568733642),
-        (100.0, 2.635932990553525, 137.93723146922673),
-    ]:
-        around = steady(eps * np.array([0.999, 1.0, 1.001]), BELL, beta)[1]
-        assert_allclose(around[1], largest, rtol=1e-13, atol=0)
-        assert around[1] > max(around[0], around[2])
 
 
 def test_no_bonds_without_rebinding():
@@ -257,19 +237,6 @@ def test_the_start_without_rebinding_has_a_closed_form_peak():
         assert_allclose(moment, peak, rtol=TRANSIENT, atol=0)
         assert slide((np.ones(1), np.zeros(1)), eps, 0.99 * time, BELL, 0.0)[1] < moment
         assert slide((np.ones(1), np.zeros(1)), eps, 1.01 * time, BELL, 0.0)[1] < moment
-
-
-def test_all_bonds_go_where_none_come():
-    assert_array_equal(slide((np.ones(1), np.zeros(1)), 10.0, 1e3, BELL, 0.0), np.zeros((2, 1)))
-
-
-def test_rest_relaxes_the_stretch_to_nothing_and_the_share_to_that_of_rest():
-    state = slide(steady(1e6, BELL, 3.0), 0.0, 40.0, BELL, 3.0)
-    assert_allclose(state[0], 0.75, rtol=1e-10, atol=0)
-    # the late stretch of a bond fades by rebinding, at k_on (1 - N)/N = k0
-    later = slide(state, 0.0, 10.0, BELL, 3.0)
-    assert_allclose(later[1] / state[1], math.exp(-10.0), rtol=TRANSIENT, atol=0)
-    assert_array_equal(slide(state, 0.0, 1e9, BELL, 3.0)[1], [0.0])
 
 
 def hard_cases(count):

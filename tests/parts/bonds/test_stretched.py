@@ -1,6 +1,7 @@
 """Bonds with a stretch in whole scenes: static peaks, ageing, reversal, area, and the field that they make."""
 
 import math
+from itertools import product
 
 import numpy as np
 import pytest
@@ -112,23 +113,6 @@ def test_friction_turns_with_the_slider_and_back():
 # --- bonds and the clock
 
 
-def test_a_scene_of_tracked_bonds_is_the_same_for_any_clock_step():
-    stepped = drive.Table(time=(0.0, 0.004, 0.004, 0.008, 0.008, 0.012), speed=(2e-3, 2e-3, -1e-3, -1e-3, 8e-3, 8e-3))
-    tracked = bonds.Tracked(rupture=BELL, **STRETCHED, sites=50)
-    coarse, fine = (
-        {
-            name: marched(name, 20, bonds=tracked, drive=stepped, clock=Clock(duration=0.012, step=0.012 / steps))
-            for name in ("bond_fraction", "shear_stress", "contact_radius")
-        }
-        for steps in (12, 48)
-    )
-    assert np.array_equal(fine["bond_fraction"][::4], coarse["bond_fraction"])
-    assert len(np.unique(coarse["bond_fraction"])) > 20
-    largest = np.abs(coarse["shear_stress"]).max()
-    assert_allclose(fine["shear_stress"][::4], coarse["shear_stress"], rtol=1e-9, atol=1e-12 * largest)
-    assert np.array_equal(fine["contact_radius"][::4], coarse["contact_radius"])
-
-
 # --- bonds and the area
 
 DEAD = Constant(rate=1e-9)
@@ -196,22 +180,21 @@ def test_the_mean_energy_of_the_bonds_field_follows_their_force_squared():
     assert_allclose([state.shear.energy[0] for state in states], exact, rtol=1e-4)
 
 
-@pytest.mark.parametrize("kind", [shear.Modal, shear.Mapped])
-@pytest.mark.parametrize(
-    "motion", [drive.Steady(speed=PACE), drive.Start(rest=4e-3, speed=5 * PACE)], ids=["on", "start"]
-)
-def test_the_members_mean_energy_is_that_of_the_mean_on_their_own_cell(kind, motion):
-    members, part = 600, kind(**CELLED)
-    scenario, state = last(members, bonds=COHORT, shear=part, drive=motion)
-    errors = scenario.process.known_errors()
-    _, mean = last(bonds=COHORT, shear=shear.Mean(spectrum=FIELD), drive=motion)
-    cells = mean.shear.energy[0] * (1.0 + errors["cell_error_energy"])
-    spread = errors["member_spread_energy"] * cells
-    assert state.shear.energy.shape == (members,)
-    assert abs(state.shear.energy.mean() - cells) < 5.0 * spread / math.sqrt(members)
-    weights = scenario.process.weights
-    kurtosis = 6.0 * np.sum(weights**4) / np.sum(weights**2) ** 2  # of a sum of exponentials
-    assert abs(state.shear.energy.std() / spread - 1.0) < 5.0 * math.sqrt((2.0 + kurtosis) / (4.0 * members))
+def test_the_members_mean_energy_is_that_of_the_mean_on_their_own_cell():
+    for kind, motion in product(
+        [shear.Modal, shear.Mapped], [drive.Steady(speed=PACE), drive.Start(rest=4e-3, speed=5 * PACE)]
+    ):
+        members, part = 600, kind(**CELLED)
+        scenario, state = last(members, bonds=COHORT, shear=part, drive=motion)
+        errors = scenario.process.known_errors()
+        _, mean = last(bonds=COHORT, shear=shear.Mean(spectrum=FIELD), drive=motion)
+        cells = mean.shear.energy[0] * (1.0 + errors["cell_error_energy"])
+        spread = errors["member_spread_energy"] * cells
+        assert state.shear.energy.shape == (members,)
+        assert abs(state.shear.energy.mean() - cells) < 5.0 * spread / math.sqrt(members)
+        weights = scenario.process.weights
+        kurtosis = 6.0 * np.sum(weights**4) / np.sum(weights**2) ** 2  # of a sum of exponentials
+        assert abs(state.shear.energy.std() / spread - 1.0) < 5.0 * math.sqrt((2.0 + kurtosis) / (4.0 * members))
 
 
 def test_sites_of_the_slider_keep_a_pattern_and_forget_what_differs():

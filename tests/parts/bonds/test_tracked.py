@@ -111,16 +111,6 @@ def test_every_rupture_keeps_its_steady_law():
         assert np.mean(tracks.life > first) > 0.5  # of the sites, other bonds than those drawn at the start
 
 
-def test_bonds_that_only_a_stretch_breaks_give_the_steady_law_of_the_simpler_model():
-    law, speed, rebinding = RuptureRate(0.0, 0.0, 2.0), 3.0, 0.5
-    fraction = 1.0 / (1.0 + speed / (2.0 * rebinding))
-    tracks = begin(law, 10_000, 10, speed, rebinding=rebinding)
-    for _ in range(50):
-        tracks = go(tracks, 0.3, 0.1, law, rebinding)
-    has_the_law(tracks, [fraction, fraction, fraction * 4 / 3, fraction * 16 / 5])
-    assert 1.99 < np.nanmax(stretches(tracks)) <= 2.0  # up to the limit, all stretches are equally many
-
-
 def test_the_number_bound_is_binomial_and_the_force_has_the_sum_of_the_sites_variances():
     sites, members = 25, 20_000
     fraction, first, second, _ = moments(BELL, 3.0, 1.0)

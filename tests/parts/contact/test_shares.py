@@ -255,17 +255,6 @@ def test_a_sphere_that_its_bonds_let_go_under_a_changing_load_stays_their_loss()
     assert float(analysis.observables(dataset)["area_ratio"][-1]) == 0.0
 
 
-def test_a_swept_course_has_the_shares_of_its_points():
-    swept = scene(contact=Equilibrium(load={"from": 4e-3, "to": 1e-3}), sweep={"contact.load.to": [1e-3, 8e-3]})
-    together = analysis.shares(run(swept))
-    for k, point in enumerate(swept.points()):
-        alone = analysis.shares(run(point))
-        for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "radius_jkr"):
-            np.testing.assert_array_equal(together[name][k], alone[name])
-    whole = scene(sweep={"contact.load": [{"from": 4e-3, "to": 1e-3}, {"from": 4e-3, "to": 8e-3}]})
-    np.testing.assert_allclose(analysis.shares(run(whole))["radius_jkr"], together["radius_jkr"], rtol=1e-12)
-
-
 def test_shares_end_where_a_trajectory_stops():
     part = Equilibrium(indentation={"from": 1e-6, "to": -0.7e-6}, after_pull_off="stop")
     dataset = run(scene(contact=part, drive=drive.Steady(speed=3e-3)))
@@ -287,12 +276,3 @@ def test_the_load_of_an_open_contact_stands_in_the_table():
         rows = analysis.table(dataset, 3)
         (name,) = (name for name in rows[0] if name.startswith("P\n"))
         assert [float(row[name]) for row in rows] == [-100.0, -300.0, -500.0]
-
-
-def test_control_is_that_of_the_scene():
-    for control in ["load", "indentation", "displacement"]:
-        held = {control: {"from": 1e-6, "to": 3e-6}} | ({"stiffness": 2e3} if control == "displacement" else {})
-        dataset = run(scene(contact=Equilibrium(**held), clock=Clock(duration=0.4, step=0.02)))
-        found = analysis.control(dataset)
-        assert found.kind == control and math.isinf(found.stiffness) == (control != "displacement")
-        assert not analysis.is_stationary(dataset)

@@ -331,21 +331,6 @@ def test_far_from_the_origin_a_band_holds_the_energy_of_the_infinite_plane(waves
     assert_allclose(pairs.count.sum(), 0.5 * np.pi * (waves[1] ** 2 - waves[0] ** 2), rtol=5e-3, atol=0)
 
 
-def test_a_counted_cell_is_grouped_like_the_listed_one():
-    spectrum = SelfAffine(RMS, 0.3, 50e-6, 20e-6, finest(704))
-    found = modes(spectrum, CELL, 704)
-    weights, wavenumbers = found.energies(G), np.hypot(found.qx, found.qy)
-    bands = group(cell_pairs(spectrum, CELL, 704, G, 0.5), 2, 0.01)
-    lacks, squares, own_rates = relative_errors(weights, (wavenumbers / 1e5) ** 2, bands, 2)
-    assert max(lacks.values()) <= 0.01 * (1 + 1e-4)
-    for kind, lack in lacks.items():
-        assert_allclose(bands.errors[kind], lack, rtol=0, atol=1e-6)
-    lags = np.geomspace(1e-4, 1e3, 60)
-    lack = lack_of_autocorrelation(weights, (wavenumbers / 1e5) ** 2, squares, own_rates, lags)
-    assert lack.min() > -1e-8
-    assert lack.max() <= bands.errors["banded_error_autocorrelation"] * (1 + 1e-4)
-
-
 def test_a_cell_without_modes_says_what_to_do():
     for spectrum, points, cure in (
         (Band(RMS, 300e-6, 250e-6), None, "make the cell longer"),

@@ -7,11 +7,9 @@ from itertools import product
 import mpmath
 import numpy as np
 import pytest
-from helpers.fields import field_of
 from numpy.testing import assert_allclose
 from scipy import integrate, special
 
-from sim.numerics.grid import Grid
 from sim.parts.shear.modes import Modes, modes
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, Tabulated, VonKarman
 
@@ -286,57 +284,6 @@ def test_a_cell_without_modes_is_refused():
         modes(Gaussian(1.0, 0.1), 1.0, 2)
     with pytest.raises(ValueError, match="positive length"):
         modes(AFFINE, 0.0)
-
-
-def realisations(found: Modes, grid: Grid, count: int, seed: int):
-    """Gaussian fields of the modes: amplitudes of variance/2 on +q, their conjugates on -q."""
-    generator = np.random.Generator(np.random.Philox(key=np.array([seed, 2], dtype=np.uint64)))
-    normals = generator.standard_normal((count, len(found.variance), 2))
-    amplitude = np.sqrt(found.variance) / 2 * (normals[..., 0] + 1j * normals[..., 1])
-    half = np.zeros((count, grid.points, grid.points // 2 + 1), complex)
-    half[:, found.ix % grid.points, found.iy] = amplitude
-    first = found.iy == 0  # its column holds q and -q
-    half[:, -found.ix[first] % grid.points, 0] = amplitude[:, first].conj()
-    return field_of(grid, half * grid.cell**2)
-
-
-def test_realisations_have_the_density_asked_for_in_every_ring_and_sector():
-    for points, name in product([21, 24], ["self_affine", "h0", "turned"]):
-        spectrum, count = (CUT_OFF | SMOOTH)[name], 200
-        grid = Grid(1.0, points)
-        found = modes(spectrum, grid.cell, points)
-        density = np.abs(grid.forward(realisations(found, grid, count, seed=5))) ** 2 / grid.cell**2
-        place = (slice(None), found.ix % points, found.iy)
-        relative = np.mean(density[place] / (found.variance * grid.cell**2 / 2), axis=0)
-        radius = np.hypot(found.ix, found.iy).astype(int)
-        sector = (np.arctan2(found.iy, found.ix) / math.pi * 8).astype(int)
-        for bins in (radius, sector):
-            for one in np.unique(bins):
-                inside = relative[bins == one]  # each the mean of ``count`` exponential variables of mean one
-                assert abs(np.mean(inside) - 1) < 5 / math.sqrt(count * len(inside))
-        power = np.sum(density[0] * grid.multiplicity)
-        density[place] = 0.0
-        density[:, -found.ix[found.iy == 0] % points, 0] = 0.0
-        assert np.max(density) < 1e-28 * power  # nothing anywhere else
-
-
-def test_mean_square_and_energy_of_realisations_scatter_as_foretold():
-    for points in [21, 24]:
-        count = 2000
-        grid = Grid(1.0, points)
-        found = modes(AFFINE, grid.cell, points)
-        fields = realisations(found, grid, count, seed=6)
-        weights = found.energies(1.0)
-        power = np.abs(grid.forward(fields)[:, found.ix % points, found.iy]) ** 2 / grid.cell**4
-        for sample, share, spread in [
-            (np.mean(fields**2, axis=(1, 2)), found.variance, found.variance_spread),
-            (2 * power @ (weights / found.variance), weights, found.energy_spread()),
-        ]:
-            total = np.sum(share)
-            assert abs(np.mean(sample) / total - 1) < 5 * spread / math.sqrt(count)
-            excess = 6 * np.sum(share**4) / np.sum(share**2) ** 2  # Σ share · Exp(1)
-            error = math.sqrt((excess + 2) / count)
-            assert abs(np.var(sample) / (spread * total) ** 2 - 1) < 5 * error
 
 
 def test_the_spread_is_that_of_the_number_of_equal_pairs():

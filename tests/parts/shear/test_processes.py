@@ -1,6 +1,5 @@
 """Fluctuations: stationarity, correlation, amplitude, and the energy of their own map."""
 
-import itertools
 from itertools import product
 
 import numpy as np
@@ -175,26 +174,6 @@ def test_relaxing_amplitude_follows_the_exact_second_moment():
         expected.append(1.0 + (expected[-1] - 1.0) * np.exp(-2.0 * step / 1e-3))
     error = np.sqrt(np.sum(pairs**2) / members)
     assert np.all(np.abs(found.mean(axis=1) - np.array(expected) * pairs.sum()) < 5.0 * error)
-
-
-def test_relaxing_amplitude_is_second_order_in_the_step():
-    onset = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
-    ramp = drive.Ramp(start=5e-4, stop=6e-3)
-    duration, time = 4e-3, 1e-3
-
-    def mean_energy(steps):
-        """The mean of the process, from the same two coefficients that the step uses."""
-        times = np.linspace(0.0, duration, steps + 1)
-        amplitude = [onset.factor(ramp.motion(1, t, t, duration).speed, 0.0)[0] for t in times]
-        energy = amplitude[0] ** 2
-        for before, after in itertools.pairwise(amplitude):
-            share = -np.expm1(-2.0 * duration / steps / time)
-            energy += share * (0.5 * (before**2 + after**2) - energy)
-        return energy
-
-    ends = np.array([mean_energy(steps) for steps in (16, 32, 64, 128)])
-    changes = np.diff(ends)
-    assert_allclose(np.log2(changes[:-1] / changes[1:]), 2.0, atol=0.1)
 
 
 def test_stress_amplitude_follows_the_bonds():
