@@ -7,14 +7,12 @@ import numpy as np
 
 import sim
 from benchmarks import bonds_plain
-from benchmarks.compare import COUNTED, LOAD, STEADY
-from benchmarks.scenes import loaded, scene, steady
+from benchmarks.scenes import COUNTED, lens, steady
 from benchmarks.timing import Bench, Beside, Row
 from sim.laws.schallamach import bell_stress, transition_probabilities
 from sim.numerics.noise import Noise
 from sim.parts.bonds import models as bonds
 from sim.parts.bonds.rupture import Bell
-from sim.parts.drive import Steady
 from sim.parts.exchange import Bonding
 
 #: Two-state bonds: V = Vc, and half a bond's life at rest a step.
@@ -27,7 +25,7 @@ BELL_SPEED = 10.0
 def population(part: Any, members: int, steps: int, speed: float, step: float) -> Callable[[], Bonding]:
     """A program that advances bonds from their start by a block of steps of steady sliding, for a batch of members."""
     noise = Noise(1, "bonds", np.arange(members))
-    first, motions = steady(speed, step, steps, Steady)
+    first, motions = steady(speed, step, steps)
     return lambda: part.advance(part.start(first, noise), motions, np.ones(1), noise)[1]
 
 
@@ -56,11 +54,11 @@ def counted(bench: Bench) -> list[Row]:
         share=steps * members,
     )
     many, long = bench.of((1000, 1000), (3, 10))
-    text = scene(many, long, long // 10, STEADY.replace("10 um/s", "10 mm/s"), COUNTED, LOAD)
-    one = loaded(text.replace("10_000", str(sites)))
+    drive, counting = {"model": "steady", "speed": "10 mm/s"}, COUNTED | {"sites": sites}
+    scene = sim.load(lens(many, long, long // 10, drive=drive, bonds=counting))
     rows += bench.compare(
         "counted, 10⁴ bonds: `sim.run` in memory, 1000 members × 1000 steps, 11 records",
-        lambda: sim.run(one),
+        lambda: sim.run(scene),
         gillespie(many, 300),
         share=many * long,
         turns=7,

@@ -10,17 +10,6 @@ from scipy.integrate import solve_ivp
 class TrackedNumpy:
     """Bonds under Bell's rupture in fixed steps: in each, a bond breaks and a free site binds by chance.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Independent sites that follow one slider.
-    rate, softness, rebinding_rate : float
-        k0 [1/s], κ/f_b [1/m], k_on [1/s].
-    random : numpy.random.Generator
-        Where the chances come from.
-
-    Notes
-    -----
     First order in the step. A free site keeps the stretch 0; a bond breaks when an exponential number
     is below its rupture times the step, which needs one exponential function less than its chance.
     """
@@ -57,24 +46,6 @@ def mean_stretch_in_steps(slip, duration, rate, softness, rebinding_rate):
 def renewal(sites, outputs, step, speed, rate, softness, rebinding_rate, seed):
     """Bonds under Bell's rupture in steady sliding, one after the other and life by life: exact, compiled.
 
-    Parameters
-    ----------
-    sites, outputs : int
-        Independent sites, free at the start; number of output times.
-    step, speed : float
-        Time between outputs [s], V [m/s].
-    rate, softness, rebinding_rate : float
-        k0 [1/s], κ/f_b [1/m], k_on [1/s].
-    seed : int
-        Of numba's own generator.
-
-    Returns
-    -------
-    array, shape (3, outputs)
-        Number of bound sites, sum of their stretches [m] and of their squares [m²], at each output.
-
-    Notes
-    -----
     A life ends where its integrated rupture k0 (e^(gt) − 1)/g, g = softness × speed, reaches an exponential number.
     """
     np.random.seed(seed)  # noqa: NPY002  the generator of compiled code
@@ -95,24 +66,6 @@ def renewal(sites, outputs, step, speed, rate, softness, rebinding_rate, seed):
 def counted_gillespie_numpy(bound, sites, speed_ratio, rebinding_rate, duration, random):
     """Numbers of bound sites after a time, by Gillespie's algorithm on all members at once.
 
-    Parameters
-    ----------
-    bound : array of int, shape (members,)
-        Bound sites at the start.
-    sites : int
-        Sites of each member.
-    speed_ratio, rebinding_rate, duration : float
-        V/Vc [1], h [1/s], time [s].
-    random : numpy.random.Generator
-        Where waiting times and choices come from.
-
-    Returns
-    -------
-    array of int, shape (members,)
-        Bound sites at the end.
-
-    Notes
-    -----
     A free site binds with the rate h, a bound one breaks with h V/Vc. Each turn lets one event happen in
     every member that is not done yet.
     """

@@ -6,8 +6,7 @@ import mpmath
 import numpy as np
 
 from benchmarks import contact_plain as plain
-from benchmarks.compare import LOAD, RAMP, RATE
-from benchmarks.scenes import field, followed, scene
+from benchmarks.scenes import RAMP, RATE, field, followed, lens
 from benchmarks.timing import Bench, Beside, Row, absolute, spent
 from sim.laws import jkr
 
@@ -48,8 +47,8 @@ def radii(bench: Bench) -> list[Row]:
 def disc(bench: Bench) -> list[Row]:
     """A step of a contact that pays for waves by its finite size."""
     members, steps = bench.of((64, 1000), (2, 4))
-    text = scene(members, steps, 1, RAMP, RATE, field("banded", bench.of(512, 64), 'contact = "disc"'), LOAD)
-    program = followed(text)
+    shear = field("banded", bench.of(512, 64), contact="disc")
+    program = followed(lens(members, steps, drive=RAMP, bonds=RATE, shear=shear))
     program()
     times = [1e6 * spent(program) / (members * steps) for _ in range(bench.of(5, 1))]
     return [absolute("a contact of finite size (`disc`), 64 members: a member-step of a run", times, "µs", 5.0)]

@@ -10,13 +10,11 @@ from scipy import fft
 
 import sim
 from benchmarks import plain
-from benchmarks.compare import LOAD, RAMP, RATE
-from benchmarks.scenes import field, followed, loaded, scene, shortest, steady
+from benchmarks.scenes import RAMP, RATE, field, followed, lens, steady
 from benchmarks.timing import Bench, Beside, Row
 from sim.engine import MemberNoise, follow, start
 from sim.laws.halfspace import surface_energy
 from sim.numerics.noise import Noise
-from sim.parts.drive import Steady
 from sim.parts.exchange import Bonding
 from sim.spectrum.families import SelfAffine
 
@@ -26,7 +24,7 @@ TEXTBOOK, HALF = "numpy, noise by rfft2", "numpy, only pairs with power drawn"
 
 def known(points: int) -> tuple[int, float, Callable]:
     """What the programs of numpy need: the grid, its cell, and the spectrum's density."""
-    spectrum = SelfAffine(rms=100e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=shortest(points))
+    spectrum = SelfAffine(rms=100e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=512e-6 / points)
     return points, CELL, spectrum.radial_density
 
 
@@ -44,19 +42,18 @@ def banded(bench: Bench) -> list[Row]:
     points, rows = bench.of(512, 64), []
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "x.nc"
-        parts = RAMP, RATE, field("banded", points, "tolerance = 0.01"), LOAD
+        parts = {"drive": RAMP, "bonds": RATE, "shear": field("banded", points, tolerance=0.01)}
         for name, members, steps, every, more, goal in (
-            ("1024 members × 10⁴ steps, 1001 records", 1024, 10_000, 10, "", 8000),
-            ("1024 members × 2000 steps, all recorded, uncompressed", 1024, 2000, 1, 'compression = "none"', 2500),
-            ("one member × 10⁵ steps, 1001 records", 1, 100_000, 100, "", 230),
+            ("1024 members × 10⁴ steps, 1001 records", 1024, 10_000, 10, {}, 8000),
+            ("1024 members × 2000 steps, all recorded, uncompressed", 1024, 2000, 1, {"compression": "none"}, 2500),
+            ("one member × 10⁵ steps, 1001 records", 1, 100_000, 100, {}, 230),
         ):
             members, steps = bench.of((members, steps), (2, 2 * every))
-            text = scene(members, steps, every, *parts, f"[record]\n{more}\n")
-            one = loaded(text)
-            third = abs(one.process.known_errors()["banded_error_third_cumulant"])
+            scene = sim.load(lens(members, steps, every, record=more, **parts))
+            third = abs(scene.process.known_errors()["banded_error_third_cumulant"])
             rows += bench.compare(
                 f"banded at 1 %, 512²: run to netCDF, {name}",
-                lambda one=one: sim.run(one, to=file, replace=True),
+                lambda scene=scene: sim.run(scene, to=file, replace=True),
                 *by_numpy(points, goal, f"third cumulant of ΔΓ {third:.1%}; none")[: 2 if every == 10 else 1],
                 share=members * steps,
                 turns=7,
@@ -67,9 +64,10 @@ def banded(bench: Bench) -> list[Row]:
 def bands(bench: Bench) -> list[Row]:
     """The bands alone, beside the random numbers that they need."""
     members, steps = bench.of((64, 1000), (2, 5))
-    parts = RAMP, RATE, field("banded", bench.of(512, 64), "tolerance = 0.01"), LOAD
-    process, noise = loaded(scene(members, steps, 1, *parts)).process, Noise(1, "shear", np.arange(members))
-    first, motions = steady(EXPONENT * 5e-6 / 1e-3, 1e-3, steps, Steady)
+    shear = field("banded", bench.of(512, 64), tolerance=0.01)
+    process = sim.load(lens(members, steps, drive=RAMP, bonds=RATE, shear=shear)).process
+    noise = Noise(1, "shear", np.arange(members))
+    first, motions = steady(EXPONENT * 5e-6 / 1e-3, 1e-3, steps)
     still = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
     began = process.start(first, still, noise)
     shapes = np.tile(process.shapes, (steps * members, 1))
@@ -92,7 +90,7 @@ def modal(bench: Bench) -> list[Row]:
     rows, steps = [], bench.of(50, 2)
     for points in (256, 512):
         size = bench.of(points, 32)
-        program = followed(scene(1, steps, 1, RAMP, RATE, field("modal", size), LOAD))
+        program = followed(lens(1, steps, drive=RAMP, bonds=RATE, shear=field("modal", size)))
         rows += bench.compare(f"modal, {points}²: a step of a run", program, *by_numpy(size, 6), share=steps)
     return rows
 
@@ -102,7 +100,7 @@ def mapped(bench: Bench) -> list[Row]:
     rows = []
     for points, goal in ((512, 2.0), (1024, 1.5)):
         size = bench.of(points, 32)
-        one = loaded(scene(1, 1000, 1, RAMP, RATE, field("mapped", size), LOAD))
+        one = sim.load(lens(1, 1000, drive=RAMP, bonds=RATE, shear=field("mapped", size)))
         noise = MemberNoise.of(1, np.arange(1))
         states = [start(one, noise)]
 

@@ -1,13 +1,12 @@
-"""The page of the benchmarks, ``docs/speed.md``, and its figure, from the rows that are stored."""
+"""The page of the benchmarks, ``docs/speed.md``, from the rows that are stored."""
 
-from pathlib import Path
 from typing import Any
 
 from benchmarks.timing import Row
 
 TITLE = """# Speed
 
-`make bench` measures every row below and writes this page and its figure; `make bench ROWS="modal contact"` measures
+`make bench` measures every row below and writes this page; `make bench ROWS="modal contact"` measures
 only some groups of rows. The programs are in [benchmarks/](../benchmarks): ours beside the best simple one that a
 user of numpy and scipy would write for the same work, or beside a step that no program can do without.
 
@@ -27,16 +26,7 @@ user of numpy and scipy would write for the same work, or beside a step that no 
   new pages decides between them. `sim` as a command runs as it does for a user.
 
 """
-GROWTH = """
-## Growth
-
-![CPU time over members, steps, records, points of a sweep and points of a grid](speed.png)
-
-*CPU time of loading a scene (hollow) and of running it into a file (filled); the grey line is linear growth. The rows
-above give the exponent over the last decade, in brackets the smallest and the largest between neighbouring points:
-for grids that of the run alone, as the modes of a cell are found once, at its start; else that of both together.
-Where nothing else is named the scene is banded; its first loading groups the bands, which are kept.*
-
+END = """
 `sim converge SCENARIO.toml` shows what the models cost and err on a scene of your own.
 """
 HEADINGS = ("work", "beside", "goal", "result", "met", "CPU time, ours; theirs", "errors, ours; theirs")
@@ -48,7 +38,7 @@ def text(results: dict[str, Any]) -> str:
     lines = [TITLE, "Measured: ", "; ".join(machines), ".\n\n"]
     lines += [f"| {' | '.join(cells)} |\n" for cells in (HEADINGS, ["---"] * len(HEADINGS))]
     lines += [f"| {' | '.join(cells(row))} |\n" for row in rows_of(results)]
-    return "".join([*lines, GROWTH])
+    return "".join([*lines, END])
 
 
 def rows_of(results: dict[str, Any]) -> list[Row]:
@@ -65,7 +55,7 @@ def cells(row: Row) -> tuple[str, ...]:
 
 def unit(row: Row) -> str:
     """The unit of a goal."""
-    return {"faster": "times faster", "as long": "times as long", "exponent": ""}.get(row.kind, row.kind)
+    return {"faster": "times faster", "as long": "times as long"}.get(row.kind, row.kind)
 
 
 def result(row: Row) -> str:
@@ -74,7 +64,7 @@ def result(row: Row) -> str:
     if row.kind == "faster" and middle < 1.0:
         low, middle, high, said = 1.0 / high, 1.0 / middle, 1.0 / low, "times slower"
     else:
-        said = {"faster": "times faster", "as long": "times as long", "exponent": ""}.get(row.kind, row.kind)
+        said = {"faster": "times faster", "as long": "times as long"}.get(row.kind, row.kind)
     spread = "" if low == middle == high else f"({number(low)} to {number(high)})"
     return " ".join(filter(None, (number(middle), said, spread)))
 
@@ -90,35 +80,3 @@ def seconds(value: float) -> str:
         if value >= scale:
             return f"{number(value / scale)} {name}"
     return f"{value:.1e} s"
-
-
-def draw(results: dict[str, Any], path: Path) -> None:
-    """The figure of growth."""
-    import matplotlib as mpl
-    from matplotlib.ticker import LogLocator
-
-    from sim.plots.style import GUIDE, LINES, STYLE, WIDE, Picture
-
-    grown = [row for row in rows_of(results) if row.curves]
-    if not grown:
-        return
-    with mpl.rc_context(STYLE):
-        figure = Picture(figsize=(WIDE, 4.2), layout="constrained")
-        panels = figure.subplots(2, 4, sharey=True)
-        for panel, row in zip(panels.flat, grown, strict=False):
-            sizes, load, run = (row.curves[name] for name in ("sizes", "load", "run"))
-            panel.loglog(sizes, run, "o-", color=LINES[0], markersize=3.5, label="run into a file")
-            panel.loglog(sizes, load, "o:", color=LINES[1], markersize=3.5, mfc="white", label="loading the scene")
-            linear = [run[-1] * size / sizes[-1] for size in sizes]
-            panel.loglog(sizes, linear, **GUIDE, label="linear growth")
-            over, _, scene = row.ours.removeprefix("growth over ").partition(": ")
-            panel.set_title(scene.replace("10⁴", "$10^4$"))
-            panel.set_xlabel(over)
-            panel.xaxis.set_major_locator(LogLocator(numticks=4))
-            panel.set_ylim(5e-4, 500.0)
-        for first in panels[:, 0]:
-            first.set_ylabel("CPU time (s)")
-        for panel in panels.flat[len(grown) :]:
-            panel.axis("off")
-            panel.legend(*panels.flat[0].get_legend_handles_labels(), loc="center", fontsize=8.0)
-        figure.savefig(path, dpi=200)

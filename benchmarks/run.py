@@ -1,7 +1,7 @@
-"""Speed beside plain numpy and scipy, goals and growth: ``make bench``.
+"""Speed beside plain numpy and scipy, and goals: ``make bench``.
 
 ``python -m benchmarks.run [GROUP ...]`` measures all groups of rows or some, keeps them in ``benchmarks/results.json``
-beside those of the other groups, and writes ``docs/speed.md`` and its figure of all that is kept. With ``--write``
+beside those of the other groups, and writes ``docs/speed.md`` of all that is kept. With ``--write``
 it measures nothing.
 """
 
@@ -17,11 +17,11 @@ import numba
 import numpy as np
 import scipy
 
-from benchmarks import bonds, contact, fields, growth, page, spring, whole
+from benchmarks import bonds, contact, fields, page, spring, whole
 from benchmarks.timing import Bench, Row
 
 ROOT = Path(__file__).parent.parent
-RESULTS, PAGE, FIGURE = ROOT / "benchmarks" / "results.json", ROOT / "docs" / "speed.md", ROOT / "docs" / "speed.png"
+RESULTS, PAGE = ROOT / "benchmarks" / "results.json", ROOT / "docs" / "speed.md"
 #: One core for each program, and memory that is freed stays with the process.
 ENVIRONMENT = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMEXPR")}
 ENVIRONMENT |= {"MALLOC_TRIM_THRESHOLD_": "1000000000", "MALLOC_MMAP_THRESHOLD_": "1000000000"}
@@ -29,8 +29,8 @@ GROUPS: dict[str, Callable[[Bench], list[Row]]] = {
     group.__name__: group
     for group in (
         fields.banded, whole.large, fields.modal, fields.mapped, fields.energy, bonds.counted, bonds.tracked,
-        bonds.cohorts, spring.spring, contact.radii, contact.disc, whole.memory, whole.commands, whole.first,
-        whole.gallery, whole.files, whole.statistics, whole.workers, whole.parts, whole.estimates, growth.growth,
+        bonds.cohorts, spring.spring, contact.radii, contact.disc, whole.commands, whole.first, whole.gallery,
+        whole.statistics,
     )
 }  # fmt: skip
 
@@ -51,14 +51,13 @@ def main() -> None:
         kept = {group: kept[group] for group in GROUPS if group in kept}
         RESULTS.write_text(json.dumps(kept, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(page.text(kept), encoding="utf-8")
-    page.draw(kept, FIGURE)
 
 
 def machine() -> str:
     """Processor and versions."""
     cpu = platform.processor() or platform.machine()
     if Path("/proc/cpuinfo").exists():
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         cpu = next((line.partition(":")[2].strip() for line in lines if line.startswith("model name")), cpu)
     versions = f"Python {platform.python_version()}, numpy {np.__version__}, scipy {scipy.__version__}"
     return f"{cpu}, {os.cpu_count()} cores; {versions}, numba {numba.__version__}"

@@ -7,13 +7,13 @@ import os
 import resource
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks import compare
 from sim.cli import cli
 
 #: CPU seconds that one measurement takes at least.
@@ -46,7 +46,6 @@ class Row:
     result: list[float]
     seconds: list[float]
     errors: str = ""
-    curves: dict[str, list[float]] | None = None
 
     @property
     def met(self) -> bool | None:
@@ -58,10 +57,7 @@ class Row:
     @property
     def stored(self) -> dict[str, Any]:
         """The row for a file, its numbers to four digits."""
-        numbers = {"result": _short(self.result), "seconds": _short(self.seconds)}
-        if self.curves:
-            numbers["curves"] = {name: _short(values) for name, values in self.curves.items()}
-        return asdict(self) | numbers
+        return asdict(self) | {"result": _short(self.result), "seconds": _short(self.seconds)}
 
 
 def _short(numbers: list[float]) -> list[float]:
@@ -91,10 +87,10 @@ def told(program: Callable[[], float], times: int = 1) -> float:
 
 def spent(program: Callable[[], object], times: int = 1) -> float:
     """CPU seconds of some calls of a program, with those of the processes that it starts and ends."""
-    began = compare.spent()
+    began = time.process_time() + sum(os.times()[2:4])
     for _ in range(times):
         program()
-    return compare.spent() - began
+    return time.process_time() + sum(os.times()[2:4]) - began
 
 
 @dataclass(frozen=True)
@@ -140,9 +136,9 @@ class Bench:
             seconds = spent(lambda: cli(list(arguments), standalone_mode=False))
         return seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
 
-    def imports(self, names: str) -> float:
-        """CPU time [s] of a process that only imports some modules."""
-        return spent(lambda: exec(f"import {names}")) if self.quick else child("-c", f"import {names}")[0]
+    def python(self, program: str) -> float:
+        """CPU time [s] of a process that runs a program of Python."""
+        return spent(lambda: exec(program)) if self.quick else child("-c", program)[0]
 
 
 def absolute(ours: str, values: list[float], unit: str, goal: float | None, beside: str = "–") -> Row:

@@ -186,11 +186,11 @@ def test_a_distribution_is_over_members_and_the_second_half():
 
 
 @pytest.mark.verify
-def test_a_dataset_of_4_gb_is_summarised_within_1_gb(tmp_path):
+def test_a_dataset_of_4_gb_is_summarised_within_1_and_a_half_gb(tmp_path):
     clock, speed = Clock(duration=0.467, step=1e-3), drive.Steady(speed=3e-3)
-    short = run(scene(clock=clock, drive=speed, ensemble=Ensemble(members=1024)), to=tmp_path / "short.nc")
+    short = run(scene(clock=clock, drive=speed, ensemble=Ensemble(members=1024)))
     tiled(short, tmp_path / "long.nc", 92)
     with sim.open(tmp_path / "long.nc") as dataset:
         assert dataset.nbytes > 3.9e9
     _, megabytes = child("-m", "sim", "stats", str(tmp_path / "long.nc"))
-    assert megabytes < 1000.0
+    assert megabytes < 1500.0
