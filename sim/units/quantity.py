@@ -113,22 +113,17 @@ def same_unit(first: Any, last: Any) -> tuple[float, float, str | None] | None:
     >>> same_unit("10 um/s", "3 mm/s")
     (10.0, 3000.0, 'um/s')
     """
-    bare = isinstance(first, int | float) and isinstance(last, int | float)
-    if not bare and not (isinstance(first, str) and isinstance(last, str)):
+    numbers = [float(number) for number in (first, last) if isinstance(number, int | float) and math.isfinite(number)]
+    if len(numbers) == 2:
+        return numbers[0], numbers[1], None
+    parts = [part for text in (first, last) if isinstance(text, str) and (part := _split(text))]
+    if len(parts) < 2 or not all(math.isfinite(number) for number, _ in parts):
         return None
-    start, stop = ((float(first), ""), (float(last), "")) if bare else (_split(first), _split(last))
-    if start is None or stop is None or not math.isfinite(start[0]) or not math.isfinite(stop[0]):
-        return None
-    (low, unit), (high, other) = start, stop
-    if unit != other:
-        try:
-            scale = _scale(other, unit) if unit and other else None
-        except ValueError:
-            scale = None
-        if scale is None:
-            return None
-        high = _times(high, scale)
-    return low, high, None if bare else unit
+    (low, unit), (high, other) = parts
+    with contextlib.suppress(ValueError):
+        scale = 1.0 if unit == other else _scale(other, unit) if unit and other else None
+        return (low, _times(high, scale), unit) if scale else None
+    return None
 
 
 def _fault(message: str) -> PydanticCustomError:

@@ -213,13 +213,19 @@ def at_once(quantity: Quantity) -> WrapValidator:
 
 
 def plain_text(path: Path) -> str:
-    """Return the text of a plain file of at most 256 MiB; no pipe or device is waited for."""
-    if not path.is_file():
-        raise OSError(errno.ENOENT, "there is none, or it is no plain file")
-    if path.stat().st_size > _MOST_BYTES:
+    """Return the text of a plain file of at most 256 MiB."""
+    size = _plain(path).stat().st_size
+    if size > _MOST_BYTES:
         raise OSError(errno.EFBIG, f"it is larger than {_MOST_BYTES // 2**20} MiB")
     with path.open(encoding="utf-8-sig") as file:
-        return file.read(path.stat().st_size)
+        return file.read(size)
+
+
+def _plain(path: Path) -> Path:
+    """Return the path of a plain file, so that no pipe or device is waited for."""
+    if not path.is_file():
+        raise OSError(errno.ENOENT, "there is none, or it is no plain file")
+    return path
 
 
 @contextlib.contextmanager
@@ -239,7 +245,9 @@ def blamed(name: str) -> Iterator[None]:
     except UnicodeDecodeError:
         reason = "is not UTF-8 text; save it as plain CSV in UTF-8"
     except OSError as fault:
-        reason = f"cannot be read ({fault.strerror or fault}); give a path relative to the scenario"
+        reason = (
+            f"cannot be read ({fault.strerror or fault}); name a plain file, relative to the scenario that names it"
+        )
     except (ValueError, RuntimeError, EOFError, MemoryError) as fault:
         reason = str(fault)
     about = {"file": name[:200], "reason": reason.partition("\n")[0]}
@@ -262,10 +270,7 @@ def file_text(name: str, context: Any) -> str:
 
 def file_path(name: str, context: Any) -> Path:
     """Return the path of a plain file that a scenario names; arguments as of ``file_text``."""
-    path = context["files"].path(name) if context and "files" in context else Path(name)
-    if not path.is_file():
-        raise OSError(errno.ENOENT, "there is none, or it is no plain file")
-    return path
+    return _plain(context["files"].path(name) if context and "files" in context else Path(name))
 
 
 def file_columns(name: str, context: Any, wanted: dict[str, Quantity], header: str | None = None) -> dict[str, Array]:
@@ -599,13 +604,10 @@ def read_measured(path: Path, known: Mapping[str, Quantity], outcomes: Mapping[s
         With one line.
     """
     try:
-        return _measured_columns(plain_text(path), known, outcomes)
-    except UnicodeDecodeError:
-        raise BadInput([f"{path}: is not UTF-8 text; save it as plain CSV in UTF-8"]) from None
-    except OSError as fault:
-        raise BadInput([f"{path}: cannot be read ({fault.strerror}); name a CSV file"]) from None
-    except TableError as fault:
-        raise BadInput([f"{path}: {fault}"]) from None
+        with blamed(str(path)):
+            return _measured_columns(plain_text(path), known, outcomes)
+    except PydanticCustomError as fault:
+        raise BadInput([str(fault)]) from None
 
 
 def measured_points(columns: Mapping[str, Any], known: Mapping[str, Quantity]) -> dict[str, Points]:
@@ -633,7 +635,8 @@ def _measured_columns(text: str, known: Mapping[str, Quantity], outcomes: Mappin
         if name in known:
             wanted[name] = known[name]
         elif base in outcomes and base in units:
-            wanted[name] = Quantity("1" if _relative(unit, outcomes[base]) else outcomes[base].unit, name, above=0)
+            relative = unit == "%" and outcomes[base].unit != "1"
+            wanted[name] = Quantity("1" if relative else outcomes[base].unit, name, above=0)
         else:
             raise TableError(_unknown(name, known))
     bare = [name for name, quantity in wanted.items() if not units[name] and quantity.unit != "1"]
@@ -644,17 +647,12 @@ def _measured_columns(text: str, known: Mapping[str, Quantity], outcomes: Mappin
     points = {}
     for name in (name for name in arrays if name in known):
         values, errors = arrays[name], arrays.get(name + ERROR)
-        if errors is not None and _relative(units[name + ERROR], known[name]):
-            errors = errors * np.abs(values)
+        if errors is not None and wanted[name + ERROR].unit != known[name].unit:
+            errors = errors * np.abs(values)  # a share of the value
         if errors is not None and not np.all(errors > 0.0):
             raise TableError(f'column "{name}" has a value of 0, whose relative error says nothing; give it in units')
         points[name] = Points(values, errors)
     return points
-
-
-def _relative(unit: str, quantity: Quantity) -> bool:
-    """Return True if an error with this unit is a share of the value."""
-    return unit == "%" and quantity.unit != "1"
 
 
 def _unknown(name: str, known: Iterable[str]) -> str:
