@@ -201,7 +201,6 @@ def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]]
     """Statistics of a dataset over time and sweep, of each whole run, and what the numbers mean."""
     from sim import analysis
 
-    dataset = analysis.scene.plain(dataset)  # once, not in each of what follows
     rows, once = analysis.table(dataset, most), analysis.highlights(dataset, most)
     further = analysis.losses(dataset, most), analysis.spread(dataset)
     return [shown for shown in (rows, once, *further) if shown], analysis.notes(dataset, rows, once)
@@ -329,6 +328,8 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     from sim.analysis import scene
 
     with scene.open(path) as dataset:
+        if message := scene.lacking(dataset):
+            say(f"note: {path}: {message}", err=True)
         yield analysis.where(dataset, _values(chosen, "--where"))
 
 

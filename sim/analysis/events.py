@@ -13,7 +13,7 @@ from sim.analysis.scene import (
     control,
     in_pieces,
     may_stop,
-    of_dataset,
+    plain,
     setting,
     sweep_dims,
     where_recorded,
@@ -33,7 +33,6 @@ _NOTHING = 1e-12
 _PEAKS = (("peak_stress", "peak", "shear_stress", "Pa"), ("peak_friction", "peak_friction", "friction_force", "N"))
 
 
-@of_dataset
 def events(dataset: xr.Dataset) -> xr.Dataset:
     """Events of a run, once per member, or once for all where they agree.
 
@@ -60,6 +59,7 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
 
         Where only statistics were recorded, those of them that follow, as ``…_mean``.
     """
+    dataset = plain(dataset)
     dims, latest = (*sweep_dims(dataset), MEMBERS), with_trajectories(dataset, "detachment_time")
     if "detachment_time" in latest and bool(latest["detachment_time"].isel(t=-1).isnull().all()):
         latest = latest.isel(t=[-1])  # none was open before either
@@ -110,7 +110,6 @@ def _masks(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(found)
 
 
-@of_dataset
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
     """The friction peak after a start from rest, and the friction maximum of a ramp of the speed.
 
@@ -135,6 +134,7 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     the peak of their mean. Where only statistics were recorded it is the peak of the ensemble mean over the
     records, ``peak_stress_mean``, with the standard error at that time.
     """
+    dataset = plain(dataset)
     drive = word(dataset, "drive.model", "")
     ramp, start = drive == "ramp", drive == "start"
     if not bool((ramp | start).any()):

@@ -1,5 +1,6 @@
 """Times at which something first happens in a run, known although many a run ends before it does."""
 
+import warnings
 from typing import NamedTuple
 
 import numpy as np
@@ -8,7 +9,7 @@ from scipy import special
 
 from sim.analysis.observables import ordered
 from sim.analysis.scene import MEMBERS, is_stationary
-from sim.analysis.statistics import LEVEL, WIDE
+from sim.analysis.statistics import LEVEL
 
 
 class Lifetime(NamedTuple):
@@ -64,21 +65,18 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
 
 
 def _halves(watched: np.ndarray, happened: np.ndarray) -> list[float]:
-    """When a survival, and the ends of its interval, first are one half or less; nan where they never are.
+    """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan."""
+    from scipy import stats  # its import takes a second
 
-    As by ``scipy.stats.ecdf``, whose import takes a second.
-    """
-    when, of, each = np.unique(watched, return_inverse=True, return_counts=True)
-    events, at_risk = np.bincount(of, happened), watched.size - np.cumsum(each) + each
-    left = at_risk - events
-    survival = left / watched.size if np.all(happened) else np.cumprod(left / at_risk)
-    with np.errstate(divide="ignore", invalid="ignore"):  # there is no interval where the survival is 1 or 0
-        logarithm = np.log(survival)
-        width = WIDE * np.sqrt(1.0 / logarithm**2 * np.cumsum(events / (at_risk * left)))
-        ends = [np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)]
-    several = happened.sum() > 1
-    below = [np.flatnonzero(values <= 0.5) for values in (survival, *(ends if several else 2 * [np.empty(0)]))]
-    return [float(when[places[0]]) if places.size else np.nan for places in below]
+    survival = stats.ecdf(stats.CensoredData(uncensored=watched[happened], right=watched[~happened])).sf
+    curves = [survival]
+    if happened.sum() > 1:
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # no interval if it is 1 or 0
+            interval = survival.confidence_interval(LEVEL, method="log-log")
+        curves += [interval.low, interval.high]
+    below = [curve.quantiles[curve.probabilities <= 0.5] for curve in curves]
+    halves = [float(times[0]) if times.size else np.nan for times in below]
+    return halves + [np.nan] * (3 - len(halves))
 
 
 def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:

@@ -9,7 +9,7 @@ import pandas as pd
 import xarray as xr
 
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.scene import answered, is_stationary, of_dataset, speed_name, speed_of, steady_points, sweep_dims
+from sim.analysis.scene import answered, is_stationary, speed_name, speed_of, steady_points, sweep_dims
 from sim.analysis.stationary import distribution
 from sim.analysis.statistics import QUANTILES, averaging, shares, statistics
 from sim.analysis.tables import as_means, once
@@ -31,7 +31,6 @@ _ENDINGS |= {"effective_samples": ("effective_samples", 0), "correlation_time": 
 _ENDINGS |= {"correlation_time_error": ("correlation_time_sem", 0)}
 
 
-@of_dataset
 def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     """Write all statistics as one long table, as ``tidy`` gives them.
 
@@ -52,7 +51,6 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
             one.to_csv(file, header=names, index=False, na_rep="nan", lineterminator="\n")
 
 
-@of_dataset
 def tidy(dataset: xr.Dataset) -> pd.DataFrame:
     """All statistics, one row for each quantity, sweep value and time, in SI.
 
@@ -107,7 +105,6 @@ def _long(dataset: xr.Dataset, found: xr.Dataset, key: str, over: str) -> pd.Dat
     return rows.assign(**{column: pd.Categorical.from_codes(alike, [text]) for column, text in texts.items()})
 
 
-@of_dataset
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
     found = statistics(dataset)

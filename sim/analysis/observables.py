@@ -16,7 +16,7 @@ from sim.analysis.scene import (
     answered,
     control,
     may_stop,
-    of_dataset,
+    plain,
     setting,
     stays_held,
     where_recorded,
@@ -55,7 +55,6 @@ def pure(values: xr.DataArray, text: str, symbol: str = "") -> xr.DataArray:
     return ordered(values).assign_attrs(units="1", long_name=text, symbol=symbol)
 
 
-@of_dataset
 def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
     """Radii of the contacts with the full work of adhesion and with none, held as the sphere is.
 
@@ -65,7 +64,7 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
         ``radius_jkr`` and ``radius_hertz`` [m], without the dimension ``t`` where what holds the sphere stays at all
         points of the sweep. The former is nan where that contact is open, the latter 0.
     """
-    found = dataset[[*_REFERENCES]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
+    found = plain(dataset)[[*_REFERENCES]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
     if bool(stays_held(dataset).all()):
         found = found.isel(t=0, drop=True)
     found = found.astype(float, copy=False).map(ordered)
@@ -77,20 +76,19 @@ def full_area(dataset: xr.Dataset) -> xr.DataArray:
     return np.pi * reference_radii(dataset)["radius_jkr"] ** 2
 
 
-@of_dataset
 def bond_work(dataset: xr.Dataset) -> xr.DataArray:
     """Work of adhesion that the bonds left would give without fluctuations: Δγ(fraction) [J/m^2].
 
     ``work (1 - share + share * fraction)``, per member where the bonds differ between members, and
     of the mean fraction where only that was recorded.
     """
+    dataset = plain(dataset)
     share = setting(dataset, "adhesion.bond_share")
     fraction = dataset["bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"]
     left = setting(dataset, "adhesion.work") * (1.0 - share + share * fraction)
     return ordered(left).assign_attrs(units="J/m^2", symbol="Δγ", long_name="work of adhesion of the bonds left")
 
 
-@of_dataset
 def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     """The shares of JKR's area that each mechanism takes, per member and time.
 
@@ -112,6 +110,7 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     after it would give: ``bonds_radius``, ``fluctuations_radius``, ``equilibrium_radius`` and ``contact_radius``,
     as recorded.
     """
+    dataset = plain(dataset)
     suffix = "" if "contact_area" in dataset else "_mean"
     area, full = dataset[f"contact_area{suffix}"].astype(float, copy=False), full_area(dataset)
     there = {str(name).removesuffix("_mean") for name in dataset}
@@ -133,7 +132,6 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(found, attrs=dataset.attrs)
 
 
-@of_dataset
 def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
     """The shares of JKR's area that fluctuations and bonds take if the fluctuations are charged first.
 
@@ -154,7 +152,7 @@ def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
     Fluctuations alone leave w = Δγ(1) - χ ΔΓ. Where no equilibrium with that exists, the area is 0.
     """
     charged = share_observables(dataset)
-    return xr.Dataset(_in_turn(charged, _charged_first(dataset)), attrs=dataset.attrs)
+    return xr.Dataset(_in_turn(charged, _charged_first(plain(dataset))), attrs=dataset.attrs)
 
 
 def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
@@ -188,7 +186,6 @@ def _in_turn(charged: xr.Dataset, first: xr.DataArray) -> dict[str, xr.DataArray
     return {"lost_to_fluctuations_first": first, "lost_to_bonds_last": last, "order_of_charging": more}
 
 
-@of_dataset
 def observables(dataset: xr.Dataset) -> xr.Dataset:
     """Every recorded trajectory, per member where members differ, and what follows from them.
 
@@ -196,6 +193,7 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     ``fraction_detached`` is 1 where the contact is open, ``fraction_masked`` is 1 where it is closed though
     no work of adhesion is left (Hertz's contact): their ensemble means are the fractions.
     """
+    dataset = plain(dataset)
     found = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
     for suffix in ("", *(f"_{kind}" for kind in KEPT)):
         if f"contact_area{suffix}" in found and set(_REFERENCES) <= set(found):
@@ -210,7 +208,6 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     return found.drop_vars([n for n in found if str(n).startswith(("in_contact", "masked"))])
 
 
-@of_dataset
 def all_observables(dataset: xr.Dataset) -> xr.Dataset:
     """``observables``, with the shares of the lost area where they are known, in both orders of charging."""
     return chosen_observables(dataset, None)
@@ -269,7 +266,6 @@ def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
     return {f"fraction_masked_{kind}": pure(dataset[f"masked_{kind}"].where(closed), text) for kind in KEPT}
 
 
-@of_dataset
 def settled(trajectories: xr.Dataset) -> xr.Dataset:
     """Observables averaged over the second half of the run, one record long.
 

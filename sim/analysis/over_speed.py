@@ -14,7 +14,6 @@ from sim.analysis.scene import (
     in_pieces,
     is_stationary,
     is_steady,
-    of_dataset,
     speed_name,
     speed_of,
     stays_held,
@@ -38,7 +37,6 @@ _NEAR = 4.0
 _READ = {"contact_area", "jkr_radius", "hertz_radius"}
 
 
-@of_dataset
 def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
     """Observables over the sliding speed, of a ramp or a sweep of steady speeds: A(V), F(V) and τ(V) by default.
 
@@ -151,7 +149,6 @@ def speed_dim(dataset: xr.Dataset) -> str | None:
     return next(varying, None)
 
 
-@of_dataset
 def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
     """Speeds at which the mean contact area has lost 5 and 50 % of JKR's, and half of what it can down to Hertz's.
 

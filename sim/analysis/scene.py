@@ -11,7 +11,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args
+from typing import Any, NamedTuple, get_args
 
 import numpy as np
 import xarray as xr
@@ -21,12 +21,16 @@ from sim.numerics.lazy import Refused, open_lazily
 from sim.units.errors import BadInput
 from sim.units.notation import Recorded
 
-Given = ParamSpec("Given")
-T = TypeVar("T")
-
 MEMBERS = "member"
 #: Trajectories that are read and worked on at once [byte].
 ROOM = 2**26
+#: Quantities that every run records unless its scenario chooses some, and the statements that need them.
+_STATEMENTS = {
+    "contact_area": "contact area", "friction_force": "friction", "in_contact": "open contacts",
+    "masked": "masked contacts", "detachment_time": "detachment", "jkr_radius": "area ratio",
+    "bonds_radius": "area lost to bonds and fluctuations", "peak_stress": "peak of stress",
+    "peak_friction": "peak of friction",
+}  # fmt: skip
 #: A missing variable in the words of xarray, without the ending of a statistic.
 _MISSING = re.compile(r"(?:^|named ')(\w+?)(?:_mean|_std|_sem)?(?:'|$)")
 _CONTROLS = ("load", "indentation", "displacement")
@@ -75,6 +79,18 @@ def _fault(dataset: xr.Dataset) -> str:
     return f"lacks the numbers {missing[0]}" if missing else ""
 
 
+def lacking(dataset: xr.Dataset) -> str:
+    """Return which statements a dataset of an older version cannot make, in one sentence; "" if it makes all."""
+    if hdf5.tables(dataset.attrs["scenario_resolved"]).get("record", {}).get("quantities") is not None:
+        return ""
+    recorded = {re.sub("_(mean|std|sem)$", "", str(name)) for name in dataset.variables}
+    lost = [statement for name, statement in _STATEMENTS.items() if name not in recorded]
+    version = dataset.attrs["sim_version"]
+    return (
+        f"made by sim {version}, which did not record all: no {', no '.join(lost)}; run anew for these" if lost else ""
+    )
+
+
 def with_trajectories(dataset: xr.Dataset, *names: str) -> xr.Dataset:
     """Return the dataset without its trajectories, except those named."""
     timed = [str(name) for name, variable in dataset.data_vars.items() if "t" in variable.dims]
@@ -93,6 +109,7 @@ def in_pieces(dataset: xr.Dataset, dims: Sequence[str], reduce: Callable[[xr.Dat
     reduce : callable
         Function of a dataset in memory.
     """
+    dataset = plain(dataset)
     sizes = {name: dataset.sizes[name] for name in dims if name in dataset.sizes}
     dim = max(sizes, key=sizes.__getitem__, default="t")
     timed = [variable for variable in dataset.variables.values() if {dim, "t"} <= set(variable.dims)]
@@ -116,17 +133,6 @@ def _chunk(variable: xr.Variable, dim: str) -> int:
 def plain(dataset: xr.Dataset) -> xr.Dataset:
     """A dataset whose speed is a variable like others, as statistics need it."""
     return dataset.reset_coords("speed") if "speed" in dataset.coords else dataset
-
-
-def of_dataset(function: Callable[Given, T]) -> Callable[Given, T]:
-    """Let a function of a dataset take one whose speed is a coordinate, too."""
-
-    @functools.wraps(function)
-    def taking(*given: Given.args, **named: Given.kwargs) -> T:
-        first: Any = plain(given[0]) if given and isinstance(given[0], xr.Dataset) else None
-        return function(*given, **named) if first is None else function(first, *given[1:], **named)  # type: ignore[arg-type]
-
-    return taking
 
 
 def claim(dataset: xr.Dataset, path: Path, target: Path, replace: bool, *others: Path) -> None:

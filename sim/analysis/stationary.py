@@ -9,7 +9,7 @@ from scipy import special
 
 from sim.analysis.correlation import autocovariance, covariance_of, inflation, members_for_memory, time_of
 from sim.analysis.observables import all_observables, chosen_observables, restricted, settled
-from sim.analysis.scene import MEMBERS, in_pieces, of_dataset, sweep_dims
+from sim.analysis.scene import MEMBERS, in_pieces, plain, sweep_dims
 from sim.analysis.statistics import (
     LEVEL,
     QUANTILES,
@@ -197,7 +197,6 @@ def _errors(
     return errors, np.where(of_series, freedom, np.where(members > 1, members - 1.0, np.nan))
 
 
-@of_dataset
 def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
     """Statistics of observables over the members and the second half of the run, at each point of the sweep.
 
@@ -215,6 +214,7 @@ def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> x
         and with the dimension ``quantile`` ``…_quantile``, ``…_quantile_low``, ``…_quantile_high``; see ``over_time``.
         Of what is the same for all members there is no error.
     """
+    dataset = plain(dataset)
     dims, late = sweep_dims(dataset), dataset.isel(t=slice(dataset.sizes["t"] // 2, None))
     step = float(dataset["t"][-1] - dataset["t"][-2]) if dataset.sizes["t"] > 1 else 0.0
     shape, found = tuple(dataset.sizes[dim] for dim in dims), dict[str, xr.DataArray]()

@@ -19,7 +19,7 @@ from sim.analysis.observables import (
     restricted,
     share_observables,
 )
-from sim.analysis.scene import MEMBERS, in_pieces, of_dataset, sweep_dims
+from sim.analysis.scene import MEMBERS, in_pieces, sweep_dims
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option
@@ -111,7 +111,6 @@ def averaging(dataset: xr.Dataset, late: bool) -> str:
     return f"mean over the {' and '.join(over)}" if over else ""
 
 
-@of_dataset
 def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     """Mean, spread, quantiles and skewness over the members, each mean and quantile with its error.
 
@@ -262,7 +261,6 @@ def values_at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
     return np.where(share > 0.0, low + share * (high - low), np.where(known, low, np.nan))
 
 
-@of_dataset
 def statistics(dataset: xr.Dataset) -> xr.Dataset:
     """Statistics over the members of everything recorded, at each sweep value and time.
 
@@ -293,7 +291,6 @@ def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quan
     return in_pieces(restricted(dataset, names), ("t",), reduce)
 
 
-@of_dataset
 def shares(dataset: xr.Dataset) -> xr.Dataset:
     """Which share of the lost contact area comes from which mechanism.
 

@@ -15,17 +15,7 @@ from sim.analysis.events import events
 from sim.analysis.lifetimes import half_lives
 from sim.analysis.observables import restricted
 from sim.analysis.over_speed import loss_speeds
-from sim.analysis.scene import (
-    MEMBERS,
-    is_stationary,
-    is_steady,
-    of_dataset,
-    resolved,
-    speed_name,
-    stays_held,
-    sweep_dims,
-    word,
-)
+from sim.analysis.scene import MEMBERS, is_stationary, is_steady, resolved, speed_name, stays_held, sweep_dims, word
 from sim.analysis.stationary import distribution, of_second_half
 from sim.analysis.statistics import QUANTILES, WIDE, averaging, over_members, summary
 from sim.analysis.stick_slip import varies
@@ -131,7 +121,6 @@ _NO_SHARES = ("bond_fraction", "slip_count")
 _ROUNDING = 1e-13
 
 
-@of_dataset
 def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """The statistics in about a dozen rows for the terminal.
 
@@ -195,7 +184,6 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     return [*dict.fromkeys(lines), *filter(None, [words])]
 
 
-@of_dataset
 def highlights(dataset: xr.Dataset, rows: int = 12, found: xr.Dataset | None = None) -> list[dict[str, str]]:
     """What each point of the sweep has once in its whole run, in a dozen rows at most; none where there is nothing.
 
@@ -353,7 +341,6 @@ def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | flo
     return {f"{heading}{gap}({shown})" if shown else heading: texts}
 
 
-@of_dataset
 def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
     """How each quantity is spread over members and stationary time, a row each; none of a sweep or of what changes."""
     if not _spreads(dataset):
@@ -393,7 +380,6 @@ def _spread_of(found: xr.Dataset, column: _Column) -> dict[str, str]:
     return row | {"free values": f"{of('effective_samples'):.3g}"}
 
 
-@of_dataset
 def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """At which speeds the area is lost, a row for each point of the sweep of other keys; none where it is not."""
     found = as_means(loss_speeds(dataset))
@@ -409,7 +395,6 @@ def as_means(found: xr.Dataset) -> xr.Dataset:
     return found.rename({name: f"{name}_mean" for name in found if not str(name).endswith(("_low", "_high"))})
 
 
-@of_dataset
 def once(dataset: xr.Dataset) -> xr.Dataset:
     """Statistics of what a run has once."""
     found = events(dataset)

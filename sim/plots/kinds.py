@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
-from sim.analysis.scene import MEMBERS, answered, claim, of_dataset
+from sim.analysis.scene import MEMBERS, answered, claim, plain
 from sim.numerics.files import claim as claim_file, output
 from sim.plots import curves, field, slider, style, theories
 from sim.plots.measured import Measured
@@ -145,16 +145,15 @@ KINDS: dict[str, Kind] = {
 }
 
 
-@of_dataset
 def default(dataset: xr.Dataset) -> str:
     """Return the kind of figure that fits a dataset best."""
+    dataset = plain(dataset)
     return next(name for name, kind in KINDS.items() if not _missing(dataset, name) and kind.fits(dataset))
 
 
-@of_dataset
 def drawable(dataset: xr.Dataset) -> list[str]:
     """Return the kinds of figures that can be drawn of a dataset."""
-    return [kind for kind in KINDS if not _missing(dataset, kind)]
+    return [kind for kind in KINDS if not _missing(plain(dataset), kind)]
 
 
 def _missing(dataset: xr.Dataset, kind: str) -> str:
@@ -175,7 +174,6 @@ def _drawn_over(dataset: xr.Dataset, x: str) -> str:
     return {"": default(dataset), "speed": "curve"}.get(x, "sweep" if x in swept else "time")
 
 
-@of_dataset
 def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None = None) -> Figure:
     """Draw a figure of a dataset.
 
@@ -200,7 +198,7 @@ def draw(dataset: xr.Dataset, kind: str | None = None, choices: Choices | None =
         For an unknown kind, or a kind that lacks data, with the cure and the kinds that can be drawn.
     """
     choices = choices or Choices()
-    dataset = choices.of_member(dataset)
+    dataset = choices.of_member(plain(dataset))
     kind = kind or _drawn_over(dataset, choices.x)
     if kind not in KINDS:
         raise ValueError(f'there is no figure "{kind}"; known: {", ".join(KINDS)}')

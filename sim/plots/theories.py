@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from sim.analysis import control, is_steady, loop_energy, setting, settled
 from sim.analysis.events import cycles_of
-from sim.analysis.scene import of_dataset, stays_held
+from sim.analysis.scene import plain, stays_held
 from sim.laws import halfspace, jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style
@@ -114,13 +114,13 @@ def case_of(dataset: xr.Dataset) -> Case:
     return Case(held, reversible=(shares or [_FRACTION])[0], **numbers)
 
 
-@of_dataset
 def points_of(dataset: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """Return shear stress [Pa] and contact area [m^2] of closed contacts, means over the members.
 
     Of steady sliding the mean over the second half of the run at each point of the sweep, else records
     spread evenly over the run.
     """
+    dataset = plain(dataset)
     means = xr.Dataset({name: style.mean_of(dataset, name) for name in ("shear_stress", "contact_area")})
     if is_steady(dataset):
         means = settled(means)

@@ -134,6 +134,17 @@ def test_maps_of_netcdf_in_its_formats_are_read_and_other_files_are_refused(fold
     assert "map.nc: is not a netCDF file" in sim("check", "mapped.toml").stderr
 
 
+def test_a_dataset_of_an_older_version_says_once_which_statements_it_lacks(folder):
+    with package.open("out.nc") as dataset:
+        dataset.load().drop_vars(["peak_friction", "bonds_radius"]).to_netcdf("old.nc")
+    for command in (["stats"], ["plot", "time"]):
+        done = sim(command[0], "old.nc", *command[1:])
+        assert done.exit_code == 0 and done.stderr.count("\n") == 1
+        assert all(words in done.stderr for words in ("old.nc", "lost to bonds", "peak of friction"))
+        assert "masked" not in done.stderr
+    assert sim("stats", "out.nc").stderr == ""
+
+
 def test_a_dataset_makes_no_figure_read_a_file_it_names(folder):
     """A spectrum in the scenario of a dataset may name a file, whose rows are beside it."""
     table = {"model": "tabulated", "file": "secret.csv", "normalization": "in_integral"}

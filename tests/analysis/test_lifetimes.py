@@ -1,12 +1,10 @@
 """Lifetimes that runs end before: against exponential ones, with intervals that hold what they promise."""
 
 import math
-import warnings
 
 import numpy as np
 import pytest
 import xarray as xr
-from scipy import stats
 
 from sim import analysis
 
@@ -26,21 +24,6 @@ def test_intervals_of_censored_lifetimes_hold_what_they_promise(end):
         low, high = (np.array([getattr(one, f"{name}_{side}") for one in found]) for side in ("low", "high"))
         high[np.isnan(high)] = math.inf  # a median that may lie beyond the runs
         assert 0.92 < np.mean((low <= truth) & (truth <= high)) < 0.98, name
-
-
-@pytest.mark.parametrize("end", [0.5, 1.0, math.inf])
-def test_medians_of_tied_times_and_their_intervals_are_those_of_scipy(end):
-    for times in np.random.default_rng(4).exponential(size=(100, 9)).round(1):
-        happened = times <= end
-        sample = stats.CensoredData(uncensored=times[happened], right=np.full(9 - happened.sum(), end))
-        survival = stats.ecdf(sample).sf
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):
-            interval = survival.confidence_interval(method="log-log")
-        found = analysis.lifetime(np.where(happened, times, math.nan), min(end, 99.0))
-        below = [one.quantiles[one.probabilities <= 0.5] for one in (survival, interval.low, interval.high)]
-        wanted = [each[0] if each.size else math.nan for each in below]
-        if happened.sum() > 1:
-            np.testing.assert_array_equal(found[:3], wanted)
 
 
 def test_the_rate_counts_the_time_of_those_that_go_on():
