@@ -112,7 +112,7 @@ def test_stress_that_only_rises_has_no_maximum():
     dataset = ramped(drive=drive.Ramp(start=1e-6, stop=1e-4, scale="log"), clock=Clock(duration=1.0, step=0.1))
     assert legend_of(plots.draw(dataset, "stress").axes[0])[0] == ["simulated", "steady sliding, exact", "mean field"]
     # transients after a jump of the speed have no maximum over the speed
-    jump = drive.Table(time=(0.0, 0.5, 0.5, 1.0), speed=(1e-3, 1e-3, 4e-3, 4e-3))
+    jump = drive.Table(time=(0.0, 0.3, 0.3, 0.6, 0.6, 1.0), speed=(1e-4, 1e-4, 2e-3, 2e-3, 2e-2, 2e-2))
     panel = plots.draw(ramped(drive=jump, clock=Clock(duration=1.0, step=0.1)), "stress").axes[0]
     assert not [line for line in panel.lines if line.get_markerfacecolor() == "none"]
 
