@@ -408,8 +408,7 @@ def over(dataset: xr.Dataset, name: str) -> Scene:
 _PLAIN = {"time": "t", "load": "normal_load", "travel": "displacement", "drive.speed": "speed"}
 
 
-# Panels of one observable each, and the figures made of them: over speed, time or a swept key, and friction loops.
-
+# -- panels and figures -------------------------------------------------------------------------
 
 Panel = Callable[[Axes, Scene], None]
 

@@ -124,7 +124,9 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
         for key in shear[table]:
             with contextlib.suppress(KeyError):
                 shear[table][key] = style.number_at(setting(dataset, f"shear.{table}.{key}"), at)
-    spectrum = _spectrum(shear["spectrum"])
+    if shear["spectrum"].get("file") and not shear["spectrum"].get("wavenumbers"):
+        raise ValueError("the spectrum names a file, whose rows the dataset lacks; run the scenario again")
+    spectrum: Any = TypeAdapter(Spectrum).validate_python(shear["spectrum"])
     if spectrum.wavevector is not None:
         raise ValueError("a ripple is a single wave and has no spectral density to compare; draw its map")
     amplitude = TypeAdapter(Amplitude).validate_python(shear["amplitude"])
@@ -134,13 +136,6 @@ def _target(dataset: xr.Dataset, stress: xr.DataArray, at: dict[str, int]) -> tu
         return spectrum, float(np.mean(stress.to_numpy() ** 2) / np.sum(cells.variance)), "target, scaled"
     factor = amplitude.factor(*(_then(dataset, name, at, stress) for name in ("speed", "shear_stress")))
     return spectrum, float(np.mean(factor**2)), "target"
-
-
-def _spectrum(table: dict[str, Any]) -> Any:
-    """Return the spectrum of a dataset's scenario, with the rows of a file that the dataset holds."""
-    if table.get("file") and not table.get("wavenumbers"):
-        raise ValueError("the spectrum names a file, whose rows the dataset lacks; run the scenario again")
-    return TypeAdapter(Spectrum).validate_python(table)
 
 
 def _lattice_of(stress: xr.DataArray) -> Grid | Rectangle:

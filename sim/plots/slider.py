@@ -59,11 +59,6 @@ class Population(NamedTuple):
         """Share of the sites that are bound at rest."""
         return float(schallamach.rest_share(self.rupture.law(self.stiffness).at_rest, self.rebinding))
 
-    def start_peak(self, speed: np.ndarray) -> np.ndarray:
-        """Return the static peak [Pa] after a long rest, of bonds with one pathway that do not rebind."""
-        peak = schallamach.start_up_peak(speed, *self.pathway)
-        return self.density * self.at_rest * np.asarray(peak.force)
-
 
 def population_of(dataset: xr.Dataset, at: dict[str, int]) -> Population | None:
     """Return the bonds at a point of the sweep; None if they do not stretch or the dataset lacks their numbers."""
@@ -103,8 +98,7 @@ def steady_laws(dataset: xr.Dataset, at: dict[str, int], speed: np.ndarray) -> l
     return laws
 
 
-# Figures of a slider behind a spring: creep, the map of stability, and the contact area before sliding.
-
+# -- behind a spring, or under a force ----------------------------------------------------------
 
 #: Speeds of a map, and at which its boundary is drawn.
 _CELLS, _FINE = 28, 200
@@ -203,7 +197,8 @@ def _swings(force: np.ndarray, speed: np.ndarray, edges: np.ndarray) -> np.ndarr
 
 def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
     """Return the stiffness below which steady sliding is unstable [N/m], in mean field for ``rate`` bonds; else nan."""
-    at, bonds = dict.fromkeys(sweep_dims(dataset), 0), population_of(dataset, dict.fromkeys(sweep_dims(dataset), 0))
+    at = dict.fromkeys(sweep_dims(dataset), 0)
+    bonds = population_of(dataset, at)
     if bonds is None:
         return np.full(speed.shape, np.nan)
     mean_field = bool(bonds.pathway) and str(word(dataset, "bonds.model", "").item()) == "rate"
@@ -215,17 +210,15 @@ def _boundary(dataset: xr.Dataset, speed: np.ndarray) -> np.ndarray:
     growth, firm, contact_growth = (more - less) / (2.0 * _LITTLE * area), np.full(speed.shape, math.inf), 0.0
     if str(word(dataset, "drive.contact_stiffness", "half_space").item()) == "half_space":
         contact_growth = 0.5
-        modulus, ratio = (float(dataset[f"effective_{name}"].isel(at, missing_dims="ignore")) for name in _SOLID)
+        modulus, ratio = (style.number_at(dataset[f"effective_{n}"], at) for n in ("shear_modulus", "poisson_ratio"))
         firm = 0.75 * math.pi**2 * modulus * np.sqrt(area / math.pi) / (2.0 - ratio)
     with contextlib.suppress(KeyError):
         firm = np.full(speed.shape, style.number_at(setting(dataset, "drive.contact_stiffness"), at))
-    mass, damping, viscosity = (style.number_at(setting(dataset, f"drive.{key}"), at) for key in _DELAYS)
+    mass, damping, viscosity = (
+        style.number_at(setting(dataset, f"drive.{key}"), at) for key in ("mass", "damping", "viscosity")
+    )
     body = Body(area, growth, 0.0, mass, damping, viscosity, firm, contact_growth)
     return np.asarray(onset(speed, bonds.stiffness, bonds.rebinding, bonds.density, body).stiffness)
-
-
-_DELAYS = ("mass", "damping", "viscosity")
-_SOLID = ("shear_modulus", "poisson_ratio")
 
 
 def _area(dataset: xr.Dataset, at: dict[str, int], bound: np.ndarray) -> np.ndarray:
@@ -284,8 +277,7 @@ def incipient_figure(dataset: xr.Dataset, absolute: bool = False) -> Figure:
     return figure
 
 
-# Figures of what bonds bear: friction over speed with its maximum, and the static peak after a rest.
-
+# -- stress of the bonds ------------------------------------------------------------------------
 
 #: Speeds at which a closed form is drawn.
 _CURVE = 600
@@ -508,7 +500,8 @@ def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: f
     for start in {start.rest: start for start in starts}.values():
         bonds = population_of(dataset, start.at)
         if bonds and bonds.pathway:
-            peak = start.fraction * bonds.start_peak(fine)
+            force = np.asarray(schallamach.start_up_peak(fine, *bonds.pathway).force)
+            peak = start.fraction * (bonds.density * bonds.at_rest * force)
             panel.plot(pace * fine, factor * peak, linestyle=":", label="none rebinds", **thin)
     for law in steady_laws(dataset, starts[0].at, fine)[:1]:
         panel.plot(pace * fine, factor * law.stress, label="steady sliding", **thin)

@@ -41,6 +41,9 @@ GREY: Any = {"color": REFERENCE, "linewidth": 0.9, "zorder": 1.5}
 GUIDE: Any = {"color": REFERENCE, "linewidth": 0.5, "zorder": 1}
 HOLLOW: Any = {"marker": "o", "markersize": 3.5, "mfc": "white", "linestyle": "none"}
 
+#: Look of all legends.
+LEGEND: Any = {"handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
+
 _TICKS = {"direction": "in", "labelsize": 7.5, "major.width": 0.6, "minor.width": 0.4}
 STYLE: Any = {
     "font.family": "STIXGeneral", "mathtext.fontset": "stix",
@@ -250,9 +253,9 @@ def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any
         return
     longest = max((len(text.replace("$", "")) for text in entries), default=0)
     panel.legend(
-        entries.values(), entries, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2, handletextpad=0.5,
-        ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1), labelspacing=0.25,
-        title="\n".join(textwrap.wrap(title, 62)) or None, title_fontsize=7.0, alignment="left",
+        entries.values(), entries, loc="lower left", bbox_to_anchor=(0.0, 1.0), borderaxespad=0.2,
+        ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1),
+        title="\n".join(textwrap.wrap(title, 62)) or None, **LEGEND,
     )  # fmt: skip
 
 
@@ -261,8 +264,7 @@ def legends_of_first(figure: Figure, axes: Any) -> None:
     for panel in axes[:, 1:].flat:
         if panel.get_legend():
             panel.get_legend().remove()
-    look = {"ncols": 3, "handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
-    moved_legend(axes[0, 0], figure, loc="outside upper left", **look)
+    moved_legend(axes[0, 0], figure, loc="outside upper left", ncols=3, **LEGEND)
     for panel in axes.flat:
         panel.label_outer()
 

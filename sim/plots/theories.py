@@ -159,8 +159,8 @@ def theories_figure(dataset: xr.Dataset) -> Figure:
     axes[0].set_ylim(factor * max(bottom, 0.0), factor * top)
     _, symbol, si = _CONTROLS[case.held]
     words = f"{symbol} = {style.text_of(case.value, si)}, $w$ = {style.text_of(case.work, 'J/m^2')}"
-    look: Any = {"ncols": 3, "handletextpad": 0.5, "labelspacing": 0.25, "alignment": "left", "title_fontsize": 7.0}
-    figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper left", title=words, **look)
+    handles, labels = axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", title=words, ncols=3, **style.LEGEND)
     return figure
 
 
@@ -171,24 +171,15 @@ def _panel(panel: Axes, case: Case, along: dict[str, np.ndarray], areas: dict[st
         if name in ("jkr", "hertz"):  # whatever the shear
             panel.axhline(values[0], linestyle=line, label=label, **style.GREY)
             continue
-        branch = adhesive(values, factor * areas["hertz"])
+        held = values > np.nan_to_num(factor * areas["hertz"]) * (1.0 + 1e-9)
+        branch = np.where(held, values, np.nan)
         panel.plot(along[name], branch, linestyle=line, color=colour, label=label)
-        held = np.flatnonzero(np.isfinite(branch))
-        if held.size and held[-1] < len(branch) - 1:  # it ends: at a fold with a dot
-            panel.plot(along[name][held[-1]], branch[held[-1]], "o", markersize=3, color=colour)
+        if np.any(held) and not held[-1]:  # the branch ends at a fold
+            end = np.flatnonzero(held)[-1]
+            panel.plot(along[name][end], branch[end], "o", markersize=3, color=colour)
 
 
-def adhesive(areas: np.ndarray, hertz: np.ndarray) -> np.ndarray:
-    """Return the areas of an adhesive contact under a theory; nan where it has Hertz's area.
-
-    >>> adhesive(np.array([3.0, 2.0, 1.0]), np.array([1.0, 1.0, 1.0]))
-    array([ 3.,  2., nan])
-    """
-    return np.where(areas > np.nan_to_num(hertz) * (1.0 + 1e-9), areas, np.nan)
-
-
-# The figure that everyone draws: pressure, surfaces and tangential displacement across the contact.
-
+# -- profiles across the contact -----------------------------------------------------------
 
 #: Points of a profile on one side, and how far it goes in contact radii.
 _SIDE, _REACH = 1500, 2.0
@@ -226,11 +217,6 @@ class Shape(NamedTuple):
         return np.append(-r[:0:-1], r)
 
 
-def _member(dataset: xr.Dataset, name: str, at: dict[str, int]) -> np.ndarray:
-    """An observable of the first member over time, or its mean where only that was recorded."""
-    return style.recorded(dataset, name).isel({"member": 0} | at, missing_dims="ignore").to_numpy()
-
-
 #: Contacts with the look of their lines.
 _Shown = list[tuple[Shape, dict[str, Any]]]
 
@@ -247,14 +233,16 @@ def shapes_of(dataset: xr.Dataset, time: float | None = None) -> tuple[_Shown, f
     """
     at = style.first_point(dataset)[0]
     names = ("contact_radius", "indentation", "shear_stress", "speed")
-    radius, depth, stress, speed = (_member(dataset, name, at) for name in names)
+    first = {"member": 0} | at
+    radius, depth, stress, speed = (
+        style.recorded(dataset, name).isel(first, missing_dims="ignore").to_numpy() for name in names
+    )
     if not np.any(radius > 0.0):
         raise ValueError("the contact that would be drawn is never closed; raise the load or the indentation")
     k = int(np.flatnonzero(radius > 0.0)[-1] if time is None else np.abs(dataset["t"].to_numpy() - time).argmin())
     if not radius[k] > 0.0:
-        raise ValueError(
-            f"the contact is open at t = {style.text_of(float(dataset['t'][k]), 's')}; choose another time"
-        )
+        when = style.text_of(float(dataset["t"][k]), "s")
+        raise ValueError(f"the contact is open at t = {when}; choose another time")
     sphere, work = (style.number_at(setting(dataset, key), at) for key in ("sphere.radius", "adhesion.work"))
     moduli = ("contact_modulus", "effective_shear_modulus", "effective_poisson_ratio")
     bodies = (sphere, *(style.number_at(dataset[name], at) for name in moduli))
@@ -352,7 +340,7 @@ def _map_panel(figure: Figure, panel: Axes, shape: Shape, reach: float, length: 
     panel.set_ylabel(length.label("$y$"))
 
 
-# The figure of a loop: load and contact radius over the displacement of what holds the sphere, and the energy lost.
+# -- loop of a JKR test --------------------------------------------------------------------
 
 
 #: Radii at which the equilibrium curve is evaluated.

@@ -218,7 +218,7 @@ def _thinned(corners: np.ndarray, panel: Axes) -> np.ndarray:
     return panel.transData.inverted().transform(np.asarray(fewer.vertices)[drawn])
 
 
-# Tables of measured points beside a run, and of a fit of its scenario.
+# -- measured points and a fit --------------------------------------------------------------
 
 
 Rows = list[dict[str, str]]
@@ -381,7 +381,7 @@ def _end(end: float, is_open: bool) -> str:
     return "unknown" if math.isnan(end) else f"{end:.4g}" + (" (bound)" if is_open else "")
 
 
-# The page of a run as HTML, filled from the dataset and its log.
+# -- the page -------------------------------------------------------------------------------
 
 
 #: Rows of a table.
