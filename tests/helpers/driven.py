@@ -176,3 +176,27 @@ def pulled(stiffness=1.0, speed=1.0, mass=0.0, damping=0.0, **keys):
     stage = speed * STRETCH if isinstance(speed, float) else speed
     given = {"stage": stage, "stiffness": stiffness * stiff, "mass": mass * stiff, "damping": damping * stiff}
     return Spring(**given, contact_stiffness="rigid", **keys)
+
+
+def jolted(speed, step, factor=1.0001):
+    """A stage in steady motion whose speed, in stretches a second, rises by a factor after a first step."""
+    speeds = speed, speed, factor * speed, factor * speed
+    return {"time": (0.0, step, step, 1e3), "value": tuple(value * STRETCH for value in speeds)}
+
+
+def mode_of(signal, step, frequency, modes):
+    """Growth rate and frequency of the mode nearest to a frequency in a signal, by linear prediction."""
+    changes = np.diff(signal)
+    shifted = np.stack([changes[modes - 1 - k : -1 - k] for k in range(modes)], axis=1)
+    roots = np.roots([1.0, *-np.linalg.lstsq(shifted, changes[modes:])[0]]).astype(complex)
+    nearest = min(np.log(roots[roots.imag > 0.0]) / step, key=lambda root: abs(root.imag - frequency))
+    return nearest.real, nearest.imag
+
+
+def check_onset(growth, onset, frequency, near=0.01, rtol=1e-4):
+    """Disturbances, of a ``growth`` rate and frequency at a stiffness, neither grow nor fade at the onset alone."""
+    rate, turns = growth(onset)
+    assert abs(rate) < 1e-4 * frequency
+    assert_allclose(turns, frequency, rtol=rtol)
+    assert growth((1.0 - near) * onset)[0] > 1e-3
+    assert growth((1.0 + near) * onset)[0] < -1e-3

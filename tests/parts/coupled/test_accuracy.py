@@ -10,6 +10,7 @@ from numpy.testing import assert_allclose
 from sim.engine import MemberNoise, follow
 from sim.laws.schallamach import Body, first_moment_amplitude, first_moment_onset, first_moment_stress
 from sim.parts.bonds import Cohort, Tracked
+from sim.parts.coupled import radau
 from sim.parts.drive import READINGS, Table
 
 #: Bonds whose stretch, life at rest and stiffness are units and which are remade as fast, at a site of unit area.
@@ -20,6 +21,17 @@ def passed(scene, every=1):
     """What a single member goes through, at some of its clock steps, and the readings of its drive by name."""
     course = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(0, scene.times.steps + 1, every))[1]
     return course, dict(zip(READINGS, course.driven[:, 0].T, strict=True))
+
+
+def test_the_matrices_of_radau_split_its_rates_and_its_polynomials_are_exact():
+    turning = np.array([[radau.TURNING.real, -radau.TURNING.imag], [radau.TURNING.imag, radau.TURNING.real]])
+    modes = np.block([[np.full((1, 1), radau.PACE), np.zeros((1, 2))], [np.zeros((2, 1)), turning]])
+    assert_allclose(radau.FORTH @ radau.BACK, np.eye(3), atol=1e-14)
+    assert_allclose(radau.FORTH @ modes @ radau.BACK, radau.RATES, rtol=0, atol=1e-13)
+    places, powers = np.append(radau.NODES, 0.0), np.arange(4)[:, np.newaxis]
+    assert_allclose(places**powers @ radau.VALUES, radau.BETWEEN ** np.arange(4.0), rtol=1e-13)
+    slopes = np.arange(4.0) * radau.BETWEEN ** np.array([0.0, 0.0, 1.0, 2.0])
+    assert_allclose(places**powers @ radau.SLOPES, slopes, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("steps", [10**5, pytest.param(10**6, marks=pytest.mark.verify)])
@@ -45,20 +57,21 @@ def test_the_energies_stay_balanced_over_many_steps_where_stretches_are_resolved
         assert np.all(np.abs(read["energy_residual"]) <= 10.0 * tolerance * read["drive_work"][-1])
 
 
-@pytest.mark.parametrize("keys", [{}, {"damping": 0.05}, {"mass": 0.05, "damping": 0.05}])
-def test_smooth_motion_is_followed_to_order_five(keys):
-    def position(steps, tolerance):
-        stage = {"time": (0.0, 2.0), "value": (10.0 * STRETCH, 14.0 * STRETCH)}
-        drive = spring(0.5, stage, tolerance=tolerance, start="steady", **keys)
-        course, read = passed(scenario(2.0, steps, drive, start="steady"))
-        return course.position[-1, 0] / STRETCH, read["substeps"][-1]
+def test_smooth_motion_is_followed_to_order_five():
+    for keys in [{}, {"damping": 0.05}, {"mass": 0.05, "damping": 0.05}]:
 
-    exact, off = position(16, 1e-12)[0], []
-    for steps in (8, 64):
-        found, taken = position(steps, 1e-2)
-        assert taken < steps + 8  # the first clock step finds its length, all others are one sub-step each
-        off.append(abs(found - exact))
-    assert np.log(off[0] / off[1]) / np.log(8.0) > 4.5
+        def position(steps, tolerance):
+            stage = {"time": (0.0, 2.0), "value": (10.0 * STRETCH, 14.0 * STRETCH)}
+            drive = spring(0.5, stage, tolerance=tolerance, start="steady", **keys)
+            course, read = passed(scenario(2.0, steps, drive, start="steady"))
+            return course.position[-1, 0] / STRETCH, read["substeps"][-1]
+
+        exact, off = position(16, 1e-12)[0], []
+        for steps in (8, 64):
+            found, taken = position(steps, 1e-2)
+            assert taken < steps + 8  # the first clock step finds its length, all others are one sub-step each
+            off.append(abs(found - exact))
+        assert np.log(off[0] / off[1]) / np.log(8.0) > 4.5
 
 
 def jump(before, after, step, duration):

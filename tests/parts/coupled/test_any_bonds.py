@@ -1,0 +1,175 @@
+"""Laws that a slider on bonds of any model obeys: limits of the spring, restarts, balances, pull-off."""
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from helpers.driven import (
+    DENSITY,
+    HELD,
+    LOAD,
+    MODULUS,
+    PULLED_OFF,
+    STIFF,
+    STRETCH,
+    R,
+    check_blocks,
+    check_members,
+    check_pulled_off,
+    check_turned,
+    fastest,
+    force,
+    marched,
+    pulled,
+    residual,
+    scenario,
+    spring,
+    stuck,
+    turning,
+)  # fmt: skip
+from numpy.testing import assert_allclose
+
+import sim
+from sim.engine import march
+from sim.laws import jkr
+from sim.parts.bonds import Cohort, FirstMoment, Rate, Tracked
+from sim.parts.drive import Steady as AtSpeed
+from sim.units.errors import BadInput
+
+MOMENT = FirstMoment
+COHORTS = functools.partial(Cohort, tolerance=1e-4)
+FINE = functools.partial(Cohort, tolerance=1e-6)
+SITES, MANY = (functools.partial(Tracked, sites=sites) for sites in (100, 300))
+BODY = {"mass": 1e-3, "damping": 1e-3}
+
+
+@pytest.mark.parametrize(("make", "tolerance"), [(MOMENT, 1e-6), (functools.partial(Cohort, tolerance=1e-8), 1e-8)])
+def test_a_stage_that_begins_in_steady_sliding_keeps_the_stress_of_a_prescribed_speed(make, tolerance):
+    lens = {"share": 0.3, "start": "steady", "make": make}
+    for keys in ({}, {"mass": 1e-3, "damping": 2e-3, "contact": 0.5}):
+        drives = spring(1.0, start="steady", tolerance=tolerance, **keys), AtSpeed(speed=10.0 * STRETCH)
+        one, other = (list(march(scenario(1.0, 4, drive, **lens), np.arange(1)))[-1] for drive in drives)
+        assert_allclose(one.bonding.stress, other.bonding.stress, rtol=1e-8)
+        assert_allclose(one.drive.speed, other.drive.speed, rtol=1e-8)
+
+
+@pytest.mark.parametrize("make", [MOMENT, functools.partial(Cohort, tolerance=1e-7)])
+def test_a_stiff_spring_becomes_the_prescribed_drive_as_one_over_its_stiffness(make):
+    prescribed = scenario(1.0, 10, AtSpeed(speed=10.0 * STRETCH), make=make)
+    exact, errors = np.array([state.bonding.stress[0] for state in march(prescribed, np.arange(1))]), []
+    for stiffness in (40.0, 4e2, 4e3):
+        states, _ = marched(scenario(1.0, 10, spring(stiffness, tolerance=1e-8), make=make))
+        errors.append(np.max(np.abs([state.bonding.stress[0] for state in states] - exact)) / max(exact))
+        assert errors[-1] < 10.0 / (stiffness / 0.0390213)
+    assert_allclose(np.divide(errors[:-1], errors[1:]), 10.0, rtol=0.05)
+
+
+@pytest.mark.parametrize("make", [MOMENT, FINE])
+@pytest.mark.parametrize(("x0", "time", "later"), [(0.5, 0.559773594776, ((5, 0.858292500361), (9, 1.90289022829))),
+                                                   (2.0, 0.0489005107, ())])  # fmt: skip
+def test_bonds_that_are_not_remade_share_one_stretch_until_they_run_away(make, x0, time, later):
+    # E1(x(t)) = E1(x0) − k0 t; they are remade so rarely that it does not show
+    scene = scenario(2.0 * time, 20, force(0.5 * x0, tolerance=1e-9), rebinding=1e-13, make=make)
+    first = next(march(scene, np.arange(1)))
+    if make is MOMENT:
+        first = first._replace(bonds=first.bonds._replace(bound=np.full(1, 0.5)))
+    else:
+        first.bonds.cohorts.weight[0, 0] = 0.5
+    states = list(march(scene, np.arange(1), first))
+    assert_allclose(states[-1].drive.runaway_time, time, rtol=1e-7)
+    for place, stretch in later:
+        bonding = states[place - 1].bonding  # the force is constant, so that the stretch is its share per bond
+        share = bonding.fraction[0] * scene.bonds.bound_at_rest
+        assert_allclose(0.5 * x0 / share, stretch, rtol=1e-7)
+
+
+@pytest.mark.parametrize("make", [MOMENT, COHORTS])
+def test_springs_from_soft_to_stiff_keep_the_energies_balanced(make):
+    for stiffness in (4e-8, 1.0, 4e4):
+        for keys in ({}, {"damping": 1e-3}, {"mass": 1e-9}, {"contact": 1.0}):
+            _, read = marched(scenario(20.0, 5, spring(stiffness, **keys), share=0.3, make=make))
+            assert residual(read) < 1e-5, (stiffness, keys)
+
+
+@pytest.mark.parametrize(("make", "keys"), [(MOMENT, {}), (MOMENT, {"contact": 0.2, "mass": 1e-4, "viscosity": 1e-3}),
+                                            (COHORTS, BODY), (COHORTS, {"contact": 0.2, "viscosity": 1e-3}),
+                                            (SITES, {}), (SITES, BODY)])  # fmt: skip
+def test_a_member_is_the_same_alone_in_blocks_and_restarted_in_the_middle_of_a_slip(make, keys):
+    steps = 200
+    scene = scenario(4.0, steps, spring(0.02, **keys), share=0.5, make=make)
+    straight = list(march(scene, np.arange(3)))
+    if make is SITES:  # it slips at once where bonds give way: the displacements tell, not the speeds
+        way = np.diff([state.drive.position[0] for state in straight]) / STRETCH
+        least = np.minimum(way[:-1], way[1:])
+        slip = int(np.argmax(least)) + 1
+        assert least[slip - 1] > 3.0 * 10.0 * 4.0 / steps
+    else:
+        slip = fastest(straight)
+    check_members(scene, straight, slip)
+    if not scene.by_steps:
+        check_blocks(scene, straight, 4)
+
+
+@pytest.mark.parametrize(("make", "keys", "start"), [(MOMENT, {"damping": 1e-2}, "bonded"), (COHORTS, {}, "empty"),
+                                                     (COHORTS, BODY, "steady"), (MANY, {}, "bonded")])  # fmt: skip
+def test_a_stage_that_rests_turns_and_stops_keeps_the_energies_balanced_and_the_signs(make, keys, start):
+    scene = scenario(8.0, 16, turning(**keys), share=0.0 if make is MANY else 0.5, make=make, start=start)
+    check_turned(*marched(scene))
+
+
+CARRIED = functools.partial(Cohort, tolerance=1e-4, area="carried")
+
+
+@pytest.mark.parametrize(("make", "viscosity"), [(MOMENT, 0.0), (MOMENT, 0.1), (COHORTS, 0.0), (SITES, 0.0),
+                                                 (CARRIED, 0.0)])  # fmt: skip
+def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_its_bonds_up_again(make, viscosity):
+    load = PULLED_OFF["load"]
+    if make is SITES:  # a load at which pull-off is not left to chance
+        load = load | {"value": tuple(min(value, 2.0 * value) for value in load["value"])}
+    scene = scenario(3.0, 30, spring(1.0, viscosity=viscosity), share=0.5, make=make, **(PULLED_OFF | {"load": load}))
+    states, read = marched(scene)
+    check_pulled_off(states, read)
+    if make is MOMENT:
+        check_blocks(scene, states)
+
+
+@pytest.mark.parametrize(("make", "keys"), [(MOMENT, {"mass": 0.1, "damping": 0.1}),
+                                            (FINE, {"contact": 50.0, "viscosity": 1.0}),
+                                            (MANY, {"mass": 0.1, "damping": 0.1})])  # fmt: skip
+def test_a_contact_that_pays_for_its_mean_stress_shrinks_to_that_of_hertz_within_the_sub_steps(make, keys):
+    # strong bonds: at their peak the whole energy of the mean stress is more than adhesion can pay
+    strong = {"make": lambda **recipe: make(**(recipe | {"site_density": 100.0 * DENSITY})), "share": 0.5}
+    scene = scenario(4.0, 80, spring(2.0, **keys), reversible=1.0, **strong)
+    states, read = marched(scene)
+    radii = np.array([state.contact.radius[0] for state in states[1:]])
+    assert_allclose([state.drive.radius[0] for state in states[1:]], radii, rtol=1e-12)
+    hertz = jkr.radius_at_load(LOAD, 0.0, R, MODULUS)
+    assert_allclose(np.min(radii), hertz, rtol=1e-12)
+    assert np.max(radii) > 1.5 * hertz
+    assert residual(read) < 3e-5  # of 300 bonds each breaks at a step's end
+
+
+STICKING = Rate(critical_speed=0.5 * STRETCH, rebinding_rate=2.0, stress=1e5)
+
+
+@pytest.mark.parametrize(
+    ("scene", "onset", "frequency"),
+    [(scenario(1.0, 4, spring(1.0)), 0.0390213 * STIFF, 4.691569),
+     (scenario(1.0, 4, spring(1.0), make=COHORTS), 0.0295565 * STIFF, 4.25784),
+     (stuck(1.0, 4, STICKING, pulled(1.0, 1.0, 0.01, 0.05)), 2.2733333 * HELD / STRETCH, 11.1355287)],
+)  # fmt: skip
+def test_a_check_shows_below_which_spring_the_slider_oscillates(scene, onset, frequency):
+    shown = sim.check(scene).partition("\nslider\n")[2]
+    (row,) = (line for line in shown.splitlines() if line.startswith("  oscillates below"))
+    assert f"{onset:.4g} N/m" in row
+    assert f"{frequency / (2.0 * math.pi):.3g} Hz" in row
+
+
+def test_a_check_shows_no_onset_for_a_slider_that_damping_keeps_stable():
+    assert "oscillates below" not in sim.check(stuck(1.0, 4, STICKING, pulled(1.0, 1.0, damping=10.0)))
+
+
+def test_a_study_of_a_drive_that_feels_its_noise_is_refused():
+    with pytest.raises(BadInput, match=r"drive\.model"):
+        sim.converge(scenario(1.0, 4, spring(1.0)))
