@@ -1,4 +1,4 @@
-"""Writes docs/keys.md, every key of a scenario file, from the declarations in the code."""
+"""Write docs/keys.md, every key of a scenario file, from the declarations in the code."""
 
 import re
 import sys
@@ -23,7 +23,7 @@ _FIRST = ("name", "seed")
 
 
 def text() -> str:
-    """The page."""
+    """Return the page."""
     sections: dict[tuple, tuple[list[str], dict[str, type]]] = {}
     for path, field in all_tables(Scenario):
         options = tables(field.annotation)
@@ -48,17 +48,17 @@ def _section(titles: list[str], options: dict[str, type]) -> list[str]:
         for key, field in sorted(keys(table).items(), key=lambda item: table is Scenario and item[0] not in _FIRST):
             if key not in ("model", "sweep"):
                 rows.setdefault((f"`{key}`", *_row(key, field, titles)), []).append(_form(name))
-    several = len(options) > 1
-    lines += ["| key | unit | meaning | default |" + (" models |" if several else "")]
-    lines += ["| --- | --- | --- | --- |" + (" --- |" if several else "")]
+    has_models = len(options) > 1
+    lines += ["| key | unit | meaning | default |" + (" models |" if has_models else "")]
+    lines += ["| --- | --- | --- | --- |" + (" --- |" if has_models else "")]
     for row, having in rows.items():
-        shown = [*row, "" if len(having) == len(options) else ", ".join(having)] if several else row
+        shown = [*row, "" if len(having) == len(options) else ", ".join(having)] if has_models else row
         lines.append(f"| {' | '.join(shown)} |")
     return lines if rows else lines[:-2]
 
 
 def _row(key: str, field: typing.Any, titles: list[str]) -> tuple[str, str, str]:
-    """Unit, meaning and default of a key."""
+    """Return unit, meaning and default of a key."""
     quantity, inner = declaration(field), tables(field.annotation)
     place = f"[{titles[0].strip('[]')}.{key}]" if titles[0].startswith("[") else f"[{key}]"
     default = f"`{str(field.default).lower() if isinstance(field.default, bool) else field.default}`"
@@ -79,18 +79,18 @@ def _row(key: str, field: typing.Any, titles: list[str]) -> tuple[str, str, str]
 
 
 def _form(name: str) -> str:
-    """A model's name, or that of a form without one."""
+    """Return the name of a model, or of a form without a model."""
     model, _, form = name.partition("[")
     return f"`{model}`" + (f" with a {form[:-1]}" if form else "") if model else f"a {form[:-1]}"
 
 
 def _meaning(table: type) -> str:
-    """The first paragraph of a table's description."""
+    """Return the first paragraph of the description of a table."""
     return re.sub(r"`+", "`", " ".join((table.__doc__ or "").split("\n\n")[0].split())).replace("\\", "")
 
 
 def _words(annotation: typing.Any) -> list[str]:
-    """The words that a key may take."""
+    """Return the words that a key may take."""
     if typing.get_origin(annotation) is typing.Literal:
         return [f"`{word}`" for word in typing.get_args(annotation)]
     return [word for option in typing.get_args(annotation) for word in _words(option)]

@@ -42,26 +42,26 @@ class Clock:
 
     @property
     def steps(self) -> int:
-        """Number of clock steps."""
+        """Return the number of clock steps."""
         return round(self.duration / self.step)
 
     @property
     def stride(self) -> int:
-        """Clock steps from one record to the next."""
+        """Return the number of clock steps from one record to the next."""
         return round((self.record or self.step) / self.step)
 
     @property
     def records(self) -> int:
-        """Number of records, the one at t = 0 included."""
+        """Return the number of records, with that at t = 0."""
         return self.steps // self.stride + 1
 
     def time(self, step: int) -> float:
-        """Time at the end of a step [s]; never accumulated."""
+        """Return the time at the end of a step [s]; it is never accumulated."""
         return self.duration * (step / self.steps)
 
     @property
     def times(self) -> np.ndarray:
-        """Times of the records, shape (records,) [s]."""
+        """Return the times of the records [s], shape (records,)."""
         return np.array([self.time(k * self.stride) for k in range(self.records)])
 
 

@@ -95,7 +95,7 @@ class Scenario:
         return f'<Scenario "{self.name}": {models}; members {self.ensemble.members}, points {points}>'
 
     def _repr_html_(self) -> str:
-        """Every key with its value, for notebooks."""
+        """Return every key with its value as HTML, for notebooks."""
         return as_html(self.name, entries(self))
 
     @model_validator(mode="after")
@@ -115,45 +115,45 @@ class Scenario:
 
     @property
     def _parts(self) -> dict[str, Any]:
-        """Everything that decides about the run, the sweep included."""
+        """Return the values that decide about the run, with the sweep."""
         return {name: getattr(self, name) for name in _FIELDS if name != "source"}
 
     @property
     def origin(self) -> Source:
-        """The file that describes this scenario; of one that was changed in Python only the files it has read."""
+        """Return the source; of a scenario that was changed in Python only the path and the files it has read."""
         source = self.source
         described = bool(source.text) and source.parts == self._parts
         return source if described else Source(path=source.path, files=source.files)
 
     @cached_property
     def rest_radius(self) -> float:
-        """Contact radius with every bond of rest and no fluctuation [m]; nan without equilibrium."""
+        """Return the contact radius at rest, with all bonds and no fluctuation [m]; nan without equilibrium."""
         return rest_radius(self.solid, self.sphere, self.adhesion, self.contact)
 
     @cached_property
     def population(self) -> BondModel:
-        """The model of the bonds, chosen by their number if the scenario leaves the choice."""
-        return self.bonds.chosen(*self._bonds_seen)
+        """Return the model of the bonds; model = "auto" is chosen by their number."""
+        return self.bonds.chosen(*self._bond_conditions)
 
     @property
-    def _bonds_seen(self) -> tuple[float, bool]:
-        """Area of the contact at rest [m²], and whether the field reads the forces of the bonds."""
+    def _bond_conditions(self) -> tuple[float, bool]:
+        """Return the area of the contact at rest [m²], and True if the field reads the forces of the bonds."""
         return math.pi * self.rest_radius**2, self.fluctuations.spectrum.bond_made
 
     @cached_property
     def fluctuations(self) -> Model:
-        """The model of the shear part, chosen by what is recorded if the scenario leaves the choice."""
+        """Return the model of the shear part; model = "auto" is chosen by the recorded maps."""
         return self.shear.chosen(bool(self.record.maps))
 
     @cached_property
     def why(self) -> dict[str, str]:
-        """Reasons for the models that the scenario left open, by part."""
-        why = {"shear": self.shear.why(bool(self.record.maps)), "bonds": self.bonds.why(*self._bonds_seen)}
+        """Return the reason for the model of each part with model = "auto"."""
+        why = {"shear": self.shear.why(bool(self.record.maps)), "bonds": self.bonds.why(*self._bond_conditions)}
         return {part: reason for part, reason in why.items() if reason}
 
     @cached_property
     def process(self) -> Process:
-        """The shear part on this solid and cell; ``BadInput`` where it cannot be built."""
+        """Return the shear part on this solid and cell; raise ``BadInput`` if it cannot be built."""
         try:
             return self.fluctuations.process(*self.solid.effective, self._square)
         except PydanticCustomError as fault:  # of a point inside a long sweep, which was not tried before
@@ -161,18 +161,18 @@ class Scenario:
 
     @property
     def contact_area(self) -> float:
-        """Area of the contact at rest [m²], of one without equilibrium that of a hundredth of the sphere's radius."""
+        """Return the area of the contact at rest [m²]; of one without equilibrium, that of radius R/100."""
         radius = self.rest_radius if self.rest_radius > 0.0 else 0.01 * self.sphere.radius
         return math.pi * radius**2
 
     @property
     def _square(self) -> float:
-        """Side of the square that is as large as the contact at rest [m]."""
+        """Return the side of the square with the area of the contact at rest [m]."""
         return math.sqrt(math.pi) * self.rest_radius
 
     @property
     def map_lattice(self) -> Lattice | None:
-        """Sides and points of the maps that are recorded; None where none is."""
+        """Return sides and points of the recorded maps; None without maps."""
         return cast(ModalProcess | CarriedProcess, self.process).lattice if self.record.maps else None
 
     @cached_property
@@ -182,7 +182,7 @@ class Scenario:
 
     @cached_property
     def margin(self) -> Shares | None:
-        """Share of ΔΓ that a contact of finite radius pays when it grows; None where waves are taken as short."""
+        """Return the share of ΔΓ that acts on the edge of a finite contact; None if waves are taken as short."""
         if self.fluctuations.contact == "plane":
             return None
         bodies = self.sphere.radius, self.solid.contact_modulus
@@ -191,30 +191,30 @@ class Scenario:
 
     @cached_property
     def times(self) -> Times:
-        """Clock of the run."""
+        """Return the clock of the run."""
         return Times(self.clock.step, self.clock.steps, self.clock.duration)
 
     @cached_property
     def setting(self) -> Setting:
-        """Constants by which parts judge themselves."""
+        """Return the constants from which parts make their remarks."""
         strength = float(self.population.steady(np.zeros(1)).strength[0])
         bodies = *self.solid.effective, self.solid.contact_modulus, self.sphere.radius
         return Setting(*bodies, self.adhesion.work, strength, self.rest_radius, self._square, self.times)
 
     @property
     def chosen(self) -> tuple[Drive, BondModel, Model, Contact]:
-        """The four parts with the models chosen that the scenario leaves open."""
+        """Return the four parts in the order in which they act, each "auto" replaced by a model."""
         return self.drive, self.population, self.fluctuations, self.contact
 
     def speeds(self, count: int, share: float = 1.0) -> np.ndarray:
-        """Speeds at times spread evenly over the run or a first share of it, its ends included [m/s]."""
+        """Return speeds [m/s] at evenly spaced times of the run, or of a first share of it, with both ends."""
         duration = self.times.duration
         instants = np.repeat(np.linspace(0.0, share * duration, count), 2)
         return self.drive.pieces(instants, duration).joined.last[::2]
 
     @cached_property
     def parts(self) -> Parts:
-        """The parts as the engine sees them: each model fits its protocol with a class of state of its own."""
+        """Return the parts for the engine; each model fits its protocol with its class of state."""
         return Parts(*cast(Parts, (self.drive, self.population, self.process, self.contact)))
 
     def release(self) -> None:
@@ -224,7 +224,7 @@ class Scenario:
 
     @cached_property
     def varies(self) -> dict[str, bool]:
-        """For each part, and the control of the contact, whether its values differ between members: by its class."""
+        """Return, for each part and the control of the contact, True if its values differ between members."""
         driven = self.drive.per_member
         bonded = driven or self.population.per_member
         by_bonds = bonded and (self.fluctuations.reads_stress or self.fluctuations.passes)
@@ -233,7 +233,7 @@ class Scenario:
 
     @property
     def by_steps(self) -> bool:
-        """True if a part feeds back, so that a run goes step by step and not by blocks of steps.
+        """Return True if a part feeds back, so that a run goes step by step and not by blocks of steps.
 
         Under a drive that feels the friction bonds and an equilibrium contact follow within its own sub-steps; a block
         of them needs fluctuations that the contact does not feel, or that stay as they are.

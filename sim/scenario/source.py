@@ -21,14 +21,14 @@ class Source:
     parts: dict[str, Any] = field(default_factory=dict)
 
     def changed(self, values: dict[str, Any]) -> "Source":
-        """The source of the same text with more overrides, which replace those of the keys inside theirs."""
+        """Return the source with more overrides; they replace those of keys inside their own keys."""
         inside = tuple(f"{key}." for key in values)
         others = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
         return Source(self.path, self.text, others | values, self.files)
 
     @property
     def written(self) -> dict[str, Any]:
-        """Path, text, overrides and files, of which another process makes the same source."""
+        """Return path, text, overrides and files, from which another process makes the same source."""
         return {"path": self.path, "text": self.text, "overrides": self.overrides, "files": self.files}
 
 
@@ -40,11 +40,11 @@ class Files:
     texts: dict[str, str] = field(default_factory=dict)
 
     def path(self, name: str) -> Path:
-        """Path of the file."""
+        """Return the path of a file."""
         return self.folder / name
 
     def text(self, name: str) -> str:
-        """The file's text, others for the dataset's provenance."""
+        """Return the text of a file, which the dataset keeps as its provenance."""
         if name not in self.texts:
             self.texts[name] = plain_text(self.path(name))
         return self.texts[name]

@@ -4,7 +4,7 @@ import math
 import re
 from typing import Literal
 
-#: Of a mean that is told with its error.
+#: Most digits of a mean with its error.
 _MOST_DIGITS = 7
 
 _PREFIXES = {-15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G", 12: "T"}
@@ -25,7 +25,7 @@ Recorded = Literal[
 
 
 def scaled(magnitude: float, unit: str) -> tuple[float, str]:
-    """Factor from SI to a unit with a prefix that suits a magnitude, and that unit as a reader writes it.
+    """Return the factor from SI to a unit with a prefix that suits a magnitude, and that unit for people.
 
     >>> scaled(0.042, "J/m^2")
     (1000.0, 'mJ/m²')
@@ -43,7 +43,7 @@ def scaled(magnitude: float, unit: str) -> tuple[float, str]:
 
 
 def engineering(value: float, unit: str) -> str:
-    """A number with its unit, four digits at most, in the SI prefix that suits it.
+    """Return a number with its unit in the SI prefix that suits it, with four digits at most.
 
     >>> print(engineering(1.203e-4, "m"), engineering(42e-3, "J/m^2"), engineering(4.55e-8, "m^2"))
     120.3 µm 42 mJ/m² 0.0455 mm²
@@ -53,7 +53,7 @@ def engineering(value: float, unit: str) -> str:
 
 
 def concise(mean: float, sem: float) -> str:
-    """A mean with its standard error in the last digits, as metrologists write it.
+    """Return a mean with its standard error in the last digits, as metrologists write it.
 
     Seven digits of the mean at most: a smaller error stays untold and leaves five. So without brackets
     there is no error, it is not known, or it is below half of the seventh digit.

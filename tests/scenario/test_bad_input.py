@@ -187,8 +187,8 @@ TOGETHER = [
 )
 def test_a_fault_is_reported_once_at_its_key_with_a_cure(refusal, cases):
     for old, new, key, words in cases:
-        found = refusal((old, new))
-        assert len(found) == 1 and agrees(found[0], key, words), (new, found)
+        problems = refusal((old, new))
+        assert len(problems) == 1 and agrees(problems[0], key, words), (new, problems)
 
 
 def test_all_faults_of_values_come_in_one_pass(refusal):

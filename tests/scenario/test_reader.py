@@ -147,8 +147,8 @@ def test_the_ends_of_a_range_may_have_different_units(scene):
 
 def test_several_keys_form_the_outer_product_the_last_fastest(scene):
     swept = scene('[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n"adhesion.bond_share" = [0, 0.5, 1]\n')
-    found = [(point.contact.load, point.adhesion.bond_share) for point in swept.points()]
-    assert found == list(itertools.product([1e-3, 2e-3], [0.0, 0.5, 1.0]))
+    result = [(point.contact.load, point.adhesion.bond_share) for point in swept.points()]
+    assert result == list(itertools.product([1e-3, 2e-3], [0.0, 0.5, 1.0]))
     assert [axis.keys for axis in swept.sweep] == [("contact.load",), ("adhesion.bond_share",)]
 
 
@@ -271,8 +271,8 @@ def fits(schema, node, value):
     kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
     allowed = node.get("type", [])
     allowed = [allowed] if isinstance(allowed, str) else allowed
-    named = [kinds[kind] for kind in allowed if kind != "null"]
-    if allowed and not any(isinstance(value, kind) for kind in named):
+    classes = [kinds[kind] for kind in allowed if kind != "null"]
+    if allowed and not any(isinstance(value, kind) for kind in classes):
         return False
     if isinstance(value, dict) and not set(node.get("required", ())) <= set(value):
         return False
@@ -305,9 +305,9 @@ def test_every_number_of_the_schema_says_its_meaning_and_unit():
             for inner in node:
                 yield from numbers(inner)
 
-    found = list(numbers(json_schema(Scenario)))
-    assert len(found) > 30
-    assert all(node["description"].endswith("]") and node["examples"] for node in found)
+    result = list(numbers(json_schema(Scenario)))
+    assert len(result) > 30
+    assert all(node["description"].endswith("]") and node["examples"] for node in result)
 
 
 def test_every_key_of_every_table_has_a_meaning():
@@ -340,15 +340,15 @@ def test_a_scenario_cannot_be_changed(scene):
 def test_points_of_a_sweep_share_the_tables_of_the_same_values_and_are_those_made_one_by_one(scene):
     loads, models = ["1 mN", "2 mN", "4 mN"], [{"model": "none"}, {"model": "steady", "critical_speed": 1, "stress": 1}]
     sweep = {"contact.load": loads, "bonds": models, "contact.after_pull_off": ["stop", "stay_open"]}
-    found = scene(overrides={"sweep": sweep})
-    points = found.points()
+    result = scene(overrides={"sweep": sweep})
+    points = result.points()
     values = [dict(zip(sweep, row, strict=True)) for row in itertools.product(*sweep.values())]
-    expected = [found.with_values(value) for value in values]
+    expected = [result.with_values(value) for value in values]
     assert points == expected
     assert [point.origin for point in points] == [point.origin for point in expected]
     assert points[0].contact is points[2].contact is not points[1].contact
     assert points[0].solid is points[-1].solid
-    assert all(one is other for one, other in zip(points, found.points(), strict=True))
+    assert all(one is other for one, other in zip(points, result.points(), strict=True))
     assert len(list(distinct(points))) == len(list(distinct(points[:1]))) + 5 + 1
 
 

@@ -76,13 +76,13 @@ def test_the_pieces_of_a_block_of_intervals_are_those_of_each(name):
 
 @pytest.mark.parametrize("name", COURSES)
 def test_a_course_is_cut_where_it_turns_or_jumps_and_nowhere_else(name):
-    turns, found = COURSES[name][1], pieces(name, 0.0, DURATION)
-    assert_allclose([piece.stop for piece in found], [*turns, DURATION], rtol=1e-15)
-    for piece in found:
+    turns, result = COURSES[name][1], pieces(name, 0.0, DURATION)
+    assert_allclose([piece.stop for piece in result], [*turns, DURATION], rtol=1e-15)
+    for piece in result:
         assert_allclose(piece.first, at(name, piece.start), rtol=1e-14)
         before = at(name, piece.stop - 1e-7)
         assert_allclose(piece.last, before, rtol=1e-5)
-    for before, after in itertools.pairwise(found):
+    for before, after in itertools.pairwise(result):
         assert before.stop == after.start
         assert (before.last == after.first) == (name != "table" or before.stop != 0.5)
 
@@ -103,7 +103,7 @@ def test_an_instant_is_one_piece_with_the_value_after_a_jump():
 def test_the_values_of_rows_are_their_own_and_sums_over_many_rows_are_rounded_once():
     random = np.random.default_rng(1)
     times, values = np.linspace(0.0, 1.0, 201), random.normal(size=201)
-    found = table_pieces(times, values, np.array([0.0, 0.3, 0.7, 1.0]), 1.0)
-    assert_array_equal(found.last, values[1:])
-    sums = [math.fsum(found.integral[found.interval == k]) for k in range(3)]
-    assert_array_equal(found.joined.integral, sums)
+    result = table_pieces(times, values, np.array([0.0, 0.3, 0.7, 1.0]), 1.0)
+    assert_array_equal(result.last, values[1:])
+    sums = [math.fsum(result.integral[result.interval == k]) for k in range(3)]
+    assert_array_equal(result.joined.integral, sums)
