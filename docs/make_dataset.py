@@ -4,7 +4,7 @@ import sys
 from collections.abc import Iterable
 from pathlib import Path
 
-from sim.ensemble.recorded import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, VARIABLES
+from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, LARGEST, MAP, NUMBERS, VARIABLES
 
 TARGET = Path(__file__).with_name("dataset.md")
 HEAD = """# The variables of a dataset

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from sim.ensemble.recorded import LARGEST, VARIABLES, Variable
+from sim.ensemble.variables import LARGEST, VARIABLES, Variable
 from sim.scenario.scenario import Scenario
 
 _GROUP = 256

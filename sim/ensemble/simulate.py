@@ -16,12 +16,10 @@ from typing import Any, cast
 import numpy as np
 
 from sim.engine import MemberNoise, State, Trajectory, follow
+from sim.ensemble.dataset import attributes, attributes_of, identity, in_memory, moments, outline, write
 from sim.ensemble.execute import compute
-from sim.ensemble.netcdf import attributes_of, in_memory, write
-from sim.ensemble.outline import attributes, identity, moments, outline
 from sim.ensemble.plan import Block, Plan, Task, snapshots
 from sim.ensemble.preview import fitting, refuse_full_disk
-from sim.ensemble.recorded import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.ensemble.store import (
     WHOLE,
     Arrays,
@@ -34,6 +32,7 @@ from sim.ensemble.store import (
     Unfinished,
     lock_of,
 )  # fmt: skip
+from sim.ensemble.variables import DISC_ENERGIES, LARGEST, MAP, VARIABLES, Variable
 from sim.laws.halfspace import cross_energy_of_map, disc_energy_of_map
 from sim.numerics.files import DiskFull, OutputExists, StoreTrouble, claim, explained
 from sim.numerics.grid import Lattice

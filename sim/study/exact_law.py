@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.special import gammainccinv, gammaincinv, ndtr
 
 from sim.engine import balance, march, trajectory_of
-from sim.ensemble.recorded import VARIABLES
+from sim.ensemble.variables import VARIABLES
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Bonding, Gammas, Motion, Motions
 from sim.parts.shear.bands import cell_pairs

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from sim.ensemble.outline import scenario_json
+from sim.ensemble.dataset import scenario_json
 from sim.numerics import files
 from sim.plots.style import in_units
 from sim.scenario.scenario import Scenario

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.ensemble.outline import variable_name
-from sim.ensemble.recorded import VARIABLES
+from sim.ensemble.dataset import variable_name
+from sim.ensemble.variables import VARIABLES
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import quantities
 from sim.units.errors import BadInput

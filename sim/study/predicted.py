@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from sim.engine import MemberNoise, Trajectory, balance, follow
 from sim.ensemble.plan import together
-from sim.ensemble.recorded import VARIABLES
+from sim.ensemble.variables import VARIABLES
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Motion
 from sim.scenario.scenario import Scenario

@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose
 from benchmarks.timing import child
 from sim import analysis
 from sim.ensemble import plan as plans, preview
-from sim.ensemble.outline import identity
+from sim.ensemble.dataset import identity
 from sim.ensemble.plan import Plan
 from sim.ensemble.preview import fitting, forecast, memory, remarks, size
 from sim.ensemble.simulate import run

@@ -9,7 +9,7 @@ import xarray as xr
 from helpers.scenes import scene
 from pydantic import TypeAdapter
 
-from sim.ensemble.outline import scenario_json
+from sim.ensemble.dataset import scenario_json
 from sim.ensemble.simulate import run
 from sim.parts.contact.models import Adhesion
 from sim.scenario.reader import load

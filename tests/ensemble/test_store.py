@@ -288,7 +288,7 @@ def test_a_run_that_replaces_an_output_and_is_stopped_goes_on_to_replace_it(tmp_
 def test_runs_of_an_older_version_are_named(tmp_path, monkeypatch):
     path = ensemble.run(sample(), tmp_path / "out.nc")
     with monkeypatch.context() as patched, pytest.raises(BadInput, match=r"made by sim .*: finish it there"):
-        patched.setattr("sim.ensemble.outline._version", lambda name: "9.9")
+        patched.setattr("sim.ensemble.dataset._version", lambda name: "9.9")
         ensemble.run(sample(), path, resume=True)
     for folder in ("old.nc.parts", "shards.nc.parts/1-of-2"):
         (tmp_path / folder).mkdir(parents=True)

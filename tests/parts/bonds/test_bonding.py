@@ -8,7 +8,7 @@ from helpers.scenes import BELL, BONDS, CONTACTS, CUT_OFF, SHEARS, STRETCHED, on
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.engine import march, trajectory_of
-from sim.ensemble.recorded import VARIABLES
+from sim.ensemble.variables import VARIABLES
 from sim.numerics.noise import Noise
 from sim.parts import drive
 from sim.parts.bonds import models as bonds

@@ -11,7 +11,7 @@ from helpers.scenes import BELL, BONDS, CELL, STRETCHED, one_step, scene
 from numpy.testing import assert_allclose
 
 from sim.engine import march, trajectory_of
-from sim.ensemble.recorded import VARIABLES
+from sim.ensemble.variables import VARIABLES
 from sim.laws.schallamach import bell_lives, bell_moments, start_up_force, start_up_peak
 from sim.numerics.noise import Noise
 from sim.parts import drive

@@ -11,7 +11,7 @@ from helpers.scenes import SHEARS, scene
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.engine import march, pack, trajectory_of
-from sim.ensemble.recorded import VARIABLES
+from sim.ensemble.variables import VARIABLES
 from sim.laws import jkr
 from sim.parts import drive
 from sim.parts.bonds import models as bonds

@@ -17,10 +17,10 @@ from numpy.testing import assert_allclose
 import sim
 from sim import cli
 from sim.engine import march, trajectory_of
-from sim.ensemble import netcdf, plan as plans, simulate as ensemble
-from sim.ensemble.outline import variable_name
+from sim.ensemble import dataset as datasets, plan as plans, simulate as ensemble
+from sim.ensemble.dataset import variable_name
 from sim.ensemble.plan import Plan
-from sim.ensemble.recorded import LARGEST, VARIABLES
+from sim.ensemble.variables import LARGEST, VARIABLES
 from sim.numerics.files import StoreTrouble
 from sim.parts.drive import READINGS
 from sim.parts.shear import models as shear
@@ -55,7 +55,7 @@ def test_every_variable_has_unit_and_long_name_and_stands_on_its_page():
     page = Path(__file__).parents[2].joinpath("docs", "dataset.md").read_text(encoding="utf-8")
     given = {variable_name(key) for key in quantities(scenario)}
     for name, variable in dataset.variables.items():
-        assert name in given or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.recorded"
+        assert name in given or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.variables"
         assert variable.attrs["long_name"], name
         assert "units" in variable.attrs or "flag_values" in variable.attrs, name
     assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}
@@ -73,7 +73,7 @@ def test_the_file_opens_lazily_and_equals_the_run_in_memory(tmp_path):
 
 def test_a_large_dataset_is_written_by_another_process_with_the_same_content(tmp_path, monkeypatch):
     path = ensemble.run(sample(), tmp_path / "small.nc")
-    monkeypatch.setattr(netcdf, "_IN_MEMORY", 0)
+    monkeypatch.setattr(datasets, "_IN_MEMORY", 0)
     with sim.open(path) as small, sim.open(ensemble.run(sample(), tmp_path / "large.nc")) as large:
         xr.testing.assert_identical(small, large)
 
@@ -196,7 +196,7 @@ def test_a_run_that_fails_leaves_the_older_output(tmp_path, monkeypatch):
     def broken(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(netcdf, "fill", broken)
+    monkeypatch.setattr(datasets, "_fill", broken)
     with pytest.raises(StoreTrouble, match="No space left"):
         ensemble.run(sample(seed=6), path, replace=True)
     assert path.read_bytes() == before

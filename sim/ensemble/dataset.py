@@ -1,0 +1,403 @@
+"""Dataset of a run: its variables with units and names, and a netCDF file that is written once all parts are stored.
+
+A file that HDF5 is still writing is lost when the run is killed; a renamed part is not.
+"""
+
+import concurrent.futures
+import contextlib
+import functools
+import hashlib
+import importlib.metadata
+import json
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import netCDF4
+import numpy as np
+from pydantic import TypeAdapter
+
+from sim.ensemble.execute import WorkerDied, pool
+from sim.ensemble.plan import Plan, part_name
+from sim.ensemble.store import Blocks
+from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
+from sim.numerics.files import HDF5
+from sim.numerics.grid import Lattice
+from sim.numerics.hdf5 import CHUNK_CACHE, Refused, opened, tables
+from sim.scenario.scenario import Scenario
+from sim.scenario.schema import quantities
+from sim.scenario.sweep import Axis, written
+
+#: A dataset of more bytes is not built in memory.
+_IN_MEMORY = 256 * 2**20
+#: Options of netCDF for each ``record.compression``. Six digits are within 5e-7: 20 bits and the leading one, rounded
+#: to nearest, so that flags stay flags and equal numbers stay equal.
+_ZLIB: dict[str, Any] = {"zlib": True, "complevel": 1, "shuffle": True}
+_DIGITS = _ZLIB | {"significant_digits": 20, "quantize_mode": "BitRound"}
+_PACKED: dict[str, dict[str, Any]] = {"none": {}, "zlib": _ZLIB, "digits": _DIGITS}
+_FLAGS = "detached in_contact"
+#: Version of a package, which is looked up in its files.
+_version = functools.cache(importlib.metadata.version)
+#: The auxiliary coordinate of all variables over time, if it is prescribed.
+SPEED = "speed"
+_STATISTICS = {
+    "mean": "ensemble mean of",
+    "std": "standard deviation over the ensemble of",
+    "sem": "standard error of the ensemble mean of",
+}
+
+
+class Described(NamedTuple):
+    """Description of one variable; ``values`` are None if the parts hold them."""
+
+    kind: Any
+    dimensions: tuple[str, ...]
+    attributes: dict[str, Any]
+    values: Any
+    chunks: tuple[int, ...] | None
+    compression: str
+
+
+class Place(NamedTuple):
+    """Variables of a quantity by statistic, "" for itself, and their axes: of members (``each``), of time."""
+
+    names: dict[str, str]
+    each: bool = True
+    timed: bool = True
+
+    def axes(self, piece: "Piece", rows: slice = slice(None)) -> tuple[int | slice, ...]:
+        """Return the index of the numbers of some members in a piece."""
+        return (*piece.where, *((rows,) if self.each else ()), *((piece.times,) if self.timed else ()))
+
+
+class Piece(NamedTuple):
+    """Parts of one block at some points of a sweep: index of the points, records, members and names of the parts."""
+
+    where: tuple[int | slice, ...]
+    times: slice
+    members: list[slice]
+    names: list[str]
+
+    def of_sweep(self, values: np.ndarray) -> np.ndarray:
+        """Return the values of a part, without the axis of points if nothing is swept."""
+        return values if self.where else values[0]
+
+
+@dataclass
+class Outline:
+    """Everything of a dataset but the numbers of the parts."""
+
+    sizes: dict[str, int] = field(default_factory=dict)
+    attributes: dict[str, Any] = field(default_factory=dict)
+    variables: dict[str, Described] = field(default_factory=dict)
+    places: dict[str, Place] = field(default_factory=dict)
+    pieces: list[Piece] = field(default_factory=list)
+
+    def add(
+        self, name: str, kind: Any, dimensions: tuple[str, ...], unit: str, long_name: str, symbol: str = "",
+        values: Any = None, chunks: tuple[int, ...] | None = None, compression: str = "zlib", **more: Any,
+    ) -> None:  # fmt: skip
+        """Add a variable; without ``values`` the parts hold them."""
+        attributes = {"units": unit, "long_name": long_name, "symbol": symbol} | more
+        attributes = {key: value for key, value in attributes.items() if not isinstance(value, str) or value}
+        self.variables[name] = Described(kind, dimensions, attributes, values, chunks, compression)
+
+
+def outline(plan: Plan) -> Outline:
+    """Return the dataset of a plan without the numbers of its parts."""
+    content = Outline(attributes=attributes(plan))
+    _add_dimensions(content, plan)
+    _add_numbers(content, plan)
+    for variable in plan.variables + plan.largest:
+        content.places[variable.name] = _add_recorded(content, plan, variable)
+    if plan.scenario.record.maps:
+        _add_maps(content, plan)
+    groups = plan.groups()
+    members = [slice(int(group[0]), int(group[-1]) + 1) for group in groups]
+    for pack in plan.packs:
+        where: tuple[int | slice, ...] = ()
+        if plan.scenario.sweep:
+            *outer, along = map(int, np.unravel_index(pack.start, _sweep_shape(plan)))
+            where = (*outer, slice(along, along + len(pack)))
+        for index, block in enumerate(plan.blocks(plan.points[pack.start])):
+            names = [part_name(pack.start, group, index) for group in range(len(groups))]
+            content.pieces.append(Piece(where, slice(block.records.start, block.records.stop), members, names))
+    return content
+
+
+def _sweep_names(plan: Plan) -> tuple[str, ...]:
+    return tuple(variable_name(axis.keys[0]) for axis in plan.scenario.sweep)
+
+
+def _sweep_shape(plan: Plan) -> tuple[int, ...]:
+    return tuple(len(axis.values) for axis in plan.scenario.sweep)
+
+
+def variable_name(key: str) -> str:
+    """Return the variable of a key of the scenario, swept or not, so that runs can be joined along any key."""
+    return key.replace(".", "_")
+
+
+def _add_dimensions(content: Outline, plan: Plan) -> None:
+    scene = plan.points[0]
+    for axis in plan.scenario.sweep:
+        content.sizes[variable_name(axis.keys[0])] = len(axis.values)
+        _add_sweep_coordinates(content, plan, axis)
+    if plan.per_member and any(map(plan.varies, plan.variables)):
+        content.sizes["member"] = plan.members
+        described = "1", "number of the ensemble member", "", np.arange(plan.members)
+        content.add("member", "i4", ("member",), *described, standard_name="realization")
+    content.sizes["t"] = scene.clock.records
+    content.add("t", "f8", ("t",), "s", "time since the start", "t", scene.clock.times)
+
+
+def _add_sweep_coordinates(content: Outline, plan: Plan, axis: Axis) -> None:
+    """Add the swept values as coordinates: numbers in SI, anything else as a label."""
+    place = plan.scenario.sweep.index(axis)
+    stride, along = math.prod(_sweep_shape(plan)[place + 1 :]), (variable_name(axis.keys[0]),)
+    points = [quantities(plan.points[i * stride]) for i in range(len(axis.values))]
+    for position, key in enumerate(axis.keys):
+        if all(key in numbers for numbers in points):
+            quantity = points[0][key][0]
+            described = quantity.unit, quantity.meaning, quantity.symbol, [numbers[key][1] for numbers in points]
+            content.add(variable_name(key), "f8", along, *described)
+        else:
+            labels = [_label(row[position]) for row in axis.values]
+            names = [label if labels.count(label) == 1 else f"{label} {i}" for i, label in enumerate(labels, 1)]
+            content.add(variable_name(key), str, along, "", f"swept {key}", "", np.array(names, object))
+
+
+def _label(value: Any) -> str:
+    if isinstance(value, dict):
+        return str(value.get("model") or json.dumps(value, sort_keys=True))
+    return str(value)
+
+
+def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
+    """Return the resolved scenario as canonical JSON: SI numbers throughout, and the sweep as in the scenario.
+
+    ``per_member`` is True if every member is recorded, for a scenario that leaves this to the size of the run.
+    """
+    dumped = TypeAdapter(Scenario).dump_python(scenario, by_alias=True, exclude={"source", "sweep"}, mode="json")
+    if per_member is not None:
+        dumped["record"]["per_member"] = per_member
+    sweep = {"sweep": written(scenario.sweep)} if scenario.sweep else {}
+    return json.dumps(dumped | sweep, sort_keys=True, default=str)
+
+
+def attributes(plan: Plan) -> dict[str, Any]:
+    """Return the global attributes: the scenario and the versions that ran it."""
+    scene, source = plan.scenario, plan.scenario.origin
+    resolved = scenario_json(scene, plan.per_member)
+    digest = hashlib.sha256(resolved.encode()).hexdigest()[:16]
+    versions = {name: _version(name) for name in ("numpy", "scipy", "numba")}
+    sim_version = _version("sliding-sim")
+    files = {n: {"sha256": hashlib.sha256(t.encode()).hexdigest(), "text": t} for n, t in source.files.items()}
+    return {
+        "Conventions": "CF-1.11",
+        "title": scene.name,
+        "source": f"sliding-sim {sim_version}, simulation of an adhesive sliding interface",
+        "history": f"sim run; scenario {digest}; {', '.join(f'{n} {version}' for n, version in versions.items())}",
+        "references": "N. Menga, G. Carbone, D. Dini, arXiv:1710.06506; J. Mech. Phys. Solids 112 (2018) 145 and"
+        " 133 (2019) 103744 (corrigendum)",
+        "scenario_toml": source.text,
+        "scenario_overrides": json.dumps(source.overrides, sort_keys=True, default=str),
+        "scenario_resolved": resolved,
+        "scenario_files": json.dumps(files, sort_keys=True),
+        "seed": str(scene.seed),
+        "members": np.int32(scene.ensemble.members),
+        "sim_version": sim_version,
+        **{f"{name}_version": version for name, version in versions.items()},
+    }
+
+
+def identity(attributes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what decides the numbers of a dataset, from its attributes: the scenario, its files, and the versions."""
+    if not (scenario := tables(attributes.get("scenario_resolved"))):
+        return {}
+    files = tables(attributes.get("scenario_files"))
+    digests = {name: entry.get("sha256") for name, entry in files.items() if isinstance(entry, dict)}
+    versions = {key.removesuffix("_version"): attributes[key] for key in attributes if key.endswith("_version")}
+    return {"scenario": scenario, "files": digests, "version": versions}
+
+
+def _add_numbers(content: Outline, plan: Plan) -> None:
+    """Add the numbers that all points have in common as 0-d variables, and derived numbers at each point."""
+    points = [quantities(point) for point in plan.points]
+    swept = {key for axis in plan.scenario.sweep for key in axis.keys}
+    for key, (quantity, value) in points[0].items():
+        if key not in swept and all(key in numbers and numbers[key][1] == value for numbers in points):
+            described = quantity.unit, quantity.meaning, quantity.symbol, value
+            content.add(variable_name(key), "f8", (), *described)
+    described_as = {number.name: (number.unit, number.long_name, number.symbol) for number in NUMBERS}
+    described_as |= {name: ("1", text, "") for name, text in KNOWN_ERRORS.items()}
+    derived: dict[str, list[float]] = {}
+    for point in plan.points:
+        numbers = {number.name: number.read(point) for number in NUMBERS if number.applies(point)}
+        for name, value in (numbers | point.process.known_errors()).items():
+            derived.setdefault(name, []).append(float(value))
+        point.release()
+    for name, values in derived.items():
+        if len(values) == len(plan.points):
+            array = np.reshape(values, _sweep_shape(plan))
+            content.add(name, "f8", _sweep_names(plan), *described_as[name], array)
+            if "error" in name:
+                content.attributes[name] = max(values, key=abs)
+
+
+def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
+    """Add the variables of a quantity that is recorded at each record, or once a run."""
+    shape, varies, whole = _sweep_shape(plan), plan.varies(recorded), recorded in plan.largest
+    each = varies and plan.per_member
+    dimensions = (*_sweep_names(plan), *(("member",) if each else ()), *(() if whole else ("t",)))
+    chunks = (
+        *((1,) * (len(shape) - 1) + (len(plan.packs[0]),) if shape else ()),
+        *((plan.group,) if each else ()),
+        max(1, plan.records_of_block(plan.points[0])),
+    )
+    prescribed = any(variable.name == SPEED and not plan.varies(variable) for variable in plan.variables)
+    names = {}
+    for statistic, of in (_STATISTICS if varies and not each else {"": ""}).items():
+        kind = "f4" if plan.scenario.record.precision == "float32" and not (statistic or whole) else "f8"
+        more: dict[str, Any] = {} if whole else {"compression": plan.scenario.record.compression}
+        if not whole and recorded.name != SPEED and prescribed:
+            more["coordinates"] = SPEED
+        if recorded.name == "in_contact" and not statistic:
+            kind, more = "i1", {"compression": more["compression"].replace("digits", "zlib")}
+            more |= {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
+        names[statistic] = "_".join(filter(None, (recorded.name, statistic)))
+        described = recorded.unit, f"{of} {recorded.long_name}".strip(), recorded.symbol
+        content.add(names[statistic], kind, dimensions, *described, None, None if whole else chunks, **more)
+    return Place(names, each, not whole)
+
+
+def _add_maps(content: Outline, plan: Plan) -> None:
+    """Add the variables of the stress maps."""
+    scene = plan.points[0]
+    lattice = cast(Lattice, scene.map_lattice)
+    count = min(scene.record.map_members, plan.members)
+    sizes = dict(zip("xy", lattice.shape, strict=True))
+    content.sizes |= {"map_member": count, "map_time": len(scene.record.maps)} | sizes
+    content.add("map_member", "i4", ("map_member",), "1", "member of a map", "", np.arange(count))
+    content.add("map_time", "f8", ("map_time",), "s", "time of a map", "t", sorted(scene.record.maps))
+    for axis, text, side in zip("xy", ("along", "across"), lattice.sides, strict=True):
+        positions = np.arange(sizes[axis]) * (side / sizes[axis])
+        content.add(axis, "f8", (axis,), "m", f"position {text} the sliding direction", axis, positions)
+    names = (*_sweep_names(plan), "map_member", "map_time", "x", "y")
+    content.add(MAP[0], "f8", names, *MAP[1:], None, (1,) * (len(names) - 2) + lattice.shape)
+    content.places[MAP[0]] = Place({"": MAP[0]})
+    for energy in DISC_ENERGIES if all(point.margin is not None for point in plan.points) else ():
+        content.add(energy[0], "f8", names[:-2], *energy[1:])
+        content.places[energy[0]] = Place({"": energy[0]})
+
+
+def in_memory(outline: Outline, parts: Blocks) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
+    """Return dimensions, values and attributes of each variable, by name."""
+    arrays = {}
+    for name, described in outline.variables.items():
+        shape = [outline.sizes[size] for size in described.dimensions]
+        arrays[name] = np.empty(shape, object if described.kind is str else described.kind)
+        if described.values is not None:
+            arrays[name][...] = described.values
+    _fill(outline, parts, arrays)
+    return {name: (each.dimensions, arrays[name], each.attributes) for name, each in outline.variables.items()}
+
+
+def write(outline: Outline, parts: Blocks, path: Path) -> None:
+    """Write the netCDF file: from memory at once, or if it is large part by part in a process that may crash by itself.
+
+    HDF5 crashes at some limits of the size of files if it writes part by part, and gives no reason for its trouble.
+    """
+    sizes = [math.prod(outline.sizes[size] for size in each.dimensions) for each in outline.variables.values()]
+    try:
+        if 8 * sum(sizes) <= _IN_MEMORY:
+            _write(outline, parts, path, diskless=True, persist=True)
+            return
+        executor = pool(1)
+        try:
+            executor.submit(_write, outline, parts, path).result()
+        except concurrent.futures.BrokenExecutor:
+            raise WorkerDied(f"the process that writes {path} died: the disk may be full, or memory short") from None
+        finally:
+            executor.shutdown(kill_workers=True)
+    except RuntimeError:
+        with path.open("ab") as file:  # which raises what HDF5 does not tell
+            file.write(bytes(2**20))
+        raise
+
+
+def _write(outline: Outline, parts: Blocks, path: Path, **how: Any) -> None:
+    with HDF5, netCDF4.Dataset(path, "w", format="NETCDF4", **how) as file:
+        for name, size in outline.sizes.items():
+            file.createDimension(name, size)
+        file.setncatts(outline.attributes)
+        _fill(outline, parts, {name: _variable(file, name, each) for name, each in outline.variables.items()})
+
+
+def _variable(file: netCDF4.Dataset, name: str, described: Described) -> netCDF4.Variable:
+    kind, dimensions, attributes, values, chunks, compression = described
+    packed = {"fletcher32": True, **_PACKED[compression]} if dimensions and kind is not str else {}
+    variable = file.createVariable(name, kind, dimensions, chunksizes=chunks, fill_value=False, **packed)
+    if chunks:
+        variable.set_var_chunk_cache(CHUNK_CACHE)
+    variable.setncatts(attributes)
+    if values is not None:
+        variable[...] = values
+    return variable
+
+
+def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None:
+    """Put the numbers of the parts into variables, or into arrays."""
+    for piece in outline.pieces:
+        pools: dict[str, list[np.ndarray]] = {}
+        for rows, part in zip(piece.members, piece.names, strict=True):
+            for key, values in parts.load(part).items():
+                name, _, snapshot = key.partition("@")
+                place = outline.places.get(name)
+                if place is None:
+                    continue
+                if snapshot:
+                    drawn = slice(rows.start, rows.start + values.shape[1])
+                    variables[name][(*piece.where, drawn, int(snapshot))] = piece.of_sweep(values)
+                elif "" in place.names:
+                    variables[name][place.axes(piece, rows)] = piece.of_sweep(values if place.each else values[:, 0])
+                else:
+                    pools.setdefault(name, []).append(np.moveaxis(values, 1, 0))
+        for name, groups in pools.items():
+            place = outline.places[name]
+            for statistic, values in pooled(groups).items():
+                variables[place.names[statistic]][place.axes(piece)] = piece.of_sweep(values)
+
+
+def moments(values: np.ndarray) -> np.ndarray:
+    """Return count, mean and sum of squared deviations over the first axis, shape (3, records) or (3,)."""
+    mean = np.ascontiguousarray(values.T).mean(axis=-1)
+    squares = np.ascontiguousarray(((values - mean) ** 2).T).sum(axis=-1)
+    return np.stack([np.full_like(mean, len(values)), mean, squares])
+
+
+def pooled(groups: list[np.ndarray]) -> dict[str, np.ndarray]:
+    """Return mean, standard deviation and standard error from the ``moments`` of groups, pooled in their order."""
+    count, mean, squares = groups[0]
+    for other, other_mean, other_squares in groups[1:]:
+        total, step = count + other, other_mean - mean
+        mean = mean + step * other / total
+        squares = squares + other_squares + step**2 * count * other / total
+        count = total
+    with np.errstate(invalid="ignore", divide="ignore"):
+        deviation = np.sqrt(squares / (count - 1.0))
+    return {"mean": mean, "std": deviation, "sem": deviation / np.sqrt(count)}
+
+
+def attributes_of(path: Path) -> dict[str, Any]:
+    """Return the global attributes of a netCDF file; none if it is no such file or is not read."""
+    # of a reader in another thread; without xarray there is none
+    reading = getattr(sys.modules.get("xarray.backends.netCDF4_"), "NETCDF4_PYTHON_LOCK", contextlib.nullcontext())
+    try:
+        with HDF5, reading, opened(path) as file:
+            return {name: file.getncattr(name) for name in file.ncattrs()}
+    except (OSError, RuntimeError, Refused):
+        return {}
