@@ -5,9 +5,8 @@ from typing import Any
 
 import numpy as np
 
-import sim
 from benchmarks import bonds_plain
-from benchmarks.scenes import COUNTED, lens, steady
+from benchmarks.scenes import steady
 from benchmarks.timing import Bench, Beside, Row
 from sim.laws.schallamach import bell_stress, transition_probabilities
 from sim.numerics.noise import Noise
@@ -30,15 +29,10 @@ def population(part: Any, members: int, steps: int, speed: float, step: float) -
 
 
 def counted(bench: Bench) -> list[Row]:
-    """10⁴ bonds, 100 members, 100 steps; and 1000 members through whole runs."""
+    """10⁴ bonds, 100 members, 100 steps."""
     sites, members, steps = bench.of((10_000, 100, 100), (50, 3, 4))
     random = np.random.default_rng(1)
     stay, bind = transition_probabilities(SPEED * STEP, STEP, SPEED, RATE)
-
-    def gillespie(members: int, goal: float) -> Beside:
-        """A step of all members at once, event by event."""
-        bound, known = np.full(members, sites // 2), (sites, 1.0, RATE, STEP, random)
-        return Beside("numpy, Gillespie", lambda: bonds_plain.counted_gillespie_numpy(bound, *known), members, goal)
 
     def binomials() -> None:
         bound = np.full(members, sites // 2)
@@ -46,24 +40,12 @@ def counted(bench: Bench) -> list[Row]:
             bound = random.binomial(bound, stay) + random.binomial(sites - bound, bind)
 
     part = bonds.Counted(critical_speed=SPEED, rebinding_rate=RATE, sites=sites)
-    rows = bench.compare(
+    return bench.compare(
         "counted, 10⁴ bonds: 100 members × 100 steps",
         population(part, members, steps, SPEED, STEP),
-        gillespie(members, 500),
         Beside("numpy's Generator.binomial", binomials, steps * members, goal=1.1, bound=True),
         share=steps * members,
     )
-    many, long = bench.of((1000, 1000), (3, 10))
-    drive, counting = {"model": "steady", "speed": "10 mm/s"}, COUNTED | {"sites": sites}
-    scene = sim.load(lens(many, long, long // 10, drive=drive, bonds=counting))
-    rows += bench.compare(
-        "counted, 10⁴ bonds: `sim.run` in memory, 1000 members × 1000 steps, 11 records",
-        lambda: sim.run(scene),
-        gillespie(many, 300),
-        share=many * long,
-        turns=7,
-    )
-    return rows
 
 
 def stepped(shape: tuple[int, ...], step: float, count: int) -> Callable[[], None]:
@@ -95,11 +77,11 @@ def tracked(bench: Bench) -> list[Row]:
     ):
         steps, per_output = bench.of(steps, 5), round(step / fine)
         ours, theirs = population(part, members, steps, BELL_SPEED, step), stepped((members, sites), fine, per_output)
-        said = "numpy in the same steps" if per_output == 1 else f"numpy, {per_output} steps to each"
+        label = "numpy in the same steps" if per_output == 1 else f"numpy, {per_output} steps to each"
         rows += bench.compare(
             f"tracked, 20 members of 10⁴ bonds, {name}",
             ours,
-            Beside(said, theirs, goal=goal, errors=errors(ours(), fine)),
+            Beside(label, theirs, goal=goal, errors=errors(ours(), fine)),
             Beside(
                 "compiled renewals (numba)",
                 lambda steps=steps, step=step: bonds_plain.renewal(

@@ -63,26 +63,6 @@ def renewal(sites, outputs, step, speed, rate, softness, rebinding_rate, seed):
     return sums
 
 
-def counted_gillespie_numpy(bound, sites, speed_ratio, rebinding_rate, duration, random):
-    """Numbers of bound sites after a time, by Gillespie's algorithm on all members at once.
-
-    A free site binds with the rate h, a bound one breaks with h V/Vc. Each turn lets one event happen in
-    every member that is not done yet.
-    """
-    bound, time = bound.copy(), np.zeros(len(bound))
-    active = np.arange(len(bound))
-    while active.size:
-        number = bound[active]
-        bind = rebinding_rate * (sites - number)
-        total = bind + rebinding_rate * speed_ratio * number
-        time[active] += random.standard_exponential(active.size) / total
-        going = time[active] < duration
-        binds = random.random(active.size) * total < bind
-        bound[active] += np.where(going, np.where(binds, 1, -1), 0)
-        active = active[going]
-    return bound
-
-
 def pulled_slider(times, stiffness, speed, method, tolerance):
     """Positions of a massless slider that a spring pulls over bonds under Bell's rupture, by scipy's ``solve_ivp``.
 

@@ -142,7 +142,7 @@ def interval(ratios: list[float], confidence: float = 0.95) -> tuple[float, floa
 
 
 def slower(ratios: list[float]) -> bool:
-    """Whether the new tree is slower: a median below 0.95, and all of its interval below 1."""
+    """True if the new tree is slower: a median below 0.95, and all of its interval below 1."""
     return float(np.median(ratios)) < 0.95 and interval(ratios)[1] < 1.0
 
 
@@ -176,7 +176,7 @@ def main() -> None:
     old, new, *rows = sys.argv[1:]
     began, failed = time.time(), False
     for row, pairs in measured(Path(old).resolve(), Path(new).resolve(), tuple(rows) or ROWS).items():
-        ratios = [one / two for one, two in pairs]
+        ratios = [first / second for first, second in pairs]
         low, high = interval(ratios)
         failed |= slower(ratios)
         seconds = " ".join(f"{value:9.2e} s" for value in np.median(pairs, axis=0))

@@ -1,4 +1,4 @@
-"""Rows of the contact radius: laws for arrays, and a contact on a disc."""
+"""Rows of the contact radius: laws for arrays."""
 
 from collections.abc import Callable
 
@@ -6,8 +6,7 @@ import mpmath
 import numpy as np
 
 from benchmarks import contact_plain as plain
-from benchmarks.scenes import RAMP, RATE, field, followed, lens
-from benchmarks.timing import Bench, Beside, Row, absolute, spent
+from benchmarks.timing import Bench, Beside, Row
 from sim.laws import jkr
 
 SPHERE_RADIUS, MODULUS = 2e-3, 6.4e6
@@ -18,11 +17,11 @@ def error(radii: np.ndarray, exact: Callable, states: tuple[np.ndarray, ...], so
     chosen = np.flatnonzero((states[-1] > 0) & np.isfinite(radii))[:some]
     with mpmath.workdps(50):
         known = [exact(*(state[i] for state in states), SPHERE_RADIUS, MODULUS) for i in chosen]
-        return f"{max(float(abs(radii[i] / one - 1)) for i, one in zip(chosen, known, strict=True)):.0e}"
+        return f"{max(float(abs(radii[i] / value - 1)) for i, value in zip(chosen, known, strict=True)):.0e}"
 
 
 def radii(bench: Bench) -> list[Row]:
-    """JKR's radii at a load, at an indentation and behind stiffnesses around the contact's own."""
+    """JKR's radii at a load and behind stiffnesses around the contact's own."""
     rows, random, count = [], np.random.default_rng(1), bench.of(100_000, 20)
     work, load = random.uniform(-1e-3, 42e-3, count), random.uniform(-1e-4, 4e-3, count)
     depth, stiffness = random.uniform(-1e-6, 8e-6, count), 10 ** random.uniform(1, 4, count)
@@ -30,25 +29,13 @@ def radii(bench: Bench) -> list[Row]:
     for name, ours, theirs, exact, states, beside, goal in (
         ("at a load", jkr.radius_at_load, plain.radius_at_load, plain.exact_radius_at_load, (load, work),
          "numpy, closed form", 1.5),
-        ("at an indentation", jkr.radius_at_indentation, plain.radius_at_indentation,
-         plain.exact_radius_at_indentation, (depth, work), "numpy, Newton", 4.0),
         ("behind a stiffness", jkr.radius_at_displacement, plain.radius_by_newton, plain.exact_radius,
          (depth, stiffness, work), "numpy, Newton", 3.5),
     ):  # fmt: skip
-        both = [error(one(*states, *known), exact, states, bench.of(200, 5)) for one in (ours, theirs)]
+        errors = [error(law(*states, *known), exact, states, bench.of(200, 5)) for law in (ours, theirs)]
         rows += bench.compare(
             f"`laws.jkr` {name}, 10⁵ radii",
             lambda ours=ours, states=states: ours(*states, *known),
-            Beside(beside, lambda one=theirs, states=states: one(*states, *known), goal=goal, errors="; ".join(both)),
+            Beside(beside, lambda law=theirs, states=states: law(*states, *known), goal=goal, errors="; ".join(errors)),
         )
     return rows
-
-
-def disc(bench: Bench) -> list[Row]:
-    """A step of a contact that pays for waves by its finite size."""
-    members, steps = bench.of((64, 1000), (2, 4))
-    shear = field("banded", bench.of(512, 64), contact="disc")
-    program = followed(lens(members, steps, drive=RAMP, bonds=RATE, shear=shear))
-    program()
-    times = [1e6 * spent(program) / (members * steps) for _ in range(bench.of(5, 1))]
-    return [absolute("a contact of finite size (`disc`), 64 members: a member-step of a run", times, "µs", 5.0)]

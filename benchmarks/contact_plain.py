@@ -47,21 +47,6 @@ def radius_by_newton(displacement, stiffness, work, sphere_radius, modulus):
     return x * x
 
 
-def radius_at_indentation(indentation, work, sphere_radius, modulus):
-    """Newton's method on x⁴/R − √(2π w/E*) x = δ, x the square root of the radius, from the right of the root."""
-    c4, c1 = 1 / sphere_radius, np.sqrt(2 * np.pi * np.maximum(work, 0.0) / modulus)
-    x = np.maximum(sphere_radius * indentation, 0.0) ** 0.25 + np.cbrt(c1 * sphere_radius)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        for _ in range(60):
-            cube = c4 * x * x * x
-            slope = 4 * cube - c1
-            move = (x * (cube - c1) - indentation) / slope
-            x = np.where(slope > 0, x - move, np.nan)
-            if not np.any(move > 1e-15 * x):
-                break
-    return x * x
-
-
 def exact_radius(displacement, stiffness, work, sphere_radius, modulus):
     """The radius to fifty digits, by Newton's method from the right."""
     displacement, stiffness, work, sphere_radius, modulus = map(
@@ -82,8 +67,3 @@ def exact_radius_at_load(load, work, sphere_radius, modulus):
     load, work, sphere_radius, modulus = map(mpmath.mpf, map(float, (load, work, sphere_radius, modulus)))
     pull = 3 * mpmath.pi * work * sphere_radius
     return mpmath.cbrt(3 * sphere_radius / (4 * modulus) * (load + pull + mpmath.sqrt(pull * (2 * load + pull))))
-
-
-def exact_radius_at_indentation(indentation, work, sphere_radius, modulus):
-    """The same at an indentation."""
-    return exact_radius(indentation, mpmath.inf, work, sphere_radius, modulus)

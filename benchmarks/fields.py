@@ -1,6 +1,5 @@
 """Rows of the fluctuating shear stress: banded, modal, mapped, and the energy of a given field."""
 
-import itertools
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -10,12 +9,9 @@ from scipy import fft
 
 import sim
 from benchmarks import plain
-from benchmarks.scenes import RAMP, RATE, field, followed, lens, steady
+from benchmarks.scenes import RAMP, RATE, field, followed, lens
 from benchmarks.timing import Bench, Beside, Row
 from sim.engine import MemberNoise, follow, start
-from sim.laws.halfspace import surface_energy
-from sim.numerics.noise import Noise
-from sim.parts.exchange import Bonding
 from sim.spectrum.families import SelfAffine
 
 CELL, SHEAR_MODULUS, EXPONENT = 0.24e-3, 1.6e6, 0.1
@@ -23,7 +19,7 @@ TEXTBOOK, HALF = "numpy, noise by rfft2", "numpy, only pairs with power drawn"
 
 
 def known(points: int) -> tuple[int, float, Callable]:
-    """What the programs of numpy need: the grid, its cell, and the spectrum's density."""
+    """Return the arguments of the programs of numpy: the grid, its cell, and the spectrum's density."""
     spectrum = SelfAffine(rms=100e3, hurst=0.8, longest=60e-6, rolloff=24e-6, shortest=512e-6 / points)
     return points, CELL, spectrum.radial_density
 
@@ -58,31 +54,7 @@ def banded(bench: Bench) -> list[Row]:
                 share=members * steps,
                 turns=7,
             )
-    return [*rows, *bands(bench)]
-
-
-def bands(bench: Bench) -> list[Row]:
-    """The bands alone, beside the random numbers that they need."""
-    members, steps = bench.of((64, 1000), (2, 5))
-    shear = field("banded", bench.of(512, 64), tolerance=0.01)
-    process = sim.load(lens(members, steps, drive=RAMP, bonds=RATE, shear=shear)).process
-    noise = Noise(1, "shear", np.arange(members))
-    first, motions = steady(EXPONENT * 5e-6 / 1e-3, 1e-3, steps)
-    still = Bonding(np.ones(1), np.zeros(1), np.zeros(1))
-    began = process.start(first, still, noise)
-    shapes = np.tile(process.shapes, (steps * members, 1))
-    generator = np.random.Generator(np.random.SFC64(1))
-
-    def numbers() -> None:
-        generator.standard_normal(shapes.shape)
-        generator.standard_gamma(shapes)
-
-    return bench.compare(
-        "banded at 1 %, 512²: the steps alone",
-        lambda: process.advance(began, motions, still, noise),
-        Beside("numpy's normals and gammas alone", numbers, steps * members, goal=1.0),
-        share=steps * members,
-    )
+    return rows
 
 
 def modal(bench: Bench) -> list[Row]:
@@ -100,14 +72,14 @@ def mapped(bench: Bench) -> list[Row]:
     rows = []
     for points, goal in ((512, 2.0), (1024, 1.5)):
         size = bench.of(points, 32)
-        one = sim.load(lens(1, 1000, drive=RAMP, bonds=RATE, shear=field("mapped", size)))
+        scene = sim.load(lens(1, 1000, drive=RAMP, bonds=RATE, shear=field("mapped", size)))
         noise = MemberNoise.of(1, np.arange(1))
-        states = [start(one, noise)]
+        states = [start(scene, noise)]
 
-        def step(one=one, noise=noise, states=states) -> None:
-            before = states[0] if states[0].step < 1000 else start(one, noise)
-            states[0], _ = follow(one, noise, before, range(before.step + 1, before.step + 2))
-            one.process.maps(states[0].shear, states[0].drive.position, 1)
+        def step(scene=scene, noise=noise, states=states) -> None:
+            before = states[0] if states[0].step < 1000 else start(scene, noise)
+            states[0], _ = follow(scene, noise, before, range(before.step + 1, before.step + 2))
+            scene.process.maps(states[0].shear, states[0].drive.position, 1)
 
         textbook = plain.TextbookModes(*known(size), SHEAR_MODULUS, 1)
         half = plain.HalfSpectrumMap(*known(size), 1)
@@ -118,31 +90,5 @@ def mapped(bench: Bench) -> list[Row]:
             Beside(f"{TEXTBOOK}, scipy's irfft2", lambda of=textbook: of.map(EXPONENT), goal=goal),
             Beside("numpy, half spectrum drawn, scipy's irfft2", lambda of=half: of.map(EXPONENT)),
             Beside("scipy's irfft2 alone", lambda still=still: fft.irfft2(still), bound=True),
-        )
-    return rows
-
-
-def energy(bench: Bench) -> list[Row]:
-    """ΔΓ of a given field, and of several at once."""
-    rows, random = [], np.random.default_rng(1)
-    for points in (512, 1024):
-        size = bench.of(points, 32)
-        fields, weights = random.standard_normal((8, size, size)), plain.energy_weights(size, CELL, SHEAR_MODULUS)
-        turn = itertools.cycle(fields)
-
-        def ours(turn=turn) -> None:
-            surface_energy(next(turn), CELL, SHEAR_MODULUS)
-
-        rows += bench.compare(
-            f"`surface_energy` of a field, {points}²",
-            ours,
-            Beside("scipy's rfft2 alone", lambda turn=turn: fft.rfft2(next(turn)), goal=1.25, bound=True),
-            Beside("scipy's rfft2 and numpy", lambda turn=turn, w=weights: plain.surface_energy(next(turn), w)),
-        )
-        rows += bench.compare(
-            f"`surface_energy` of 8 fields at once, {points}², each",
-            lambda fields=fields: surface_energy(fields, CELL, SHEAR_MODULUS),
-            Beside("a field alone", ours, goal=1.05, bound=True),
-            share=8,
         )
     return rows

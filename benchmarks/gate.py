@@ -28,15 +28,8 @@ for name, scene in json.load(sys.stdin).items():
     np.savez(name, **{key: array for key, array in values.items() if array.dtype.kind in "biuf"})
 """
 SPEEDS = {"model": "table", "time": [0, 3e-3, 3e-3, 20e-3], "speed": [1e-3, 1e-3, 2e-2, 0]}
-HEAVY = SPRING | {
-    "stage": {"from": 1e-2, "to": -1e-2, "cycles": 1},
-    "start": "rest",
-    "start_after": 1e-3,
-    "mass": 1e-4,
-    "damping": 0.1,
-    "viscosity": 1e5,
-    "contact_stiffness": "rigid",
-}
+TURNING = {"stage": {"from": 1e-2, "to": -1e-2, "cycles": 1}, "start": "rest", "start_after": 1e-3}
+HEAVY = SPRING | TURNING | {"mass": 1e-4, "damping": 0.1, "viscosity": 1e5, "contact_stiffness": "rigid"}
 CREEP = {"model": "force", "force": {"from": 0.0, "to": 3e-3}, "damping": 0.1, "contact_stiffness": "rigid"}
 
 CONSTANT = {"model": "constant", "rate": 200.0}

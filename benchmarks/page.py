@@ -19,9 +19,7 @@ user of numpy and scipy would write for the same work, or beside a step that no 
 - **Goals** for fields are meant beside the textbook's program, which makes its noise by a transform; a leaner one,
   which draws no number that it does not need, stands in the next row without a goal.
 - **Errors**, ours first: of the third cumulant of ΔΓ for bands, of the friction for bonds, of the position (over the
-  largest) for sliders, of the radius for
-  contacts. Where none are given, both answers are exact to rounding or follow the same law without an error of the
-  step.
+  largest) for sliders, of the radius for contacts. No error is given if both programs are exact to rounding.
 - Memory that a program has freed stays with its process, for ours and the others alike: else the system's time for
   new pages decides between them. `sim` as a command runs as it does for a user.
 
@@ -62,11 +60,11 @@ def result(row: Row) -> str:
     """The result in words."""
     low, middle, high = row.result
     if row.kind == "faster" and middle < 1.0:
-        low, middle, high, said = 1.0 / high, 1.0 / middle, 1.0 / low, "times slower"
+        low, middle, high, words = 1.0 / high, 1.0 / middle, 1.0 / low, "times slower"
     else:
-        said = {"faster": "times faster", "as long": "times as long"}.get(row.kind, row.kind)
+        words = {"faster": "times faster", "as long": "times as long"}.get(row.kind, row.kind)
     spread = "" if low == middle == high else f"({number(low)} to {number(high)})"
-    return " ".join(filter(None, (number(middle), said, spread)))
+    return " ".join(filter(None, (number(middle), words, spread)))
 
 
 def number(value: float) -> str:

@@ -20,12 +20,6 @@ def energy_weights(points, cell, shear_modulus):
     return 0.5 * columns * (1 + (qy / q) ** 2) / (2 * shear_modulus * q) / points**4
 
 
-def surface_energy(field, weights):
-    """Elastic energy per area of a periodic shear-stress map [J/m²]."""
-    modes = fft.rfft2(field)
-    return np.sum(weights * (modes.real**2 + modes.imag**2))
-
-
 class TextbookModes:
     """An Ornstein-Uhlenbeck stress field on an n × n grid, as the textbooks give it, and its energy.
 

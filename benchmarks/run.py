@@ -28,8 +28,8 @@ ENVIRONMENT |= {"MALLOC_TRIM_THRESHOLD_": "1000000000", "MALLOC_MMAP_THRESHOLD_"
 GROUPS: dict[str, Callable[[Bench], list[Row]]] = {
     group.__name__: group
     for group in (
-        fields.banded, whole.large, fields.modal, fields.mapped, fields.energy, bonds.counted, bonds.tracked,
-        bonds.cohorts, spring.spring, contact.radii, contact.disc, whole.commands, whole.first, whole.gallery,
+        fields.banded, fields.modal, fields.mapped, bonds.counted, bonds.tracked,
+        bonds.cohorts, spring.spring, contact.radii, whole.commands, whole.first, whole.gallery,
         whole.statistics,
     )
 }  # fmt: skip
@@ -42,15 +42,15 @@ def main() -> None:
     chosen = [] if sys.argv[1:] == ["--write"] else sys.argv[1:] or list(GROUPS)
     if unknown := set(chosen) - set(GROUPS):
         sys.exit(f"no group {', '.join(sorted(unknown))}; there are {', '.join(GROUPS)}")
-    kept = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
+    results = json.loads(RESULTS.read_text(encoding="utf-8")) if RESULTS.exists() else {}
     for name in chosen:
         rows = [row.stored for row in GROUPS[name](Bench())]
         for row in rows:
             print(*page.cells(Row(**row)), sep=" | ", flush=True)
-        kept[name] = {"date": str(datetime.date.today()), "machine": machine(), "rows": rows}
-        kept = {group: kept[group] for group in GROUPS if group in kept}
-        RESULTS.write_text(json.dumps(kept, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
-    PAGE.write_text(page.text(kept), encoding="utf-8")
+        results[name] = {"date": str(datetime.date.today()), "machine": machine(), "rows": rows}
+        results = {group: results[group] for group in GROUPS if group in results}
+        RESULTS.write_text(json.dumps(results, ensure_ascii=False, indent=1) + "\n", encoding="utf-8")
+    PAGE.write_text(page.text(results), encoding="utf-8")
 
 
 def machine() -> str:

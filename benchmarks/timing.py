@@ -49,7 +49,7 @@ class Row:
 
     @property
     def met(self) -> bool | None:
-        """Whether the median reaches the goal, if there is one."""
+        """True if the median reaches the goal; None without a goal."""
         if self.goal is None:
             return None
         return self.result[1] >= self.goal if self.kind == "faster" else self.result[1] <= self.goal
@@ -80,8 +80,8 @@ class Beside(NamedTuple):
     errors: str = ""
 
 
-def told(program: Callable[[], float], times: int = 1) -> float:
-    """CPU seconds of some calls of a program that says them itself."""
+def self_timed(program: Callable[[], float], times: int = 1) -> float:
+    """Return the CPU seconds of some calls of a program that measures itself."""
     return sum(program() for _ in range(times))
 
 
@@ -95,7 +95,7 @@ def spent(program: Callable[[], object], times: int = 1) -> float:
 
 @dataclass(frozen=True)
 class Bench:
-    """How thoroughly to time; ``quick`` calls each program once, at small sizes: its numbers mean nothing."""
+    """Thoroughness of timing; ``quick`` calls each program once, at small sizes: its numbers mean nothing."""
 
     quick: bool = False
 
@@ -109,13 +109,10 @@ class Bench:
     ) -> list[Row]:  # fmt: skip
         """Rows of a program beside others; in each turn all are timed, after two calls of each that do not count."""
         programs = [Beside(ours, program, share), *others]
-        repeats = [1 if self.quick else self._repeats(one.program, clock) for one in programs]
-        mine, *theirs = np.transpose(
-            [
-                [clock(one.program, count) / count / one.share for one, count in zip(programs, repeats, strict=True)]
-                for _ in range(self.of(turns, 1))
-            ]
-        )
+        repeats = [1 if self.quick else self._repeats(other.program, clock) for other in programs]
+        pairs = list(zip(programs, repeats, strict=True))
+        times = [[clock(p.program, n) / n / p.share for p, n in pairs] for _ in range(self.of(turns, 1))]
+        mine, *theirs = np.transpose(times)
         rows = []
         for other, times in zip(others, theirs, strict=True):
             kind, ratios = ("as long", mine / times) if other.bound else ("faster", times / mine)

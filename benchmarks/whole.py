@@ -6,17 +6,17 @@ from pathlib import Path
 import numpy as np
 
 import sim
-from benchmarks.scenes import BANDED, RAMP, RATE, field, lens, tiled, written
-from benchmarks.timing import Bench, Beside, Row, absolute, middle, told
+from benchmarks.scenes import BANDED, RATE, lens, tiled
+from benchmarks.timing import Bench, Beside, Row, absolute, middle, self_timed
 
-#: What a command cannot do without now, and what else none could in 0.1.0, when the goals were set.
-CHECKED, OLDER = "tomllib, click, numpy, numba, pydantic", ", scipy.special, pint"
+#: Modules that a command cannot do without.
+CHECKED = "tomllib, click, numpy, numba, pydantic, scipy.special, pint"
 STARTER = str(Path(sim.__file__).parent / "starter.toml")
 GALLERY = Path(__file__).parent.parent / "scenarios"
 
 
 def commands(bench: Bench) -> list[Row]:
-    """The starter scene by three commands, kernels being in the cache, beside the import of what each must have."""
+    """The starter scene by three commands, kernels being in the cache, beside the import of the modules of each."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
         for words, modules, goal in (
@@ -28,15 +28,9 @@ def commands(bench: Bench) -> list[Row]:
             rows += bench.compare(
                 f"`sim {' '.join(words)}` of the starter scene",
                 lambda words=words, output=output: bench.command(words[0], STARTER, *words[1:], *output)[0],
-                Beside(
-                    f"import {modules}{OLDER}",
-                    lambda modules=modules: bench.python(f"import {modules + OLDER}"),
-                    goal=goal,
-                    bound=True,
-                ),
-                Beside(f"import {modules}", lambda modules=modules: bench.python(f"import {modules}"), bound=True),
+                Beside(f"import {modules}", lambda m=modules: bench.python(f"import {m}"), goal=goal, bound=True),
                 turns=9,
-                clock=told,
+                clock=self_timed,
             )
     return rows
 
@@ -55,31 +49,14 @@ def gallery(bench: Bench) -> list[Row]:
     """All scenes of the gallery."""
     scenes, times = sorted(GALLERY.glob("*.toml"))[bench.of(0, -1) :], {}
     with tempfile.TemporaryDirectory() as folder:
-        for one in scenes:
-            turns = [
-                bench.command("run", str(one), "-o", f"{folder}/x.nc", "--force", "-j", "1")
-                for _ in range(bench.of(3, 1))
-            ]
-            times[one.stem] = [seconds for seconds, _ in turns]
+        for path in scenes:
+            arguments = "run", str(path), "-o", f"{folder}/x.nc", "--force", "-j", "1"
+            turns = [bench.command(*arguments) for _ in range(bench.of(3, 1))]
+            times[path.stem] = [cpu for cpu, _ in turns]
     slowest = max(times, key=lambda name: np.median(times[name]))
-    others = ", ".join(f"{name} {np.median(one):.1f}" for name, one in times.items() if name != slowest)
+    others = ", ".join(f"{name} {np.median(seconds):.1f}" for name, seconds in times.items() if name != slowest)
     beside = f"this is {slowest}; the others [s]: {others}"
     return [absolute("`sim run` of the gallery's slowest scene", times[slowest], "s", 5.0, beside)]
-
-
-def large(bench: Bench) -> list[Row]:
-    """10⁷ member-steps of a banded 512² cell, with its start, into a file."""
-    members, steps = bench.of((1000, 10_000), (2, 20))
-    with tempfile.TemporaryDirectory() as folder:
-        shear = field("banded", bench.of(512, 64), tolerance=0.01)
-        path = written(lens(members, steps, 10, drive=RAMP, bonds=RATE, shear=shear), Path(folder) / "large.toml")
-        arguments = "run", str(path), "-o", f"{folder}/x.nc", "--force", "-j", "1"
-        seconds, megabytes = zip(*(bench.command(*arguments) for _ in range(bench.of(3, 1))), strict=True)
-    name = "`sim run`, banded at 1 %, 512²: 10⁷ member-steps, 1001 records"
-    return [
-        absolute(f"{name}: time", list(seconds), "s", 10.0),
-        absolute(f"{name}: peak memory", list(megabytes), "MB", 500.0),
-    ]
 
 
 def statistics(bench: Bench) -> list[Row]:
