@@ -50,7 +50,7 @@ class RuptureRate(NamedTuple):
         return self.rate + self.catch
 
     def at(self, stretch: Array) -> Array:
-        """Rupture rate of bonds of a stretch [m] below any limit [1/s]."""
+        """Return the rupture rate of bonds of a stretch [m] below any limit [1/s]."""
         size = np.abs(stretch)
         return self.rate * np.exp(size * self.softness) + self.catch * np.exp(-size * self.relief)
 
@@ -68,44 +68,38 @@ class RuptureRate(NamedTuple):
 class _Law:
     """Attributes of all rupture laws.
 
-    ``depends_on_stretch``: the rupture does, by a limit or below it. ``separable``: ∫k dt of a bond is a factor of its
-    own times a clock common to all, on which the first moment and tracked bonds rest.
+    ``depends_on_stretch``: true if the rupture depends on the stretch, by a limit or below it. ``separable``: true if
+    ∫k dt of a bond is a factor of the bond times a clock common to all, as the first moment and tracked bonds need.
+    A subclass gives ``law``, its numbers for bonds of a stiffness [N/m], and ``closed_form``: share bound [1], mean
+    force [N] and mean square force [N²] per site in steady sliding at speeds [m/s].
     """
 
     depends_on_stretch: ClassVar[bool] = True
     separable: ClassVar[bool] = True
 
-    def law(self, bond_stiffness: float) -> RuptureRate:
-        """Numbers of this law for bonds of a stiffness [N/m]."""
-        raise NotImplementedError
-
-    def closed_form(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> SiteMoments:
-        """Share bound [1], mean force [N] and mean square force [N²] per site in steady sliding at speeds [m/s]."""
-        raise NotImplementedError
-
     def first_moment_excess(self, bond_stiffness: float, rebinding_rate: float) -> float:
-        """Relative error of the friction maximum if every bond is taken at the mean stretch [1]."""
+        """Return the relative error of the friction maximum if every bond has the mean stretch [1]."""
         return 0.0
 
     def first_moment_onset(
         self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
     ) -> Onset:
-        """Onset of oscillations behind a spring at speeds [m/s], as of the law ``first_moment_onset``."""
+        """Return the onset of oscillations behind a spring at speeds [m/s], as the law ``first_moment_onset``."""
         return Onset(*np.full((2, *speed.shape), np.nan))
 
     def first_moment_amplitude(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> Array:
-        """Growth of the oscillations beyond their onset at speeds [m/s], as of the law ``first_moment_amplitude``."""
+        """Return the growth of oscillations beyond their onset at speeds [m/s], as ``first_moment_amplitude``."""
         return np.full(speed.shape, np.nan)
 
     @property
     def pathways(self) -> list[tuple[float, float]]:
-        """Pathways of rupture as of the law ``resolved_onset``; none where force opens nothing."""
+        """Pathways of rupture as of the law ``resolved_onset``; none if force opens no pathway."""
         return []
 
     def resolved_onset(
         self, speed: Array, bond_stiffness: float, rebinding_rate: float, site_density: float, body: Body
     ) -> Onset:
-        """Onset of oscillations behind a spring of bonds resolved by stretch, as of the law ``resolved_onset``."""
+        """Return the onset of oscillations behind a spring of bonds resolved by stretch, as ``resolved_onset``."""
         if not self.pathways:
             return Onset(*np.full((2, *speed.shape), np.nan))
         return resolved_onset(speed, self.pathways, bond_stiffness, rebinding_rate, site_density, body)
@@ -217,7 +211,7 @@ Rupture = Annotated[Constant | Bell | CutOff | Catch, Field(discriminator="model
 
 @device
 def rate_at(stretch, law):
-    """Rupture rate of a bond of a stretch below any limit under a ``RuptureRate``."""
+    """Return the rupture rate of a bond of a stretch below any limit under a ``RuptureRate``."""
     rate, softness, _, catch, relief = law
     size = math.fabs(stretch)
     return rate * exp(size * softness) + catch * exp(-size * relief)
@@ -225,7 +219,7 @@ def rate_at(stretch, law):
 
 @device
 def rupture_integral(stretch, slip, duration, rate, softness):
-    """∫k dt of a bond whose stretch x goes from ``stretch`` by ``slip`` at constant speed, of any sign.
+    """Return ∫k dt of a bond whose stretch x goes from ``stretch`` by ``slip`` at constant speed, of any sign.
 
     The rate is ``rate`` × e^(\\|x\\| ``softness``), the softness of either sign.
 
@@ -249,9 +243,9 @@ def rupture_integral(stretch, slip, duration, rate, softness):
 
 @device
 def time_to_rupture(stretch, speed, threshold, rate, softness, limit):
-    """Time after which ∫k dt has reached ``threshold`` or the stretch its limit, at constant ``speed`` of any sign.
+    """Return the time after which ∫k dt has reached ``threshold`` or the stretch its limit, at constant ``speed``.
 
-    Infinite where neither ever happens.
+    The speed has any sign. The time is infinite if neither ever happens.
     """
     pace = math.fabs(speed) * softness
     size = math.fabs(stretch) * softness
@@ -274,7 +268,7 @@ def time_to_rupture(stretch, speed, threshold, rate, softness, limit):
 
 @device
 def hazard_integral(stretch, slip, duration, law):
-    """∫k dt of a bond under a ``RuptureRate`` whose stretch goes from ``stretch`` by ``slip`` at constant speed."""
+    """Return ∫k dt under a ``RuptureRate`` of a bond whose stretch goes from ``stretch`` by ``slip``."""
     rate, softness, _, catch, relief = law
     slipping = rupture_integral(stretch, slip, duration, rate, softness)
     return slipping + rupture_integral(stretch, slip, duration, catch, -relief) if catch > 0.0 else slipping
@@ -282,7 +276,7 @@ def hazard_integral(stretch, slip, duration, law):
 
 @device
 def fresh_integral(age, speed, law):
-    """∫k dt of a bond born unstretched, up to an ``age``; its analytic continuation at a negative age."""
+    """Return ∫k dt of a bond born unstretched, up to an ``age``; its analytic continuation at a negative age."""
     rate, softness, _, catch, relief = law
     change = math.fabs(speed) * softness * age
     slipping = rate * age * (math.expm1(change) / change if change != 0.0 else 1.0)
@@ -294,14 +288,14 @@ def fresh_integral(age, speed, law):
 
 @device
 def growth(stretch, slip, law):
-    """Factor by which ∫k dt of a bond exceeds that of a fresh one over any motion along ``slip``; 0 where none does."""
+    """Return ∫k dt of a bond over that of a fresh one for any motion along ``slip``; 0 if there is no such factor."""
     along = stretch * slip >= 0.0 and law[3] == 0.0
     return exp(min(math.fabs(stretch) * law[1], 690.0)) if along else 0.0
 
 
 @device
 def hazard_time(stretch, speed, threshold, law):
-    """Time after which ∫k dt has reached ``threshold`` or the stretch its limit, at constant ``speed`` of any sign.
+    """Return the time after which ∫k dt has reached ``threshold`` or the stretch its limit, at constant ``speed``.
 
     With a catch pathway by Newton's method within a bracket; the slip pathway alone takes longer.
     """

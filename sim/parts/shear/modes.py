@@ -3,7 +3,7 @@
 A pair ±q stands for the pixel (2π/L)² of the wavevector plane around its lattice point. Its
 variance is the spectrum *integrated* over that pixel. So a cell's field has the spectrum's
 variance but for the pixel of q = 0, even if the spectrum ends inside a pixel. Nothing is
-renormalised; ``error_variance`` and ``error_energy`` are the variance and energy that the cell lacks.
+renormalised; ``Modes.errors`` gives the variance and energy that the cell lacks.
 
 The fluctuations that bonds make have a frozen part and one that the bonds' lives renew. Sites are fixed on the slider.
 Their mean force f̄ makes a pattern that never changes but in size, with the power n f̄². The deviations of the forces
@@ -78,24 +78,20 @@ class Modes:
         """
         return 0.5 * compliance(self.qx, self.qy, shear_modulus, poisson_ratio) * self.variance
 
-    @functools.cached_property
-    def error_variance(self) -> float:
-        """Relative error of the cell's variance against the spectrum's own."""
-        return _relative(float(np.sum(self.variance)), self.spectrum.variance)
+    def errors(self, shear_modulus: float = 1.0, poisson_ratio: float = 0.5) -> dict[str, float]:
+        """Return the relative errors of the cell against the infinite plane, and the spreads of one realisation.
 
-    def error_energy(self, shear_modulus: float = 1.0, poisson_ratio: float = 0.5) -> float:
-        """Return the relative error of the cell's mean ΔΓ against the infinite plane's, for any modulus the same."""
-        total = float(np.sum(self.energies(shear_modulus, poisson_ratio)))
-        return _relative(total, float(self.spectrum.surface_energy(shear_modulus, poisson_ratio)))
-
-    @functools.cached_property
-    def variance_spread(self) -> float:
-        """Expected relative standard deviation of one realisation's mean square, Gaussian amplitudes."""
-        return _spread(self.variance)
-
-    def energy_spread(self, poisson_ratio: float = 0.5) -> float:
-        """Return the expected relative standard deviation of one realisation's ΔΓ, Gaussian amplitudes."""
-        return _spread(self.energies(1.0, poisson_ratio))
+        The errors are those of the variance and of the mean ΔΓ. The spreads are the expected relative standard
+        deviations of the mean square and of ΔΓ for Gaussian amplitudes.
+        """
+        energy = float(np.sum(self.energies(shear_modulus, poisson_ratio)))
+        infinite = float(self.spectrum.surface_energy(shear_modulus, poisson_ratio))
+        return {
+            "cell_error_variance": _relative(float(np.sum(self.variance)), self.spectrum.variance),
+            "cell_error_energy": _relative(energy, infinite),
+            "member_spread_variance": _spread(self.variance),
+            "member_spread_energy": _spread(self.energies(1.0, poisson_ratio)),
+        }
 
 
 def _relative(value: float, exact: float) -> float:
@@ -140,7 +136,7 @@ def modes(spectrum: Family, cell: float, points: int | None = None) -> Modes:
     >>> from sim.spectrum import Band, Ripple
     >>> modes(Ripple(2.0, 1.0), cell=4.0).variance.tolist()
     [2.0]
-    >>> print(f"{abs(modes(Band(1.0, longest=2.0, shortest=0.5), cell=4.0).error_variance):.9f}")
+    >>> print(f"{abs(modes(Band(1.0, longest=2.0, shortest=0.5), 4.0).errors()['cell_error_variance']):.9f}")
     0.000000000
     """
     if not (math.isfinite(cell) and cell > 0.0):
@@ -320,13 +316,7 @@ class ModalProcess(Renewing):
         return Gammas(2.0 * self.weights, np.ones(self.pairs), self.wavenumber)
 
     def known_errors(self) -> dict[str, float]:
-        """Return the errors of the cell against the infinite plane, and the spreads of one realisation."""
-        return {
-            "cell_error_variance": self.modes.error_variance,
-            "cell_error_energy": self.modes.error_energy(self.shear_modulus, self.poisson_ratio),
-            "member_spread_variance": self.modes.variance_spread,
-            "member_spread_energy": self.modes.energy_spread(self.poisson_ratio),
-        }
+        return self.modes.errors(self.shear_modulus, self.poisson_ratio)
 
 
 class FixedProcess(ModalProcess):
