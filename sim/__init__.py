@@ -116,9 +116,9 @@ def open(path: Path) -> "xarray.Dataset":
     BadInput
         If there is no such file, or it is none of our datasets.
     """
-    from sim.analysis import scene
+    from sim.analysis import dataset
 
-    return scene.open(path)
+    return dataset.open(path)
 
 
 def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None) -> "pandas.DataFrame":
@@ -126,7 +126,7 @@ def stats(dataset: "xarray.Dataset | Path", where: dict[str, Any] | None = None)
 
     ``where`` gives values of swept keys, ``{"contact.load": "4 mN"}``.
     """
-    from sim.analysis.long_table import frame
+    from sim.analysis.tables import frame
 
     return _plainly(frame, dataset, where)
 

@@ -248,7 +248,7 @@ def stats(output: Path, chosen: tuple[str, ...], whole: bool, csv: Path | None, 
 
     with _opened(output, chosen) as dataset:
         if csv is not None:
-            analysis.scene.claim(dataset, output, csv, force)
+            analysis.dataset.claim(dataset, output, csv, force)
             analysis.to_csv(dataset, csv)  # before any printing, as nobody may read it to its end
         _print_tables(*_tables(dataset, sys.maxsize if whole else _ROWS))
         if csv is not None:
@@ -325,10 +325,10 @@ def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
     """A dataset of ours, at chosen values of its sweep, or one message."""
     _import_xarray()
     from sim import analysis
-    from sim.analysis import scene
+    from sim.analysis.dataset import lacking, open as opened
 
-    with scene.open(path) as dataset:
-        if message := scene.lacking(dataset):
+    with opened(path) as dataset:
+        if message := lacking(dataset):
             say(f"note: {path}: {message}", err=True)
         yield analysis.where(dataset, _values(chosen, "--where"))
 

@@ -6,17 +6,28 @@ broken bonds, whether adhesion is masked); *events* come once in a run (when it 
 peak); ``summary`` turns both into statistics over the members.
 """
 
-from sim.analysis.correlation import IntegralTime, correlation_time, integral_time
-from sim.analysis.events import events, loop_energy, peaks
-from sim.analysis.lifetimes import Lifetime, first_passage, lifetime
-from sim.analysis.long_table import tidy, to_csv
+from sim.analysis.dataset import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
+from sim.analysis.events import events, loop_energy, peaks, slip_sizes, slips, stick_slip
 from sim.analysis.observables import bond_work, observables, reference_radii, settled, share_observables
 from sim.analysis.over_speed import crossing, loss_speeds, speed_curves
-from sim.analysis.scene import Control, control, is_stationary, is_steady, setting, speed_of, sweep_dims
-from sim.analysis.stationary import distribution, over_time
-from sim.analysis.statistics import QUANTILES, averaging, shares, skewness_error, statistics, summary, where
-from sim.analysis.stick_slip import slip_sizes, slips, stick_slip
-from sim.analysis.tables import highlights, losses, notes, spread, table
+from sim.analysis.statistics import (
+    QUANTILES,
+    IntegralTime,
+    Lifetime,
+    averaging,
+    correlation_time,
+    distribution,
+    first_passage,
+    integral_time,
+    lifetime,
+    over_time,
+    shares,
+    skewness_error,
+    statistics,
+    summary,
+    where,
+)
+from sim.analysis.tables import highlights, losses, notes, spread, table, tidy, to_csv
 from sim.units.notation import concise, engineering, scaled
 
 __all__ = [

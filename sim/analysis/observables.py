@@ -11,7 +11,7 @@ from collections.abc import Collection
 import numpy as np
 import xarray as xr
 
-from sim.analysis.scene import (
+from sim.analysis.dataset import (
     MEMBERS,
     answered,
     control,

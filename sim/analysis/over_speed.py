@@ -7,8 +7,7 @@ import numpy as np
 import xarray as xr
 from scipy import special
 
-from sim.analysis.observables import observables, reference_radii
-from sim.analysis.scene import (
+from sim.analysis.dataset import (
     MEMBERS,
     answered,
     in_pieces,
@@ -20,8 +19,8 @@ from sim.analysis.scene import (
     sweep_dims,
     with_trajectories,
 )
-from sim.analysis.stationary import of_second_half
-from sim.analysis.statistics import LEVEL, over_members
+from sim.analysis.observables import observables, reference_radii
+from sim.analysis.statistics import LEVEL, of_second_half, over_members
 
 #: Shares of JKR's area whose loss has a speed.
 LOSSES = (0.05, 0.5)

@@ -1,28 +1,251 @@
-"""Statistics over the members of an ensemble, at each time and sweep value."""
+"""Statistics over members at each time, over members and stationary time, of lifetimes, and correlation times."""
 
-from collections.abc import Collection, Mapping
-from typing import Any
+import math
+import warnings
+from collections.abc import Collection, Iterator, Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 import xarray as xr
 from scipy import special
 
-from sim.analysis.correlation import correlation_time
+from sim.analysis.dataset import MEMBERS, in_pieces, is_stationary, plain, steady_points, sweep_dims
 from sim.analysis.events import events
 from sim.analysis.observables import (
     KEPT,
+    all_observables,
     charges,
     chosen_observables,
     observables,
+    ordered,
     pure,
     reference_radii,
     restricted,
+    settled,
     share_observables,
 )
-from sim.analysis.scene import MEMBERS, in_pieces, sweep_dims
 from sim.units.errors import BadInput
 from sim.units.notation import engineering
 from sim.units.quantity import read_option
+
+#: How many correlation times the autocorrelation is summed over: what is cut off is e^-6 of it.
+_WINDOW = 6.0
+#: Records that a correlation time must span: Simpson's rule is then right to (1/2)^4/180, 0.03 %.
+_FEWEST = 2.0
+#: How many of its standard errors the correlation of neighbouring records is below that of ``_FEWEST``.
+_SURELY = 4.0
+#: Numbers that are transformed at once, values that a correlation time is taken from, and records apart at most.
+_AT_ONCE, _VALUES, _LAGS = 2**19, 2**22, 2**16
+
+
+class IntegralTime(NamedTuple):
+    """An integral correlation time and its standard error [s]; if records are too coarse, what it is below [s]."""
+
+    time: float
+    sem: float
+    below: float = math.nan
+
+
+_NOTHING = IntegralTime(math.nan, math.nan)
+
+
+def integral_time(values: np.ndarray, step: float) -> IntegralTime:
+    """Integral correlation time of stationary trajectories: the integral of the autocorrelation.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        Independent members of one process.
+    step : float
+        Time between records [s].
+
+    Returns
+    -------
+    IntegralTime
+        In seconds. nan where nothing fluctuates, where the run is shorter than the window (run longer, or
+        with more members), and where the time spans less than two records, so that no sum over records
+        is right: then ``below`` is two records, if the records show it beyond their noise (record more often).
+
+    Notes
+    -----
+    The autocovariance is averaged over members and times, of the deviations from the ensemble mean
+    at each time (unbiased; for a single member from its own mean in time). Its integral is summed up to
+    the smallest W at which ``W step >= 6 T(W)`` (A. Sokal, Monte Carlo Methods in Statistical Mechanics,
+    1997), which leaves out e^-6 of an exponential memory, by Simpson's rule, which adds (step/T)^4/180 of it
+    (the trapezoidal rule would add (step/T)^2/12). The standard error ``T sqrt(2 (2W + 1)/n)``, n the number
+    of free values, is Madras and Sokal's for a Gaussian process (J. Stat. Phys. 50 (1988) 109).
+
+    Examples
+    --------
+    Values that forget a fifth from one record to the next, ``exp(-1/T) = 0.8``:
+
+    >>> rng = np.random.default_rng(5)
+    >>> x = np.zeros((64, 4000))
+    >>> for k in range(1, 4000):
+    ...     x[:, k] = 0.8 * x[:, k - 1] + rng.normal(size=64)
+    >>> time, sem, _ = integral_time(x, step=1.0)
+    >>> print(f"{-1 / math.log(0.8):.2f} {abs(time - 4.48) < 5 * sem} {sem < 0.1}")
+    4.48 True True
+
+    Every tenth record tells only that the time is shorter than two of them:
+
+    >>> integral_time(x[:, ::10], step=10.0)
+    IntegralTime(time=nan, sem=nan, below=20.0)
+    """
+    members, records = values.shape
+    if records < 2 or not np.all(np.isfinite(values)):
+        return _NOTHING
+    return time_of(autocovariance(values), members, records, step, max(values.max(), -values.min()))
+
+
+def time_of(covariance: np.ndarray, members: int, records: int, step: float, largest: float) -> IntegralTime:
+    """The ``integral_time`` of an autocovariance of so many members, whose values are as large as ``largest``."""
+    free, lags = max(members - 1, 1), np.arange(len(covariance))
+    if records < 2 or not covariance[0] > (1e-10 * largest) ** 2:
+        return _NOTHING
+    correlation = covariance / covariance[0]
+    coarse = math.exp(-1.0 / _FEWEST)
+    if correlation[1] < coarse:
+        sure = correlation[1] < coarse - _SURELY / math.sqrt(free * records)
+        return IntegralTime(math.nan, math.nan, _FEWEST * step if sure else math.nan)
+    weights = np.where(lags % 2, 4.0, 2.0) / 3.0
+    weights[0] /= 2.0
+    sums = np.cumsum(weights * correlation)
+    windows = np.flatnonzero(lags >= _WINDOW * sums)
+    if len(windows) == 0:
+        return _NOTHING
+    window = int(windows[0])
+    time = step * float(sums[window])
+    return IntegralTime(time, time * math.sqrt(2.0 * (2.0 * window + 1.0) / (free * records)))
+
+
+def members_for_memory(members: int, records: int) -> int:
+    """Return the number of members that are enough for a correlation time."""
+    return min(members, max(2, _VALUES // records))
+
+
+def autocovariance(values: np.ndarray) -> np.ndarray:
+    """Covariance of records by the number of records between them, averaged over members and times.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        Independent members of one process. Deviations are those from the ensemble mean at each record, of a single
+        member from its own mean in time; and one member less counts as free.
+    """
+    members = len(values)
+    mean = values.mean(axis=0) if members > 1 else values.mean()
+    return covariance_of(values, mean, max(members - 1.0, 1.0))
+
+
+def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> np.ndarray:
+    """Return the mean product of deviations by the number of records between them.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        Series; of long ones no more than 65,536 records between two are looked at.
+    mean : float or array, shape (records,)
+        Value from which deviations are taken.
+    free : float
+        Number of independent series.
+    """
+    members, records = values.shape
+    lags = min(records, _LAGS)
+    length = scipy.fft.next_fast_len(lags, real=True)
+    power, rows = np.zeros((2, length + 1), complex), max(1, _AT_ONCE // (2 * length))
+    mean = np.broadcast_to(mean, records)
+    for first in range(0, members, rows):
+        before = None
+        for start in range(0, records, length):  # stretches; each with itself and with the one before
+            stretch = slice(start, start + length)
+            spectrum = scipy.fft.rfft(values[first : first + rows, stretch] - mean[stretch], 2 * length)
+            power[0] += np.sum(spectrum.real**2 + spectrum.imag**2, axis=0)
+            if before is not None:
+                power[1] += np.sum(spectrum * before.conj(), axis=0)
+            before = spectrum
+    total = power[0] + (-1.0) ** np.arange(length + 1) * power[1]  # the second is half the length later
+    return scipy.fft.irfft(total, 2 * length)[:lags] / (free * np.arange(records, records - lags, -1))
+
+
+class Inflation(NamedTuple):
+    """How many records tell as much as one free value, and of how many free values the estimate of that is."""
+
+    records: float
+    freedom: float
+
+
+def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
+    """Variance of a mean over correlated records, in that of a mean over as many independent ones.
+
+    Parameters
+    ----------
+    covariance : array
+        As of ``autocovariance``.
+    members, records : int
+        Of how many members and records it is.
+
+    Returns
+    -------
+    Inflation
+        ``1 + 2 sum of the autocorrelation`` over records up to Sokal's window (see ``integral_time``), and the degrees
+        of freedom of a variance that is estimated with it, ``n/(2W + 1)``; nan where there is no window.
+
+    Notes
+    -----
+    Of a single series the sum is corrected for the deviations being from its own mean (U. Wolff, Comput. Phys. Commun.
+    156 (2004) 143).
+    """
+    if not covariance[0] > 0.0:
+        return Inflation(math.nan, math.nan)
+    sums = 2.0 * np.cumsum(covariance / covariance[0]) - 1.0
+    windows = np.flatnonzero(np.arange(len(sums)) >= 0.5 * _WINDOW * sums)
+    if len(windows) == 0:
+        return Inflation(math.nan, math.nan)
+    window, free = int(windows[0]), max(members - 1, 1)
+    wide = (2.0 * window + 1.0) / records
+    found = max(float(sums[window]), 1.0 / records) * (1.0 + wide if members == 1 else 1.0)
+    return Inflation(found, free / wide)
+
+
+def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
+    """Integral correlation time of the fluctuation energy ΔΓ(t) at each point of the sweep.
+
+    Defined only for a stationary process: nan wherever the speed changes during the run, and where
+    ``integral_time`` gives none.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``correlation_time``, ``correlation_time_sem`` and, where records are too coarse for a number,
+        ``correlation_time_below`` [s] with the sweep's dimensions.
+    """
+    energy = dataset.get("fluctuation_energy")
+    times = [xr.full_like(dataset["contact_modulus"], math.nan) for _ in range(3)]
+    if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
+        step = float(dataset["t"][1] - dataset["t"][0])
+        energy = energy.isel({MEMBERS: slice(members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"]))})
+        all_points = steady_points(dataset).broadcast_like(dataset["contact_modulus"])
+        steady = all_points.transpose(*sweep_dims(dataset)).to_numpy()
+        for point in np.ndindex(steady.shape):
+            if steady[point]:
+                values = energy.isel(dict(zip(sweep_dims(dataset), point, strict=True))).to_numpy()
+                found_here = integral_time(values.astype(float, copy=False), step)
+                for each, number in zip(times, found_here, strict=True):
+                    each[point] = number
+    about = "integral correlation time of the fluctuation energy"
+    texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"what the {about} is below"}
+    found = xr.Dataset()
+    for (suffix, text), numbers in zip(texts.items(), times, strict=True):
+        found[f"correlation_time{suffix}"] = numbers
+        found[f"correlation_time{suffix}"].attrs = {"units": "s", "long_name": text}
+    found["correlation_time"].attrs["symbol"] = "t_c"
+    return found
+
+
+# --- members, at each time and sweep value ---
+
 
 QUANTILES = (0.05, 0.5, 0.95)
 
@@ -323,3 +546,407 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
     share_observables(dataset.isel(t=[0]))  # where they are not known it says why
     lost = in_pieces(restricted(dataset, ["lost_to_bonds"]), ("t",), lambda piece: summary(charges(piece)))
     return lost.merge(radii).assign(area_ratio_hertz=ratio)
+
+
+# --- members and the second half of a stationary run ---
+
+
+#: From so many members on the spread of their means gives the error, whatever the correlation in time.
+_MANY = 16
+#: Records of the second half at which the displacement of a slider is read.
+_PLACES = 256
+_LEVELS = np.array(QUANTILES)
+
+
+def _shares(
+    spreads: np.ndarray, errors: np.ndarray, freedoms: np.ndarray, surely: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shares of the values between which those under a quantile of the law are.
+
+    They are those of as many free values as have the error of the share of values under it, of fewer where that error
+    is not well known. There are none where the mean, which is first in each array, has too few free values for any:
+    twice as few where they are estimated by the autocorrelation, which sees a tail seldom.
+    """
+    wider = errors * special.stdtrit(freedoms, 0.5 + 0.5 * LEVEL) / special.ndtri(0.5 + 0.5 * LEVEL)
+    with np.errstate(divide="ignore", invalid="ignore"):  # what does not spread is known without end
+        count = np.fmin(spreads**2 / wider**2, 1e12)
+    none = np.isnan(quantile_ranks(surely * count[0], _LEVELS)[0])
+    low, high = np.where(none, np.nan, quantile_ranks(count[1:], _LEVELS)) / (count[1:] - 1.0)
+    return low, high
+
+
+def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str, Any]:
+    """Statistics of a stationary observable over members and records together.
+
+    Parameters
+    ----------
+    values : array, shape (members, records)
+        nan where there is none.
+    step : float
+        Time between records [s].
+    name : str
+        Of the observable; ``"fraction_detached"`` and ``"fraction_masked"`` are shares.
+
+    Returns
+    -------
+    dict
+        ``mean``, ``sem``, ``low`` and ``high`` (95 % interval of the mean), ``std``, ``skewness``, ``quantile``,
+        ``quantile_low`` and ``quantile_high`` (three each), ``effective_samples``: so many independent values tell
+        as much of the mean, and ``correlation_time`` with ``correlation_time_sem`` [s], see ``integral_time``. What is
+        not known is nan, as the errors of a single run that is shorter than its memory.
+
+    Notes
+    -----
+    The error of the mean is that of the members' means in time; of fewer than 16 members that from the autocorrelation,
+    summed over Sokal's window, where it has more degrees of freedom. The interval is Student's. The share of values
+    under a quantile has such an error, too, and as many free values as have it tell between which order statistics the
+    quantile is. Quantiles are exact.
+
+    Examples
+    --------
+    A series of 2000 values that forget a tenth from one to the next tells as much as about a hundred:
+
+    >>> rng = np.random.default_rng(3)
+    >>> x = np.zeros((1, 2000))
+    >>> for k in range(1, 2000):
+    ...     x[:, k] = 0.9 * x[:, k - 1] + rng.normal(size=1)
+    >>> found = over_time(x)
+    >>> print(50 < found["effective_samples"] < 200, found["low"] < 0.0 < found["high"])
+    True True
+    """
+    found = _over_time(values[np.newaxis], step, name, True)
+    return {kind: numbers[0] if kind.startswith("quantile") else float(numbers[0]) for kind, numbers in found.items()}
+
+
+def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict[str, np.ndarray]:
+    """Return the statistics of ``over_time`` at each point of a sweep, of values of shape (points, members, records).
+
+    An observable that does not ``differ`` between members has no error.
+    """
+    points, members, _ = values.shape
+    known = np.isfinite(values)
+    counts = known.sum(axis=-1, dtype=float)
+    total, whole = counts.sum(axis=-1), known.all(axis=(1, 2))
+    if not whole.all():
+        values = np.where(known, values, np.nan)
+    ordered = np.sort(values.reshape(points, -1), axis=-1)  # nan last
+    levels = values_at_ranks(ordered, _LEVELS * (total[:, np.newaxis] - 1.0))
+    with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there is nothing, or no spread
+        means = _sum(values) / counts
+        mean = np.nansum(means, axis=-1) / np.isfinite(means).sum(axis=-1)
+        deviations = values - mean[:, np.newaxis, np.newaxis]
+        cubes = _sum(deviations**3).sum(axis=-1)
+        np.square(deviations, out=deviations)
+        spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
+        below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
+        del deviations, known
+        memory = [_memory(*each, step, members) for each in zip(values, levels, mean, whole, strict=True)]
+        inflated, times = (np.array(each) for each in zip(*memory, strict=True))
+        spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
+        errors, freedoms = _errors(np.array([means, *below]), spreads, np.moveaxis(inflated, -1, 0), total)
+        low, high = interval(name, mean, errors[0], freedoms[0] + 1.0)
+        skewness = np.where(spread > 1e-12 * abs(mean), cubes / total / spread**3, np.nan)
+        effective = np.where(errors[0] > 1e-12 * abs(mean), (spread / errors[0]) ** 2, np.nan)
+    ends = np.tile(_LEVELS, (2, points, 1))
+    if differ:
+        shares = (
+            _shares(*each, 1.0 if members >= _MANY else 0.5)
+            for each in zip(spreads.T, errors.T, freedoms.T, strict=True)
+        )
+        ends = np.stack(list(shares), axis=1)
+    else:
+        errors[0], low, high = 0.0, mean, mean
+    result = {"mean": mean, "std": spread, "sem": errors[0], "low": low, "high": high}
+    result |= {"skewness": skewness, "effective_samples": effective}
+    if whole.any():
+        result |= {"correlation_time": times[:, 0], "correlation_time_sem": times[:, 1]}
+    ranks = ends * (total[:, np.newaxis] - 1.0)
+    ranks[~((ends >= 0.0) & (ends <= 1.0))] = np.nan
+    return result | {
+        "quantile": levels, "quantile_low": values_at_ranks(ordered, ranks[0]),
+        "quantile_high": values_at_ranks(ordered, ranks[1]),
+    }  # fmt: skip
+
+
+def _sum(values: np.ndarray) -> np.ndarray:
+    """Return the sum over the last axis of the values that are not nan."""
+    sums = values.sum(axis=-1)
+    return sums if np.isfinite(sums).all() else np.nansum(values, axis=-1)
+
+
+def _memory(
+    values: np.ndarray, levels: np.ndarray, mean: float, whole: bool, step: float, members: int
+) -> tuple[np.ndarray, tuple[float, float]]:
+    """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
+
+    nan if values are missing, and of many members, whose means give the errors.
+    """
+    inflated = np.full((2, 1 + len(levels)), np.nan)
+    if not whole:
+        return inflated, (np.nan, np.nan)
+    records, free = values.shape[-1], max(members - 1, 1)
+    some = members if members < _MANY else members_for_memory(members, records)
+    common = values.mean(axis=0) if members > 1 else mean
+    covariance = covariance_of(values[:some], common, some * free / members)
+    if members < _MANY:
+        inflated[:, 0] = inflation(covariance, members, records)
+        for k, (level, share) in enumerate(zip(levels, _LEVELS, strict=True)):
+            flags = (values <= level).astype(float)
+            if members > 1:
+                flag_covariance = autocovariance(flags)
+            else:
+                flag_covariance = covariance_of(flags, share, 1.0) - (flags.mean() - share) ** 2
+            inflated[:, 1 + k] = inflation(flag_covariance, members, records)
+    time = time_of(covariance, some, records, step, float(np.max(np.abs(values))))
+    return inflated, (time.time, time.sem)
+
+
+def _errors(
+    means: np.ndarray, spreads: np.ndarray, inflated: np.ndarray, count: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return standard errors of means and their degrees of freedom, from the members' means or the autocorrelation.
+
+    Parameters
+    ----------
+    means : array, shape (quantities, points, members)
+    spreads : array, shape (quantities, points)
+    inflated : array, shape (quantities, points, 2)
+        See ``Inflation``.
+    count : array, shape (points,)
+        Number of values.
+    """
+    known, (records, freedom) = np.isfinite(means), np.moveaxis(inflated, -1, 0)
+    members = known.sum(axis=-1)
+    if known.all():
+        std = means.std(axis=-1, ddof=1) if means.shape[-1] > 1 else np.full(spreads.shape, np.nan)
+    else:
+        center = np.nansum(means, axis=-1, keepdims=True) / members[..., np.newaxis]
+        std = np.sqrt(np.nansum((means - center) ** 2, axis=-1) / np.where(members > 1, members - 1.0, np.nan))
+    of_series = freedom > members - 1.0
+    errors = np.where(of_series, spreads * np.sqrt(records / count * (1.0 + records / count)), std / np.sqrt(members))
+    return errors, np.where(of_series, freedom, np.where(members > 1, members - 1.0, np.nan))
+
+
+def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+    """Statistics of observables over the members and the second half of the run, at each point of the sweep.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it, with each member; of a stationary run (see ``is_stationary``).
+    names : collection of str, optional
+        The observables, all by default.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``…_mean``, ``…_sem``, ``…_low``, ``…_high``, ``…_std``, ``…_skewness``, ``…_effective_samples``,
+        and with the dimension ``quantile`` ``…_quantile``, ``…_quantile_low``, ``…_quantile_high``; see ``over_time``.
+        Of what is the same for all members there is no error.
+    """
+    dataset = plain(dataset)
+    dims, late = sweep_dims(dataset), dataset.isel(t=slice(dataset.sizes["t"] // 2, None))
+    step = float(dataset["t"][-1] - dataset["t"][-2]) if dataset.sizes["t"] > 1 else 0.0
+    shape, found = tuple(dataset.sizes[dim] for dim in dims), dict[str, xr.DataArray]()
+    for name in chosen_observables(restricted(late, names).isel(t=[-1]), names):
+        variable = _observable(late, str(name))
+        values = _rows(variable, dims)
+        statistics = _over_time(values.reshape(-1, *values.shape[-2:]), step, str(name), MEMBERS in variable.dims)
+        for kind, numbers in statistics.items():
+            found[f"{name}_{kind}"] = _statistic(dataset, kind, variable, numbers.reshape((*shape, *numbers.shape[1:])))
+    if "speed_mean" in found and {"slider_position", "spring_force"} <= set(dataset):  # a slider that may slip
+        for at, known in _of_the_way(dataset, dims):
+            for kind, value in known.items():
+                found[f"speed_{kind}"].values[at] = value
+    return xr.Dataset(found)
+
+
+def _of_the_way(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], dict[str, float]]]:
+    """Mean speed of a slider [m/s] with its error, by place in the sweep: slips come and go between two records.
+
+    It is the way over the time, whose ends are anywhere in stick and slip: the way's spread about a steady one gives
+    the error.
+    """
+    last, late = dataset.sizes["t"] - 1, dataset.sizes["t"] // 2
+    records = np.unique(np.linspace(late, last, _PLACES).astype(int)) - late
+    way = dataset["slider_position"].isel(t=slice(late, None)).load().isel(t=records)
+    time, ways = way["t"].to_numpy() - float(way["t"][0]), _rows(way, dims)
+    for at in np.ndindex(ways.shape[:-2]):
+        if np.isnan(ways[at]).any():  # after a runaway there is none
+            continue
+        speeds = (ways[at][:, -1] - ways[at][:, 0]) / time[-1]
+        off = np.std(ways[at] - speeds[:, np.newaxis] * time, axis=-1)
+        mean, error = float(np.mean(speeds)), float(np.sqrt(2.0 * np.mean(off**2) / len(speeds)) / time[-1])
+        yield at, {"mean": mean, "sem": error, "low": mean - WIDE * error, "high": mean + WIDE * error}
+
+
+def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
+    """The ``distribution`` of observables; of a dataset of statistics alone, those of their means over that time."""
+    if "contact_radius" in dataset:
+        return distribution(dataset, names)
+    return summary(settled(all_observables(dataset)), quantiles=False)
+
+
+def _observable(dataset: xr.Dataset, name: str) -> xr.DataArray:
+    """Return an observable of a dataset in memory."""
+    if name in dataset:
+        return dataset[name].load()
+    return in_pieces(restricted(dataset, [name]), ("t",), lambda piece: chosen_observables(piece, [name]))[name]
+
+
+def _rows(variable: xr.DataArray, dims: tuple[str, ...]) -> np.ndarray:
+    """Values of an observable with all dimensions of the sweep, shape (..., members, records)."""
+    missing = [name for name in (*dims, MEMBERS) if name not in variable.dims]
+    return variable.expand_dims(missing).transpose(*dims, MEMBERS, "t").to_numpy().astype(float, copy=False)
+
+
+def _statistic(dataset: xr.Dataset, kind: str, variable: xr.DataArray, numbers: np.ndarray) -> xr.DataArray:
+    """Return a statistic of an observable at all points of the sweep, described."""
+    result = xr.full_like(dataset["contact_modulus"], np.nan, float)
+    if kind.startswith("quantile"):
+        result = result.expand_dims(quantile=list(QUANTILES), axis=-1)
+    return result.copy(data=numbers).assign_attrs(described(kind, variable))
+
+
+# --- lifetimes, of which some are longer than the run ---
+
+
+class Lifetime(NamedTuple):
+    """Median and rate of an event, with the ends of their 95 % intervals; nan what the runs are too short to tell.
+
+    ``half`` [s] is the time by which it has happened in half of the members, ``rate`` [1/s] how often it
+    happened in all the time in which it could.
+    """
+
+    half: float
+    half_low: float
+    half_high: float
+    rate: float
+    rate_low: float
+    rate_high: float
+
+
+def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
+    """Median and rate of an event that may come after a run's end.
+
+    Parameters
+    ----------
+    times : array, shape (members,)
+        When it happened [s]; nan where it did not.
+    ends : float or array
+        How long each member was watched [s].
+
+    Notes
+    -----
+    The median is that of Kaplan and Meier's survival; its interval, after Brookmeyer and Crowley, holds the times at
+    which the log-log interval of the survival has one half. The interval of the rate is that of a Poisson process,
+    from chi-square.
+
+    Examples
+    --------
+    Three of four members detach within 10 s:
+
+    >>> found = lifetime(np.array([2.0, 5.0, 7.0, np.nan]), 10.0)
+    >>> print(f"{found.half:.0f} s, {found.rate:.3f} /s, {found.rate_low:.2f} to {found.rate_high:.2f} /s")
+    5 s, 0.125 /s, 0.03 to 0.37 /s
+    """
+    happened = np.isfinite(times)
+    watched = np.where(happened, times, ends)
+    half = low = high = np.nan
+    if np.any(happened) and np.all(np.isfinite(watched)):
+        half, low, high = _halves(watched, happened)
+    count, exposure, tail = float(happened.sum()), float(np.sum(watched)), 0.5 - 0.5 * LEVEL
+    if not exposure > 0.0:
+        return Lifetime(half, low, high, np.nan, np.nan, np.nan)
+    least = special.gammaincinv(count, tail) if count else 0.0
+    most = special.gammaincinv(count + 1.0, 1.0 - tail)
+    return Lifetime(half, low, high, count / exposure, least / exposure, most / exposure)
+
+
+def _halves(watched: np.ndarray, happened: np.ndarray) -> list[float]:
+    """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan."""
+    from scipy import stats  # its import takes a second
+
+    survival = stats.ecdf(stats.CensoredData(uncensored=watched[happened], right=watched[~happened])).sf
+    curves = [survival]
+    if happened.sum() > 1:
+        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # no interval if it is 1 or 0
+            interval = survival.confidence_interval(LEVEL, method="log-log")
+        curves += [interval.low, interval.high]
+    below = [curve.quantiles[curve.probabilities <= 0.5] for curve in curves]
+    halves = [float(times[0]) if times.size else np.nan for times in below]
+    return halves + [np.nan] * (3 - len(halves))
+
+
+def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
+    """Time at which each member first crosses a level, from whichever side it begins [s]; nan where it never does.
+
+    Between two records that lie on both sides of it the time is interpolated; a crossing there and back between two
+    records is not seen.
+
+    Parameters
+    ----------
+    observable : xarray.DataArray
+        With the dimension ``t``, as a variable of a dataset or one of ``observables``.
+    level : float
+        In the unit of the observable.
+    """
+    above = observable.reset_coords(drop=True).astype(float) - level
+    side = np.sign(above.isel(t=0))
+    crossed = (above * side <= 0.0) & (side != 0.0)
+    at = crossed.argmax("t")
+    before, after, times = above.isel(t=(at - 1).clip(0)), above.isel(t=at), observable["t"]
+    ends = times.isel(t=(at - 1).clip(0)), times.isel(t=at)
+    share = (before / (before - after).where(before != after)).drop_vars("t", errors="ignore")
+    first, last = (end.drop_vars("t", errors="ignore") for end in ends)
+    found = (first + share * (last - first)).where(crossed.any("t"))
+    found = found.where(side != 0.0, float(times[0]))
+    text = f"time at which the {observable.attrs.get('long_name', observable.name)} first crosses {level:.6g}"
+    return ordered(found).assign_attrs(units="s", long_name=text)
+
+
+def half_lives(dataset: xr.Dataset, found: xr.Dataset) -> xr.Dataset:
+    """Median times of the first detachment and masking, in a stationary run rates, from the ``events`` of a dataset."""
+    of = xr.Dataset()
+    for event, name, words in (
+        ("first_detachment", "detached", "detached"),
+        ("first_masked", "masked", "had their adhesion masked"),
+    ):
+        if event in found:
+            of = of.merge(lifetimes(dataset, found[event], name, words))
+    return of if is_stationary(dataset) else of.drop_vars([name for name in of if "_rate" in str(name)])
+
+
+def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:
+    """Median and rate of an event, at each point of the sweep.
+
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    times : xarray.DataArray
+        When it first happened in each member [s], nan where it did not: ``events(dataset)["first_detachment"]``, or
+        of ``first_passage``.
+    name, words : str
+        What the variables are named by, and what has happened: ``"detached"``, ``"detached"``.
+
+    Returns
+    -------
+    xarray.Dataset
+        ``half_<name>`` and ``<name>_rate``, with ``…_low`` and ``…_high``; see ``lifetime``. Empty where members do
+        not differ.
+    """
+    if MEMBERS not in times.dims:
+        return xr.Dataset()
+    watched = float(dataset["t"][-1] - dataset["t"][0])
+    values = np.moveaxis(times.to_numpy() - float(dataset["t"][0]), times.get_axis_num(MEMBERS), -1)
+    one, found = times.isel({MEMBERS: 0}, drop=True), {}
+    every = np.array([lifetime(members, watched) for members in values.reshape(-1, values.shape[-1])])
+    half, rate = f"time by which half of the members have {words}", f"rate at which members have {words}"
+    for k, field in enumerate(Lifetime._fields):
+        stem, _, end = field.partition("_")
+        key = "_".join(filter(None, [f"half_{name}" if stem == "half" else f"{name}_rate", end]))
+        text = f"{'' if not end else f'{end} end of the 95 % interval of the '}{half if stem == 'half' else rate}"
+        about = {"units": "s" if stem == "half" else "1/s", "long_name": text}
+        found[key] = one.copy(data=every[:, k].reshape(one.shape)).assign_attrs(about)
+    return xr.Dataset(found)

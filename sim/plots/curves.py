@@ -14,10 +14,10 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.figure import Figure
 
 from sim.analysis import averaging, bond_work, is_stationary, is_steady, setting, settled, slips, summary, sweep_dims
+from sim.analysis.dataset import answered, speed_of, stays_held
+from sim.analysis.events import jumps
 from sim.analysis.observables import KEPT, observables, share_observables
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.scene import answered, speed_of, stays_held
-from sim.analysis.transients import jumps
 from sim.plots import style
 from sim.plots.measured import Compared, Measured
 from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_value, symbol

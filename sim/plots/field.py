@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 
 from sim.analysis import setting
-from sim.analysis.scene import resolved, where_recorded, word
+from sim.analysis.dataset import resolved, where_recorded, word
 from sim.laws.halfspace import angular_compliance, displacement
 from sim.numerics.grid import Grid, Rectangle, lattice_of
 from sim.parts.shear.modes import Modes, modes

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sim.analysis import sweep_dims
-from sim.analysis.scene import MEMBERS, answered, claim, plain
+from sim.analysis.dataset import MEMBERS, answered, claim, plain
 from sim.numerics.files import claim as claim_file, output
 from sim.plots import curves, field, slider, style, theories
 from sim.plots.measured import Measured

@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.axes import Axes
 
 from sim.analysis import sweep_dims
-from sim.analysis.scene import plain
+from sim.analysis.dataset import plain
 from sim.plots.style import BOTH, GUIDE, HOLLOW, legend
 from sim.units.quantity import Quantity
 from sim.units.tables import Points, measured_points, read_measured

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from pydantic import TypeAdapter
 
 from sim.analysis import is_steady, setting, sweep_dims
+from sim.analysis.dataset import MEMBERS, word
+from sim.analysis.events import incipient_law, jumps
 from sim.analysis.over_speed import speed_dim
-from sim.analysis.scene import MEMBERS, word
-from sim.analysis.transients import incipient_law, jumps
 from sim.laws import jkr, schallamach
 from sim.laws.schallamach import Body
 from sim.parts.bonds.rupture import Rupture

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from sim.analysis import control, is_steady, loop_energy, setting, settled
+from sim.analysis.dataset import plain, stays_held
 from sim.analysis.events import cycles_of
-from sim.analysis.scene import plain, stays_held
 from sim.laws import halfspace, jkr
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.plots import style

@@ -33,7 +33,7 @@ from sim.analysis import (
     sweep_dims,
     table,
 )
-from sim.analysis.scene import claim, speed_name
+from sim.analysis.dataset import claim, speed_name
 from sim.analysis.statistics import over_members
 from sim.numerics import hdf5
 from sim.numerics.files import output

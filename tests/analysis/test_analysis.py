@@ -9,7 +9,7 @@ from helpers import lens
 from helpers.lens import scene
 
 from sim import analysis
-from sim.analysis import scene as dataset_module
+from sim.analysis import dataset as dataset_module
 from sim.ensemble.simulate import run
 from sim.parts.contact import Equilibrium
 from sim.parts.drive import Steady

@@ -9,7 +9,7 @@ from helpers import lens
 from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
 
 from sim import analysis
-from sim.analysis import over_speed, scene as dataset_module
+from sim.analysis import dataset as dataset_module, over_speed
 from sim.analysis.observables import charged_in_turn, observables, share_observables
 from sim.ensemble.simulate import run
 from sim.laws import jkr

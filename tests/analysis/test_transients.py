@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from sim.analysis.transients import incipient_law, speed_step, way_to_sliding
+from sim.analysis.events import incipient_law, speed_step, way_to_sliding
 
 LENGTH, LEVEL, OVER = 6e-6, 12e-3, 3e-3
 

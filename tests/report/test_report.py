@@ -353,7 +353,7 @@ def test_the_page_of_a_file_has_its_scenario_cost_and_the_commands_that_repeat_i
     Path("y.toml").write_text(page.words("pre")[0], encoding="utf-8")
     arguments = ["-o", "z.nc", "--set", 'contact.load="2 mN"', "--set", "seed=7", "--quiet", "--no-table"]
     assert sim("run", "y.toml", *arguments).exit_code == 0
-    with analysis.scene.open("y.nc") as first, analysis.scene.open("z.nc") as again:
+    with analysis.dataset.open("y.nc") as first, analysis.dataset.open("z.nc") as again:
         assert first.equals(again)
 
 

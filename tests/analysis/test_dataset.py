@@ -4,7 +4,7 @@ import pytest
 from helpers.lens import RADIUS, scene
 
 from sim import analysis
-from sim.analysis.scene import resolved, word
+from sim.analysis.dataset import resolved, word
 from sim.ensemble.simulate import run
 from sim.parts import drive
 from sim.parts.contact import Equilibrium
