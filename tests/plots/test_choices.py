@@ -116,14 +116,6 @@ def test_an_unknown_axis_is_refused_with_the_known_ones(ramp):
         draw(ramp, "time", x="zzz")
 
 
-def test_lines_break_where_the_speed_changes_its_sign():
-    dataset = simulated(drive=drive.Table(time=(0.0, 0.2, 0.4), speed=(2.1e-3, -2e-3, 2e-3)), shear=shear.Uniform())
-    speed = dataset["speed"].to_numpy()
-    turns = np.flatnonzero(speed[1:] * speed[:-1] < 0.0)
-    x, _ = drawn(draw(dataset, "curve").axes[0], pictures.BOTH)
-    assert len(turns) == 2 and np.flatnonzero(np.isnan(x)).tolist() == [turns[0] + 1, turns[1] + 2]
-
-
 def test_absolute_areas_stand_in_place_of_shares(ramp):
     found = analysis.statistics(ramp)
     panel = draw(ramp, "curve", absolute=True).axes[0]

@@ -50,12 +50,6 @@ def test_map_of_a_ripple_and_its_displacement_have_the_closed_amplitudes():
     assert along > 500.0 and across < 1e-6  # x to the right
 
 
-def test_contact_circle_has_the_members_radius():
-    dataset = mapped(members=2)
-    (circle,) = (patch for patch in plots.draw(dataset, "map").axes[0].patches if isinstance(patch, Circle))
-    np.testing.assert_allclose(circle.radius, 1e6 * dataset["contact_radius"][0, -1], rtol=1e-14)
-
-
 def test_arrow_points_where_the_slider_goes():
     for speed, text in [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]:
         amplitude = Stress(reference=3e5)

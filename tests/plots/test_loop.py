@@ -197,22 +197,14 @@ def test_each_value_of_a_sweep_has_its_curve_and_its_own_equilibria():
 
 
 def test_every_shape_of_dataset_can_be_drawn():
+    sites = bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50)
+    counted = {"ensemble": Ensemble(members=4), "bonds": sites}
+    moving = {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}}
     for changes in [
-        {"ensemble": Ensemble(members=4), "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50)},
-        {
-            "ensemble": Ensemble(members=4),
-            "bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=50),
-            "record": Record(per_member=False),
-        },
+        counted,
+        counted | {"record": Record(per_member=False)},
         {"contact": Equilibrium(indentation={"from": -4e-6, "to": -2e-6})},
-        {
-            "sweep": {
-                "contact": [
-                    {"model": "equilibrium", "indentation": {"from": "2 um", "to": "-2 um"}},
-                    {"model": "equilibrium", "load": "1 mN"},
-                ]
-            }
-        },
+        {"sweep": {"contact": [moving, {"model": "equilibrium", "load": "1 mN"}]}},
     ]:
         dataset = moved(**changes, clock=COARSE)
         loads, radii, _ = plots.draw(dataset, "loop").axes

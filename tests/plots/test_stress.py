@@ -128,6 +128,8 @@ def test_models_side_by_side_each_name_their_maximum():
 
 
 def test_every_kind_of_sliding_can_be_drawn():
+    sites = bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES)
+    tracked = {"bonds": sites, "ensemble": Ensemble(members=3)}
     for changes in [
         {"drive": drive.Ramp(start=-1e-3, stop=2e-3)},
         {"drive": drive.Ramp(start=0.0, stop=1e-2)},
@@ -135,12 +137,8 @@ def test_every_kind_of_sliding_can_be_drawn():
         {"drive": drive.Steady(speed=1e-3), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}},
         {"bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5)},
         {"bonds": bonds.Unbroken(stress=3e5)},
-        {"bonds": bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES), "ensemble": Ensemble(members=3)},
-        {
-            "bonds": bonds.Tracked(rupture=Bell(**BELL), sites=50, **SITES),
-            "ensemble": Ensemble(members=3),
-            "record": Record(per_member=False),
-        },
+        tracked,
+        tracked | {"record": Record(per_member=False)},
     ]:
         figure = plots.draw(ramped(**({"clock": Clock(duration=1.0, step=0.1)} | changes)), "stress")
         stress = [line for line in figure.axes[0].lines if np.size(line.get_ydata()) > 2]

@@ -195,11 +195,6 @@ def test_tangential_displacement_is_that_of_the_uniform_stress(slid):
     assert_allclose(circle.radius, 1e6 * radius, rtol=1e-14)
 
 
-def test_without_shear_stress_only_the_normal_fields_are_drawn():
-    figure = plots.draw(plain(bonds=bonds.Unbroken()), "profile")
-    assert [panel.get_ylabel() for panel in figure.axes] == ["normal pressure $p$ (kPa)", "height $z$ (µm)"]
-
-
 def test_a_contact_that_came_off_is_drawn_as_it_last_was():
     ramp = simulated(contact=Equilibrium(load=-3e-4), shear=shear.Uniform())
     closed = np.flatnonzero(ramp["in_contact"].to_numpy())
