@@ -12,7 +12,8 @@ from sim.scenario.messages import Fault, faults, problems
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import with_models
 from sim.scenario.source import Files, Source
-from sim.scenario.toml_text import parse, put, read_text
+from sim.scenario.sweep import set_key
+from sim.scenario.toml_text import parse, read_text
 from sim.units.errors import BadInput
 
 __all__ = ["BadInput", "load"]
@@ -51,9 +52,9 @@ def load(
         file, text, folder = str(scenario), read_text(Path(scenario)), Path(scenario).parent
         document = parse(text, file)
     words = {_words(key): value for key, value in overrides.items()}
-    wrong = put(document, words)
-    if "source" in document:
-        wrong.append(Fault(("source",), "is not a key"))
+    for path, value in words.items():
+        set_key(document, path, value)
+    wrong = [Fault(("source",), "is not a key")] if "source" in document else []
     files = Files(folder)
     document = with_models(Scenario, document) | {"source": Source(file, text, overrides, files.texts)}
     try:

@@ -347,8 +347,8 @@ class Scenario:
             part = getattr(self, name)
             document[name] = _adapter(cast(Hashable, type(part))).dump_python(part, by_alias=True)
         for key, value in values.items():
-            set_key(document, key, value)
             *above, last = key.split(".")
+            set_key(document, [*above, last], value)
             table = functools.reduce(dict.__getitem__, above, document)
             if above and table.get("file") and last not in _FILE_COLUMNS + _OF_USE:
                 for column in _FILE_COLUMNS:

@@ -13,7 +13,6 @@ from pydantic.fields import FieldInfo
 from pydantic.json_schema import SkipJsonSchema
 
 from sim.numerics.files import OutputExists
-from sim.scenario.source import Source
 from sim.units.quantity import Quantity
 
 
@@ -93,7 +92,7 @@ def entries(part: Any, prefix: str = "") -> Iterator[Entry]:
     for name, key, quantity in _listed(cast(Hashable, type(part))):
         value = getattr(part, name)
         if is_dataclass(value):
-            yield from () if isinstance(value, Source) else entries(value, f"{prefix}{key}.")
+            yield from () if key == "source" else entries(value, f"{prefix}{key}.")
         elif quantity is not None:
             number = value[0] if isinstance(value, tuple) and value else value
             number = isinstance(number, int | float) and not isinstance(number, bool)

@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -24,9 +24,9 @@ class Axis:
     values: tuple[tuple[Any, ...], ...]
 
 
-def set_key(document: dict[str, Any], key: str, value: Any) -> None:
-    """Set a dotted key in a nested document, copying or making the tables on its way."""
-    *tables, last = key.split(".")
+def set_key(document: dict[str, Any], words: Sequence[str], value: Any) -> None:
+    """Set a key in a nested document by the words of its path, copying or making the tables on its way."""
+    *tables, last = words
     for name in tables:
         inner = document.get(name)
         document[name] = dict(inner) if isinstance(inner, dict) else {}

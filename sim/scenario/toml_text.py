@@ -7,7 +7,6 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from sim.scenario.messages import Fault
 from sim.units.errors import BadInput
 from sim.units.terminal import one_line
 
@@ -77,21 +76,6 @@ def toml(value: Any) -> str:
 
 def _refusal(problem: str) -> BadInput:
     return BadInput([one_line(problem)])
-
-
-def put(document: dict[str, Any], overrides: dict[tuple[str, ...], Any]) -> list[Fault]:
-    """Set the overrides in the document; return the faults of those whose table is none."""
-    faults = []
-    for words, value in overrides.items():
-        table: Any = document
-        for word in words[:-1]:
-            table = table.setdefault(word, {})
-            if not isinstance(table, dict):
-                faults.append(Fault(words, f'needs a table, but "{word}" is none in the file'))
-                break
-        else:
-            table[words[-1]] = value
-    return faults
 
 
 def written(document: dict[str, Any], table: tuple[str, ...] = ()) -> str:

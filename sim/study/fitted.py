@@ -15,7 +15,8 @@ from sim.numerics import files
 from sim.plots.style import in_units
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
-from sim.scenario.toml_text import parse, put, written
+from sim.scenario.sweep import set_key
+from sim.scenario.toml_text import parse, written
 from sim.study.fit import POOR, Fit, Found, fit
 from sim.study.fit_figure import figure, refuse_units
 from sim.study.fitting import LEVEL
@@ -187,7 +188,8 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
         one.free.key: one.value if one.free.quantity.unit == "1" else f"{one.value:.12g} {one.free.quantity.unit}"
         for one in fit.numbers
     }
-    put(tables, {tuple(key.split(".")): value for key, value in changed.items()})
+    for key, value in changed.items():
+        set_key(tables, key.split("."), value)
     above = Path(source.path).parent
     if source.path and above.resolve() != folder.resolve():
         _move(tables, above, folder)

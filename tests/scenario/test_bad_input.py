@@ -264,7 +264,7 @@ def test_a_fault_of_a_sweep_is_reported_at_its_key_with_a_cure(refusal):
         ({"contact.lod": 1}, 'did you mean "load"'),
         ({"nope.x.y": 3}, "nope: is not a key; known: clock, "),
         ({"contact": 5}, "must be a table"),
-        ({"name.x": 1}, 'needs a table, but "name" is none'),
+        ({"name.x": 1}, "name: Input should be a valid string"),
         ({'""': 1}, "is not a key"),
         ({"contact.indentation": "1 um"}, "contact: a load and an indentation cannot both"),
         ({'sweep."contact.load"': [1, "2 mm"]}, 'contact.load...unit "mm"'),
