@@ -78,9 +78,9 @@ def steady(speed: float, step: float, steps: int) -> tuple[Any, Any]:
 
 def written(scene: Tables, path: Path) -> Path:
     """Write a scene as a scenario file; return its path."""
-    from sim.scenario import toml_text
+    from sim.scenario import files
 
-    path.write_text(toml_text.written(scene), encoding="utf-8")
+    path.write_text(files.written(scene), encoding="utf-8")
     return path
 
 

@@ -41,7 +41,7 @@ from sim.plots import kinds
 from sim.plots.kinds import Choices
 from sim.plots.measured import Measured, Residuals
 from sim.plots.style import STYLE
-from sim.scenario.toml_text import toml
+from sim.scenario.files import toml
 from sim.units.errors import BadInput
 from sim.units.notation import scaled
 from sim.units.terminal import plain

@@ -8,12 +8,11 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
+from sim.scenario.files import Files, Source, parse, read_text
 from sim.scenario.messages import Fault, faults, problems
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import with_models
-from sim.scenario.source import Files, Source
 from sim.scenario.sweep import set_key
-from sim.scenario.toml_text import parse, read_text
 from sim.units.errors import BadInput
 
 __all__ = ["BadInput", "load"]

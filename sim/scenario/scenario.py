@@ -25,9 +25,9 @@ from sim.parts.shear.maps import CarriedProcess
 from sim.parts.shear.modes import ModalProcess
 from sim.scenario.checks import CHECKED, faults_across, remarks_between, rest_radius
 from sim.scenario.clock import Clock, Ensemble, Record
+from sim.scenario.files import Files, Source
 from sim.scenario.messages import in_plain_words, plain_spoken
 from sim.scenario.schema import as_html, entries, with_models
-from sim.scenario.source import Files, Source
 from sim.scenario.sweep import read_sweep, rows, set_key
 from sim.units.errors import BadInput
 from sim.units.quantity import Quantity

@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 from sim.ensemble.dataset import scenario_json
 from sim.numerics import files
 from sim.plots.style import in_units
+from sim.scenario.files import parse, written
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read
 from sim.scenario.sweep import set_key
-from sim.scenario.toml_text import parse, written
 from sim.study.fit import POOR, Fit, Found, fit
 from sim.study.fit_figure import figure, refuse_units
 from sim.study.fitting import LEVEL

@@ -17,9 +17,9 @@ from scipy import stats
 import sim
 from sim.cli import cli
 from sim.plots.style import Unit, in_units
+from sim.scenario.files import written
 from sim.scenario.reader import load
 from sim.scenario.schema import quantities
-from sim.scenario.toml_text import written
 from sim.study import fit as calibration, fitted, mechanisms, predicted
 from sim.study.fit import fit
 from sim.study.fit_figure import figure

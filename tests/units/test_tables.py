@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
-from sim.scenario.source import Files
+from sim.scenario.files import Files
 from sim.units import tables
 from sim.units.quantity import Quantity
 from sim.units.tables import TableError, at_once, columns, file_path, file_text, headings, matrix

@@ -1,13 +1,15 @@
-"""From a TOML file to its document, and overrides on top of it."""
+"""Files of a scenario: its TOML text, its origin, and the files that it names."""
 
 import errno
 import json
 import re
 import tomllib
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from sim.units.errors import BadInput
+from sim.units.tables import plain_text
 from sim.units.terminal import one_line
 
 _MOST_BYTES = 2**20
@@ -99,3 +101,49 @@ def written(document: dict[str, Any], table: tuple[str, ...] = ()) -> str:
 
 def _key(word: str) -> str:
     return word if re.fullmatch(r"[A-Za-z0-9_-]+", word) else json.dumps(word, ensure_ascii=False)
+
+
+# Origin of a scenario: its text and the files it names.
+
+
+@dataclass(frozen=True)
+class Source:
+    """Origin of a scenario: the file's text, what was changed on top, and every file it names.
+
+    ``parts`` are those of the first scenario made from it, the one that text and overrides describe.
+    """
+
+    path: str = ""
+    text: str = ""
+    overrides: dict[str, Any] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
+    parts: dict[str, Any] = field(default_factory=dict)
+
+    def changed(self, values: dict[str, Any]) -> "Source":
+        """Return the source with more overrides; they replace those of keys inside their own keys."""
+        inside = tuple(f"{key}." for key in values)
+        others = {key: value for key, value in self.overrides.items() if not key.startswith(inside)}
+        return Source(self.path, self.text, others | values, self.files)
+
+    @property
+    def written(self) -> dict[str, Any]:
+        """Return path, text, overrides and files, from which another process makes the same source."""
+        return {"path": self.path, "text": self.text, "overrides": self.overrides, "files": self.files}
+
+
+@dataclass(frozen=True)
+class Files:
+    """Files that a scenario names, relative to its own folder, and the text of each that was read."""
+
+    folder: Path
+    texts: dict[str, str] = field(default_factory=dict)
+
+    def path(self, name: str) -> Path:
+        """Return the path of a file."""
+        return self.folder / name
+
+    def text(self, name: str) -> str:
+        """Return the text of a file, which the dataset keeps as its provenance."""
+        if name not in self.texts:
+            self.texts[name] = plain_text(self.path(name))
+        return self.texts[name]
