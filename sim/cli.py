@@ -352,10 +352,10 @@ def converge(
     seconds = read_option(budget, "--budget", "s", above=0)
     accepted = None if tolerance is None else read_option(tolerance, "--tolerance", "1", above=0, below=1)
     scene = _load(scenario, changes)
-    from sim.study import converge as convergence
+    from sim.study.converge import study
 
     target = output or Path("outputs") / f"{scenario.stem}-converge.nc"
-    print_table(*convergence.carried_out(scene, target, force, seconds, accepted))
+    print_table(*study(scene, target, force, seconds, accepted))
 
 
 @cli.command(epilog="Exit codes: 0 done; 1 not converged; 2 bad input; 73 an output exists; 74 trouble with files.")

@@ -1,366 +1,617 @@
-"""Speed against error for one scene: ``sim converge``.
+"""Speed against error of one scene: ``sim converge``.
 
-Every setting (``sim.study.settings``) changes one thing of the scene: the shear model, the bond model, the clock
-step or the grid. Its error follows without sampling from closed forms and a march without noise
-(``sim.study.exact_law``); samples check that, and stand in where there is no law. Errors of several changes add up.
+A *setting* changes one thing of the scene: the shear model, the bond model or the clock step. The scene is run at each
+setting and at a finer one, and the difference is the error of the setting. Where members differ, both runs have the
+same members, so that most of their noise cancels. Errors of several changes add up.
 """
 
 import importlib.metadata
+import itertools
+import json
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, cast
 
+import matplotlib as mpl
 import numpy as np
 import xarray as xr
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 
 from sim.analysis import engineering
+from sim.engine import MemberNoise, follow
+from sim.ensemble.plan import together
+from sim.ensemble.variables import VARIABLES
 from sim.numerics import files
+from sim.parts.exchange import Bonding, Gammas, Motion, Motions
+from sim.parts.shear.bands import cell_pairs
+from sim.parts.shear.process import Fluctuation
+from sim.plots.style import BONDS, FLUCTUATIONS, LINES, REFERENCE, STYLE, legend, rows
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import files_read, quantities
-from sim.study.exact_law import QUANTITIES, STATISTICS, Walk, cell_gammas, memory
-from sim.study.figure import figure
-from sim.study.samples import Array, Estimates, affordable, coupled, estimates, fluctuates, sampled, timed
-from sim.study.settings import Row, at_step, number_of_sites, plain, settings, tolerance_of
-from sim.study.verdicts import explanation, recommendation, table
+from sim.scenario.schema import files_read, keys, model, tables
 from sim.units.errors import BadInput
+from sim.units.notation import concise
 
-__all__ = ["carried_out", "claim", "converge", "explanation", "figure", "recommendation", "save", "table"]
+Array = NDArray[np.float64]
 
-#: Shares of the budget: runs without noise, times, samples.
-_WALKS, _TIMES, _SAMPLES = 0.4, 0.2, 0.4
-#: Times at which a run is sampled; those of a stationary one, which are pooled, and the most steps of that.
-_STATED, _POOLED, _LONG_ENOUGH = 6, 32, 512
-#: Finest clock step over the scene's, and over that of coupled samples; change over tolerance that ends the halving.
-_FINEST, _FINEST_SAMPLED, _FINE = 2.0**-12, 0.25, 0.1
-#: Standard errors beyond which a deviation is more than chance, and by which an error may be larger than it was found.
+#: A table to print, and the text below it.
+Printed = tuple[list[dict[str, str]], str]
+QUANTITIES = ("shear_stress", "bond_fraction", "fluctuation_energy", "contact_radius")
+STATISTICS = ("mean", "spread", "skewness", "correlation time")
+_ENERGY, _RADIUS = 2, 3
+_WORDS = {"stress": "the shear stress", "bonds": "the bond fraction", "ΔΓ": "ΔΓ", "radius": "the radius"}
+_READ = {variable.name: variable.read for variable in VARIABLES if variable.name in QUANTITIES}
+
+_BANDS, _COHORTS = (0.3, 0.1, 0.03, 0.01, 0.003), (1e-2, 1e-3, 1e-4, 1e-5, 1e-6)
+
+#: Shares of the budget that are spent on times and on clock steps; the rest is spent on models and grids.
+_TIMING, _STEPS = 0.15, 0.3
+#: Records at which runs without noise, and members, are compared; fewest and most members.
+_RECORDS, _TIMES, _FEWEST, _MOST = 1000, 6, 16, 2**14
+#: Most numbers that are kept of the finest of several clock steps, and most steps that are run at once.
+_NUMBERS, _PIECE = 2**22, 512
+#: Finest clock step over the scene's; share of the tolerance below which an error is small enough.
+_FINEST_STEP, _SMALL = 2.0**-12, 0.1
+#: Error of the finest step over its difference from the next: of first order, or of half an order if members differ.
+_REST, _REST_OF_NOISE = 1.0, 1.0 / (math.sqrt(2.0) - 1.0)
+#: Standard errors that are added to an error before it is compared.
 _SURE = 2.0
-#: Error of the finest sampled step over its difference from the next: of half an order, as of first passages.
-_REST = 1.0 / (math.sqrt(2.0) - 1.0)
+#: Errors below this are roundings.
+_ROUNDING = 1e-9
+
+#: Parts by the name in the dataset: words, table of the scenario, colour and marker.
+_PARTS = {
+    "shear": ("shear model", "shear", FLUCTUATIONS, "o"),
+    "bonds": ("bond model", "bonds", BONDS, "s"),
+    "step": ("clock step", "clock", LINES[3], "^"),
+}
+#: Variables of the dataset that the figure shows.
+_DRAWN = ("part", "own", "time", "error", "standard_error")
+#: Unit and meaning of the variables of the dataset, by attribute of ``Setting``.
+_DESCRIBED = {
+    "part": ("", "part of the scene that the setting changes"),
+    "toml": ("", "lines of the scenario file that choose the setting"),
+    "own": ("1", "1 if the scene has this setting as it is written"),
+    "time": ("s", "CPU time of the scene's run, median of three pieces"),
+    "members": ("1", "members that were compared"),
+    "error": ("1", "largest error over the run"),
+    "standard_error": ("1", "standard error of the error"),
+}
+
+
+@dataclass
+class Setting:
+    """One setting of the scene, with its cost and its error.
+
+    Attributes
+    ----------
+    label, part, toml : str
+        Name; ``"shear"``, ``"bonds"`` or ``"step"``; lines of the scenario file that choose it.
+    scenario : Scenario
+        The scene at this setting, without sweep and maps.
+    own : int
+        1 if the scene has this setting as it is written.
+    ratio : float
+        Clock step over the scene's.
+    time : float
+        CPU time of the scene's run [s].
+    members : int
+        Members that were compared.
+    error, standard_error : array, shape (quantities, statistics)
+        Largest error over the run and its standard error, in units of the largest mean, or for ΔΓ beyond its mean in
+        units of its own value; nan if it is not known.
+    """
+
+    label: str
+    part: str
+    scenario: Scenario
+    toml: str
+    own: int = 0
+    ratio: float = 1.0
+    time: float = math.nan
+    members: int = 0
+    error: Array = field(default_factory=lambda: np.full((4, 4), np.nan))
+    standard_error: Array = field(default_factory=lambda: np.zeros((4, 4)))
 
 
 def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None = None) -> xr.Dataset:
-    """Run a scene at every admissible setting, and say what each costs and how far it is from the truth.
+    """Run a scene at every admissible setting, and report the cost and the error of each.
 
     Parameters
     ----------
     scenario : Scenario
         The scene, without its sweep: at the values that its tables give.
     budget_seconds : float
-        Computing time to spend [s]. Each run without noise is made once at least.
+        Computing time to spend [s]. Settings that do not fit into it are left out and named.
     tolerance : float, optional
-        Error that is accepted, by default that of the scene.
+        Accepted error, by default that of the scene.
 
     Returns
     -------
     xarray.Dataset
-        Along ``row``: the CPU time of the scene's run at each setting, its largest ``error`` for each ``quantity`` and
-        ``statistic`` in units of the ``yardstick``, and at the stated times ``t`` the ``value`` in a sample, its
-        ``deviation`` from what is expected and the ``standard_error`` of that.
+        Along ``row``: the CPU time of the scene's run at each setting, and its largest ``error`` for each ``quantity``
+        and ``statistic`` with the ``standard_error``.
 
     Raises
     ------
     BadInput
-        If the drive feels the friction, or the field is a measured map.
+        If the drive solves for the motion, the field is a measured map, or the scene itself does not fit into the
+        budget.
 
     Notes
     -----
-    Truth: all modes of the cell (of a grid eight times as fine as the finest that is tried, where the spectrum has no
-    end), cohorts to 1e-6 or the linear rate equation, and the limit of short steps. Under such bonds, which any that
-    keep the accepted error resemble, the clock step is halved until steps agree; the finest is taken to differ from
-    the limit by the largest change so far, each halved as often as the step since, which is no less than errors of
-    first order or better leave. Yardsticks are largest values over the run: of the mean for means and for the spread
-    of bonds, of the spread for spreads, of the skewness for that of ΔΓ; that of the rest is not judged.
+    Errors of means are in units of the largest mean over the run, those of standard deviations as well, but for ΔΓ in
+    units of its largest standard deviation. Skewness and correlation time are compared for ΔΓ alone, in closed form.
+    The finest clock step that fits is assumed to be off by its difference from the next, or by 2.4 times as much if
+    members differ (order one half).
     """
     if scenario.drive.solves_motion:
-        said = (
-            f'drive.model is "{scenario.drive.model}", whose slider feels the noise: no law gives its truth; study the'
-        )
-        raise BadInput([f'{said} scene at a speed that is prescribed, such as [drive] model = "ramp"'])
+        raise BadInput([f'drive.model = "{scenario.drive.model}": a finer run takes another path; prescribe the speed'])
     if scenario.fluctuations.measured:
-        said = "shear.field is a measured map, which no simpler model stands for: study random fields of its spectrum,"
-        raise BadInput([f'{said} spectrum = {{ model = "measured", file = "..." }}'])
-    left_out: list[str] = []
-    base = plain(scenario)
-    accepted = tolerance_of(scenario) if tolerance is None else tolerance
-    sites = number_of_sites(scenario)
-    study = _Study(base, settings(base, left_out), sites if accepted**2 * sites < 1.0 else math.inf)
-    study.judge_models()
-    study.judge_bonds()
-    study.judge_steps(accepted, _WALKS * budget_seconds)
-    share = _TIMES * budget_seconds / len(study.rows)
-    as_written = timed(base, 2.0 * share)
-    for row in study.rows:
-        row.time, row.time_low, row.time_high = as_written if row.own else timed(row.scenario, share)
-    study.sample(_SAMPLES * budget_seconds)
-    return _assembled(scenario, study, accepted, left_out)
+        raise BadInput(["shear.field: a map has no simpler model; study fields of its spectrum, shear.spectrum"])
+    began, left_out = time.process_time(), list[str]()
+    chosen_models = {"shear": _table(scenario.fluctuations), "bonds": _table(scenario.population)}
+    base = scenario.with_values(chosen_models | {"record": {}})
+    accepted = tolerance or float(_table(scenario.shear).get("tolerance", 0.01))
+    own, half = _at_step(base, 1.0), began + 0.5 * budget_seconds
+    found = [_admitted(*changes, base, left_out, half) for changes in _tried(base)]
+    building, settings = time.process_time() - began, [*itertools.chain(*found), own]
+    for row in settings:  # compiles, which is not counted
+        follow(row.scenario, MemberNoise.of(base.seed, np.arange(1)), None, range(1, 2))
+    end = time.process_time() + budget_seconds - building
+    for row in settings:
+        row.time = _timed(row.scenario, _TIMING * budget_seconds / len(settings))
+    parts, judged = list(dict.fromkeys(row.part for row in settings[:-1])), list[Setting]()
+    for place, part in enumerate(parts):
+        now = time.process_time()
+        until = now + (end - now - _STEPS * budget_seconds) / (len(parts) - place)
+        judged += _judged(base, [row for row in settings if row.part == part], until, left_out)
+    means = [row for row in judged if row.part == "bonds" and "sites" not in _table(row.scenario.bonds)]
+    judged += _judged_steps(own, [own, *means][-1], accepted, end)
+    return _dataset(scenario, judged, accepted, left_out)
 
 
-def claim(scenario: Scenario, target: Path, replace: bool) -> Path:
-    """Refuse files that cannot be written or are not to be replaced; the name of the picture beside the dataset."""
+def _table(part: object) -> dict[str, Any]:
+    """Return the keys of a part that have a value, as its table in a scenario file."""
+    return dict(TypeAdapter(Any).dump_python(part, by_alias=True, exclude_none=True))
+
+
+def _tried(scenario: Scenario) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield the settings of a scene, simple ones first: the part, and the keys of its table that are changed."""
+    shear, bonds = _table(scenario.shear), _table(scenario.bonds)
+    if "correlation" in shear:
+        yield "shear", {"model": "mean"}
+        for tolerance in sorted({*_BANDS, shear.get("tolerance", _BANDS[0])}, reverse=True):
+            yield "shear", {"model": "banded", "tolerance": tolerance}
+        yield "shear", {"model": "mapped" if shear["model"] == "mapped" else "modal"}  # the same numbers
+    if "rebinding_rate" not in bonds:
+        return
+    carried, stretched = bonds.get("area") == "carried", "rupture" in bonds
+    if not (stretched or carried):
+        yield "bonds", {"model": "steady"}
+    yield "bonds", {"model": "rate"}
+    for tolerance in sorted({*_COHORTS, bonds.get("tolerance", _COHORTS[0])}, reverse=True) if stretched else ():
+        yield "bonds", {"model": "cohort", "tolerance": tolerance}
+    sites = bonds.get("sites") or bonds.get("site_density", math.inf) * math.pi * scenario.rest_radius**2
+    last, most = ("tracked", 1e5) if stretched else ("counted", 1e9)
+    if not carried and ("sites" in bonds or 0.0 < sites <= most):  # sites cannot be carried with the area
+        yield "bonds", {"model": last, "sites": round(sites)}
+
+
+def _admitted(part: str, changes: dict[str, Any], base: Scenario, left_out: list[str], end: float) -> list[Setting]:
+    """Return the scene with some keys of a part changed; nothing, but a reason in ``left_out``, if it refuses them.
+
+    After some CPU time of the process, ``end`` [s], only the setting of the scene itself is built.
+    """
+    given, label = _table(getattr(base, part)), " ".join(f"{value}" for value in changes.values())
+    admitted = tables(keys(Scenario)[part].annotation).values()
+    kinds = [keys(kind).keys() for kind in admitted if model(kind) == changes["model"]]
+    declared = max(kinds, key=lambda names: ("rupture" in given) == ("rupture" in names))
+    own = given.items() >= changes.items()
+    try:
+        if time.process_time() > end and not own:
+            raise ValueError("does not fit into the budget")
+        changed = base.with_values({part: {key: given[key] for key in given.keys() & declared} | changes})
+        changed.process  # noqa: B018 - some models are refused only when their modes are made
+    except ValueError as fault:
+        left_out.append(f"{label}: " + str(fault).partition("\n")[0])
+        return []
+    toml = "\n".join(f"{key} = {json.dumps(value)}" for key, value in changes.items())
+    return [Setting(label, part, changed, toml, int(own))]
+
+
+def _at_step(scenario: Scenario, ratio: float) -> Setting:
+    """Return the scene with its clock step times a power of two and the same records."""
+    clock = scenario.clock
+    step, record = clock.step * ratio, clock.stride * clock.step
+    changed = scenario.with_values({"clock": {"duration": clock.duration, "step": step, "record": record}})
+    text, label = f'step = "{step:.12g} s"\nrecord = "{record:.12g} s"', f"step {engineering(step, 's')}"
+    return Setting(label, "step", changed, text, int(ratio == 1.0), ratio)
+
+
+def _fluctuates(scenario: Scenario) -> bool:
+    """True if members differ."""
+    return any(scenario.varies.values())
+
+
+def _timed(scenario: Scenario, seconds: float) -> float:
+    """Return the CPU time of the scene's run [s]: the median of three pieces, timed in about some seconds."""
+    members, last = scenario.ensemble.members if _fluctuates(scenario) else 1, scenario.clock.steps
+    full = min(together(scenario), members)
+    batch, began = min(full, _FEWEST), time.process_time()
+    follow(scenario, MemberNoise.of(scenario.seed, np.arange(batch)), None, range(1, 2))
+    if (time.process_time() - began) * full / batch < 0.25 * seconds:
+        batch = full
+    noise, paces, piece, state = MemberNoise.of(scenario.seed, np.arange(batch)), list[float](), 1, None
+    for _ in range(4):  # the first fills the caches
+        count, began = 0, time.process_time()
+        while (spent := time.process_time() - began) < 0.25 * seconds:
+            before = state.step if state is not None and state.step < last else 0
+            steps = range(before + 1, min(before + piece, last) + 1)
+            state, _ = follow(scenario, noise, state if before else None, steps)
+            count, piece = count + len(steps), min(2 * piece, _PIECE)
+        paces.append(spent / count)
+    return -(-members // full) * last * full / batch * float(np.median(paces[1:]))
+
+
+def _records(scenario: Scenario) -> range:
+    """Return the clock steps at which runs are compared, the same times for any clock step."""
+    clock = scenario.clock
+    every = clock.stride * -(-clock.records // (_TIMES if _fluctuates(scenario) else _RECORDS))
+    return range(clock.steps % every, clock.steps + 1, every)
+
+
+def _run(scenario: Scenario, count: int, steps: range, end: float = math.inf) -> Array:
+    """Return the ``QUANTITIES`` of the first members at some clock steps, shape (4, members, steps).
+
+    Raises
+    ------
+    TimeoutError
+        If the process has used more CPU time than ``end`` [s] before the run ends.
+    """
+    values, length = list[Array](), 1 + len(steps) // 20
+    for members in np.array_split(np.arange(count), -(-count // together(scenario))):
+        noise, state, courses = MemberNoise.of(scenario.seed, members), None, []
+        for piece in (steps[first : first + length] for first in range(0, len(steps), length)):
+            if time.process_time() > end:
+                raise TimeoutError
+            state, course = follow(scenario, noise, state, piece)
+            read = (_READ[name](scenario, course) for name in QUANTITIES)
+            courses.append([np.broadcast_to(found, (len(piece), len(members))).T for found in read])
+        values.append(np.concatenate(courses, axis=2))
+    return np.concatenate(values, axis=1)
+
+
+def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
+    """Return relative errors of mean, spread, skewness and correlation time of ΔΓ at amplitude 1, in closed form.
+
+    ΔΓ is a weighted sum of independent gamma numbers, whose n-th cumulant is ``(n − 1)! Σ shape wⁿ``. The rate of a
+    mode grows with a ``power`` of its wavenumber.
+    """
+    sums = []
+    for terms in (row.scenario.process.gammas, truth):
+        mean, variance, third = (np.sum(terms.shape * terms.weight**n) for n in (1, 2, 3))
+        lives = np.sum(terms.shape * terms.weight**2 * terms.wavenumber ** -float(power))
+        of_spread = (2.0 * third / variance**1.5, lives / variance) if variance > 0.0 else (0.0, 0.0)
+        sums.append((mean + terms.constant, math.sqrt(variance), *of_spread))
+    return np.array([value / exact - 1.0 if exact else 0.0 for value, exact in zip(*sums, strict=True)])
+
+
+def _truth(base: Scenario) -> Gammas:
+    """Return the distribution of ΔΓ by all modes of the cell."""
+    part: Any = base.fluctuations
+    pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)
+    weight, shape, wavenumber = np.broadcast_arrays(pairs.weight, pairs.count.astype(float), pairs.wavenumber)
+    return Gammas(weight, shape, wavenumber)
+
+
+def _errors(values: Array, reference: Array, known: Array | None = None) -> tuple[Array, Array]:
+    """Return the largest differences over the run between two settings, and their standard errors.
+
+    Parameters
+    ----------
+    values, reference : array, shape (4, members, times)
+        The ``QUANTITIES``; a single member stands for all.
+    known : array, optional
+        Relative errors of mean, spread, skewness and correlation time of ΔΓ, which replace the sampled ones. The radius
+        is corrected in proportion (control variate), which removes most of its noise.
+
+    Returns
+    -------
+    error, standard_error : array, shape (4, 4)
+        For each quantity and statistic, in units of the largest mean, for the spread of ΔΓ of its largest spread.
+    """
+    influences, statistics = [], []
+    for sample in (values, reference):
+        mean, spread = (np.nan_to_num(of(sample, axis=1, keepdims=True)) for of in (np.mean, np.std))
+        spread = np.where(spread > 1e-12 * np.abs(mean), spread, 0.0)
+        off = np.where(spread > 0.0, sample - mean, 0.0)
+        of_spread = np.divide(off**2 - spread**2, 2.0 * spread, out=np.zeros(off.shape), where=spread > 0.0)
+        influences.append(np.stack([off, of_spread], axis=1))
+        statistics.append(np.stack([mean, spread], axis=1))
+    influence, difference = (one - two for one, two in (influences, statistics))
+    if known is not None:
+        off = influences[1][:, 0]
+        along, variance = (np.sum(off[of] * off[_ENERGY], axis=0) for of in (_RADIUS, _ENERGY))
+        slope = np.zeros((4, 2, 1, off.shape[2]))
+        slope[_RADIUS, 0, 0] = np.divide(along, variance, out=np.zeros(variance.shape), where=variance > 0.0)
+        slope[_RADIUS, 1] = np.abs(slope[_RADIUS, 0])
+        exact, of_exact = (known[:2, np.newaxis, np.newaxis] * of[1][_ENERGY] for of in (statistics, influences))
+        difference = difference + slope * (exact - difference[_ENERGY])
+        influence = influence + slope * (of_exact - influence[_ENERGY])
+    count, size = influence.shape[2], np.abs(difference[:, :, 0])
+    deviation = np.sqrt(np.sum(influence**2, axis=2) / (count * max(count - 1, 1)))
+    unit = np.repeat(np.abs(statistics[1][:, :1, 0]).max(axis=2), 2, axis=1)
+    if (spread := statistics[1][_ENERGY, 1].max()) > 0.0:
+        unit[_ENERGY, 1] = spread
+    largest = size.argmax(axis=2)[..., np.newaxis]
+    found = np.full((2, 4, 4), np.nan)
+    for place, numbers in enumerate((size, deviation)):
+        at_largest = np.take_along_axis(numbers, largest, axis=2)[..., 0]
+        found[place, :, :2] = np.divide(at_largest, unit, out=np.zeros((4, 2)), where=unit > 0.0)
+    if known is not None:
+        found[:, _ENERGY] = np.abs(known), np.zeros(4)
+    return found[0], found[1]
+
+
+def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[str]) -> list[Setting]:
+    """Return the settings of one part that fit into the time, with their errors against the finest of them.
+
+    As many members are compared as are estimated to fit into half of the time.
+    """
+    steps, left = _records(max((row.scenario for row in settings), key=_fluctuates)), end - time.process_time()
+    fitting, samples = sorted(settings, key=lambda row: (not row.own, row.time)), dict[str, Array]()
+    part, costs = cast(Any, base.fluctuations), {row.label: row.time / base.ensemble.members for row in settings}
+    alike = [row.label for row in settings if not _fluctuates(row.scenario)]  # one member stands for all
+    while sum(costs[row.label] * _FEWEST for row in fitting if row.label not in alike) > left:
+        _leave_out(fitting.pop(), left_out)
+    noisy = sum(costs[row.label] for row in fitting if row.label not in alike)
+    count = int(np.clip(0.5 * left / max(noisy, 1e-12), _FEWEST, _MOST))
+    for row in fitting:
+        row.members = 1 if row.label in alike else count
+        try:
+            samples[row.label] = _run(row.scenario, row.members, steps, end)
+        except TimeoutError:
+            _leave_out(row, left_out)
+    fitting = [row for row in settings if row.label in samples]
+    truth = _truth(base) if fitting[0].part == "shear" and part.per_member and not part.amplitude.relaxing else None
+    for row in fitting:
+        known = None if truth is None else _known_errors(row, truth, part.correlation.power)
+        row.error, row.standard_error = _errors(samples[row.label], samples[fitting[-1].label], known)
+    return fitting
+
+
+def _leave_out(row: Setting, left_out: list[str]) -> None:
+    """Name a setting that does not fit into the budget; ``BadInput`` if it is that of the scene."""
+    if row.own:
+        raise BadInput([f'--budget: "{row.label}", as the scene has it, does not fit; give a larger budget'])
+    left_out.append(f"{row.label}: does not fit into the budget")
+
+
+class _Replayed:
+    """A shear process with the fluctuations of a finer run, of which it has the energy at unit amplitude."""
+
+    def __init__(self, scenario: Scenario, energy: Array) -> None:
+        self.process, self.amplitude, self.energy = scenario.process, scenario.fluctuations.law, energy
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.process, name)
+
+    def start(self, motion: Motion, bonding: Bonding, noise: Any) -> Fluctuation:
+        """Return the fluctuations at t = 0."""
+        size = self.amplitude.factor(motion.speed, bonding.strength)
+        return Fluctuation(size**2 * self.energy[0], size, np.empty(0))
+
+    def advance(self, state: Any, motions: Motions, bonding: Bonding, noise: Any) -> tuple[Fluctuation, Array]:
+        """Return the fluctuations after a block of steps, and ΔΓ at each of them."""
+        size = self.amplitude.factor(motions.speed, bonding.strength)
+        energy = size**2 * self.energy[motions.step : motions.step + len(motions.time)]
+        return Fluctuation(energy[-1], size[-1], np.empty(0)), energy
+
+
+def _at_steps(rows: Sequence[Setting], count: int) -> list[Array]:
+    """Return the ``QUANTITIES`` by several clock steps, the finest first, all under the fluctuations that it draws.
+
+    Fluctuations have no error in time. Their amplitude and the bonds have, so these are computed at each step.
+    """
+    finest, part = rows[0].scenario, rows[0].scenario.fluctuations
+    scenarios = [row.scenario for row in rows]
+    if part.per_member and not (part.law.relaxing or part.law.remembers or part.spectrum.bond_made):
+        steps = range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio))
+        _, course = follow(finest, MemberNoise.of(finest.seed, np.arange(count)), None, steps)
+        size = part.law.factor(course.speed, course.strength) ** 2
+        unit = np.divide(course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0)
+        for place, row in enumerate(rows[1:], 1):
+            scenarios[place] = row.scenario.with_values({})
+            replayed = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
+            scenarios[place].__dict__["process"] = replayed
+    return [_run(scenario, count, _records(scenario)) for scenario in scenarios]
+
+
+def _judged_steps(own: Setting, finest: Setting, accepted: float, end: float) -> list[Setting]:
+    """Return clock steps with their errors: halved until two agree, or until the next does not fit into the time.
+
+    The bonds are those of the finest model, which any model of small error resembles.
+    """
+    exact, noisy = finest.scenario, _fluctuates(finest.scenario)
+    coarse = [ratio for ratio in (2.0, 4.0) if not exact.clock.stride % round(ratio)]
+    rows = [_at_step(exact, ratio) for ratio in (0.5, 1.0, *coarse)]
+    pace, left = finest.time / (exact.ensemble.members if noisy else 1), end - time.process_time()
+    count = max(min(_NUMBERS // exact.clock.steps, together(exact), int(left / (32.0 * pace))), 4) if noisy else 1
+    if count * pace * sum(1.0 / row.ratio for row in rows) > left:
+        _leave_out(own, [])
+    while True:
+        began = time.process_time()
+        runs, rest = _at_steps(rows, count), np.zeros((4, 4))
+        for longer, shorter in itertools.pairwise(runs[::-1]):
+            rest = np.fmax(0.5 * rest, _errors(longer, shorter)[0])
+        rest *= _REST_OF_NOISE if noisy else _REST
+        now, agree = time.process_time(), len(rows) > 2 and float(np.nanmax(rest)) <= _SMALL * accepted
+        if agree or rows[0].ratio <= _FINEST_STEP or now + 2.2 * (now - began) > end:
+            break
+        rows.insert(0, _at_step(exact, 0.5 * rows[0].ratio))
+    for row, run in zip(rows, runs, strict=True):
+        row.error, row.standard_error = _errors(run, runs[0])
+        row.error, row.members, row.time = row.error + rest, count, own.time / row.ratio
+    return rows[::-1]
+
+
+class Choice(NamedTuple):
+    """One setting of each part, with the cost and the error of them together; the clock step is last in ``rows``.
+
+    ``bound`` is the largest error with two standard errors added, by which combinations are chosen.
+    """
+
+    rows: tuple[int, ...]
+    time: float
+    error: Array
+    standard_error: Array
+    bound: float
+
+
+def choices(dataset: xr.Dataset) -> list[Choice]:
+    """Return all combinations of one setting a part, that of the scene first.
+
+    Errors add up, and so does the time that each change adds to a step; clock steps multiply it.
+    """
+    part, own, cost = (dataset[name].to_numpy() for name in ("part", "own", "time"))
+    kinds = [np.flatnonzero(part == kind) for kind in _PARTS if kind in part]
+    groups = [sorted(of_part.tolist(), key=lambda row: -own[row]) for of_part in kinds]
+    written, combined = float(cost[groups[-1][0]]), list[Choice]()
+    for chosen_rows in itertools.product(*groups):
+        *changed, step = cost[list(chosen_rows)].tolist()
+        total = max(written + sum(each - written for each in changed), 0.2 * min([written, *changed])) * step / written
+        error = np.nan_to_num(dataset["error"].to_numpy()[list(chosen_rows)]).sum(axis=0)
+        deviation = np.sqrt(np.nansum(dataset["standard_error"].to_numpy()[list(chosen_rows)] ** 2, axis=0))
+        bound = float(np.max(error + _SURE * deviation))
+        combined.append(Choice(chosen_rows, float(f"{total:.2g}"), error, deviation, bound))
+    return combined
+
+
+def chosen(tried: list[Choice], tolerance: float) -> tuple[Choice, bool]:
+    """Return the cheapest combination that keeps the tolerance, or the most accurate with False.
+
+    Of combinations that take as long, to two digits, the most accurate is used.
+    """
+    good = [choice for choice in tried if choice.bound <= tolerance * (1.0 + _ROUNDING)]
+    best = min(good or tried, key=lambda choice: (choice.time if good else 0.0, choice.bound))
+    return best, bool(good)
+
+
+def _worst(error: Array, deviation: Array) -> tuple[str, int, int]:
+    """Return the largest of errors (quantities, statistics) in percent, its quantity and its statistic."""
+    place = int(np.argmax(np.nan_to_num(error)))
+    off, spread = 100.0 * float(np.ravel(error)[place]), 100.0 * float(np.ravel(deviation)[place])
+    text = concise(off, spread) if spread > 0.01 * off else f"{float(f'{off:.2g}'):.4g}"
+    return text if max(off, spread) > 100.0 * _ROUNDING else "0", *divmod(place, error.shape[1])
+
+
+def table(dataset: xr.Dataset) -> list[dict[str, str]]:
+    """Return a row for each setting, for the terminal."""
+    lines = list[dict[str, str]]()
+    for name in dataset["row"].to_numpy():
+        here = dataset.sel(row=name)
+        cells = {"changed": str(here["part"].values), "setting": str(name) + " *" * int(here["own"])}
+        cells["time"] = engineering(float(f"{float(here['time']):.2g}"), "s")
+        for place, symbol in enumerate(_WORDS):
+            size, _, statistic = _worst(*(here[of].to_numpy()[place : place + 1] for of in ("error", "standard_error")))
+            cells[f"{symbol}\n(%)"] = f"{size} {STATISTICS[statistic]}" if statistic and size != "0" else size
+        lines.append(cells | {"members": f"{int(here['members']):,}"})
+    return lines
+
+
+def explanation(dataset: xr.Dataset) -> str:
+    """Return the subject of the study and the meaning of the table's columns, in sentences."""
+    swept, left_out = dataset.attrs["swept"], dataset.attrs["left_out"].replace("\n", "; ")
+    lines = [
+        "Each row changes one thing of the scene (* marks it as it is written). time: CPU time of its run on one core.",
+        "(%): largest difference from a finer setting, and its standard error; of ΔΓ beyond its mean in its own units.",
+    ]
+    lines += [f"The values of {swept} are those of the tables; choose others by --set."] * bool(swept)
+    return "\n".join(lines + [f"Left out: {left_out}."] * bool(left_out))
+
+
+def recommendation(dataset: xr.Dataset) -> str:
+    """Return the cheapest combination that keeps the accepted error, in words and with the lines to write."""
+    tolerance, tried = float(dataset.attrs["tolerance"]), choices(dataset)
+    own, (best, good) = tried[0], chosen(tried, tolerance)
+    cost, name = (
+        engineering(best.time, "s"),
+        "It" if best is own else f"“{', '.join(dataset['row'].values[list(best.rows)])}”",
+    )
+    verdict = "is the cheapest combination that keeps" if good else "comes nearest; none is shown to keep"
+    lines = [f"As it is written the scene is {_off(own)}."]
+    lines.append(f"{name} {verdict} {100.0 * tolerance:.4g} %: {_off(best)}, {cost} of CPU time.")
+    if not good and float(np.max(best.error)) <= tolerance:
+        lines.append("The noise of the samples is too large; a larger budget reduces it.")
+    changed = [dataset.isel(row=row) for row, before in zip(best.rows, own.rows, strict=True) if row != before]
+    toml = [f"\n[{_PARTS[str(row['part'].values)][1]}]\n{row['toml'].values}" for row in changed]
+    return "\n".join([*lines, *["Write:"] * bool(toml), *toml])
+
+
+def _off(choice: Choice) -> str:
+    """Return the largest error of a combination in words."""
+    size, quantity, statistic = _worst(choice.error, choice.standard_error)
+    return f"off by {size} % ({STATISTICS[statistic]} of {[*_WORDS.values()][quantity]})" if size != "0" else "exact"
+
+
+def _dataset(scenario: Scenario, settings: list[Setting], tolerance: float, left_out: list[str]) -> xr.Dataset:
+    """Return the settings with units and long names."""
+    dims, variables = ("row", "quantity", "statistic"), dict[str, Any]()
+    for name, (unit, text) in _DESCRIBED.items():
+        values = np.array([getattr(row, name) for row in settings])
+        variables[name] = (dims[: values.ndim], values, {"long_name": text} | ({"units": unit} if unit else {}))
+    coordinates = {"row": [row.label for row in settings], "quantity": [*QUANTITIES], "statistic": [*STATISTICS]}
+    swept = [key for axis in scenario.sweep for key in axis.keys]
+    return xr.Dataset(variables, coordinates, {
+        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}",
+        "sim_version": importlib.metadata.version("sliding-sim"), "seed": str(scenario.seed),
+        "tolerance": tolerance, "swept": ", ".join(swept), "left_out": "\n".join(left_out),
+    })  # fmt: skip
+
+
+def figure(dataset: xr.Dataset) -> Figure:
+    """Draw the largest error of each setting against the CPU time of the run, in the width of a column.
+
+    Bars are two standard errors. Exact settings are drawn at a tenth of the smallest error. A ring marks
+    the scene, a star the recommended combination.
+    """
+    with mpl.rc_context(STYLE):
+        picture, (panel,) = rows([3.0])
+        part, own, cost, error, deviation = (dataset[name].to_numpy() for name in _DRAWN)
+        size, tolerance = np.nan_to_num(error).reshape(len(part), -1), float(dataset.attrs["tolerance"])
+        at, best = size.argmax(axis=1)[:, np.newaxis], chosen(choices(dataset), tolerance)[0]
+        off, bars = (np.take_along_axis(of, at, 1)[:, 0] for of in (size, deviation.reshape(size.shape)))
+        floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
+        off = np.maximum(off, floor)
+        for name, (words, _, colour, marker) in _PARTS.items():
+            look: Any = {"color": colour, "marker": marker, "markersize": 3.6, "linewidth": 0.6, "label": words}
+            if np.any(here := part == name):
+                panel.errorbar(cost[here], off[here], yerr=_SURE * bars[here], **look)
+        panel.plot(cost[own == 1], off[own == 1], "o", color="none", mec="black", markersize=7.5, label="as written")
+        panel.plot(
+            [best.time], [max(best.bound, floor)], "*", color="black", markersize=7.0, zorder=5, label="recommended"
+        )
+        panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
+        panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
+        legend(panel)
+    return picture
+
+
+def study(scenario: Scenario, target: Path, replace: bool, seconds: float, tolerance: float | None) -> Printed:
+    """Study a scene and save dataset and figure; return the table to print and the text below it."""
     picture = target.with_suffix(".png")
     if picture == target:
         raise BadInput([f"{target}: the dataset cannot have the name of its picture; end it in .nc"])
     for path in (target, picture):
         files.claim(path, replace, files_read(scenario))
-    return picture
-
-
-def carried_out(
-    scenario: Scenario, target: Path, replace: bool, seconds: float, tolerance: float | None
-) -> tuple[list[dict[str, str]], str]:
-    """Study a scene and save dataset and figure; the table to print and the text below it."""
-    picture = claim(scenario, target, replace)
-    found = converge(scenario, seconds, tolerance)
-    save(found, target, picture)
-    return table(found), f"{explanation(found)}\n\n{recommendation(found)}\n\n{target}\n{picture}"
-
-
-def save(found: xr.Dataset, target: Path, picture: Path) -> None:
-    """Write the dataset and its figure, each whole or not at all."""
+    dataset = converge(scenario, seconds, tolerance)
     with files.output(target) as beside:
-        found.to_netcdf(beside)
+        dataset.to_netcdf(beside)
     with files.output(picture) as beside:
-        figure(found).savefig(beside, format="png")
-
-
-class _Study:
-    """The rows of one scene and the runs without noise that they are judged by.
-
-    ``sites`` is the number of bond sites whose noise counts, infinite if none does.
-    """
-
-    def __init__(self, base: Scenario, rows: list[Row], sites: float) -> None:
-        self.base, self.sites, self.rows = base, sites, rows
-        self.own_sites = Row("", "", base, "").sites
-        points = [row.points for row in self.of("grid")]
-        grids = [*points, 8 * max(points)] if points else []
-        self.terms = [cell_gammas(base), base.process.gammas]
-        self.terms += [row.scenario.process.gammas for row in self.of("shear")]
-        self.terms += [cell_gammas(base, count) for count in grids]
-        self.walk = Walk.of(base, self.terms)
-        #: The run with exact bonds, once ``judge_bonds`` has found it.
-        self.exact = self.walk
-        law = self.walk.statistics(-1 if grids else 0, sites)
-        #: Where there is a law of each statistic, or none is needed: the skewness is judged of ΔΓ alone.
-        self.lawful: NDArray[np.bool_] = np.all(np.isfinite(law), axis=0)
-        self.lawful[0] |= not self.walk.stretched
-        self.lawful[[0, 1, 3], 2] = self.lawful[:, 3] = True
-        self.yard = _yardsticks(_meant(law, self.walk))
-
-    def of(self, part: str) -> list[Row]:
-        """The rows that change one part."""
-        return [row for row in self.rows if row.part == part]
-
-    def _largest(self, difference: Array) -> Array:
-        """Largest difference over the records in units of the yardsticks, shape (quantities, statistics)."""
-        return np.max(_over(np.abs(difference), self.yard), axis=0)
-
-    def judge_models(self) -> None:
-        """Errors of shear models and of grids, by the terms of ΔΓ that they draw."""
-        part: Any = self.base.fluctuations
-        for which, row in enumerate(shears := self.of("shear"), 2):
-            row.law = self.walk.statistics(which, self.own_sites)
-            row.error = self._largest(self.walk.statistics(which, self.sites) - self.walk.statistics(0, self.sites))
-            cell, own = (memory(terms, part.correlation.power) for terms in (self.terms[0], self.terms[which]))
-            row.error[2, 3] = abs(own / cell - 1.0)
-        for which, row in enumerate(self.of("grid"), 2 + len(shears)):
-            row.error = self._largest(self.walk.statistics(which, self.sites) - self.walk.statistics(-1, self.sites))
-
-    def judge_bonds(self) -> None:
-        """Errors of bond models at the scene's clock step; the last without a number of sites is exact."""
-        rows = self.of("bonds")
-        walks = [self.walk if row.own else Walk.of(row.scenario, self.terms[:2])
-                 for row in rows if math.isinf(row.sites)]  # fmt: skip
-        if walks:
-            self.exact = walks[-1]
-        exact = _meant(self.exact.statistics(0, self.sites), self.exact)
-        for row, walk in zip(rows, walks + [self.exact] * (len(rows) - len(walks)), strict=True):
-            row.law = walk.statistics(1, row.sites)
-            row.error = self._largest(_meant(walk.statistics(0, row.sites), walk) - exact)
-
-    def judge_steps(self, tolerance: float, seconds: float) -> None:
-        """Errors of clock steps: from the longest that the records allow, halved until they agree or the time is up.
-
-        A first-order error changes by half of itself when the step is halved, more or less as a jump of the speed
-        lies within a step: what is left of the finest is taken from the largest change so far.
-        """
-        ratios = [ratio for ratio in (4.0, 2.0) if not self.base.clock.stride % round(ratio)] + [1.0]
-        found: list[tuple[Row, Array]] = []
-        rest, agree, late = np.zeros(self.yard.shape), False, False
-        end = time.process_time() + seconds  # what has run before may have compiled
-        while ratios or not (late or (agree and len(found) > 2) or found[-1][0].ratio <= _FINEST):
-            began = time.process_time()
-            row = at_step(self.base, ratios.pop(0) if ratios else 0.5 * found[-1][0].ratio)
-            exact = at_step(self.exact.scenario, row.ratio).scenario
-            walk = self.exact if row.own else Walk.of(exact, self.terms[:2])
-            found.append((row, _meant(walk.statistics(0, self.own_sites), walk)))
-            if len(found) > 1:
-                rest = np.fmax(0.5 * rest, self._largest(found[-1][1] - found[-2][1]))
-            if row.ratio < 1.0:
-                late = time.process_time() + 2.0 * (time.process_time() - began) > end
-                agree = bool(np.max(rest) <= _FINE * tolerance)
-        for row, statistics in found:
-            row.error = self._largest(statistics - found[-1][1]) + rest
-        self.rows += [row for row, _ in found]
-
-    def sample(self, seconds: float) -> None:
-        """Sample shear and bond models that fluctuate; where there is no law also clock steps, under the same noise."""
-        lawless = not self.lawful[1:, 0].all()
-        own = self.walk.statistics(1, self.own_sites)[:, 1:, :2]
-        self.pooled = not lawless and bool(np.all(np.ptp(own, axis=0) <= 1e-9 * self.yard[1:, :2]))
-        records = self.walk.steps[self.walk.steps <= _LONG_ENOUGH] if self.pooled else self.walk.steps
-        count = min(_POOLED if self.pooled else _STATED, len(records) - 1)
-        self.stated = np.unique(np.rint(np.linspace(len(records) - 1, 0, count, endpoint=False)).astype(int))
-        steps = self.walk.steps[self.stated]
-        for row in self.rows:
-            row.value = row.deviation = row.standard_error = np.full((1 if self.pooled else len(steps), 4, 4), np.nan)
-        shears = [row for row in self.of("shear") if lawless or fluctuates(row.scenario)]
-        bonds = [row for row in self.of("bonds") if math.isfinite(row.sites)]
-        coarse = [row for row in self.of("step")[::-1] if row.ratio >= _FINEST_SAMPLED]
-        coarse = coarse if lawless and fluctuates(self.base) else []
-        share = seconds / max(len(shears + bonds + coarse), 1)
-        for rows in (shears, bonds):
-            for row in rows:
-                row.members = affordable(row.scenario, int(steps[-1]), share, len(steps))
-            self._compare([(row, self._estimates(sampled(row.scenario, row.members, steps.tolist())))
-                           for row in rows if row.members])  # fmt: skip
-        if coarse:
-            self._couple(coarse, share * len(coarse))
-
-    def _estimates(self, values: Array) -> Estimates:
-        """Statistics of a sample, shape (quantities, members, times): at each time, or of all times together."""
-        found = estimates(values[np.newaxis] if self.pooled else np.moveaxis(values, 2, 0)[..., np.newaxis])
-        return Estimates(*(np.insert(of, 3, np.nan, axis=2) for of in found))  # no correlation time
-
-    def _compare(self, drawn: list[tuple[Row, Estimates]]) -> None:
-        """Samples of one part against their laws, else against the fullest model among them."""
-        if not drawn:
-            return
-        fullest, best = drawn[-1]
-        self.yard[:, 1] = np.where(np.isnan(self.yard[:, 1]), np.fmax.reduce(best.value[..., 1]), self.yard[:, 1])
-        judged = np.ones(self.yard.shape, bool)
-        judged[0], judged[[0, 1, 3], 2] = self.walk.stretched, False
-        for row, found in drawn:
-            assert row.law is not None
-            law = row.law[self.stated[: len(found.value)]]
-            lawful = self.lawful & np.isfinite(law)
-            apart = found.less(best) if row is not fullest else np.full((2, *law.shape), np.nan)
-            pairs = zip((found.value - law, found.standard_error), apart, strict=True)
-            both = (_over(np.where(judged, np.where(lawful, *pair), np.nan), self.yard) for pair in pairs)
-            row.value, (row.deviation, row.standard_error) = found.value, both
-            error = _sampled_error(row.deviation, row.standard_error, _SURE)
-            self._take(row, error if row is not fullest else np.zeros(error.shape))
-
-    def _take(self, row: Row, found: Array) -> None:
-        """Errors of a sample and their bounds, shape (2, quantities, statistics), where no law gives them."""
-        only = ~self.lawful & np.isfinite(found[1])
-        for kept, new in zip((row.error, row.bound), found, strict=True):
-            kept[only] = np.fmax(row.error, new)[only]
-
-    def _couple(self, rows: Sequence[Row], seconds: float) -> None:
-        """Sampled errors of clock steps, finest first, under the same fluctuations."""
-        finest = rows[0]
-        steps = np.rint(self.walk.steps[self.stated] / finest.ratio).astype(int)
-        members = affordable(finest.scenario, int(steps[-1]), seconds / 2.0, len(rows) * len(steps))
-        if not members:
-            return
-        found = [self._estimates(values) for values in coupled([r.scenario for r in rows], members, steps.tolist())]
-        less = [each.less(found[0]) for each in found]
-        errors = [_sampled_error(_over(apart, self.yard), _over(sem, self.yard), 0.0) for apart, sem in less]
-        for row, error in zip(rows, errors, strict=True):
-            row.members = members
-            self._take(row, error + _REST * errors[1])
-        for row in self.of("step"):
-            if row.ratio < finest.ratio:
-                self._take(row, _REST * errors[1])
-
-
-def _meant(statistics: Array, walk: Walk) -> Array:
-    """Statistics with means of a run without noise where they have no law."""
-    mean = statistics[:, 1:, 0]
-    statistics[:, 1:, 0] = np.where(np.isnan(mean), walk.means[:, 1:], mean)
-    return statistics
-
-
-def _over(numbers: Array, yard: Array) -> Array:
-    """Numbers in units of the yardsticks; 0 where both are 0."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        found = numbers / yard
-    return np.where((numbers == 0.0) & (yard == 0.0), 0.0, found)
-
-
-def _sampled_error(deviation: Array, sem: Array, least: float) -> Array:
-    """Largest deviation of at least so many standard errors and its bound, shape (2, quantities, statistics)."""
-    size = np.abs(deviation)
-    return np.stack([np.fmax.reduce(np.where(size >= least * sem, size, 0.0)), np.fmax.reduce(size + _SURE * sem)])
-
-
-def _yardsticks(statistics: Array) -> Array:
-    """Units of errors, shape (quantities, statistics): largest values of a run, nan of a spread that is not known."""
-    yard = np.max(np.abs(statistics), axis=0)
-    yard[:2, 1] = yard[:2, 0]
-    yard[:, 2] = yard[2, 2] if yard[2, 2] > 0.0 else 1.0
-    return yard
-
-
-_LONG = ("mean shear stress", "bonds over bonds at rest", "energy of the fluctuations per area", "contact radius")
-_UNITS = ("Pa", "1", "J/m^2", "m")
-_DIMS = ("row", "t", "quantity", "statistic")
-#: Unit and meaning of what the dataset has of each row, by attribute.
-_OF_ROWS = {
-    "part": ("", "what the setting changes"),
-    "toml": ("", "lines of the scenario file that choose the setting"),
-    "own": ("1", "1 where the scene has this setting as it is written"),
-    "time": ("s", "CPU time of the scene's run, median of the repeats"),
-    "time_low": ("s", "CPU time of the scene's run, least of the repeats"),
-    "time_high": ("s", "CPU time of the scene's run, largest of the repeats"),
-    "members": ("1", "members sampled"),
-    "clock_step": ("s", "clock step"),
-    "value": ("", "sampled statistic, in SI units"),
-    "deviation": ("1", "sampled statistic less what is expected, in units of the yardstick"),
-    "standard_error": ("1", "standard error of the deviation, in units of the yardstick"),
-    "error": ("1", "largest error over the run, in units of the yardstick"),
-    "bound": ("1", "what the error is at most, where it is known from samples only, in units of the yardstick"),
-}
-
-
-def _assembled(scenario: Scenario, study: _Study, tolerance: float, left_out: list[str]) -> xr.Dataset:
-    """Everything that was found, with units and long names."""
-    clock = study.base.clock
-    stated = study.walk.steps[study.stated[-1:] if study.pooled else study.stated]
-    variables: dict[str, Any] = {"yardstick": (_DIMS[2:], study.yard, {"long_name": "unit of errors, in SI units"})}
-    for name, (unit, text) in _OF_ROWS.items():
-        values = np.array([getattr(row, name) for row in study.rows])
-        dims = _DIMS[:1] + _DIMS[5 - values.ndim :]
-        variables[name] = (dims, values, {"long_name": text} | ({"units": unit} if unit else {}))
-    coordinates = {
-        "row": ("row", [row.label for row in study.rows], {"long_name": "setting"}),
-        "t": ("t", [clock.time(int(step)) for step in stated], {"units": "s", "long_name": "time of the statistics"}),
-        "quantity": ("quantity", list(QUANTITIES), {"long_name": "; ".join(_LONG), "comment": ", ".join(_UNITS)}),
-        "statistic": ("statistic", list(STATISTICS), {"long_name": "statistic"}),
-    }
-    version = importlib.metadata.version("sliding-sim")
-    members = scenario.ensemble.members if fluctuates(study.base) else 1
-    dataset = xr.Dataset(variables, coordinates, {
-        "Conventions": "CF-1.11", "title": f"speed against error: {scenario.name}",
-        "history": f"sim converge; sliding-sim {version}", "sim_version": version, "seed": str(scenario.seed),
-        "tolerance": tolerance, "clock_step": clock.step, "steps": clock.steps,
-        "members_of_run": members, "fluctuates": int(fluctuates(study.base)), "pooled": int(study.pooled),
-        "sites": study.sites, "point": _point(scenario), "left_out": "\n".join(left_out),
-    })  # fmt: skip
-    dataset["t"].encoding["_FillValue"] = None  # the conventions allow a coordinate none
-    return dataset
-
-
-def _point(scenario: Scenario) -> str:
-    """Which point of a sweep is studied, and how to choose another."""
-    if not scenario.sweep:
-        return ""
-    declared = quantities(scenario)
-    keys = [key for axis in scenario.sweep for key in axis.keys]
-    at = [f"{key} = {engineering(declared[key][1], declared[key][0].unit)}" if key in declared
-          else f"{key} as its table has it" for key in keys]  # fmt: skip
-    return f"{', '.join(at)}; choose another point of the sweep by --set {keys[0]}=…"
+        figure(dataset).savefig(beside, format="png")
+    return table(dataset), f"{explanation(dataset)}\n\n{recommendation(dataset)}\n\n{target}\n{picture}"
