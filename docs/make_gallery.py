@@ -70,7 +70,7 @@ class Entry(NamedTuple):
 
     @property
     def commands(self) -> list[str]:
-        """What gives the figure at a terminal."""
+        """Commands that give the figure at a terminal."""
         path = f"scenarios/{self.scenario}"
         if self.free:
             free = "".join(f" --free {key}" for key in self.free)
@@ -84,16 +84,16 @@ class Entry(NamedTuple):
         return [f"sim run {path}.toml{options}{output}", f"{shown}{chosen}"]
 
     def run(self) -> Any:
-        """The dataset of the question, or the fit."""
+        """Return the dataset of the question, or the fit."""
         path = ROOT / "scenarios" / f"{self.scenario}.toml"
         if self.free:
             return sim.fit(path, path.with_suffix(".csv"), self.free)
         return sim.run(sim.load(path, dict(self.changes)))
 
-    def draw(self, found: Any) -> None:
+    def draw(self, result: Any) -> None:
         """Make the picture, of few colours and as many pixels as its size allows."""
         chosen: Any = {"where": dict(self.where), "units": self.units}
-        figure = fitted(found.problem, found.best) if self.free else sim.plot(found, self.kind, **chosen)
+        figure = fitted(result.problem, result.best) if self.free else sim.plot(result, self.kind, **chosen)
         for dpi, colours in FINENESS:
             drawn, small = io.BytesIO(), io.BytesIO()
             figure.savefig(drawn, format="png", dpi=dpi)
@@ -105,24 +105,24 @@ class Entry(NamedTuple):
         (FOLDER / f"{self.name}.png").write_bytes(small.getvalue())
 
     def text(self, numbers: dict[str, Any]) -> str:
-        """The part of the page with the question, its figure, its answer and the commands."""
+        """Return the part of the page with the question, its figure, its answer and the commands."""
         commands = "\n".join(f"    {command}" for command in self.commands)
         figure = f"![{self.question}]({self.name}.png)"
         scenario = f"[`{self.scenario}`](../../scenarios/{self.scenario}.toml)"
         answer = textwrap.fill(
-            f"{self.said(numbers)} ({scenario})", 120, break_long_words=False, break_on_hyphens=False
+            f"{self.filled(numbers)} ({scenario})", 120, break_long_words=False, break_on_hyphens=False
         )
         return f"## {self.question}\n\n{figure}\n\n{answer}\n\n{commands}\n"
 
-    def said(self, numbers: dict[str, Any]) -> str:
-        """The answer with its numbers."""
+    def filled(self, numbers: dict[str, Any]) -> str:
+        """Return the answer with its numbers."""
         shown = {name: concise(*value) if isinstance(value, list | tuple) else value for name, value in numbers.items()}
         shown = {name: _Certain(value) if isinstance(value, float) else value for name, value in shown.items()}
         return " ".join(self.answer.format(**shown).split())
 
 
 def _toml(value: Any) -> str:
-    """A value as an override on a command line has it."""
+    """Return a value as an override of the command line."""
     if isinstance(value, dict):
         return "{" + ", ".join(f'"{key}" = {_toml(inner)}' for key, inner in value.items()) + "}"
     if isinstance(value, list):
@@ -130,10 +130,10 @@ def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else str(value)
 
 
-def pair(found: xr.Dataset, variable: str, factor: float = 1.0, **at: float) -> Number:
+def pair(summary: xr.Dataset, variable: str, factor: float = 1.0, **at: float) -> Number:
     """A mean of the statistics with its standard error where it has one, at the records nearest to some values."""
-    index = {name: nearest(found[name], value) for name, value in at.items()}
-    value, error = (factor * float(found[f"{variable}_{kind}"].isel(index).squeeze()) for kind in ("mean", "sem"))
+    index = {name: nearest(summary[name], value) for name, value in at.items()}
+    value, error = (factor * float(summary[f"{variable}_{kind}"].isel(index).squeeze()) for kind in ("mean", "sem"))
     return (value, error) if error > 0.0 else value
 
 
@@ -277,7 +277,7 @@ def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
         mean("area_ratio", dataset, 100.0, t=then, adhesion_bond_share=bonds, shear_paid_by_adhesion=paid)
         for bonds, paid in ((1.0, 0.0), (0.0, 1.0), (1.0, 1.0))
     ]
-    bonds, fluctuations = (float(np.max(one)) for one in left[:2])
+    bonds, fluctuations = (float(np.max(each)) for each in left[:2])
     return {"speed": 1e3 * speed, "bonds": left[0], "fluctuations": left[1],
             "both": left[2], "product": 0.01 * bonds * fluctuations}  # fmt: skip
 
@@ -290,11 +290,11 @@ def decomposition(dataset: xr.Dataset) -> dict[str, Number]:
 )
 def soft_lens(dataset: xr.Dataset) -> dict[str, Number]:
     rms = 30e3
-    found = analysis.summary(analysis.settled(analysis.observables(dataset))).sel(shear_spectrum_rms=rms)
+    late = analysis.summary(analysis.settled(analysis.observables(dataset))).sel(shear_spectrum_rms=rms)
     work = analysis.bond_work(dataset).isel(t=-1)
     return {"modulus": 1e-6 * modulus_of(dataset),
             "width": 2e3 * float(dataset["radius_at_rest"].max()), "rms": 1e-3 * rms,
-            "masked": pair(found, "fraction_masked", 100.0), "energy": pair(found, "fluctuation_energy", 1e3),
+            "masked": pair(late, "fraction_masked", 100.0), "energy": pair(late, "fluctuation_energy", 1e3),
             "work": 1e3 * float(work.max())}  # fmt: skip
 
 
@@ -309,7 +309,7 @@ def ten_wavelengths(dataset: xr.Dataset) -> dict[str, Number]:
     area, ratio = (dataset["contact_area"].isel(t=-1), statistics(dataset)["area_ratio_quantile"].isel(t=-1))
     count = dataset.sizes["member"]
     spread = 100.0 * (area.std("member", ddof=1) / area.mean("member")).to_numpy()
-    three, ten, thirty = ((float(one), float(one) / np.sqrt(2.0 * (count - 1))) for one in spread)
+    three, ten, thirty = ((float(each), float(each) / np.sqrt(2.0 * (count - 1))) for each in spread)
     low, high = (100.0 * float(ratio.isel(shear_spectrum_longest=1).sel(quantile=level)) for level in (0.05, 0.95))
     return {"three": three, "ten": ten, "thirty": thirty, "low": low, "high": high}
 
@@ -412,11 +412,14 @@ def velocity_step(dataset: xr.Dataset) -> dict[str, Number]:
     of which ends in bonds that break.""",
 )
 def friction_loop(dataset: xr.Dataset) -> dict[str, Number]:
-    one = dataset.isel(member=0)
-    turns = np.flatnonzero(np.diff(np.sign(one["stage_speed"].to_numpy())[1:])) + 1
-    stage, slider, work = (one[name].to_numpy()[turns] for name in ("stage_position", "slider_position", "drive_work"))
+    member = dataset.isel(member=0)
+    turns = np.flatnonzero(np.diff(np.sign(member["stage_speed"].to_numpy())[1:])) + 1
+    stage, slider, work = (
+        member[name].to_numpy()[turns] for name in ("stage_position", "slider_position", "drive_work")
+    )
     return {"stage": 1e6 * abs(float(stage[2] - stage[1])), "slider": 1e6 * abs(float(slider[2] - slider[1])),
-            "force": 1e3 * float(abs(one["friction_force"]).max()), "work": 1e6 * float(work[2] - work[1])}  # fmt: skip
+            "force": 1e3 * float(abs(member["friction_force"]).max()),
+            "work": 1e6 * float(work[2] - work[1])}  # fmt: skip
 
 
 @asks(
@@ -448,9 +451,9 @@ def creep(dataset: xr.Dataset) -> dict[str, Number]:
     kind="incipient",
 )
 def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
-    found, load = analysis.events(dataset).isel(member=0), 1e3 * dataset["contact_load"].to_numpy()
-    lost, area = 100.0 * (1.0 - found["area_at_threshold"].to_numpy()), dataset["contact_area"].isel(member=0, t=0)
-    power = np.polyfit(np.log(area), np.log(found["incipient_alpha"]), 1)[0]
+    pulls, load = analysis.events(dataset).isel(member=0), 1e3 * dataset["contact_load"].to_numpy()
+    lost, area = 100.0 * (1.0 - pulls["area_at_threshold"].to_numpy()), dataset["contact_area"].isel(member=0, t=0)
+    power = np.polyfit(np.log(area), np.log(pulls["incipient_alpha"]), 1)[0]
     return {"small": float(lost[0]), "least": float(load[0]), "large": float(lost[-1]), "load": float(load[-1]),
             "power": float(power)}  # fmt: skip
 
@@ -466,12 +469,12 @@ def incipient_shear(dataset: xr.Dataset) -> dict[str, Number]:
 def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate", "site_density")
     peak = laws.schallamach.first_moment_peak(*(float(dataset[f"bonds_{name}"]) for name in names))
-    slips, found = analysis.slips(dataset).isel(member=0), analysis.stick_slip(dataset).isel(member=0)
+    slips, events = analysis.slips(dataset).isel(member=0), analysis.stick_slip(dataset).isel(member=0)
     mean = slips.mean("slip")
-    return {"onset": 1e3 * float(found["slips_from"]), "peak": 1e3 * float(peak.speed),
+    return {"onset": 1e3 * float(events["slips_from"]), "peak": 1e3 * float(peak.speed),
             "drop": 1e3 * float(mean["force_drop"]), "slip": 1e6 * float(mean["slip_amplitude"]),
             "static": 1e3 * float(mean["static_friction"]),
-            "kinetic": 1e3 * float(found["kinetic_friction"])}  # fmt: skip
+            "kinetic": 1e3 * float(events["kinetic_friction"])}  # fmt: skip
 
 
 @asks(
@@ -484,9 +487,9 @@ def stick_slip(dataset: xr.Dataset) -> dict[str, Number]:
     kind="stability",
 )
 def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
-    found, stiffness = analysis.stick_slip(dataset).isel(member=0), dataset["drive_stiffness"].to_numpy()
-    up, down = (1e3 * float(found[name][0]) for name in ("slips_from", "slips_down_to"))
-    calm = found["slips_down_to"].isnull().to_numpy()
+    events, stiffness = analysis.stick_slip(dataset).isel(member=0), dataset["drive_stiffness"].to_numpy()
+    up, down = (1e3 * float(events[name][0]) for name in ("slips_from", "slips_down_to"))
+    calm = events["slips_down_to"].isnull().to_numpy()
     return {"soft": float(stiffness[0]), "up": up, "down": down, "stiff": float(stiffness[np.argmax(calm)])}
 
 
@@ -501,11 +504,11 @@ def stability_map(dataset: xr.Dataset) -> dict[str, Number]:
     put in.""",
 )
 def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
-    found_at = analysis.distribution(dataset)
-    slow, fast = (found_at.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
+    late = analysis.distribution(dataset)
+    slow, fast = (late.sel(drive_stage=speed) for speed in (2e-3, 3e-3))
     names = {"before": slow, "after": fast}
-    found: dict[str, Number] = {name: pair(one, "area_ratio", 100.0) for name, one in names.items()}
-    return found | {"slow": 2.0, "fast": 3.0, "bonds": pair(fast, "lost_to_bonds", 100.0),
+    numbers: dict[str, Number] = {name: pair(each, "area_ratio", 100.0) for name, each in names.items()}
+    return numbers | {"slow": 2.0, "fast": 3.0, "bonds": pair(fast, "lost_to_bonds", 100.0),
                     "bonded": pair(slow, "lost_to_bonds", 100.0), "noise": pair(fast, "lost_to_fluctuations", 100.0),
                     "calm": pair(slow, "lost_to_fluctuations", 100.0),
                     "rms": 1e-3 * float(dataset["shear_spectrum_rms"]),
@@ -522,13 +525,13 @@ def pdms_lens_spring(dataset: xr.Dataset) -> dict[str, Number]:
     kind="sweep",
 )
 def motor_clutch(dataset: xr.Dataset) -> dict[str, Number]:
-    found = analysis.summary(analysis.settled(dataset[["friction_force"]]), quantiles=False)
+    late = analysis.summary(analysis.settled(dataset[["friction_force"]]), quantiles=False)
     stiffness, best = (
         dataset["drive_contact_stiffness"].to_numpy(),
-        int(np.argmax(found["friction_force_mean"].to_numpy())),
+        int(np.argmax(late["friction_force_mean"].to_numpy())),
     )
     at = {"most": best, "softly": 0, "stiffly": -1}
-    numbers = {name: pair(found.isel(drive_contact_stiffness=k), "friction_force", 1e12) for name, k in at.items()}
+    numbers = {name: pair(late.isel(drive_contact_stiffness=k), "friction_force", 1e12) for name, k in at.items()}
     borne = np.array(numbers["stiffly"])
     numbers["glides"] = 120.0 - 1.2 * float(borne[0]), 1.2 * float(borne[1])
     numbers["motors"] = 1e12 * float(dataset["drive_force"])
@@ -560,8 +563,8 @@ def bond_noise(dataset: xr.Dataset) -> dict[str, Number]:
     way: {open} % of the members, on average at {off} ms, at a speed of {at:.1f} mm/s.""",
 )
 def fixed_grips(dataset: xr.Dataset) -> dict[str, Number]:
-    depth, found = dataset["contact_indentation"], statistics(dataset)
-    high, deep = found.isel(contact_indentation=0), found.isel(contact_indentation=-1, t=-1)
+    depth, over_members = dataset["contact_indentation"], statistics(dataset)
+    high, deep = over_members.isel(contact_indentation=0), over_members.isel(contact_indentation=-1, t=-1)
     off = pair(high, "first_detachment", 1e3)
     then = 1e-3 * (off[0] if isinstance(off, tuple) else off)
     return {"deep": 1e6 * float(depth[-1]), "high": 1e6 * float(depth[0]), "kept": pair(deep, "area_ratio", 100.0),
@@ -706,24 +709,24 @@ def afm_tip(dataset: xr.Dataset) -> dict[str, Number]:
 
 
 def text(numbers: dict[str, dict[str, Any]]) -> str:
-    """The page."""
+    """Return the page."""
     return "\n".join([HEAD, *(entry.text(numbers[entry.name]) for entry in ENTRIES)])
 
 
-def kept() -> dict[str, dict[str, Any]]:
-    """The numbers of all answers as they were last computed."""
+def stored_numbers() -> dict[str, dict[str, Any]]:
+    """Return the numbers of all answers as last computed."""
     return json.loads(NUMBERS.read_text(encoding="utf-8")) if NUMBERS.exists() else {}
 
 
 def main(names: list[str]) -> None:
     """Run, draw and answer questions, all or some, and write the page."""
-    numbers = kept()
+    numbers = stored_numbers()
     for entry in ENTRIES:
         if not names or entry.name in names:
             dataset = entry.run()
             numbers[entry.name] = entry.numbers(dataset)
             entry.draw(dataset)
-            sys.stdout.write(f"{entry.name}: {entry.said(numbers[entry.name])}\n")
+            sys.stdout.write(f"{entry.name}: {entry.filled(numbers[entry.name])}\n")
     ordered = {entry.name: numbers[entry.name] for entry in ENTRIES}
     NUMBERS.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
     PAGE.write_text(text(ordered), encoding="utf-8")

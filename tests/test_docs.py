@@ -89,7 +89,7 @@ def test_the_page_for_newcomers_shows_what_its_code_gives():
 
 
 GALLERY = maker_of("gallery")
-NUMBERS = GALLERY.kept()
+NUMBERS = GALLERY.stored_numbers()
 
 
 def test_every_scenario_has_its_question_in_the_gallery():
