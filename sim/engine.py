@@ -1,4 +1,4 @@
-"""The engine: in which order the parts act in one step; it holds no physics of its own.
+"""Engine: order of the parts in one step. It holds no physics.
 
 drive → speed → bonds → fraction, stress → shear → ΔΓ → w = Δγ(fraction) − χ ΔΓ → contact → radius.
 """
@@ -14,7 +14,7 @@ from sim.parts import extremes
 from sim.parts.contact.balance import Balance
 from sim.parts.coupled import coupled
 from sim.parts.coupled.coupled import StepContact
-from sim.parts.exchange import Array, Bonding, ContactState, Indices, Sliding, Storing, during
+from sim.parts.exchange import Array, Bonding, ContactState, Indices, Motions, Sliding, Storing, during
 from sim.scenario.scenario import Scenario
 
 Arrays = dict[str, Array]
@@ -41,7 +41,7 @@ class State(NamedTuple):
 
 
 class Trajectory(NamedTuple):
-    """What a batch of members goes through, with the time as first axis and the member as second.
+    """Trajectory of a batch of members, with the time as first axis and the member as second.
 
     ``time`` [s], ``position`` [m] and ``speed`` [m/s] of the slider; ``fraction``, ``stress`` and ``strength`` of the
     bonds as of ``Bonding``; ``energy`` ΔΓ [J/m²]; ``driven`` the readings of a drive that feels the friction, in
@@ -75,7 +75,7 @@ class MemberNoise(NamedTuple):
 
 
 def start(scenario: Scenario, noise: MemberNoise) -> State:
-    """The state at t = 0."""
+    """Return the state at t = 0."""
     drive, population, process, contact = scenario.parts
     slider, motion = drive.begin(scenario.times, len(noise.bonds.members))
     bonds = population.start(motion, noise.bonds)
@@ -93,7 +93,7 @@ def start(scenario: Scenario, noise: MemberNoise) -> State:
 
 
 def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) -> tuple[State, Trajectory]:
-    """The state after a block of clock steps and what it went through.
+    """Return the state after a block of clock steps, and the trajectory in it.
 
     Where a drive feels the friction the block ends, perhaps earlier, where the contact opens or closes.
     """
@@ -112,15 +112,20 @@ def advance(scenario: Scenario, state: State, noise: MemberNoise, steps: range) 
     shear, energy = process.advance(state.shear, motions, bonding, noise.shear)
     terms = balance(scenario, bonding.fraction, bonding.strength, energy, motions.position)
     touch = contact.advance(state.contact, motions, scenario.times.duration, terms)
-    if drive.solves_motion:
-        valid = coupled.steps_until_contact_changes(sliders, touch.radius)
-        if valid < len(steps):
-            return advance(scenario, state, noise, steps[:valid])
+    valid = coupled.steps_until_contact_changes(sliders, touch.radius) if drive.solves_motion else len(steps)
+    if valid < len(steps):
+        return advance(scenario, state, noise, steps[:valid])
     at_start, pull = (state.bonding, state.contact.radius), _pull(scenario, motions.time, touch.radius)
     largest = extremes.after(state.extremes, at_start, bonding, touch.radius, pull, motions)
     end = State(steps[-1], slider, bonds, bonding.at(-1), shear, touch.at(-1), largest)
+    return end, _trajectory(motions.time, motions, bonding, energy, driven, touch)
+
+
+def _trajectory(
+    time: Array, motion: Motions | Sliding, bonding: Bonding, energy: Array, driven: Array, contact: ContactState
+) -> Trajectory:
     of_bonds = bonding.fraction, bonding.stress, bonding.strength
-    return end, Trajectory(motions.time, motions.position, motions.speed, *of_bonds, energy, driven, *touch)
+    return Trajectory(time, motion.position, motion.speed, *of_bonds, energy, driven, *contact)
 
 
 def march(scenario: Scenario, members: Indices, state: State | None = None, keep: bool = True) -> Iterator[State]:
@@ -135,8 +140,8 @@ def march(scenario: Scenario, members: Indices, state: State | None = None, keep
     state : State, optional
         Where to go on from; without it the march starts at t = 0 and yields that state first.
     keep : bool
-        Whether a state stays good after the next one is made. Without it large arrays (those of
-        tracked bonds) are handed on from state to state, which saves a copy of them at each step.
+        True if a state stays valid after the next step. If false, large arrays (of tracked bonds) are reused
+        from state to state, which saves a copy at each step.
 
     Yields
     ------
@@ -162,39 +167,38 @@ def follow(scenario: Scenario, noise: MemberNoise, state: State | None, steps: r
     state : State
         That at the last of the ``steps``.
     course : Trajectory
-        What was passed at each of them; the same numbers, bit for bit, as a march gives.
+        Trajectory at each of them; the same numbers, bit for bit, as a march gives.
     """
-    kept = []
+    blocks = []
     if state is None:
         state = start(scenario, noise)
-        kept += [trajectory_of(scenario, state)] if steps.start == 0 else []
+        blocks += [trajectory_of(scenario, state)] if steps.start == 0 else []
     rows, numbers = len(noise.shear.members), 1 + scenario.process.pairs // _MANY_PAIRS
     longest = 1 if scenario.by_steps else max(1, _BLOCK_NUMBERS // (rows * numbers))
     while state.step < steps[-1]:
         block = range(state.step + 1, min(state.step + longest, steps[-1]) + 1)
-        state, passed = advance(scenario, state, noise, block)
+        state, trajectory = advance(scenario, state, noise, block)
         wanted = slice((steps.start - block.start) % steps.step, None, steps.step)
-        kept.append(Trajectory(*(values[wanted] for values in passed)))
-    return state, Trajectory(*map(np.concatenate, zip(*kept, strict=True)))
+        blocks.append(Trajectory(*(values[wanted] for values in trajectory)))
+    return state, Trajectory(*map(np.concatenate, zip(*blocks, strict=True)))
 
 
 def trajectory_of(scenario: Scenario, state: State) -> Trajectory:
-    """What a march passes at one state, with a time axis of length 1."""
-    time, drive, bonds = np.full(1, scenario.times.at(state.step)), state.drive, state.bonding
-    moving = time, drive.position, drive.speed, bonds.fraction, bonds.stress, bonds.strength
-    driven = scenario.parts.drive.readings(drive)
-    return Trajectory(*(values[np.newaxis] for values in (*moving, state.shear.energy, driven, *state.contact)))
+    """Return the trajectory at one state, with a time axis of length 1."""
+    time, driven = np.full(1, scenario.times.at(state.step)), scenario.parts.drive.readings(state.drive)
+    values = _trajectory(time, state.drive, state.bonding, state.shear.energy, driven, state.contact)
+    return Trajectory(*(array[np.newaxis] for array in values))
 
 
 def balance(scenario: Scenario, fraction: Array, strength: Array, energy: Array, position: Array) -> Balance:
-    """The terms of the effective work of adhesion w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*)."""
+    """Return the terms of the effective work of adhesion w = Δγ(bond fraction) − χ ΔΓ − α 6τ0²a/(πE*)."""
     margin = None if scenario.margin is None else scenario.margin.at(position)
     bonded, fluctuating = scenario.adhesion.work_of_bonds(fraction), scenario.fluctuations.paid_by_adhesion * energy
     return Balance(bonded, fluctuating, strength, margin, scenario.bodies, scenario.adhesion.work)
 
 
 def _step_contact(scenario: Scenario, touch: ContactState, energy: Array, steps: range) -> StepContact:
-    """Contact and half-space at the start of some clock steps, for a drive that feels the friction."""
+    """Return contact and half-space at the start of some clock steps, for a drive that feels the friction."""
     contact, bodies, times, adhesion = scenario.contact, scenario.bodies, scenario.times, scenario.adhesion
     first, last = contact.mount_between(times.at(np.arange(steps.start - 1.0, steps.stop)), times.duration)
     share = 1.0 if scenario.margin is None else scenario.margin(np.nan_to_num(touch.radius, nan=0.0))
@@ -207,19 +211,19 @@ def _step_contact(scenario: Scenario, touch: ContactState, energy: Array, steps:
 
 
 def _pull(scenario: Scenario, time: float | Array, radius: Array) -> Array:
-    """Tensile load of the contact [N], where the control makes it."""
+    """Return the tensile load of the contact [N] if the control makes it, else 0."""
     if not scenario.contact.makes_load:
         return np.zeros((*radius.shape[:-1], 1))
     return -scenario.contact.control(time, scenario.times.duration).normal_load(radius, scenario.bodies)
 
 
 def pack(state: State) -> Arrays:
-    """A state as named arrays, ``{"bonds.bound": ...}``, from which ``unpack`` makes it again."""
+    """Return a state as named arrays, ``{"bonds.bound": ...}``; ``unpack`` is the inverse."""
     return dict(_named(state))
 
 
 def _named(state: tuple[object, ...]) -> Iterator[tuple[str, Array]]:
-    """The arrays of a state with their names, those of a state inside it with a dotted one."""
+    """Yield the arrays of a state with their names; names in a nested state are dotted."""
     for name, value in zip(get_type_hints(type(state)), state, strict=True):
         if isinstance(value, tuple):
             yield from ((f"{name}.{inner}", array) for inner, array in _named(value))
@@ -228,7 +232,7 @@ def _named(state: tuple[object, ...]) -> Iterator[tuple[str, Array]]:
 
 
 def unpack(scenario: Scenario, arrays: Arrays) -> State:
-    """The state of a scenario that ``pack`` took apart."""
+    """Return the state of a scenario from the arrays of ``pack``."""
     kinds = {name: part.state_class for name, part in scenario.parts._asdict().items()}
     kinds |= {"bonding": Bonding, "extremes": extremes.Extremes}
     inner = {name: _assembled(kind, _within(arrays, name)) for name, kind in kinds.items()}
@@ -236,13 +240,13 @@ def unpack(scenario: Scenario, arrays: Arrays) -> State:
 
 
 def _assembled(kind: type, arrays: Arrays) -> tuple[object, ...]:
-    """A state of a part from its arrays."""
+    """Return the state of a part from its arrays."""
     inner = {name: (hint, _within(arrays, name)) for name, hint in get_type_hints(kind).items()}
-    values = {name: _assembled(*found) if found[1] else arrays[name] for name, found in inner.items()}
-    made: tuple[object, ...] = kind(**values)
-    return made
+    values = {name: _assembled(*part) if part[1] else arrays[name] for name, part in inner.items()}
+    state: tuple[object, ...] = kind(**values)
+    return state
 
 
 def _within(arrays: Arrays, name: str) -> Arrays:
-    """The arrays of what stands under a name."""
+    """Return the arrays under a dotted name."""
     return {key.removeprefix(f"{name}."): array for key, array in arrays.items() if key.startswith(f"{name}.")}

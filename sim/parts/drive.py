@@ -59,8 +59,8 @@ class _Sliding:
         return Slider(np.zeros(1), motion.speed), motion
 
     def advance(self, state: Slider, times: Times, steps: range) -> tuple[Slider, Motions]:
-        found = self._of_steps(times, steps) if len(steps) > 1 else self._of_one(times, steps.start)
-        time, duration, slip, path, first, speed, unsteady = found
+        rows = self._of_steps(times, steps) if len(steps) > 1 else self._of_one(times, steps.start)
+        time, duration, slip, path, first, speed, unsteady = rows
         position = np.add.accumulate(np.concatenate([state.position[np.newaxis], slip]))[1:]
         motions = Motions(steps.start, time, duration, slip, path, first, speed, position, unsteady)
         return Slider(position[-1], speed[-1]), motions
@@ -71,16 +71,16 @@ class _Sliding:
         return np.array(self._sums(ends, times.duration))[:, :, np.newaxis]
 
     def _of_one(self, times: Times, step: int) -> Array:
-        """Rows of ``_sums`` for a single step, made for many at once and kept."""
+        """Rows of ``_sums`` for a single step, computed for many steps at once."""
         before = (step - 1) // _AHEAD * _AHEAD
-        if (known := self._kept.get((times, before))) is None:
-            known = self._of_steps(times, range(before + 1, min(before + _AHEAD, times.steps) + 1))
-            self._kept.clear()
-            self._kept[times, before] = known
-        return known[:, step - before - 1 : step - before]
+        if (rows := self._ahead.get((times, before))) is None:
+            rows = self._of_steps(times, range(before + 1, min(before + _AHEAD, times.steps) + 1))
+            self._ahead.clear()
+            self._ahead[times, before] = rows
+        return rows[:, step - before - 1 : step - before]
 
     @cached_property
-    def _kept(self) -> dict[tuple[Times, int], Array]:
+    def _ahead(self) -> dict[tuple[Times, int], Array]:
         return {}
 
     def readings(self, state: Slider) -> Array:
@@ -90,7 +90,7 @@ class _Sliding:
         return []
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
-        """The speed in the intervals between some times [s], in pieces."""
+        """Return the speed in the intervals between some times [s], in pieces."""
         raise NotImplementedError
 
     def motion(self, step: int, start: float, stop: float, duration: float) -> Motion:
@@ -225,7 +225,7 @@ class Driven(NamedTuple):
     substeps : array
         Sub-steps since the start.
     runaway_time : array
-        Time at which nothing held the body any longer [s], nan if never.
+        Time at which the slider lost stability [s], nan if never.
     energies : array, shape (members, 8)
         Energies since the start [J], columns of ``ENERGY``.
     acceleration : array
@@ -247,7 +247,7 @@ class Driven(NamedTuple):
     acceleration: Array
 
     def at(self, k: int) -> "Driven":
-        """The slider at the end of step k of a block."""
+        """Return the slider at the end of step k of a block."""
         return Driven(*(values[k] for values in self))
 
 
@@ -275,7 +275,7 @@ class _Driven:
 
     @property
     def course(self) -> Prescribed:
-        """What is prescribed over time."""
+        """Prescribed course over time."""
         raise NotImplementedError
 
     @property
@@ -291,7 +291,7 @@ class _Driven:
         return state, Motion(0, 0.0, 0.0, zero, zero, speed, speed)
 
     def first(self, duration: float) -> float:
-        """What is prescribed at the start, speed of the stage [m/s] or force [N]."""
+        """Return the prescribed speed of the stage [m/s] or force [N] at the start."""
         return float(self.course.at(np.zeros(1), duration)[0])
 
     def _first_speed(self, duration: float) -> float:
@@ -308,7 +308,7 @@ class _Driven:
         return (0.0, 0.0) if self.contact_stiffness == "rigid" else (1.0 / float(self.contact_stiffness), 0.0)
 
     def driven(self, ends: Array, duration: float) -> Pieces:
-        """What is prescribed, speed of the stage or force, in the intervals between some times [s]."""
+        """Return the prescribed speed of the stage or force in the intervals between some times [s]."""
         return self.course.pieces(ends, duration)
 
     def readings(self, state: Driven) -> Array:
@@ -375,23 +375,26 @@ class Spring(_Driven):
         return self.pieces(ends, duration)
 
     def pieces(self, ends: Array, duration: float) -> Pieces:
-        """The speed of the stage in the intervals between some times [s], in pieces."""
+        """Return the speed of the stage in the intervals between some times [s], in pieces."""
         after = self.start_after
         if after <= ends[0]:
-            found = self.course.pieces(ends - after, duration - after)
-            return found._replace(start=found.start + after, stop=found.stop + after)
+            return _shifted(self.course.pieces(ends - after, duration - after), after)
         if after >= ends[-1]:
             return _zeros(ends)
         rests, cut = ends[ends < after], ends[ends > after]
         still = _zeros(np.append(rests, after))
-        found = self.course.pieces(np.append(0.0, cut - after), duration - after)
-        moving = found._replace(start=found.start + after, stop=found.stop + after)
+        moving = _shifted(self.course.pieces(np.append(0.0, cut - after), duration - after), after)
         pieces = Pieces(*(np.concatenate(pair) for pair in zip(still, moving, strict=True)))
         return pieces._replace(interval=np.searchsorted(ends, 0.5 * (pieces.start + pieces.stop)) - 1)
 
 
+def _shifted(pieces: Pieces, time: float) -> Pieces:
+    """Return pieces that begin later by a time [s]."""
+    return pieces._replace(start=pieces.start + time, stop=pieces.stop + time)
+
+
 def _zeros(ends: Array) -> Pieces:
-    """Nothing in the intervals between some times [s]."""
+    """Return pieces of zero in the intervals between some times [s]."""
     none = np.zeros(len(ends) - 1)
     return linear_pieces(np.arange(len(none)), ends[:-1], ends[1:], none, none)
 

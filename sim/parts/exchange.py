@@ -135,7 +135,7 @@ class Motions(NamedTuple):
 
 
 def during(values: Array, steps: int) -> Array:
-    """What stays during a block, with the step as first axis."""
+    """Return values that are constant during a block, with the step as first axis."""
     return values[np.newaxis] if steps == 1 else np.repeat(values[np.newaxis], steps, axis=0)
 
 
@@ -176,7 +176,7 @@ class Bonding(NamedTuple):
     stored: Array = _NONE
 
     def at(self, k: int) -> "Bonding":
-        """The bonds at the end of step k of a block."""
+        """Return the bonds at the end of step k of a block."""
         return Bonding(*(values[k] if values.ndim > 1 else values for values in self))
 
 
@@ -256,11 +256,11 @@ class ContactState(NamedTuple):
     phases: Array
 
     def at(self, k: int) -> "ContactState":
-        """The contact at the end of step k of a block."""
+        """Return the contact at the end of step k of a block."""
         return ContactState(*(values[k] for values in self))
 
 
-Own = TypeVar("Own")
+State = TypeVar("State")
 Terms = TypeVar("Terms", contravariant=True)
 
 
@@ -275,7 +275,7 @@ class Part(Protocol):
         """Sentences on what this part assumes or cannot hold in such a scene, for ``sim check``."""
 
 
-class Drive(Part, Protocol[Own]):
+class Drive(Part, Protocol[State]):
     """Motion of the slider."""
 
     @property
@@ -283,20 +283,20 @@ class Drive(Part, Protocol[Own]):
         """True if the motion follows from the friction and is solved together with the bonds."""
 
     @property
-    def state_class(self) -> type[Own]:
+    def state_class(self) -> type[State]:
         """Class of the state, a ``NamedTuple`` with ``position`` and ``speed``."""
 
-    def begin(self, times: Times, members: int) -> tuple[Own, Motion]:
+    def begin(self, times: Times, members: int) -> tuple[State, Motion]:
         """State and motion of some members at t = 0: no slip, and the speed with which the run begins."""
 
-    def advance(self, state: Own, times: Times, steps: range) -> tuple[Own, Motions]:
+    def advance(self, state: State, times: Times, steps: range) -> tuple[State, Motions]:
         """State at the end of a block of steps and the exact motion in it, of a drive that prescribes it."""
 
-    def readings(self, state: Own) -> Array:
+    def readings(self, state: State) -> Array:
         """Recorded quantities of a drive that feels the friction, shape (members, quantities), else (1, 0)."""
 
 
-class Bonds(Part, Protocol[Own]):
+class Bonds(Part, Protocol[State]):
     """A population of bonds between slider and half-space."""
 
     @property
@@ -307,40 +307,40 @@ class Bonds(Part, Protocol[Own]):
         """
 
     @property
-    def state_class(self) -> type[Own]:
+    def state_class(self) -> type[State]:
         """Class of the state."""
 
     @property
     def in_place(self) -> bool:
         """True if ``advance`` works in the arrays of the state that it is given, which is spent then."""
 
-    def start(self, motion: Motion, noise: Noise) -> Own:
+    def start(self, motion: Motion, noise: Noise) -> State:
         """Population at t = 0, as the key ``start`` has it."""
 
-    def advance(self, state: Own, motions: Motions, radius: Array, noise: Noise) -> tuple[Own, Bonding]:
+    def advance(self, state: State, motions: Motions, radius: Array, noise: Noise) -> tuple[State, Bonding]:
         """Population after a block of steps, and what others read of it at the end of each.
 
         ``radius`` is that of the contact at the start of the block [m], nan where it was open.
         """
 
-    def bonding(self, state: Own) -> Bonding:
+    def bonding(self, state: State) -> Bonding:
         """Everything that others read of a population."""
 
     def steady(self, speed: Array) -> Bonding:
         """Ensemble mean in steady sliding at speeds [m/s], arrays of their shape or (1,)."""
 
 
-class Shear(Protocol[Own]):
+class Shear(Protocol[State]):
     """Process of the shear-stress fluctuations: a shear model on a given solid and cell."""
 
     @property
-    def state_class(self) -> type[Own]:
+    def state_class(self) -> type[State]:
         """Class of the state, a ``NamedTuple`` with ``energy``."""
 
-    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> Own:
+    def start(self, motion: Motion, bonding: Bonding, noise: Noise) -> State:
         """Stationary fluctuations at t = 0."""
 
-    def advance(self, state: Own, motions: Motions, bonding: Bonding, noise: Noise) -> tuple[Own, Array]:
+    def advance(self, state: State, motions: Motions, bonding: Bonding, noise: Noise) -> tuple[State, Array]:
         """Fluctuations after a block of steps, at the ends of which the bonds are ``bonding``; ΔΓ at each [J/m²]."""
 
     @property

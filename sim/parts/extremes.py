@@ -19,7 +19,7 @@ BEFORE, LAST, LARGEST, WHEN = range(4)
 
 
 class Extremes(NamedTuple):
-    """Running maxima over the clock steps, each of shape (rows, 4); nan counts as 0, and of equals the first is kept.
+    """Running maxima over the clock steps, each of shape (rows, 4); NaN counts as 0; ties keep the first.
 
     ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
     is that of the tensile load of a closed contact [N], followed where the control makes the load.
@@ -64,8 +64,7 @@ def after(
     rows = max(len(so_far.stress), stress.shape[1])
     members = max(rows, len(so_far.friction), radii.shape[1])
     counts = rows, members, max(len(so_far.pull), pull.shape[1])
-    found = (values + np.zeros((count, 1)) for values, count in zip(so_far, counts, strict=True))
-    largest = Extremes(*found)
+    largest = Extremes(*(values + np.zeros((count, 1)) for values, count in zip(so_far, counts, strict=True)))
     ends = motions.first, motions.speed, motions.time[:, 0], motions.duration[:, 0]
     _follow(stress, stiffness, relaxation, radii, pull, *ends, *largest)
     return largest
@@ -80,7 +79,7 @@ def _with_start(before: Array, values: Array, steps: int) -> Array:
 
 @device
 def _of(values, k, i):
-    """The value of a member at a time, where all may share one."""
+    """Return the value of a member at a time; all members may share a column."""
     return values[k, i if values.shape[1] > 1 else 0]
 
 
@@ -110,9 +109,9 @@ def _follow(stresses, stiffness, relaxation, radii, pulls, first, speed, times, 
 
 
 @device
-def _keep(now, rise, slope, time, step, kept):
+def _keep(now, rise, slope, time, step, maximum):
     """Replace a maximum by that after a value ``now`` at ``time``; slopes at both ends of the step, nan if unknown."""
-    before, last, largest, when = kept[BEFORE], kept[LAST], kept[LARGEST], kept[WHEN]
+    before, last, largest, when = maximum[BEFORE], maximum[LAST], maximum[LARGEST], maximum[WHEN]
     now = 0.0 if math.isnan(now) else now
     if now > largest:
         largest, when = now, time
@@ -125,7 +124,7 @@ def _keep(now, rise, slope, time, step, kept):
         peak = last - 0.25 * (before - now) * (1.0 - back)
     if peak > largest:
         largest, when = peak, time - back * step
-    kept[BEFORE], kept[LAST], kept[LARGEST], kept[WHEN] = last, now, largest, when
+    maximum[BEFORE], maximum[LAST], maximum[LARGEST], maximum[WHEN] = last, now, largest, when
 
 
 @device

@@ -28,22 +28,22 @@ from sim.parts.coupled.row import (
     SOME,
     Contact,
     Slider,
-    area_kept,
+    area_or_last,
     compliance,
     contact_area,
     contact_at,
     driven,
     elastic,
+    from_units,
     later,
     next_step,
     pieces_to,
     pull_on,
-    put_down,
     run_away,
     slider_in,
     slip_free,
     slips_free,
-    take_up,
+    to_units,
 )
 from sim.parts.drive import ENERGY
 
@@ -75,7 +75,7 @@ _FEW_BIRTHS = 0.1
 
 @device
 def slopes(first, middle, last, step):
-    """Slopes at start and nodes of the parabola through values there."""
+    """Return the slopes at start and nodes of the parabola through values there."""
     early, late = (middle - first) / (GAMMA * step), (last - middle) / ((1.0 - GAMMA) * step)
     bend = late - early
     return early - GAMMA * bend, early + GAMMA * bend, late + (1.0 - GAMMA) * bend
@@ -83,7 +83,7 @@ def slopes(first, middle, last, step):
 
 @device
 def sums_at(pool, count, unit, rules, node):
-    """Sums over the bonds at a node, stretches over their ``unit``."""
+    """Compute the sums over the bonds at a node, stretches over their ``unit``."""
     bound, moment, square, lost, rates = 0.0, 0.0, 0.0, 0.0, pool[8]
     for i in range(count):
         rates[i] = rate_at(pool[1, i], rules.law)
@@ -99,30 +99,30 @@ def sums_at(pool, count, unit, rules, node):
 
 
 @device
-def _tried(pool, count, way, duration, off, free, rules):
-    """Bonds after a motion tried: their share, the sum of their stretches, births early and late, factor of the step.
+def _try_motion(pool, count, way, duration, off, free, rules):
+    """Return the bonds after a trial: their share, sum of stretches, births early and late, factor of the step.
 
     Below 1 the factor refuses the step, as births are not good to the tolerance of the bonds.
     """
-    one, two, factor = try_step(pool, count, way, way / duration, duration, off, free, rules)
+    early, late, factor = try_step(pool, count, way, way / duration, duration, off, free, rules)
     limit, far = rules.limit, 2.0 / 3.0 * way - 4.0 / 3.0 * off
-    bound, moment = one + two, one * far
+    bound, moment = early + late, early * far
     if limit < math.inf:
         for i in range(count):
             low = max(pool[1, i] + way - 0.5 * pool[2, i], -limit)
             high = min(pool[1, i] + way + 0.5 * pool[2, i], limit)
             bound += pool[4, i]
             moment += pool[4, i] * 0.5 * (low + high)
-        return bound, moment, one, two, factor
+        return bound, moment, early, late, factor
     for i in range(count):
         bound += pool[4, i]
         moment += pool[4, i] * (pool[1, i] + way)
-    return bound, moment, one, two, factor
+    return bound, moment, early, late, factor
 
 
 @device
 def _cut(pool, count, way, duration, rules):
-    """Share of the sites whose bonds reach the limit of their stretch on a way."""
+    """Return the share of the sites whose bonds reach the limit of their stretch on a way."""
     cut = 0.0
     for i in range(count):
         most = math.fabs(pool[1, i] + way) + 0.5 * pool[2, i]
@@ -133,7 +133,7 @@ def _cut(pool, count, way, duration, rules):
 
 @device
 def start_of(row, node, yields, slider):
-    """Speeds of interface and body, and the force on the mass, at the start of a sub-step, by the balance of forces."""
+    """Return the speeds of interface and body, and the force on the mass, at the start, by the balance of forces."""
     mass, damping = slider.mass, slider.damping
     speed, body, thick = row.speed, row.body_speed, node.area * slider.viscosity
     bears = node.area * node.moment
@@ -150,8 +150,8 @@ def start_of(row, node, yields, slider):
 
 
 @device
-def set_out(row, node, start, slider, contact):
-    """Lay out the start of a sub-step, whose bonds are known, and return ``start_of`` it."""
+def begin_sub_step(row, node, start, slider, contact):
+    """Set the contact at the start of a sub-step, whose bonds are known, and return its ``start_of``."""
     node.radius, node.area, _, _ = contact_area(node.bound, node.moment, start, row.radius, contact)
     node.sheared = row.sheared
     yields, _ = compliance(node.radius, slider)
@@ -191,7 +191,7 @@ def before_node(place, nodes, at_start, start, step, row, slider):
 
 @device
 def balance(way, bound, moment, before, after, approach, start, row, slider, contact):
-    """Force in excess at a node with these bonds, its slope if they stay, how small a slip is none; nan without any.
+    """Return the excess force at a node with these bonds, its slope if they stay, and the tolerance of the slip.
 
     What belongs to the slip is written to the node.
     """
@@ -223,7 +223,7 @@ def balance(way, bound, moment, before, after, approach, start, row, slider, con
 
 @device
 def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules):
-    """Find the slip to a node and take the bonds there; their number, and the factor of the step for births.
+    """Find the slip to a node and move the bonds; return their number, and the factor of the step for births.
 
     A number below zero where there is no balance of forces or its slope is not that of a short sub-step.
     """
@@ -239,7 +239,7 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
         if (way >= 0.0) != ahead:
             ahead = way >= 0.0
             steepen(pool, count, way, off, rules)
-        bound, moment, one, two, factor = _tried(pool, count, unit * way, duration, off, free, rules)
+        bound, moment, early, late, factor = _try_motion(pool, count, unit * way, duration, off, free, rules)
         over, elasticity, none = balance(
             way, bound, moment / unit, before, after, approach, start, row, slider, contact
         )
@@ -251,7 +251,7 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
             return -1, 0.0
         if math.fabs(over / slope) <= none:
             after.cut = _cut(pool, count, unit * way, duration, rules) if rules.limit < math.inf else 0.0
-            count = carry(pool, count, unit * way, off, one, two, rules)
+            count = carry(pool, count, unit * way, off, early, late, rules)
             sums_at(pool, count, unit, rules, after)
             return count, factor
         last_way, last_over = way, over
@@ -260,8 +260,8 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
 
 
 @device
-def book_nodes(row, nodes, start, step, slider, limit, energy):
-    """Take an accepted sub-step: integrals of the powers over it, and the row at its end."""
+def accept_nodes(row, nodes, start, step, slider, limit, energy):
+    """Add an accepted sub-step to the row: integrals of the powers over it, and the row at its end."""
     damping, viscosity = slider.damping, slider.viscosity
     firms = np.empty(3)
     for i in range(3):
@@ -296,7 +296,7 @@ def book_nodes(row, nodes, start, step, slider, limit, energy):
 
 @device
 def longest(row, unit, rules):
-    """Sub-step beyond which births are not resolved [s]."""
+    """Return the sub-step beyond which births are not resolved [s]."""
     if rules.rebinding == 0.0:
         return math.inf
     speed = math.fabs(row.speed) * unit
@@ -309,20 +309,20 @@ def longest(row, unit, rules):
 
 @device
 def bend_of(nodes, step):
-    """Acceleration of the interface in a sub-step."""
+    """Return the acceleration of the interface in a sub-step."""
     early, late = nodes[1].slip / GAMMA, (nodes[2].slip - nodes[1].slip) / (1.0 - GAMMA)
     return 2.0 / step * (late - early) / step
 
 
 @device
 def error_of_way(bend, step, nodes, row, slider):
-    """Error of a sub-step's way by the change of its acceleration, over the tolerance."""
+    """Return the error of a sub-step's slip by the change of its acceleration, over the tolerance."""
     return step * step / 24.0 * math.fabs(bend - row.acceleration) / (1.0 + math.fabs(nodes[2].slip)) / slider.tolerance
 
 
 @device
 def stored_energy(row, square, time, slider, contact):
-    """Elastic and kinetic energy of spring, body, contact and bonds."""
+    """Return the elastic and kinetic energy of spring, body, contact and bonds."""
     stiffness, mass, viscosity = slider.stiffness, slider.mass, slider.viscosity
     _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
     if not area >= 0.0:  # equilibrium was lost on the way
@@ -332,7 +332,7 @@ def stored_energy(row, square, time, slider, contact):
     return energy + 0.5 * row.spring_force * row.spring_force / stiffness if stiffness > 0.0 else energy
 
 
-#: Share of a piece below which a sub-step that fails may be an avalanche; share of a limit by which one is tried.
+#: Share of a piece below which a sub-step that fails may be an avalanche; share of a limit that is tried.
 _BRIEF, _TRIED = 1e-9, 1e-7
 #: Sub-steps within which bonds break that none leads over.
 _AROUND = 8.0
@@ -340,7 +340,7 @@ _AROUND = 8.0
 
 @device
 def _at_once(pool, count, way, unit, rules):
-    """Share bound and sum of the stretches once all bonds have gone a way, and none is beyond the limit."""
+    """Return the share bound and the sum of the stretches after a displacement, without bonds beyond the limit."""
     bound, moment, limit = 0.0, 0.0, rules.limit
     for i in range(count):
         x, half = pool[1, i] + unit * way, 0.5 * pool[2, i]
@@ -352,7 +352,7 @@ def _at_once(pool, count, way, unit, rules):
 
 @device
 def _lacking(way, pool, count, row, time, slider, contact, unit, rules):
-    """Force that bonds lack, along the pull, once all have gone a way at once; area, shear and way of the body."""
+    """Return the missing force after a displacement at once; area, radius, u, displacement of the body."""
     bound, moment = _at_once(pool, count, way, unit, rules)
     radius, area, _, _ = contact_area(bound, moment, time, row.radius, contact)
     yields, _ = compliance(radius, slider)
@@ -363,8 +363,8 @@ def _lacking(way, pool, count, row, time, slider, contact, unit, rules):
 
 
 @device
-def _snap(row, pool, count, time, slider, contact, unit, rules, node, energy):
-    """Slip at once to where bonds bear the pull again, if an avalanche has begun; bonds left, below zero if none has.
+def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, energy):
+    """Slip at once to where bonds bear the pull, if an avalanche has begun; return the bonds left, else less than 0.
 
     The first such place is looked for in steps of at most half the width to which stretches are resolved.
     """
@@ -416,8 +416,8 @@ def _snap(row, pool, count, time, slider, contact, unit, rules, node, energy):
 
 
 @device
-def _shed(row, pool, count, time, reach, slider, contact, unit, rules, node, energy):
-    """Break bonds of one stretch that are within a ``reach`` of its limit; bonds left, below zero if there are none.
+def _break_stretched(row, pool, count, time, reach, slider, contact, unit, rules, node, energy):
+    """Break bonds of one stretch within a ``reach`` of its limit; return the bonds left, less than 0 without such.
 
     Their force falls in no time, so that no sub-step leads over it where something delays the slip.
     """
@@ -431,10 +431,10 @@ def _shed(row, pool, count, time, reach, slider, contact, unit, rules, node, ene
     if left == count:
         return -1
     stored = stored_energy(row, node.square, time, slider, contact)
-    _, area, _, _ = area_kept(row.bound, row.moment, time, row, contact)
+    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
     sums_at(pool, left, unit, rules, node)
     row.bound, row.moment, row.acceleration = node.bound, node.moment, 0.0
-    row.radius, node.area, _, _ = area_kept(row.bound, row.moment, time, row, contact)
+    row.radius, node.area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
     yields, _ = compliance(row.radius, slider)
     row.speed, row.body_speed, _ = start_of(row, node, yields, slider)
     broken = 0.5 * area * gone * limit * limit
@@ -444,13 +444,13 @@ def _shed(row, pool, count, time, reach, slider, contact, unit, rules, node, ene
 
 
 @device
-def _let_go(row, pool, time, brief, slider, contact, unit, rules, node, energy):
+def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energy):
     """Break all bonds at once and slip, where nothing delays the interface, if they last less than ``brief``."""
     k = rate_at(unit * node.moment / node.bound, rules.law) if node.bound > 0.0 else 0.0
     if not (k * brief > 1.0 and slips_free(row, slider)):
         return False
     stored = stored_energy(row, node.square, time, slider, contact)
-    _, area, _, _ = area_kept(row.bound, row.moment, time, row, contact)
+    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
     broken = 0.5 * area * node.square
     slip_free(row, time, slider, contact)
     pool[0, 0], pool[1, 0], pool[2, 0] = row.bound, 0.0, 0.0
@@ -463,7 +463,7 @@ def _let_go(row, pool, time, brief, slider, contact, unit, rules, node, energy):
 
 @device
 def _piece(row, bonds, slider, contact, unit, rules, room, energy):
-    """Go through one piece of a clock step; the time after which it ends or there is no way on, and the bonds.
+    """Go through one piece of a clock step; return the time of its end or of lost stability, and the bonds.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
@@ -479,7 +479,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             return length, count, travelled, settled
         if not step > LEAST * length:
             slid, row.next_step = row.slip, 0.0
-            if _let_go(row, pool, start, _BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
+            if _break_all(row, pool, start, _BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
                 count = settled = 1
                 travelled += unit * (row.slip - slid)
             elif contact.stays > 0.0:
@@ -489,13 +489,15 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             continue
         saved[:, :count] = pool[:3, :count]
         first = nodes[0]
-        at_start = set_out(row, first, start, slider, contact)
-        found, factor = go_to_node(1, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules)
-        if found >= 0:
-            found, other = go_to_node(2, nodes, at_start, pool, found, start, step, row, slider, contact, unit, rules)
+        at_start = begin_sub_step(row, first, start, slider, contact)
+        new_count, factor = go_to_node(1, nodes, at_start, pool, count, start, step, row, slider, contact, unit, rules)
+        if new_count >= 0:
+            new_count, other = go_to_node(
+                2, nodes, at_start, pool, new_count, start, step, row, slider, contact, unit, rules
+            )
             factor = min(factor, other)
         way, bend, error = nodes[2].slip, 0.0, math.inf
-        if found >= 0:
+        if new_count >= 0:
             bend = bend_of(nodes, step)
             error = error_of_way(bend, step, nodes, row, slider)
         grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)
@@ -505,15 +507,17 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             if rules.limit < math.inf and step < _BRIEF * length:
                 slid, reach = row.slip, _AROUND * step * math.fabs(row.speed) + _TRIED * rules.limit / unit
                 if brittle:
-                    found = _snap(row, pool, count, start, slider, contact, unit, rules, first, energy)
+                    new_count = _slip_event(row, pool, count, start, slider, contact, unit, rules, first, energy)
                 else:
-                    found = _shed(row, pool, count, start, reach, slider, contact, unit, rules, first, energy)
-                if found >= 0:
-                    count, row.next_step = found, 1e-6 * length
+                    new_count = _break_stretched(
+                        row, pool, count, start, reach, slider, contact, unit, rules, first, energy
+                    )
+                if new_count >= 0:
+                    count, row.next_step = new_count, 1e-6 * length
                     travelled += unit * (row.slip - slid)
             continue
-        book_nodes(row, nodes, start, step, slider, rules.limit / unit, energy)
-        count, row.acceleration = found, bend
+        accept_nodes(row, nodes, start, step, slider, rules.limit / unit, energy)
+        count, row.acceleration = new_count, bend
         travelled += unit * way
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:
             direction = -1.0 if way < 0.0 else 1.0
@@ -531,7 +535,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
 
 @device
 def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, room):
-    """Take a row and its cohorts through the pieces of a clock step; the time reached, whether something holds."""
+    """Take a row and its cohorts through a clock step; return the time reached, and False if stability is lost."""
     (weight, stretch, width, lattice), (pool, _, nodes) = bonds, room
     count = read_row(pool, weight, stretch, width, share)
     time, going, travelled, settled = 0.0, True, lattice[0], lattice[1]
@@ -590,13 +594,13 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
         bonds = weight[m], stretch[m], width[m], lattice[m]
         for k in range(len(clock)):
             start, stop = stop, pieces_to(k, stop, pieces)
-            take_up(columns, booked, rows[m], energies[m], units, work)
+            to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(row.runaway_time):
                 now = contact_at(contact, bare[m], clock[k], row)
                 time, going = _through(row, energy, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
                 if not going:
                     run_away(row, booked, clock[k, 0] + time)
                 left = 1.0
-            put_down(columns, booked, rows[m], energies[m], units, work)
+            from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             sum_row(weight[m], stretch[m], width[m], rules, room[0][4], sums[:, k, m])

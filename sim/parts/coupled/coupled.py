@@ -59,7 +59,7 @@ class StepContact(NamedTuple):
     mounts : tuple of Mount
         Mount of the sphere at the start and at the end of each step.
     stays : bool
-        Whether the radius stays during a step.
+        True if the radius stays during a step.
     sphere_radius, modulus, poisson_ratio : float
         R [m], E* [Pa], ν [1].
     shear_modulus : float
@@ -109,12 +109,12 @@ def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: fl
 
 
 def _renewing(bonds: _Driven) -> float:
-    """Way on which sliding renews bonds of a linear rate equation, V_c/h [m], infinite for others."""
+    """Return the displacement on which sliding renews bonds of the rate equation, V_c/h [m], infinite for others."""
     return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, Rate) else math.inf
 
 
 def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, duration: float) -> Driven:
-    """The slider at t = 0, with the spring loaded by what its motion takes, and the energy that is stored."""
+    """Return the slider at t = 0, with its spring loaded for its motion, and the stored energy."""
     drive, slider = cast(Force | Spring, parts.drive), cast(Driven, slider)
     speed, radius = slider.speed, np.nan_to_num(contact.radius, nan=0.0)
     area, (yields, slope) = np.pi * radius**2, drive.yields(contact.shear_modulus, contact.poisson_ratio)
@@ -131,7 +131,7 @@ def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, 
 
 
 def with_contact_stress(parts: Parts, bonding: Bonding, speed: Array) -> Bonding:
-    """The readings of bonds whose strength is their actual stress, with that of a viscous interface at speeds [m/s]."""
+    """Return bonds whose strength is their actual stress, with the viscous stress added to their stress."""
     viscosity = cast(Force | Spring, parts.drive).viscosity
     return bonding._replace(stress=bonding.stress + viscosity * speed, strength=np.abs(bonding.stress))
 
@@ -243,20 +243,20 @@ def _advanced(
 
 
 def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
-    """Number of clock steps up to the first that ends with another contact radius [m] than its sub-steps."""
+    """Return the number of clock steps up to the first that ends with another contact radius [m] than its sub-steps."""
     apart = ~np.all(_agree(slider.radius, radius), axis=1)
     return int(np.argmax(apart)) + 1 if apart[:-1].any() else len(apart)
 
 
-def _agree(own: Array, radius: Array) -> Flags:
+def _agree(own_radius: Array, radius: Array) -> Flags:
     """True where two radii of a contact differ by rounding alone, or both are those of an open one."""
     size = np.fmax(radius, 0.0)
-    same: Flags = np.abs(own - size) <= _SAME * size
+    same: Flags = np.abs(own_radius - size) <= _SAME * size
     return same
 
 
 def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units: tuple[float, float]) -> _Numbers:
-    """The numbers of slider, bonds and contact, but for what holds the sphere, in their units."""
+    """Return the numbers of slider, bonds and contact in their units, without load and base of the mount."""
     stretch, force = units
     stiff, density = force / stretch, force / (stretch * contact.area)
     yields, slope = (stiff * value for value in drive.yields(contact.shear_modulus, contact.poisson_ratio))
@@ -269,17 +269,19 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
         slows = stretch / bonds.critical_speed if isinstance(bonds, Steady) else 0.0
         binding = bonds.rebinding_rate if isinstance(bonds, Rate) else 0.0
         breaking, of_rest = Law(0.0, 0.0, stretch / _renewing(bonds), binding, 1.0, 1.0, slows), 1.0
-    taken = 0.0
+    mean_stress = 0.0
     if contact.reversible:
         stress = density * stretch
-        taken = contact.reversible * float(mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio))
-    still = 0.0, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, taken
+        mean_stress = contact.reversible * float(
+            mean_stress_energy(1.0, stress, contact.modulus, contact.poisson_ratio)
+        )
+    still = 0.0, 0.0, 0.0, 0.0, 0.0, float(contact.stays), contact.bonded / of_rest, mean_stress
     solid = contact.mounts[0].stiffness, 1.0 / contact.sphere_radius, contact.modulus, contact.area
     return tuple(slider), tuple(breaking), tuple(Contact(*still, *solid))
 
 
 def _clock(contact: StepContact, ends: Array) -> Array:
-    """Beginning of each step, load and displacement of the base there, each with its rate; shape (steps, 5)."""
+    """Return the beginning of each step, its load and base, each with its rate; shape (steps, 5)."""
     duration = ends[1:] - ends[:-1]
     clock = np.zeros((len(duration), 5))
     clock[:, 0] = ends[:-1]

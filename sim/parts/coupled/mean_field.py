@@ -1,11 +1,20 @@
-"""Rows of sliders and bonds through a clock step: what happens at once at its start, sub-steps, stick and slip."""
+"""Rows of sliders and bonds through a clock step: elastic slips at its start, sub-steps, stick and slip."""
 
 import math
 
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.coupled.radau import NODE_VALUES, RATES, book, kinetics, newton, rested, share_left, tried
+from sim.parts.coupled.radau import (
+    NODE_VALUES,
+    RATES,
+    accept,
+    kinetics,
+    newton,
+    share_after_rest,
+    share_left,
+    try_sub_step,
+)
 from sim.parts.coupled.row import (
     COLUMNS,
     ENERGIES,
@@ -18,7 +27,7 @@ from sim.parts.coupled.row import (
     Contact,
     Law,
     Slider,
-    area_kept,
+    area_or_last,
     compliance,
     contact_area,
     contact_at,
@@ -26,27 +35,27 @@ from sim.parts.coupled.row import (
     driven,
     elastic,
     free_ways,
+    from_units,
     later,
     next_step,
     pieces_to,
     pull_on,
-    put_down,
     run_away,
     slider_in,
     slip_free,
     slips_free,
-    take_up,
+    to_units,
 )
 from sim.parts.drive import ENERGY
 
-#: Way over the cut-off stretch on which bonds are tried, and that within which they may snap.
+#: Way over the cut-off stretch on which bonds are tried, and that within which they may slip at once.
 _TRIED, NEAR = 1e-7, 1e-3
 
 
 @device
 def stored_in(row, time, slider, law, contact):
-    """Elastic and kinetic energy of spring, body, contact and bonds."""
-    _, area, _, _ = area_kept(row.bound, row.moment, time, row, contact)
+    """Return the elastic and kinetic energy of spring, body, contact and bonds."""
+    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
     stiffness, viscosity = slider.stiffness, slider.viscosity
     energy = 0.5 * slider.mass * row.body_speed * row.body_speed
     energy += 0.5 * row.sheared * area * (row.moment + viscosity * row.speed)
@@ -59,7 +68,7 @@ def stored_in(row, time, slider, law, contact):
 
 @device
 def _lacking(way, row, time, slider, law, contact):
-    """What the bonds lack along the pull once they have gone a way at once: force, or way where the body stays.
+    """Return the missing force of the bonds after a displacement at once, or the missing displacement of the body.
 
     Also N, M, radius, area, u then, and the way of the body.
     """
@@ -83,8 +92,8 @@ def _lacking(way, row, time, slider, law, contact):
 
 
 @device
-def snap(row, time, reach, slider, law, contact, energy):
-    """Slip at once to where bonds bear the pull again, if slip breaks more than it stretches; whether it does.
+def slip_event(row, time, reach, slider, law, contact, energy):
+    """Slip at once to where bonds bear the pull again, if slip breaks more than it stretches. True if so.
 
     That counts which does so within a ``reach`` in units of the cut-off stretch.
 
@@ -124,7 +133,7 @@ def snap(row, time, reach, slider, law, contact, energy):
 
 
 @device
-def let_go(row, time, brief, slider, law, contact, energy):
+def break_all(row, time, brief, slider, law, contact, energy):
     """Break all bonds at once and slip, where nothing delays it, if they last less than a ``brief`` time.
 
     Bonds that are stretched the more the fewer are left break ever faster, all of them in no time; whether that is so.
@@ -133,7 +142,7 @@ def let_go(row, time, brief, slider, law, contact, energy):
     if not (k * brief > 1.0 and slips_free(row, slider)):
         return False
     before = stored_in(row, time, slider, law, contact)
-    _, area, _, _ = area_kept(row.bound, row.moment, time, row, contact)
+    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
     broken = 0.5 * area * row.moment * row.moment / row.bound
     slip_free(row, time, slider, contact)
     energy.rupture += broken
@@ -154,7 +163,7 @@ _FEW_TURNS = 20
 
 @device
 def _piece(row, slider, law, contact, nodes, energy):
-    """Go through one piece of a clock step; the time after which it ends or there is no way on.
+    """Go through one piece of a clock step. Return the time at which it ends or the slider loses stability.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
@@ -165,21 +174,21 @@ def _piece(row, slider, law, contact, nodes, energy):
         left = length - start
         step = next_step(row, left, length, math.inf)
         if not step > LEAST * length:
-            gone = let_go(row, start, _BRIEF * length, slider, law, contact, energy)
+            gone = break_all(row, start, _BRIEF * length, slider, law, contact, energy)
             if contact.stays > 0.0 and not gone:
                 return start
             contact, nodes.last_step = (contact, 0.0) if gone else (later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
-        grows, stands = tried(row, start, step, slider, law, contact, nodes)
+        grows, stands = try_sub_step(row, start, step, slider, law, contact, nodes)
         if not stands:
             row.next_step = step * grows
-            if brittle and step < _BRIEF * length and snap(row, start, NEAR, slider, law, contact, energy):
+            if brittle and step < _BRIEF * length and slip_event(row, start, NEAR, slider, law, contact, energy):
                 row.next_step, nodes.last_step = 1e-6 * length, 0.0
             continue
-        book(row, start, step, slider, law, contact, nodes, energy)
+        accept(row, start, step, slider, law, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
-        if brittle and snap(row, start + step, 0.0, slider, law, contact, energy):
+        if brittle and slip_event(row, start + step, 0.0, slider, law, contact, energy):
             row.next_step, nodes.last_step = 1e-6 * length, 0.0
         if step == left:
             return length
@@ -189,15 +198,15 @@ def _piece(row, slider, law, contact, nodes, energy):
 
 @device
 def _slips(time, start, row, slider, law, contact):
-    """Pull beyond what the bonds bear at a time if nothing has moved since the start, over the unit of force."""
-    share = rested(row.bound, time - start, law)
-    _, area, _, _ = area_kept(share, share, time, row, contact)
+    """Return the pull beyond the strength of the bonds at a time, if nothing has moved since the start."""
+    share = share_after_rest(row.bound, time - start, law)
+    _, area, _, _ = area_or_last(share, share, time, row, contact)
     return math.fabs(pull_on(time, start, 0.0, row, slider)) - area * share
 
 
 @device
 def _rest(row, start, settles, slider, law, contact, energy):
-    """Stay at rest until the pull is more than bonds bear; the time at which it is, or the end of the piece.
+    """Stay at rest until the pull exceeds the strength of the bonds; return its time or the end.
 
     A slip that ``settles`` has come to rest where pull and strength are equal, and the strength grows faster.
     """
@@ -218,9 +227,9 @@ def _rest(row, start, settles, slider, law, contact, energy):
     first, last = row.spring_force, pull_on(end, start, 0.0, row, slider)
     if slider.forced == 0.0:
         energy.work += 0.5 * (last - first) * (last + first) / slider.stiffness
-    moment, share = 0.0, rested(row.bound, end - start, law)
+    moment, share = 0.0, share_after_rest(row.bound, end - start, law)
     for _ in range(_FEW_TURNS):  # the stress takes a little of the area, if adhesion pays for it
-        radius, area, _, _ = area_kept(share, moment, end, row, contact)
+        radius, area, _, _ = area_or_last(share, moment, end, row, contact)
         moment = last / area if area > 0.0 else 0.0
     row.spring_force, row.bound, row.radius, row.moment = last, share, radius, moment
     row.speed, row.body_speed = 0.0, 0.0
@@ -229,19 +238,19 @@ def _rest(row, start, settles, slider, law, contact, energy):
 
 @device
 def _jump(row, time, slider, law, contact):
-    """Speed at which a body without mass begins to slip: the highest at which friction and damping bear the pull.
+    """Return the speed at which a body without mass begins to slip: the highest in balance with the pull.
 
     Newton's method from above: friction is convex in the speed.
     """
     damping, viscosity = slider.damping, slider.viscosity
     pull, speed = math.fabs(row.spring_force), 0.0
-    _, area, _, _ = area_kept(0.0, 0.0, time, row, contact)
+    _, area, _, _ = area_or_last(0.0, 0.0, time, row, contact)
     if not damping + area * viscosity > 0.0:  # an open contact
         return 0.0
     speed = pull / (damping + area * viscosity)
     for _ in range(100):
         share = row.bound * share_left(law.sense * speed, law)
-        _, area, by_bound, by_moment = area_kept(share, share, time, row, contact)
+        _, area, by_bound, by_moment = area_or_last(share, share, time, row, contact)
         bears = damping + area * viscosity
         slope = bears - law.slows * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
         change = (bears * speed + area * share - pull) / slope
@@ -253,7 +262,7 @@ def _jump(row, time, slider, law, contact):
 
 @device
 def _slide(row, start, slider, along, contact, nodes, energy):
-    """Slip until the speed comes to zero or the piece ends; the time reached, negative where there is no way on."""
+    """Slip until the speed comes to zero or the piece ends. Return the time reached; negative without a solution."""
     length, sense = slider.length, along.sense
     for _ in range(MOST_STEPS):
         left = length - start
@@ -266,7 +275,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                 contact = later(contact, 0.0, 1.0)
                 continue
             return start if slider.mass == 0.0 or row.speed == 0.0 else -1.0
-        grows, stands = tried(row, start, step, slider, along, contact, nodes)
+        grows, stands = try_sub_step(row, start, step, slider, along, contact, nodes)
         if not stands:
             row.next_step = step * grows
             continue
@@ -292,7 +301,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                     far, below = step, speed
                     above *= 0.5 if side < 0 else 1.0
                     side = -1
-        book(row, start, step, slider, along, contact, nodes, energy)
+        accept(row, start, step, slider, along, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         start = length if step == left else start + step
         if stops:
@@ -304,13 +313,13 @@ def _slide(row, start, slider, along, contact, nodes, energy):
 
 @device
 def _last_speed(nodes, step):
-    """Speed of the interface at the end of a sub-step."""
+    """Return the speed of the interface at the end of a sub-step."""
     return (RATES[2, 0] * nodes.slip[0] + RATES[2, 1] * nodes.slip[1] + RATES[2, 2] * nodes.slip[2]) / step
 
 
 @device
 def _sticking_piece(row, slider, law, contact, nodes, energy):
-    """Go through one piece with bonds that bear any pull up to their strength at rest; the time reached."""
+    """Go through one piece with bonds that bear any pull up to their strength at rest. Return the time reached."""
     start, length = 0.0, slider.length
     stuck, sense = 0, 0.0
     for _ in range(_CHANGES):
@@ -343,7 +352,7 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
 
 @device
 def _clock_step(row, slider, law, contact, pieces, nodes, energy):
-    """Go through the pieces of a clock step; the time reached, and whether something holds the body still."""
+    """Go through a clock step; return the time reached, and False if stability is lost."""
     is_open, time, worked, going = row.radius == 0.0, 0.0, energy.work, True
     for p in range(len(pieces)):
         slider = slider_in(slider, pieces[p])
@@ -390,7 +399,7 @@ def advance_rows(inputs, numbers, outputs):
         stop = 0
         for k in range(len(clock)):
             start, stop = stop, pieces_to(k, stop, pieces)
-            take_up(columns, booked, rows[m], energies[m], units, work)
+            to_units(columns, booked, rows[m], energies[m], units, work)
             if law.sense != 0.0:
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
             if math.isnan(row.runaway_time):
@@ -398,5 +407,5 @@ def advance_rows(inputs, numbers, outputs):
                 time, going = _clock_step(row, slider, law, now, pieces[start:stop], nodes[0], energy)
                 if not going:
                     run_away(row, booked, clock[k, 0] + time)
-            put_down(columns, booked, rows[m], energies[m], units, work)
+            from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]

@@ -8,7 +8,7 @@ as it is, body X (mass m, damping c) and interface X_s = X − u obey
 
 where bonds without a stretch have M = ±N instead, with the sense of the sliding, and N = 1/(1 + |Ẋ_s|/V_c) if they
 follow the speed at once. The area A is that of the equilibrium contact with the work of adhesion that these bonds
-leave. Slip, u, N and M at the three nodes are the unknowns, found by Newton's method; speeds and accelerations follow
+leave. Slip, u, N and M at the three nodes are the unknowns, error by Newton's method; speeds and accelerations follow
 from the positions by the method itself. So the equations are solved as they stand, whether mass, damping, viscosity
 and 1/k_t are zero (then they are of index 2) or not, and a stiff spring costs no steps.
 """
@@ -71,7 +71,7 @@ NODE_VALUES = np.dtype(
 
 @device
 def kinetics(bound, moment, speed, law):
-    """Ṅ and its slopes over N and M; Ṁ and its slope over N; that over M, and over the speed; Ṅ's; k, \\|speed\\|/l."""
+    """Ṅ and slopes over N and M; Ṁ and slope over N; that over M, and over the speed; Ṅ's; k, \\|speed\\|/l."""
     rate, softness, cuts, binding, sense = law.rate, law.softness, law.cuts, law.binding, law.sense
     stretch = moment / bound if bound > 0.0 else 0.0
     k = rate * math.exp(min(softness * math.fabs(stretch), 690.0))
@@ -87,13 +87,13 @@ def kinetics(bound, moment, speed, law):
 
 @device
 def share_left(speed, law):
-    """Bonds over those of rest of bonds without a stretch, continued smoothly through a speed of zero."""
+    """Return the bond fraction of bonds without a stretch, continued smoothly through a speed of zero."""
     return 1.0 / (1.0 + law.slows * law.sense * speed)
 
 
 @device
-def rested(bound, time, law):
-    """Bonds over those of rest after some time at rest: all of them, if they follow the speed at once."""
+def share_after_rest(bound, time, law):
+    """Return the bond fraction after some time at rest: 1 if bonds follow the speed at once."""
     return 1.0 if law.slows != 0.0 else bound - (1.0 - bound) * math.expm1(-law.binding * time)
 
 
@@ -105,7 +105,7 @@ def _sum(weights, i, values):
 
 @inlined
 def equations(row, nodes, start, step, slider, law, contact):
-    """Residuals at the three nodes for slip, u, N, M there, and their slopes at the middle one.
+    """Compute the residuals at the three nodes for slip, u, N, M there, and their slopes at the middle one.
 
     The slopes are those of the balance of forces over N, M and the speed, of u over the same, of Ṅ and of Ṁ; nan where
     there is no equilibrium.
@@ -164,7 +164,7 @@ def equations(row, nodes, start, step, slider, law, contact):
 
 @device
 def _over(number):
-    """1/number, of a complex one with a single division."""
+    """Return 1/number, with a single division if it is complex."""
     return number.conjugate() * (1.0 / (number.real * number.real + number.imag * number.imag))
 
 
@@ -191,8 +191,8 @@ def _resolved(rate, slopes, slider, law):
 
 
 @device
-def _taken(mode, slopes, balance, yielding, bonds, stretches):
-    """Slip, u, N and M that take residuals of a mode away."""
+def _correction(mode, slopes, balance, yielding, bonds, stretches):
+    """Return the changes of slip, u, N and M that remove the residuals of a mode."""
     nn, nm, mn, mm, n_slip, m_slip, u_slip, by_balance, by_u, by_n, by_m = mode
     bound, moment = nn * bonds + nm * stretches, mn * bonds + mm * stretches
     slip = by_balance * balance + by_u * yielding + by_n * bonds + by_m * stretches
@@ -202,17 +202,17 @@ def _taken(mode, slopes, balance, yielding, bonds, stretches):
 
 @inlined
 def correct(modes, slopes, slider, nodes):
-    """Replace residuals at the nodes by what takes them away."""
+    """Replace the residuals at the nodes by the changes that remove them."""
     balance, yielding, bonds, stretches = nodes.residuals[0], nodes.residuals[1], nodes.residuals[2], nodes.residuals[3]
     gives = slider.yielding + slider.yielding_radius > 0.0
     real = _sum(BACK, 0, balance), _sum(BACK, 0, yielding) if gives else 0.0, _sum(BACK, 0, bonds)
-    one = _taken(modes[0], slopes, real[0], real[1], real[2], _sum(BACK, 0, stretches))
+    by_real = _correction(modes[0], slopes, real[0], real[1], real[2], _sum(BACK, 0, stretches))
     turned = _turned(yielding) if gives else complex(0.0, 0.0)
-    two = _taken(modes[1], slopes, _turned(balance), turned, _turned(bonds), _turned(stretches))
+    by_pair = _correction(modes[1], slopes, _turned(balance), turned, _turned(bonds), _turned(stretches))
     for i in range(3):
         first, second, third = FORTH[i, 0], FORTH[i, 1], FORTH[i, 2]
         for k in range(4):
-            nodes.residuals[k, i] = first * one[k] + second * two[k].real + third * two[k].imag
+            nodes.residuals[k, i] = first * by_real[k] + second * by_pair[k].real + third * by_pair[k].imag
 
 
 @device
@@ -245,11 +245,11 @@ def _ahead(row, nodes, step, law):
         if nodes.last_step > 0.0:
             x = 1.0 + NODES[i] * step / nodes.last_step
             first, second = x - NODES[0], x - NODES[1]
-            one = x * second * (x - 1.0) * _BASE[0]
-            two = x * first * (x - 1.0) * _BASE[1]
+            early = x * second * (x - 1.0) * _BASE[0]
+            middle = x * first * (x - 1.0) * _BASE[1]
             last = x * first * second * _BASE[2] - 1.0
             for k in range(4):
-                nodes.values[k, i] = one * nodes.past[k, 0] + two * nodes.past[k, 1] + last * nodes.past[k, 2]
+                nodes.values[k, i] = early * nodes.past[k, 0] + middle * nodes.past[k, 1] + last * nodes.past[k, 2]
         else:
             time = NODES[i] * step
             nodes.slip[i], nodes.sheared[i], nodes.bound[i], nodes.moment[i] = row.speed * time, 0.0, 0.0, 0.0
@@ -261,7 +261,7 @@ def _ahead(row, nodes, step, law):
 
 @device
 def newton(row, start, step, slider, law, contact, nodes):
-    """Solve for slip, u, N, M at the nodes, by Newton's method with the middle one's slopes; whether that worked.
+    """Solve for slip, u, N, M at the nodes, by Newton's method with the slopes at the middle node. True if solved.
 
     It ends where the next correction would be small, at the pace of the last two.
     """
@@ -311,7 +311,7 @@ def newton(row, start, step, slider, law, contact, nodes):
 
 @inlined
 def error_of(row, start, step, slider, law, contact, nodes):
-    """Defect of the equations between nodes, as an error of a stretch: of order 4 in the sub-step, over its scale.
+    """Return the defect of the equations between nodes, as an error of a stretch: of order 4, over its scale.
 
     The polynomials through start and nodes solve the equations at the nodes alone. What is missing between them of the
     balance of forces, of N, of M and, with a mass, of the speed is taken over what resists it.
@@ -348,7 +348,7 @@ def error_of(row, start, step, slider, law, contact, nodes):
         to_moment = step * of_moment[0]
     if law.slows != 0.0:
         to_bound = step * of_bound[0] + bound - share_left(speed, law)
-    found = max(
+    error = max(
         math.fabs(to_bound - step * of_bound[0]) / (1.0 + step * math.fabs(of_bound[1])) / (bound + FEW),
         math.fabs(to_moment - step * of_moment[0]) / (1.0 + step * math.fabs(on[0])) / scale,
     )
@@ -357,13 +357,13 @@ def error_of(row, start, step, slider, law, contact, nodes):
     stiffest = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0)
     firm = max(1.0, stiffest / (area * (bound + SOME))) if mass > 0.0 and area > 0.0 else 1.0
     # an open contact bears nothing: then what is missing from the spring counts
-    found = max(found, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law.scale)
-    return max(found, firm * step * math.fabs(going - pace) / law.scale) if mass > 0.0 else found
+    error = max(error, firm * math.fabs(balance) / (bears if bears > 0.0 else stiffness) / law.scale)
+    return max(error, firm * step * math.fabs(going - pace) / law.scale) if mass > 0.0 else error
 
 
 @inlined
-def tried(row, start, step, slider, law, contact, nodes):
-    """Solve for a sub-step: length of the next over that of this one, and whether this one stands.
+def try_sub_step(row, start, step, slider, law, contact, nodes):
+    """Solve for a sub-step; return the length of the next over that of this one, and True if this one is accepted.
 
     The error is measured to order 4 where the result is of order 5 or more, so that a power of it is held to the
     tolerance. It goes with the sixth power of the length; where it has grown since the last sub-step, the same growth
@@ -386,8 +386,8 @@ def tried(row, start, step, slider, law, contact, nodes):
 
 
 @inlined
-def book(row, start, step, slider, law, contact, nodes, energy):
-    """Take an accepted sub-step: integrals of the powers by the method's own shares, and the row at its end."""
+def accept(row, start, step, slider, law, contact, nodes, energy):
+    """Add an accepted sub-step to the row: integrals of the powers by the method, state at its end."""
     damping, viscosity = slider.damping, slider.viscosity
     way, speed, body = 0.0, 0.0, 0.0
     follows = contact.stays == 0.0
@@ -417,12 +417,12 @@ def book(row, start, step, slider, law, contact, nodes, energy):
             row.sheared + nodes.sheared[i],
             nodes.pulls[i] - slider.stiffness * (nodes.slip[i] + nodes.sheared[i]),
         )
-        given = body if slider.forced > 0.0 else driven(start + NODES[i] * step, slider)[1]
+        drive_speed = body if slider.forced > 0.0 else driven(start + NODES[i] * step, slider)[1]
         _, _, _, _, k, travel = kinetics(bound, moment, speed, law)
         square = moment * moment / bound if bound > 0.0 and law.sense == 0.0 else 0.0
         fresh = law.binding * (1.0 - bound) * square / bound if bound > 0.0 else 0.0
         share = SHARES[i] * step
-        energy.work += share * pull * given
+        energy.work += share * pull * drive_speed
         energy.damping += share * damping * body * body
         energy.viscosity += share * area * viscosity * speed * speed
         energy.rupture += share * 0.5 * area * (square * (k + 3.0 * travel) + fresh)

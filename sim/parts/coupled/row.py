@@ -110,7 +110,7 @@ class Inputs(NamedTuple):
 
 @device
 def _missing(a, load, base, contact):
-    """Depth of a contact of Hertz of this radius beyond what holds the sphere, and its slope over the radius."""
+    """Return the depth of a Hertzian contact of this radius beyond that of the mount, and its slope over the radius."""
     stiffness, curvature, modulus = contact.stiffness, contact.curvature, contact.modulus
     hertz = a * a * curvature
     if stiffness == math.inf:
@@ -122,15 +122,15 @@ def _missing(a, load, base, contact):
 
 @device
 def contact_area(bound, moment, time, radius, contact):
-    """Contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
+    """Return the contact radius in equilibrium with these bonds, area over the reference's, its slopes over N and M.
 
     Newton's method on the energy release rate, convex in the radius, from the last one: from the right of the root
     it goes left. nan where there is none; Hertz's radius where adhesion does not pay for the mean stress there.
     """
     if contact.stays > 0.0:
         return radius, math.pi * radius * radius / contact.area, 0.0, 0.0
-    bonded, taken, unit, modulus = contact.bonded, contact.mean_stress, contact.area, contact.modulus
-    work, tilt = contact.bare + bonded * bound, taken * moment * moment
+    bonded, mean_stress, unit, modulus = contact.bonded, contact.mean_stress, contact.area, contact.modulus
+    work, tilt = contact.bare + bonded * bound, mean_stress * moment * moment
     load, base = contact.load + contact.load_rate * time, contact.base + contact.base_rate * time
     a, slope = radius, 1.0
     if work > 0.0 and tilt > 0.0 and load + base > 0.0:  # the edge can pull, not push
@@ -160,12 +160,12 @@ def contact_area(bound, moment, time, radius, contact):
     if work <= 0.0:
         return a, math.pi * a * a / unit, 0.0, 0.0
     growth = 2.0 * math.pi * a / unit / slope
-    return a, math.pi * a * a / unit, growth * bonded, -2.0 * growth * taken * moment * a
+    return a, math.pi * a * a / unit, growth * bonded, -2.0 * growth * mean_stress * moment * a
 
 
 @device
 def compliance(radius, slider):
-    """1/k_t of the contact and its slope over the radius; 0 for an open one."""
+    """Return 1/k_t of the contact and its slope over the radius; 0 for an open one."""
     if slider.yielding_radius == 0.0 or not radius > 0.0:
         return slider.yielding, 0.0
     return slider.yielding + slider.yielding_radius / radius, -slider.yielding_radius / (radius * radius)
@@ -173,7 +173,7 @@ def compliance(radius, slider):
 
 @device
 def driven(time, slider):
-    """A prescribed value's integral from the start of its piece, and the value: a cubic through both ends."""
+    """Return the integral of a prescribed value from the start of its piece, and the value: a cubic in time."""
     length, first, last, integral = slider.length, slider.first, slider.last, slider.integral
     share = time / length
     cubic = (first + last) * length - 2.0 * integral
@@ -184,7 +184,7 @@ def driven(time, slider):
 
 @device
 def pull_on(time, start, way, row, slider):
-    """Spring force when the body has gone ``way`` since the ``start`` of a sub-step, or the force prescribed."""
+    """Return the spring force after a displacement ``way`` of the body since ``start``, or the prescribed force."""
     if slider.forced > 0.0:
         return driven(time, slider)[1]
     return row.spring_force + slider.stiffness * (driven(time, slider)[0] - driven(start, slider)[0] - way)
@@ -245,37 +245,37 @@ def pieces_to(step, start, pieces):
 
 
 @device
-def take_up(columns, spent, given, gained, units, work):
-    """Lay out a row and its energies for a clock step, in the units of the equations."""
-    columns[:] = given / units
+def to_units(columns, spent, state, totals, units, work):
+    """Convert a row and its energies to the units of the equations, at the start of a clock step."""
+    columns[:] = state / units
     row = columns.view(ROW)[0]
     row.position, row.slip, row.path, row.squared_speed, row.substeps = 0.0, 0.0, 0.0, 0.0, 0.0
     spent[:] = 0.0
-    spent[_STORED] = gained[_STORED] / work
+    spent[_STORED] = totals[_STORED] / work
 
 
 @device
-def put_down(columns, spent, given, gained, units, work):
-    """Take back a row and its energies after a clock step."""
-    before = given.view(ROW)[0]
+def from_units(columns, spent, state, totals, units, work):
+    """Convert a row and its energies from the units of the equations, after a clock step."""
+    before = state.view(ROW)[0]
     position, substeps = before.position, before.substeps
-    given[:] = columns * units
+    state[:] = columns * units
     before.position += position
     before.substeps += substeps
-    gained[:_STORED] += spent[:_STORED] * work
-    gained[_STORED] = spent[_STORED] * work
+    totals[:_STORED] += spent[:_STORED] * work
+    totals[_STORED] = spent[_STORED] * work
 
 
 @device
 def run_away(row, spent, time):
-    """End a row that nothing holds any longer; bonds and contact stay as they were."""
+    """End a row that has lost stability; bonds and contact stay as they are."""
     row.runaway_time, row.position, row.speed, row.body_speed = time, math.nan, math.nan, math.nan
     spent[:] = math.nan
 
 
 @device
-def area_kept(bound, moment, time, row, contact):
-    """What ``contact_area`` gives for such bonds, and the area of the row where equilibrium was lost on the way."""
+def area_or_last(bound, moment, time, row, contact):
+    """Return ``contact_area`` for these bonds; if there is no equilibrium, radius and area of the row."""
     radius, area, by_bound, by_moment = contact_area(bound, moment, time, row.radius, contact)
     if area >= 0.0:
         return radius, area, by_bound, by_moment
@@ -322,21 +322,21 @@ def elastic(row, time, slider, contact, energy):
 
 @device
 def slips_free(row, slider):
-    """Whether a slip without bonds takes no time and has an end: behind a spring, or where a body stays behind."""
+    """True if a slip without bonds takes no time and has an end: behind a spring, or ahead of a body that stays."""
     yields, _ = compliance(row.radius, slider)
     return slider.viscosity == 0.0 and (yields > 0.0 if slider.mass + slider.damping > 0.0 else slider.stiffness > 0.0)
 
 
 @device
 def free_ways(row, slider):
-    """Ways of an interface without bonds, and of its body, to where nothing pulls them."""
+    """Return the displacements of an interface without bonds, and of its body, to where no force acts."""
     body = 0.0 if slider.mass + slider.damping > 0.0 else row.spring_force / slider.stiffness
     return body + row.sheared, body
 
 
 @device
 def slip_free(row, time, slider, contact):
-    """Slip at once, with next to no bonds, to where nothing pulls the interface."""
+    """Slip at once, with next to no bonds, to where no force acts on the interface."""
     slip, body = free_ways(row, slider)
     radius, area, _, _ = contact_area(FEW, 0.0, time, row.radius, contact)
     row.bound, row.moment, row.sheared, row.radius = FEW, 0.0, 0.0, radius if area >= 0.0 else row.radius

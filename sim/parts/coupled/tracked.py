@@ -1,7 +1,7 @@
 """Rows of sliders and bonds followed one by one through a clock step, from one rupture or binding to the next.
 
 Between two events the number of bonds stays and their force is linear in the slip, so that a sub-step of the scheme in
-``cohorts`` is tried on sums alone; the bonds, whose arrays are spent, then go its way once. It ends at the next
+``cohorts`` is try_sub_step on sums alone; the bonds, whose arrays are spent, then go its way once. It ends at the next
 event. What does not hold the slider back is set right at once after an event: it slips as far as the bonds that are
 left have it, and bond after bond where slip itself breaks them.
 """
@@ -29,12 +29,12 @@ from sim.parts.bonds.tracked import (
 )
 from sim.parts.coupled.cohorts import (
     NODE,
+    accept_nodes,
     balance,
     before_node,
+    begin_sub_step,
     bend_of,
-    book_nodes,
     error_of_way,
-    set_out,
     stored_energy,
 )
 from sim.parts.coupled.row import (
@@ -53,13 +53,13 @@ from sim.parts.coupled.row import (
     contact_area,
     contact_at,
     elastic,
+    from_units,
     later,
     next_step,
     pieces_to,
-    put_down,
     run_away,
     slider_in,
-    take_up,
+    to_units,
 )
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array
@@ -86,7 +86,7 @@ class Ground(NamedTuple):
 
 @device
 def _sums(tracks, ground, node):
-    """Share bound, sum of the stretches and of their squares over the sites, stretches over their unit."""
+    """Compute the share bound, sum of the stretches and of their squares over the sites, stretches over their unit."""
     frame, unit, sites = tracks[2], ground.unit, ground.sites
     number, slider, births = frame[BONDS], frame[SLIDER], frame[SUM]
     node.bound = number / sites
@@ -97,7 +97,7 @@ def _sums(tracks, ground, node):
 
 @device
 def _go(tracks, way, duration, ground):
-    """Take the bonds a way of the slider in a time."""
+    """Advance the bonds by a displacement of the slider in a time."""
     (bonds, soonest, frame), (events, ways, durations, laid, after) = tracks, ground.space
     ways[0], durations[0] = way * ground.unit, duration
     one_step(bonds, soonest, frame, ways, durations, ground.law, ground.address, events, laid, after)
@@ -105,13 +105,13 @@ def _go(tracks, way, duration, ground):
 
 @device
 def _same(node, bound, total):
-    """Whether the bonds of a node are so many and so stretched, but for rounding."""
+    """True if number and stretch of the bonds of a node are these, except for rounding."""
     return node.bound == bound and math.fabs(node.moment - total) <= 1e-9 * (math.fabs(total) + bound)
 
 
 @device
 def _set_right(line, time, tracks, slider, contact, ground, energy, node):
-    """Slip at once to where bonds bear the pull, as far as nothing delays it; whether there is such a place."""
+    """Slip at once to where bonds bear the pull, as far as nothing delays it; True if there is such a place."""
     row, trial, worked, unit, limit = line[0], np.empty(1, ROW), energy.work, ground.unit, ground.law[2]
     for _ in range(MOST_STEPS):
         energy.work = worked
@@ -148,7 +148,7 @@ def _set_right(line, time, tracks, slider, contact, ground, energy, node):
 
 @device
 def _try(nodes, at_start, start, step, row, slider, contact):
-    """Find the nodes of a sub-step in which no bond breaks or is made; whether there are any.
+    """Find the nodes of a sub-step in which no bond breaks or is made; True if there are any.
 
     The first guess is never taken: on the way to the next event, which may be as short as any, what is no slip may
     still be a speed.
@@ -156,7 +156,7 @@ def _try(nodes, at_start, start, step, row, slider, contact):
     for place in (1, 2):
         approach = before_node(place, nodes, at_start, start, step, row, slider)
         before, after = nodes[place - 1], nodes[place]
-        way, bound, found = approach.slip, before.bound, False
+        way, bound, is_solved = approach.slip, before.bound, False
         for turn in range(_TURNS):
             total = before.moment + bound * way
             over, slope, none = balance(way, bound, total, before, after, approach, start, row, slider, contact)
@@ -165,17 +165,17 @@ def _try(nodes, at_start, start, step, row, slider, contact):
             if turn > 0 and math.fabs(over / slope) <= none:
                 after.bound, after.moment = bound, total
                 after.square = before.square + way * (2.0 * before.moment + bound * way)
-                found = True
+                is_solved = True
                 break
             way -= over / slope
-        if not found:
+        if not is_solved:
             return False
     return True
 
 
 @device
 def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
-    """Set right what a bond made or broken has changed; whether there is a way, with what holds the contact then."""
+    """Balance the forces after a bond has formed or broken; return True if possible, and the contact then."""
     row, node, area_before = line[0], nodes[0], nodes[2].area
     row.acceleration = 0.0
     _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
@@ -185,18 +185,18 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
     yields, _ = compliance(row.radius, slider)
     if yields > 0.0 and slider.viscosity == 0.0:  # it is sheared as by the bonds before
         before += 0.5 * row.sheared * (row.sheared / yields - area * row.moment)
-    there = _set_right(line, time, tracks, slider, contact, ground, energy, node)
-    if not there and contact.stays == 0.0:
+    is_balanced = _set_right(line, time, tracks, slider, contact, ground, energy, node)
+    if not is_balanced and contact.stays == 0.0:
         contact = later(contact, 0.0, 1.0)
-        there = _set_right(line, time, tracks, slider, contact, ground, energy, node)
+        is_balanced = _set_right(line, time, tracks, slider, contact, ground, energy, node)
     after = stored_energy(row, node.square, time, slider, contact)
     energy.snaps += before - after + energy.work - worked - (energy.rupture - lost)
-    return there, contact
+    return is_balanced, contact
 
 
 @device
 def _piece(line, tracks, slider, contact, ground, nodes, energy):
-    """Go through one piece of a clock step; the time after which it ends or there is no way on.
+    """Go through one piece of a clock step; return the time of its end or of lost stability.
 
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
@@ -208,7 +208,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
             return length
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
-        at_start = set_out(row, first, start, slider, contact)
+        at_start = begin_sub_step(row, first, start, slider, contact)
         step = next_step(row, left, length, math.inf)
         whole, bend, grows, cut, turns = step, 0.0, 0.0, False, 0
         for _ in range(_TRIALS):
@@ -236,7 +236,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
             contact = later(contact, 0.0, 1.0)
             row.next_step = 0.0
             continue
-        book_nodes(row, nodes, start, step, slider, math.inf, energy)
+        accept_nodes(row, nodes, start, step, slider, math.inf, energy)
         row.next_step = max(row.next_step, step * grows) if cut or step == left else step * grows
         start = length if step == left else start + step
         _go(tracks, last.slip, step, ground)
@@ -244,8 +244,8 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
         row.bound, row.moment, row.acceleration = first.bound, first.moment, bend
         energy.rupture += 0.5 * last.area * (last.square - first.square)
         if cut or not _same(first, last.bound, last.moment):
-            there, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
-            if not there:
+            is_balanced, contact = _after_event(line, start, tracks, slider, contact, ground, energy, nodes)
+            if not is_balanced:
                 return start
         if start == length:
             return length
@@ -254,7 +254,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
 
 @device
 def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
-    """Take a row and its bonds through the pieces of a clock step; the time reached, whether something holds."""
+    """Take a row and its bonds through a clock step; return the time reached, and False if stability is lost."""
     row, time, first = line[0], 0.0, nodes[0]
     for p in range(len(pieces)):
         slider, from_here = slider_in(slider, pieces[p]), later(contact, time, contact.stays)
@@ -299,13 +299,13 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
         ground = Ground(units[SLIP], np.float64(due.shape[1]), law, (seed, members[m]), space)
         for k in range(len(clock)):
             start, stop = stop, pieces_to(k, stop, pieces)
-            take_up(columns, booked, rows[m], energies[m], units, work)
+            to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(line[0].runaway_time):
                 now = contact_at(contact, bare[m], clock[k], line[0])
                 time, going = _through(line, energy, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
                     run_away(line[0], booked, clock[k, 0] + time)
-            put_down(columns, booked, rows[m], energies[m], units, work)
+            from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
         stamp[m] = np.int64(frame[m, STEPS])
     return 0
