@@ -319,11 +319,19 @@ def _cluster(address: str) -> Iterator[_Team]:
         client = Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError) as trouble:
         raise WorkerDied(f"no scheduler of dask answers at {address}: {trouble}") from None
+    lost = WorkerDied(f"the scheduler at {address} went away; what is computed is kept")
+
+    def room() -> int:
+        try:
+            return _AHEAD * max(1, sum(client.nthreads().values()))
+        except OSError:
+            raise lost from None
+
     with client, client.as_current():
         try:
-            yield _Team(client.get_executor(pure=False), lambda: _AHEAD * max(1, sum(client.nthreads().values())), True)
+            yield _Team(client.get_executor(pure=False), room, far=True)
         except (CancelledError, concurrent.futures.CancelledError, CommClosedError):
-            raise WorkerDied(f"the scheduler at {address} went away; what is computed is kept") from None
+            raise lost from None
 
 
 def _killed_on_cluster() -> tuple[type[Exception], ...]:

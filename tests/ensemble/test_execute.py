@@ -267,9 +267,10 @@ def test_a_cluster_whose_workers_are_killed_gives_the_same_numbers(tmp_path, mon
 
 
 @pytest.mark.verify
-def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path, many_parts):
+def test_a_scheduler_that_goes_away_is_told_and_what_is_computed_stays(tmp_path, many_parts, monkeypatch):
     from distributed import LocalCluster
 
+    monkeypatch.setattr(execute, "_PATIENCE", "2 s")
     cluster, path = LocalCluster(processes=False, n_workers=1, dashboard_address=":0"), tmp_path / "out.nc"
     with pytest.raises(WorkerDied, match="went away"), cluster:
         how = {"progress": lambda done: cluster.close(), "scheduler": cluster.scheduler_address}
