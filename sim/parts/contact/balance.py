@@ -114,14 +114,14 @@ class DisplacementControl:
 
     def radius(self, work: Array, stress: Array, reversible: float, bodies: Bodies) -> Array:
         """Return the largest stable equilibrium radius [m]: Hertz's if no work of adhesion is left, nan without one."""
-        rigid, held = math.isinf(self.stiffness), (self.base, self.stiffness)
+        rigid, machine = math.isinf(self.stiffness), (self.base, self.stiffness)
         if reversible == 0.0 and rigid:
             return np.asarray(jkr.radius_at_indentation(self.base, work, *bodies[:2]))
         if reversible == 0.0:
-            return np.asarray(jkr.radius_at_displacement(*held, work, *bodies[:2]))
+            return np.asarray(jkr.radius_at_displacement(*machine, work, *bodies[:2]))
         if rigid:
             return np.asarray(radius_at_indentation_reversible(self.base, work, stress, reversible, *bodies))
-        return np.asarray(radius_at_displacement_reversible(*held, work, stress, reversible, *bodies))
+        return np.asarray(radius_at_displacement_reversible(*machine, work, stress, reversible, *bodies))
 
     def normal_load(self, radius: Array, bodies: Bodies) -> Array:
         """Return the load on the sphere [N]; 0 if the contact is open."""

@@ -325,15 +325,6 @@ def _runs(a, rate, bend, s_a, s_t, left):
 
 
 @device
-def _start(running, t, a, rate, stop, least):
-    """Return first step, longest step, reach, and size of an error that counts; ``running``, the time is an error's."""
-    if running:
-        reach = math.log(a / least)
-        return 0.1, min(reach, _LONGEST), reach, 1e-3 * stop - a / rate
-    return min(stop - t, 0.1 * a / abs(rate)), stop - t, stop - t, a
-
-
-@device
 def _try(running, t, a, h, size, scene, front):
     """Return time and radius after an inner step, error over tolerance, and energy/(2 pi work)."""
     x, now = (0.0, t) if running else (t, a)
@@ -365,7 +356,11 @@ def _piece(t, a, stop, least, tries, scene, front):
         if a <= least and rate < 0.0:
             return t, 0.0, energy, tries
         running = rate < 0.0 and not shy and (cross or _runs(a, rate, bend, s_a, s_t, stop - t))
-        first, longest, reach, size = _start(running, t, a, rate, stop, least)
+        # first step, longest step, and size of an error that counts, in the time or, running, in the logarithm
+        first, longest, reach, size = min(stop - t, 0.1 * a / abs(rate)), stop - t, stop - t, a
+        if running:
+            reach, size = math.log(a / least), 1e-3 * stop - a / rate
+            first, longest = 0.1, min(reach, _LONGEST)
         h = min(first if running != was or h == 0.0 else h, longest)
         was, whole = running, h == reach
         t1, a1, error, more = _try(running, t, a, h, size, scene, front)

@@ -113,59 +113,42 @@ def _level(
     radius = block * np.hypot(ix, iy)
     ends = (np.abs(radius - limit / step) < block for limit in spectrum.support)
     cut = functools.reduce(np.logical_or, ends, block * farthest > reach - block)
-    blocks_of_squares = [np.empty((3, 0))]
+    rows = [np.empty((3, 0))]
     for blocks, side in ((np.flatnonzero(~cut), 3), (np.flatnonzero(cut), min(block, 27))):
         for first in range(0, blocks.size, _SQUARES // side**2):
-            some = blocks[first : first + _SQUARES // side**2]
-            squares = _Squares.of(spectrum, step, reach, block * ix[some], block * iy[some], block / side, side)
-            blocks_of_squares.append(squares.counted(share[some], poisson_ratio))
-    weight, wavenumber, count = np.concatenate(blocks_of_squares, axis=1)
+            some, size = blocks[first : first + _SQUARES // side**2], block / side
+            sums = _counted(spectrum, step, reach, block * ix[some], block * iy[some], size, side, poisson_ratio)
+            full = sums[-1] > 0.0
+            stress, energy, outward, square = (values[full] for values in sums)
+            count = size**2 * energy * (energy / square)
+            rows.append(np.stack([share[some][full] * (energy / stress) / count, outward / energy, count]))
+    weight, wavenumber, count = np.concatenate(rows, axis=1)
     return weight / (shear_modulus * step), step * wavenumber, count
 
 
-@dataclass(frozen=True, eq=False)
-class _Squares:
-    """Equal squares that divide blocks of the lattice, arrays of shape (blocks, side, side); lengths in pixels.
+def _counted(
+    spectrum: Family, step: float, reach: int, x: Indices, y: Indices, size: float, side: int, poisson_ratio: float
+) -> tuple[Array, ...]:
+    """Return sums over blocks around (x, y) [pixels]: stress, energy, energy × wavenumber, energy squared.
 
-    ``held`` is the share of a square between the ends of the spectrum, ``density`` the density there,
-    ``on_grid`` the share of it on the grid.
+    A block is divided into ``side``² squares of a ``size``.
     """
-
-    size: float
-    qx: Array
-    qy: Array
-    radius: Array
-    held: Array
-    density: Array
-    on_grid: Array
-
-    @classmethod
-    def of(
-        cls, spectrum: Family, step: float, reach: int, x: Indices, y: Indices, size: float, side: int
-    ) -> "_Squares":
-        """Return the squares of blocks around (x, y)."""
-        offsets = size * (np.arange(side) - 0.5 * (side - 1))
-        qx = x[:, np.newaxis, np.newaxis] + offsets[:, np.newaxis]
-        qy = y[:, np.newaxis, np.newaxis] + offsets
-        radius = np.hypot(qx, qy)
-        low, high = (limit / step for limit in spectrum.support)
-        held = _within(high, qx, qy, radius, size) - _within(low, qx, qy, radius, size)
-        inside = step * np.clip(radius, low * (1.0 + 1e-12), high * (1.0 - 1e-12)) / radius
-        last = reach + 0.5 if math.isinf(high) else math.inf  # a spectrum that ends is all on the grid
-        on_grid = np.clip((last - np.abs(qx)) / size + 0.5, 0.0, 1.0) * np.clip((last - qy) / size + 0.5, 0.0, 1.0)
-        return cls(size, qx, qy, radius, held, spectrum.density(inside * qx, inside * qy), on_grid)
-
-    def counted(self, share: Array, poisson_ratio: float) -> Array:
-        """Return rows weight, wavenumber and count of blocks that have their sum and sum of squares of energies."""
-        energy = compliance(self.qx, self.qy, 1.0, poisson_ratio) * self.on_grid * self.density
-        # of the pixels in a square only those on the edge are held in part
-        square = energy**2 * self.held * (1.0 - (1.0 - self.held) / self.size)
-        values = (self.density * self.held, energy * self.held, energy * self.held * self.radius, square)
-        stress, first, outward, second = (np.sum(value, axis=(1, 2)) for value in values)
-        full = second > 0.0
-        stress, first, outward, second = (value[full] for value in (stress, first, outward, second))
-        count = self.size**2 * first * (first / second)
-        return np.stack([share[full] * (first / stress) / count, outward / first, count])
+    offsets = size * (np.arange(side) - 0.5 * (side - 1))
+    qx = x[:, np.newaxis, np.newaxis] + offsets[:, np.newaxis]
+    qy = y[:, np.newaxis, np.newaxis] + offsets
+    radius = np.hypot(qx, qy)
+    low, high = (limit / step for limit in spectrum.support)
+    # share of a square between the ends of the spectrum, density there, and share of that on the grid
+    inside = _within(high, qx, qy, radius, size) - _within(low, qx, qy, radius, size)
+    scale = step * np.clip(radius, low * (1.0 + 1e-12), high * (1.0 - 1e-12)) / radius
+    density = spectrum.density(scale * qx, scale * qy)
+    last = reach + 0.5 if math.isinf(high) else math.inf  # a spectrum that ends is all on the grid
+    on_grid = np.clip((last - np.abs(qx)) / size + 0.5, 0.0, 1.0) * np.clip((last - qy) / size + 0.5, 0.0, 1.0)
+    energy = compliance(qx, qy, 1.0, poisson_ratio) * on_grid * density
+    # of the pixels in a square only those on the edge are inside in part
+    square = energy**2 * inside * (1.0 - (1.0 - inside) / size)
+    sums = density * inside, energy * inside, energy * inside * radius, square
+    return tuple(np.sum(values, axis=(1, 2)) for values in sums)
 
 
 def _within(edge: float, qx: Array, qy: Array, radius: Array, size: float) -> Array:

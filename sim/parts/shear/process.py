@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field
 from pydantic.dataclasses import dataclass
 
-from sim.numerics.jit import device, kernel, law
+from sim.numerics.jit import kernel, law
 from sim.numerics.noise import Noise
 from sim.parts.exchange import Array, Bonding, Gammas, Motion, Motions
 from sim.units.quantity import Quantity
@@ -358,14 +358,9 @@ def renewed_size(law: Amplitude, state: Fluctuation, motions: Motions, amplitude
     return np.sqrt(0.5 * (amplitude**2 + before**2))
 
 
-@device
-def shares(exponent):
-    """Return the shares of a number that stay and are renewed over an ``exponent`` ∫λdt; their squares add to one."""
-    lost = -math.expm1(-exponent)
-    return 1.0 - lost, math.sqrt(lost * (2.0 - lost))
-
-
 @kernel("void(float64[:], float64[:], float64[:])")
 def _shares(exponents, keep, renew):
+    """Write the shares of a number that stay and are renewed over exponents ∫λdt; their squares add up to one."""
     for k in range(exponents.size):
-        keep[k], renew[k] = shares(exponents[k])
+        lost = -math.expm1(-exponents[k])
+        keep[k], renew[k] = 1.0 - lost, math.sqrt(lost * (2.0 - lost))
