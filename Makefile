@@ -59,6 +59,7 @@ lines:
 
 lint: $(STAMP)
 	$(BIN)/ruff check .
+	$(BIN)/ruff check --preview --select PLW1514 sim
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 

@@ -1,10 +1,134 @@
-"""The workflow that runs the tests on other systems."""
+"""The whole way of a user where the names of Linux are missing and files follow the rules of Windows (emulated)."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
+
+ELSEWHERE = Path(__file__).parent / "helpers" / "elsewhere"
+SCENE = """
+name = "a lens — Größe µ"
+seed = 3
+[clock]
+duration = "40 ms"
+step = "1 ms"
+[solid]
+shear_modulus = "1.6 MPa"
+[sphere]
+radius = "2 mm"
+[adhesion]
+work = "42 mJ/m^2"
+[contact]
+load = "4 mN"
+[drive]
+model = "table"
+file = "Geschwindigkeit à.csv"
+[bonds]
+model = "counted"
+critical_speed = "10 mm/s"
+rebinding_rate = "500 1/s"
+sites = 100
+stress = "0.3 MPa"
+[ensemble]
+members = 40
+[sweep]
+"contact.load" = ["2 mN", "4 mN"]
+"bonds.rebinding_rate" = ["400 1/s", "500 1/s"]
+"""
+SPEEDS = "time [ms];speed [mm/s]\r\n0;0,1\r\n40;20\r\n"
+AREAS = {0.1: 45300, 1: 44000, 5: 39500, 10: 36200, 20: 32500, 50: 29000}
+CURVES = "speed [mm/s],contact_area [um^2],contact_area_error [um^2]\r\n"
+CURVES += "".join(f"{speed},{area},200\r\n" for speed, area in AREAS.items())
+
+
+@pytest.fixture
+def elsewhere(tmp_path):
+    """A folder with a scenario, and ``sim`` as a process there on the emulated system, in a console of cp1252."""
+    folder = tmp_path / "Ordner mit Größe ñ"
+    folder.mkdir()
+    (folder / "szene µ.toml").write_bytes(SCENE.replace("\n", "\r\n").encode())
+    steady = SCENE[: SCENE.index("[sweep]")].replace('"counted"', '"steady"')
+    steady = steady.replace('rebinding_rate = "500 1/s"', "").replace("sites = 100", "")
+    (folder / "fit.toml").write_text(steady, encoding="utf-8", newline="\r\n")
+    (folder / "Geschwindigkeit à.csv").write_bytes(SPEEDS.encode())
+    (folder / "curves.csv").write_bytes(CURVES.encode())
+    path = os.pathsep.join([str(ELSEWHERE), *sys.path])
+    environment = {**os.environ, "PYTHONPATH": path, "PYTHONIOENCODING": "cp1252", "PYTHONUTF8": "0"}
+
+    def sim(*words, code=0):
+        command = [sys.executable, "-W", "error::FutureWarning", "-m", "sim", *words]
+        process = subprocess.run(command, cwd=folder, env=environment, capture_output=True, encoding="cp1252")
+        assert process.returncode == code, (words, process.stderr)
+        assert "Traceback" not in process.stderr
+        return process.stdout + process.stderr
+
+    sim.folder = folder
+    return sim
+
+
+def variables(path):
+    with xr.open_dataset(path) as dataset:
+        return {name: value.values for name, value in dataset.load().variables.items() if value.dtype.kind in "biuf"}
+
+
+def test_the_emulated_system_hides_its_names_from_the_package_alone():
+    program = """
+import os, signal
+for name in ("sim.somewhere", "elsewhere"):
+    for text in ("import fcntl", "os.fork", "os.getuid", "signal.SIGHUP"):
+        try:
+            exec(text, {"__name__": name, "os": os, "signal": signal})
+            print(name, "sees")
+        except (ImportError, AttributeError):
+            print(name, "does not see")
+try:
+    os.open(".", os.O_RDONLY)
+except PermissionError:
+    print("folders are refused")
+"""
+    environment = {**os.environ, "PYTHONPATH": str(ELSEWHERE)}
+    printed = subprocess.run(
+        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+    )
+    seen = ["sim.somewhere does not see"] * 4 + ["elsewhere sees"] * 4 + ["folders are refused"]
+    assert printed.stdout.splitlines() == seen
+
+
+def test_a_user_goes_from_a_scenario_to_a_fit(elsewhere):
+    sim, scene = elsewhere, "szene µ.toml"
+    sim("new", "erste Szene.toml")
+    assert "counted" in sim("check", scene)
+    sim("run", scene, "-o", "one.nc", "-j", "1", "--quiet")
+    sim("run", scene, "-o", "zwei Läufe.nc", "-j", "2", "--quiet", "--max-time", "1 us", code=75)
+    sim("run", scene, "-o", "zwei Läufe.nc", "-j", "2", "--quiet", "--resume")
+    one, two = (variables(sim.folder / name) for name in ("one.nc", "zwei Läufe.nc"))
+    assert one.keys() == two.keys()
+    for name, values in one.items():
+        np.testing.assert_array_equal(values, two[name], err_msg=name)
+    assert not [path for path in sim.folder.iterdir() if path.is_dir() or path.suffix in (".lock", ".tmp")]
+    assert "A/A_JKR" in sim("stats", "zwei Läufe.nc", "--csv", "stats ü.csv")
+    assert (sim.folder / "stats ü.csv").stat().st_size > 1000
+    sim("plot", "zwei Läufe.nc", "-o", "Bild.png")
+    sim("report", "zwei Läufe.nc", "-o", "Seite.html")
+    assert "Größe µ" in (sim.folder / "Seite.html").read_text(encoding="utf-8")
+    sim("fit", "fit.toml", "curves.csv", "--free", "bonds.critical_speed", "--steady", "-o", "à")
+    assert (sim.folder / "à_fit.json").exists()
+
+
+def test_an_output_that_is_open_elsewhere_is_published_by_resume(elsewhere):
+    sim, scene = elsewhere, "szene µ.toml"
+    sim("run", scene, "-o", "out.nc", "--quiet")
+    with (sim.folder / "out.nc").open("rb"):
+        message = sim("run", scene, "-o", "out.nc", "--quiet", "--force", "--set", "seed=4", code=74)
+    assert "out.nc" in message
+    assert "--resume" in message
+    sim("run", scene, "-o", "out.nc", "--quiet", "--resume", "--set", "seed=4")
+    assert not (sim.folder / "out.nc.parts").exists()
+    assert variables(sim.folder / "out.nc")["seed"] == 4
 
 
 @pytest.mark.verify
