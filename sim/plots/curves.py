@@ -339,12 +339,12 @@ def _compared(scene: Scene, name: str, line: Line, factor: float) -> Compared:
     return Compared(line.number, line.point, line.colour, scene.x[line.number], mean, error, full)
 
 
-def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, named: bool = True) -> None:
+def mark_jumps(panel: Axes, scene: Scene, name: str, line: Line, factor: float, labelled: bool = True) -> None:
     """Draw a cross at each pull-off and a ring at each jump-in of a curve."""
     x, mean = scene.x[line.number], factor * scene.values(f"{name}_mean", line)
     for words, at, sign in zip(("pull-off", "jump-in"), scene.openings(line), (_CROSS, _RING), strict=True):
         if at.size:
-            panel.plot(x[at], mean[at], color=line.colour, label=words if named else "", **sign)
+            panel.plot(x[at], mean[at], color=line.colour, label=words if labelled else "", **sign)
 
 
 def over_speed(dataset: xr.Dataset) -> Scene:

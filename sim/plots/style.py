@@ -1,4 +1,4 @@
-"""How pictures look: style, colours, units on axes, symbols, letters and legends.
+"""Look of pictures: style, colours, units on axes, symbols, letters and legends.
 
 One colour means one thing throughout: blue what broken bonds do, vermilion what shear fluctuations
 do, black the contact with both; grey lines are closed forms, such as JKR's and Hertz's contacts.

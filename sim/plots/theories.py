@@ -456,7 +456,7 @@ def _cycle(panel: Axes, scene: Scene, name: str, line: Line, factor: float, kind
     if kind != "load" and not along_load:  # under a dead load the sphere leaves: no place to draw a jump to
         jumps = np.concatenate(scene.openings(line))
         panel.vlines(x[jumps], 0.0, mean[jumps], colors=line.colour, linestyles="dotted", linewidth=0.8)
-    mark_jumps(panel, scene, name, line, factor, named=not loads)
+    mark_jumps(panel, scene, name, line, factor, labelled=not loads)
 
 
 def _equilibria(panels: list[Axes], scene: Scene, theories: list[Theory], factors: tuple[float, ...]) -> None:

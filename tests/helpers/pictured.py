@@ -1,4 +1,4 @@
-"""What the tests of figures share: small runs, and what was drawn of them."""
+"""Small runs and their drawn lines, for the tests of figures."""
 
 from sim.ensemble.simulate import run
 from sim.parts import drive
