@@ -20,9 +20,8 @@ from PIL import Image
 import sim
 from sim import analysis, laws
 from sim.analysis import concise, distribution, shares, statistics
-from sim.study.fit import Fit
-from sim.study.fit_figure import figure as fitted
-from sim.study.fitting import LEVEL
+from sim.study.fit import Fit, figure as fitted
+from sim.study.likelihood import LEVEL
 
 ROOT = Path(__file__).parent.parent
 FOLDER = Path(__file__).with_name("gallery")

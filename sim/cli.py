@@ -376,9 +376,9 @@ def fit(
     """Calibrate numbers of a scenario to measured curves: CSV columns named as variables of a dataset, with units."""
     _announce_compiling()
     scene, target = _load(scenario, changes), stem or scenario.with_suffix("")
-    from sim.study import fitted
+    from sim.study import fit
 
-    found, shown = fitted.carried_out(scene, data, keys, common, target, force, steady, judged, units)
+    found, shown = fit.carried_out(scene, data, keys, common, target, force, steady, judged, units)
     for rows, text in shown:
         print_table(rows, text)
     sys.exit(DONE if found.converged else FAILED)

@@ -1,31 +1,57 @@
 """Numbers of a scenario calibrated to measured curves: ``sim fit``.
 
-The curves are fitted by steady sliding, which is quick (``sim.study.predicted``). Then the scenario's own models run
+The curves are fitted by steady sliding, which is quick (``sim.study.likelihood``). Then the scenario's own models run
 once with what was found; what they add to steady sliding is added to it, with the error that their members leave, and
 the fit is made anew, until it stays. The same noise is drawn each time. Where steady sliding does not depend on a key
 that is free, such as the speed of an edge that lags, or what slides feels its friction, every prediction is a run.
 """
 
 import contextlib
+import copy
 import difflib
+import io
+import itertools
+import json
 import math
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from sim.ensemble.dataset import scenario_json
+from sim.numerics import files
+from sim.plots.style import BOTH, GUIDE, HOLLOW, REFERENCE, STYLE, Unit, across, axis_scale, in_units, legend, rows
+from sim.scenario.files import parse, written
 from sim.scenario.scenario import Scenario
-from sim.scenario.schema import quantities
-from sim.study.fitting import Free, Interval, Minimum, Problem, entangled, idle, interval, problem_of, with_errors
-from sim.study.measured import read
-from sim.study.predicted import groups
+from sim.scenario.schema import files_read, quantities
+from sim.scenario.sweep import set_key
+from sim.study.likelihood import (
+    HELD,
+    LEVEL,
+    Free,
+    Interval,
+    Measured,
+    Minimum,
+    Problem,
+    entangled,
+    groups,
+    idle,
+    interval,
+    problem_of,
+    read,
+    with_errors,
+)
+from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
-from sim.units.notation import engineering
-from sim.units.quantity import Quantity
+from sim.units.notation import concise, engineering, scaled
+from sim.units.quantity import Quantity, read_option
 
 Array = NDArray[np.float64]
 
@@ -99,7 +125,7 @@ def fit(
     scenario : Scenario
         Its own values are where the search starts; without its sweep.
     data : sequence of Path
-        CSV tables (``sim.study.measured.read``), all fitted together.
+        CSV tables (``sim.study.likelihood.read``), all fitted together.
     free : iterable of str
         Keys, each ``"KEY"`` or ``"KEY=LOW:HIGH"`` with bounds such as ``"1 mm/s:100 mm/s"``.
     common : dict, optional
@@ -289,3 +315,285 @@ def _refuse_entangled(problem: Problem) -> None:
         faults.append(f"--free {names}: the curves depend on them only together, as on a product; free one of them")
     if faults:
         raise BadInput(faults)
+
+
+#: Height of a curve's panel and of that of its residuals [in].
+_CURVE, _RESIDUALS = 1.5, 0.8
+#: Words and unit of a condition.
+_ALONG = {"speed": ("sliding speed $V$", "m/s"), "t": ("time $t$", "s")}
+
+
+def figure(problem: Problem, best: Minimum) -> Figure:
+    """Each curve over what was varied, with error bars and the fit, above its residuals in standard errors.
+
+    The lines are of many speeds where only the speed was varied, else they join the rows in the order of what was.
+    Grey is steady sliding alone, where the scenario's own models add to it.
+    """
+    fitted, alone = problem.predicted(best.x), problem.steady(best.x)
+    off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
+    curves = [(table, curve) for table in problem.tables for curve in table.curves]
+    with mpl.rc_context(STYLE):
+        drawn, panels = rows([_CURVE, _RESIDUALS] * len(curves), shared=False)
+        for number, (table, curve) in enumerate(curves):
+            here, (upper, lower) = problem.curve == number, panels[2 * number : 2 * number + 2]
+            words, si, along = _along(table)
+            order, (unit, name, symbol) = np.argsort(along, kind="stable"), curve.described
+            x, y = Unit.of(along, si, logarithmic=axis_scale(along) == "log"), Unit.of(curve.values, unit)
+            bars: Any = HOLLOW | {"color": BOTH, "elinewidth": 0.7, "zorder": 3, "label": "measured"}
+            spread = y.factor * problem.sigma[here]
+            upper.errorbar(x.factor * along, y.factor * curve.values, yerr=spread, **bars)
+            both = [(fitted, BOTH, "fit")]
+            if np.any(problem.shift):
+                both.append((alone, REFERENCE, "in steady sliding"))
+            fine, smooth = problem.between(best.x, table, curve.name)
+            for values, colour, label in both:
+                line, over = values[here][order], along[order]
+                if fine.size:  # what is added to steady sliding is known at the rows
+                    line, over = smooth + np.interp(fine, over, line - alone[here][order]), fine
+                upper.plot(x.factor * over, y.factor * line, color=colour, linewidth=0.9, label=label,
+                           zorder=2 if colour == BOTH else 1.8)  # fmt: skip
+            upper.set_ylabel(y.label(f"{name.partition(',')[0]} ${symbol}$"))
+            upper.tick_params(labelbottom=False)
+            lower.plot(x.factor * along, off[here], color=BOTH, **HOLLOW)
+            lower.axhline(0.0, **GUIDE)
+            lower.margins(y=0.15)
+            lower.set_ylabel("residual ($\\sigma$)")
+            for panel, text in ((upper, ""), (lower, x.label(words))):
+                across(panel, x.factor * along, text, axis_scale(along), 0.05)
+            if not number:
+                legend(upper)
+    return drawn
+
+
+def refuse_units(tables: Sequence[Measured], units: Sequence[str]) -> None:
+    """Refuse a unit that no axis of the figure of some tables can have, before anything is fitted."""
+    try:
+        with in_units(units):
+            for table in tables:
+                _, si, along = _along(table)
+                for values, unit in ((along, si), *((curve.values, curve.described[0]) for curve in table.curves)):
+                    Unit.of(values, unit)
+    except ValueError as fault:
+        raise BadInput([f"--units: {fault}"]) from None
+
+
+def _along(table: Measured) -> tuple[str, str, Array]:
+    """Words, unit and values of what varies from row to row."""
+    varied = [(name, values) for name, values in table.conditions.items() if np.ptp(values) > 0.0]
+    if not varied:
+        return "row", "1", np.arange(1.0, table.rows + 1.0)
+    name, values = max(varied, key=lambda one: len(np.unique(one[1])))
+    if name == "held":
+        name = HELD[table.held]
+        return name.replace("_", " "), "N" if table.held == "load" else "m", values
+    words, unit = _ALONG.get(name, (name, "1"))
+    return words, unit, values
+
+
+#: First words of a line of the scenarios that are written here, by which they may be replaced.
+_MADE = "# Made by sim fit"
+
+
+#: A table to print, with the text below it.
+Shown = tuple[list[dict[str, str]], str]
+
+
+def carried_out(
+    scenario: Scenario, data: Sequence[Path], free: Sequence[str], common: Sequence[str], stem: Path, replace: bool,
+    steady: bool, judged: bool, units: Sequence[str] = (),
+) -> tuple[Fit, list[Shown]]:  # fmt: skip
+    """Fit, compare mechanisms if wanted, and write the files.
+
+    Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, of ``claim`` and of the
+    figure.
+    """
+    pairs = [pair.partition("=")[::2] for pair in common]
+    sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
+    outputs = claim(scenario, data, stem, replace)
+    refuse_units([read(path, scenario) for path in data] if units else [], units)
+    found = fit(scenario, data, free, sizes, steady)
+    verdict = compare(found.problem, found.best, found.scenario.seed) if judged else None
+    save(scenario, found, data, outputs, verdict, units)
+    shown: list[Shown] = [(_table(found), f"\n{_explanation(found)}\n")]
+    if verdict is not None:
+        doubt = (
+            "; but even the scenario as it is lies off: perhaps none of these is true" if found.p_value <= POOR else ""
+        )
+        shown.append((_comparison(verdict), f"\n{verdict.words}{doubt}\n"))
+    return found, [*shown, ([], "\n".join(map(str, outputs)))]
+
+
+class Outputs(NamedTuple):
+    """The files of a fit: scenario, numbers and figure."""
+
+    toml: Path
+    json: Path
+    png: Path
+
+
+def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -> Outputs:
+    """The files to be written, ``<stem>_fit.toml`` and so on; refused where they exist, unless they are replaced.
+
+    Even then no scenario is replaced but one that a fit has made.
+    """
+    outputs = Outputs(*(stem.with_name(f"{stem.name}_fit.{ending}") for ending in Outputs._fields))
+    read = [*files_read(scenario), *data]
+    for path in outputs:
+        if not (replace and path == outputs.toml and _made_here(path, read)):
+            files.claim(path, replace, read)
+    return outputs
+
+
+def _made_here(path: Path, read: Sequence[Path]) -> bool:
+    """Whether a file is a scenario that a fit has made, and none that is read."""
+    if not path.is_file() or any(one.exists() and path.samefile(one) for one in read):
+        return False
+    with path.open("rb") as file:
+        return any(line.startswith(_MADE.encode()) for line in file)
+
+
+def _table(fit: Fit) -> list[dict[str, str]]:
+    """One row for each number found, in units that suit it."""
+    rows = []
+    for one in fit.numbers:
+        nothing = one.interval.low_open and not one.interval.high_open and one.error > abs(one.value)
+        factor, unit = scaled(one.interval.high if nothing else one.value, one.free.quantity.unit)
+        shown = concise(factor * one.value, factor * one.error)
+        shown = f"below {factor * one.interval.high:.3g}" if nothing else shown
+        row = {"key": one.free.key, "value": f"{shown} {unit}".rstrip()}
+        ends = zip(one.interval[:2], one.interval[2:], strict=True)
+        low, high = (_end(factor * end, is_open) for end, is_open in ends)
+        row[f"{LEVEL:.0%} interval"] = f"{low} to {high}"
+        row["start"] = engineering(one.free.start, one.free.quantity.unit)
+        shift = (one.value - one.steady) / one.error if one.error > 0.0 else math.nan
+        alone = engineering(one.steady, one.free.quantity.unit)
+        row["steady sliding alone"] = f"{alone} ({-shift:+.1f} errors)" if abs(shift) > 0.05 else alone
+        rows.append(row)
+    return rows
+
+
+def _end(end: float, is_open: bool) -> str:
+    """One end of an interval, which the data, a bound or nothing sets."""
+    return "unknown" if math.isnan(end) else f"{end:.4g}" + (" (bound)" if is_open else "")
+
+
+def _explanation(fit: Fit) -> str:
+    """How good the fit is, and what to know of its numbers."""
+    problem, best = fit.problem, fit.best
+    likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
+    lines = [f"chi^2 {best.chi_square:.4g} at {problem.freedom} degrees of freedom{likely}, AICc {fit.aicc:.4g}"]
+    if not fit.converged:
+        lines.append("the fit has not converged: start nearer, give bounds, or free fewer keys")
+    tables = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in problem.tables]
+    return "\n".join([*lines, *fit.remarks, *tables])
+
+
+def _comparison(verdict: Verdict) -> list[dict[str, str]]:
+    """One row for each mechanism, the best first; p and the rejection where there is one to compare with."""
+    least, rows = verdict.judged[0].aicc, []
+    for one in verdict.judged:
+        row = {"mechanism": one.name, "chi^2": f"{one.chi_square:.4g}", "AICc - least": f"{one.aicc - least:.3g}"}
+        if len(verdict.judged) > 1:
+            drawn = f"{one.p_value:.3g}" if math.isfinite(one.p_value) else "by AICc alone"
+            row["p"] = "compared with" if one.name == WHOLE else drawn
+            row["rejected"] = "yes" if one.rejected else ""
+        rows.append(row)
+    return rows
+
+
+def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[str, Any]:
+    """All numbers of a fit [SI]."""
+    found: dict[str, Any] = {
+        "scenario": fit.scenario.source.path,
+        "data": [str(path) for path in data],
+        "level": LEVEL,
+        "numbers": {one.free.key: _described(one) for one in fit.numbers},
+        "correlations": {"keys": [one.free.key for one in fit.numbers], "matrix": fit.correlations.tolist()},
+        "common_errors": _common(fit),
+        "chi_square": fit.best.chi_square,
+        "degrees_of_freedom": fit.problem.freedom,
+        "p_value": fit.p_value,
+        "aicc": fit.aicc,
+        "converged": fit.converged,
+        "remarks": list(fit.remarks),
+    }
+    if verdict is not None:
+        judged = [one._asdict() for one in verdict.judged]
+        found["mechanisms"] = {"sufficient": verdict.sufficient, "words": verdict.words, "judged": judged}
+    return _without_nan(found)
+
+
+def _described(one: Found) -> dict[str, Any]:
+    ends = one.interval._asdict()
+    described = {"value": one.value, "unit": one.free.quantity.unit, "standard_error": one.error, **ends}
+    return described | {"start": one.free.start, "steady_sliding_alone": one.steady}
+
+
+def _common(fit: Fit) -> dict[str, float]:
+    """What was found of the relative errors that curves share."""
+    found = fit.best.x[len(fit.problem.free) :]
+    return {name: float(size * x) for (name, size), x in zip(fit.problem.common.items(), found, strict=True)}
+
+
+def _without_nan(value: Any) -> Any:
+    """A document in which a number that is not known is null, as JSON has it."""
+    if isinstance(value, dict):
+        return {key: _without_nan(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_without_nan(inner) for inner in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
+    """The scenario as it was given, its question first, with the values found, for a file in a folder."""
+    source = scenario.origin
+    text = source.text or written(_plain(json.loads(scenario_json(scenario))))
+    tables = copy.deepcopy(parse(text, source.path))
+    changed = source.overrides | {
+        one.free.key: one.value if one.free.quantity.unit == "1" else f"{one.value:.12g} {one.free.quantity.unit}"
+        for one in fit.numbers
+    }
+    for key, value in changed.items():
+        set_key(tables, key.split("."), value)
+    above = Path(source.path).parent
+    if source.path and above.resolve() != folder.resolve():
+        _move(tables, above, folder)
+    keys = ", ".join(one.free.key for one in fit.numbers)
+    comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
+    asked = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
+    opening = f"{asked}#\n" if asked else ""
+    return f"{opening}{_MADE}: {keys} are calibrated to measured curves.\n{written(tables)}"
+
+
+def _plain(value: Any) -> Any:
+    """Tables without the keys that are left out."""
+    return {key: _plain(one) for key, one in value.items() if one is not None} if isinstance(value, dict) else value
+
+
+def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
+    """Name files from another folder."""
+    for key, value in table.items():
+        if isinstance(value, dict):
+            _move(value, above, folder)
+        elif key == "file" and isinstance(value, str):
+            table[key] = os.path.relpath(above / value, folder)
+
+
+def save(
+    scenario: Scenario,
+    fit: Fit,
+    data: Sequence[Path],
+    outputs: Outputs,
+    verdict: Verdict | None,
+    units: Sequence[str] = (),
+) -> None:
+    """Write scenario, numbers and figure, each whole."""
+    picture = io.BytesIO()
+    with in_units(units):
+        drawn = figure(fit.problem, fit.best)
+    drawn.savefig(picture, format="png")
+    numbers = json.dumps(document(fit, data, verdict), indent=2, allow_nan=False) + "\n"
+    texts = scenario_text(scenario, fit, outputs.toml.parent).encode(), numbers.encode(), picture.getvalue()
+    for path, content in zip(outputs, texts, strict=True):
+        with files.output(path) as beside:
+            beside.write_bytes(content)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.scenario.schema import quantities
-from sim.study.fitting import Free, Minimum, Problem, idle, minimum
+from sim.study.likelihood import Free, Minimum, Problem, idle, minimum
 from sim.units.quantity import Quantity
 
 Array = NDArray[np.float64]

@@ -20,11 +20,9 @@ from sim.plots.style import Unit, in_units
 from sim.scenario.files import written
 from sim.scenario.reader import load
 from sim.scenario.schema import quantities
-from sim.study import fit as calibration, fitted, mechanisms, predicted
-from sim.study.fit import fit
-from sim.study.fit_figure import figure
-from sim.study.fitting import minimum, problem_of
-from sim.study.measured import Curve, Measured, read
+from sim.study import fit as calibration, likelihood, mechanisms
+from sim.study.fit import figure, fit
+from sim.study.likelihood import Curve, Measured, minimum, problem_of, read
 from sim.units.errors import BadInput
 
 SELF_AFFINE = {"model": "self_affine", "rms": "150 kPa", "hurst": 0.8, "longest": "60 um", "shortest": "1 um",
@@ -117,9 +115,9 @@ SCENES = {
 def test_steady_sliding_is_what_a_run_at_a_steady_speed_ends_in(changes):
     scene = load(LENS).with_values(changes)
     made, names = rows_of(scene, speed=SPEEDS[::3])
-    (group,) = predicted.groups(scene, made)
-    alone = predicted.by_steady_sliding(group, {}, names)
-    sampled = predicted.asked([group], {}, names, False)
+    (group,) = likelihood.groups(scene, made)
+    alone = likelihood.by_steady_sliding(group, {}, names)
+    sampled = likelihood.asked([group], {}, names, False)
     for name in names:
         assert np.all(np.isfinite(alone[name]))
         assert_allclose(alone[name], sampled.mean[name], rtol=1e-12, atol=0)
@@ -130,10 +128,10 @@ def test_rows_have_the_load_and_the_solid_of_their_own():
     scene = load(LENS)
     loads, moduli = np.array([-1e-4, 0.0, 4e-3, 4e-3]), np.array([1e6, 1e6, 1e6, 2e6])
     made, names = rows_of(scene, held=loads, **{"solid.shear_modulus": moduli})
-    groups = predicted.groups(scene, made)
+    groups = likelihood.groups(scene, made)
     assert [group.rows.tolist() for group in groups] == [[0, 1, 2], [3]]
     for group in groups:
-        found = predicted.by_steady_sliding(group, {"adhesion.work": 0.05}, names)
+        found = likelihood.by_steady_sliding(group, {"adhesion.work": 0.05}, names)
         for k, row in enumerate(group.rows):
             one = {"contact.load": loads[row], "solid.shear_modulus": moduli[row], "adhesion.work": 0.05}
             point = sim.run(scene.with_values(one)).isel(t=-1)
@@ -149,7 +147,7 @@ def test_numbers_changed_unchecked_are_those_changed_and_checked():
         "contact.load": 1e-3,
         "solid.shear_modulus": 1e6,
     }
-    found = predicted.changed(scene, values)
+    found = likelihood.changed(scene, values)
     assert quantities(found) == quantities(scene.with_values(values))
     assert found.rest_radius == scene.with_values(values).rest_radius != scene.rest_radius
 
@@ -354,7 +352,7 @@ def test_members_shift_the_fit_and_their_error_joins_the_datas(tmp_path, truth):
     found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
     (rms, _), noise = found.numbers, found.problem.noise
     assert found.converged and abs(rms.value - rms.steady) > rms.error and np.all(noise[6:9] > 0.0)
-    again = predicted.asked(found.problem.groups[0], found.values, ["contact_area"], False)
+    again = likelihood.asked(found.problem.groups[0], found.values, ["contact_area"], False)
     assert_allclose(found.problem.predicted(found.best.x)[:10], again.mean["contact_area"], rtol=2e-4)
     assert_allclose(noise[:10], again.error["contact_area"], rtol=0.05)
 
@@ -454,15 +452,15 @@ def test_what_cannot_be_freed_is_refused(free, said, curves):
 
 def judged(scene, made, keys, draws, seed=LENS["seed"]):
     free = [calibration._free(scene, key) for key in keys]
-    problem = problem_of([made], [predicted.groups(scene, made)], free, {})
+    problem = problem_of([made], [likelihood.groups(scene, made)], free, {})
     return mechanisms.compare(problem, minimum(problem, problem.start, errors=True), seed, draws)
 
 
 def drawn_of(scene, error, seed, speeds=SPEEDS, names=("contact_area", "friction_force")):
     """Curves of a scene at speeds, with errors."""
     made, _ = rows_of(scene, speed=speeds)
-    (group,) = predicted.groups(scene, made)
-    exact = predicted.by_steady_sliding(group, {}, list(names))
+    (group,) = likelihood.groups(scene, made)
+    exact = likelihood.by_steady_sliding(group, {}, list(names))
     curves = noisy(exact, error, seed)
     return made._replace(curves=tuple(Curve(n, v, error * np.abs(exact[n])) for n, v in curves.items()))
 
@@ -477,7 +475,7 @@ ONE_ALONE = {"bonds only": {"shear.paid_by_adhesion": 0.0}, "fluctuations only":
 def test_a_mechanism_that_explains_as_much_is_not_rare():
     scene = load(SPRUNG)
     made = drawn_of(scene, 0.01, 3)
-    problem = problem_of([made], [predicted.groups(scene, made)], [calibration._free(scene, "bonds.stress")], {})
+    problem = problem_of([made], [likelihood.groups(scene, made)], [calibration._free(scene, "bonds.stress")], {})
     best = minimum(problem, problem.start, errors=True)
     for less in (0.0, 1e-6, -1e-6):  # as precisely as a minimum is known
         least = best._replace(chi_square=best.chi_square * (1.0 + less))
@@ -513,7 +511,7 @@ def test_without_another_mechanism_nothing_is_compared():
     verdict = judged(scene, drawn_of(scene, 0.01, 12), ["bonds.critical_speed", "bonds.stress"], 2)
     assert verdict.sufficient == "" and "no other mechanism" in verdict.words and len(verdict.judged) == 1
     assert "no fluctuations act" in verdict.words and "no bonds" not in verdict.words
-    assert list(fitted._comparison(verdict)[0]) == ["mechanism", "chi^2", "AICc - least"]
+    assert list(calibration._comparison(verdict)[0]) == ["mechanism", "chi^2", "AICc - least"]
 
 
 def test_the_tables_that_a_comparison_lacks_are_shown_as_they_are_written():
@@ -526,7 +524,7 @@ def test_the_tables_that_a_comparison_lacks_are_shown_as_they_are_written():
 
 def problem_at(scene):
     made = drawn_of(scene, 0.01, 14)
-    return problem_of([made], [predicted.groups(scene, made)], [calibration._free(scene, "adhesion.work")], {})
+    return problem_of([made], [likelihood.groups(scene, made)], [calibration._free(scene, "adhesion.work")], {})
 
 
 def test_curves_at_rest_are_said_to_tell_no_mechanism():
@@ -571,10 +569,10 @@ def test_fewer_points_than_the_criterion_needs_tell_nothing():
 def test_a_theory_is_preferred_by_its_own_data():
     scene = load(LENS).with_values({"bonds.stress": 6e4})
     made, _ = rows_of(scene, speed=SPEEDS)
-    (group,) = predicted.groups(scene, made)
+    (group,) = likelihood.groups(scene, made)
     values = {"adhesion.bond_share": 0.0, "shear.paid_by_adhesion": 0.0}
     names = ["contact_area", "friction_force"]
-    exact = predicted.by_steady_sliding(group, values | {"lambda": 0.4}, names, "scaled_angle")
+    exact = likelihood.by_steady_sliding(group, values | {"lambda": 0.4}, names, "scaled_angle")
     exact_curves = tuple(Curve(n, v, 0.002 * np.abs(v)) for n, v in noisy(exact, 0.002, 10).items())
     verdict = judged(scene, made._replace(curves=exact_curves), ["bonds.critical_speed", "bonds.stress"], 20)
     assert verdict.judged[0].name == "mixed mode, scaled angle" and len(verdict.judged) == 12
@@ -718,7 +716,7 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
     )
     before = [path.read_bytes() for path in made]
     chosen = []
-    monkeypatch.setattr(fitted, "figure", lambda *_: chosen.append(Unit.of(1.0, "m/s").name) or Figure((1.0, 1.0)))
+    monkeypatch.setattr(calibration, "figure", lambda *_: chosen.append(Unit.of(1.0, "m/s").name) or Figure((1.0, 1.0)))
     again = command(scenario, curves, *free, "--steady")
     assert getattr(again.exception, "exit_code", 0) == 73
     assert command(scenario, curves, "--free", "bonds.stress", "--steady", "--force", "--units", "um/s").exit_code == 0
@@ -730,7 +728,7 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
 
 
 def test_a_unit_that_no_axis_has_is_refused_before_the_fit(scenario, curves, monkeypatch):
-    monkeypatch.setattr(fitted, "fit", None)
+    monkeypatch.setattr(calibration, "fit", None)
     done = command(scenario, curves, "--free", "bonds.stress", "--units", "um/s", "--units", "kPa")
     assert isinstance(done.exception, BadInput) and '--units: no axis of this figure can be in "kPa"' in str(
         done.exception
@@ -740,7 +738,7 @@ def test_a_unit_that_no_axis_has_is_refused_before_the_fit(scenario, curves, mon
 def test_a_fit_that_does_not_converge_exits_1(scenario, curves, monkeypatch):
     monkeypatch.setattr(calibration, "with_errors", lambda problem, start: (
         problem, minimum(problem, start, errors=True)._replace(converged=False)))  # fmt: skip
-    monkeypatch.setattr(fitted, "save", lambda *given: None)
+    monkeypatch.setattr(calibration, "save", lambda *given: None)
     done = command(scenario, curves, "--free", "bonds.stress", "--steady")
     assert done.exit_code == 1 and "has not converged" in done.output
 

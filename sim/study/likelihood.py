@@ -1,0 +1,741 @@
+"""Measured curves, their prediction by a scenario, and their least squares.
+
+Curves are columns of CSV tables, named as variables of a dataset, with units and standard errors. They are predicted
+in two ways. Steady sliding answers for all rows in a fraction of a millisecond: each row is a contact that has always
+slid at its speed, with the mean of the fluctuations and the edge in equilibrium. The scenario's own run has everything
+else: members, clock steps, histories, edges that lag.
+
+A number above zero without an upper bound is fitted in its logarithm. The sum of squares is over errors; a relative
+error that curves share is one more number, known to be 0 within its size.
+"""
+
+import functools
+import math
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize, stats
+
+from sim.engine import MemberNoise, Trajectory, balance, follow
+from sim.ensemble.dataset import variable_name
+from sim.ensemble.plan import together
+from sim.ensemble.variables import VARIABLES
+from sim.laws.theories import compare_at_indentation, compare_at_load
+from sim.parts.exchange import Motion
+from sim.scenario.scenario import Scenario
+from sim.scenario.schema import quantities
+from sim.spectrum.family import Family
+from sim.units.errors import BadInput
+from sim.units.quantity import Quantity
+from sim.units.tables import read_measured
+
+Array = NDArray[np.float64]
+
+#: Column of what holds the sphere, by the key of the contact that prescribes it.
+HELD = {"load": "normal_load", "indentation": "indentation", "displacement": "displacement"}
+#: What is recorded of a history, or is no measured number; and what is measured of a slider that feels its friction.
+_NOT_MEASURED = ("in_contact", "masked", "detachment_time", "dissipated_energy", "applied_load")
+#: Sizes of the contact, which are never below 0, with their units.
+_SIZES = {"contact_radius": "m", "contact_area": "m^2"}
+_OF_SLIDER = ("speed", "slider_position", "spring_force")
+
+
+class Curve(NamedTuple):
+    """What was measured of one variable in one table [SI]; its ``errors`` are standard errors, None where unknown."""
+
+    name: str
+    values: Array
+    errors: Array | None
+
+    @property
+    def described(self) -> tuple[str, str, str]:
+        """Unit, long name and symbol of the variable."""
+        return next((one.unit, one.long_name, one.symbol) for one in VARIABLES if one.name == self.name)
+
+
+class Measured(NamedTuple):
+    """One table: under which conditions which curves were measured.
+
+    ``conditions`` holds the columns ``"t"``, ``"speed"``, ``"held"`` (load, indentation or displacement) and those of
+    other keys of the scenario, by the key; rows are numbered alike in all columns. ``held`` is the key of the contact
+    that holds the sphere. ``ranges`` names the range of each column, for people.
+    """
+
+    path: Path
+    held: str
+    conditions: dict[str, Array]
+    curves: tuple[Curve, ...]
+    ranges: str = ""
+
+    @property
+    def rows(self) -> int:
+        return len(self.curves[0].values)
+
+
+def read(path: Path, scenario: Scenario) -> Measured:
+    """Read a table of measured curves.
+
+    Parameters
+    ----------
+    path : Path
+        CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``: conditions,
+        variables of a dataset, and beside these their standard errors, in the same dimension or in ``[%]``.
+        Conditions are ``t``, ``speed``, what holds the sphere (``normal_load``, ``indentation`` or ``displacement``),
+        or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. Of a slider behind a
+        spring or under a force the speed is no condition but a curve; ``stage_speed`` is that of a steady stage.
+    scenario : Scenario
+        What the curves are compared with.
+
+    Raises
+    ------
+    BadInput
+        With one line.
+    """
+    at, outcomes = _conditions(scenario), _outcomes(scenario)
+    known = {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}
+    found = read_measured(path, known, outcomes)
+    conditions = {at[name][0]: points.values for name, points in found.items() if name in at}
+    curves = tuple(Curve(name, *points) for name, points in found.items() if name not in at)
+    unclear = _unclear(scenario, conditions)
+    unclear = unclear or _against(conditions, curves)
+    if not curves:
+        unclear = 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
+    nothing = [name for name, values, errors in curves if errors is None and not np.any(values)]
+    if nothing:
+        unclear = (
+            unclear or f"{nothing[0]} is 0 in all rows, which has no scatter of its own; give errors, or leave it out"
+        )
+    if unclear:
+        raise BadInput([f"{path}: {unclear}"])
+    extremes = ((name, points.values.min(), points.values.max(), known[name].unit) for name, points in found.items())
+    ranges = ", ".join(f"{name} {low:.4g} to {high:.4g} {unit}" for name, low, high, unit in extremes)
+    return Measured(path, scenario.contact.kind, conditions, curves, ranges)
+
+
+def _against(conditions: dict[str, Array], curves: tuple[Curve, ...]) -> str:
+    """What is wrong with the signs of forces and speeds; "" for nothing."""
+    for name, values, _ in curves:
+        if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
+            return f"{name} has the sign of the speed; turn the sign of one of them"
+    return ""
+
+
+def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
+    """Condition and declaration by the name of a column."""
+    kind = scenario.contact.kind
+    units = {one.name: one.unit for one in VARIABLES}
+    found = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
+    if not scenario.drive.solves_motion:
+        found |= dict.fromkeys(("speed", "drive_speed"), ("speed", Quantity("m/s", "sliding speed")))
+    elif "drive_stage" in found:
+        found["stage_speed"] = found["drive_stage"]
+    held = ("held", Quantity(units[HELD[kind]], f"what holds the sphere, contact.{kind}"))
+    found |= dict.fromkeys((HELD[kind], f"contact_{kind}"), held)
+    return found | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
+
+
+def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
+    """Declaration of each variable that can be measured."""
+    of_slider = _OF_SLIDER if scenario.drive.solves_motion else ()
+    there = (one for one in VARIABLES if (one.part != "drive" or one.name in of_slider) and one.applies(scenario))
+    sizes = {name: Quantity(unit, name, at_least=0) for name, unit in _SIZES.items()}
+    return {one.name: sizes.get(one.name, Quantity(one.unit, one.long_name))
+            for one in there if one.name not in _NOT_MEASURED}  # fmt: skip
+
+
+def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
+    """What a table lacks to say at which speed, or under which load, its rows were measured; "" for nothing."""
+    drive, contact = scenario.drive, scenario.contact
+    if "t" in conditions:
+        both = [name for name in ("speed", "held") if name in conditions]
+        said = "times already say the speed and the load, by the scenario; leave out t, or these columns"
+        return said if both else ""
+    if drive.solves_motion and not {"drive.stage", "drive.force"} & quantities(scenario).keys():
+        return f'what drives the slider changes during the run (drive.model = "{drive.model}"); add a column "t [s]"'
+    if "speed" not in conditions and drive.model != "steady" and not drive.solves_motion:
+        said = f'the speed changes during the run (drive.model = "{drive.model}")'
+        return f'{said}; add a column "speed [mm/s]", or "t [s]"'
+    if "held" not in conditions and contact.changes:
+        return f'contact.{contact.kind} changes during the run; add a column "{HELD[contact.kind]}", or "t [s]"'
+    column = "t [s]" if drive.solves_motion else "speed [mm/s]"
+    return "" if conditions else f'no column says where the points were taken; add for example "{column}"'
+
+
+#: Values of keys, by their dotted names.
+Values = Mapping[str, float]
+
+_READ = {one.name: one.read for one in VARIABLES}
+
+
+def changed(scenario: Scenario, values: Values) -> Scenario:
+    """A scenario with some numbers changed and nothing checked, in microseconds, for values within their bounds."""
+    tree: dict[str, Any] = {}
+    for key, value in values.items():
+        *tables, last = key.split(".")
+        table = tree
+        for name in tables:
+            table = table.setdefault(name, {})
+        table[last] = value
+    found: Scenario = _changed(scenario, tree)
+    return found
+
+
+def _changed(part: Any, tree: dict[str, Any]) -> Any:
+    """A part with numbers changed, and tables in it."""
+    own, names = _keys(cast(Hashable, type(part)))
+    kept = {name: getattr(part, name) for name in own}
+    for key, value in tree.items():
+        name = names.get(key, key)
+        kept[name] = _changed(kept[name], value) if isinstance(value, dict) else value
+    made = object.__new__(type(part))
+    made.__dict__.update(kept)
+    return made
+
+
+@functools.cache
+def _keys(table: type) -> tuple[list[str], dict[str, str]]:
+    """Names of a table's values, and by the key of a file where that is another one."""
+    declared = getattr(table, "__pydantic_fields__", {})
+    return [item.name for item in fields(table)], {one.alias: name for name, one in declared.items() if one.alias}
+
+
+class Group(NamedTuple):
+    """Rows of a table at which keys of the scenario are the same.
+
+    ``scenario`` has them; ``rows`` are their places in the table, ``time`` [s] and ``speed`` [m/s] theirs, shape
+    (rows, 1): the contact's course is one over ``time``.
+    """
+
+    scenario: Scenario
+    rows: NDArray[np.int64]
+    time: Array
+    speed: Array
+
+
+def groups(scenario: Scenario, table: Measured) -> list[Group]:
+    """The groups of a table's rows; ``BadInput`` where a row has values that do not go together."""
+    own = {key: values for key, values in table.conditions.items() if key not in ("t", "speed", "held")}
+    columns = np.array([*own.values()]).reshape(len(own), table.rows)
+    found = []
+    for place in np.unique(columns, axis=1, return_index=True)[1] if own else [0]:
+        rows = np.flatnonzero(np.all(columns == columns[:, place : place + 1], axis=0))
+        try:
+            one = scenario.with_values({key: float(values[place]) for key, values in own.items()})
+        except BadInput as fault:
+            raise BadInput([f"{table.path}: row {place + 1}: {said}" for said in fault.problems]) from None
+        found.append(_group(one, table, rows))
+    return found
+
+
+def _group(scenario: Scenario, table: Measured, rows: NDArray[np.int64]) -> Group:
+    time = np.linspace(0.0, scenario.clock.duration, len(rows))  # a course of the rows, as long as the run
+    if "t" in table.conditions:
+        time = table.conditions["t"][rows]
+    if "held" in table.conditions:
+        scenario = scenario.with_values(
+            {f"contact.{scenario.contact.kind}": _course(time, table.conditions["held"][rows])}
+        )
+    if "speed" in table.conditions:
+        speed = table.conditions["speed"][rows]
+    else:
+        instants = np.repeat(time, 2) if "t" in table.conditions else np.zeros(2 * len(rows))
+        speed = scenario.drive.pieces(instants, scenario.clock.duration).joined.last[::2]
+    return Group(scenario, rows, time[:, np.newaxis], speed[:, np.newaxis])
+
+
+def _course(time: Array, values: Array) -> Any:
+    """What holds the sphere at the rows: a number where that is one."""
+    return float(values[0]) if np.all(values == values[0]) else {"time": time, "value": values}
+
+
+def steady_course(scenario: Scenario, time: Array, speed: Array) -> Trajectory:
+    """Contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s]; shapes (rows, 1)."""
+    found = scenario.population.steady(speed[:, 0])
+    still = 0.0 * speed
+    bonding = type(found)(*(np.reshape(values, (-1, 1)) + still for values in found))
+    motion = Motion(0, time, 0.0 * time, still, still, speed, speed)  # type: ignore[arg-type]
+    shear = scenario.fluctuations
+    size = shear.amplitude.factor(speed, bonding.strength) ** 2
+    size = bonding.frozen + bonding.varying if shear.spectrum.bond_made else size
+    energy = size * _plane_energy(shear.spectrum, *scenario.solid.effective)
+    terms = balance(scenario, bonding.fraction, bonding.strength, np.broadcast_to(energy, speed.shape), still)
+    touch = scenario.contact.start(motion, scenario.clock.duration, terms)
+    moving = time, still, speed, bonding.fraction, bonding.stress, bonding.strength, energy
+    return Trajectory(*moving, np.empty((len(speed), 1, 0)), *touch)
+
+
+@functools.lru_cache(maxsize=256)  # most numbers that are changed are none of the spectrum's
+def _plane_energy(spectrum: Family, shear_modulus: float, poisson_ratio: float) -> float:
+    return float(spectrum.surface_energy(shear_modulus, poisson_ratio))
+
+
+def by_steady_sliding(group: Group, values: Values, names: list[str], theory: str = "") -> dict[str, Array]:
+    """Variables at the rows of a group with some numbers changed, in steady sliding.
+
+    ``theory`` is the name of a theory of ``sim.laws.theories`` that gives the radius in place of the contact's balance,
+    at the stress of the bonds; its numbers ``"alpha"`` and ``"lambda"`` are among the ``values``.
+    """
+    own = {key: value for key, value in values.items() if "." in key or key in ("seed",)}
+    scenario = changed(group.scenario, own)
+    course = steady_course(scenario, group.time, group.speed)
+    if theory:
+        course = course._replace(radius=_radius_by(theory, scenario, course, values))
+    return {name: np.broadcast_to(_READ[name](scenario, course), group.speed.shape)[:, 0] for name in names}
+
+
+def _radius_by(theory: str, scenario: Scenario, course: Trajectory, values: Values) -> Array:
+    """Contact radius by a theory, at the stress that the bonds bear and the full work of adhesion."""
+    control = scenario.contact.control(course.time, scenario.clock.duration)
+    load, base, _ = control.mount
+    at_load = scenario.contact.kind == "load"
+    compare: Callable[..., dict[str, Array]] = compare_at_load if at_load else compare_at_indentation
+    numbers = {"reversible": values.get("alpha", 0.0), "mixity": values.get("lambda", 0.5)}
+    rest = scenario.adhesion.work, *scenario.bodies
+    return compare(np.abs(course.stress), load if at_load else base, *rest, **numbers)[theory]
+
+
+class Sampled(NamedTuple):
+    """Means over members of each variable at the rows of a table, and their standard errors, 0 where none differ."""
+
+    mean: dict[str, Array]
+    error: dict[str, Array]
+
+
+def asked(found: list[Group], values: Values, names: list[str], by_time: bool) -> Sampled:
+    """What the scenario's own models give at the rows of a table, with the noise of its seed.
+
+    Where rows have times, or only speeds and the drive passes through these, they are read along the scenario's run;
+    else each row is a run of its own at a steady speed, of the stage if there is one, of which the second half counts.
+
+    Raises
+    ------
+    BadInput
+        If the run does not reach the speed of a row, or passes it twice.
+    """
+    count = sum(len(group.rows) for group in found)
+    sampled = Sampled(*({name: np.full(count, np.nan) for name in names} for _ in range(2)))
+    for group in found:
+        scenario = group.scenario.with_values(dict(values) | {"record": {}})
+        runs: list[tuple[NDArray[np.int64], Scenario, Weights]] = []
+        driven = scenario.drive.solves_motion
+        if by_time or not (driven or scenario.drive.model == "steady" or scenario.contact.changes):
+            runs.append((group.rows, scenario, functools.partial(_places, group, by_time)))
+        else:
+            runs += [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
+        for rows, point, places in runs:
+            for name, members in _members(point, names, places).items():
+                mean = members.mean(axis=1)
+                spread = members.std(axis=1, ddof=1) if members.shape[1] > 1 else 0.0 * mean
+                sampled.mean[name][rows] = mean
+                sampled.error[name][rows] = spread / math.sqrt(members.shape[1])
+    return sampled
+
+
+def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
+    """The scenario at the steady speed of a row, or under its own steady stage or force, and held as it was there."""
+    held = scenario.contact.course.at(group.time[row], scenario.clock.duration)
+    steady = {"drive": {"model": "steady", "speed": float(group.speed[row, 0])}}
+    drive = {} if scenario.drive.solves_motion else steady
+    return scenario.with_values(drive | {f"contact.{scenario.contact.kind}": float(held[0])})
+
+
+#: Weights of the records of a run that make the rows, shape (rows, records).
+Weights = Callable[[Trajectory], Array]
+
+
+def _second_half(course: Trajectory) -> Array:
+    weights = (np.arange(len(course.time)) >= len(course.time) // 2).astype(float)
+    return weights[np.newaxis] / weights.sum()
+
+
+def _places(group: Group, by_time: bool, course: Trajectory) -> Array:
+    """Weights of the two records between which a row lies, by its time or by the logarithm of its speed."""
+    if by_time:
+        along, at = course.time[:, 0], group.time[:, 0]
+    else:
+        with np.errstate(divide="ignore"):
+            along, at = np.log(np.abs(course.speed[:, 0])), np.log(np.abs(group.speed[:, 0]))
+    if along[0] > along[-1]:
+        along, at = -along, -at
+    rising, near = bool(np.all(np.diff(along) > 0.0)), 1e-9 * max(1.0, float(np.ptp(along)))
+    if not rising or at.min() < along[0] - near or at.max() > along[-1] + near:
+        said = "the run must pass each measured speed once"
+        if rising:
+            ends = (np.abs(course.speed), np.abs(group.speed))
+            run, data = (f"{values.min():.3g} to {values.max():.3g}" for values in ends)
+            said = f"the run goes from {run} m/s, the data from {data}"
+        raise BadInput([f'drive.speed: {said}; fit with a wider drive, or with [drive] model = "steady"'])
+    place = np.clip(np.searchsorted(along, at) - 1, 0, len(along) - 2)
+    part = np.clip((at - along[place]) / (along[place + 1] - along[place]), 0.0, 1.0)
+    weights = np.zeros((len(at), len(along)))
+    rows = np.arange(len(at))
+    weights[rows, place], weights[rows, place + 1] = 1.0 - part, part
+    return weights
+
+
+def _members(point: Scenario, names: list[str], places: Weights) -> dict[str, Array]:
+    """Variables at rows by member, shape (rows, members); one member where none differ."""
+    count = point.ensemble.members if any(point.varies.values()) else 1
+    steps, most = range(0, point.clock.steps + 1, point.clock.stride), together(point)
+    kept: dict[str, list[Array]] = {name: [] for name in names}
+    for first in range(0, count, most):
+        members = np.arange(first, min(first + most, count))
+        _, course = follow(point, MemberNoise.of(point.seed, members), None, steps)
+        weights = places(course)
+        for name in names:
+            values = np.broadcast_to(_READ[name](point, course), (len(steps), len(members)))
+            kept[name].append(np.array([[row @ one for one in values.T] for row in weights]))
+    return {name: np.concatenate(several, axis=1) for name, several in kept.items()}
+
+
+try:
+    import lmfit
+except ModuleNotFoundError:
+    raise BadInput(["fitting needs lmfit, of an extra: pip install 'sliding-sim[fit]'"]) from None
+
+
+#: Probability of an interval.
+LEVEL = 0.95
+#: Residual of a row at which the contact is open, in standard errors.
+_OPEN = 1e6
+#: Step of derivatives, in logarithms or shares of the range, and relative size of a direction that changes nothing.
+_STEP, _NOTHING = 1e-4, 1e-5
+#: The same, and the precision of a minimum, where each prediction is a run, known to the tolerance of its steps alone.
+_RUN_STEP, _RUN_NOTHING, _RUN_PRECISION = 1e-3, 1e-2, 1e-6
+#: Change of all rows, in standard errors and over an e-fold, that is none.
+_NO_EFFECT = 1e-6
+#: Speeds of a line that is drawn.
+_DRAWN = 200
+#: Precision of the ends of an interval, over its half width, that of the sums of squares there, and most steps to one.
+_END, _END_SQUARES, _MOST = 1e-3, 1e-5, 30
+#: Rounds in which errors that nobody gave are found.
+_ROUNDS = 4
+#: Most evaluations of a minimum, for each number and one more.
+_EVALUATIONS = 100
+
+
+class Free(NamedTuple):
+    """A number of the scenario that is to be found between two bounds; ``start`` is the scenario's own."""
+
+    key: str
+    quantity: Quantity
+    start: float
+    low: float
+    high: float
+
+    @property
+    def logarithmic(self) -> bool:
+        return self.low > 0.0
+
+    @property
+    def width(self) -> float:
+        """Change of the number as it is fitted that is a large one: an e-fold, its range, or its size without one."""
+        if self.logarithmic:
+            return 1.0
+        return max(self.high - self.low if math.isfinite(self.high - self.low) else abs(self.start), 1e-300)
+
+    def inner(self, value: float) -> float:
+        """The number as it is fitted."""
+        return math.log(value) if self.logarithmic else value
+
+    def outer(self, x: float) -> float:
+        return min(max(math.exp(x), self.low), self.high) if self.logarithmic else x
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Measured numbers beside those that a scenario predicts for them.
+
+    ``values`` are all curves of all ``tables`` in turn, ``curve`` the number of each one's curve; ``sigma`` their
+    standard errors, ``estimated`` where nobody gave them. ``shift`` is what the scenario's own models add to
+    steady sliding at each of them, and ``noise`` its standard error. ``common`` are relative errors that all points
+    of a variable share. ``fixed`` and ``theory`` make another mechanism of the scenario. With ``by_run`` each
+    prediction is a run of the scenario's own models, as steady sliding does not depend on all that is free.
+    """
+
+    tables: tuple[Measured, ...]
+    groups: tuple[list[Group], ...]
+    free: tuple[Free, ...]
+    common: dict[str, float]
+    values: Array
+    sigma: Array
+    curve: NDArray[np.int64]
+    estimated: NDArray[np.bool_]
+    shift: Array
+    noise: Array
+    fixed: Values
+    theory: str = ""
+    by_run: bool = False
+
+    @property
+    def start(self) -> Array:
+        return np.array([one.inner(one.start) for one in self.free] + [0.0] * len(self.common))
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        return [(one.inner(one.low), one.inner(one.high)) for one in self.free] + [(-math.inf, math.inf)] * len(
+            self.common
+        )
+
+    def numbers(self, x: Array) -> dict[str, float]:
+        """Values of the free keys and of those that make the mechanism."""
+        return {one.key: one.outer(float(number)) for one, number in zip(self.free, x, strict=False)} | dict(self.fixed)
+
+    def steady(self, x: Array) -> Array:
+        """All curves in steady sliding, or by runs."""
+        numbers, found = self.numbers(x), []
+        if self.by_run:
+            return self._joined(self.sampled(x))[0]
+        for table, several in zip(self.tables, self.groups, strict=True):
+            names = [curve.name for curve in table.curves]
+            kept = {name: np.empty(table.rows) for name in names}
+            for group in several:
+                for name, values in by_steady_sliding(group, numbers, names, self.theory).items():
+                    kept[name][group.rows] = values
+            found += [kept[name] for name in names]
+        return np.concatenate(found)
+
+    def sampled(self, x: Array) -> list[Sampled]:
+        """The curves of each table by the scenario's own models."""
+        numbers, both = self.numbers(x), zip(self.tables, self.groups, strict=True)
+        return [asked(several, numbers, [curve.name for curve in table.curves], "t" in table.conditions)
+                for table, several in both]  # fmt: skip
+
+    def _joined(self, sampled: Sequence[Sampled]) -> tuple[Array, Array]:
+        """Means and standard errors of all curves."""
+        both: list[list[Array]] = [[], []]
+        for table, found in zip(self.tables, sampled, strict=True):
+            for kept, part in zip(both, found, strict=True):
+                kept += [part[curve.name] for curve in table.curves]
+        return np.concatenate(both[0]), np.concatenate(both[1])
+
+    def predicted(self, x: Array) -> Array:
+        """All curves, with the shift and the common errors."""
+        found = self.steady(x) + self.shift
+        for k, (name, size) in enumerate(self.common.items()):
+            found = np.where(self.of(name), found * (1.0 + size * x[len(self.free) + k]), found)
+        return found
+
+    def between(self, x: Array, table: Measured, name: str) -> tuple[Array, Array]:
+        """Speeds from the least to the largest of a table, and its curve there in steady sliding.
+
+        Without any where more than the speed was varied.
+        """
+        several = next(groups for one, groups in zip(self.tables, self.groups, strict=True) if one is table)
+        speeds = several[0].speed
+        if [*table.conditions] != ["speed"] or self.by_run or not np.min(speeds) > 0.0:
+            return np.empty(0), np.empty(0)
+        fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
+        group = several[0]._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
+        return fine[:, 0], by_steady_sliding(group, self.numbers(x), [name], self.theory)[name]
+
+    def of(self, name: str) -> NDArray[np.bool_]:
+        """Where a variable is."""
+        names = [curve.name for table in self.tables for curve in table.curves]
+        return np.array([one == name for one in names])[self.curve]
+
+    def place(self, number: int) -> str:
+        """Variable and row of one of all numbers."""
+        name = [curve.name for table in self.tables for curve in table.curves][self.curve[number]]
+        return f"{name}: row {number - int(np.argmax(self.curve == self.curve[number])) + 1}"
+
+    def residuals(self, x: Array) -> Array:
+        """Deviations over errors, and the common errors over their sizes."""
+        off = (self.values - self.predicted(x)) / np.hypot(self.sigma, self.noise)
+        return np.append(np.nan_to_num(off, nan=_OPEN, posinf=_OPEN, neginf=-_OPEN), x[len(self.free) :])
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom."""
+        return len(self.values) - len(self.free)
+
+    def criterion(self, chi_square: float) -> float:
+        """Akaike's criterion for few points, AICc."""
+        count = len(self.free) + len({*self.curve[self.estimated].tolist()})
+        size = chi_square + 2.0 * float(np.sum(np.log(self.sigma[self.estimated]))) + 2.0 * count
+        left = len(self.values) - count - 1
+        return size + 2.0 * count * (count + 1) / left if left > 0 else math.inf
+
+    def compared(self, x: Array) -> "Problem":
+        """This problem with the shift from steady sliding at x to what the scenario's own models give there."""
+        mean, noise = self._joined(self.sampled(x))
+        if not np.all(np.isfinite(mean)):
+            said = "has no value in the run with what was found: is the contact open there?"
+            raise BadInput([f"{self.place(int(np.flatnonzero(~np.isfinite(mean))[0]))} {said}"])
+        return replace(self, shift=mean - self.steady(x), noise=noise)
+
+
+class Minimum(NamedTuple):
+    """A minimum of the sum of squares, with the covariance of what is free (None where it was not asked for)."""
+
+    x: Array
+    chi_square: float
+    covariance: Array | None
+    converged: bool
+
+
+def minimum(
+    problem: Problem, start: Array, held: dict[int, float] | None = None, errors: bool = False, precision: float = 1e-8
+) -> Minimum:
+    """The least sum of squares near a start, with some numbers held, to a relative precision."""
+    held = held or {}
+    parameters = lmfit.Parameters()
+    for k, (low, high) in enumerate(problem.bounds):
+        room = 1e-3 * (high - low) if math.isfinite(high - low) else 0.0  # at a bound no step has an effect
+        value = held[k] if k in held else min(max(start[k], low + room), high - room)
+        parameters.add(f"p{k}", value=value, min=low, max=high, vary=k not in held)
+
+    def numbers(given: Any) -> Array:
+        return np.array([one.value for one in given.values()])
+
+    if len(held) == len(parameters):
+        x = numbers(parameters)
+        return Minimum(x, float(np.sum(problem.residuals(x) ** 2)), None, True)
+    how: dict[str, Any] = {"calc_covar": errors, "scale_covar": False, "max_nfev": _EVALUATIONS * (len(parameters) + 1)}
+    if problem.by_run:  # steps of the minimizer's own would be lost in the rounding of a run
+        moved, precision = [k for k in range(len(parameters)) if k not in held], _RUN_PRECISION
+        how["Dfun"] = lambda given: _derivatives(problem, numbers(given), moved)
+    found = lmfit.Minimizer(lambda given: problem.residuals(numbers(given)), parameters, **how).leastsq(
+        ftol=precision, xtol=precision
+    )
+    covariance = getattr(found, "covar", None) if errors else None
+    return Minimum(numbers(found.params), float(found.chisqr), covariance, bool(found.success))
+
+
+def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
+    """The minimum, and the problem with errors of the curves that came without: the scatter around it."""
+    for _ in range(_ROUNDS if problem.estimated.any() else 1):
+        best = minimum(problem, start, errors=True)
+        start, off = best.x, problem.values - problem.predicted(best.x)
+        if not problem.estimated.any():
+            break
+        sigma, share = problem.sigma.copy(), problem.freedom / len(problem.values)
+        for number in np.unique(problem.curve[problem.estimated]):
+            here = problem.curve == number
+            scatter = math.sqrt(float(np.sum(off[here] ** 2)) / (share * here.sum()))
+            sigma[here] = max(scatter, 1e-9 * float(np.abs(problem.values[here]).max()))
+        problem = replace(problem, sigma=sigma)
+    return problem, best
+
+
+def idle(problem: Problem) -> list[str]:
+    """Free keys that have no effect on the curves."""
+    sizes = np.sqrt(np.sum(_derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0))
+    least = _NO_EFFECT * math.sqrt(len(problem.values))
+    return [one.key for one, size in zip(problem.free, sizes, strict=True) if size < least]
+
+
+def entangled(problem: Problem) -> list[list[str]]:
+    """Sets of free keys that the curves depend on only together, as on their product."""
+    count, spaces = len(problem.free), []
+    for share in (0.05, 0.16):  # off the bounds, and what holds at two places is no accident of one
+        inside = [x + share * (0.5 * (low + high) - x) if math.isfinite(high - low) else x
+                  for x, (low, high) in zip(problem.start, problem.bounds, strict=True)]  # fmt: skip
+        columns = _derivatives(problem, np.array(inside), range(count))
+        _, sizes, rows = np.linalg.svd(columns / np.maximum(np.sqrt(np.sum(columns**2, axis=0)), 1e-300))
+        nothing = (_RUN_NOTHING if problem.by_run else _NOTHING) * sizes[0]
+        spaces.append([rows[k] for k in range(count) if k >= len(sizes) or sizes[k] < nothing])
+    if not all(spaces):
+        return []
+    return [[problem.free[k].key for k in range(count) if abs(row[k]) > 0.1] for row in spaces[0]]
+
+
+def _derivatives(problem: Problem, x: Array, places: Iterable[int]) -> Array:
+    """Derivatives of the residuals over what is free, a column for each place in it."""
+    columns, share = [], _RUN_STEP if problem.by_run else _STEP
+    for k in places:
+        low, high = problem.bounds[k]
+        step = share * (1.0 if k >= len(problem.free) else problem.free[k].width)
+        up, down = x.copy(), x.copy()
+        up[k], down[k] = min(x[k] + step, high), max(x[k] - step, low)
+        columns.append((problem.residuals(up) - problem.residuals(down)) / (up[k] - down[k]))
+    return np.array(columns).T
+
+
+class Interval(NamedTuple):
+    """Ends of an interval of 95 %, and whether the data or a bound set each."""
+
+    low: float
+    high: float
+    low_open: bool
+    high_open: bool
+
+
+def interval(problem: Problem, best: Minimum, k: int) -> Interval:
+    """Return the interval in which the sum of squares, least over all else, stays below its bound (profile likelihood).
+
+    ``lmfit.conf_interval`` gives no interval if a bound and not the data ends it, and widens all by an estimated
+    variance where the errors are known; so the ends are sought here.
+    """
+    freedom = problem.freedom
+    known = stats.f.ppf(LEVEL, 1, freedom) if problem.estimated.any() else stats.chi2.ppf(LEVEL, 1)
+    ends = [_end(problem, best, k, sign, math.sqrt(known)) for sign in (-1.0, 1.0)]
+    (low, low_open), (high, high_open) = ends
+    return Interval(problem.free[k].outer(low), problem.free[k].outer(high), low_open, high_open)
+
+
+def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> tuple[float, bool]:
+    """One end of an interval, and whether it is only the bound of the number."""
+    assert best.covariance is not None
+    bound = problem.bounds[k][0 if sign < 0.0 else 1]
+    spread = math.sqrt(best.covariance[k, k])
+    along = best.covariance[:, k] / spread  # where the rest goes with this number
+    room, near, far, start = abs(bound - best.x[k]), 0.0, rise * spread, best.x
+    known = {0.0: -rise}
+
+    def above(distance: float) -> float:
+        """Root of what the sum of squares has risen there, over the end's; 0 where it is near enough."""
+        nonlocal start
+        if distance not in known:
+            held = bound if distance == room else best.x[k] + sign * distance
+            guess = _nearest(problem, (start, best.x + along * (held - best.x[k]) / spread), k, held)
+            found = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
+            root, start = math.sqrt(max(found.chi_square - best.chi_square, 0.0)), found.x
+            known[distance] = 0.0 if abs(root / rise - 1.0) < _END else root - rise
+        return known[distance]
+
+    for _ in range(_MOST):
+        far = min(far, room)
+        if above(far) >= 0.0:
+            near = optimize.brentq(above, near, far, rtol=_END, maxiter=_MOST, disp=False)
+            return best.x[k] + sign * near, False
+        if far == room:
+            return bound, True
+        # the root of a parabola is a line
+        near, far = far, far * min(1.1 * rise / max(rise + above(far), 1e-300), 3.0)
+    return math.nan, True
+
+
+def _nearest(problem: Problem, starts: Iterable[Array], k: int, held: float) -> Array:
+    """The start, within all bounds and with one number held, at which the curves are nearest already.
+
+    Where the data do not bound a number, the straight way to it leads out of all that can be.
+    """
+    low, high = np.transpose(problem.bounds)
+    within = [np.clip(np.where(np.arange(len(low)) == k, held, start), low, high) for start in starts]
+    return min(within, key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
+
+
+def problem_of(
+    tables: Sequence[Measured], groups: Sequence[list[Group]], free: Sequence[Free], common: dict[str, float]
+) -> Problem:
+    """The problem of some tables; ``BadInput`` where they hold fewer numbers than are free."""
+    curves = [curve for table in tables for curve in table.curves]
+    for name in common:
+        if name not in {curve.name for curve in curves}:
+            raise BadInput([f"--common {name}: no such curve; measured: {', '.join(curve.name for curve in curves)}"])
+    values = np.concatenate([curve.values for curve in curves])
+    if len(values) <= len(free):
+        said = f"{len(values)} measured number{'s' if len(values) > 1 else ''} cannot tell {len(free)} free"
+        raise BadInput([f"{tables[0].path}: {said}; measure more, or free fewer keys"])
+    guesses = [np.full(len(c.values), 0.01 * max(float(np.abs(c.values).max()), 1e-300)) for c in curves]
+    sigma = [guess if curve.errors is None else curve.errors for curve, guess in zip(curves, guesses, strict=True)]
+    unknown = [np.full(len(curve.values), curve.errors is None) for curve in curves]
+    number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
+    zero = np.zeros(len(values))
+    kept = np.concatenate(sigma), number, np.concatenate(unknown), zero, zero
+    return Problem(tuple(tables), tuple(groups), tuple(free), dict(common), values, *kept, {})
