@@ -147,8 +147,8 @@ def _guard(dataset: xr.Dataset, path: Path) -> None:
     text = content.decode("utf-8-sig", "replace").replace("\r\n", "\n")
     if content.startswith((b"\x89HDF", b"CDF")):
         raise BadInput([f"{path} is a dataset, which is not replaced; name another file"])
-    told = str(dataset.attrs.get("scenario_files")), dataset.attrs.get("scenario_toml")
-    if content and (hashlib.sha256(text.encode()).hexdigest() in told[0] or text == told[1]):
+    recorded = str(dataset.attrs.get("scenario_files")), dataset.attrs.get("scenario_toml")
+    if content and (hashlib.sha256(text.encode()).hexdigest() in recorded[0] or text == recorded[1]):
         raise BadInput([f"{path} is the scenario of this dataset, or a table of it; name another file"])
 
 
@@ -164,7 +164,7 @@ def answered() -> Iterator[None]:
     try:
         yield
     except KeyError as fault:
-        name = found[1] if (found := _MISSING.search(str(fault.args[0]))) else ""
+        name = match[1] if (match := _MISSING.search(str(fault.args[0]))) else ""
         if name not in get_args(Recorded):
             raise
         raise BadInput([f'{name} was not recorded; add "{name}" to record.quantities and run again']) from None
@@ -215,7 +215,7 @@ def is_stationary(dataset: xr.Dataset) -> bool:
 
 
 def _is_borne(dataset: xr.Dataset) -> bool:
-    """Whether one force pulls all the time, and no trajectory ends in a runaway."""
+    """Return True if one force pulls all the time, and no trajectory ends in a runaway."""
     if "drive_force" not in dataset or "runaway_time" not in dataset:
         return False
     return bool((word(dataset, "drive.model", "") == "force").all() & dataset["runaway_time"].isel(t=-1).isnull().all())
@@ -286,7 +286,7 @@ def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
 
 
 def may_stop(dataset: xr.Dataset) -> bool:
-    """Whether trajectories may stop at a pull-off, nan from there on."""
+    """Return True if trajectories may stop at a pull-off, nan from there on."""
     return bool((word(dataset, "contact.after_pull_off", "stop") == "stop").any())
 
 

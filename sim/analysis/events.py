@@ -37,7 +37,7 @@ _ENDS = {
     "slips_from": "lowest speed of the stage, as it gets faster, at which a slip begins that another one follows",
     "slips_down_to": "lowest speed of the stage, as it gets slower, at which a slip begins that follows another one",
 }
-#: What is known of each slip: unit and meaning.
+#: Properties of each slip: unit and meaning.
 _SLIPS = {
     "slip_time": ("s", "time at which a slip begins"),
     "slip_duration": ("s", "time from the beginning of a slip to its end"),
@@ -97,8 +97,8 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
     rows = [_slips(least, time, *(values[at] for values in series)) for at in np.ndindex(*shape)]
     most = max(len(row) for row in rows)
     table = np.full((len(rows), most, len(_SLIPS)), np.nan)
-    for own, row in zip(table, rows, strict=True):
-        own[: len(row)] = row
+    for slots, row in zip(table, rows, strict=True):
+        slots[: len(row)] = row
     table = table.reshape(*shape, most, len(_SLIPS))
     described: dict[str, Any] = {
         name: ((*outer, "slip"), table[..., k], {"units": unit, "long_name": text})
@@ -110,17 +110,17 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
 
 def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stress: Any) -> np.ndarray:
     """The slips of one member, a row each, columns ``_SLIPS``."""
-    from scipy.signal import find_peaks  # heavy: for sliders behind a spring alone
+    from scipy.signal import find_peaks  # its import is slow, and only springs need it
 
-    there = np.isfinite(force) & np.isfinite(position)
-    if not np.any(there):
+    known = np.isfinite(force) & np.isfinite(position)
+    if not np.any(known):
         return np.empty((0, len(_SLIPS)))
     sense = _sense(stage)
     turns = np.flatnonzero(np.diff(sense)) + 1
-    ends = np.unique([0, *turns[turns < there.sum()], there.sum()])
-    fall = least * np.max(np.abs(force[there]))
+    ends = np.unique([0, *turns[turns < known.sum()], known.sum()])
+    fall = least * np.max(np.abs(force[known]))
     pulled = np.concatenate([[0.0], np.cumsum(0.5 * (stage[1:] + stage[:-1]) * np.diff(time))])
-    found = []
+    rows = []
     for start, stop in itertools.pairwise(ends):
         along = sense[start] * force[start:stop]
         moved = sense[start] * (position - _FASTER * pulled)[start:stop]
@@ -137,11 +137,11 @@ def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stres
         slipped = (moved[low - start] > moved[top - start]) & (falls > 0.0)
         top, low, ahead, falls = top[slipped], low[slipped], ahead[slipped], falls[slipped]
         after = np.append(time[top], np.nan)[1:]  # when the next one begins
-        found.append(np.stack([
+        rows.append(np.stack([
             time[top], time[low] - time[top], after - time[low], after - time[top],
             ahead, np.abs(stage[top]), sense[start] * force[top], sense[start] * (force[top] - force[low]), falls,
         ], axis=1))  # fmt: skip
-    return np.concatenate(found)
+    return np.concatenate(rows)
 
 
 def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float) -> int:
@@ -151,7 +151,7 @@ def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float
     """
     if moved[low] > moved[top]:
         return top
-    from scipy.signal import find_peaks  # heavy: for sliders behind a spring alone
+    from scipy.signal import find_peaks  # its import is slow, and only springs need it
 
     later = top + find_peaks(force[top : low + 1])[0]
     later = later[force[later] - force[low] >= fall]
@@ -193,48 +193,49 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     read = {*_READ, "drive_work", "stage_position"}
     if "stage_speed" not in dataset or not read <= set(dataset.variables):
         return xr.Dataset()
-    half, several = _beginning(dataset), varies(dataset)
+    half, at_many_speeds = _beginning(dataset), varies(dataset)
     some = with_trajectories(dataset, *read)
-    return in_pieces(some, (*sweep_dims(dataset), MEMBERS), lambda piece: _means(piece, half, several))
+    return in_pieces(some, (*sweep_dims(dataset), MEMBERS), lambda piece: _means(piece, half, at_many_speeds))
 
 
 def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset:
-    """What ``stick_slip`` gives, of slips that begin after a time [s]."""
-    found = slips(dataset).pad(slip=(0, 1))  # where there is none, too, a mean is over something
-    begins = found["slip_time"]
+    """Return the variables of ``stick_slip``, of slips that begin after a time [s]."""
+    each_slip = slips(dataset).pad(slip=(0, 1))  # a mean needs at least one, also if no slip came
+    begins = each_slip["slip_time"]
     counted = begins >= half
-    means = found.where(counted).mean("slip", keep_attrs=True)
-    apart = (found["slip_amplitude"] - means["slip_amplitude"]).where(counted)
+    means = each_slip.where(counted).mean("slip", keep_attrs=True)
+    apart = (each_slip["slip_amplitude"] - means["slip_amplitude"]).where(counted)
     beyond_one = (counted.sum("slip") - 1.0).clip(0.0)
     spread = ((apart**2).sum("slip") / beyond_one.where(beyond_one > 0.0)) ** 0.5
     text = "standard deviation of the displacements in slips over their mean"
     means["slip_spread"] = (spread / means["slip_amplitude"]).assign_attrs(units="1", long_name=text)
     counts = counted.sum("slip").astype(float).assign_attrs(units="1", long_name="number of slips")
     first, last = begins.where(counted).min("slip"), begins.where(counted).max("slip")
-    several = last > first
+    has_many = last > first
     end = dataset["t"].where(dataset["spring_force"].notnull()).max("t")
-    first, last = first.where(several, half), last.where(several, end)
+    first, last = first.where(has_many, half), last.where(has_many, end)
     path = abs(dataset["stage_position"].diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
     slid = abs(dataset["slider_position"].astype(float).diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
-    made, gone, went = (_between(dataset, values, first, last) for values in (dataset["drive_work"], path, slid))
-    kinetic = (made / gone.where(went > 0.5 * gone)).assign_attrs(
+    work, gone, went = (_between(dataset, values, first, last) for values in (dataset["drive_work"], path, slid))
+    kinetic = (work / gone.where(went > 0.5 * gone)).assign_attrs(
         units="N", long_name="work of the stage over its path"
     )
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
-    return every.assign(_between_speeds(dataset, found) if several_speeds else {}).map(ordered, keep_attrs=True)
+    return every.assign(_between_speeds(dataset, each_slip) if several_speeds else {}).map(ordered, keep_attrs=True)
 
 
-def _between_speeds(dataset: xr.Dataset, found: xr.Dataset) -> dict[str, xr.DataArray]:
+def _between_speeds(dataset: xr.Dataset, each_slip: xr.Dataset) -> dict[str, xr.DataArray]:
     """Speeds of a stage between which slips follow each other."""
-    turn, later = abs(dataset["stage_speed"]).idxmax("t"), found["recurrence_time"].notnull()
-    kept = later & (found["slip_time"] <= turn), later.shift(slip=1, fill_value=False) & (found["slip_time"] > turn)
-    speeds = (found["slip_speed"].where(which).min("slip") for which in kept)
+    turn, later = abs(dataset["stage_speed"]).idxmax("t"), each_slip["recurrence_time"].notnull()
+    before = each_slip["slip_time"] <= turn
+    chosen = later & before, later.shift(slip=1, fill_value=False) & ~before & each_slip["slip_time"].notnull()
+    speeds = (each_slip["slip_speed"].where(which).min("slip") for which in chosen)
     ends = zip(_ENDS.items(), speeds, strict=True)
     return {name: speed.assign_attrs(units="m/s", long_name=text) for (name, text), speed in ends}
 
 
 def varies(dataset: xr.Dataset) -> bool:
-    """Whether the stage has several speeds in the course of a run, there and back not told apart, or rests."""
+    """Return True if the magnitude of the stage's speed changes in a run."""
     stage = abs(dataset["stage_speed"]).where(dataset["stage_speed"] != 0.0)
     return bool((stage.max("t") > (1.0 + _ROUNDING) * stage.min("t")).any())
 
@@ -258,8 +259,8 @@ def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = L
         are), and ``share_as_large`` [1], the share of slips that are as large or larger. Of a stage at one speed those
         that begin in the second half of the run.
     """
-    found = slips(dataset, least)
-    sizes = found[of].where(found["slip_time"] >= _beginning(dataset))
+    each_slip = slips(dataset, least)
+    sizes = each_slip[of].where(each_slip["slip_time"] >= _beginning(dataset))
     over = [name for name in (MEMBERS, "slip") if name in sizes.dims]
     sizes = sizes.drop_vars(over, errors="ignore").stack(rank=over, create_index=False)
     ascending = sizes.copy(data=np.sort(sizes.to_numpy(), axis=-1))
@@ -365,7 +366,7 @@ def speed_step(dataset: xr.Dataset) -> xr.Dataset:
     if bool((word(dataset, "drive.model", "") == "force").any()) or speed_name(dataset) not in dataset:
         return xr.Dataset()
     speeds = speed_of(dataset).transpose(..., "t").to_numpy()
-    if not any(_rise(own) for own in speeds.reshape(-1, speeds.shape[-1])):
+    if not any(_rise(course) for course in speeds.reshape(-1, speeds.shape[-1])):
         return xr.Dataset()
     return _of_each(dataset, _STEP, _stepped, speed_name(dataset), "friction_force", "slider_position")
 
@@ -378,7 +379,7 @@ def _rise(speed: np.ndarray) -> tuple[int, int] | None:
 
 
 def _stepped(speed: np.ndarray, force: np.ndarray, position: np.ndarray) -> tuple[float, ...]:
-    """What ``speed_step`` gives of one trajectory."""
+    """Return the numbers of ``speed_step`` of one trajectory."""
     unknown = (math.nan,) * len(_STEP)
     if (place := _rise(speed)) is None:
         return unknown
@@ -420,7 +421,7 @@ def way_to_sliding(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _pulled(speed: np.ndarray, force: np.ndarray, area: np.ndarray) -> tuple[float, ...]:
-    """What ``way_to_sliding`` gives of one trajectory."""
+    """Return the numbers of ``way_to_sliding`` of one trajectory."""
     slowed = np.flatnonzero(np.diff(np.abs(speed)) < 0.0) + 1
     turned = np.flatnonzero(speed[1:] * speed[:-1] < 0.0) + 1
     force = np.abs(force[: min([*slowed[:1], *turned[:1], len(force)])])
@@ -449,7 +450,7 @@ def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
 
 
 def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any, *read: str) -> xr.Dataset:
-    """What a function gives of the trajectories ``read`` of each member, described by units and meanings."""
+    """Apply a function to the trajectories ``read`` of each member; describe its results by units and meanings."""
     first = dataset[read[-1]]
     outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in first.dims]
     block = functools.partial(_block, described=described, of=of, read=read)
@@ -459,9 +460,9 @@ def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any
 def _block(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any, read: tuple[str, ...]) -> xr.Dataset:
     series = [dataset[name].astype(float).broadcast_like(dataset[read[-1]]) for name in read]
     dims: Any = {"input_core_dims": [["t"]] * len(read), "output_core_dims": [[]] * len(described), "vectorize": True}
-    found = xr.apply_ufunc(of, *series, **dims)
-    about = ((name, one, *described[name]) for name, one in zip(described, found, strict=True))
-    return xr.Dataset({name: one.assign_attrs(units=unit, long_name=text) for name, one, unit, text in about})
+    results = xr.apply_ufunc(of, *series, **dims)
+    about = ((name, values, *described[name]) for name, values in zip(described, results, strict=True))
+    return xr.Dataset({name: values.assign_attrs(units=unit, long_name=text) for name, values, unit, text in about})
 
 
 # --- all events of a run, once per member ---
@@ -505,25 +506,25 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
     dims, latest = (*sweep_dims(dataset), MEMBERS), with_trajectories(dataset, "detachment_time")
     if "detachment_time" in latest and bool(latest["detachment_time"].isel(t=-1).isnull().all()):
         latest = latest.isel(t=[-1])  # none was open before either
-    found = in_pieces(latest, dims, _openings)
+    result = in_pieces(latest, dims, _openings)
     read = ["masked", "in_contact_mean", *(f"masked_{kind}" for kind in KEPT)]
     read += ["contact_area"] if may_stop(dataset) else []
     with where_recorded():
-        found = found.merge(in_pieces(with_trajectories(dataset, *read), dims, _masks))
+        result = result.merge(in_pieces(with_trajectories(dataset, *read), dims, _masks))
     for part in (peaks, stick_slip, speed_step, way_to_sliding):
         with where_recorded():
-            found = found.merge(part(dataset))
+            result = result.merge(part(dataset))
     for suffix in ("", "_mean", "_std", "_sem"):
         if f"dissipated_energy{suffix}" in dataset:
             lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
             text = "energy dissipated by opening and closing, in all"
-            found[f"total_dissipated{suffix}"] = lost.assign_attrs(units="J", long_name=text, symbol="W")
+            result[f"total_dissipated{suffix}"] = lost.assign_attrs(units="J", long_name=text, symbol="W")
         for name in ("pull_off_load", "pull_off_time"):
             if name + suffix in dataset:
-                found[name + suffix] = dataset[name + suffix].astype(float)
+                result[name + suffix] = dataset[name + suffix].astype(float)
     with contextlib.suppress(ValueError), answered():
-        found = found.merge(loop_energy(dataset).mean("cycle", keep_attrs=True))
-    return found
+        result = result.merge(loop_energy(dataset).mean("cycle", keep_attrs=True))
+    return result
 
 
 def _openings(dataset: xr.Dataset) -> xr.Dataset:
@@ -538,18 +539,18 @@ def _openings(dataset: xr.Dataset) -> xr.Dataset:
 
 def _masks(dataset: xr.Dataset) -> xr.Dataset:
     """Each record stands for the time since the one before; a trajectory that stopped counts up to its end."""
-    suffix, found = "" if "masked" in dataset else "_mean", masks(dataset)
-    masked = found[f"fraction_masked{suffix}"]
+    suffix, result = "" if "masked" in dataset else "_mean", masks(dataset)
+    masked = result[f"fraction_masked{suffix}"]
     if stops := not suffix and may_stop(dataset):
         masked = masked.where(dataset["contact_area"].notnull())
     share = masked.isel(t=slice(min(1, dataset.sizes["t"] - 1), None)).mean("t", skipna=stops)
-    found = {f"time_masked{suffix}": pure(share, "share of the time in which adhesion was masked")}
+    result = {f"time_masked{suffix}": pure(share, "share of the time in which adhesion was masked")}
     if not suffix:
         ever = masked == 1.0
         text = "time at which adhesion was first masked, of the contacts in which it was"
         first = dataset["t"].isel(t=ever.argmax("t")).drop_vars("t").where(ever.any("t"))
-        found["first_masked"] = ordered(first).assign_attrs(units="s", long_name=text)
-    return xr.Dataset(found)
+        result["first_masked"] = ordered(first).assign_attrs(units="s", long_name=text)
+    return xr.Dataset(result)
 
 
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
@@ -581,7 +582,7 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
     ramp, start = drive == "ramp", drive == "start"
     if not bool((ramp | start).any()):
         return xr.Dataset()
-    found, between = {}, float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
+    result, between = {}, float(dataset["t"][-1] - dataset["t"][0]) / max(dataset.sizes["t"] - 1, 1)
     beginning = _start_of_sliding(dataset)
     slides = (ramp | start) & (dataset["t"] >= beginning - 1e-6 * between)  # the record of the start counts
     for name, prefix, source, unit in _PEAKS:
@@ -602,8 +603,8 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
             described[f"{name}_sem"] = (error, unit, error.attrs["long_name"])
         for key, (values, units, words) in described.items():
             values = values.where(known).drop_vars("t", errors="ignore")
-            found[key] = ordered(values).assign_attrs(units=units, long_name=words)
-    return xr.Dataset(found)
+            result[key] = ordered(values).assign_attrs(units=units, long_name=words)
+    return xr.Dataset(result)
 
 
 def _start_of_sliding(dataset: xr.Dataset) -> xr.DataArray:
@@ -631,29 +632,29 @@ def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
         values = sizes(some)
         at = values.fillna(-1.0).argmax("t")
         first, last = _ends(values)
-        found = {"at": at, "size": values.isel(t=at), "first": first, "last": last}
-        found |= {"peak": values.isel(t=some["top"])} if "top" in some else {}
-        return xr.Dataset({name: values.drop_vars("t", errors="ignore") for name, values in found.items()})
+        result = {"at": at, "size": values.isel(t=at), "first": first, "last": last}
+        result |= {"peak": values.isel(t=some["top"])} if "top" in some else {}
+        return xr.Dataset({name: values.drop_vars("t", errors="ignore") for name, values in result.items()})
 
-    dims, several = sweep_dims(recorded), recorded.sizes.get(MEMBERS, 1) > 1
-    if several:
+    dims, is_ensemble = sweep_dims(recorded), recorded.sizes.get(MEMBERS, 1) > 1
+    if is_ensemble:
         recorded = recorded.assign(top=in_pieces(recorded, ("t",), mean)["mean"].fillna(-1.0).argmax("t"))
-    found = in_pieces(recorded, (*dims, MEMBERS), each)
-    ends = found["first"], found["last"]
-    above = [found["size"] / (1.0 + _ROUNDING) > end for end in ends]
-    if several:
-        drops = [1.0 - end / found["peak"].where(found["peak"] > 0.0) for end in ends]
+    result = in_pieces(recorded, (*dims, MEMBERS), each)
+    ends = result["first"], result["last"]
+    above = [result["size"] / (1.0 + _ROUNDING) > end for end in ends]
+    if is_ensemble:
+        drops = [1.0 - end / result["peak"].where(result["peak"] > 0.0) for end in ends]
         errors = [drop.std(MEMBERS, ddof=1) / np.sqrt(recorded.sizes[MEMBERS]) for drop in drops]
         falls = [drop.mean(MEMBERS) > _ERRORS * error for drop, error in zip(drops, errors, strict=True)]
         above = [higher & fall for higher, fall in zip(above, falls, strict=True)]
     first, last = above
-    return found.assign(known=last & (~ramp | first))
+    return result.assign(known=last & (~ramp | first))
 
 
 def _ends(values: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
     """The first and the last value that is there."""
-    there = values.notnull()
-    first, last = there.argmax("t"), values.sizes["t"] - 1 - there.isel(t=slice(None, None, -1)).argmax("t")
+    known = values.notnull()
+    first, last = known.argmax("t"), values.sizes["t"] - 1 - known.isel(t=slice(None, None, -1)).argmax("t")
     return values.isel(t=first), values.isel(t=last)
 
 
@@ -690,8 +691,8 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     """
     cycles = cycles_of(dataset)
     if not bool((cycles >= 1.0).any()):
-        said = 'give some, such as [contact] load = { from = "4 mN", to = "-1 mN", cycles = 2 }'
-        raise ValueError(f"nothing makes cycles there and back; {said}")
+        cure = 'give some, such as [contact] load = { from = "4 mN", to = "-1 mN", cycles = 2 }'
+        raise ValueError(f"nothing makes cycles there and back; {cure}")
     count = int(cycles.max())
     suffix = "" if "normal_load" in dataset else "_mean"
     read = (f"{name}{suffix}" for name in ("contact_radius", "normal_load", "displacement", "dissipated_energy"))
@@ -711,16 +712,16 @@ def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
     put_in = done.fillna(0.0).cumsum("t")
     rounding = _NOTHING * abs(put_in).max("t")
     missing = _per_cycle(done.isnull().cumsum("t").astype(float), period, dataset["t"], count)
-    found = {}
+    result = {}
     for name, series, text in (
         ("loop_energy", put_in, "closed integral of the load over the displacement"),
         ("loop_dissipation", dataset[f"dissipated_energy{suffix}"], "energy dissipated by opening and closing"),
     ):
         values = _per_cycle(series.astype(float), period, dataset["t"], count).where(missing == 0.0)
         values = values.where(~(abs(values) < rounding), 0.0)
-        found[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
+        result[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
     cycle = xr.DataArray(np.arange(1, count + 1), dims="cycle", attrs={"long_name": "number of the cycle"})
-    return xr.Dataset(found, {"cycle": cycle})
+    return xr.Dataset(result, {"cycle": cycle})
 
 
 def cycles_of(dataset: xr.Dataset) -> xr.DataArray:

@@ -64,11 +64,11 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
         ``radius_jkr`` and ``radius_hertz`` [m], without the dimension ``t`` where what holds the sphere stays at all
         points of the sweep. The former is nan where that contact is open, the latter 0.
     """
-    found = plain(dataset)[[*_REFERENCES]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
+    radii = plain(dataset)[[*_REFERENCES]].rename(jkr_radius="radius_jkr", hertz_radius="radius_hertz")
     if bool(stays_held(dataset).all()):
-        found = found.isel(t=0, drop=True)
-    found = found.astype(float, copy=False).map(ordered)
-    return found.assign(radius_jkr=found["radius_jkr"].where(found["radius_jkr"] > 0.0))
+        radii = radii.isel(t=0, drop=True)
+    radii = radii.astype(float, copy=False).map(ordered)
+    return radii.assign(radius_jkr=radii["radius_jkr"].where(radii["radius_jkr"] > 0.0))
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
@@ -113,8 +113,8 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     dataset = plain(dataset)
     suffix = "" if "contact_area" in dataset else "_mean"
     area, full = dataset[f"contact_area{suffix}"].astype(float, copy=False), full_area(dataset)
-    there = {str(name).removesuffix("_mean") for name in dataset}
-    charged = {name: loss for name, loss in _LOSSES.items() if loss[0] in there}
+    recorded = {str(name).removesuffix("_mean") for name in dataset}
+    charged = {name: loss for name, loss in _LOSSES.items() if loss[0] in recorded}
     if any(radius not in dataset for radius, _ in charged.values()):
         raise ValueError("shares need each member; record them: [record] per_member = true")
     left = [np.pi * dataset[radius].astype(float, copy=False) ** 2 for radius, _ in charged.values()]
@@ -125,11 +125,11 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     texts |= {name + suffix: text for name, (_, text) in charged.items()}
     lost = [(before - after) / full for before, after in itertools.pairwise(levels)]
     words = zip(texts.items(), lost, strict=False)
-    found = {name: pure(share, f"share of JKR's area lost to {text}") for (name, text), share in words}
+    shares = {name: pure(share, f"share of JKR's area lost to {text}") for (name, text), share in words}
     if suffix:  # the bonds are the same for all members, so the spread is the area's
         for kind in ("std", "sem"):
-            found[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")
-    return xr.Dataset(found, attrs=dataset.attrs)
+            shares[f"lost_to_fluctuations_{kind}"] = pure(dataset[f"contact_area_{kind}"] / full, "")
+    return xr.Dataset(shares, attrs=dataset.attrs)
 
 
 def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
@@ -161,13 +161,13 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
         raise ValueError("the other order of charging needs the fluctuation energy of each member, on a plane")
     try:
         held, share = control(dataset), setting(dataset, "shear.paid_by_adhesion")
-        given = dataset["applied_load"] if "applied_load" in dataset else dataset.get("contact_load")
+        load = dataset["applied_load"] if "applied_load" in dataset else dataset.get("contact_load")
     except KeyError as fault:
         raise ValueError(f"the other order of charging is not known: {fault.args[0]}") from None
     work = setting(dataset, "adhesion.work") - share * dataset["fluctuation_energy"].astype(float, copy=False)
     sphere = work, setting(dataset, "sphere.radius"), dataset["contact_modulus"]
     if held.kind == "load":
-        radius = xr.apply_ufunc(jkr.radius_at_load, given, *sphere)
+        radius = xr.apply_ufunc(jkr.radius_at_load, load, *sphere)
     elif held.kind == "indentation":
         radius = xr.apply_ufunc(jkr.radius_at_indentation, dataset["indentation"], *sphere)
     else:
@@ -180,8 +180,8 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
 
 def _in_turn(charged: xr.Dataset, first: xr.DataArray) -> dict[str, xr.DataArray]:
     """The shares of ``charged_in_turn``, of those in the other order."""
-    both = charged["lost_to_bonds"] + charged["lost_to_fluctuations"]
-    last = pure(both - first, "share of JKR's area lost to broken bonds, after the fluctuations")
+    lost = charged["lost_to_bonds"] + charged["lost_to_fluctuations"]
+    last = pure(lost - first, "share of JKR's area lost to broken bonds, after the fluctuations")
     more = pure(first - charged["lost_to_fluctuations"], "what fluctuations take more if they are charged first")
     return {"lost_to_fluctuations_first": first, "lost_to_bonds_last": last, "order_of_charging": more}
 
@@ -194,18 +194,18 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     no work of adhesion is left (Hertz's contact): their ensemble means are the fractions.
     """
     dataset = plain(dataset)
-    found = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
+    result = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
     for suffix in ("", *(f"_{kind}" for kind in KEPT)):
-        if f"contact_area{suffix}" in found and set(_REFERENCES) <= set(found):
-            ratio = found[f"contact_area{suffix}"].astype(float, copy=False) / full_area(dataset)
-            found[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
-        if f"in_contact{suffix}" in found:
-            closed = found[f"in_contact{suffix}"].astype(float, copy=False)
+        if f"contact_area{suffix}" in result and set(_REFERENCES) <= set(result):
+            ratio = result[f"contact_area{suffix}"].astype(float, copy=False) / full_area(dataset)
+            result[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
+        if f"in_contact{suffix}" in result:
+            closed = result[f"in_contact{suffix}"].astype(float, copy=False)
             opened = closed if suffix in ("_std", "_sem") else 1.0 - closed
-            found[f"fraction_detached{suffix}"] = pure(opened, "open contacts")
+            result[f"fraction_detached{suffix}"] = pure(opened, "open contacts")
     with where_recorded():
-        found = found.assign(masks(dataset))
-    return found.drop_vars([n for n in found if str(n).startswith(("in_contact", "masked"))])
+        result = result.assign(masks(dataset))
+    return result.drop_vars([n for n in result if str(n).startswith(("in_contact", "masked"))])
 
 
 def all_observables(dataset: xr.Dataset) -> xr.Dataset:

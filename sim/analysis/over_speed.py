@@ -61,19 +61,20 @@ def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
     """
     wanted, along, speed = names or _CURVES, "t", speed_of(dataset)
     if not is_steady(dataset):
-        found = over_members(dataset, wanted)
+        curves = over_members(dataset, wanted)
     elif is_stationary(dataset) and (swept := speed_dim(dataset)) is not None:
-        along, speed, found = swept, speed.isel(t=0, drop=True), of_second_half(dataset, wanted)
+        along, speed, curves = swept, speed.isel(t=0, drop=True), of_second_half(dataset, wanted)
     else:
         raise ValueError("the speed neither changes nor is swept while all else stays; curves over it need one of both")
     with answered():
-        found[[f"{name}_mean" for name in wanted]]
-    kept = [name for name in found if str(name).startswith(tuple(f"{one}_" for one in wanted))]
+        curves[[f"{name}_mean" for name in wanted]]
+    prefixes = tuple(f"{name}_" for name in wanted)
+    chosen = [name for name in curves if str(name).startswith(prefixes)]
     for name in set(speed.dims) - {along}:
         if bool((speed == speed.isel({name: 0})).all()):
             speed = speed.isel({name: 0}, drop=True)
-    found = found[kept].assign_coords(speed=speed)
-    return found.swap_dims({along: "speed"}) if speed.dims == (along,) else found
+    curves = curves[chosen].assign_coords(speed=speed)
+    return curves.swap_dims({along: "speed"}) if speed.dims == (along,) else curves
 
 
 class Crossing(NamedTuple):
@@ -105,16 +106,16 @@ def crossing(speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: n
     interval is Student's, symmetric in the logarithm, with the error of the jackknife that leaves each group out of
     the whole curve: so noise that members have in common at different speeds counts as in common.
     """
-    weights, several = sizes / sizes.sum(), len(groups) > 1
+    weights, has_error = sizes / sizes.sum(), len(groups) > 1
     mean = sum(weight * group for weight, group in zip(weights, groups, strict=True)) - level
     first = int(np.argmax(mean <= 0.0))
     if not mean[0] > 0.0 >= mean[first]:
         return Crossing(math.nan, math.nan, math.nan)
-    error = float(groups[:, first].std(ddof=1)) / math.sqrt(len(groups)) if several else 0.0
+    error = float(groups[:, first].std(ddof=1)) / math.sqrt(len(groups)) if has_error else 0.0
     window = _about(first, np.abs(mean) <= _NEAR * error)
     x, mean = np.log(speeds[window]), mean[window]
     at = float(_zero(x, mean))
-    if not several:
+    if not has_error:
         return Crossing(math.exp(at), math.nan, math.nan)
     each = weights[:, None]
     above = groups[:, window] - np.broadcast_to(level, speeds.shape)[window]
@@ -136,7 +137,7 @@ def _about(first: int, near: np.ndarray) -> slice:
 
 
 def _zero(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Where the straight lines through the values along the last axis are zero."""
+    """Return the zeros of straight lines through the values along the last axis."""
     aside = x - x.mean()
     return x.mean() - y.mean(axis=-1) * np.sum(aside**2) / np.sum(aside * y, axis=-1)
 
@@ -178,14 +179,14 @@ def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
     levels = {f"speed_at_{100.0 * loss:.0f}_percent_lost": 1.0 - loss + 0.0 * hertz for loss in LOSSES}
     levels["speed_halfway_to_hertz"] = 0.5 * (1.0 + hertz)
     groups, sizes = _group_means(dataset, along)
-    dims, found = [[along], ["group", along], ["group"], [along]], {}
+    dims, result = [[along], ["group", along], ["group"], [along]], {}
     for name, level in levels.items():
         inputs = speed, groups, sizes, level + 0.0 * speed
         ends = xr.apply_ufunc(crossing, *inputs, input_core_dims=dims, output_core_dims=[[]] * 3, vectorize=True)
         for end, values in zip(("", "_low", "_high"), ends, strict=True):
             text = f"{_ENDS[end]}sliding speed at which the mean contact area has {_WORDS[name]}"
-            found[name + end] = values.assign_attrs(units="m/s", long_name=text)
-    return xr.Dataset(found)
+            result[name + end] = values.assign_attrs(units="m/s", long_name=text)
+    return xr.Dataset(result)
 
 
 def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.DataArray]:

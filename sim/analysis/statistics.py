@@ -170,7 +170,7 @@ def covariance_of(values: np.ndarray, mean: np.ndarray | float, free: float) -> 
 
 
 class Inflation(NamedTuple):
-    """How many records tell as much as one free value, and of how many free values the estimate of that is."""
+    """Number of records that count as one independent value, and the degrees of freedom of that estimate."""
 
     records: float
     freedom: float
@@ -205,8 +205,8 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
         return Inflation(math.nan, math.nan)
     window, free = int(windows[0]), max(members - 1, 1)
     wide = (2.0 * window + 1.0) / records
-    found = max(float(sums[window]), 1.0 / records) * (1.0 + wide if members == 1 else 1.0)
-    return Inflation(found, free / wide)
+    ratio = max(float(sums[window]), 1.0 / records) * (1.0 + wide if members == 1 else 1.0)
+    return Inflation(ratio, free / wide)
 
 
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
@@ -231,17 +231,17 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         for point in np.ndindex(steady.shape):
             if steady[point]:
                 values = energy.isel(dict(zip(sweep_dims(dataset), point, strict=True))).to_numpy()
-                found_here = integral_time(values.astype(float, copy=False), step)
-                for each, number in zip(times, found_here, strict=True):
+                estimate = integral_time(values.astype(float, copy=False), step)
+                for each, number in zip(times, estimate, strict=True):
                     each[point] = number
     about = "integral correlation time of the fluctuation energy"
     texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"what the {about} is below"}
-    found = xr.Dataset()
+    result = xr.Dataset()
     for (suffix, text), numbers in zip(texts.items(), times, strict=True):
-        found[f"correlation_time{suffix}"] = numbers
-        found[f"correlation_time{suffix}"].attrs = {"units": "s", "long_name": text}
-    found["correlation_time"].attrs["symbol"] = "t_c"
-    return found
+        result[f"correlation_time{suffix}"] = numbers
+        result[f"correlation_time{suffix}"].attrs = {"units": "s", "long_name": text}
+    result["correlation_time"].attrs["symbol"] = "t_c"
+    return result
 
 
 # --- members, at each time and sweep value ---
@@ -314,19 +314,19 @@ def where(dataset: xr.Dataset, chosen: Mapping[str, Any]) -> xr.Dataset:
             unit = swept.attrs.get("units", "1")
             wanted = read_option(value, key, unit)
             near = int(np.abs(swept.to_numpy() - wanted).argmin())
-            there = abs(float(swept[near]) - wanted) <= _NEAR * abs(wanted)
+            is_known = abs(float(swept[near]) - wanted) <= _NEAR * abs(wanted)
             known = [engineering(float(f"{number:.4g}"), unit) for number in swept.to_numpy()]
         else:
             known = [str(text) for text in swept.to_numpy()]
-            there, near = value in known, known.index(value) if value in known else 0
-        if not there:
+            is_known, near = value in known, known.index(value) if value in known else 0
+        if not is_known:
             raise BadInput([f"{key} has no value {value}; there are: {', '.join(known)}"])
         dataset = dataset.isel({name: [near]})
     return dataset
 
 
 def averaging(dataset: xr.Dataset, late: bool) -> str:
-    """What a mean is over, in words: the second half of the run where it is of that, and the members that differ."""
+    """Return in words the sample of a mean: the second half of the run if ``late``, and members that differ."""
     over = ["second half of the run"] if late and dataset.sizes["t"] > 2 else []
     members = dataset.sizes.get(MEMBERS, dataset.attrs.get("members", 1))
     differ = MEMBERS in dataset.sizes or any(str(name).endswith("_sem") for name in dataset.data_vars)
@@ -360,22 +360,22 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
     members have none (a 5 % quantile of less than 59), it is nan. The skewness is corrected for the number of members;
     of n members of a normal law it has the standard error ``skewness_error(n)``.
     """
-    found: dict[str, xr.DataArray] = {}
+    result: dict[str, xr.DataArray] = {}
     members = float(trajectories.attrs.get("members", 1))
     for key, variable in trajectories.data_vars.items():
         name = str(key)
         stem, _, kind = name.rpartition("_")
         if kind in KEPT:
-            found[name] = variable
+            result[name] = variable
             if kind == "mean" and f"{stem}_sem" in trajectories:
                 ends = interval(stem, variable.to_numpy(), trajectories[f"{stem}_sem"].to_numpy(), members)
                 for end, at in zip(("low", "high"), ends, strict=True):
                     text = f"{_OF[end]} of {variable.attrs.get('long_name', stem).removeprefix(_OF['mean'] + ' of ')}"
-                    found[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(long_name=text)
+                    result[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(long_name=text)
             continue
         for kind, values in _statistics_of(variable.astype(float), quantiles).items():
-            found[f"{name}_{kind}"] = values.assign_attrs(described(kind, variable))
-    return xr.Dataset(found)
+            result[f"{name}_{kind}"] = values.assign_attrs(described(kind, variable))
+    return xr.Dataset(result)
 
 
 def described(kind: str, variable: xr.DataArray) -> dict[str, Any]:
@@ -395,12 +395,12 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
     if quantiles:
         values.sort()  # nan last
     count = np.sum(~np.isnan(values), axis=-1, dtype=float)
-    one = variable.isel({MEMBERS: 0}, drop=True)
-    found = {kind: one.copy(data=data) for kind, data in _moments(str(variable.name), values, count).items()}
+    first_member = variable.isel({MEMBERS: 0}, drop=True)
+    result = {kind: first_member.copy(data=data) for kind, data in _moments(str(variable.name), values, count).items()}
     if quantiles:
         for kind, data in _quantiles(values, count).items():
-            found[kind] = one.expand_dims(quantile=list(QUANTILES)).copy(data=data)
-    return found
+            result[kind] = first_member.expand_dims(quantile=list(QUANTILES)).copy(data=data)
+    return result
 
 
 def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
@@ -427,8 +427,8 @@ def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | f
         half = special.stdtrit(np.where(count > 1.0, count - 1.0, np.nan), 0.5 + 0.5 * LEVEL) * sem
         return mean - half, mean + half
     with np.errstate(invalid="ignore", divide="ignore"):  # time averages of the members count for more than one each
-        several = np.where(sem > 0.0, mean * (1.0 - mean) / sem**2, 0.0)
-    count = np.where(count > 1.0, np.maximum(count, several), np.nan)
+        equivalent = np.where(sem > 0.0, mean * (1.0 - mean) / sem**2, 0.0)
+    count = np.where(count > 1.0, np.maximum(count, equivalent), np.nan)
     shrunk = 1.0 + WIDE**2 / count
     middle = (mean + 0.5 * WIDE**2 / count) / shrunk
     half = WIDE / shrunk * np.sqrt(np.maximum(mean * (1.0 - mean), 0.0) / count + (0.5 * WIDE / count) ** 2)
@@ -501,8 +501,8 @@ def statistics(dataset: xr.Dataset) -> xr.Dataset:
         ``sim.analysis.events.events``), and ``correlation_time`` with its standard error. A member whose trajectory
         has stopped is left out from there on; ``fraction_detached`` counts it.
     """
-    found = over_members(dataset)
-    return found.merge(summary(events(dataset).assign_attrs(dataset.attrs))).merge(correlation_time(dataset))
+    result = over_members(dataset)
+    return result.merge(summary(events(dataset).assign_attrs(dataset.attrs))).merge(correlation_time(dataset))
 
 
 def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quantiles: bool = True) -> xr.Dataset:
@@ -610,12 +610,12 @@ def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str
     >>> x = np.zeros((1, 2000))
     >>> for k in range(1, 2000):
     ...     x[:, k] = 0.9 * x[:, k - 1] + rng.normal(size=1)
-    >>> found = over_time(x)
-    >>> print(50 < found["effective_samples"] < 200, found["low"] < 0.0 < found["high"])
+    >>> result = over_time(x)
+    >>> print(50 < result["effective_samples"] < 200, result["low"] < 0.0 < result["high"])
     True True
     """
-    found = _over_time(values[np.newaxis], step, name, True)
-    return {kind: numbers[0] if kind.startswith("quantile") else float(numbers[0]) for kind, numbers in found.items()}
+    result = _over_time(values[np.newaxis], step, name, True)
+    return {kind: numbers[0] if kind.startswith("quantile") else float(numbers[0]) for kind, numbers in result.items()}
 
 
 def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict[str, np.ndarray]:
@@ -747,18 +747,19 @@ def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> x
     dataset = plain(dataset)
     dims, late = sweep_dims(dataset), dataset.isel(t=slice(dataset.sizes["t"] // 2, None))
     step = float(dataset["t"][-1] - dataset["t"][-2]) if dataset.sizes["t"] > 1 else 0.0
-    shape, found = tuple(dataset.sizes[dim] for dim in dims), dict[str, xr.DataArray]()
+    shape, result = tuple(dataset.sizes[dim] for dim in dims), dict[str, xr.DataArray]()
     for name in chosen_observables(restricted(late, names).isel(t=[-1]), names):
         variable = _observable(late, str(name))
         values = _rows(variable, dims)
         statistics = _over_time(values.reshape(-1, *values.shape[-2:]), step, str(name), MEMBERS in variable.dims)
         for kind, numbers in statistics.items():
-            found[f"{name}_{kind}"] = _statistic(dataset, kind, variable, numbers.reshape((*shape, *numbers.shape[1:])))
-    if "speed_mean" in found and {"slider_position", "spring_force"} <= set(dataset):  # a slider that may slip
+            numbers = numbers.reshape((*shape, *numbers.shape[1:]))
+            result[f"{name}_{kind}"] = _statistic(dataset, kind, variable, numbers)
+    if "speed_mean" in result and {"slider_position", "spring_force"} <= set(dataset):  # a slider that may slip
         for at, known in _of_the_way(dataset, dims):
             for kind, value in known.items():
-                found[f"speed_{kind}"].values[at] = value
-    return xr.Dataset(found)
+                result[f"speed_{kind}"].values[at] = value
+    return xr.Dataset(result)
 
 
 def _of_the_way(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], dict[str, float]]]:
@@ -790,7 +791,7 @@ def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) ->
 def _observable(dataset: xr.Dataset, name: str) -> xr.DataArray:
     """Return an observable of a dataset in memory."""
     if name in dataset:
-        return dataset[name].load()
+        return dataset[name].compute()  # load would keep each variable in the dataset
     return in_pieces(restricted(dataset, [name]), ("t",), lambda piece: chosen_observables(piece, [name]))[name]
 
 
@@ -846,8 +847,8 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
     --------
     Three of four members detach within 10 s:
 
-    >>> found = lifetime(np.array([2.0, 5.0, 7.0, np.nan]), 10.0)
-    >>> print(f"{found.half:.0f} s, {found.rate:.3f} /s, {found.rate_low:.2f} to {found.rate_high:.2f} /s")
+    >>> result = lifetime(np.array([2.0, 5.0, 7.0, np.nan]), 10.0)
+    >>> print(f"{result.half:.0f} s, {result.rate:.3f} /s, {result.rate_low:.2f} to {result.rate_high:.2f} /s")
     5 s, 0.125 /s, 0.03 to 0.37 /s
     """
     happened = np.isfinite(times)
@@ -899,21 +900,21 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
     ends = times.isel(t=(at - 1).clip(0)), times.isel(t=at)
     share = (before / (before - after).where(before != after)).drop_vars("t", errors="ignore")
     first, last = (end.drop_vars("t", errors="ignore") for end in ends)
-    found = (first + share * (last - first)).where(crossed.any("t"))
-    found = found.where(side != 0.0, float(times[0]))
+    passage = (first + share * (last - first)).where(crossed.any("t"))
+    passage = passage.where(side != 0.0, float(times[0]))
     text = f"time at which the {observable.attrs.get('long_name', observable.name)} first crosses {level:.6g}"
-    return ordered(found).assign_attrs(units="s", long_name=text)
+    return ordered(passage).assign_attrs(units="s", long_name=text)
 
 
-def half_lives(dataset: xr.Dataset, found: xr.Dataset) -> xr.Dataset:
+def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
     """Median times of the first detachment and masking, in a stationary run rates, from the ``events`` of a dataset."""
     of = xr.Dataset()
     for event, name, words in (
         ("first_detachment", "detached", "detached"),
         ("first_masked", "masked", "had their adhesion masked"),
     ):
-        if event in found:
-            of = of.merge(lifetimes(dataset, found[event], name, words))
+        if event in event_times:
+            of = of.merge(lifetimes(dataset, event_times[event], name, words))
     return of if is_stationary(dataset) else of.drop_vars([name for name in of if "_rate" in str(name)])
 
 
@@ -940,7 +941,7 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
         return xr.Dataset()
     watched = float(dataset["t"][-1] - dataset["t"][0])
     values = np.moveaxis(times.to_numpy() - float(dataset["t"][0]), times.get_axis_num(MEMBERS), -1)
-    one, found = times.isel({MEMBERS: 0}, drop=True), {}
+    first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
     every = np.array([lifetime(members, watched) for members in values.reshape(-1, values.shape[-1])])
     half, rate = f"time by which half of the members have {words}", f"rate at which members have {words}"
     for k, field in enumerate(Lifetime._fields):
@@ -948,5 +949,5 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
         key = "_".join(filter(None, [f"half_{name}" if stem == "half" else f"{name}_rate", end]))
         text = f"{'' if not end else f'{end} end of the 95 % interval of the '}{half if stem == 'half' else rate}"
         about = {"units": "s" if stem == "half" else "1/s", "long_name": text}
-        found[key] = one.copy(data=every[:, k].reshape(one.shape)).assign_attrs(about)
-    return xr.Dataset(found)
+        result[key] = first_member.copy(data=every[:, k].reshape(first_member.shape)).assign_attrs(about)
+    return xr.Dataset(result)

@@ -167,13 +167,13 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     held, steady = bool(stays_held(dataset).all()), is_steady(dataset)
     stay = [c.name for c in _COLUMNS if c.changing and (steady if c.name == "stage_speed" else held)]
     columns = [column for column in _COLUMNS if column.name not in stay]
-    found, points = _tabulated(dataset, rows, [column.name for column in columns])
+    means, points = _tabulated(dataset, rows, [column.name for column in columns])
     whole = bool(sweep_dims(dataset)) and _lasts(dataset)
-    cells = _places(found, {name: index for name, index in points.items() if name != "t" or not whole})
+    cells = _places(means, {name: index for name, index in points.items() if name != "t" or not whole})
     speeds = dataset.get("drive_speed", xr.DataArray())
     same = whole and any(name in points for name in speeds.dims)  # V is a column already
-    cells |= _shown(found, points, [column for column in columns if not (same and column.name == "speed")])
-    times, errors, below = (_at(found[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below"))
+    cells |= _shown(means, points, [column for column in columns if not (same and column.name == "speed")])
+    times, errors, below = (_at(means[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below"))
     if np.any(np.isfinite(times) | np.isfinite(below)):
         ((heading, texts),) = _cells(_MEMORY.heading, "s", np.where(np.isnan(times), below, times), errors).items()
         cells[heading] = [f"<{text}" if math.isfinite(most) else text for text, most in zip(texts, below, strict=True)]
@@ -181,25 +181,25 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
 
 
 def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]]) -> list[str]:
-    """What stands in the rows of ``table`` and ``highlights``: means over what, how many rows, and symbols in words."""
+    """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows, symbols."""
     whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     points = math.prod(dataset.sizes[name] for name in sweep_dims(dataset))
-    said = [words] if (words := averaging(dataset, whole)) else []
+    phrases = [words] if (words := averaging(dataset, whole)) else []
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
         why = "nothing held the body"
         if "stage_speed" in dataset:
             why = 'the interface let go faster than it is followed; give drive.viscosity or contact_stiffness = "rigid"'
-        said.append(f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: {why}")
+        phrases.append(f"{gone} of {dataset['runaway_time'].isel(t=-1).size} trajectories end in a runaway: {why}")
     if any("(" in cell for row in rows for cell in row.values()):
-        said.append("in brackets the standard error in the last digits, wider where members are few")
-    lines = ["; ".join(said)] if said else []
+        phrases.append("in brackets the standard error in the last digits, wider where members are few")
+    lines = ["; ".join(phrases)] if phrases else []
     for shown, total in ((rows, points if whole else points * dataset.sizes["t"]), (once, points)):
         if 0 < len(shown) < total:
             lines.append(f"{len(shown)} of {total} rows shown; all: --all, or --csv FILE; chosen: --where KEY=VALUE")
     headings = {re.sub(r"[ \n]\([^()]*\)$", "", heading) for row in (*rows[:1], *once[:1]) for heading in row}
     with contextlib.suppress(KeyError, TypeError):  # not of every dataset; none where all was recorded
-        kept = ", ".join(resolved(dataset, "record.quantities")) or "contact_radius alone"
-        lines.append(f"columns of what was not recorded are left out; record.quantities keeps {kept}")
+        recorded = ", ".join(resolved(dataset, "record.quantities")) or "contact_radius alone"
+        lines.append(f"columns of what was not recorded are left out; record.quantities keeps {recorded}")
     known = [c for c in (*_COLUMNS, _MEMORY, *_EVENTS) if c.meaning and c.heading in headings]
     if _spreads(dataset):
         over = averaging(dataset, True).removeprefix("mean over the ")
@@ -208,8 +208,8 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     return [*dict.fromkeys(lines), *filter(None, [words])]
 
 
-def highlights(dataset: xr.Dataset, rows: int = 12, found: xr.Dataset | None = None) -> list[dict[str, str]]:
-    """What each point of the sweep has once in its whole run, in a dozen rows at most; none where there is nothing.
+def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
+    """Return the events of each point of the sweep, in a dozen rows at most; no rows if there are no events.
 
     Parameters
     ----------
@@ -217,8 +217,6 @@ def highlights(dataset: xr.Dataset, rows: int = 12, found: xr.Dataset | None = N
         As ``sim run`` writes it.
     rows : int
         How many rows at most (at least one).
-    found : xarray.Dataset, optional
-        What ``once`` gives, if it is known already.
 
     Returns
     -------
@@ -227,19 +225,19 @@ def highlights(dataset: xr.Dataset, rows: int = 12, found: xr.Dataset | None = N
         (the mean, and the 5 and 95 % quantiles of those that did), what a cycle there and back took and
         how much it dissipated, and the friction peak of a start or a ramp.
     """
-    found = once(dataset) if found is None else found
+    statistics_once = once(dataset)
     points = _points(dataset.sizes, _thinned(dataset, rows))
-    shown = _shown(found, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
+    shown = _shown(statistics_once, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
     cells = _places(dataset, points)
     for heading, texts in shown.items():
         cells[heading] = texts
-        if heading.startswith("first\ndetached") and "first_detachment_quantile" in found:
-            cells |= _range(found["first_detachment_quantile"], points)
+        if heading.startswith("first\ndetached") and "first_detachment_quantile" in statistics_once:
+            cells |= _range(statistics_once["first_detachment_quantile"], points)
     return _rows(cells) if shown else []
 
 
 def _of_drive(dataset: xr.Dataset, name: str) -> bool:
-    """Whether an event is shown under this drive: the speed of a peak on a ramp, its time after a start.
+    """Return True if an event is shown under this drive: the speed of a peak on a ramp, its time after a start.
 
     And kinetic friction of a stage at one speed, else it is a mean over speeds.
     """
@@ -250,11 +248,11 @@ def _of_drive(dataset: xr.Dataset, name: str) -> bool:
     return wanted is None or bool((word(dataset, "drive.model", "") == wanted).any())
 
 
-def _places(found: xr.Dataset, points: Points) -> Columns:
+def _places(places: xr.Dataset, points: Points) -> Columns:
     """The columns that say where in the sweep and when each row is."""
     cells: Columns = {}
     for name, index in points.items():
-        cells |= _cells(name, found[name].attrs.get("units", "1"), found[name][index].to_numpy())
+        cells |= _cells(name, places[name].attrs.get("units", "1"), places[name][index].to_numpy())
     return cells
 
 
@@ -268,14 +266,14 @@ def _range(quantiles: xr.DataArray, points: Points) -> Columns:
     return {f"5 to 95 %\nof members ({shown})": texts}
 
 
-def _shown(found: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Columns:
+def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Columns:
     """The columns that are not constant at their dull value at these points."""
     cells: Columns = {}
     for name, heading, dull, *_ in columns:
-        if f"{name}_mean" not in found:
+        if f"{name}_mean" not in means:
             continue
-        mean, sem = _at(found[f"{name}_mean"], points), _error(found, name, points)
-        unit = found[f"{name}_mean"].attrs.get("units", "1")
+        mean, sem = _at(means[f"{name}_mean"], points), _error(means, name, points)
+        unit = means[f"{name}_mean"].attrs.get("units", "1")
         if unit == "1" and name not in _NO_SHARES:  # differences of areas leave rounding behind
             unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | np.isnan(mean)):
@@ -283,9 +281,9 @@ def _shown(found: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
     return cells
 
 
-def _error(found: xr.Dataset, name: str, points: Points) -> np.ndarray:
+def _error(means: xr.Dataset, name: str, points: Points) -> np.ndarray:
     """Half of the 95 % interval in errors of a normal law: the standard error, wider where few members tell it."""
-    low, high = (_at(found.get(f"{name}_{end}"), points) for end in ("low", "high"))
+    low, high = (_at(means.get(f"{name}_{end}"), points) for end in ("low", "high"))
     return (high - low) / (2.0 * WIDE)
 
 
@@ -306,22 +304,22 @@ def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dat
     counts["t"] = max(1, rows // math.prod(counts.values()))
     whole = bool(sweep_dims(dataset)) and _lasts(dataset)
     if whole:
-        found = of_second_half(dataset, names)
+        result = of_second_half(dataset, names)
     else:
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
             dataset = dataset.isel(t=slice(_last(dataset) + 1))
             counts["t"] = min(counts["t"], dataset.sizes["t"])
             records = _spread(dataset.sizes["t"], counts["t"])
             dataset = restricted(dataset, names).isel(t=records)
-        found = over_members(dataset, names, quantiles=False)
-        if "applied_load" in dataset and "normal_load_mean" in found:  # it is known of open contacts too
+        result = over_members(dataset, names, quantiles=False)
+        if "applied_load" in dataset and "normal_load_mean" in result:  # it is known of open contacts too
             for kind in ("mean", "low", "high"):
-                found[f"normal_load_{kind}"] = dataset["applied_load"].fillna(found[f"normal_load_{kind}"])
-    return found.merge(memory), _points({**found.sizes, "t": found.sizes.get("t", 1)}, counts)
+                result[f"normal_load_{kind}"] = dataset["applied_load"].fillna(result[f"normal_load_{kind}"])
+    return result.merge(memory), _points({**result.sizes, "t": result.sizes.get("t", 1)}, counts)
 
 
 def _lasts(dataset: xr.Dataset) -> bool:
-    """Whether the second half of the run is stationary: speed and control are constant, and not all have stopped."""
+    """Return True if speed and control are constant and a trajectory lasts to the second half of the run."""
     return is_stationary(dataset) and _last(dataset) >= dataset.sizes["t"] // 2
 
 
@@ -341,7 +339,7 @@ def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
 
 
 def _thinned(dataset: xr.Dataset, rows: int, names: tuple[str, ...] | None = None) -> dict[str, int]:
-    """How many values of each dimension of the sweep make at most ``rows`` points, two of each at least."""
+    """Return numbers of values of the sweep's dimensions that make at most ``rows`` points, two of each at least."""
     counts = {name: dataset.sizes[name] for name in (sweep_dims(dataset) if names is None else names)}
     while math.prod(counts.values()) > rows and max(counts.values()) > 2:
         counts[max(counts, key=lambda name: counts[name])] -= 1
@@ -366,37 +364,37 @@ def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | flo
 
 
 def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
-    """How each quantity is spread over members and stationary time, a row each; none of a sweep or of what changes."""
+    """Return the spread of each quantity over members and stationary time, a row each; no rows of a sweep."""
     if not _spreads(dataset):
         return []
     fixed = [column for column in _COLUMNS if not column.changing]
-    found = distribution(dataset, [column.name for column in fixed]).isel(dict.fromkeys(sweep_dims(dataset), 0))
-    fixed = [column for column in fixed if f"{column.name}_std" in found]
-    rough = [_ROUNDING * abs(float(found[f"{column.name}_mean"])) for column in fixed]
+    result = distribution(dataset, [column.name for column in fixed]).isel(dict.fromkeys(sweep_dims(dataset), 0))
+    fixed = [column for column in fixed if f"{column.name}_std" in result]
+    rough = [_ROUNDING * abs(float(result[f"{column.name}_mean"])) for column in fixed]
     spreads = zip(fixed, rough, strict=True)
-    return [_spread_of(found, column) for column, least in spreads if float(found[f"{column.name}_std"]) > least]
+    return [_spread_of(result, column) for column, least in spreads if float(result[f"{column.name}_std"]) > least]
 
 
 def _spreads(dataset: xr.Dataset) -> bool:
-    """Whether this is one stationary run of members that differ."""
+    """Return True for one stationary run of members that differ."""
     single = all(dataset.sizes[name] == 1 for name in sweep_dims(dataset))
     return single and MEMBERS in dataset.sizes and _lasts(dataset)
 
 
-def _spread_of(found: xr.Dataset, column: _Column) -> dict[str, str]:
+def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
     """A row of ``spread``."""
 
     def of(kind: str) -> np.ndarray:
-        return found[f"{column.name}_{kind}"].to_numpy()
+        return means[f"{column.name}_{kind}"].to_numpy()
 
-    unit = found[f"{column.name}_mean"].attrs.get("units", "1")
+    unit = means[f"{column.name}_mean"].attrs.get("units", "1")
     factor, shown = (100.0, "%") if unit == "1" else scaled(float(np.max(np.abs(of("quantile")))), unit)
     error, *errors = factor * np.append(of("high") - of("low"), of("quantile_high") - of("quantile_low")) / (2.0 * WIDE)
     row = {"quantity": f"{' '.join(column.heading.split())} ({shown})"}
     row |= {"mean": concise(factor * float(of("mean")), error), "sd": f"{factor * of('std'):.3g}"}
     for level, value, sem in zip(QUANTILES, factor * of("quantile"), errors, strict=True):
         row[f"{100.0 * level:.0f} %"] = concise(value, sem)
-    time = float(found.get(f"{column.name}_correlation_time", math.nan))
+    time = float(means.get(f"{column.name}_correlation_time", math.nan))
     step, unit = scaled(time, "s")
     row |= {"skewness": f"{of('skewness'):.2f}", "t_c": "–"}
     if time > 0.0:
@@ -406,23 +404,23 @@ def _spread_of(found: xr.Dataset, column: _Column) -> dict[str, str]:
 
 def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """At which speeds the area is lost, a row for each point of the sweep of other keys; none where it is not."""
-    found = as_means(loss_speeds(dataset))
-    sizes = {name: dataset.sizes[name] for name in sweep_dims(dataset) if name in found.dims}
-    points = _points(sizes, _thinned(found[list(found)], rows, tuple(sizes)))
+    speeds = as_means(loss_speeds(dataset))
+    sizes = {name: dataset.sizes[name] for name in sweep_dims(dataset) if name in speeds.dims}
+    points = _points(sizes, _thinned(speeds[list(speeds)], rows, tuple(sizes)))
     whose = "stage" if speed_name(dataset) == "stage_speed" else "V"
-    shown = _shown(found, points, [column._replace(heading=column.heading.format(whose)) for column in _LOSSES])
+    shown = _shown(speeds, points, [column._replace(heading=column.heading.format(whose)) for column in _LOSSES])
     return _rows(_places(dataset, points) | shown) if shown else []
 
 
-def as_means(found: xr.Dataset) -> xr.Dataset:
+def as_means(speeds: xr.Dataset) -> xr.Dataset:
     """With the ending of a mean on what has ends of an interval."""
-    return found.rename({name: f"{name}_mean" for name in found if not str(name).endswith(("_low", "_high"))})
+    return speeds.rename({name: f"{name}_mean" for name in speeds if not str(name).endswith(("_low", "_high"))})
 
 
 def once(dataset: xr.Dataset) -> xr.Dataset:
     """Statistics of what a run has once."""
-    found = events(dataset)
-    return summary(found.assign_attrs(dataset.attrs)).merge(as_means(half_lives(dataset, found)))
+    result = events(dataset)
+    return summary(result.assign_attrs(dataset.attrs)).merge(as_means(half_lives(dataset, result)))
 
 
 # --- a long table for other programs, and a data frame ---
@@ -460,8 +458,8 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
     header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in columns]
     with output(Path(path)) as beside, beside.open("w", encoding="utf-8", newline="") as file:
         for names in (header, *[False] * (len(frames) - 1)):
-            one = frames.pop(0).reindex(columns=columns)
-            one.to_csv(file, header=names, index=False, na_rep="nan", lineterminator="\n")
+            rows = frames.pop(0).reindex(columns=columns)
+            rows.to_csv(file, header=names, index=False, na_rep="nan", lineterminator="\n")
 
 
 def tidy(dataset: xr.Dataset) -> pd.DataFrame:
@@ -485,25 +483,25 @@ def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
     late = is_stationary(dataset) and "contact_radius" in dataset
     spread = distribution(dataset) if late else xr.Dataset()  # first, as it keeps trajectories until it ends
     timed = statistics(dataset)
-    found = [(timed[[name for name in timed if "t" in timed[name].dims]], members), (once(dataset), members)]
-    found.append((as_means(loss_speeds(dataset)), members))
+    groups = [(timed[[name for name in timed if "t" in timed[name].dims]], members), (once(dataset), members)]
+    groups.append((as_means(loss_speeds(dataset)), members))
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
-        found.append((shares(dataset), members))
-    found.append((spread, half))
+        groups.append((shares(dataset), members))
+    groups.append((spread, half))
     frames = [
-        _long(dataset, each, str(key), over) for each, over in found for key in each if str(key).endswith("_mean")
+        _long(dataset, each, str(key), over) for each, over in groups for key in each if str(key).endswith("_mean")
     ]
     columns = [*map(str, dataset["contact_modulus"].coords), "t", "speed", "quantity", "unit", "over", *_ENDINGS]
     return [name for name in columns if any(name in frame for frame in frames)], frames
 
 
-def _long(dataset: xr.Dataset, found: xr.Dataset, key: str, over: str) -> pd.DataFrame:
+def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.DataFrame:
     """Rows of the statistics of a quantity, the name of whose mean is given."""
-    name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "t") if n in found[key].dims]
+    name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "t") if n in group[key].dims]
     columns = {}
     for column, (ending, place) in _ENDINGS.items():
-        if f"{name}_{ending}" in found:  # xarray's get looks for similar names where there is none: half of the time
-            values = found[f"{name}_{ending}"]
+        if f"{name}_{ending}" in group:  # xarray's get would look for similar names
+            values = group[f"{name}_{ending}"]
             columns[column] = values.isel(quantile=place, drop=True) if "quantile" in values.dims else values
     if speed_name(dataset) in dataset:
         speed = speed_of(dataset)
@@ -513,18 +511,18 @@ def _long(dataset: xr.Dataset, found: xr.Dataset, key: str, over: str) -> pd.Dat
         rows = xr.Dataset(columns).to_dataframe(dim_order=dims).reset_index()
     else:
         rows = pd.DataFrame([{column: float(values) for column, values in columns.items()}])
-    texts = {"quantity": name, "unit": found[key].attrs.get("units", "1"), "over": over}
+    texts = {"quantity": name, "unit": group[key].attrs.get("units", "1"), "over": over}
     alike = np.zeros(len(rows), int)
     return rows.assign(**{column: pd.Categorical.from_codes(alike, [text]) for column, text in texts.items()})
 
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
     """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
-    found = statistics(dataset)
+    result = statistics(dataset)
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
-        found = found.merge(shares(dataset))
+        result = result.merge(shares(dataset))
     flat: dict[str, xr.DataArray] = {}
-    for key, variable in found.data_vars.items():
+    for key, variable in result.data_vars.items():
         if "quantile" in variable.dims:  # each is a variable of its own
             stem, _, end = str(key).rpartition("_quantile")
             flat |= {
