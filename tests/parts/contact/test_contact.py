@@ -163,23 +163,6 @@ def test_a_contact_that_is_open_from_the_start_never_detached():
 BACK = {"from": 1.0, "to": -3.0, "cycles": 2}
 
 
-def test_a_contact_that_stays_open_is_open_to_the_end():
-    scenario = maugis(Equilibrium(load=BACK), 128)
-    radius, closed, when = course(scenario, "contact_radius", "in_contact", "detachment_time")
-    assert closed.sum() == np.count_nonzero(radius) == 21  # -1.5 itself is still closed
-    assert np.all(radius[21:] == 0.0)
-    assert when[-1] == 21.0 / 128.0
-
-
-def test_a_contact_that_stops_has_no_radius_any_more():
-    scenario = maugis(Equilibrium(load=BACK, after_pull_off="stop"), 128)
-    radius, area, force, closed = course(scenario, "contact_radius", "contact_area", "friction_force", "in_contact")
-    for values in (radius, area, force):
-        assert np.isnan(values[21:]).all()
-        assert np.isfinite(values[:21]).all()
-    assert_array_equal(closed, [1.0] * 21 + [0.0] * 108)
-
-
 def test_a_free_sphere_jumps_into_contact_where_it_touches():
     for held, radius in [
         ({"indentation": BACK}, (8.0 / 3.0) ** (1.0 / 3.0)),

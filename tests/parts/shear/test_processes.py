@@ -15,7 +15,7 @@ from sim.parts.bonds import models as bonds
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Constant, Diffusion, Onset, Slip, Stress, Time, Wave
 from sim.scenario.clock import Clock
-from sim.spectrum.families import Gaussian, Ripple, VonKarman
+from sim.spectrum.families import Ripple
 
 G = 1.6e6
 MEMORIES = {
@@ -176,13 +176,6 @@ def test_relaxing_amplitude_follows_the_exact_second_moment():
     assert np.all(np.abs(found.mean(axis=1) - np.array(expected) * pairs.sum()) < 5.0 * error)
 
 
-def test_stress_amplitude_follows_the_bonds():
-    part = shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=Stress(reference=1e5))
-    population = bonds.Steady(critical_speed=2e-3, stress=4e5)
-    process, found = energies(part, 1, Clock(duration=2e-3, step=1e-3), population=population)
-    assert_allclose(found, process.energy * 2.0**2, rtol=1e-13)
-
-
 def test_depths_that_do_not_go_together_are_refused():
     timed = {"spectrum": SPECTRUM, "correlation": Time(time=1.0)}
     with pytest.raises(ValueError, match='use model = "modal"'):
@@ -200,23 +193,3 @@ def test_amplitude_at_rest_is_its_floor():
     for amplitude, floor in ((Onset(speed=1e-3, width=0.3, floor=0.05), 0.05), (Constant(), 1.0)):
         assert_allclose(amplitude.factor(np.zeros(1), np.zeros(1)), floor, rtol=1e-15)
     assert Stress(reference=1e5).factor(np.zeros(1), np.zeros(1)) == 0.0
-
-
-def test_a_banded_mean_that_relaxes_follows_that_of_all_modes():
-    for name in ["wave", "diffusion"]:
-        # many weak fast modes hold much of the mean and little of the variance: the bands must keep both
-        onset = Onset(speed=1e-3, width=0.05, floor=0.0, relaxing=True)
-        correlation = {"wave": Wave(waves=1.0), "diffusion": Diffusion(diffusivity=2e-9)}[name]
-        recipe = {"spectrum": VonKarman(rms=150e3, length=2e-5, hurst=0.1), "cell": CELL, "points": 128}
-        motion = drive.Table(time=(0.0, 0.1e-3, 0.1e-3, 10.0), speed=(1e-5, 1e-5, 1e-2, 1e-2))
-        process = scene(shear=shear.Banded(**recipe, correlation=correlation, amplitude=onset, tolerance=0.01)).process
-        modal = scene(shear=shear.Modal(**recipe, correlation=correlation, amplitude=onset)).process
-        pairs, share = modal.modes.energies(G), 0.5 * process.bands.weight * process.bands.freedom
-        for time in np.geomspace(1e-4, 3.0, 30):
-            exponents = (
-                correlation.exponents(q, motion.motion(1, 0.1e-3, 0.1e-3 + time, 10.0))
-                for q in (modal.wavenumber, process.bands.wavenumber)
-            )
-            exact, banded = (np.sum(w * -np.expm1(-2.0 * x)) for w, x in zip((pairs, share), exponents, strict=True))
-            assert abs(banded - exact) < 0.01 * pairs.sum()
-        assert 0.0 < process.known_errors()["banded_error_relaxing_mean"] <= 0.01
