@@ -61,9 +61,9 @@ def run(
     to : path, optional
         The netCDF file to make; without it everything stays in memory.
     replace : bool
-        Whether an existing file, and an unfinished run of it, may be replaced.
+        True if an existing file, and an unfinished run of it, may be replaced.
     resume : bool
-        Whether to go on with an unfinished run of the same scenario; a finished one is left as it is.
+        True to go on with an unfinished run of the same scenario; a finished one is left as it is.
     jobs : int
         Processes that share the work; the numbers are the same for any. The command takes one a core by itself.
     progress : bool or callable

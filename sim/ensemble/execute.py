@@ -227,7 +227,7 @@ def _work_off(
 
 
 def _submitted(team: _Team, advance: Advance, store: Blocks, chain: _Chain) -> Any:
-    """The future of the next block of a chain."""
+    """Give out the next block of a chain; return its future."""
     number, state = chain.missing[-1], chain.state
     task: Task | bytes | None = None
     if isinstance(team.executor, _Here):
@@ -273,7 +273,7 @@ def _block(
 
 @functools.cache
 def _code() -> tuple[str, ...]:
-    """What decides the numbers: sources and versions."""
+    """Return the hash of the sources and the versions, which decide the numbers."""
     return digest().hex(), *(version(name) for name in ("numpy", "scipy", "numba"))
 
 
@@ -286,7 +286,14 @@ def pool(jobs: int) -> Any:
     environment = {"PYTHONPATH": os.pathsep.join(folder or os.getcwd() for folder in sys.path), "PYTHONSAFEPATH": "1"}
     environment |= _ONE_THREAD | {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e18"}
     how: dict[str, Any] = {"initializer": _begin, "initargs": (os.getpid(),), "env": environment}
-    return loky.ProcessPoolExecutor(jobs, context=get_context("loky"), **how)
+    executor = loky.ProcessPoolExecutor(jobs, context=get_context("loky"), **how)
+    if threading.current_thread() is threading.main_thread():
+        before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # new processes inherit that
+        try:
+            executor.submit(os.getpid)  # which starts all processes
+        finally:
+            signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+    return executor
 
 
 def _begin(parent: int) -> None:
@@ -297,6 +304,7 @@ def _begin(parent: int) -> None:
 
 
 def _end_with(parent: int) -> None:
+    """End this process when another one is gone."""
     import psutil
 
     with contextlib.suppress(psutil.Error):
@@ -308,7 +316,7 @@ def _end_with(parent: int) -> None:
 
 @contextlib.contextmanager
 def _cluster(address: str) -> Iterator[_Team]:
-    """The workers of a dask scheduler; that the scheduler goes away is one message."""
+    """Give the workers of a dask scheduler; if the scheduler goes away, there is one message."""
     try:
         from distributed import CancelledError, Client  # slow to import
         from distributed.comm import CommClosedError, resolve_address
@@ -335,7 +343,7 @@ def _cluster(address: str) -> Iterator[_Team]:
 
 
 def _killed_on_cluster() -> tuple[type[Exception], ...]:
-    """The exception by which dask gives up a block whose workers died again and again, if dask is loaded."""
+    """Return the exception by which dask gives up a block whose workers died again and again, if dask is loaded."""
     distributed = sys.modules.get("distributed")
     return (distributed.KilledWorker,) if distributed else ()
 

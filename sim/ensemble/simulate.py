@@ -75,9 +75,9 @@ def run(
     to : path, optional
         The netCDF file to make; without it everything stays in memory.
     replace : bool
-        Whether an existing file and an unfinished run of it may be replaced.
+        True if an existing file and an unfinished run of it may be replaced.
     resume : bool
-        Whether to go on with an unfinished run of the same scenario; a finished one is left as it is.
+        True to go on with an unfinished run of the same scenario; a finished one is left as it is.
     jobs : int
         Processes that share the work; the numbers are the same for any.
     progress : callable
@@ -215,7 +215,7 @@ def advance(task: Task, number: int, state: State | None) -> tuple[State, Arrays
 
 
 def _shapes(task: Task) -> Iterator[dict[str, tuple[int, ...]]]:
-    """Names and shapes of what each block of a task records, as ``advance`` makes them."""
+    """Yield the names and shapes of what each block of a task records, as ``advance`` makes them."""
     point, members = task.points[0], len(task.members)
     rows = {name: ((3 if task.pooled else members) if name in task.each else 1) for name in task.quantities}
     drawn = int(np.sum(task.members < point.record.map_members))

@@ -255,7 +255,7 @@ class Unfinished:
         return OutputBusy(text)
 
     def _busy(self, numbers: Iterable[int], of: int) -> list[int]:
-        """Numbers of those shards that another process holds."""
+        """Return the numbers of those shards that another process holds."""
         busy = []
         for number in numbers:
             path = self.folder / lock_of(number, of)
@@ -267,7 +267,7 @@ class Unfinished:
         return busy
 
     def _manifest(self) -> Manifest:
-        """The manifest of the folder; empty if there is none, or a damaged one."""
+        """Return the manifest of the folder; empty if there is none, or a damaged one."""
         try:
             manifest = json.loads(read_whole(self.folder / _MANIFEST))
         except (FileNotFoundError, RecursionError, ValueError):
@@ -332,7 +332,7 @@ class Unfinished:
 
 
 def _lock(path: Path, wait: float = 0.0) -> Any:
-    """A lock that is held; None if another process has it. On a file system without locks a file stands in for it."""
+    """Return a lock that is held now, None if another process has it; without locks of the file system it is a file."""
     from filelock import FileLock, SoftFileLock, Timeout  # slow to import
 
     with warnings.catch_warnings():  # of filelock, if it falls back by itself
@@ -364,7 +364,7 @@ def refuse_other(path: Path, older: Manifest, wanted: Manifest) -> None:
 
 
 def _changed(older: Manifest, wanted: Manifest) -> dict[str, tuple[Any, Any]]:
-    """What decides the numbers and differs between two manifests, by dotted key: before and now."""
+    """Return the entries before and now that differ between two manifests and decide the numbers, by dotted key."""
     was, now = (
         _flat(manifest.get("run")) | {key: manifest.get(key) for key in ("code", "shards", "sweep") if key in manifest}
         for manifest in (older, wanted)
@@ -382,7 +382,7 @@ def _short(value: Any) -> str:
 
 
 def _flat(tree: Any, path: str = "") -> dict[str, Any]:
-    """The values of nested tables by dotted key."""
+    """Return the values of nested tables by dotted key."""
     if not isinstance(tree, dict):
         return {path: tree}
     return {k: v for name, inner in tree.items() for k, v in _flat(inner, f"{path}.{name}".lstrip(".")).items()}

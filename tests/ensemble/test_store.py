@@ -412,6 +412,16 @@ def test_a_shard_that_was_stopped_goes_on(tmp_path):
     assert same(path, shared())
 
 
+def test_the_shards_of_a_large_array_are_computed_some_at_a_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(ensemble, "_LOCKS", 2)
+    for number in (1, 4):
+        ensemble.run(shared(), tmp_path / "out.nc", shard=(number, 5))
+    counted = []
+    ensemble.run(shared(), tmp_path / "out.nc", resume=True, progress=counted.append)
+    assert sum(counted) == plans.work(Plan.of(shared()))
+    assert same(tmp_path / "out.nc", shared())
+
+
 def test_a_shard_that_replaces_begins_only_its_own_blocks_anew(tmp_path):
     path = ensemble.run(shared(seed=6), tmp_path / "out.nc")
     for number in (1, 2, 1, 3):
