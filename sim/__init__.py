@@ -86,23 +86,23 @@ def run(
     from sim.units.terminal import Shown, progress_bar
 
     scene = _scene(scenario)
-    given = Shown(progress) if callable(progress) else Shown()
+    own_display = contextlib.nullcontext(Shown(progress) if callable(progress) else Shown())
     try:
-        with progress_bar(work(Plan.of(scene))) if progress is True else contextlib.nullcontext(given) as shown:
+        with progress_bar(work(Plan.of(scene))) if progress is True else own_display as shown:
             how: dict[str, Any] = {"replace": replace, "resume": resume, "jobs": jobs}
             return simulate.run(scene, to, **how, progress=shown.advance, stage=shown.begin)
     except Exception as fault:
-        said = str(fault).replace("the same command", "the same call")
-        said = said.replace("--resume", "resume=True").replace("--force", "replace=True")
+        message = str(fault).replace("the same command", "the same call")
+        message = message.replace("--resume", "resume=True").replace("--force", "replace=True")
         if isinstance(fault, simulate.OutputExists | BadInput):
-            raise BadInput([said]) from None
-        if said != str(fault):
-            fault.args = (said,)
+            raise BadInput([message]) from None
+        if message != str(fault):
+            fault.args = (message,)
         raise
 
 
 def check(scenario: "Scenario | Path | dict[str, Any]") -> "Text":
-    """What a scenario would run: every quantity in SI, models, errors known beforehand, time, memory, file size."""
+    """Describe a run: models, quantities in SI, error estimates, and the time, memory and file that it takes."""
     from sim.ensemble.preview import preview
 
     return Text(preview(_scene(scenario)))
@@ -168,7 +168,7 @@ def plot(
 
     if unknown := choices.keys() - {*Choices._fields}:
         raise BadInput([f"{sorted(unknown)[0]}: is no choice of a figure; there are: {', '.join(Choices._fields)}"])
-    figure = _plainly(lambda found: draw(found, kind, Choices(ax=ax, **choices)), dataset, where)
+    figure = _plainly(lambda run: draw(run, kind, Choices(ax=ax, **choices)), dataset, where)
     if to is not None:
         save(figure, pathlib.Path(to))
     return figure if ax is None else ax
@@ -233,14 +233,14 @@ def _scene(scenario: "Scenario | Path | dict[str, Any]") -> "Scenario":
 
 
 def _plainly(function: Callable[..., Any], dataset: "xarray.Dataset | Path", where: dict[str, Any] | None) -> Any:
-    """What a function makes of a dataset, or of the file that holds it; ``BadInput`` for what it cannot use."""
+    """Return the result of a function of a dataset, or of a file with one; its faults become ``BadInput``."""
     from sim.analysis.statistics import where as chosen
     from sim.units.errors import BadInput
 
     try:
         if isinstance(dataset, str | os.PathLike):
-            with open(dataset) as found:
-                return function(chosen(found, where or {}))
+            with open(dataset) as opened:
+                return function(chosen(opened, where or {}))
         return function(chosen(dataset, where or {}))
     except BadInput:
         raise

@@ -25,7 +25,7 @@ _MEMBERS = click.option("--members", type=click.IntRange(1, 10**7), help="Replac
 _FORCE = click.option("--force", is_flag=True, help="Replace files that exist.")
 _WHERE = click.option("--where", "chosen", multiple=True, metavar="KEY=VALUE", help="Of a swept key this value alone.")
 
-_KEPT = "stopped; what was computed is kept: the same command with --resume goes on"
+_STOPPED = "stopped; what was computed is kept: the same command with --resume goes on"
 _CODES = (
     "Exit codes: 0 done; 1 failed; 2 bad input; 73 the output exists; 74 trouble with disk or files; 75 stopped, to go"
     " on with --resume, or another run holds the output; 130 stopped at once."
@@ -172,9 +172,9 @@ def run(
     from sim.ensemble.execute import orders
 
     plan = plans.Plan.of(scene)
-    kept: Any = BlockFiles(parts_of(target)) if resume else ()
-    jobs, said = preview.announced(plan, jobs, memory, share, kept)
-    for line in [] if quiet else said:
+    parts: Any = BlockFiles(parts_of(target)) if resume else ()
+    jobs, lines = preview.processes(plan, jobs, memory, share, parts)
+    for line in [] if quiet else lines:
         note(line)
     how: dict[str, Any] = {"shard": share, "replace": force, "resume": resume, "jobs": jobs, "scheduler": scheduler}
     with contextlib.ExitStack() as shown:
@@ -186,7 +186,7 @@ def run(
                 simulate.run(scene, target, **how, memory=memory, stage=stages.begin, progress=stages.shown.advance)
             except (simulate.Stopped, KeyboardInterrupt) as stopped:
                 simulate.log(target, began, stages.ended())
-                _fail(_KEPT, getattr(stopped, "exit_code", INTERRUPTED))
+                _fail(_STOPPED, getattr(stopped, "exit_code", INTERRUPTED))
         shown.callback(lambda: simulate.log(target, began, stages.ended()))
         if tabulated := not (quiet or bare or shard) and preview.tabulated(plan):
             stages.begin("table")
@@ -198,7 +198,7 @@ def run(
 
 
 def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]], list[str]]:
-    """Statistics of a dataset over time and sweep, of each whole run, and what the numbers mean."""
+    """Return the tables of statistics of a dataset, and notes on their numbers."""
     from sim import analysis
 
     rows, once = analysis.table(dataset, most), analysis.highlights(dataset, most)
@@ -207,7 +207,7 @@ def _tables(dataset: Any, most: int = _ROWS) -> tuple[list[list[dict[str, str]]]
 
 
 def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
-    """The tables of a run that is done, which trouble with them does not change."""
+    """Return the tables of a run that is done; trouble with them is a note."""
     try:
         with _opened(target) as dataset:
             return _tables(dataset.load() if dataset.nbytes < _SMALL else dataset)
@@ -217,8 +217,7 @@ def _tables_of(target: Path) -> tuple[list[list[dict[str, str]]], list[str]]:
 
 def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
     for rows in tables:
-        print_rows(rows)
-        say()
+        print_table(rows, "")
     for line in notes:
         say(line)
 
@@ -229,7 +228,7 @@ def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
 @_SEED
 @_MEMBERS
 def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: int | None) -> None:
-    """Print what a scenario would run: quantities in SI, models, errors known beforehand, time, memory, file size."""
+    """Preview a run: models, quantities in SI, error estimates, and the time, memory and file that it takes."""
     from sim.ensemble.preview import preview
 
     _announce_compiling()
@@ -322,7 +321,7 @@ def _import_xarray() -> None:
 
 @contextlib.contextmanager
 def _opened(path: Path, chosen: tuple[str, ...] = ()) -> Iterator[Any]:
-    """A dataset of ours, at chosen values of its sweep, or one message."""
+    """Open a dataset at chosen values of its sweep."""
     _import_xarray()
     from sim import analysis
     from sim.analysis.dataset import lacking, open as opened
@@ -378,10 +377,10 @@ def fit(
     scene, target = _load(scenario, changes), stem or scenario.with_suffix("")
     from sim.study import fit
 
-    found, shown = fit.carried_out(scene, data, keys, common, target, force, steady, judged, units)
+    result, shown = fit.carried_out(scene, data, keys, common, target, force, steady, judged, units)
     for rows, text in shown:
         print_table(rows, text)
-    sys.exit(DONE if found.converged else FAILED)
+    sys.exit(DONE if result.converged else FAILED)
 
 
 @cli.command()

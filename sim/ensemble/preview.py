@@ -177,10 +177,10 @@ def memory_limit() -> tuple[float, str]:
     return psutil.virtual_memory().available + psutil.Process().memory_info().rss, "are free"
 
 
-def fitting(plan: Plan, jobs: int, most: float = math.inf, kept: bool = False) -> int:
+def fitting(plan: Plan, jobs: int, most: float = math.inf, in_memory: bool = False) -> int:
     """Return the number of processes, at most ``jobs``, for which ``most`` [byte] of memory are enough.
 
-    If ``most`` is infinite, the limit is ``memory_limit``. A dataset that is ``kept`` in memory counts.
+    If ``most`` is infinite, the limit is ``memory_limit``. A dataset that stays ``in_memory`` counts.
 
     Raises
     ------
@@ -188,7 +188,7 @@ def fitting(plan: Plan, jobs: int, most: float = math.inf, kept: bool = False) -
         If memory is too small for one process; the message says how much the run takes.
     """
     limit, source = (most, "are allowed (--max-memory)") if most < math.inf else memory_limit()
-    dataset = _parts(plan) + plan.bytes if kept else 0.0
+    dataset = _parts(plan) + plan.bytes if in_memory else 0.0
     for count in range(jobs, 0, -1):
         if memory(plan, count) + dataset <= limit:
             return count
@@ -234,7 +234,7 @@ def usual_jobs(plan: Plan) -> int:
     return min(wanted, cores()) if wanted > 1 else 1
 
 
-def announced(
+def processes(
     plan: Plan, jobs: int | None, most: float, shard: tuple[int, int] = (1, 1), parts: Any = ()
 ) -> tuple[int, list[str]]:
     """Return the number of processes of a run and the lines that are printed before it.

@@ -116,7 +116,7 @@ def run(
         If processes died again and again at the same block.
     """
     plan = Plan.of(scenario)
-    jobs = fitting(plan, jobs, memory, kept=to is None)
+    jobs = fitting(plan, jobs, memory, in_memory=to is None)
     how: dict[str, Any] = {"progress": progress, "stop": stop, "jobs": jobs, "scheduler": scheduler}
     stage("simulating")
     if to is None:

@@ -53,7 +53,7 @@ def test_a_run_has_as_many_processes_as_memory_holds_and_is_refused_if_it_holds_
     assert needed == sorted(needed)
     monkeypatch.setattr(preview, "memory_limit", lambda: (needed[2], "are free"))
     assert [fitting(plan, jobs) for jobs in (4, 2)] == [3, 2]
-    assert "note: there is memory for 3 of 4 processes" in preview.announced(plan, 4, needed[2])[1]
+    assert "note: there is memory for 3 of 4 processes" in preview.processes(plan, 4, needed[2])[1]
     monkeypatch.setattr(preview, "memory_limit", lambda: (0.5 * needed[0], "are free"))
     assert fitting(plan, 4, needed[2]) == 3  # what is asked for counts alone
     for to in (None, tmp_path / "x.nc"):
@@ -63,7 +63,7 @@ def test_a_run_has_as_many_processes_as_memory_holds_and_is_refused_if_it_holds_
     assert not list(tmp_path.iterdir())
     assert size(0.5 * needed[0]) in preview.preview(plan.scenario)
     with pytest.raises(preview.NoRoom):
-        fitting(plan, 1, needed[0], kept=True)
+        fitting(plan, 1, needed[0], in_memory=True)
 
 
 def test_the_memory_limit_is_that_of_the_variable_else_of_the_job_else_what_is_free(monkeypatch):
@@ -87,8 +87,8 @@ def test_steps_of_a_run_that_are_done_are_not_counted_again(monkeypatch):
     left = 1.0 - 3 * plan.group / plan.members
     whole, rest = (forecast(plan, 2, left=share) for share in (1.0, left))
     assert rest.cpu < 0.9 * whole.cpu
-    assert preview.announced(plan, 2, math.inf)[1][-1].startswith(preview._times(whole, 2))
-    assert preview.announced(plan, 2, math.inf, parts=done)[1][-1].startswith(preview._times(rest, 2))
+    assert preview.processes(plan, 2, math.inf)[1][-1].startswith(preview._times(whole, 2))
+    assert preview.processes(plan, 2, math.inf, parts=done)[1][-1].startswith(preview._times(rest, 2))
 
 
 def test_a_run_whose_parts_and_dataset_the_disk_does_not_hold_is_refused_and_leaves_nothing(monkeypatch, tmp_path):
