@@ -149,7 +149,7 @@ def test_a_dataset_of_an_older_version_says_once_which_statements_it_lacks(folde
 def test_a_dataset_makes_no_figure_read_a_file_it_names():
     """A spectrum in the scenario of a dataset may name a file; its rows must be in the dataset."""
     for model in ("tabulated", "measured"):
-        scenario = {"shear": {"spectrum": {"model": model, "file": "secret.csv"}}}
+        scenario = {"shear": {"spectrum": {"model": model, "file": "secret.csv"}, "amplitude": {}}}
         dataset = xr.Dataset(attrs={"scenario_resolved": json.dumps(scenario)})
         with pytest.raises(ValueError, match="names a file"):
             field._target(dataset, xr.DataArray(), {})
