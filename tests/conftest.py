@@ -1,8 +1,7 @@
-"""What tests of several folders are given."""
+"""Fixtures for tests of several folders."""
 
 import contextlib
 import os
-import resource
 import sys
 
 import pytest
@@ -24,6 +23,7 @@ def _written_at_once(request):
 @pytest.fixture
 def room():
     """A limit on the bytes of a file, which stands for a full disk: ``with room(100): ...``."""
+    resource = pytest.importorskip("resource", reason="the system has no limit on the bytes of a file")
 
     @contextlib.contextmanager
     def limited(size):

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
+on_linux = pytest.mark.skipif(sys.platform != "linux", reason="another system is emulated on Linux alone")
+
 ELSEWHERE = Path(__file__).parent / "helpers" / "elsewhere"
 SCENE = """
 name = "a lens — Größe µ"
@@ -75,6 +77,7 @@ def variables(path):
         return {name: value.values for name, value in dataset.load().variables.items() if value.dtype.kind in "biuf"}
 
 
+@on_linux
 def test_the_emulated_system_hides_its_names_from_the_package_alone():
     program = """
 import os, signal
@@ -98,6 +101,7 @@ except PermissionError:
     assert printed.stdout.splitlines() == seen
 
 
+@on_linux
 def test_a_user_goes_from_a_scenario_to_a_fit(elsewhere):
     sim, scene = elsewhere, "szene µ.toml"
     sim("new", "erste Szene.toml")
@@ -119,6 +123,7 @@ def test_a_user_goes_from_a_scenario_to_a_fit(elsewhere):
     assert (sim.folder / "à_fit.json").exists()
 
 
+@on_linux
 def test_an_output_that_is_open_elsewhere_is_published_by_resume(elsewhere):
     sim, scene = elsewhere, "szene µ.toml"
     sim("run", scene, "-o", "out.nc", "--quiet")
