@@ -111,17 +111,16 @@ SCENES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("changes", SCENES.values(), ids=SCENES)
-def test_steady_sliding_is_what_a_run_at_a_steady_speed_ends_in(changes):
-    scene = load(LENS).with_values(changes)
-    made, names = rows_of(scene, speed=SPEEDS[::3])
-    (group,) = likelihood.groups(scene, made)
-    alone = likelihood.by_steady_sliding(group, {}, names)
-    sampled = likelihood.asked([group], {}, names, False)
-    for name in names:
-        assert np.all(np.isfinite(alone[name]))
-        assert_allclose(alone[name], sampled.mean[name], rtol=1e-12, atol=0)
-        assert np.all(sampled.error[name] == 0.0)
+def test_steady_sliding_is_what_a_run_at_a_steady_speed_ends_in():
+    for label, changes in SCENES.items():
+        scene = load(LENS).with_values(changes)
+        made, names = rows_of(scene, speed=SPEEDS[::3])
+        (group,) = likelihood.groups(scene, made)
+        alone = likelihood.by_steady_sliding(group, {}, names)
+        sampled = likelihood.asked([group], {}, names, False)
+        for name in names:
+            assert_allclose(alone[name], sampled.mean[name], rtol=1e-12, atol=0, equal_nan=False, err_msg=label)
+            assert np.all(sampled.error[name] == 0.0)
 
 
 def test_rows_have_the_load_and_the_solid_of_their_own():
@@ -245,12 +244,6 @@ def test_a_minimum_at_which_the_contact_is_open_is_left_for_a_lower_one(tmp_path
     radii = sim.laws.jkr.radius_at_load(loads, tried, 2e-3, 6.4e6)
     least = np.min(np.sum(((radii - measured) / (0.01 * measured)) ** 2, axis=1))
     assert found.best.chi_square < least and not any("open" in said for said in found.remarks)
-
-
-def test_a_number_without_bounds_of_its_own_is_found(tmp_path, truth):
-    path = table(tmp_path / "exact.csv", {"speed [m/s]": SPEEDS}, truth, 0.01)
-    found = fit(load(LENS).with_values({"contact.load": 3e-3}), [path], ["contact.load"], steady=True)
-    assert_allclose(found.values["contact.load"], 4e-3, rtol=1e-6)
 
 
 def test_an_edge_that_lags_is_found_from_loading_and_unloading(tmp_path):
@@ -435,11 +428,7 @@ def test_a_number_that_the_data_do_not_bound_ends_at_its_bound(tmp_path, truth):
         ("clock.step", "no physical number"),
         ("bonds.stress=1:2", "start inside"),
         ("bonds.stress=2 kPa:1 kPa", "wrong order"),
-        ("bonds.stress=1 m:2 m", "not a unit of Pa"),
-        ("bonds.stress=1 kPa", "LOW:HIGH"),
         ("bonds.critical_speed=0:1 m/s", r'must be above 0 m/s.*"bonds.critical_speed=100 µm/s:1 m/s"'),
-        ("adhesion.bond_share=-1:1", r'"adhesion.bond_share=0.006:1"'),
-        ("shear.amplitude.floor=", "LOW:HIGH"),
     ],
 )
 def test_what_cannot_be_freed_is_refused(free, said, curves):
@@ -560,11 +549,6 @@ def test_a_theory_is_preferred_only_where_the_scenario_fits_worse():
     assert name == "" and words.startswith("the data cannot tell: JKR") and mechanisms.WHOLE in words
 
 
-def test_fewer_points_than_the_criterion_needs_tell_nothing():
-    name, words = weighed(math.inf, ("bonds only", 8.0, 0.4, False), ("fluctuations only", 40.0, 0.01, True))
-    assert name == "" and "measure more" in words
-
-
 @pytest.mark.verify
 def test_a_theory_is_preferred_by_its_own_data():
     scene = load(LENS).with_values({"bonds.stress": 6e4})
@@ -633,29 +617,15 @@ def test_the_lines_of_the_documentation_sample_a_posterior_that_agrees_with_the_
 
 HEADER = "speed [mm/s],contact_area [mm^2]"
 BAD = {
-    "empty": ("", "the table is empty"),
     "no unit of an area": ("speed [mm/s],contact_area [mm]\n1,2\n3,4\n", "not a unit of m"),
-    "unknown column": ("speed [mm/s],area [mm^2]\n1,2\n3,4\n", 'column "area" is neither'),
-    "one without a unit": ("speed [mm/s],contact_area\n1,2\n3,4\n", '"contact_area" has no unit where others have one'),
     "misspelt": ("speed [mm/s],contact_arae [mm^2]\n1,2\n3,4\n", 'did you mean "contact_area"'),
     "no curve": ("speed [mm/s]\n1\n3\n", "no column was measured"),
     "no condition": ("contact_area [mm^2]\n0.04\n0.05\n", "where the points were taken"),
-    "nan": (f"{HEADER}\n1,0.04\n2,nan\n", "line 3: contact_area must be finite"),
     "area below 0": (f"{HEADER}\n1,0.04\n2,-0.04\n", "line 3: contact_area must be at least 0 m^2"),
     "nothing but 0": (f"{HEADER}\n1,0\n2,0\n3,0\n", "contact_area is 0 in all rows"),
-    "1e300": (f"{HEADER}\n1,1e300\n2,2\n", "is too large to be real"),
-    "units swapped": ("speed [mm^2],contact_area [mm/s]\n1,0.04\n2,0.03\n", 'column "speed" has the unit "mm^2"'),
-    "no number": (f"{HEADER}\n1,0.04\n2,0.04mm\n", "line 3: contact_area is not a number"),
-    "negative error": (f"{HEADER},contact_area_error [%]\n1,2,-3\n2,3,4\n", "contact_area_error must be above 0"),
-    "empty cell": (f"{HEADER}\n1,0.04\n2,\n", "line 3: contact_area is not a number"),
-    "ragged": (f"{HEADER}\n1,0.04\n2\n", "line 3: 1 cells"),
     "one point": (f"{HEADER}\n1,0.04\n", "1 measured number cannot tell 1 free"),
-    "no errors": (f"{HEADER},contact_area_error [mm^2]\n1,0.04,0\n2,0.04,0.1\n", "must be above 0"),
-    "error of nothing": (f"{HEADER},friction_force_error [mN]\n1,2,3\n2,3,4\n", "is the error of"),
     "time and speed": ("t [s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n", "leave out t"),
-    "twice": ("speed [mm/s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n", "each column once"),
     "against the speed": ("speed [mm/s],friction_force [mN]\n-1,2\n-2,3\n", "has the sign of the speed"),
-    "of another solid": ("solid_poisson_ratio,contact_area [mm^2]\n0.5,2\n0.7,3\n", "at most 0.5"),
 }  # fmt: skip
 
 
@@ -679,14 +649,6 @@ def test_a_bad_table_is_refused_with_one_line_and_nothing_is_written(text, said,
     (line,) = done.exception.problems
     assert said in line and "\n" not in line and str(path) in line
     assert {one.name for one in tmp_path.iterdir()} == {"lens.toml", "bad.csv"}
-
-
-def test_what_is_no_table_is_refused(scenario, tmp_path):
-    binary = tmp_path / "binary.csv"
-    binary.write_bytes(b"\x89HDF\xff\xfe")
-    for path, said in ((tmp_path / "none.csv", "cannot be read"), (tmp_path, "is no plain file"), (binary, "UTF-8")):
-        done = command(scenario, path, "--free", "bonds.stress")
-        assert isinstance(done.exception, BadInput) and said in str(done.exception)
 
 
 # -- the command ----------------------------------------------------------------------------------
