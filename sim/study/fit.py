@@ -111,7 +111,7 @@ class Fit(NamedTuple):
     @property
     def values(self) -> dict[str, float]:
         """Values of the free keys [SI]."""
-        return {one.free.key: one.value for one in self.numbers}
+        return {item.free.key: item.value for item in self.numbers}
 
 
 def fit(
@@ -140,7 +140,7 @@ def fit(
     """
     base = scenario.with_values({"record": {}})
     chosen = [_free(base, text) for text in free]
-    if len({one.key for one in chosen}) < len(chosen):
+    if len({item.key for item in chosen}) < len(chosen):
         raise BadInput(["--free: a key is there twice; give each once"])
     tables = [read(path, base) for path in data]
     problem = problem_of(tables, [groups(base, table) for table in tables], chosen, common or {})
@@ -168,14 +168,14 @@ def _searched(problem: Problem) -> tuple[Problem, Minimum]:
 
     A contact that is open has no slope that would lead out of there.
     """
-    found = [with_errors(problem, problem.start)]
-    if not problem.by_run and (_poor(*found[0]) or _open(*found[0]).size):
-        for k, one in enumerate(problem.free):
+    minima = [with_errors(problem, problem.start)]
+    if not problem.by_run and (_poor(*minima[0]) or _open(*minima[0]).size):
+        for k, item in enumerate(problem.free):
             for sign in (-1.0, 1.0):
-                beside = found[0][1].x.copy()
-                beside[k] += sign * _BESIDE * one.width
-                found.append(with_errors(problem, beside))
-    return min(found, key=lambda one: one[0].criterion(one[1].chi_square))
+                beside = minima[0][1].x.copy()
+                beside[k] += sign * _BESIDE * item.width
+                minima.append(with_errors(problem, beside))
+    return min(minima, key=lambda item: item[0].criterion(item[1].chi_square))
 
 
 def _likely(problem: Problem, best: Minimum) -> float:
@@ -198,58 +198,66 @@ def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minim
     """The fit with its intervals, and what to know of it."""
     count = len(problem.free)
     if best.covariance is None:
-        said = ("the errors could not be found: the data do not hold some of the numbers",)
+        message = ("the errors could not be found: the data do not hold some of the numbers",)
         none = Interval(math.nan, math.nan, True, True)
-        numbers = [Found(one, one.outer(float(best.x[k])), math.nan, none, one.outer(float(alone.x[k])))
-                   for k, one in enumerate(problem.free)]  # fmt: skip
-        return Fit(scenario, problem, best, tuple(numbers), np.full((count, count), np.nan), False, said)
+        numbers = [Found(item, item.outer(float(best.x[k])), math.nan, none, item.outer(float(alone.x[k])))
+                   for k, item in enumerate(problem.free)]  # fmt: skip
+        return Fit(scenario, problem, best, tuple(numbers), np.full((count, count), np.nan), False, message)
     spread = np.sqrt(np.diag(best.covariance))
-    found = []
-    for k, one in enumerate(problem.free):
-        value = one.outer(float(best.x[k]))
-        error = spread[k] * (value if one.logarithmic else 1.0)
-        found.append(Found(one, value, float(error), interval(problem, best, k), one.outer(float(alone.x[k]))))
+    estimates = []
+    for k, item in enumerate(problem.free):
+        value = item.outer(float(best.x[k]))
+        error = spread[k] * (value if item.logarithmic else 1.0)
+        estimates.append(Found(item, value, float(error), interval(problem, best, k), item.outer(float(alone.x[k]))))
     alike = (best.covariance / np.outer(spread, spread))[:count, :count]
-    final = scenario.with_values({one.free.key: one.value for one in found})
-    return Fit(final, problem, best, tuple(found), alike, converged, tuple(_remarks(problem, best, found, alike)))
+    final = scenario.with_values({item.free.key: item.value for item in estimates})
+    return Fit(
+        final, problem, best, tuple(estimates), alike, converged, tuple(_remarks(problem, best, estimates, alike))
+    )
 
 
-def _remarks(problem: Problem, best: Minimum, found: list[Found], alike: Array) -> list[str]:
-    said = []
-    for i, one in enumerate(found):
+def _remarks(problem: Problem, best: Minimum, estimates: list[Found], alike: Array) -> list[str]:
+    remarks = []
+    for i, item in enumerate(estimates):
         for j in range(i):
             if abs(alike[i, j]) > _ALIKE:
-                both = f"{found[j].free.key} and {one.free.key}"
-                said.append(f"the data hardly tell {both} apart (correlation {alike[i, j]:.3f})")
-        ends = [*zip(("below", "above"), one.interval[:2], one.interval[2:], strict=True)]
+                pair = f"{estimates[j].free.key} and {item.free.key}"
+                remarks.append(f"the data hardly tell {pair} apart (correlation {alike[i, j]:.3f})")
+        ends = [*zip(("below", "above"), item.interval[:2], item.interval[2:], strict=True)]
         if bound := [word for word, end, is_open in ends if is_open and not math.isnan(end)]:
-            said.append(f"{one.free.key}: the data do not bound it {' or '.join(bound)}; its bound is given instead")
+            remarks.append(
+                f"{item.free.key}: the data do not bound it {' or '.join(bound)}; its bound is given instead"
+            )
         if lost := [word for word, end, _ in ends if math.isnan(end)]:
-            said.append(f"{one.free.key}: the end of its interval was not found {' or '.join(lost)}")
+            remarks.append(f"{item.free.key}: the end of its interval was not found {' or '.join(lost)}")
     if (p_value := _likely(problem, best)) <= POOR:
-        said.append(f"the curves lie further off than their errors (p = {p_value:.2g}): the model lacks something, a")
-        said[-1] += (
+        remarks.append(
+            f"the curves lie further off than their errors (p = {p_value:.2g}): the model lacks something, a"
+        )
+        remarks[-1] += (
             " number that is not free is wrong, or the errors are too small; the intervals hold for none of these"
         )
-    said += _of_other_units(problem, best)
+    remarks += _of_other_units(problem, best)
     if (open_there := _open(problem, best)).size:
         rows = ", ".join(map(problem.place, open_there[:_NAMED]))
-        said.append(f"the contact is open by the fit where it was measured: {rows}")
+        remarks.append(f"the contact is open by the fit where it was measured: {rows}")
     if problem.estimated.any():
-        said.append("curves without errors: their scatter around the fit stands for them")
-    return said
+        remarks.append("curves without errors: their scatter around the fit stands for them")
+    return remarks
 
 
 def _of_other_units(problem: Problem, best: Minimum) -> list[str]:
     """What to say of curves of which measured and fitted values differ as if one had another unit."""
-    said, fitted = [], np.abs(problem.predicted(best.x))
+    remarks, fitted = [], np.abs(problem.predicted(best.x))
     for number in range(int(problem.curve[-1]) + 1):
         here = problem.curve == number
         size, least = float(np.median(np.abs(problem.values[here]))), float(np.median(fitted[here]))
         if min(size, least) > 0.0 and not 1.0 / _OTHER_UNIT < size / least < _OTHER_UNIT:
             name = problem.place(int(np.argmax(here))).partition(":")[0]
-            said.append(f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario")
-    return said
+            remarks.append(
+                f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario"
+            )
+    return remarks
 
 
 def _free(scenario: Scenario, text: str) -> Free:
@@ -257,11 +265,11 @@ def _free(scenario: Scenario, text: str) -> Free:
     key, sign, span = text.partition("=")
     key, known = key.strip(), quantities(scenario)
     if key not in known or key.partition(".")[0] in _OTHER or known[key][0].whole:
-        physical = [one for one, (quantity, _) in known.items()
-                    if one.partition(".")[0] not in _OTHER and not quantity.whole]  # fmt: skip
+        physical = [item for item, (quantity, _) in known.items()
+                    if item.partition(".")[0] not in _OTHER and not quantity.whole]  # fmt: skip
         near = difflib.get_close_matches(key, physical, 1, 0.5)
-        said = "is no physical number of the scenario" + (f'; did you mean "{near[0]}"?' if near else "")
-        raise BadInput([f"--free {key[:80]}: {said or 'is not there'}"])
+        message = "is no physical number of the scenario" + (f'; did you mean "{near[0]}"?' if near else "")
+        raise BadInput([f"--free {key[:80]}: {message or 'is not there'}"])
     quantity, start = known[key]
     low, high = max(quantity.at_least, quantity.above), min(quantity.at_most, quantity.below)
     if sign:
@@ -284,9 +292,9 @@ def _span(key: str, span: str, quantity: Quantity, start: float) -> tuple[float,
     try:
         low, high = (quantity.read(_number(end)) for end in ends)
     except ValueError as fault:
-        said = str(fault) if len(ends) == 2 else "takes two bounds"
+        message = str(fault) if len(ends) == 2 else "takes two bounds"
         raise BadInput(
-            [f'--free {key}={span[:60]}: {said}; write KEY=LOW:HIGH, such as "{key}={_typical(quantity, start)}"']
+            [f'--free {key}={span[:60]}: {message}; write KEY=LOW:HIGH, such as "{key}={_typical(quantity, start)}"']
         ) from None
     if not low < high:
         raise BadInput([f"--free {key}={span[:60]}: the bounds are in the wrong order; write the lower one first"])
@@ -308,10 +316,10 @@ def _typical(quantity: Quantity, start: float) -> str:
 
 def _refuse_entangled(problem: Problem) -> None:
     """Refuse keys that have no effect on the curves, or only together."""
-    said = "has no effect on what was measured; fix it"
-    faults = [f"--free {key}: {said}" for key in idle(problem)]
-    for several in [] if faults else entangled(problem):
-        names = f"{', '.join(several[:-1])} and {several[-1]}"
+    message = "has no effect on what was measured; fix it"
+    faults = [f"--free {key}: {message}" for key in idle(problem)]
+    for together in [] if faults else entangled(problem):
+        names = f"{', '.join(together[:-1])} and {together[-1]}"
         faults.append(f"--free {names}: the curves depend on them only together, as on a product; free one of them")
     if faults:
         raise BadInput(faults)
@@ -342,11 +350,11 @@ def figure(problem: Problem, best: Minimum) -> Figure:
             bars: Any = HOLLOW | {"color": BOTH, "elinewidth": 0.7, "zorder": 3, "label": "measured"}
             spread = y.factor * problem.sigma[here]
             upper.errorbar(x.factor * along, y.factor * curve.values, yerr=spread, **bars)
-            both = [(fitted, BOTH, "fit")]
+            lines = [(fitted, BOTH, "fit")]
             if np.any(problem.shift):
-                both.append((alone, REFERENCE, "in steady sliding"))
+                lines.append((alone, REFERENCE, "in steady sliding"))
             fine, smooth = problem.between(best.x, table, curve.name)
-            for values, colour, label in both:
+            for values, colour, label in lines:
                 line, over = values[here][order], along[order]
                 if fine.size:  # what is added to steady sliding is known at the rows
                     line, over = smooth + np.interp(fine, over, line - alone[here][order]), fine
@@ -382,7 +390,7 @@ def _along(table: Measured) -> tuple[str, str, Array]:
     varied = [(name, values) for name, values in table.conditions.items() if np.ptp(values) > 0.0]
     if not varied:
         return "row", "1", np.arange(1.0, table.rows + 1.0)
-    name, values = max(varied, key=lambda one: len(np.unique(one[1])))
+    name, values = max(varied, key=lambda item: len(np.unique(item[1])))
     if name == "held":
         name = HELD[table.held]
         return name.replace("_", " "), "N" if table.held == "load" else "m", values
@@ -411,16 +419,16 @@ def carried_out(
     sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
     outputs = claim(scenario, data, stem, replace)
     refuse_units([read(path, scenario) for path in data] if units else [], units)
-    found = fit(scenario, data, free, sizes, steady)
-    verdict = compare(found.problem, found.best, found.scenario.seed) if judged else None
-    save(scenario, found, data, outputs, verdict, units)
-    shown: list[Shown] = [(_table(found), f"\n{_explanation(found)}\n")]
+    result = fit(scenario, data, free, sizes, steady)
+    verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
+    save(scenario, result, data, outputs, verdict, units)
+    shown: list[Shown] = [(_table(result), f"\n{_explanation(result)}\n")]
     if verdict is not None:
         doubt = (
-            "; but even the scenario as it is lies off: perhaps none of these is true" if found.p_value <= POOR else ""
+            "; but even the scenario as it is lies off: perhaps none of these is true" if result.p_value <= POOR else ""
         )
         shown.append((_comparison(verdict), f"\n{verdict.words}{doubt}\n"))
-    return found, [*shown, ([], "\n".join(map(str, outputs)))]
+    return result, [*shown, ([], "\n".join(map(str, outputs)))]
 
 
 class Outputs(NamedTuple):
@@ -446,7 +454,7 @@ def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -
 
 def _made_here(path: Path, read: Sequence[Path]) -> bool:
     """Whether a file is a scenario that a fit has made, and none that is read."""
-    if not path.is_file() or any(one.exists() and path.samefile(one) for one in read):
+    if not path.is_file() or any(item.exists() and path.samefile(item) for item in read):
         return False
     with path.open("rb") as file:
         return any(line.startswith(_MADE.encode()) for line in file)
@@ -455,18 +463,18 @@ def _made_here(path: Path, read: Sequence[Path]) -> bool:
 def _table(fit: Fit) -> list[dict[str, str]]:
     """One row for each number found, in units that suit it."""
     rows = []
-    for one in fit.numbers:
-        nothing = one.interval.low_open and not one.interval.high_open and one.error > abs(one.value)
-        factor, unit = scaled(one.interval.high if nothing else one.value, one.free.quantity.unit)
-        shown = concise(factor * one.value, factor * one.error)
-        shown = f"below {factor * one.interval.high:.3g}" if nothing else shown
-        row = {"key": one.free.key, "value": f"{shown} {unit}".rstrip()}
-        ends = zip(one.interval[:2], one.interval[2:], strict=True)
+    for item in fit.numbers:
+        nothing = item.interval.low_open and not item.interval.high_open and item.error > abs(item.value)
+        factor, unit = scaled(item.interval.high if nothing else item.value, item.free.quantity.unit)
+        shown = concise(factor * item.value, factor * item.error)
+        shown = f"below {factor * item.interval.high:.3g}" if nothing else shown
+        row = {"key": item.free.key, "value": f"{shown} {unit}".rstrip()}
+        ends = zip(item.interval[:2], item.interval[2:], strict=True)
         low, high = (_end(factor * end, is_open) for end, is_open in ends)
         row[f"{LEVEL:.0%} interval"] = f"{low} to {high}"
-        row["start"] = engineering(one.free.start, one.free.quantity.unit)
-        shift = (one.value - one.steady) / one.error if one.error > 0.0 else math.nan
-        alone = engineering(one.steady, one.free.quantity.unit)
+        row["start"] = engineering(item.free.start, item.free.quantity.unit)
+        shift = (item.value - item.steady) / item.error if item.error > 0.0 else math.nan
+        alone = engineering(item.steady, item.free.quantity.unit)
         row["steady sliding alone"] = f"{alone} ({-shift:+.1f} errors)" if abs(shift) > 0.05 else alone
         rows.append(row)
     return rows
@@ -491,24 +499,24 @@ def _explanation(fit: Fit) -> str:
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:
     """One row for each mechanism, the best first; p and the rejection where there is one to compare with."""
     least, rows = verdict.judged[0].aicc, []
-    for one in verdict.judged:
-        row = {"mechanism": one.name, "chi^2": f"{one.chi_square:.4g}", "AICc - least": f"{one.aicc - least:.3g}"}
+    for item in verdict.judged:
+        row = {"mechanism": item.name, "chi^2": f"{item.chi_square:.4g}", "AICc - least": f"{item.aicc - least:.3g}"}
         if len(verdict.judged) > 1:
-            drawn = f"{one.p_value:.3g}" if math.isfinite(one.p_value) else "by AICc alone"
-            row["p"] = "compared with" if one.name == WHOLE else drawn
-            row["rejected"] = "yes" if one.rejected else ""
+            drawn = f"{item.p_value:.3g}" if math.isfinite(item.p_value) else "by AICc alone"
+            row["p"] = "compared with" if item.name == WHOLE else drawn
+            row["rejected"] = "yes" if item.rejected else ""
         rows.append(row)
     return rows
 
 
 def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[str, Any]:
     """All numbers of a fit [SI]."""
-    found: dict[str, Any] = {
+    result: dict[str, Any] = {
         "scenario": fit.scenario.source.path,
         "data": [str(path) for path in data],
         "level": LEVEL,
-        "numbers": {one.free.key: _described(one) for one in fit.numbers},
-        "correlations": {"keys": [one.free.key for one in fit.numbers], "matrix": fit.correlations.tolist()},
+        "numbers": {item.free.key: _described(item) for item in fit.numbers},
+        "correlations": {"keys": [item.free.key for item in fit.numbers], "matrix": fit.correlations.tolist()},
         "common_errors": _common(fit),
         "chi_square": fit.best.chi_square,
         "degrees_of_freedom": fit.problem.freedom,
@@ -518,21 +526,21 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
         "remarks": list(fit.remarks),
     }
     if verdict is not None:
-        judged = [one._asdict() for one in verdict.judged]
-        found["mechanisms"] = {"sufficient": verdict.sufficient, "words": verdict.words, "judged": judged}
-    return _without_nan(found)
+        judged = [item._asdict() for item in verdict.judged]
+        result["mechanisms"] = {"sufficient": verdict.sufficient, "words": verdict.words, "judged": judged}
+    return _without_nan(result)
 
 
-def _described(one: Found) -> dict[str, Any]:
-    ends = one.interval._asdict()
-    described = {"value": one.value, "unit": one.free.quantity.unit, "standard_error": one.error, **ends}
-    return described | {"start": one.free.start, "steady_sliding_alone": one.steady}
+def _described(item: Found) -> dict[str, Any]:
+    ends = item.interval._asdict()
+    described = {"value": item.value, "unit": item.free.quantity.unit, "standard_error": item.error, **ends}
+    return described | {"start": item.free.start, "steady_sliding_alone": item.steady}
 
 
 def _common(fit: Fit) -> dict[str, float]:
     """What was found of the relative errors that curves share."""
-    found = fit.best.x[len(fit.problem.free) :]
-    return {name: float(size * x) for (name, size), x in zip(fit.problem.common.items(), found, strict=True)}
+    shares = fit.best.x[len(fit.problem.free) :]
+    return {name: float(size * x) for (name, size), x in zip(fit.problem.common.items(), shares, strict=True)}
 
 
 def _without_nan(value: Any) -> Any:
@@ -550,24 +558,24 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
     text = source.text or written(_plain(json.loads(scenario_json(scenario))))
     tables = copy.deepcopy(parse(text, source.path))
     changed = source.overrides | {
-        one.free.key: one.value if one.free.quantity.unit == "1" else f"{one.value:.12g} {one.free.quantity.unit}"
-        for one in fit.numbers
+        item.free.key: item.value if item.free.quantity.unit == "1" else f"{item.value:.12g} {item.free.quantity.unit}"
+        for item in fit.numbers
     }
     for key, value in changed.items():
         set_key(tables, key.split("."), value)
     above = Path(source.path).parent
     if source.path and above.resolve() != folder.resolve():
         _move(tables, above, folder)
-    keys = ", ".join(one.free.key for one in fit.numbers)
+    keys = ", ".join(item.free.key for item in fit.numbers)
     comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
-    asked = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
-    opening = f"{asked}#\n" if asked else ""
+    question = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
+    opening = f"{question}#\n" if question else ""
     return f"{opening}{_MADE}: {keys} are calibrated to measured curves.\n{written(tables)}"
 
 
 def _plain(value: Any) -> Any:
     """Tables without the keys that are left out."""
-    return {key: _plain(one) for key, one in value.items() if one is not None} if isinstance(value, dict) else value
+    return {key: _plain(item) for key, item in value.items() if item is not None} if isinstance(value, dict) else value
 
 
 def _move(table: dict[str, Any], above: Path, folder: Path) -> None:

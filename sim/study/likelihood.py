@@ -54,7 +54,7 @@ class Curve(NamedTuple):
     @property
     def described(self) -> tuple[str, str, str]:
         """Unit, long name and symbol of the variable."""
-        return next((one.unit, one.long_name, one.symbol) for one in VARIABLES if one.name == self.name)
+        return next((item.unit, item.long_name, item.symbol) for item in VARIABLES if item.name == self.name)
 
 
 class Measured(NamedTuple):
@@ -97,9 +97,9 @@ def read(path: Path, scenario: Scenario) -> Measured:
     """
     at, outcomes = _conditions(scenario), _outcomes(scenario)
     known = {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}
-    found = read_measured(path, known, outcomes)
-    conditions = {at[name][0]: points.values for name, points in found.items() if name in at}
-    curves = tuple(Curve(name, *points) for name, points in found.items() if name not in at)
+    result = read_measured(path, known, outcomes)
+    conditions = {at[name][0]: points.values for name, points in result.items() if name in at}
+    curves = tuple(Curve(name, *points) for name, points in result.items() if name not in at)
     unclear = _unclear(scenario, conditions)
     unclear = unclear or _against(conditions, curves)
     if not curves:
@@ -111,7 +111,7 @@ def read(path: Path, scenario: Scenario) -> Measured:
         )
     if unclear:
         raise BadInput([f"{path}: {unclear}"])
-    extremes = ((name, points.values.min(), points.values.max(), known[name].unit) for name, points in found.items())
+    extremes = ((name, points.values.min(), points.values.max(), known[name].unit) for name, points in result.items())
     ranges = ", ".join(f"{name} {low:.4g} to {high:.4g} {unit}" for name, low, high, unit in extremes)
     return Measured(path, scenario.contact.kind, conditions, curves, ranges)
 
@@ -127,38 +127,40 @@ def _against(conditions: dict[str, Array], curves: tuple[Curve, ...]) -> str:
 def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
     """Condition and declaration by the name of a column."""
     kind = scenario.contact.kind
-    units = {one.name: one.unit for one in VARIABLES}
-    found = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
+    units = {item.name: item.unit for item in VARIABLES}
+    result = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
     if not scenario.drive.solves_motion:
-        found |= dict.fromkeys(("speed", "drive_speed"), ("speed", Quantity("m/s", "sliding speed")))
-    elif "drive_stage" in found:
-        found["stage_speed"] = found["drive_stage"]
+        result |= dict.fromkeys(("speed", "drive_speed"), ("speed", Quantity("m/s", "sliding speed")))
+    elif "drive_stage" in result:
+        result["stage_speed"] = result["drive_stage"]
     held = ("held", Quantity(units[HELD[kind]], f"what holds the sphere, contact.{kind}"))
-    found |= dict.fromkeys((HELD[kind], f"contact_{kind}"), held)
-    return found | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
+    result |= dict.fromkeys((HELD[kind], f"contact_{kind}"), held)
+    return result | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
 
 
 def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
     """Declaration of each variable that can be measured."""
     of_slider = _OF_SLIDER if scenario.drive.solves_motion else ()
-    there = (one for one in VARIABLES if (one.part != "drive" or one.name in of_slider) and one.applies(scenario))
+    recorded = (
+        item for item in VARIABLES if (item.part != "drive" or item.name in of_slider) and item.applies(scenario)
+    )
     sizes = {name: Quantity(unit, name, at_least=0) for name, unit in _SIZES.items()}
-    return {one.name: sizes.get(one.name, Quantity(one.unit, one.long_name))
-            for one in there if one.name not in _NOT_MEASURED}  # fmt: skip
+    return {item.name: sizes.get(item.name, Quantity(item.unit, item.long_name))
+            for item in recorded if item.name not in _NOT_MEASURED}  # fmt: skip
 
 
 def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
     """What a table lacks to say at which speed, or under which load, its rows were measured; "" for nothing."""
     drive, contact = scenario.drive, scenario.contact
     if "t" in conditions:
-        both = [name for name in ("speed", "held") if name in conditions]
-        said = "times already say the speed and the load, by the scenario; leave out t, or these columns"
-        return said if both else ""
+        columns = [name for name in ("speed", "held") if name in conditions]
+        message = "times already say the speed and the load, by the scenario; leave out t, or these columns"
+        return message if columns else ""
     if drive.solves_motion and not {"drive.stage", "drive.force"} & quantities(scenario).keys():
         return f'what drives the slider changes during the run (drive.model = "{drive.model}"); add a column "t [s]"'
     if "speed" not in conditions and drive.model != "steady" and not drive.solves_motion:
-        said = f'the speed changes during the run (drive.model = "{drive.model}")'
-        return f'{said}; add a column "speed [mm/s]", or "t [s]"'
+        message = f'the speed changes during the run (drive.model = "{drive.model}")'
+        return f'{message}; add a column "speed [mm/s]", or "t [s]"'
     if "held" not in conditions and contact.changes:
         return f'contact.{contact.kind} changes during the run; add a column "{HELD[contact.kind]}", or "t [s]"'
     column = "t [s]" if drive.solves_motion else "speed [mm/s]"
@@ -168,7 +170,7 @@ def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
 #: Values of keys, by their dotted names.
 Values = Mapping[str, float]
 
-_READ = {one.name: one.read for one in VARIABLES}
+_READ = {item.name: item.read for item in VARIABLES}
 
 
 def changed(scenario: Scenario, values: Values) -> Scenario:
@@ -180,27 +182,27 @@ def changed(scenario: Scenario, values: Values) -> Scenario:
         for name in tables:
             table = table.setdefault(name, {})
         table[last] = value
-    found: Scenario = _changed(scenario, tree)
-    return found
+    result: Scenario = _changed(scenario, tree)
+    return result
 
 
 def _changed(part: Any, tree: dict[str, Any]) -> Any:
     """A part with numbers changed, and tables in it."""
-    own, names = _keys(cast(Hashable, type(part)))
-    kept = {name: getattr(part, name) for name in own}
+    attributes, names = _keys(cast(Hashable, type(part)))
+    values = {name: getattr(part, name) for name in attributes}
     for key, value in tree.items():
         name = names.get(key, key)
-        kept[name] = _changed(kept[name], value) if isinstance(value, dict) else value
-    made = object.__new__(type(part))
-    made.__dict__.update(kept)
-    return made
+        values[name] = _changed(values[name], value) if isinstance(value, dict) else value
+    changed_part = object.__new__(type(part))
+    changed_part.__dict__.update(values)
+    return changed_part
 
 
 @functools.cache
 def _keys(table: type) -> tuple[list[str], dict[str, str]]:
     """Names of a table's values, and by the key of a file where that is another one."""
     declared = getattr(table, "__pydantic_fields__", {})
-    return [item.name for item in fields(table)], {one.alias: name for name, one in declared.items() if one.alias}
+    return [item.name for item in fields(table)], {item.alias: name for name, item in declared.items() if item.alias}
 
 
 class Group(NamedTuple):
@@ -218,17 +220,17 @@ class Group(NamedTuple):
 
 def groups(scenario: Scenario, table: Measured) -> list[Group]:
     """The groups of a table's rows; ``BadInput`` where a row has values that do not go together."""
-    own = {key: values for key, values in table.conditions.items() if key not in ("t", "speed", "held")}
-    columns = np.array([*own.values()]).reshape(len(own), table.rows)
-    found = []
-    for place in np.unique(columns, axis=1, return_index=True)[1] if own else [0]:
+    keyed = {key: values for key, values in table.conditions.items() if key not in ("t", "speed", "held")}
+    columns = np.array([*keyed.values()]).reshape(len(keyed), table.rows)
+    result = []
+    for place in np.unique(columns, axis=1, return_index=True)[1] if keyed else [0]:
         rows = np.flatnonzero(np.all(columns == columns[:, place : place + 1], axis=0))
         try:
-            one = scenario.with_values({key: float(values[place]) for key, values in own.items()})
+            item = scenario.with_values({key: float(values[place]) for key, values in keyed.items()})
         except BadInput as fault:
-            raise BadInput([f"{table.path}: row {place + 1}: {said}" for said in fault.problems]) from None
-        found.append(_group(one, table, rows))
-    return found
+            raise BadInput([f"{table.path}: row {place + 1}: {message}" for message in fault.problems]) from None
+        result.append(_group(item, table, rows))
+    return result
 
 
 def _group(scenario: Scenario, table: Measured, rows: NDArray[np.int64]) -> Group:
@@ -254,9 +256,9 @@ def _course(time: Array, values: Array) -> Any:
 
 def steady_course(scenario: Scenario, time: Array, speed: Array) -> Trajectory:
     """Contacts that have slid at speeds [m/s] for ever, held as the scenario has it at times [s]; shapes (rows, 1)."""
-    found = scenario.population.steady(speed[:, 0])
+    result = scenario.population.steady(speed[:, 0])
     still = 0.0 * speed
-    bonding = type(found)(*(np.reshape(values, (-1, 1)) + still for values in found))
+    bonding = type(result)(*(np.reshape(values, (-1, 1)) + still for values in result))
     motion = Motion(0, time, 0.0 * time, still, still, speed, speed)  # type: ignore[arg-type]
     shear = scenario.fluctuations
     size = shear.amplitude.factor(speed, bonding.strength) ** 2
@@ -279,8 +281,8 @@ def by_steady_sliding(group: Group, values: Values, names: list[str], theory: st
     ``theory`` is the name of a theory of ``sim.laws.theories`` that gives the radius in place of the contact's balance,
     at the stress of the bonds; its numbers ``"alpha"`` and ``"lambda"`` are among the ``values``.
     """
-    own = {key: value for key, value in values.items() if "." in key or key in ("seed",)}
-    scenario = changed(group.scenario, own)
+    changes = {key: value for key, value in values.items() if "." in key or key in ("seed",)}
+    scenario = changed(group.scenario, changes)
     course = steady_course(scenario, group.time, group.speed)
     if theory:
         course = course._replace(radius=_radius_by(theory, scenario, course, values))
@@ -305,7 +307,7 @@ class Sampled(NamedTuple):
     error: dict[str, Array]
 
 
-def asked(found: list[Group], values: Values, names: list[str], by_time: bool) -> Sampled:
+def by_runs(result: list[Group], values: Values, names: list[str], by_time: bool) -> Sampled:
     """What the scenario's own models give at the rows of a table, with the noise of its seed.
 
     Where rows have times, or only speeds and the drive passes through these, they are read along the scenario's run;
@@ -316,9 +318,9 @@ def asked(found: list[Group], values: Values, names: list[str], by_time: bool) -
     BadInput
         If the run does not reach the speed of a row, or passes it twice.
     """
-    count = sum(len(group.rows) for group in found)
+    count = sum(len(group.rows) for group in result)
     sampled = Sampled(*({name: np.full(count, np.nan) for name in names} for _ in range(2)))
-    for group in found:
+    for group in result:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
         runs: list[tuple[NDArray[np.int64], Scenario, Weights]] = []
         driven = scenario.drive.solves_motion
@@ -363,12 +365,12 @@ def _places(group: Group, by_time: bool, course: Trajectory) -> Array:
         along, at = -along, -at
     rising, near = bool(np.all(np.diff(along) > 0.0)), 1e-9 * max(1.0, float(np.ptp(along)))
     if not rising or at.min() < along[0] - near or at.max() > along[-1] + near:
-        said = "the run must pass each measured speed once"
+        message = "the run must pass each measured speed once"
         if rising:
             ends = (np.abs(course.speed), np.abs(group.speed))
             run, data = (f"{values.min():.3g} to {values.max():.3g}" for values in ends)
-            said = f"the run goes from {run} m/s, the data from {data}"
-        raise BadInput([f'drive.speed: {said}; fit with a wider drive, or with [drive] model = "steady"'])
+            message = f"the run goes from {run} m/s, the data from {data}"
+        raise BadInput([f'drive.speed: {message}; fit with a wider drive, or with [drive] model = "steady"'])
     place = np.clip(np.searchsorted(along, at) - 1, 0, len(along) - 2)
     part = np.clip((at - along[place]) / (along[place + 1] - along[place]), 0.0, 1.0)
     weights = np.zeros((len(at), len(along)))
@@ -381,15 +383,15 @@ def _members(point: Scenario, names: list[str], places: Weights) -> dict[str, Ar
     """Variables at rows by member, shape (rows, members); one member where none differ."""
     count = point.ensemble.members if any(point.varies.values()) else 1
     steps, most = range(0, point.clock.steps + 1, point.clock.stride), together(point)
-    kept: dict[str, list[Array]] = {name: [] for name in names}
+    columns: dict[str, list[Array]] = {name: [] for name in names}
     for first in range(0, count, most):
         members = np.arange(first, min(first + most, count))
         _, course = follow(point, MemberNoise.of(point.seed, members), None, steps)
         weights = places(course)
         for name in names:
             values = np.broadcast_to(_READ[name](point, course), (len(steps), len(members)))
-            kept[name].append(np.array([[row @ one for one in values.T] for row in weights]))
-    return {name: np.concatenate(several, axis=1) for name, several in kept.items()}
+            columns[name].append(np.array([[row @ item for item in values.T] for row in weights]))
+    return {name: np.concatenate(batches, axis=1) for name, batches in columns.items()}
 
 
 try:
@@ -473,70 +475,72 @@ class Problem:
 
     @property
     def start(self) -> Array:
-        return np.array([one.inner(one.start) for one in self.free] + [0.0] * len(self.common))
+        return np.array([item.inner(item.start) for item in self.free] + [0.0] * len(self.common))
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
-        return [(one.inner(one.low), one.inner(one.high)) for one in self.free] + [(-math.inf, math.inf)] * len(
+        return [(item.inner(item.low), item.inner(item.high)) for item in self.free] + [(-math.inf, math.inf)] * len(
             self.common
         )
 
     def numbers(self, x: Array) -> dict[str, float]:
         """Values of the free keys and of those that make the mechanism."""
-        return {one.key: one.outer(float(number)) for one, number in zip(self.free, x, strict=False)} | dict(self.fixed)
+        return {item.key: item.outer(float(number)) for item, number in zip(self.free, x, strict=False)} | dict(
+            self.fixed
+        )
 
     def steady(self, x: Array) -> Array:
         """All curves in steady sliding, or by runs."""
-        numbers, found = self.numbers(x), []
+        numbers, result = self.numbers(x), []
         if self.by_run:
             return self._joined(self.sampled(x))[0]
-        for table, several in zip(self.tables, self.groups, strict=True):
+        for table, table_groups in zip(self.tables, self.groups, strict=True):
             names = [curve.name for curve in table.curves]
-            kept = {name: np.empty(table.rows) for name in names}
-            for group in several:
+            columns = {name: np.empty(table.rows) for name in names}
+            for group in table_groups:
                 for name, values in by_steady_sliding(group, numbers, names, self.theory).items():
-                    kept[name][group.rows] = values
-            found += [kept[name] for name in names]
-        return np.concatenate(found)
+                    columns[name][group.rows] = values
+            result += [columns[name] for name in names]
+        return np.concatenate(result)
 
     def sampled(self, x: Array) -> list[Sampled]:
         """The curves of each table by the scenario's own models."""
-        numbers, both = self.numbers(x), zip(self.tables, self.groups, strict=True)
-        return [asked(several, numbers, [curve.name for curve in table.curves], "t" in table.conditions)
-                for table, several in both]  # fmt: skip
+        numbers, pairs = self.numbers(x), zip(self.tables, self.groups, strict=True)
+        return [by_runs(table_groups, numbers, [curve.name for curve in table.curves], "t" in table.conditions)
+                for table, table_groups in pairs]  # fmt: skip
 
     def _joined(self, sampled: Sequence[Sampled]) -> tuple[Array, Array]:
         """Means and standard errors of all curves."""
-        both: list[list[Array]] = [[], []]
-        for table, found in zip(self.tables, sampled, strict=True):
-            for kept, part in zip(both, found, strict=True):
-                kept += [part[curve.name] for curve in table.curves]
-        return np.concatenate(both[0]), np.concatenate(both[1])
+        means_and_errors: list[list[Array]] = [[], []]
+        for table, result in zip(self.tables, sampled, strict=True):
+            for joined, part in zip(means_and_errors, result, strict=True):
+                joined += [part[curve.name] for curve in table.curves]
+        return np.concatenate(means_and_errors[0]), np.concatenate(means_and_errors[1])
 
     def predicted(self, x: Array) -> Array:
         """All curves, with the shift and the common errors."""
-        found = self.steady(x) + self.shift
+        result = self.steady(x) + self.shift
         for k, (name, size) in enumerate(self.common.items()):
-            found = np.where(self.of(name), found * (1.0 + size * x[len(self.free) + k]), found)
-        return found
+            result = np.where(self.of(name), result * (1.0 + size * x[len(self.free) + k]), result)
+        return result
 
     def between(self, x: Array, table: Measured, name: str) -> tuple[Array, Array]:
         """Speeds from the least to the largest of a table, and its curve there in steady sliding.
 
         Without any where more than the speed was varied.
         """
-        several = next(groups for one, groups in zip(self.tables, self.groups, strict=True) if one is table)
-        speeds = several[0].speed
+        table_groups = next(groups for item, groups in zip(self.tables, self.groups, strict=True) if item is table)
+        speeds = table_groups[0].speed
         if [*table.conditions] != ["speed"] or self.by_run or not np.min(speeds) > 0.0:
             return np.empty(0), np.empty(0)
         fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
-        group = several[0]._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
+        group = table_groups[0]._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
         return fine[:, 0], by_steady_sliding(group, self.numbers(x), [name], self.theory)[name]
 
     def of(self, name: str) -> NDArray[np.bool_]:
         """Where a variable is."""
         names = [curve.name for table in self.tables for curve in table.curves]
-        return np.array([one == name for one in names])[self.curve]
+        return np.array([item == name for item in names])[self.curve]
 
     def place(self, number: int) -> str:
         """Variable and row of one of all numbers."""
@@ -564,8 +568,8 @@ class Problem:
         """This problem with the shift from steady sliding at x to what the scenario's own models give there."""
         mean, noise = self._joined(self.sampled(x))
         if not np.all(np.isfinite(mean)):
-            said = "has no value in the run with what was found: is the contact open there?"
-            raise BadInput([f"{self.place(int(np.flatnonzero(~np.isfinite(mean))[0]))} {said}"])
+            message = "has no value in the run with what was found: is the contact open there?"
+            raise BadInput([f"{self.place(int(np.flatnonzero(~np.isfinite(mean))[0]))} {message}"])
         return replace(self, shift=mean - self.steady(x), noise=noise)
 
 
@@ -589,8 +593,8 @@ def minimum(
         value = held[k] if k in held else min(max(start[k], low + room), high - room)
         parameters.add(f"p{k}", value=value, min=low, max=high, vary=k not in held)
 
-    def numbers(given: Any) -> Array:
-        return np.array([one.value for one in given.values()])
+    def numbers(current: Any) -> Array:
+        return np.array([item.value for item in current.values()])
 
     if len(held) == len(parameters):
         x = numbers(parameters)
@@ -598,12 +602,12 @@ def minimum(
     how: dict[str, Any] = {"calc_covar": errors, "scale_covar": False, "max_nfev": _EVALUATIONS * (len(parameters) + 1)}
     if problem.by_run:  # steps of the minimizer's own would be lost in the rounding of a run
         moved, precision = [k for k in range(len(parameters)) if k not in held], _RUN_PRECISION
-        how["Dfun"] = lambda given: _derivatives(problem, numbers(given), moved)
-    found = lmfit.Minimizer(lambda given: problem.residuals(numbers(given)), parameters, **how).leastsq(
+        how["Dfun"] = lambda current: _derivatives(problem, numbers(current), moved)
+    result = lmfit.Minimizer(lambda current: problem.residuals(numbers(current)), parameters, **how).leastsq(
         ftol=precision, xtol=precision
     )
-    covariance = getattr(found, "covar", None) if errors else None
-    return Minimum(numbers(found.params), float(found.chisqr), covariance, bool(found.success))
+    covariance = getattr(result, "covar", None) if errors else None
+    return Minimum(numbers(result.params), float(result.chisqr), covariance, bool(result.success))
 
 
 def with_errors(problem: Problem, start: Array) -> tuple[Problem, Minimum]:
@@ -626,7 +630,7 @@ def idle(problem: Problem) -> list[str]:
     """Free keys that have no effect on the curves."""
     sizes = np.sqrt(np.sum(_derivatives(problem, problem.start, range(len(problem.free))) ** 2, axis=0))
     least = _NO_EFFECT * math.sqrt(len(problem.values))
-    return [one.key for one, size in zip(problem.free, sizes, strict=True) if size < least]
+    return [item.key for item, size in zip(problem.free, sizes, strict=True) if size < least]
 
 
 def entangled(problem: Problem) -> list[list[str]]:
@@ -693,8 +697,8 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
         if distance not in known:
             held = bound if distance == room else best.x[k] + sign * distance
             guess = _nearest(problem, (start, best.x + along * (held - best.x[k]) / spread), k, held)
-            found = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
-            root, start = math.sqrt(max(found.chi_square - best.chi_square, 0.0)), found.x
+            result = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
+            root, start = math.sqrt(max(result.chi_square - best.chi_square, 0.0)), result.x
             known[distance] = 0.0 if abs(root / rise - 1.0) < _END else root - rise
         return known[distance]
 
@@ -730,12 +734,12 @@ def problem_of(
             raise BadInput([f"--common {name}: no such curve; measured: {', '.join(curve.name for curve in curves)}"])
     values = np.concatenate([curve.values for curve in curves])
     if len(values) <= len(free):
-        said = f"{len(values)} measured number{'s' if len(values) > 1 else ''} cannot tell {len(free)} free"
-        raise BadInput([f"{tables[0].path}: {said}; measure more, or free fewer keys"])
+        message = f"{len(values)} measured number{'s' if len(values) > 1 else ''} cannot tell {len(free)} free"
+        raise BadInput([f"{tables[0].path}: {message}; measure more, or free fewer keys"])
     guesses = [np.full(len(c.values), 0.01 * max(float(np.abs(c.values).max()), 1e-300)) for c in curves]
     sigma = [guess if curve.errors is None else curve.errors for curve, guess in zip(curves, guesses, strict=True)]
     unknown = [np.full(len(curve.values), curve.errors is None) for curve in curves]
     number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
     zero = np.zeros(len(values))
-    kept = np.concatenate(sigma), number, np.concatenate(unknown), zero, zero
-    return Problem(tuple(tables), tuple(groups), tuple(free), dict(common), values, *kept, {})
+    columns = np.concatenate(sigma), number, np.concatenate(unknown), zero, zero
+    return Problem(tuple(tables), tuple(groups), tuple(free), dict(common), values, *columns, {})

@@ -92,22 +92,22 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
     draws : int
         Curves drawn for each mechanism.
     """
-    found = [(WHOLE, problem, best)]
+    fits = [(WHOLE, problem, best)]
     for name, other in _others(problem):
-        found.append((name, other, _least(other, _starts(other))))
-    criteria = [one.criterion(least.chi_square) for _, one, least in found]
+        fits.append((name, other, _least(other, _starts(other))))
+    criteria = [item.criterion(least.chi_square) for _, item, least in fits]
     worst = min(criteria) + _HOPELESS
     judged = []
-    for place, ((name, one, least), aicc) in enumerate(zip(found, criteria, strict=True)):
+    for place, ((name, item, least), aicc) in enumerate(zip(fits, criteria, strict=True)):
         p_value, rejected = math.nan, place > 0
         if place and aicc < worst:
             rng = np.random.default_rng([seed, place])
-            p_value = _p_value(one, least, problem, best, rng, draws)
+            p_value = _p_value(item, least, problem, best, rng, draws)
             rejected = p_value <= _RARE and aicc - (criteria[0] if name in _PARTS else min(criteria)) >= _WORSE
-        judged.append(Judged(name, one.numbers(least.x), least.chi_square, aicc, p_value, rejected))
+        judged.append(Judged(name, item.numbers(least.x), least.chi_square, aicc, p_value, rejected))
     sufficient, words = _verdict(judged)
     words = "\n".join(filter(None, [words, _lacking(problem)]))
-    return Verdict(tuple(sorted(judged, key=lambda one: one.aicc)), sufficient, words)
+    return Verdict(tuple(sorted(judged, key=lambda item: item.aicc)), sufficient, words)
 
 
 def _verdict(judged: list[Judged]) -> tuple[str, str]:
@@ -117,18 +117,18 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
         return "", "there is no other mechanism to compare with"
     if math.isinf(whole.aicc):
         return "", f"the data cannot tell: AICc of {WHOLE} needs two points more than free numbers; measure more"
-    left = [one for one in others if not one.rejected]
+    left = [item for item in others if not item.rejected]
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
     first, ahead = left[0], whole.aicc - left[0].aicc
     evidence = f"p = {first.p_value:.2g}, AICc {abs(ahead):.2g} {'lower' if ahead > 0.0 else 'higher'} than of {WHOLE}"
     if len(left) > 1 or (first.name not in _PARTS and ahead < _WORSE):
-        names = " and ".join(one.name for one in left)
+        names = " and ".join(item.name for item in left)
         return "", f"the data cannot tell: {names} {'is' if len(left) == 1 else 'are'} not rejected, nor is {WHOLE}"
     if first.name not in _PARTS:
         return first.name, f"the data prefer {first.name} ({evidence}) and reject the others"
-    said = f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well ({evidence})"
-    return first.name, said + (": measure more" if first.p_value <= _RARE else "")
+    message = f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well ({evidence})"
+    return first.name, message + (": measure more" if first.p_value <= _RARE else "")
 
 
 def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
@@ -155,12 +155,12 @@ def _acting(problem: Problem) -> tuple[bool, bool]:
 
 def _lacking(problem: Problem) -> str:
     """What the curves or the scenario lack for bonds, fluctuations and theories to be told apart; "" for nothing."""
-    several = [group for groups in problem.groups for group in groups]
-    if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in several):
-        said = "the curves were measured at rest, where every mechanism is JKR's contact: they tell its work of"
+    all_groups = [group for groups in problem.groups for group in groups]
+    if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in all_groups):
+        message = "the curves were measured at rest, where every mechanism is JKR's contact: they tell its work of"
         cure = 'measure while it slides, with a column "speed [mm/s]"'
-        return f"{said} adhesion and its modulus alone; to compare mechanisms, {cure}"
-    lacks = [one for one, acts in zip(_TABLES, _acting(problem), strict=True) if not acts]
+        return f"{message} adhesion and its modulus alone; to compare mechanisms, {cure}"
+    lacks = [item for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts]
     return "\n".join(
         f"no {name} act in the scenario; to compare with them, add for example {table}" for name, table in lacks
     )
@@ -168,28 +168,28 @@ def _lacking(problem: Problem) -> str:
 
 def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:
     """A problem with some numbers fixed, and without the keys that these leave without effect."""
-    free = tuple(one for one in problem.free if not one.key.startswith(without))
-    found = replace(problem, free=free, fixed=fixed)
-    left_out = idle(found)
-    return replace(found, free=tuple(one for one in free if one.key not in left_out))
+    free = tuple(item for item in problem.free if not item.key.startswith(without))
+    result = replace(problem, free=free, fixed=fixed)
+    left_out = idle(result)
+    return replace(result, free=tuple(item for item in free if item.key not in left_out))
 
 
 def _starts(problem: Problem) -> list[Array]:
     """Where to look for the minimum: a theory's own number at several sizes, as most contacts bear only some."""
     if not problem.theory or problem.theory not in _THEORIES or not _THEORIES[problem.theory][1]:
         return [problem.start]
-    found = []
+    starts = []
     for size in (0.01, 0.1, 0.5):
         start = problem.start
         start[len(problem.free) - 1] = size
-        found.append(start)
-    return found
+        starts.append(start)
+    return starts
 
 
 def _least(problem: Problem, starts: list[Array], precision: float = 1e-8) -> Minimum:
     """The least of the minima from several starts."""
-    found = (minimum(problem, start, precision=precision) for start in starts)
-    return min(found, key=lambda one: one.chi_square)
+    minima = (minimum(problem, start, precision=precision) for start in starts)
+    return min(minima, key=lambda item: item.chi_square)
 
 
 def _p_value(
@@ -199,17 +199,17 @@ def _p_value(
 
     Where the measured one is soon seen to be nothing rare, no more are drawn.
     """
-    measured, made, larger = least.chi_square - best.chi_square, poorer.predicted(least.x), 0
+    measured, expected, larger = least.chi_square - best.chi_square, poorer.predicted(least.x), 0
     if measured <= _FINE * least.chi_square:  # what more acts explains nothing, as precisely as draws are fitted
         return 1.0
-    shared = {one.key: x for one, x in zip(poorer.free, least.x, strict=False)}
-    alike = np.array([shared.get(one.key, x) for one, x in zip(whole.free, best.x, strict=False)])
+    shared = {item.key: x for item, x in zip(poorer.free, least.x, strict=False)}
+    alike = np.array([shared.get(item.key, x) for item, x in zip(whole.free, best.x, strict=False)])
     alike = np.append(alike, best.x[len(whole.free) :])
     for drawn_so_far in range(1, draws + 1):
-        values = made + np.hypot(whole.sigma, whole.noise) * rng.standard_normal(len(made))
+        values = expected + np.hypot(whole.sigma, whole.noise) * rng.standard_normal(len(expected))
         for name, size in whole.common.items():
             values = np.where(whole.of(name), values * (1.0 + size * rng.standard_normal()), values)
-        drawn, full = (replace(one, values=values) for one in (poorer, whole))
+        drawn, full = (replace(item, values=values) for item in (poorer, whole))
         ratio = _least(drawn, [least.x], _FINE).chi_square - _least(full, [best.x, alike], _FINE).chi_square
         larger += ratio >= measured
         if larger == _ENOUGH:

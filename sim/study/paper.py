@@ -93,10 +93,10 @@ Row = tuple[Any, ...]
 
 def _check(name: str, equation: str, computed: ArrayLike, expected: ArrayLike, tolerance: float = 1e-12) -> Check:
     """A line from numbers or arrays; of arrays the worst entry is shown."""
-    found, wanted = (np.atleast_1d(values).astype(float) for values in np.broadcast_arrays(computed, expected))
-    errors = np.abs(found - wanted) / np.where(wanted == 0.0, 1.0, np.abs(wanted))
+    value, wanted = (np.atleast_1d(values).astype(float) for values in np.broadcast_arrays(computed, expected))
+    errors = np.abs(value - wanted) / np.where(wanted == 0.0, 1.0, np.abs(wanted))
     worst = np.unravel_index(np.argmax(np.where(np.isnan(errors), np.inf, errors)), errors.shape)
-    return Check(name, equation, float(found[worst]), float(wanted[worst]), float(errors[worst]), tolerance)
+    return Check(name, equation, float(value[worst]), float(wanted[worst]), float(errors[worst]), tolerance)
 
 
 def _kernel(x: ArrayLike, y: ArrayLike) -> np.ndarray:
@@ -170,8 +170,8 @@ def _disc() -> Iterator[Row]:
     field = halfspace.disc_displacement(r * np.cos(TURN), r * np.sin(TURN), 1.0, 1.0, 1.0)
     mean = np.sum(WEIGHTS * u * 2.0 * (1.0 - u * u) * field.mean(axis=1))
     volume = np.pi * RADIUS**2 * halfspace.disc_mean_displacement(*DISC)
-    found, direct = halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0), np.vectorize(_convolved)(x, y)
-    yield "displacement field, 40 points", "A8", found, direct
+    displacement, direct = halfspace.disc_displacement(x, y, 1.0, 1.0, 1.0), np.vectorize(_convolved)(x, y)
+    yield "displacement field, 40 points", "A8", displacement, direct
     yield "... at the centre, tau0 a/G", "A8", v[0], 3.0 / 4.0
     yield "... at the edge, along", "A8", v[1], 3.0 / (2.0 * np.pi) + 1.0 / (6.0 * np.pi)
     yield "... at the edge, across", "A8", v[2], 3.0 / (2.0 * np.pi) - 1.0 / (6.0 * np.pi)
@@ -343,10 +343,10 @@ def _masking() -> Iterator[Row]:
     masked = np.asarray(Ripple(1.000001 * lens, WIDTH / WAVES).surface_energy(SHEAR), float)
     contact = jkr.radius_at_load(LOAD, WORK - masked, SPHERE, MODULUS)
     for length, shear, width, printed in (("0.24", SHEAR, WIDTH, 375.0), ("4", 0.5e6, 4e-3, 51.0)):
-        found = halfspace.masking_amplitude(WORK, width / WAVES, shear)
+        amplitude = halfspace.masking_amplitude(WORK, width / WAVES, shear)
         closed = 4.0 * math.sqrt(np.pi * WAVES * shear * WORK / width)
-        yield f"masking amplitude, L = {length} mm", "Sec. 4", found, closed
-        yield "... in kPa, as printed", "Sec. 4", found / 1e3, printed, 0.5 / printed
+        yield f"masking amplitude, L = {length} mm", "Sec. 4", amplitude, closed
+        yield "... in kPa, as printed", "Sec. 4", amplitude / 1e3, printed, 0.5 / printed
     across = halfspace.masking_amplitude(WORK, WIDTH / WAVES, SHEAR, math.pi / 2)
     closed = 4.0 * math.sqrt(np.pi * WAVES * SHEAR * WORK / WIDTH)
     yield "... of a ripple across, L = 0.24 mm (not in the paper)", "45", across, closed / math.sqrt(2.0)

@@ -117,7 +117,7 @@ def test_steady_sliding_is_what_a_run_at_a_steady_speed_ends_in():
         made, names = rows_of(scene, speed=SPEEDS[::3])
         (group,) = likelihood.groups(scene, made)
         alone = likelihood.by_steady_sliding(group, {}, names)
-        sampled = likelihood.asked([group], {}, names, False)
+        sampled = likelihood.by_runs([group], {}, names, False)
         for name in names:
             assert_allclose(alone[name], sampled.mean[name], rtol=1e-12, atol=0, equal_nan=False, err_msg=label)
             assert np.all(sampled.error[name] == 0.0)
@@ -345,7 +345,7 @@ def test_members_shift_the_fit_and_their_error_joins_the_datas(tmp_path, truth):
     found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
     (rms, _), noise = found.numbers, found.problem.noise
     assert found.converged and abs(rms.value - rms.steady) > rms.error and np.all(noise[6:9] > 0.0)
-    again = likelihood.asked(found.problem.groups[0], found.values, ["contact_area"], False)
+    again = likelihood.by_runs(found.problem.groups[0], found.values, ["contact_area"], False)
     assert_allclose(found.problem.predicted(found.best.x)[:10], again.mean["contact_area"], rtol=2e-4)
     assert_allclose(noise[:10], again.error["contact_area"], rtol=0.05)
 
