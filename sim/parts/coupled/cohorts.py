@@ -39,6 +39,7 @@ from sim.parts.coupled.row import (
     next_step,
     pieces_to,
     pull_on,
+    record,
     run_away,
     slider_in,
     slip_free,
@@ -55,14 +56,7 @@ PARTS = (0.5 + (GAMMA - 1.0) * _MIDDLE, _MIDDLE, 0.5 - GAMMA * _MIDDLE)
 #: Start or node of a sub-step: slip and displacement of the body since its start, area, shear displacement, radius,
 #: share bound, sum of the stretches, of their squares and of those times the rupture rate, share cut since the node
 #: before, speed of a body with mass.
-NODE = np.dtype(
-    [
-        (name, float)
-        for name in (
-            "slip", "body", "area", "sheared", "radius", "bound", "moment", "square", "lost", "cut", "body_speed",
-        )
-    ]
-)  # fmt: skip
+NODE = record("slip body area sheared radius bound moment square lost cut body_speed")
 #: Turns of the secant method; share of the slope of a fresh elastic bond below which a sub-step is too long.
 _TURNS, _FALLING = 25, 0.02
 #: The same where slip alone breaks bonds: their force may hardly rise.
@@ -308,16 +302,15 @@ def longest(row, unit, rules):
 
 
 @device
-def bend_of(nodes, step):
-    """Return the acceleration of the interface in a sub-step."""
-    early, late = nodes[1].slip / GAMMA, (nodes[2].slip - nodes[1].slip) / (1.0 - GAMMA)
-    return 2.0 / step * (late - early) / step
+def bend_of(nodes, step, row, slider):
+    """Return the acceleration of the interface in a sub-step, and the error of its slip by the change of that.
 
-
-@device
-def error_of_way(bend, step, nodes, row, slider):
-    """Return the error of a sub-step's slip by the change of its acceleration, over the tolerance."""
-    return step * step / 24.0 * math.fabs(bend - row.acceleration) / (1.0 + math.fabs(nodes[2].slip)) / slider.tolerance
+    The error is relative to the tolerance.
+    """
+    slip = nodes[2].slip
+    early, late = nodes[1].slip / GAMMA, (slip - nodes[1].slip) / (1.0 - GAMMA)
+    bend = 2.0 / step * (late - early) / step
+    return bend, step * step / 24.0 * math.fabs(bend - row.acceleration) / (1.0 + math.fabs(slip)) / slider.tolerance
 
 
 @device
@@ -498,8 +491,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             factor = min(factor, other)
         way, bend, error = nodes[2].slip, 0.0, math.inf
         if new_count >= 0:
-            bend = bend_of(nodes, step)
-            error = error_of_way(bend, step, nodes, row, slider)
+            bend, error = bend_of(nodes, step, row, slider)
         grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)
         if not (error <= 1.0 and factor >= 1.0):
             pool[:3, :count] = saved[:, :count]

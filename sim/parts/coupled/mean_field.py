@@ -13,6 +13,7 @@ from sim.parts.coupled.radau import (
     newton,
     share_after_rest,
     share_left,
+    sum_over,
     try_sub_step,
 )
 from sim.parts.coupled.row import (
@@ -279,7 +280,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
         if not stands:
             row.next_step = step * grows
             continue
-        speed = _last_speed(nodes, step) * sense
+        speed = sum_over(RATES, 2, nodes.slip) / step * sense
         stops = speed <= 0.0
         if stops and row.speed == 0.0:
             row.next_step = 0.25 * step
@@ -290,7 +291,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                 step = near + (far - near) * (above / (above - below))
                 if not newton(row, start, step, slider, along, contact, nodes):
                     break
-                speed = _last_speed(nodes, step) * sense
+                speed = sum_over(RATES, 2, nodes.slip) / step * sense
                 if math.fabs(speed) <= 1e-13 * math.fabs(row.speed) or far - near <= 1e-15 * far:
                     break
                 if speed > 0.0:
@@ -309,12 +310,6 @@ def _slide(row, start, slider, along, contact, nodes, energy):
         if stops or start >= length:
             return start
     return -1.0
-
-
-@device
-def _last_speed(nodes, step):
-    """Return the speed of the interface at the end of a sub-step."""
-    return (RATES[2, 0] * nodes.slip[0] + RATES[2, 1] * nodes.slip[1] + RATES[2, 2] * nodes.slip[2]) / step
 
 
 @device

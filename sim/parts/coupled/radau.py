@@ -98,7 +98,7 @@ def share_after_rest(bound, time, law):
 
 
 @device
-def _sum(weights, i, values):
+def sum_over(weights, i, values):
     """Return the sum over the three nodes of values times a row of weights."""
     return weights[i, 0] * values[0] + weights[i, 1] * values[1] + weights[i, 2] * values[2]
 
@@ -125,20 +125,21 @@ def equations(row, nodes, start, step, slider, law, contact):
             nodes.radii[i] = radius
         if not (bound >= 0.0 and area >= 0.0):
             return math.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-        speed = _sum(RATES, i, nodes.slip) * over
-        body = speed + _sum(RATES, i, nodes.sheared) * over if gives else speed
+        speed = sum_over(RATES, i, nodes.slip) * over
+        body = speed + sum_over(RATES, i, nodes.sheared) * over if gives else speed
         stress = moment + viscosity * speed
         yields, softer = compliance(radius, slider)
         nodes.residuals[0, i] = (
             area * stress + damping * body - nodes.pulls[i] + stiffness * (nodes.slip[i] + nodes.sheared[i])
         )
         if mass > 0.0:
-            bend = (_sum(BENDS, i, nodes.slip) + _sum(BENDS, i, nodes.sheared)) * over - _OFF[i] * row.body_speed
+            bend = (sum_over(BENDS, i, nodes.slip) + sum_over(BENDS, i, nodes.sheared)) * over
+            bend -= _OFF[i] * row.body_speed
             nodes.residuals[0, i] += mass * bend * over
         nodes.residuals[1, i] = row.sheared + nodes.sheared[i] - yields * area * stress
         of_bound, of_moment, on, turn, _, _ = kinetics(bound, moment, speed, law)
-        nodes.residuals[2, i] = _sum(RATES, i, nodes.bound) * over - of_bound[0]
-        nodes.residuals[3, i] = _sum(RATES, i, nodes.moment) * over - of_moment[0]
+        nodes.residuals[2, i] = sum_over(RATES, i, nodes.bound) * over - of_bound[0]
+        nodes.residuals[3, i] = sum_over(RATES, i, nodes.moment) * over - of_moment[0]
         if i == 1:
             of_bonds = of_bound[1], of_bound[2], turn, of_moment[1], on[0], on[1]
         if law.sense != 0.0:
@@ -205,8 +206,8 @@ def correct(modes, slopes, slider, nodes):
     """Replace the residuals at the nodes by the changes that remove them."""
     balance, yielding, bonds, stretches = nodes.residuals[0], nodes.residuals[1], nodes.residuals[2], nodes.residuals[3]
     gives = slider.yielding + slider.yielding_radius > 0.0
-    real = _sum(BACK, 0, balance), _sum(BACK, 0, yielding) if gives else 0.0, _sum(BACK, 0, bonds)
-    by_real = _correction(modes[0], slopes, real[0], real[1], real[2], _sum(BACK, 0, stretches))
+    real = sum_over(BACK, 0, balance), sum_over(BACK, 0, yielding) if gives else 0.0, sum_over(BACK, 0, bonds)
+    by_real = _correction(modes[0], slopes, real[0], real[1], real[2], sum_over(BACK, 0, stretches))
     turned = _turned(yielding) if gives else complex(0.0, 0.0)
     by_pair = _correction(modes[1], slopes, _turned(balance), turned, _turned(bonds), _turned(stretches))
     for i in range(3):
@@ -218,7 +219,7 @@ def correct(modes, slopes, slider, nodes):
 @device
 def _turned(residuals):
     """Return the part of an unknown's residuals in the complex modes."""
-    return complex(_sum(BACK, 1, residuals), _sum(BACK, 2, residuals))
+    return complex(sum_over(BACK, 1, residuals), sum_over(BACK, 2, residuals))
 
 
 #: Share of a sub-step after which the defect of the equations is measured, between the first two nodes; there values

@@ -27,16 +27,7 @@ from sim.parts.bonds.tracked import (
     one_step,
     room,
 )
-from sim.parts.coupled.cohorts import (
-    NODE,
-    accept_nodes,
-    balance,
-    before_node,
-    begin_sub_step,
-    bend_of,
-    error_of_way,
-    stored_energy,
-)
+from sim.parts.coupled.cohorts import NODE, accept_nodes, balance, before_node, begin_sub_step, bend_of, stored_energy
 from sim.parts.coupled.row import (
     COLUMNS,
     ENERGIES,
@@ -217,8 +208,7 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
             if not _try(nodes, at_start, start, step, row, slider, contact):
                 step, cut = 0.25 * step, False
                 continue
-            bend = bend_of(nodes, step)
-            error = error_of_way(bend, step, nodes, row, slider)
+            bend, error = bend_of(nodes, step, row, slider)
             grows = min(4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else 4.0
             if not error <= 1.0:
                 step, cut = step * grows, False
