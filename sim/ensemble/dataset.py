@@ -3,7 +3,6 @@
 A file that HDF5 is still writing is lost when the run is killed; a renamed part is not.
 """
 
-import concurrent.futures
 import contextlib
 import functools
 import hashlib
@@ -20,7 +19,7 @@ import netCDF4
 import numpy as np
 from pydantic import TypeAdapter
 
-from sim.ensemble.execute import WorkerDied, pool
+from sim.ensemble.execute import pool
 from sim.ensemble.plan import Plan, part_name
 from sim.ensemble.store import Blocks
 from sim.ensemble.variables import DISC_ENERGIES, KNOWN_ERRORS, MAP, NUMBERS, Variable
@@ -316,13 +315,8 @@ def write(outline: Outline, parts: Blocks, path: Path) -> None:
         if 8 * sum(sizes) <= _IN_MEMORY:
             _write(outline, parts, path, diskless=True, persist=True)
             return
-        executor = pool(1)
-        try:
+        with pool(1) as executor:
             executor.submit(_write, outline, parts, path).result()
-        except concurrent.futures.BrokenExecutor:
-            raise WorkerDied(f"the process that writes {path} died: the disk may be full, or memory short") from None
-        finally:
-            executor.shutdown(kill_workers=True)
     except RuntimeError:
         with path.open("ab") as file:  # which raises what HDF5 does not tell
             file.write(bytes(2**20))

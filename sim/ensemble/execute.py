@@ -162,11 +162,8 @@ def compute(
             _work_off(team, advance, store, chains, progress, stop)
     elif jobs > 1 and len(tasks) > 1:
         while chains and not stop():  # a broken pool is replaced
-            executor = pool(min(jobs, len(tasks)))
-            try:
+            with pool(min(jobs, len(tasks))) as executor:
                 _work_off(_Team(executor, lambda: jobs), advance, store, chains, progress, stop)
-            finally:
-                executor.shutdown(kill_workers=True)
     else:
         try:
             _work_off(_Team(_Here(), lambda: 1), advance, store, chains, progress, stop)
@@ -277,8 +274,15 @@ def _code() -> tuple[str, ...]:
     return digest().hex(), *(version(name) for name in ("numpy", "scipy", "numba"))
 
 
-def pool(jobs: int) -> Any:
-    """Return an executor of new processes, which end with this one; scripts, threads and notebooks may start them."""
+@contextlib.contextmanager
+def pool(jobs: int) -> Iterator[Any]:
+    """Give an executor of new processes, which end with this one; scripts, threads and notebooks may start them.
+
+    Raises
+    ------
+    WorkerDied
+        If a process dies and the caller does not handle that.
+    """
     import loky  # slow to import
     from loky.backend import get_context
 
@@ -287,13 +291,18 @@ def pool(jobs: int) -> Any:
     environment |= _ONE_THREAD | {"LOKY_MAX_MEMORY_LEAK_SIZE": "1e18"}
     how: dict[str, Any] = {"initializer": _begin, "initargs": (os.getpid(),), "env": environment}
     executor = loky.ProcessPoolExecutor(jobs, context=get_context("loky"), **how)
-    if threading.current_thread() is threading.main_thread():
-        before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # new processes inherit that
-        try:
-            executor.submit(os.getpid)  # which starts all processes
-        finally:
-            signal.signal(signal.SIGINT, before or signal.SIG_DFL)
-    return executor
+    try:
+        if threading.current_thread() is threading.main_thread():
+            before = signal.signal(signal.SIGINT, signal.SIG_IGN)  # new processes inherit that
+            try:
+                executor.submit(os.getpid)  # which starts all processes
+            finally:
+                signal.signal(signal.SIGINT, before or signal.SIG_DFL)
+        yield executor
+    except concurrent.futures.BrokenExecutor:
+        raise WorkerDied("a process died: it was killed or crashed, or there was too little memory") from None
+    finally:
+        executor.shutdown(kill_workers=True)
 
 
 def _begin(parent: int) -> None:

@@ -12,7 +12,7 @@ from sim.units.terminal import progress_bar
 
 
 def missing() -> list[str]:
-    """Kernels and laws whose code is not in the cache; those of long modules, which take longest, first."""
+    """Return the kernels and laws whose code is not in the cache; first those of long modules, which take longest."""
     texts = jit.sources()
     for module in texts:
         importlib.import_module(module)
@@ -21,7 +21,7 @@ def missing() -> list[str]:
 
 
 def compile_missing(jobs: int | None) -> str:
-    """Compile what is not in the cache; what was done, in words.
+    """Compile what is not in the cache; return a text about it.
 
     Raises
     ------
@@ -42,13 +42,10 @@ def compile_all(names: list[str], jobs: int | None, progress: Callable[[int], No
     """Compile kernels and laws into the cache in some processes, by default one a core."""
     import loky  # slow to import
 
-    executor = pool(min(jobs or loky.cpu_count(), len(names)))
-    try:
+    with pool(min(jobs or loky.cpu_count(), len(names))) as executor:
         for future in concurrent.futures.as_completed([executor.submit(_compile, name) for name in names]):
             future.result()
             progress(1)
-    finally:
-        executor.shutdown(kill_workers=True)
 
 
 def _compile(name: str) -> None:
