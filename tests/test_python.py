@@ -125,6 +125,13 @@ def test_stats_are_a_data_frame_in_si(file, dataset):
         assert found.attrs["units"]["contact_radius_mean"] == "m"
 
 
+def test_the_table_of_a_run_with_cycles_gives_no_warning():  # warnings are errors here
+    cycles = {"load": {"from": "4 mN", "to": "1 mN", "cycles": 2}}
+    counted = {**SCENE["bonds"], "model": "counted", "rebinding_rate": "500 1/s", "sites": 50}
+    dataset = sim.run(swapped(contact=cycles, drive={"speed": "1 mm/s"}, bonds=counted, ensemble={"members": 3}))
+    assert "per cycle" in str(analysis.highlights(dataset))
+
+
 def test_a_value_of_a_sweep_is_chosen_by_its_key():
     dataset = sim.run({**SCENE, "sweep": {"contact.load": ["1 mN", "4 mN"]}})
     for value in ("4 mN", 4e-3):

@@ -914,7 +914,7 @@ def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
         ("first_masked", "masked", "had their adhesion masked"),
     ):
         if event in event_times:
-            of = of.merge(lifetimes(dataset, event_times[event], name, words))
+            of = of.merge(lifetimes(dataset, event_times[event], name, words), compat="no_conflicts")
     return of if is_stationary(dataset) else of.drop_vars([name for name in of if "_rate" in str(name)])
 
 

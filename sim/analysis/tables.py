@@ -420,7 +420,8 @@ def as_means(speeds: xr.Dataset) -> xr.Dataset:
 def once(dataset: xr.Dataset) -> xr.Dataset:
     """Statistics of what a run has once."""
     result = events(dataset)
-    return summary(result.assign_attrs(dataset.attrs)).merge(as_means(half_lives(dataset, result)))
+    once = as_means(half_lives(dataset, result))
+    return summary(result.assign_attrs(dataset.attrs)).merge(once, compat="no_conflicts")
 
 
 # --- a long table for other programs, and a data frame ---
