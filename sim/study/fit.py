@@ -74,7 +74,7 @@ _OTHER = ("clock", "record", "ensemble", "seed")
 
 
 class Found(NamedTuple):
-    """What was found of one free number [SI]: its value, standard error, interval, and its value in steady sliding."""
+    """Estimate of one free number [SI]: its value, standard error and interval, and its value in steady sliding."""
 
     free: Free
     value: float
@@ -184,7 +184,7 @@ def _likely(problem: Problem, best: Minimum) -> float:
 
 
 def _poor(problem: Problem, best: Minimum) -> bool:
-    """Whether the curves lie further off than their errors."""
+    """Return True if the curves lie further off than their errors."""
     freedom = problem.freedom
     return bool(freedom > 0 and best.chi_square > freedom + 4.0 * math.sqrt(2.0 * freedom))
 
@@ -247,7 +247,7 @@ def _remarks(problem: Problem, best: Minimum, estimates: list[Found], alike: Arr
 
 
 def _of_other_units(problem: Problem, best: Minimum) -> list[str]:
-    """What to say of curves of which measured and fitted values differ as if one had another unit."""
+    """Return a remark on each curve whose measured and fitted values differ as if one had another unit."""
     remarks, fitted = [], np.abs(problem.predicted(best.x))
     for number in range(int(problem.curve[-1]) + 1):
         here = problem.curve == number
@@ -261,7 +261,7 @@ def _of_other_units(problem: Problem, best: Minimum) -> list[str]:
 
 
 def _free(scenario: Scenario, text: str) -> Free:
-    """What a text ``KEY`` or ``KEY=LOW:HIGH`` frees."""
+    """Return the free number of a text ``KEY`` or ``KEY=LOW:HIGH``."""
     key, sign, span = text.partition("=")
     key, known = key.strip(), quantities(scenario)
     if key not in known or key.partition(".")[0] in _OTHER or known[key][0].whole:
@@ -453,7 +453,7 @@ def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -
 
 
 def _made_here(path: Path, read: Sequence[Path]) -> bool:
-    """Whether a file is a scenario that a fit has made, and none that is read."""
+    """Return True if a file is a scenario that a fit has written, and no input."""
     if not path.is_file() or any(item.exists() and path.samefile(item) for item in read):
         return False
     with path.open("rb") as file:
@@ -486,7 +486,7 @@ def _end(end: float, is_open: bool) -> str:
 
 
 def _explanation(fit: Fit) -> str:
-    """How good the fit is, and what to know of its numbers."""
+    """Return the quality of the fit and the remarks on its numbers."""
     problem, best = fit.problem, fit.best
     likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
     lines = [f"chi^2 {best.chi_square:.4g} at {problem.freedom} degrees of freedom{likely}, AICc {fit.aicc:.4g}"]
@@ -538,7 +538,7 @@ def _described(item: Found) -> dict[str, Any]:
 
 
 def _common(fit: Fit) -> dict[str, float]:
-    """What was found of the relative errors that curves share."""
+    """Return the estimated relative errors that curves share."""
     shares = fit.best.x[len(fit.problem.free) :]
     return {name: float(size * x) for (name, size), x in zip(fit.problem.common.items(), shares, strict=True)}
 

@@ -45,7 +45,7 @@ _OF_SLIDER = ("speed", "slider_position", "spring_force")
 
 
 class Curve(NamedTuple):
-    """What was measured of one variable in one table [SI]; its ``errors`` are standard errors, None where unknown."""
+    """Measured values of one variable in one table [SI]; ``errors`` are standard errors, None if they are unknown."""
 
     name: str
     values: Array
@@ -117,7 +117,7 @@ def read(path: Path, scenario: Scenario) -> Measured:
 
 
 def _against(conditions: dict[str, Array], curves: tuple[Curve, ...]) -> str:
-    """What is wrong with the signs of forces and speeds; "" for nothing."""
+    """Return the fault in the signs of forces and speeds; "" if there is none."""
     for name, values, _ in curves:
         if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
             return f"{name} has the sign of the speed; turn the sign of one of them"
@@ -150,7 +150,7 @@ def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
 
 
 def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
-    """What a table lacks to say at which speed, or under which load, its rows were measured; "" for nothing."""
+    """Return the column that a table lacks for the speed or the load of its rows, in words; "" if it is complete."""
     drive, contact = scenario.drive, scenario.contact
     if "t" in conditions:
         columns = [name for name in ("speed", "held") if name in conditions]
@@ -250,7 +250,7 @@ def _group(scenario: Scenario, table: Measured, rows: NDArray[np.int64]) -> Grou
 
 
 def _course(time: Array, values: Array) -> Any:
-    """What holds the sphere at the rows: a number where that is one."""
+    """Return the course of the mount at the rows, a number if it is constant."""
     return float(values[0]) if np.all(values == values[0]) else {"time": time, "value": values}
 
 
@@ -308,7 +308,7 @@ class Sampled(NamedTuple):
 
 
 def by_runs(result: list[Group], values: Values, names: list[str], by_time: bool) -> Sampled:
-    """What the scenario's own models give at the rows of a table, with the noise of its seed.
+    """Return the means by the scenario's own models at the rows of a table, with the noise of its seed.
 
     Where rows have times, or only speeds and the drive passes through these, they are read along the scenario's run;
     else each row is a run of its own at a steady speed, of the stage if there is one, of which the second half counts.
@@ -538,7 +538,7 @@ class Problem:
         return fine[:, 0], by_steady_sliding(group, self.numbers(x), [name], self.theory)[name]
 
     def of(self, name: str) -> NDArray[np.bool_]:
-        """Where a variable is."""
+        """Return True at the numbers of a variable."""
         names = [curve.name for table in self.tables for curve in table.curves]
         return np.array([item == name for item in names])[self.curve]
 

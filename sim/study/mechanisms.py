@@ -147,14 +147,14 @@ def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
 
 
 def _acting(problem: Problem) -> tuple[bool, bool]:
-    """Whether bonds and fluctuations change the work of adhesion in the scenario as it is."""
+    """Return True for bonds and for fluctuations if they change the work of adhesion in the scenario as it is."""
     scene, known = problem.groups[0][0].scenario, quantities(problem.groups[0][0].scenario)
     bonded = scene.adhesion.bond_share > 0.0 and scene.population.carries_stress
     return bonded, "shear.paid_by_adhesion" in known and scene.fluctuations.paid_by_adhesion > 0.0
 
 
 def _lacking(problem: Problem) -> str:
-    """What the curves or the scenario lack for bonds, fluctuations and theories to be told apart; "" for nothing."""
+    """Return advice if the curves or the scenario cannot distinguish bonds, fluctuations and theories; else ""."""
     all_groups = [group for groups in problem.groups for group in groups]
     if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in all_groups):
         message = "the curves were measured at rest, where every mechanism is JKR's contact: they tell its work of"
@@ -175,7 +175,7 @@ def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:
 
 
 def _starts(problem: Problem) -> list[Array]:
-    """Where to look for the minimum: a theory's own number at several sizes, as most contacts bear only some."""
+    """Return starts of the search: a theory's own number at several sizes, as most contacts bear only some."""
     if not problem.theory or problem.theory not in _THEORIES or not _THEORIES[problem.theory][1]:
         return [problem.start]
     starts = []
