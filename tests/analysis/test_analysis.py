@@ -122,7 +122,7 @@ def test_pieces_of_a_few_numbers_give_the_statistics_of_all_at_once(tmp_path, mo
 
 
 @pytest.mark.parametrize("chunks", [None, (2, 4)])
-@pytest.mark.parametrize("room", [8, 400, 10**6])
+@pytest.mark.parametrize("room", [8, 10**6])
 def test_pieces_cover_all_of_a_dataset(monkeypatch, room, chunks):
     monkeypatch.setattr(dataset_module, "ROOM", room)
     numbers = xr.Dataset({"x": (("member", "t"), np.arange(7.0 * 23.0).reshape(7, 23))})

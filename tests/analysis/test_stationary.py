@@ -8,9 +8,6 @@ import xarray as xr
 from helpers.lens import scene
 from scipy import special, stats
 
-import sim
-from benchmarks.scenes import tiled
-from benchmarks.timing import child
 from sim import analysis
 from sim.analysis.statistics import QUANTILES, quantile_ranks
 from sim.ensemble.simulate import run
@@ -183,14 +180,3 @@ def test_a_distribution_is_over_members_and_the_second_half():
     np.testing.assert_allclose(found["contact_area_quantile"], late.quantile(LEVELS, ("member", "t")).T, rtol=1e-13)
     assert found["contact_area_mean"].dims == ("contact_load",) and float(found["speed_sem"].max()) == 0.0
     assert found["contact_area_quantile_low"].attrs["units"] == "m^2"
-
-
-@pytest.mark.verify
-def test_a_dataset_of_4_gb_is_summarised_within_1_and_a_half_gb(tmp_path):
-    clock, speed = Clock(duration=0.467, step=1e-3), drive.Steady(speed=3e-3)
-    short = run(scene(clock=clock, drive=speed, ensemble=Ensemble(members=1024)))
-    tiled(short, tmp_path / "long.nc", 92)
-    with sim.open(tmp_path / "long.nc") as dataset:
-        assert dataset.nbytes > 3.9e9
-    _, megabytes = child("-m", "sim", "stats", str(tmp_path / "long.nc"))
-    assert megabytes < 1500.0

@@ -60,7 +60,7 @@ def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
     assert analysis.highlights(alone) == [] and "contact_radius_mean" in sim.stats(alone)
 
 
-@pytest.mark.parametrize(("loads", "shares", "rows"), [(2, 1, 2), (5, 1, 5), (30, 1, 12), (3, 2, 6), (6, 5, 12)])
+@pytest.mark.parametrize(("loads", "shares", "rows"), [(2, 1, 2), (30, 1, 12), (6, 5, 12)])
 def test_table_of_a_steady_sweep_has_a_row_for_each_point(loads, shares, rows):
     sweep = {
         "contact.load": list(np.linspace(1e-3, 9e-3, loads)),
