@@ -46,7 +46,7 @@ try:
 
     FAST = True
 except ImportError:
-    FAST, CPUDispatcher = False, object
+    FAST, CPUDispatcher = False, object  # type: ignore[misc,assignment]
 
 
 class _Device(CPUDispatcher):
@@ -60,7 +60,7 @@ class _Device(CPUDispatcher):
         return self._from_python(*arguments)
 
 
-def device(function: Callable, inline: str = "never") -> Callable:
+def device(function: Callable, inline: Any = "never") -> Callable:
     """Compile a helper into its callers."""
     if not FAST:
         return numba.njit(error_model="numpy", inline=inline)(function)
@@ -117,7 +117,8 @@ def machine() -> str:
     vectors = np._core._multiarray_umath.__cpu_features__  # type: ignore[attr-defined]
     features = binding.get_host_cpu_features().flatten()
     processor = binding.get_process_triple(), binding.get_host_cpu_name(), features
-    return repr((processor, numba.config.CPU_NAME, numba.config.CPU_FEATURES, np.__version__, vectors))
+    chosen = [getattr(numba.config, name) for name in ("CPU_NAME", "CPU_FEATURES", "ENABLE_AVX")]
+    return repr((processor, chosen, np.__version__, vectors))
 
 
 def _path(name: str) -> Path:
@@ -164,7 +165,7 @@ def _public(decorator: Callable[..., Callable], function: Callable) -> Callable:
         notice(_name(function))
     try:
         Path(_cache_folder()).mkdir(parents=True, exist_ok=True)
-        numba.config.CACHE_DIR = _cache_folder()  # read as the function is decorated
+        setattr(numba.config, "CACHE_DIR", _cache_folder())  # noqa: B010  read as the function is decorated
         return decorator(cache=True)(function)
     except (OSError, RuntimeError):  # no place for a cache
         return decorator()(function)
