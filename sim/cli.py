@@ -139,7 +139,11 @@ def cli() -> None:
 @_MEMBERS
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
 @click.option("--scheduler", default="", metavar="ADDRESS", help="Work on the cluster of this scheduler of dask.")
-@click.option("--max-memory", metavar="SIZE", help="Memory for all processes, such as 4 GB; less of it means fewer.")
+@click.option(
+    "--max-memory",
+    metavar="SIZE",
+    help="Memory for all processes, such as 4 GB; default SIM_MAX_MEMORY or what is free.",
+)
 @click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
 @click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; the last one makes the file.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
