@@ -15,6 +15,7 @@ import netCDF4
 import pytest
 import xarray as xr
 from click.testing import CliRunner
+from helpers.cases import posix
 from helpers.commands import SCENE, sim
 
 from sim import cli
@@ -31,7 +32,7 @@ def here(tmp_path, monkeypatch):
     """An empty folder to work in, with one scenario."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(terminal, "_SLOW", 1e6)  # no stage is named because others use the machine, too
-    Path("scene.toml").write_text(SCENE)
+    Path("scene.toml").write_text(SCENE, encoding="utf-8")
     return tmp_path
 
 
@@ -83,6 +84,7 @@ def test_check_and_a_run_without_its_table_import_neither_xarray_nor_figures_nor
     assert not table & {"pint", "dask.array", "matplotlib", "scipy.stats"}  # xarray would, to compare types with theirs
 
 
+@posix
 @pytest.mark.parametrize("orders", [[signal.SIGTERM], [signal.SIGINT, signal.SIGTERM]])
 def test_an_order_to_stop_keeps_what_is_computed(here, orders):
     points = 'sweep={"contact.load"={from=1e-3, to=4e-3, count=1000}}'
@@ -106,7 +108,7 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
         "stopped; what was computed is kept: the same command with --resume goes on",
     ]
     assert not (here / "outputs" / "scene.nc").exists()
-    assert "simulating" in Path("outputs/scene.nc.log").read_text()
+    assert "simulating" in Path("outputs/scene.nc.log").read_text(encoding="utf-8")
     kept = {part: part.stat().st_mtime_ns for part in parts.glob("*.npz")}
     assert kept
     other = sim(*long[:-1], 'sweep={"contact.load"={from=1e-3, to=4e-3, count=100}}', "--resume")
@@ -131,7 +133,7 @@ def test_a_reader_that_leaves_at_once_is_no_error(here):
 
 
 def test_bad_input_ends_with_2_one_line_a_fault_and_nothing_written(here):
-    Path("bad.toml").write_text(SCENE.replace("4 mN", "4 kg").replace("members", "memebrs"))
+    Path("bad.toml").write_text(SCENE.replace("4 mN", "4 kg").replace("members", "memebrs"), encoding="utf-8")
     before = sorted(here.iterdir())
     done = sim("run", "bad.toml")
     assert done.exit_code == 2
@@ -151,12 +153,12 @@ def test_run_writes_the_dataset_into_a_new_folder_and_ends_with_its_path(here):
     assert sorted(path.name for path in (here / "new/folder").iterdir()) == ["x.nc", "x.nc.log"]
     with xr.open_dataset("new/folder/x.nc") as dataset:
         assert dataset.sizes["member"] == 3
-    entry = json.loads(Path("new/folder/x.nc.log").read_text())
+    entry = json.loads(Path("new/folder/x.nc.log").read_text(encoding="utf-8"))
     assert entry["arguments"] == ["run", "scene.toml", "-o", "new/folder/x.nc"]
     assert list(entry["stages"]) == ["loading", "simulating", "writing", "table"]
     assert 0.0 < sum(entry["stages"].values()) <= entry["seconds"] + 0.05
     assert sim("run", "scene.toml", "-o", "new/folder/x.nc", "--force", "--no-table").exit_code == 0
-    last = json.loads(Path("new/folder/x.nc.log").read_text().splitlines()[-1])
+    last = json.loads(Path("new/folder/x.nc.log").read_text(encoding="utf-8").splitlines()[-1])
     assert list(last["stages"]) == ["loading", "simulating", "writing"]
 
 
@@ -221,6 +223,7 @@ def test_seed_members_and_set_reach_the_run(here):
         assert json.loads(dataset.attrs["scenario_overrides"])["contact.load"] == "2 mN"
 
 
+@posix
 def test_a_run_that_cannot_begin_names_the_fault_with_its_code_and_writes_nothing(here, monkeypatch):
     monkeypatch.setattr("sim.ensemble.simulate.simulate", None)  # computing would fail
     Path("loop.nc").symlink_to("loop.nc")
@@ -241,15 +244,16 @@ def test_a_run_that_cannot_begin_names_the_fault_with_its_code_and_writes_nothin
         assert sorted(here.iterdir()) == before
 
 
+@posix
 def test_a_table_that_a_scenario_reads_is_never_its_output(here):
     text = "time [s], speed [m/s]\n0, 1e-3\n1, 2e-3\n"
-    Path("v.csv").write_text(text)
+    Path("v.csv").write_text(text, encoding="utf-8")
     Path("link.nc").symlink_to("v.csv")
     for where in ('drive={ model="table", file="v.csv" }', 'sweep={ drive=[{ model="table", file="v.csv" }] }'):
         for name in ("v.csv", "link.nc"):
             done = sim("run", "scene.toml", "--set", where, "-o", name, "--force")
             assert (done.exit_code, done.stderr.startswith(f"{name}: the command reads")) == (2, True)
-            assert Path("v.csv").read_text() == text
+            assert Path("v.csv").read_text(encoding="utf-8") == text
 
 
 def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
@@ -281,11 +285,12 @@ def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
     assert sim("stats", "x.nc").exit_code == 0
 
 
+@posix
 def test_a_log_is_no_link_to_a_file_of_others(here):
-    Path("mine").write_text("mine")
+    Path("mine").write_text("mine", encoding="utf-8")
     Path("x.nc.log").symlink_to("mine")
     assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
-    assert Path("mine").read_text() == "mine"
+    assert Path("mine").read_text(encoding="utf-8") == "mine"
 
 
 def test_a_folder_that_cannot_be_written_ends_with_74(here, monkeypatch):
@@ -396,7 +401,7 @@ def test_a_wrong_command_ends_with_2():
 def dataset(tmp_path_factory):
     """A finished run."""
     folder = tmp_path_factory.mktemp("run")
-    (folder / "scene.toml").write_text(SCENE)
+    (folder / "scene.toml").write_text(SCENE, encoding="utf-8")
     assert sim("run", folder / "scene.toml", "-o", folder / "x.nc", "--quiet").exit_code == 0
     return folder / "x.nc"
 
@@ -405,7 +410,7 @@ def test_stats_prints_a_table_and_writes_csv(dataset, here):
     done = sim("stats", dataset, "--csv", "new/table.csv")
     assert done.exit_code == 0
     assert done.stdout.splitlines()[-1] == "new/table.csv"
-    header, *rows = csv.reader(Path("new/table.csv").read_text().splitlines())
+    header, *rows = csv.reader(Path("new/table.csv").read_text(encoding="utf-8").splitlines())
     assert len({len(row) for row in (header, *rows)}) == 1 and sum("contact_area" in row for row in rows) == 11
     assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
 
@@ -426,7 +431,7 @@ def made(dataset, here):
     Path("x.nc").write_bytes(dataset.read_bytes())
     Path("other.nc").write_bytes(dataset.read_bytes())
     for name in ("x.png", "x-time.png", "x.csv", "notes", "new.png", "new.nc", "new.toml"):
-        Path(name).write_text("mine")
+        Path(name).write_text("mine", encoding="utf-8")
     return here
 
 
@@ -451,6 +456,7 @@ def test_an_existing_file_is_replaced_only_if_asked(made, monkeypatch):
             assert {name for name, now in content(made).items() if now != before.get(name)} == {file}
 
 
+@posix
 def test_a_scenario_its_tables_and_datasets_are_never_replaced(made):
     Path("copy").write_bytes(Path("scene.toml").read_bytes())
     Path("link.png").symlink_to("x.nc")
@@ -483,7 +489,7 @@ def test_an_older_picture_stays_whole_if_the_new_one_fails(made, monkeypatch):
 def test_plot_writes_a_picture_beside_the_dataset_or_where_asked(dataset, here):
     done = sim("plot", dataset, "time", "-o", "new/picture.svg")
     assert (done.exit_code, done.stdout) == (0, "new/picture.svg\n")
-    assert Path("new/picture.svg").read_text().startswith("<?xml")
+    assert Path("new/picture.svg").read_text(encoding="utf-8").startswith("<?xml")
     assert sim("plot", dataset).stdout.strip() == str(dataset.with_suffix(".png"))
     assert dataset.with_suffix(".png").exists()
 
@@ -549,7 +555,7 @@ MARKS = "\x1b]0;x\x07\x9b31m\u202e\u2066"
 
 
 def test_a_terminal_without_utf_8_gets_replacements(here):
-    Path("scene.toml").write_text(SCENE.replace("a scene", "τ1 → ∮"))
+    Path("scene.toml").write_text(SCENE.replace("a scene", "τ1 → ∮"), encoding="utf-8")
     command = [sys.executable, "-m", "sim", "check", "scene.toml"]
     environment = os.environ | {"PYTHONIOENCODING": "cp1252"}
     done = subprocess.run(command, env=environment, capture_output=True, timeout=120, check=False)
@@ -569,9 +575,10 @@ def test_a_table_on_a_terminal_without_utf_8_has_replacements(monkeypatch):
 
 def test_no_control_character_of_a_scenario_or_a_dataset_reaches_the_terminal(dataset, here):
     name = json.dumps(MARKS)
-    Path("scene.toml").write_text(SCENE.replace('"a scene"', name) + f'[sweep]\n"contact.load" = [1, {name}]\n')
+    text = SCENE.replace('"a scene"', name)
+    Path("scene.toml").write_text(text + f'[sweep]\n"contact.load" = [1, {name}]\n', encoding="utf-8")
     odd = f"{MARKS}.toml"
-    Path(odd).write_text(SCENE.replace('"a scene"', name))
+    Path(odd).write_text(SCENE.replace('"a scene"', name), encoding="utf-8")
     shown = [sim("check", "scene.toml"), sim("check", odd), sim("run", odd), sim("new", odd), sim("check", "a", MARKS)]
     shown += [sim("check", odd, "--set", f"{MARKS}=1"), sim("stats", MARKS), sim("plot", dataset, MARKS)]
     shown += [sim("stats", dataset, "--where", f"{MARKS}=1"), sim("stats", f"outputs/{MARKS}.nc")]
@@ -585,7 +592,8 @@ def test_no_control_character_of_a_scenario_or_a_dataset_reaches_the_terminal(da
 
 def test_everything_is_printed_by_one_function():
     folder = Path(cli.__file__).parent
-    assert [path.name for path in folder.rglob("*.py") if "click.echo(" in path.read_text()] == ["terminal.py"]
+    texts = {path.name: path.read_text(encoding="utf-8") for path in folder.rglob("*.py")}
+    assert [name for name, text in texts.items() if "click.echo(" in text] == ["terminal.py"]
 
 
 def test_max_memory_is_honoured_and_refused_with_the_least_where_it_is_too_little(here, monkeypatch):

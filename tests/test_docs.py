@@ -9,6 +9,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+from helpers.cases import posix
 from numpy.testing import assert_allclose
 
 from sim.cli import _values, cli
@@ -116,6 +117,7 @@ def test_an_answer_of_the_gallery_is_found_again(entry):
         assert_allclose(number, NUMBERS[entry.name][name], rtol=1e-6, atol=1e-9, err_msg=name)
 
 
+@posix
 @pytest.mark.verify
 def test_the_python_of_the_readme_makes_its_scenes_and_figures(tmp_path, monkeypatch):
     code = re.search(r"In Python:\n\n```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.S)[1]

@@ -52,7 +52,7 @@ def test_importing_the_package_imports_nothing_heavy():
 
 def test_a_scene_is_a_path_a_dictionary_or_keywords(dataset, tmp_path):
     path = tmp_path / "x.toml"
-    path.write_text(TEXT)
+    path.write_text(TEXT, encoding="utf-8")
     keywords = sim.Scenario(**{**SCENE, "drive": {"model": "ramp", "start": "0 mm/s", "stop": "10 mm/s"}})
     for scene in (path, str(path), sim.load(SCENE), keywords):
         np.testing.assert_array_equal(sim.run(scene).contact_radius, dataset.contact_radius)
@@ -113,7 +113,7 @@ def test_check_reads_as_the_command_prints(tmp_path):
     found = sim.check(SCENE)
     assert repr(found) == str(found)
     assert "sphere.radius" in found
-    (tmp_path / "x.toml").write_text(TEXT)
+    (tmp_path / "x.toml").write_text(TEXT, encoding="utf-8")
     printed = CliRunner().invoke(cli, ["check", str(tmp_path / "x.toml")]).stdout
     assert printed == f"{sim.check(tmp_path / 'x.toml')}\n"
 
@@ -203,7 +203,7 @@ def test_a_scene_is_shown_in_a_line_and_as_a_table():
 
 def test_a_file_that_is_no_dataset_is_bad_input(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("x.nc").write_text("nothing")
+    Path("x.nc").write_text("nothing", encoding="utf-8")
     for name, words in (("no.nc", "no such file"), (".", "is a folder"), ("x.nc", "not a netCDF file")):
         with pytest.raises(sim.BadInput, match=words):
             sim.open(name)

@@ -80,7 +80,7 @@ def four(name):
 
 @pytest.mark.parametrize("name", NAMES + WHOLE)
 def test_every_scenario_opens_with_its_question_and_runs(name):
-    text = (FOLDER / f"{name.removeprefix('whole ')}.toml").read_text()
+    text = (FOLDER / f"{name.removeprefix('whole ')}.toml").read_text(encoding="utf-8")
     assert text.startswith("# ") and "?" in text.partition("\n\n")[0]
     dataset = four(name)
     going = dataset["runaway_time"].isnull() if "runaway_time" in dataset else True

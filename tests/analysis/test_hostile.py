@@ -10,6 +10,7 @@ import netCDF4
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.cases import posix
 from helpers.commands import SCENE as SCENE_OF_A_SECOND, sim
 
 import sim as package
@@ -37,8 +38,8 @@ def folder(sound, tmp_path, monkeypatch):
     """A folder with a dataset, its scenario and a scenario with a map."""
     monkeypatch.chdir(tmp_path)
     shutil.copy(sound, "out.nc")
-    Path("scene.toml").write_text(SCENE)
-    Path("mapped.toml").write_text(SCENE + MAP)
+    Path("scene.toml").write_text(SCENE, encoding="utf-8")
+    Path("mapped.toml").write_text(SCENE + MAP, encoding="utf-8")
     return tmp_path
 
 
@@ -55,7 +56,7 @@ def cut_short():
 
 
 FAULTS = {
-    "text": lambda: Path("out.nc").write_text("a, b\n1, 2\n"),
+    "text": lambda: Path("out.nc").write_text("a, b\n1, 2\n", encoding="utf-8"),
     "cut short": cut_short,
     "foreign": lambda: xr.Dataset({"x": ("y", np.ones(3))}).to_netcdf("out.nc"),
     "no scenario": edited(lambda file: file.setncattr("scenario_resolved", "[" * 100_000)),
@@ -77,7 +78,7 @@ def test_a_damaged_or_foreign_dataset_is_refused_in_one_line_by_every_command(fo
     assert sim("run", "scene.toml", "-o", "out.nc", "--resume").exit_code in (2, 73)
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no named pipes")
+@posix
 def test_pipes_are_not_waited_for(folder):
     os.mkfifo("map.nc")
     for command, name in (("stats", "map.nc"), ("check", "mapped.toml")):
@@ -158,21 +159,22 @@ def test_a_dataset_makes_no_figure_read_a_file_it_names():
 @pytest.mark.parametrize("text", ["alice,hunter2\nbob,swordfish\n", "time [s], speed [m/s]\n-31415,hunter2\n"])
 def test_no_message_shows_what_stands_in_a_file_elsewhere(folder, text):
     outside = folder / "secret.csv"
-    outside.write_text(text)
+    outside.write_text(text, encoding="utf-8")
     spectrum = 'model = "mean"\nspectrum = {{ model = "measured", file = "{}", spacing = "1 um" }}\n'
     (folder / "in").mkdir()
     scenario = folder / "in" / "scene.toml"
     head, rest = SCENE.split('model = "ramp"\nfrom = "1 mm/s"\nto = "20 mm/s"\n')
     for name in (outside.as_posix(), "../secret.csv"):
         for drive in (f'model = "table"\nfile = "{name}"\n', f'model = "steady"\nspeed = 1\n[shear]\n{spectrum}'):
-            scenario.write_text(head + drive.format(name) + rest)
+            scenario.write_text(head + drive.format(name) + rest, encoding="utf-8")
             message = sim("check", scenario).stderr.replace(str(folder), "")
             assert message and not any(word in message for word in ("alice", "hunter2", "swordfish", "31415"))
 
 
 def test_names_of_columns_are_shown_of_a_table_beside_the_scenario(folder):
-    Path("v.csv").write_text("time [s], sped [m/s], x=3\n0,1,2\n")
+    Path("v.csv").write_text("time [s], sped [m/s], x=3\n0,1,2\n", encoding="utf-8")
     Path("scene.toml").write_text(
-        SCENE.replace('model = "ramp"\nfrom = "1 mm/s"\nto = "20 mm/s"', 'model = "table"\nfile = "v.csv"')
+        SCENE.replace('model = "ramp"\nfrom = "1 mm/s"\nto = "20 mm/s"', 'model = "table"\nfile = "v.csv"'),
+        encoding="utf-8",
     )
     assert 'column "speed" is missing' in sim("check", "scene.toml").stderr

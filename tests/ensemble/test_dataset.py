@@ -181,10 +181,10 @@ def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
 
 def test_an_existing_output_is_kept(tmp_path):
     path = tmp_path / "out.nc"
-    path.write_text("precious")
+    path.write_text("precious", encoding="utf-8")
     with pytest.raises(ensemble.OutputExists, match="replace"):
         ensemble.run(sample(), path)
-    assert path.read_text() == "precious"
+    assert path.read_text(encoding="utf-8") == "precious"
     ensemble.run(sample(), path, replace=True)
     assert xr.open_dataset(path).attrs["sim_version"]
 

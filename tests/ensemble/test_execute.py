@@ -133,8 +133,8 @@ def test_processes_need_no_guard_in_what_starts_them_and_import_nothing_of_the_p
     folder, path = tmp_path / "present", tmp_path / "own" / "out.nc"
     folder.mkdir()
     for name in ("queue", "numpy", "loky"):
-        (folder / f"{name}.py").write_text("raise SystemExit('wrong')")
-    (tmp_path / "script.py").write_text(script(path))
+        (folder / f"{name}.py").write_text("raise SystemExit('wrong')", encoding="utf-8")
+    (tmp_path / "script.py").write_text(script(path), encoding="utf-8")
     if way == "notebook":
         nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
         cell = nbformat.v4.new_code_cell(script(path))

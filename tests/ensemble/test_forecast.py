@@ -4,7 +4,6 @@ import itertools
 import json
 import math
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -167,14 +166,14 @@ def long_scene(steps, record):
 
 @pytest.mark.verify
 def test_a_member_of_a_hundred_million_steps_is_kept_in_blocks_and_goes_on_from_the_last(tmp_path):
-    (tmp_path / "scene.toml").write_text(long_scene(steps=10**8, record=10**7))
+    (tmp_path / "scene.toml").write_text(long_scene(steps=10**8, record=10**7), encoding="utf-8")
     parts = tmp_path / "x.nc.parts"
     command = [sys.executable, "-m", "sim", "run", "scene.toml", "-o", "x.nc", "--quiet"]
     early = subprocess.Popen(command, cwd=tmp_path)
     while early.poll() is None and len(list(parts.glob("point*"))) < 40:
         time.sleep(0.01)
     early.kill()
-    assert early.wait() == -signal.SIGKILL
+    assert early.wait() != 0
     done = {path: path.stat().st_mtime_ns for path in parts.glob("point*")}
     resumed = subprocess.Popen([*command, "--resume"], cwd=tmp_path)
     while resumed.poll() is None and len(list(parts.glob("point*"))) < len(done) + 3:
@@ -188,7 +187,8 @@ def test_a_member_of_a_hundred_million_steps_is_kept_in_blocks_and_goes_on_from_
 def test_the_largest_process_of_a_run_of_ten_times_the_members_is_as_large(tmp_path, jobs):
     largest = []
     for members in (500, 5000):
-        (tmp_path / "scene.toml").write_text(long_scene(steps=2000, record=2) + f"[ensemble]\nmembers = {members}\n")
+        scene = long_scene(steps=2000, record=2) + f"[ensemble]\nmembers = {members}\n"
+        (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
         files = str(tmp_path / "scene.toml"), "-o", str(tmp_path / "x.nc")
         largest.append(child("-m", "sim", "run", *files, "--force", "--no-table", "-j", jobs)[1])
         assert 2**20 * largest[-1] < 1.5 * memory(Plan.of(load(tmp_path / "scene.toml")), 1)

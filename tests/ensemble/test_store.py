@@ -16,6 +16,7 @@ import pytest
 import xarray as xr
 from click.testing import CliRunner
 from helpers import scenes
+from helpers.cases import posix
 from helpers.scenes import CELL, LOADS, LOADS_AND_SHARES, SPECTRUM, scene
 
 from sim.cli import cli
@@ -95,7 +96,7 @@ def killed(operation, path, **how):
         os._exit(status)
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills copies of this process")
+@posix
 @pytest.mark.parametrize("some", [11, pytest.param(1, marks=pytest.mark.verify)])
 def test_a_run_that_was_killed_at_a_file_operation_goes_on_to_the_same_numbers(tmp_path, some):
     path, operation, ended = tmp_path / "killed" / "out.nc", 1, -signal.SIGKILL
@@ -259,8 +260,8 @@ def test_nothing_stays_on_a_system_that_removes_no_open_file(tmp_path, monkeypat
 def test_a_file_that_comes_during_a_run_is_not_replaced(tmp_path):
     path = tmp_path / "out.nc"
     with pytest.raises(OutputExists, match="has come during the run"):
-        ensemble.run(sample(), path, progress=lambda done: path.write_text("precious"))
-    assert path.read_text() == "precious"
+        ensemble.run(sample(), path, progress=lambda done: path.write_text("precious", encoding="utf-8"))
+    assert path.read_text(encoding="utf-8") == "precious"
     path.unlink()
     ensemble.run(sample(), path, resume=True)
     assert same(path)
@@ -293,16 +294,17 @@ def test_runs_of_an_older_version_are_named(tmp_path, monkeypatch):
     for folder in ("old.nc.parts", "shards.nc.parts/1-of-2"):
         (tmp_path / folder).mkdir(parents=True)
         manifest = {"format": store._OLDER, "run": {"version": {"sim": "0.2.0"}}}
-        (tmp_path / folder / "manifest.json").write_text(json.dumps(manifest))
+        (tmp_path / folder / "manifest.json").write_text(json.dumps(manifest), encoding="utf-8")
     for name in ("old.nc", "shards.nc"):
         with pytest.raises(OutputExists, match=r"made by sim 0.2.0: finish it there"):
             ensemble.run(sample(), tmp_path / name, resume=True)
 
 
+@posix
 def test_a_folder_that_no_run_made_is_not_touched(tmp_path):
     other, folder = tmp_path / "precious", tmp_path / "out.nc.parts"
     other.mkdir()
-    (other / "thesis.txt").write_text("years")
+    (other / "thesis.txt").write_text("years", encoding="utf-8")
     folder.symlink_to(other)
     for _ in range(2):
         with pytest.raises(OutputExists, match="is not the folder of a run; move it away"):
@@ -316,7 +318,7 @@ def test_a_folder_that_no_run_made_is_not_touched(tmp_path):
 def test_files_that_others_put_into_the_folder_stay(tmp_path):
     path = tmp_path / "out.nc"
     folder = stopped(path)
-    (folder / "notes.txt").write_text("do not forget")
+    (folder / "notes.txt").write_text("do not forget", encoding="utf-8")
     ensemble.run(sample(), path, resume=True)
     assert names(folder) == ["notes.txt"]
 

@@ -48,7 +48,7 @@ def test_kernels_are_compiled_in_other_processes_once(cold, monkeypatch):
 
 
 def test_a_cache_that_cannot_be_written_is_no_success(cold, monkeypatch):
-    (cold / "sliding-sim").write_text("no folder")
+    (cold / "sliding-sim").write_text("no folder", encoding="utf-8")
     monkeypatch.setattr(warm, "missing", lambda: SOME[:1])
     done = CliRunner().invoke(cli, ["warm"])
     assert done.exception.exit_code == 74

@@ -1,6 +1,12 @@
-"""Which cases of a parametrisation run in every test, and which in ``make verify`` only."""
+"""Marks of tests and of cases: those of POSIX systems, and those for ``make verify`` only."""
+
+import os
 
 import pytest
+
+posix = pytest.mark.skipif(
+    os.name != "posix", reason="the system has no signals, forks, symbolic links for all users or named pipes of POSIX"
+)
 
 
 def some(cases, *always):

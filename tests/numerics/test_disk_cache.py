@@ -28,6 +28,6 @@ def test_a_result_is_cached_for_each_key_and_only_if_it_took_long(tmp_path, monk
     assert disk_cache.cached("a", lambda: "anew") == "anew"
     monkeypatch.setattr(disk_cache, "digest", lambda: b"of other sources")
     assert disk_cache.cached("a", lambda: "of others") == "of others"
-    (tmp_path / "file").write_text("no folder")
+    (tmp_path / "file").write_text("no folder", encoding="utf-8")
     monkeypatch.setenv("SIM_CACHE_DIR", str(tmp_path / "file"))
     assert disk_cache.cached("a", lambda: "in no folder") == "in no folder"

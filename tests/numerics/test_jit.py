@@ -78,7 +78,7 @@ def cubed(x):
 def compiled_in(tmp_path, monkeypatch):
     """A little law compiled or loaded anew with its cache in a folder, and what it gives."""
     source = tmp_path / "little.py"
-    source.write_text(LITTLE)
+    source.write_text(LITTLE, encoding="utf-8")
 
     def answer(folder):
         monkeypatch.setenv("SIM_CACHE_DIR", str(folder))
@@ -107,9 +107,9 @@ def test_a_missing_broken_read_only_or_full_cache_stops_no_run(tmp_path, compile
         assert compiled_in(tmp_path / "cache") == fresh
         assert compilings.pop() == "little.cubed"
         assert files[0].read_bytes() != wrong
-    (tmp_path / "file").write_text("no folder")
+    (tmp_path / "file").write_text("no folder", encoding="utf-8")
     no_folder = compiled_in(tmp_path / "file")
-    unmakeable = compiled_in("/proc/no-such-place")
+    unmakeable = compiled_in(tmp_path / "file" / "below")
     with room(100):
         no_room = compiled_in(tmp_path / "full")
     assert not [path for path in (tmp_path / "full").rglob("*") if path.is_file()]

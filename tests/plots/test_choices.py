@@ -153,7 +153,7 @@ HEADER = "speed [mm/s], contact_area [mm^2], contact_area_error [%], friction_fo
 def table(tmp_path):
     def written(text):
         path = tmp_path / "measured.csv"
-        path.write_text(text)
+        path.write_text(text, encoding="utf-8")
         return path
 
     return written
@@ -263,7 +263,7 @@ def test_the_command_takes_the_choices_and_replaces_no_table(loads, table, tmp_p
     assert done.exit_code == 0, done.stderr
     assert (tmp_path / "x-curve.png").read_bytes()[:4] == b"\x89PNG"
     assert command("plot", "x.nc", "time", "--data", path, "-o", path, "--force").exit_code == 2
-    assert path.read_text().startswith("speed")
+    assert path.read_text(encoding="utf-8").startswith("speed")
     assert (
         command("plot", "x.nc", "--at", "1 s", "curve", "--force")
         .stderr.strip()

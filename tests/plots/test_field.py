@@ -144,7 +144,7 @@ def test_a_spectrum_is_drawn_before_any_run(tmp_path, monkeypatch):
     q, density = np.geomspace(1e4, 1e6, 9), np.geomspace(1.0, 1e-4, 9)
     monkeypatch.chdir(tmp_path)
     rows = "\n".join(f"{a}; {b}" for a, b in zip(q, density, strict=True))
-    Path("psd.csv").write_text(f"q [rad/m]; C [Pa^2 m^2]\n{rows}")
+    Path("psd.csv").write_text(f"q [rad/m]; C [Pa^2 m^2]\n{rows}", encoding="utf-8")
     panel, below = before(model="tabulated", file="psd.csv").axes
     line, rows = panel.lines[:2]
     table = Tabulated(q, density)
@@ -172,7 +172,7 @@ def test_a_spectrum_that_differs_along_and_across_is_drawn_twice():
 
 def test_sim_plot_draws_a_scenario_before_its_run_and_replaces_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    Path("scene.toml").write_text(STARTER.read_text())
+    Path("scene.toml").write_text(STARTER.read_text(encoding="utf-8"), encoding="utf-8")
     answer = sim("plot", "scene.toml")
     assert (answer.exit_code, answer.stdout) == (0, "outputs/scene-spectrum.png\n")
     made = Path("outputs/scene-spectrum.png").read_bytes()
@@ -185,7 +185,7 @@ def test_sim_plot_draws_a_scenario_before_its_run_and_replaces_nothing(tmp_path,
     ):
         answer = sim("plot", *arguments)
         assert answer.exit_code == 2 and words in answer.stderr
-    Path("ripple.toml").write_text(STARTER.read_text().partition("[shear]")[0])
+    Path("ripple.toml").write_text(STARTER.read_text(encoding="utf-8").partition("[shear]")[0], encoding="utf-8")
     answer = sim("plot", "ripple.toml")
     assert answer.exit_code == 2 and "no spectrum to draw before a run" in answer.stderr
     assert sorted(path.name for path in Path("outputs").iterdir()) == ["scene-spectrum.png"]

@@ -86,7 +86,7 @@ def test_a_dictionary_is_read_as_a_file_is(scene, tmp_path, monkeypatch):
 def test_a_byte_order_mark_and_windows_line_ends_change_nothing(tmp_path):
     path = tmp_path / "x.toml"
     path.write_bytes(b"\xef\xbb\xbf" + LENS.replace("\n", "\r\n").encode())
-    (tmp_path / "y.toml").write_text(LENS)
+    (tmp_path / "y.toml").write_text(LENS, encoding="utf-8")
     assert quantities(load(path)) == quantities(load(tmp_path / "y.toml"))
 
 
@@ -177,7 +177,7 @@ TABLE = '[drive]\nmodel = "table"\nfile = "speeds.csv"\n'
 
 
 def test_a_table_is_read_beside_the_scenario_and_its_text_kept(scene, tmp_path):
-    (tmp_path / "speeds.csv").write_text("time [ms], speed [mm/s]\n0, 1\n1000, 2\n")
+    (tmp_path / "speeds.csv").write_text("time [ms], speed [mm/s]\n0, 1\n1000, 2\n", encoding="utf-8")
     scenario = scene(TABLE)
     assert scenario.drive.time == (0.0, 1.0)
     assert scenario.drive.speed == (1e-3, 2e-3)
@@ -186,8 +186,8 @@ def test_a_table_is_read_beside_the_scenario_and_its_text_kept(scene, tmp_path):
 
 def test_swept_files_are_each_read(scene, tmp_path):
     for name, speed in (("slow", 1), ("fast", 5)):
-        (tmp_path / f"{name}.csv").write_text(f"time [s], speed [mm/s]\n0, {speed}\n1, {speed}\n")
-    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 9\n1, 9\n")
+        (tmp_path / f"{name}.csv").write_text(f"time [s], speed [mm/s]\n0, {speed}\n1, {speed}\n", encoding="utf-8")
+    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 9\n1, 9\n", encoding="utf-8")
     swept = scene(TABLE + '[sweep]\n"drive.file" = ["slow.csv", "fast.csv"]\n')
     assert [point.drive.speed[0] for point in swept.points()] == [1e-3, 5e-3]
     whole = scene('[sweep]\ndrive = [{ model = "table", file = "slow.csv" }, { model = "steady", speed = "2 mm/s" }]\n')
@@ -196,7 +196,7 @@ def test_swept_files_are_each_read(scene, tmp_path):
 
 
 def test_a_sweep_beside_a_file_reads_it_once(scene, tmp_path):
-    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n1, 2\n")
+    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n1, 2\n", encoding="utf-8")
     swept = scene(TABLE + '[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n')
     (tmp_path / "speeds.csv").unlink()
     assert [point.drive.speed for point in swept.points()] == [(1e-3, 2e-3)] * 2
@@ -230,11 +230,11 @@ def alternatives():
 
 def test_every_alternative_of_the_starter_is_a_scene(tmp_path):
     (tmp_path / "x.toml").write_text(STARTER.read_text(encoding="utf-8"), encoding="utf-8")
-    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n2, 5\n")
-    (tmp_path / "loads.csv").write_text("time [s], load [mN]\n0, 4\n2, -1\n")
-    (tmp_path / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 1\n3e5, 1\n")
+    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n2, 5\n", encoding="utf-8")
+    (tmp_path / "loads.csv").write_text("time [s], load [mN]\n0, 4\n2, -1\n", encoding="utf-8")
+    (tmp_path / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 1\n3e5, 1\n", encoding="utf-8")
     waves = np.cos(np.arange(16)[:, None] * 1.7) + np.sin(np.arange(16) * 2.1)
-    (tmp_path / "map.csv").write_text("\n".join(",".join(f"{v:.3e}" for v in row) for row in 1e5 * waves))
+    np.savetxt(tmp_path / "map.csv", 1e5 * waves, fmt="%.3e", delimiter=",")
     cohort = next(content for table, content in alternatives() if table == "bonds" and content["model"] == "cohort")
     rate = {"model": "rate"} | {key: value for key, value in cohort.items() if key not in ("model", "tolerance")}
     beside = {"bonds": {"bonds": cohort, "shear.amplitude": {"model": "constant"}}}  # what some models need

@@ -82,7 +82,7 @@ def test_rows_of_hundreds_of_decades_do_not_overflow():
 
 
 def test_a_table_is_read_from_csv_with_its_units(files):
-    (files.folder / "psd.csv").write_text("# rubber\nq [rad/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n")
+    (files.folder / "psd.csv").write_text("# rubber\nq [rad/mm], C [kPa^2 um^2]\n1, 2\n3, 4\n", encoding="utf-8")
     table = read(files, model="tabulated", file="psd.csv", normalization="in_density")
     assert_allclose(table.wavenumbers, [1e3, 3e3], rtol=1e-15, atol=0)
     assert_allclose(table.densities, [2e-6, 4e-6], rtol=1e-15, atol=0)
@@ -117,7 +117,7 @@ def test_a_table_is_read_from_csv_with_its_units(files):
     ],
 )
 def test_a_wrong_table_is_refused_with_file_line_and_cure(files, text, words):
-    (files.folder / "psd.csv").write_text(text)
+    (files.folder / "psd.csv").write_text(text, encoding="utf-8")
     with pytest.raises(ValidationError, match=words):
         read(files, model="tabulated", file="psd.csv")
 
@@ -270,7 +270,7 @@ def test_what_numpy_saves_as_text_is_read_by_a_header_that_is_given(files):
 
 
 def test_a_table_of_a_file_says_what_the_other_normalization_and_a_plateau_would_make_of_it(files):
-    (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 2\n")
+    (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 2\n", encoding="utf-8")
     given = {"model": "tabulated", "file": "psd.csv"}
     said, cut = read(files, **given).remarks
     assert "rms 1.13e+05 Pa" in said and "7.09e+05 Pa" in said and "39.5 times as large" in said
@@ -284,7 +284,8 @@ def test_a_table_of_a_file_says_what_the_other_normalization_and_a_plateau_would
         assert f"would add {more:.0%} to the mean energy, the rms kept" in kept  # a third
     said, _ = read(files, **given, rms="0.7 MPa").remarks
     assert 'normalization = "in_density" may be meant' in said
-    (files.folder / "psd.csv").write_text("q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 1\n")  # falls as q^-0.63
+    falling = "q [rad/m], C [Pa^2 m^2]\n1e5, 2\n3e5, 1\n"  # as q^-0.63
+    (files.folder / "psd.csv").write_text(falling, encoding="utf-8")
     assert read(files, **given, rms="400 kPa").remarks == ()
     assert Tabulated((1.0, 2.0), (1.0, 1.0)).remarks == ()
 
@@ -354,8 +355,8 @@ def test_a_wrong_map_is_refused_with_the_cure(files, change, words):
 )
 def test_a_wrong_measurement_is_refused_with_the_cure(files, given, words):
     np.savetxt(files.folder / "a.csv", white_map(8, 1.0, 1.0), delimiter=",")
-    (files.folder / "a.nc").write_text("no netCDF")
-    (files.folder / "bad.csv").write_text("x,y\n1,2\n")
+    (files.folder / "a.nc").write_text("no netCDF", encoding="utf-8")
+    (files.folder / "bad.csv").write_text("x,y\n1,2\n", encoding="utf-8")
     with pytest.raises(ValidationError, match=words):
         read(files, model="measured", **given)
 

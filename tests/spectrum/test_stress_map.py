@@ -7,6 +7,7 @@ import pickle
 import numpy as np
 import pytest
 import xarray as xr
+from helpers.cases import posix
 from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
@@ -168,6 +169,7 @@ def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files,
     assert not (files.folder / "was-executed").exists()
 
 
+@posix
 def test_a_pipe_is_not_waited_for(files):
     os.mkfifo(files.folder / "pipe.npy")
     with pytest.raises(ValidationError, match="is no plain file"):

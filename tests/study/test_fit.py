@@ -70,7 +70,7 @@ def table(path, conditions, curves, error=None):
     if error is not None:
         columns |= {f"{name}_error [%]": np.full(len(values), 100.0 * error) for name, values in curves.items()}
     rows = [",".join(f"{value:.12g}" for value in row) for row in zip(*columns.values(), strict=True)]
-    path.write_text("\n".join([",".join(columns), *rows]) + "\n")
+    path.write_text("\n".join([",".join(columns), *rows]) + "\n", encoding="utf-8")
     return path
 
 
@@ -632,7 +632,7 @@ BAD = {
 @pytest.fixture
 def scenario(tmp_path):
     path = tmp_path / "lens.toml"
-    path.write_text(f"# How fast are its bonds?\n#\n# Made up.\n\n{written(LENS)}")
+    path.write_text(f"# How fast are its bonds?\n#\n# Made up.\n\n{written(LENS)}", encoding="utf-8")
     return path
 
 
@@ -643,7 +643,7 @@ def command(*arguments):
 @pytest.mark.parametrize(("text", "said"), BAD.values(), ids=BAD)
 def test_a_bad_table_is_refused_with_one_line_and_nothing_is_written(text, said, scenario, tmp_path):
     path = tmp_path / "bad.csv"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     done = command(scenario, path, "--free", "bonds.critical_speed")
     assert isinstance(done.exception, BadInput) and done.exception.exit_code == 2
     (line,) = done.exception.problems
@@ -662,14 +662,14 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
     assert done.exit_code == 0, done.output
     made = [tmp_path / f"lens_fit.{ending}" for ending in ("toml", "json", "png")]
     assert done.output.rstrip().endswith("\n".join(map(str, made)))
-    numbers = json.loads(made[1].read_text())
+    numbers = json.loads(made[1].read_text(encoding="utf-8"))
     found = load(made[0])
     for key, value in KEYS.items():
         one = numbers["numbers"][key]
         assert one["low"] < value < one["high"] and one["start"] == value
         assert_allclose(quantities(found)[key][1], one["value"], rtol=1e-11)
-    asked = [line for line in scenario.read_text().splitlines() if line.startswith("#")]
-    assert asked and made[0].read_text().startswith("\n".join(asked))
+    asked = [line for line in scenario.read_text(encoding="utf-8").splitlines() if line.startswith("#")]
+    assert asked and made[0].read_text(encoding="utf-8").startswith("\n".join(asked))
     assert {**dict(quantities(found)), **dict.fromkeys(KEYS)} == {**quantities(load(scenario)), **dict.fromkeys(KEYS)}
     assert (
         made[2].read_bytes().startswith(b"\x89PNG")
@@ -684,9 +684,9 @@ def test_the_command_writes_scenario_numbers_and_figure_and_replaces_none_unaske
     assert command(scenario, curves, "--free", "bonds.stress", "--steady", "--force", "--units", "um/s").exit_code == 0
     assert chosen == ["µm/s"]
     assert all(path.read_bytes() != old for path, old in zip(made, before, strict=True))
-    made[0].write_text("# my own\n")
+    made[0].write_text("# my own\n", encoding="utf-8")
     refused = command(scenario, curves, "--free", "bonds.stress", "--steady", "--force")
-    assert "never replaced" in str(refused.exception) and made[0].read_text() == "# my own\n"
+    assert "never replaced" in str(refused.exception) and made[0].read_text(encoding="utf-8") == "# my own\n"
 
 
 def test_a_unit_that_no_axis_has_is_refused_before_the_fit(scenario, curves, monkeypatch):
@@ -710,7 +710,7 @@ def test_a_table_of_percent_and_of_units_has_the_same_errors(tmp_path, truth):
     percent = table(tmp_path / "percent.csv", {"speed [m/s]": SPEEDS}, {"contact_area": area}, 0.02)
     units = tmp_path / "units.csv"
     rows = [f"{v:.12g};{1e12 * a:.12g};{1e12 * 0.02 * a:.12g}" for v, a in zip(SPEEDS, area, strict=True)]
-    units.write_text("\n".join(["speed [m/s];contact_area [um^2];contact_area_error [um^2]", *rows]))
+    units.write_text("\n".join(["speed [m/s];contact_area [um^2];contact_area_error [um^2]", *rows]), encoding="utf-8")
     one, other = (read(path, load(LENS)).curves[0] for path in (percent, units))
     assert_allclose(one.errors, other.errors, rtol=1e-10)
     assert_allclose(one.values, other.values, rtol=1e-10)

@@ -130,7 +130,7 @@ def test_files_are_read_beside_the_scenario_and_otherwise_here(tmp_path, monkeyp
 @pytest.mark.parametrize("name", ["missing.csv", "", "bad\0name", "folder", "long.csv", "latin.csv"])
 def test_a_file_that_cannot_be_read_is_named_with_a_cure(tmp_path, name, monkeypatch):
     (tmp_path / "folder").mkdir()
-    (tmp_path / "long.csv").write_text("12345")
+    (tmp_path / "long.csv").write_text("12345", encoding="utf-8")
     (tmp_path / "latin.csv").write_bytes(b"\xff\xfe")
     monkeypatch.setattr(tables, "_MOST_BYTES", 4)
     with pytest.raises(ValueError, match=r"(cannot be read .*; name a plain file|save it as plain CSV in UTF-8)"):

@@ -80,7 +80,8 @@ def _open(path, flags, *arguments, real=os.open, **keywords):
 
 def _fsync(descriptor, real=os.fsync):
     number = descriptor if isinstance(descriptor, int) else descriptor.fileno()
-    flags = next(line.split()[1] for line in Path(f"/proc/self/fdinfo/{number}").read_text().splitlines()
+    lines = Path(f"/proc/self/fdinfo/{number}").read_text(encoding="utf-8").splitlines()
+    flags = next(line.split()[1] for line in lines
                  if line.startswith("flags"))  # fmt: skip
     if int(flags, 8) & 3 == os.O_RDONLY:
         raise OSError(9, "Bad file descriptor")

@@ -272,7 +272,7 @@ field = {{ file = "map.csv", pixel = "6 um", noise = "1 kPa" }}
 
 def test_check_prints_the_energy_of_the_map_beside_that_of_its_spectrum(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.toml").write_text(TOML)
+    (tmp_path / "scene.toml").write_text(TOML, encoding="utf-8")
     field = patchy() - patchy().mean()
     np.savetxt(tmp_path / "map.csv", field.T + 5e4, delimiter=",")
     answer = command("check", "scene.toml", "--members", "5")
@@ -291,9 +291,9 @@ def test_check_prints_the_energy_of_the_map_beside_that_of_its_spectrum(tmp_path
 
 def test_a_bad_map_ends_in_one_message_and_nothing_is_written(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.toml").write_text(TOML)
+    (tmp_path / "scene.toml").write_text(TOML, encoding="utf-8")
     for content in ("x [m], stress [Pa]\n1, 2\n", "1\n", "1, 2\n3\n", "\n".join(["1, nan, 3, 4, 5, 6, 7, 8"] * 8)):
-        (tmp_path / "map.csv").write_text(content)
+        (tmp_path / "map.csv").write_text(content, encoding="utf-8")
         for arguments in (("run", "scene.toml"), ("check", "scene.toml")):
             answer = command(*arguments)
             assert answer.exit_code == 2 and not answer.stdout
