@@ -155,8 +155,8 @@ def _run(
     folder = Unfinished(target, identity(attributes(plan)), order, lambda path: identity(attributes_of(path)))
     tasks = list(plan.tasks())
     names = [name for task in tasks for name in task.names]
-    own = [name for task in plan.share(*shard) for name in task.names]
-    if not (of := folder.begin(shard, resume, replace, own)):
+    names_of_shard = [name for task in plan.share(*shard) for name in task.names]
+    if not (of := folder.begin(shard, resume, replace, names_of_shard)):
         return True
     wanted = list(range(1, of + 1)) if shard == WHOLE else [shard[0]]
     busy: list[int] = []
@@ -237,18 +237,18 @@ def _shapes(task: Task) -> Iterator[dict[str, tuple[int, ...]]]:
 def _record(task: Task, point: Scenario, state: State | None, block: Block) -> tuple[State, dict[str, np.ndarray]]:
     """One part: every variable over a block and the maps in it; and the state at its end."""
     clock, members, records, noise = point.clock, task.members, block.records, MemberNoise.of(point.seed, task.members)
-    variables = [one for one in VARIABLES if one.name in task.quantities]
+    variables = [variable for variable in VARIABLES if variable.name in task.quantities]
     rows_of = {name: len(members) if name in task.each else 1 for name in task.quantities}
-    rows = {one.name: np.empty((rows_of[one.name], len(records))) for one in variables}
+    rows = {variable.name: np.empty((rows_of[variable.name], len(records))) for variable in variables}
     maps: dict[str, np.ndarray] = {}
     drawn, drawn_at = int(np.sum(members < point.record.map_members)), snapshots(point)
     for steps in block.pieces(max(1, _STEPS // clock.stride), drawn_at):
         state, course = follow(point, noise, state, steps)
         if steps[-1] % clock.stride == 0:
             first, last = steps[0] // clock.stride - records[0], steps[-1] // clock.stride + 1 - records[0]
-            for one in variables:
-                part = rows[one.name][:, first:last]
-                part[:] = np.broadcast_to(_read(one, point, course), part.T.shape).T
+            for variable in variables:
+                part = rows[variable.name][:, first:last]
+                part[:] = np.broadcast_to(_read(variable, point, course), part.T.shape).T
         if drawn and steps[-1] in drawn_at:
             for name, values in _maps(point, state, drawn).items():
                 maps[f"{name}@{drawn_at.index(steps[-1])}"] = values
@@ -281,12 +281,12 @@ def _maps(point: Scenario, state: State, drawn: int) -> dict[str, np.ndarray]:
     if point.margin is None:
         return {MAP[0]: maps}
     solid, (square, cell) = point.solid.effective, process.centred(maps)
-    found = state.contact.radius, state.bonding.stress
-    radius, stress = (np.broadcast_to(values, max(len(values), drawn))[:drawn] for values in found)
+    recorded = state.contact.radius, state.bonding.stress
+    radius, stress = (np.broadcast_to(values, max(len(values), drawn))[:drawn] for values in recorded)
     radius = np.where(2.0 * radius > cell, np.nan, radius)  # a contact that has outgrown its map
-    own = disc_energy_of_map(square, cell, radius, *solid)
+    alone = disc_energy_of_map(square, cell, radius, *solid)
     cross = cross_energy_of_map(square, cell, radius, stress, *solid)
-    return {MAP[0]: maps, DISC_ENERGIES[0][0]: own, DISC_ENERGIES[1][0]: cross}
+    return {MAP[0]: maps, DISC_ENERGIES[0][0]: alone, DISC_ENERGIES[1][0]: cross}
 
 
 def log(target: Path, began: float, stages: dict[str, float]) -> None:

@@ -405,7 +405,7 @@ def loop_figure(dataset: xr.Dataset, data: Measured | None = None) -> Figure:
     loaded.set_ylabel(radii.get_ylabel())
     of_load = scene.placed("normal_load", scene.all("normal_load_mean"), "normal load $P$", "N")
     (spent, loop), cycles = lost_energy(dataset), cycles_of(dataset)
-    labelled = scene._replace(lines=_named(scene, symbol, spent, loop))
+    labelled = scene._replace(lines=_labelled(scene, symbol, spent, loop))
     for panel, placed, name, factor in (
         (loads, labelled, "normal_load", force),
         (radii, scene, "contact_radius", length),
@@ -510,7 +510,7 @@ def lost_energy(dataset: xr.Dataset) -> tuple[xr.DataArray, xr.DataArray | None]
     return spent / cycles, style.mean_of(loop_energy(dataset), "loop_energy").mean("cycle")
 
 
-def _named(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray | None) -> list[Line]:
+def _labelled(scene: Scene, symbol: str, spent: xr.DataArray, loop: xr.DataArray | None) -> list[Line]:
     """Return the curves, each with its energies in its name."""
     energies = {"$W$": spent} | ({} if loop is None else {rf"$\oint\,P\,\mathrm{{d}}{symbol}$": loop})
     unit = style.Unit.of(np.concatenate([np.ravel(values) for values in energies.values()]), "J")
