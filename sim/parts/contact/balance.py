@@ -87,12 +87,12 @@ class LoadControl:
         """Return the energy of this contact above that of a free sphere that just touches [J].
 
         It is elastic, of the load and of adhesion. Under tension it is not defined, because the free sphere moves away,
-        and 0 is returned.
+        and 0 is returned. It is 0 for a contact of radius 0, too.
         """
-        radius = np.where(self.closes, radius, np.nan)
+        radius = np.where(self.closes & (radius > 0.0), radius, np.nan)
         indentation = self.indentation(radius, bodies)
         energy = elastic_energy(radius, indentation, bodies) - self.load * indentation - gained
-        return np.where(self.closes, energy, 0.0)
+        return np.where(np.isnan(radius), 0.0, energy)
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,11 @@ def test_energies_slope_to_the_load_and_to_the_energy_release_rate():
         assert_allclose(-rate, -jkr.energy_release_rate_at_indentation(a, depth, 1.0, 0.75), rtol=1e-13)
 
 
+def test_a_contact_of_radius_zero_has_no_energy():
+    for load in (0.0, 1.0):
+        assert LoadControl(load).energy(np.zeros(2), np.zeros(2), MAUGIS).tolist() == [0.0, 0.0]
+
+
 def test_load_indentation_and_displacement_of_any_radius_go_together():
     rng = np.random.default_rng(7)
     a = rng.uniform(0.1, 3.0, 200)
