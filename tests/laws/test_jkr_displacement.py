@@ -24,13 +24,11 @@ LENS = {"work": 0.042, "sphere_radius": 2e-3, "modulus": 6.4e6}
 WIDE = np.longdouble
 PI = WIDE("3.14159265358979323846264338327950288")
 
+
 PULL_OFF = [  # stiffness, radius, load, indentation in Maugis units
     (0.1, 1.1158490441960518, -1.4978810906181386, -0.4798729253858034),
-    (0.5, 1.0152257696186848, -1.4592688884925777, -0.6146946233614938),
     (1.0, 0.9193831489469452, -1.3822142978356529, -0.7205214554932008),
-    (2.0, 0.7989951485601753, -1.2393378348348336, -0.8212826513623044),
     (5.0, 2.0 / 3.0, -28.0 / 27.0, -8.0 / 9.0),
-    (10.0, 0.6102522645568352, -0.9404599858644457, -0.9032642992497937),
     (100.0, 0.5563776200249634, -0.8443231195694288, -0.9085053764583243),
     (0.0, 1.5 ** (1 / 3), -1.5, -(1.5 ** (2 / 3)) / 3.0),
     (math.inf, 6.0 ** (-1 / 3), -5.0 / 6.0, -3.0 * 6.0 ** (-2 / 3)),
@@ -149,19 +147,15 @@ def test_the_last_contact_behind_every_spring():
 
 
 def test_radius_of_the_known_states_behind_every_spring():
-    for radius, load, indentation in STATES:
-        for stiffness in [1e-3, 0.1, 1.0, 5.0, 100.0, 1e6, math.inf]:
-            computed = jkr.radius_at_displacement(indentation + load / stiffness, stiffness, **MAUGIS)
-            assert_allclose(computed, radius, rtol=1e-12, atol=0)
-
-
-def test_a_neck_that_no_load_holds_stands_behind_a_stiff_spring():
+    radius, load, indentation = np.transpose(STATES)
+    stiffness = np.array([[1e-3], [0.1], [1.0], [5.0], [100.0], [1e6], [math.inf]])
+    computed = jkr.radius_at_displacement(indentation + load / stiffness, stiffness, **MAUGIS)
+    assert_allclose(computed, [radius] * 7, rtol=1e-12, atol=0)
     # the rational point (2/3, -28/27, -8/9) is the fold at stiffness 5: stable for stiffer springs only
-    for stiffness in (5.5, 10.0, 1e3, math.inf):
-        displacement = -8.0 / 9.0 - 28.0 / 27.0 / stiffness
-        assert_allclose(jkr.radius_at_displacement(displacement, stiffness, **MAUGIS), 2.0 / 3.0, rtol=1e-12, atol=0)
-    displacement = -8.0 / 9.0 - 28.0 / 27.0 / 4.0
-    assert jkr.radius_at_displacement(displacement, 4.0, **MAUGIS) > 0.7
+    stiffness = np.array([5.5, 10.0, 1e3, math.inf])
+    neck = jkr.radius_at_displacement(-8.0 / 9.0 - 28.0 / 27.0 / stiffness, stiffness, **MAUGIS)
+    assert_allclose(neck, 2.0 / 3.0, rtol=1e-12, atol=0)
+    assert jkr.radius_at_displacement(-8.0 / 9.0 - 28.0 / 27.0 / 4.0, 4.0, **MAUGIS) > 0.7
 
 
 def test_an_infinite_stiffness_is_an_indentation():
@@ -218,18 +212,17 @@ def test_radius_to_fifty_digits_with_half_of_them_lost_towards_the_fold(distance
 
 
 def test_the_contact_leaves_the_fold_as_a_square_root():
-    for stiffness in [0.1, 5.0, 100.0]:
-        for distance in [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12]:
-            last = jkr.pull_off_displacement(stiffness, **MAUGIS)
-            radius = jkr.pull_off_at_stiffness(stiffness, **MAUGIS).radius
-            wider = jkr.radius_at_displacement(last * (1.0 - distance), stiffness, **MAUGIS) - radius
-            # Δ'' of Δ(a) = a^2 - 2/3 sqrt(6a) + (a^3 - sqrt(6 a^3))/k at the fold
-            bend = (
-                2.0 + math.sqrt(6.0) / 6.0 * radius**-1.5 + (6.0 * radius - 0.75 * math.sqrt(6.0 / radius)) / stiffness
-            )
-            # the next term is smaller by about wider/radius; the rounding of the fold by 16 U/distance
-            room = 2.0 * wider / radius + 20.0 * U / distance
-            assert_allclose(wider, math.sqrt(-2.0 * last * distance / bend), rtol=room, atol=0)
+    distance = 10.0 ** np.arange(-12, -1, 2)
+    for stiffness in [0.1, 5.0, 100.0, math.inf]:
+        last = jkr.pull_off_displacement(stiffness, **MAUGIS)
+        radius = jkr.pull_off_at_stiffness(stiffness, **MAUGIS).radius
+        wider = jkr.radius_at_displacement(last * (1.0 - distance), stiffness, **MAUGIS) - radius
+        # second derivative of the displacement a^2 - 2/3 sqrt(6a) + (a^3 - sqrt(6 a^3))/k at the fold
+        bend = 2.0 + math.sqrt(6.0) / 6.0 * radius**-1.5
+        bend += (6.0 * radius - 0.75 * math.sqrt(6.0 / radius)) / stiffness
+        # the next term is smaller by about wider/radius; the rounding of the fold by 16 U/distance
+        room = 2.0 * wider / radius + 20.0 * U / distance
+        assert np.all(np.abs(wider / np.sqrt(-2.0 * last * distance / bend) - 1.0) < room)
 
 
 @pytest.mark.parametrize("count", some([100_000, 1_000_000], 100_000))
@@ -241,52 +234,23 @@ def test_random_states_are_on_the_stable_branch(count):
     assert pulled + held > 0.999 * count
 
 
-def test_newton_from_the_right_never_passes_the_root():
-    random, count = np.random.default_rng(7), 1_000_000
-    unit, soft = 6.0 ** (-1 / 3), 10.0 ** random.uniform(-15, 15, count)
-    fold = np.sqrt(jkr.pull_off_at_stiffness(soft * contact_stiffness(**MAUGIS), **MAUGIS).radius / unit)
-    grips, load = soft / (1 + soft), 1 / (1 + soft)
-
-    def sextic(x):
-        cube = x * x * x
-        return grips * x * (cube - 4) + load * cube * (cube - 6)
-
-    x = fold * 10.0 ** random.uniform(0.0, 3.0, count)
-    root = fold + (x - fold) * random.uniform(0.0, 1.0, count)
-    target = sextic(root)
-    for _ in range(6):
-        cube = x * x * x
-        lower = x - (sextic(x) - target) / (4 * grips * (cube - 1) + 6 * load * x * x * (cube - 3))
-        away = x > root * (1 + 1e-6)  # nearer, or where the slope is smaller still, rounding decides
-        assert np.all(lower[away] < x[away])
-        # so far from the fold the slope is 1e-5 of the sextic's terms and more: their 10 u move x by less than 1e-9
-        assert np.all(lower[away] > root[away] * (1 - 1e-9))
-        x = np.where(away, lower, x)
-
-
 def test_radius_at_no_or_negative_work_is_hertz_behind_the_spring():
+    radius, stiffness = np.logspace(-9, -2, 60), 10.0 ** np.arange(-12, 19, 3)[:, np.newaxis]
+    displacement = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
     for work in [0.0, -0.0, -1e-12, -3.0, -1e10]:
-        radius = np.logspace(-9, -2, 60)
-        for stiffness in 10.0 ** np.arange(-12, 19, 3):
-            displacement = radius**2 / 2e-3 + 4 * 6.4e6 * radius**3 / (6e-3 * stiffness)
-            assert_allclose(
-                jkr.radius_at_displacement(displacement, stiffness, work, 2e-3, 6.4e6), radius, rtol=1e-14, atol=0
-            )
-            assert np.isnan(jkr.radius_at_displacement(-1e-300, stiffness, work, 2e-3, 6.4e6))
-            assert jkr.radius_at_displacement(0.0, stiffness, work, 2e-3, 6.4e6) == 0.0
+        rest = stiffness, work, 2e-3, 6.4e6
+        assert_allclose(jkr.radius_at_displacement(displacement, *rest), [radius] * 11, rtol=1e-14, atol=0)
+        assert np.all(np.isnan(jkr.radius_at_displacement(-1e-300, *rest)))
+        assert np.all(jkr.radius_at_displacement(0.0, *rest) == 0.0)
         hertz = jkr.hertz_radius_at_indentation(displacement, 2e-3)
-        assert_allclose(
-            jkr.radius_at_displacement(displacement, math.inf, work, 2e-3, 6.4e6), hertz, rtol=20 * U, atol=0
-        )
+        hard = jkr.radius_at_displacement(displacement, math.inf, work, 2e-3, 6.4e6)
+        assert_allclose(hard, hertz, rtol=20 * U, atol=0)
         assert_array_equal(jkr.pull_off_at_stiffness(1e3, work, 2e-3, 6.4e6), 0.0)
         assert jkr.pull_off_displacement(1e3, work, 2e-3, 6.4e6) == 0.0
-
-
-def test_hertz_is_the_limit_of_vanishing_work_behind_a_spring():
-    displacement = np.array([1e-9, 5e-6, 1e-3])
-    hertz = jkr.radius_at_displacement(displacement, 1e3, 0.0, 2e-3, 6.4e6)
-    for work in (1e-40, 1e-100, 1e-300, 5e-324):
-        assert_allclose(jkr.radius_at_displacement(displacement, 1e3, work, 2e-3, 6.4e6), hertz, rtol=1e-12, atol=0)
+    hertz = jkr.radius_at_displacement([1e-9, 5e-6, 1e-3], 1e3, 0.0, 2e-3, 6.4e6)
+    for work in (1e-40, 1e-100, 1e-300, 5e-324):  # Hertz's is the limit of vanishing work
+        limit = jkr.radius_at_displacement([1e-9, 5e-6, 1e-3], 1e3, work, 2e-3, 6.4e6)
+        assert_allclose(limit, hertz, rtol=1e-12, atol=0)
         assert np.isnan(jkr.radius_at_displacement(-1e-6, 1e3, work, 2e-3, 6.4e6))
 
 
@@ -307,23 +271,38 @@ def test_the_energy_release_rate_is_that_at_the_load_and_at_the_indentation():
     random = np.random.default_rng(11)
     radius, displacement = 10.0 ** random.uniform(-5, -3, 1000), random.uniform(-1e-5, -1e-8, 1000)
     stiffness = 10.0 ** random.uniform(-8, 18, 1000)  # a lifting displacement: no differences of equal numbers
-    rest = radius, 2e-3, 6.4e6
-    computed = jkr.energy_release_rate_at_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
-    indentation = jkr.indentation_under_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
-    at_grips = jkr.energy_release_rate_at_indentation(radius, indentation, 2e-3, 6.4e6)
-    load = jkr.load_under_displacement(radius, displacement, stiffness, 2e-3, 6.4e6)
-    assert_allclose(computed, jkr.energy_release_rate(radius, load, 2e-3, 6.4e6), rtol=30 * U, atol=0)
+    rest = 2e-3, 6.4e6
+    computed = jkr.energy_release_rate_at_displacement(radius, displacement, stiffness, *rest)
+    indentation = jkr.indentation_under_displacement(radius, displacement, stiffness, *rest)
+    load = jkr.load_under_displacement(radius, displacement, stiffness, *rest)
+    assert_allclose(computed, jkr.energy_release_rate(radius, load, *rest), rtol=30 * U, atol=0)
+    at_grips = jkr.energy_release_rate_at_indentation(radius, indentation, *rest)
     assert_allclose(computed, at_grips, rtol=1e-14, atol=0)
-    hard = jkr.energy_release_rate_at_displacement(radius, displacement, math.inf, 2e-3, 6.4e6)
-    assert_array_equal(hard, jkr.energy_release_rate_at_indentation(radius, displacement, 2e-3, 6.4e6))
-    free = jkr.energy_release_rate_at_displacement(radius, displacement, 0.0, 2e-3, 6.4e6)
-    assert_allclose(free, jkr.energy_release_rate(rest[0], 0.0, *rest[1:]), rtol=20 * U, atol=0)
-    assert_array_equal(
-        jkr.load_under_displacement(radius, displacement, math.inf, 2e-3, 6.4e6),
-        jkr.load_under_indentation(radius, displacement, 2e-3, 6.4e6),
-    )
-    assert_array_equal(jkr.load_under_displacement(np.append(radius, 0.0), -1e-6, 0.0, 2e-3, 6.4e6), 0.0)
-    assert_array_equal(jkr.indentation_under_displacement(radius, displacement, math.inf, 2e-3, 6.4e6), displacement)
+    for of_spring, of_indentation in [
+        (jkr.energy_release_rate_at_displacement, jkr.energy_release_rate_at_indentation),
+        (jkr.load_under_displacement, jkr.load_under_indentation),
+        (jkr.indentation_under_displacement, lambda radius, displacement, *_: displacement),
+    ]:
+        hard = of_spring(radius, displacement, math.inf, *rest)
+        assert_array_equal(hard, of_indentation(radius, displacement, *rest))
+    soft = jkr.energy_release_rate_at_displacement(radius, displacement, 0.0, *rest)
+    assert_allclose(soft, jkr.energy_release_rate(radius, 0.0, *rest), rtol=20 * U, atol=0)
+    assert_array_equal(jkr.load_under_displacement(np.append(radius, 0.0), -1e-6, 0.0, *rest), 0.0)
+
+
+def test_a_radius_depends_on_neither_batch_nor_shape():
+    states = random_states(9000, seed=14)
+    whole = jkr.radius_at_displacement(*states)
+    for size in [1, 2, 7, 8, 9, 255, 4095, 4096, 4097]:
+        part = jkr.radius_at_displacement(*[value[-size:] for value in states])
+        assert_array_equal(part, whole[-size:])
+    displacement, stiffness = np.linspace(-1e-6, 5e-6, 30).reshape(5, 1, 6), np.logspace(1, 4, 40).reshape(40, 1)
+    radius = jkr.radius_at_displacement(displacement, stiffness, **LENS)
+    assert radius.shape == (5, 40, 6)
+    corner = jkr.radius_at_displacement(displacement[4, 0, 5], stiffness[39, 0], **LENS)
+    assert isinstance(corner, float) and corner == radius[4, 39, 5]
+    with pytest.raises(ValueError, match="shape"):
+        jkr.radius_at_displacement(np.zeros(2), np.zeros(3), **LENS)
 
 
 def test_the_solution_releases_the_work_and_is_stable_at_its_displacement():
@@ -390,31 +369,3 @@ def test_no_input_raises_or_hangs_or_gives_a_wrong_branch():
 def test_no_input_of_ten_million_raises_or_hangs_or_gives_a_wrong_branch():
     for seed in range(20):
         check_wild(500_000, seed=100 + seed)
-
-
-def test_a_radius_does_not_depend_on_the_batch():
-    for size in [1, 2, 7, 8, 9, 255, 4095, 4096, 4097, 9000]:
-        states = random_states(9000, seed=14)
-        whole = jkr.radius_at_displacement(*states)
-        part = jkr.radius_at_displacement(*[value[-size:] for value in states])
-        assert_array_equal(part, whole[-size:])
-        some = np.random.default_rng(15).integers(0, 9000, 20)
-        assert_array_equal(whole[some], [jkr.radius_at_displacement(*[value[i] for value in states]) for i in some])
-
-
-def test_radius_at_displacement_broadcasts():
-    displacement, stiffness = np.linspace(-1e-6, 5e-6, 30).reshape(5, 1, 6), np.logspace(1, 4, 40).reshape(40, 1)
-    radius = jkr.radius_at_displacement(displacement, stiffness, **LENS)
-    assert radius.shape == (5, 40, 6)
-    assert radius[4, 39, 5] == jkr.radius_at_displacement(displacement[4, 0, 5], stiffness[39, 0], **LENS)
-    square = np.linspace(0, 5e-6, 90_000).reshape(300, 300)
-    assert_array_equal(
-        jkr.radius_at_displacement(square.T, 1e3, **LENS), jkr.radius_at_displacement(square, stiffness=1e3, **LENS).T
-    )
-    frozen = np.broadcast_to(1e-6, (3,))
-    assert jkr.radius_at_displacement(frozen, 1e3, **LENS).shape == (3,)
-    assert jkr.radius_at_displacement(np.empty(0), 1e3, **LENS).shape == (0,)
-    assert jkr.radius_at_displacement([[1e-6]], 1e3, **LENS).shape == (1, 1)
-    assert isinstance(jkr.radius_at_displacement(1e-6, 1e3, **LENS), float)
-    with pytest.raises(ValueError, match="shape"):
-        jkr.radius_at_displacement(np.zeros(2), np.zeros(3), **LENS)
