@@ -36,9 +36,6 @@ def scene(tmp_path):
     return write
 
 
-# --- reading ---
-
-
 def test_every_scenario_is_read_and_keeps_its_text_and_fits_the_schema():
     schema = json.loads(json.dumps(json_schema(Scenario)))
     for path in PATHS:
@@ -51,14 +48,8 @@ def test_every_scenario_is_read_and_keeps_its_text_and_fits_the_schema():
         assert not fits(schema, schema, {key: value for key, value in document.items() if key != "clock"})
 
 
-def test_tables_left_out_are_the_simplest(scene):
-    scenario = scene()
-    assert scenario.drive == drive.Steady(speed=0.0)
-    assert scenario.bonds == bonds.Unbroken()
-    assert scenario.shear == shear.Uniform()
-
-
-def test_a_model_left_out_is_the_simplest(scene):
+def test_a_table_or_a_model_left_out_is_the_simplest(scene):
+    assert (scene().drive, scene().bonds, scene().shear) == (drive.Steady(), bonds.Unbroken(), shear.Uniform())
     scenario = scene(
         '[drive]\nspeed = "1 mm/s"\n[bonds]\nstress = "1 kPa"\n'
         '[shear]\nmodel = "mean"\nspectrum = { model = "gaussian", rms = "1 kPa", length = "1 um" }\namplitude = {}\n'
@@ -71,47 +62,33 @@ def test_a_model_left_out_is_the_simplest(scene):
     assert not fits(schema, schema, tomllib.loads(LENS + "[bonds]\ncritical_speed = 1\n"))
 
 
-def test_a_dictionary_is_read_as_a_file_is(scene, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_dictionary_is_read_as_a_file_is(scene):
     document = tomllib.loads(LENS)
     before = copy.deepcopy(document)
     assert quantities(load(document)) == quantities(scene())
     assert load(document, {"contact.load": "2 mN"}).contact.load == 2e-3
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        scene().seed = 3
     assert document == before
-    with pytest.raises(BadInput) as fault:
-        load({**document, "sphere": {"raduis": 1}})
-    assert fault.value.problems == ['sphere.raduis: is not a key; did you mean "radius"?']
+    with pytest.raises(BadInput) as refused:
+        load({**document, "ensemble": {"members": 0, "member": 1}})
+    assert isinstance(refused.value, ValueError) and len(refused.value.problems) == 2
+    assert str(refused.value).splitlines() == refused.value.problems
 
 
-def test_a_byte_order_mark_and_windows_line_ends_change_nothing(tmp_path):
-    path = tmp_path / "x.toml"
-    path.write_bytes(b"\xef\xbb\xbf" + LENS.replace("\n", "\r\n").encode())
-    (tmp_path / "y.toml").write_text(LENS, encoding="utf-8")
-    assert quantities(load(path)) == quantities(load(tmp_path / "y.toml"))
-
-
-def test_inline_tables_and_dotted_keys_are_the_same_scene(scene):
+def test_inline_tables_dotted_keys_a_byte_order_mark_and_windows_line_ends_are_the_same_scene(scene, tmp_path):
     same = 'clock = { duration = "1 s", step = "100 ms" }\nsolid.shear_modulus = 1.6e6\nsphere.radius = 2e-3\n'
     same += 'adhesion.work = "0.042 N/m"\ncontact = { load = "4000 uN", model = "equilibrium" }\n'
     assert quantities(scene(base=same)) == quantities(scene())
-
-
-# --- overrides ---
+    (tmp_path / "y.toml").write_bytes(b"\xef\xbb\xbf" + LENS.replace("\n", "\r\n").encode())
+    assert quantities(load(tmp_path / "y.toml")) == quantities(scene())
 
 
 def test_overrides_replace_values_tables_and_what_was_left_out(scene):
-    changed = scene(
-        overrides={
-            "contact.load": "2 mN",
-            "bonds": {"model": "steady", "critical_speed": "1 mm/s"},
-            "drive.model": "steady",
-            "drive.speed": "3 mm/s",
-            "ensemble.members": 5,
-        }
-    )
-    assert changed.contact.load == 2e-3
-    assert changed.bonds.critical_speed == 1e-3
-    assert changed.drive.speed == 3e-3
+    table = {"model": "steady", "critical_speed": "1 mm/s"}
+    values = {"contact.load": "2 mN", "bonds": table, "drive.model": "steady", "drive.speed": "3 mm/s"}
+    changed = scene(overrides=values | {"ensemble.members": 5})
+    assert (changed.contact.load, changed.bonds.critical_speed, changed.drive.speed) == (2e-3, 1e-3, 3e-3)
     assert changed.ensemble.members == 5
     assert changed.source.overrides["contact.load"] == "2 mN"
 
@@ -124,25 +101,19 @@ def test_an_override_can_set_replace_and_drop_a_sweep(scene):
     assert len(scene(text, {"sweep": {"solid.shear_modulus": [1e6]}}).points()) == 1
 
 
-# --- sweeps ---
-
-
 def loads(scenario):
     return [point.contact.load for point in scenario.points()]
 
 
 def test_a_range_is_spaced_evenly_with_both_ends_in_one_unit(scene):
-    linear = scene('[sweep]\n"contact.load" = { from = "-1 mN", to = "3 mN", count = 5 }\n')
-    np.testing.assert_allclose(loads(linear), np.linspace(-1e-3, 3e-3, 5), rtol=1e-15, atol=1e-19)
-    log = scene('[sweep]\n"contact.load" = { from = "1mN", to = "100mN", count = 3, scale = "log" }\n')
-    np.testing.assert_allclose(loads(log), [1e-3, 1e-2, 1e-1], rtol=1e-15)
-    bare = scene('[sweep]\n"contact.load" = { from = 0, to = 1e-3, count = 2 }\n')
-    assert loads(bare) == [0.0, 1e-3]
-
-
-def test_the_ends_of_a_range_may_have_different_units(scene):
-    mixed = scene('[sweep]\n"contact.load" = { from = "100 uN", to = "0.01 N", count = 3, scale = "log" }\n')
-    np.testing.assert_allclose(loads(mixed), [1e-4, 1e-3, 1e-2], rtol=1e-14)
+    for ends, exact in (
+        ('from = "-1 mN", to = "3 mN", count = 5', np.linspace(-1e-3, 3e-3, 5)),
+        ('from = "1mN", to = "100mN", count = 3, scale = "log"', [1e-3, 1e-2, 1e-1]),
+        ('from = "100 uN", to = "0.01 N", count = 3, scale = "log"', [1e-4, 1e-3, 1e-2]),
+        ("from = 0, to = 1e-3, count = 2", [0.0, 1e-3]),
+    ):
+        swept = scene(f'[sweep]\n"contact.load" = {{ {ends} }}\n')
+        np.testing.assert_allclose(loads(swept), exact, rtol=1e-14, atol=1e-19)
 
 
 def test_several_keys_form_the_outer_product_the_last_fastest(scene):
@@ -152,36 +123,27 @@ def test_several_keys_form_the_outer_product_the_last_fastest(scene):
     assert [axis.keys for axis in swept.sweep] == [("contact.load",), ("adhesion.bond_share",)]
 
 
-def test_nested_keys_of_a_sweep_mean_the_same_as_quoted_ones(scene):
+def test_nested_keys_lists_of_tables_and_whole_models_are_swept(scene):
     assert loads(scene('[sweep]\ncontact.load = ["1 mN", "2 mN"]\n')) == [1e-3, 2e-3]
     assert loads(scene('[sweep.contact]\nload = { from = "1 mN", to = "2 mN", count = 2 }\n')) == [1e-3, 2e-3]
-
-
-def test_a_list_of_tables_is_zipped_into_one_axis(scene):
-    swept = scene(
-        '[[sweep]]\n"contact.load" = "1 mN"\n"sphere.radius" = "1 mm"\n'
-        '[[sweep]]\n"contact.load" = "2 mN"\n"sphere.radius" = "3 mm"\n'
-    )
-    assert [(point.contact.load, point.sphere.radius) for point in swept.points()] == [(1e-3, 1e-3), (2e-3, 3e-3)]
-    assert len(swept.sweep) == 1
-
-
-def test_a_model_is_swept_as_a_whole_table(scene):
+    pairs = ((1, 1), (2, 3))
+    zipped = scene("".join(f'[[sweep]]\n"contact.load" = "{p} mN"\n"sphere.radius" = "{r} mm"\n' for p, r in pairs))
+    assert [(point.contact.load, point.sphere.radius) for point in zipped.points()] == [(1e-3, 1e-3), (2e-3, 3e-3)]
+    assert len(zipped.sweep) == 1
     swept = scene('[sweep]\nbonds = [{ model = "none" }, { model = "steady", critical_speed = "1 mm/s" }]\n')
     assert [point.bonds for point in swept.points()] == [bonds.Unbroken(), bonds.Steady(critical_speed=1e-3)]
 
 
-# --- files beside the scenario ---
-
 TABLE = '[drive]\nmodel = "table"\nfile = "speeds.csv"\n'
 
 
-def test_a_table_is_read_beside_the_scenario_and_its_text_kept(scene, tmp_path):
-    (tmp_path / "speeds.csv").write_text("time [ms], speed [mm/s]\n0, 1\n1000, 2\n", encoding="utf-8")
-    scenario = scene(TABLE)
-    assert scenario.drive.time == (0.0, 1.0)
-    assert scenario.drive.speed == (1e-3, 2e-3)
-    assert scenario.source.files == {"speeds.csv": "time [ms], speed [mm/s]\n0, 1\n1000, 2\n"}
+def test_a_table_is_read_once_beside_the_scenario_and_its_text_kept(scene, tmp_path):
+    text = "time [ms], speed [mm/s]\n0, 1\n1000, 2\n"
+    (tmp_path / "speeds.csv").write_text(text, encoding="utf-8")
+    scenario = scene(TABLE + '[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n')
+    (tmp_path / "speeds.csv").unlink()
+    assert [(point.drive.time, point.drive.speed) for point in scenario.points()] == [((0.0, 1.0), (1e-3, 2e-3))] * 2
+    assert scenario.source.files == {"speeds.csv": text}
 
 
 def test_swept_files_are_each_read(scene, tmp_path):
@@ -193,16 +155,6 @@ def test_swept_files_are_each_read(scene, tmp_path):
     whole = scene('[sweep]\ndrive = [{ model = "table", file = "slow.csv" }, { model = "steady", speed = "2 mm/s" }]\n')
     assert [type(point.drive) for point in whole.points()] == [drive.Table, drive.Steady]
     assert set(whole.source.files) == {"slow.csv"}
-
-
-def test_a_sweep_beside_a_file_reads_it_once(scene, tmp_path):
-    (tmp_path / "speeds.csv").write_text("time [s], speed [mm/s]\n0, 1\n1, 2\n", encoding="utf-8")
-    swept = scene(TABLE + '[sweep]\n"contact.load" = ["1 mN", "2 mN"]\n')
-    (tmp_path / "speeds.csv").unlink()
-    assert [point.drive.speed for point in swept.points()] == [(1e-3, 2e-3)] * 2
-
-
-# --- starter ---
 
 
 def test_the_starter_shows_every_table_key_and_model():
@@ -257,9 +209,6 @@ def test_every_setting_in_the_comments_of_the_starter_is_a_scene(tmp_path):
     assert scenario.solid.counter_body is not None
 
 
-# --- schema ---
-
-
 def fits(schema, node, value):
     """Return True if a value fits a node of a JSON schema, of the words that ours uses."""
     if "$ref" in node:
@@ -287,11 +236,9 @@ def fits(schema, node, value):
 
 
 def test_a_table_may_name_a_file_or_hold_its_columns_by_the_schema():
-    schema = json_schema(Scenario)
-    steady = tomllib.loads(LENS)
-    assert fits(schema, schema, {**steady, "drive": {"model": "table", "file": "speeds.csv"}})
-    assert fits(schema, schema, {**steady, "drive": {"model": "table", "time": [0, 1], "speed": [0, 1]}})
-    assert not fits(schema, schema, {**steady, "drive": {"model": "table"}})
+    schema, scene = json_schema(Scenario), tomllib.loads(LENS)
+    for table, fitting in (({"file": "speeds.csv"}, True), ({"time": [0, 1], "speed": [0, 1]}, True), ({}, False)):
+        assert fits(schema, schema, {**scene, "drive": {"model": "table", **table}}) == fitting
 
 
 def test_every_number_of_the_schema_says_its_meaning_and_unit():
@@ -319,22 +266,6 @@ def test_every_key_of_every_table_has_a_meaning():
         if key not in ("model", "sweep") and not (held.description or declaration(held) or tables(held.annotation))
     ]
     assert not silent
-
-
-# --- refusals in Python ---
-
-
-def test_bad_input_is_a_value_error_with_one_line_for_each_problem(scene):
-    with pytest.raises(BadInput) as refused:
-        scene("[ensemble]\nmembers = 0\nmember = 1\n")
-    assert isinstance(refused.value, ValueError)
-    assert len(refused.value.problems) == 2
-    assert str(refused.value).splitlines() == refused.value.problems
-
-
-def test_a_scenario_cannot_be_changed(scene):
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        scene().seed = 3
 
 
 def test_points_of_a_sweep_share_the_tables_of_the_same_values_and_are_those_made_one_by_one(scene):
