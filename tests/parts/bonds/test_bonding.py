@@ -14,24 +14,17 @@ from sim.parts import drive
 from sim.parts.bonds import models as bonds
 
 READ = {variable.name: variable.read for variable in VARIABLES}
-FORTH_AND_BACK = drive.Table(
-    time=(0.0, 4e-3, 4e-3, 8e-3, 8e-3, 12e-3, 12e-3, 16e-3), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3, -2e-3, -2e-3)
-)
 MOTIONS = {
-    "through zero": drive.Ramp(start=-1e-3, stop=5e-3),
-    "forth and back": FORTH_AND_BACK,
-    "started": drive.Start(rest=3e-3, speed=4e-3),
-    "stopped": drive.Table(time=(0.0, 4e-3, 4e-3, 16e-3), speed=(3e-3, 3e-3, 0.0, 0.0)),
+    "through zero": ((0.0, 16e-3), (-1e-3, 5e-3)),
+    "forth and back": ((0.0, 4e-3, 4e-3, 8e-3, 8e-3, 12e-3, 12e-3, 16e-3), 2 * (2e-3, 2e-3, -2e-3, -2e-3)),
+    "started": ((0.0, 3e-3, 3e-3, 16e-3), (0.0, 0.0, 4e-3, 4e-3)),
+    "stopped": ((0.0, 4e-3, 4e-3, 16e-3), (3e-3, 3e-3, 0.0, 0.0)),
 }
 
 
-def mirrored(motion):
-    """The same motion the other way."""
-    if isinstance(motion, drive.Ramp):
-        return drive.Ramp(start=-motion.start, stop=-motion.stop)
-    if isinstance(motion, drive.Start):
-        return drive.Start(rest=motion.rest, speed=-motion.speed)
-    return drive.Table(time=motion.time, speed=tuple(-speed for speed in motion.speed))
+def motion(name, sense=1.0):
+    time, speed = MOTIONS[name]
+    return drive.Table(time=time, speed=tuple(sense * value for value in speed))
 
 
 def records(names, members=3, steps=16, **parts):
@@ -41,41 +34,26 @@ def records(names, members=3, steps=16, **parts):
 
 
 def test_friction_is_odd_and_energies_are_even_in_the_speed():
-    for motion, name in product(MOTIONS, BONDS):
-        parts = {"shear": SHEARS["modal, wave, relaxing stress"], "contact": CONTACTS["partly reversible"]}
-        odd, even = ["shear_stress", "friction_force"], ["bond_fraction", "fluctuation_energy", "contact_radius"]
-        one, other = (
-            records(odd + even, bonds=BONDS[name], drive=moved, **parts)
-            for moved in (MOTIONS[motion], mirrored(MOTIONS[motion]))
-        )
-        assert np.any(one[0] != 0.0)
-        for kind, there, back in zip(odd + even, one, other, strict=True):
-            expected = -there if kind in odd else there
-            # mirrored arithmetic is the same, but cohorts are merged on a lattice that starts elsewhere
-            off = getattr(BONDS[name], "tolerance", 0.0) if BONDS[name].model == "cohort" else 1e-11
-            assert_allclose(back, expected, rtol=1e-11, atol=off * np.abs(there).max(), err_msg=kind)
+    parts = {"shear": SHEARS["modal, wave, relaxing stress"], "contact": CONTACTS["partly reversible"]}
+    signs = dict.fromkeys(["shear_stress", "friction_force"], -1.0)
+    signs |= dict.fromkeys(["bond_fraction", "fluctuation_energy", "contact_radius"], 1.0)
+    for name, part in product(MOTIONS, BONDS.values()):
+        forward, mirrored = (records(signs, bonds=part, drive=motion(name, sense), **parts) for sense in (1.0, -1.0))
+        assert np.any(forward[0] != 0.0)
+        # mirrored arithmetic is the same, but cohorts are merged on a lattice that starts elsewhere
+        off = part.tolerance if part.model == "cohort" else 1e-11
+        for sign, there, back in zip(signs.values(), forward, mirrored, strict=True):
+            assert_allclose(back, sign * there, rtol=1e-11, atol=off * np.abs(there).max())
 
 
 def test_a_friction_loop_takes_work():
-    for name in BONDS:
+    for part in BONDS.values():
         # the trapezoidal sum over the second cycle; 200 members where bonds are counted or tracked
-        members = 200 if BONDS[name].model in ("counted", "tracked", "auto") else 1
-        force, place = records(["friction_force", "slider_position"], members, bonds=BONDS[name], drive=FORTH_AND_BACK)
-        last = slice(8, 17)
-        work = np.trapezoid(force[last].mean(axis=1), place[last, 0])
-        assert_allclose(place[16], place[8], atol=1e-18)
-        assert work > 0.0
-        force, place = records(
-            ["friction_force", "slider_position"], members, bonds=BONDS[name], drive=mirrored(FORTH_AND_BACK)
-        )
-        assert np.trapezoid(force[last].mean(axis=1), place[last, 0]) > 0.0
-
-
-def test_friction_in_steady_sliding_is_along_the_speed():
-    for name, speed in product(BONDS, [2e-3, -2e-3]):
-        # along +x positive: the force that the slider exerts on the half-space
-        (force,) = records(["friction_force"], 20, bonds=BONDS[name], drive=drive.Steady(speed=speed))
-        assert np.all(force[1:].mean(axis=1) * speed > 0.0)
+        members = 200 if part.model in ("counted", "tracked", "auto") else 1
+        names = ["friction_force", "slider_position"]
+        force, position = records(names, members, bonds=part, drive=motion("forth and back"))
+        assert_allclose(position[16], position[8], atol=1e-18)
+        assert np.trapezoid(force[8:].mean(axis=1), position[8:, 0]) > 0.0
 
 
 def test_bonds_without_a_stretch_bear_the_sign_of_the_last_slip():
@@ -86,38 +64,39 @@ def test_bonds_without_a_stretch_bear_the_sign_of_the_last_slip():
     for part in (BONDS[name] for name in ("none", "steady", "rate", "counted")):
         assert signs(part, drive.Steady(speed=0.0))[0] == [0] * 17  # nothing has slid
         assert signs(part, drive.Steady(speed=-1e-3))[0] == [-1] * 17  # at t = 0 that of the speed at the start
-        assert signs(part, MOTIONS["started"], 8)[0] == [0, 0, 0, 0, 1, 1, 1, 1, 1]
-        assert signs(part, MOTIONS["stopped"], 8)[0] == [1] * 9  # it keeps the sign at rest
-        turned, speed = signs(part, MOTIONS["through zero"], 8)
+        assert signs(part, motion("started"), 8)[0] == [0, 0, 0, 0, 1, 1, 1, 1, 1]
+        assert signs(part, motion("stopped"), 8)[0] == [1] * 9  # it keeps the sign at rest
+        turned, speed = signs(part, motion("through zero"), 8)
         assert turned == np.sign(np.where(speed == 0.0, -1.0, speed)).astype(int).tolist()
         # a step that ends at rest: the sign of its slip
         halting = drive.Table(time=(0.0, 1e-3, 1e-3, 2e-3), speed=(3e-3, 3e-3, -3e-3, 0.0))
         assert signs(part, halting, 2)[0] == [1, 1, -1]
 
 
+def rate_of_stress(name, speed, slip, duration):
+    """Bonding in steady sliding, and the change of its stress in one more step."""
+    scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=speed))
+    *_, state = march(scenario, np.arange(3))
+    slip = np.full(1, slip)
+    motions = one_step(41, 41e-3, duration, slip, np.abs(slip), slip / duration, slip / duration)
+    noise = Noise(5, "bonds", np.arange(3))
+    after = scenario.population.advance(deepcopy(state.bonds), motions, state.contact.radius, noise)[1].at(0)
+    return state.bonding, after.stress - state.bonding.stress
+
+
 def test_the_stiffness_is_the_slope_of_the_stress_over_slip_at_frozen_time():
     for name, speed in product([name for name in BONDS if name not in ("steady", "cohort, cut-off")], [4e-3, -4e-3]):
         # 0.1 nm within 1 as: rounding of the difference and the curvature over 1e-10/20e-6 of the cut-off
-        scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=speed))
-        *_, state = march(scenario, np.arange(3))
-        part, slip = scenario.population, np.array([np.copysign(1e-10, speed)])
-        motions = one_step(41, 41e-3, 1e-18, slip, np.abs(slip), slip / 1e-18, slip / 1e-18)
-        noise = Noise(5, "bonds", np.arange(3))
-        after = part.advance(deepcopy(state.bonds), motions, state.contact.radius, noise)[1].at(0)
-        slope = (after.stress - state.bonding.stress) / slip
-        assert_allclose(np.broadcast_to(state.bonding.stiffness, slope.shape), slope, rtol=3e-5)
+        slip = np.copysign(1e-10, speed)
+        bonding, change = rate_of_stress(name, speed, slip, 1e-18)
+        assert_allclose(np.broadcast_to(bonding.stiffness, change.shape), change / slip, rtol=3e-5)
 
 
 def test_the_relaxation_is_the_rate_of_the_stress_at_frozen_slip():
     for name in ["rate, bell", "rate, cut-off, carried", "cohort", "cohort, cut-off", "cohort, carried"]:
         # 1 ns: of the lives that rupture leaves, some 1e-6 pass, and rounding of the difference is below 1e-10
-        scenario = scene(3, 40, bonds=BONDS[name], drive=drive.Steady(speed=4e-3))
-        *_, state = march(scenario, np.arange(3))
-        part, still = scenario.population, np.zeros(1)
-        motions = one_step(41, 41e-3, 1e-9, still, still, still, still)
-        after = part.advance(state.bonds, motions, state.contact.radius, Noise(5, "bonds", np.arange(3)))[1].at(0)
-        rate = (after.stress - state.bonding.stress) / 1e-9
-        assert_allclose(np.broadcast_to(state.bonding.relaxation, rate.shape), rate, rtol=3e-5)
+        bonding, change = rate_of_stress(name, 4e-3, 0.0, 1e-9)
+        assert_allclose(np.broadcast_to(bonding.relaxation, change.shape), change / 1e-9, rtol=3e-5)
 
 
 def test_cohorts_at_a_cut_off_lose_stiffness_to_the_bonds_that_break():

@@ -5,9 +5,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from helpers.renewal import volterra
 from hypothesis import given, settings, strategies as st
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.special import lambertw
 
@@ -101,18 +100,6 @@ def test_start_up_peak_without_rebinding_is_the_lambert_formula():
         assert_allclose(march(start, [eps], time, BELL, 0.0, 1e-4)[0][0, 1], peak, rtol=1e-13, atol=0)
 
 
-def test_start_up_with_rebinding_is_the_volterra_solution_within_the_tolerance():
-    for beta, eps in [(1.0, 1.0), (10.0, 10.0)]:
-        end, errors = 1.5 * life_of(eps), []
-        exact = volterra(beta / (1.0 + beta), beta, eps, end, 1000)
-        assert_allclose(volterra(beta / (1.0 + beta), beta, eps, end, 500), exact, rtol=1e-10, atol=0)
-        for tolerance in (1e-3, 1e-5, 1e-7):
-            out, _ = march(resting(BELL, beta, tolerance), [eps], end, BELL, beta, tolerance)
-            errors.append(worst(out[-1, :2], exact))
-            assert errors[-1] < tolerance
-        assert errors[-1] < 1e-3 * errors[0]  # steps go as tolerance^(1/3): third order
-
-
 def constant_exact(beta, speed, time):
     """Moments 0 to 2 of bonds of constant rupture 1 at ``time`` after a start from rest."""
     rest = beta / (1.0 + beta)
@@ -200,14 +187,6 @@ def test_jumps_of_speed_keep_the_number_and_forget_the_clock_step():
         assert 0.0 <= state.weight.sum() <= 1.0 + 1e-12
 
 
-def test_oscillating_slip_passes_zero_within_the_tolerance():
-    speeds = 5.0 * np.cos(2.0 * np.pi * np.arange(200) / 100)
-    rough, _ = march(resting(BELL, 1.0, 1e-3), speeds, 0.02, BELL, 1.0, 1e-3)
-    exact, _ = march(resting(BELL, 1.0, 1e-6), speeds, 0.02, BELL, 1.0, 1e-6)
-    assert worst(rough[:, 0], exact[:, 0]) < 1e-3
-    assert np.max(np.abs(rough[:, 1] - exact[:, 1])) < 1e-3 * np.max(exact[:, 1])
-
-
 def test_ageing_at_rest_is_an_exponential():
     out, _ = march(empty(BELL, 1e-5), [0.0] * 40, 0.1, BELL, 2.0, 1e-5)
     time = 0.1 * np.arange(1, 41)
@@ -282,18 +261,6 @@ def test_a_long_run_does_not_drift():
             most = max(most, np.count_nonzero(state.weight))
             assert worst(moments(state), exact) < 1e-3
     assert most < state.weight.shape[1]
-
-
-def test_a_row_is_the_same_bit_for_bit_alone_or_in_a_batch():
-    rng = np.random.default_rng(1)
-    slips = rng.normal(0.05, 0.2, (60, 7))
-    batch, alone = resting(BELL, 1.0, 1e-3), [resting(BELL, 1.0, 1e-3) for _ in range(7)]
-    for slip in slips:
-        batch = advance(batch, slip, 0.02, BELL, 1.0, 1e-3)
-        alone = [advance(one, slip[i : i + 1], 0.02, BELL, 1.0, 1e-3) for i, one in enumerate(alone)]
-    for i, one in enumerate(alone):
-        for name in ("weight", "stretch", "lattice"):
-            assert_array_equal(getattr(batch, name)[i], getattr(one, name)[0])
 
 
 def test_merging_keeps_four_moments():

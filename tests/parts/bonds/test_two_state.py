@@ -1,13 +1,15 @@
 """Bond populations against their exact laws."""
 
 import math
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
+from helpers.draws import fits
 from helpers.scenes import BELL, STRETCHED, scene
 from numpy.testing import assert_allclose
-from scipy.stats import binom, chi2
+from scipy.stats import binom
 
 from sim.engine import march
 from sim.parts import drive
@@ -42,15 +44,8 @@ def test_the_rate_equation_is_second_order_under_a_ramp():
     assert_allclose(np.log2(steps[:-1] / steps[1:]), 2.0, atol=0.1)
 
 
-def test_the_rate_equation_relaxes_for_any_step():
-    for step in [1e-9, 1e-3, 1.0, 1e9]:
-        rate = bonds.Rate(critical_speed=1e-2, rebinding_rate=1.0, start_from="empty")
-        values = fractions(rate, drive.Steady(speed=1e-2), 1, duration=step)[:, 0]
-        assert_allclose(values, [0.0, -0.5 * np.expm1(-2.0 * step)], rtol=1e-13)
-
-
-@pytest.mark.parametrize("start", ["bonded", "empty", "steady"])
 @pytest.mark.parametrize("members", [2_000, pytest.param(20_000, marks=pytest.mark.verify)])
+@pytest.mark.parametrize("start", ["bonded", "empty"])
 def test_counted_bonds_have_the_exact_distribution_at_every_time(members, start):
     # sites are independent, so their number is binomial at all times, with the probability of the rate equation
     sites = 6
@@ -58,15 +53,11 @@ def test_counted_bonds_have_the_exact_distribution_at_every_time(members, start)
     counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=3.0, sites=sites, start_from=start)
     expected = fractions(rate, STEPPED, 9)[:, 0]
     numbers = np.rint(sites * fractions(counted, STEPPED, 9, members)).astype(int)
-    for probability, found in zip(expected[1:], numbers[1:], strict=True):
-        wanted = members * binom.pmf(np.arange(sites + 1), sites, probability)
-        observed = np.bincount(found, minlength=sites + 1)
-        enough = wanted > 5.0
-        wanted = np.append(wanted[enough], wanted[~enough].sum() + 1e-300)
-        observed = np.append(observed[enough], observed[~enough].sum())
-        kept = wanted > 1e-3
-        statistic = np.sum((observed[kept] - wanted[kept]) ** 2 / wanted[kept])
-        assert chi2.sf(statistic, kept.sum() - 1) > 5.7e-7  # five sigma
+    enough = members * sites * (1.0 - expected) > 25.0  # broken bonds, for more than a single cell
+    enough[0] = False  # at the start all are in one cell
+    assert enough.sum() > 5
+    for probability, bound in zip(expected[enough], numbers[enough], strict=True):
+        fits(np.bincount(bound, minlength=sites + 1), members * binom.pmf(np.arange(sites + 1), sites, probability))
 
 
 def test_counted_bonds_remember_with_the_rate_of_the_population():
@@ -74,9 +65,8 @@ def test_counted_bonds_remember_with_the_rate_of_the_population():
     sites, members, rebinding_rate, step = 30, 5_000, 3.0, 0.1
     counted = bonds.Counted(critical_speed=1e-2, rebinding_rate=rebinding_rate, sites=sites)
     values = fractions(counted, drive.Steady(speed=1e-2), 3, members, duration=3 * step)
-    found = np.corrcoef(values[1], values[2])[0, 1]
     expected = np.exp(-2.0 * rebinding_rate * step)
-    assert abs(found - expected) < 5.0 * (1.0 - expected**2) / np.sqrt(members)
+    assert abs(np.corrcoef(values[1], values[2])[0, 1] - expected) < 5.0 * (1.0 - expected**2) / np.sqrt(members)
 
 
 def test_counted_bonds_serve_one_bond_and_a_hundred_million():
@@ -90,11 +80,6 @@ def test_counted_bonds_serve_one_bond_and_a_hundred_million():
         assert_allclose(values * sites, np.rint(values * sites), rtol=1e-12, atol=1e-6)
 
 
-def test_the_steady_law_follows_the_speed_at_once():
-    law = bonds.Steady(critical_speed=1e-2)
-    assert_allclose(fractions(law, STEPPED, 21)[[1, 10, 20], 0], [1 / 1.001, 1 / 9, 1 / 1.2], rtol=1e-12)
-
-
 # --- the choice of the depth
 
 LINEAR = {"critical_speed": 1e-2, "rebinding_rate": 3.0}
@@ -102,7 +87,7 @@ FIELD = shear.Mean(spectrum=BondMade(footprint=1e-5))
 
 
 def test_the_depth_left_open_is_chosen_by_noise_and_rupture():
-    cases = [
+    for auto, depth in [
         (bonds.Auto(**LINEAR), bonds.Rate),
         (bonds.Auto(**LINEAR, sites=9_999), bonds.Counted),
         (bonds.Auto(**LINEAR, sites=10_000), bonds.Rate),
@@ -113,19 +98,14 @@ def test_the_depth_left_open_is_chosen_by_noise_and_rupture():
         (bonds.Auto(rupture=BELL, **STRETCHED, sites=10_000), bonds.Cohort),
         (bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED, sites=64), bonds.Tracked),
         (bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED), bonds.FirstMoment),
-    ]
-    for auto, depth in cases:
+    ]:
         scenario = scene(bonds=auto)
         assert type(scenario.population) is depth
         assert scenario.varies["bonds"] == (depth in (bonds.Counted, bonds.Tracked))
-    assert "1/√N of 64 sites is 0.125, above the tolerance" in scene(bonds=cases[5][0]).why["bonds"]
-
-
-def test_bonds_whose_forces_are_read_are_resolved_even_at_a_constant_rate():
-    auto = bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED)
-    scenario = scene(bonds=auto, shear=FIELD)
-    assert type(scenario.population) is bonds.Cohort
-    assert scenario.why["bonds"].endswith("the forces of the bonds are read")
+        assert scene(bonds=replace(auto, start_from="empty")).population.start_from == "empty"
+    assert scene(bonds=bonds.Auto(**LINEAR, area="carried")).population.area == "carried"
+    read = bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED)  # at a constant rate, but the force of each is needed
+    assert type(scene(bonds=read, shear=FIELD).population) is bonds.Cohort
 
 
 def test_the_number_of_sites_is_given_or_that_of_the_contact_at_rest():
@@ -141,11 +121,3 @@ def test_cohorts_chosen_are_finer_than_the_noise_left_out():
     for tolerance, cohorts in [(0.5, 1e-4), (1e-2, 1e-4), (1e-4, 1e-5)]:
         auto = bonds.Auto(rupture=BELL, **STRETCHED, tolerance=tolerance)
         assert_allclose(scene(bonds=auto).population.tolerance, cohorts, rtol=1e-15)
-
-
-def test_the_choice_keeps_what_the_depth_is_given():
-    shared = {"start_from": "empty", "area": "carried"}
-    chosen = scene(bonds=bonds.Auto(**LINEAR, **shared, stress=2e5)).population
-    assert chosen == bonds.Rate(**LINEAR, **shared, stress=2e5)
-    chosen = scene(bonds=bonds.Auto(rupture=BELL, **STRETCHED, **shared)).population
-    assert chosen == bonds.Cohort(rupture=BELL, **STRETCHED, **shared)

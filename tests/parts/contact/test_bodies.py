@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 from pydantic import TypeAdapter, ValidationError
 
 from sim.laws import halfspace
-from sim.parts.contact.models import Adhesion, Body, Solid, Sphere
+from sim.parts.contact.models import Adhesion, Body, Solid
 
 
 def test_either_modulus_describes_the_same_solid():
@@ -14,13 +14,6 @@ def test_either_modulus_describes_the_same_solid():
     by_young = Solid(youngs_modulus=2.6e6, poisson_ratio=0.3)
     assert_allclose(by_young.effective, by_shear.effective, rtol=1e-15, atol=0)
     assert_allclose(by_young.contact_modulus, 2.6e6 / (1.0 - 0.3**2), rtol=1e-14, atol=0)
-
-
-def test_not_exactly_one_modulus_is_refused_with_the_cure():
-    for moduli in [{}, {"shear_modulus": 1e6, "youngs_modulus": 3e6}]:
-        for kind in (Solid, Body):
-            with pytest.raises(ValidationError, match=r'write either shear_modulus = "1\.6 MPa" or youngs_modulus'):
-                kind(**moduli)
 
 
 def test_a_second_body_adds_its_compliances():
@@ -42,23 +35,16 @@ def test_the_work_follows_the_bonds_by_their_share():
     assert Adhesion(work=0.0).work_of_bonds(1.0) == 0.0
 
 
-def test_impossible_bodies_are_refused():
-    for kind, values in (
-        (Solid, {"shear_modulus": 0.0}),
-        (Solid, {"shear_modulus": "1.6 mm"}),
-        (Solid, {"shear_modulus": 1e6, "poisson_ratio": 0.51}),
-        (Solid, {"shear_modulus": 1e6, "counter_body": {}}),
-        (Solid, {"shear_modulus": 1e6, "density": 1.0}),
-        (Sphere, {}),
-        (Adhesion, {"work": "nan"}),
-        (Adhesion, {"work": 0.04, "bond_share": 1.1}),
+def test_impossible_bodies_are_refused_at_their_key():
+    for kind, values, place in (
+        (Solid, {}, ()),
+        (Body, {"shear_modulus": 1e6, "youngs_modulus": 3e6}, ()),
+        (Solid, {"shear_modulus": 1e6, "poisson_ratio": 0.51}, ("poisson_ratio",)),
+        (Solid, {"shear_modulus": 1e6, "counter_body": {"shear_modulus": "1 mm"}}, ("counter_body", "shear_modulus")),
+        (Solid, {"shear_modulus": 1e6, "density": 1.0}, ("density",)),
+        (Adhesion, {"work": 0.04, "bond_share": 1.1}, ("bond_share",)),
     ):
-        with pytest.raises(ValidationError):
+        with pytest.raises(ValidationError) as fault:
             TypeAdapter(kind).validate_python(values)
-
-
-def test_one_wrong_number_is_one_error_at_its_own_key():
-    with pytest.raises(ValidationError) as fault:
-        TypeAdapter(Solid).validate_python({"shear_modulus": 1e6, "counter_body": {"shear_modulus": "1 mm"}})
-    (error,) = fault.value.errors()
-    assert error["loc"] == ("counter_body", "shear_modulus")
+        (error,) = fault.value.errors()
+        assert error["loc"] == place
