@@ -6,7 +6,6 @@ the fit is made anew, until it stays. The same noise is drawn each time. Where s
 that is free, such as the speed of an edge that lags, or what slides feels its friction, every prediction is a run.
 """
 
-import contextlib
 import copy
 import difflib
 import io
@@ -14,7 +13,7 @@ import itertools
 import json
 import math
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -57,14 +56,12 @@ Array = NDArray[np.float64]
 
 #: Factor by which a number that is fitted in its logarithm may change at most, where no bounds are given.
 _WIDE = 1e4
-#: The same of bounds that are given as an example.
-_USUAL = 100.0
 #: Most runs of the scenario's own models, and the change of every number, over its error, that ends them.
 _RUNS, _STAYS = 3, 0.1
 #: Correlation beyond which the data hardly tell two numbers apart.
 _ALIKE = 0.95
 #: Start of another search, over an e-fold or the range of a number; and most rows that are named.
-_BESIDE, _NAMED = 0.5, 3
+_BESIDE, _MOST_ROWS = 0.5, 3
 #: Probability of a chi^2 as large below which a fit is doubted.
 POOR = 0.05
 #: Ratio of measured and fitted values beyond which a unit is asked for.
@@ -73,7 +70,7 @@ _OTHER_UNIT = 100.0
 _OTHER = ("clock", "record", "ensemble", "seed")
 
 
-class Found(NamedTuple):
+class Estimate(NamedTuple):
     """Estimate of one free number [SI]: its value, standard error and interval, and its value in steady sliding."""
 
     free: Free
@@ -93,7 +90,7 @@ class Fit(NamedTuple):
     scenario: Scenario
     problem: Problem
     best: Minimum
-    numbers: tuple[Found, ...]
+    numbers: tuple[Estimate, ...]
     correlations: Array
     converged: bool
     remarks: tuple[str, ...]
@@ -105,8 +102,9 @@ class Fit(NamedTuple):
 
     @property
     def p_value(self) -> float:
-        """Probability of a chi^2 as large or larger; nan where the errors were not measured."""
-        return _likely(self.problem, self.best)
+        """Probability of a chi^2 as large or larger; nan if the errors were not measured."""
+        known = self.problem.freedom > 0 and not self.problem.estimated.any()
+        return float(chdtrc(self.problem.freedom, self.best.chi_square)) if known else math.nan
 
     @property
     def values(self) -> dict[str, float]:
@@ -123,7 +121,7 @@ def fit(
     Parameters
     ----------
     scenario : Scenario
-        Its own values are where the search starts; without its sweep.
+        The search starts at its values; its sweep is left out.
     data : sequence of Path
         CSV tables (``sim.study.likelihood.read``), all fitted together.
     free : iterable of str
@@ -131,36 +129,35 @@ def fit(
     common : dict, optional
         Relative errors that all points of a variable share, as of one lens or one camera.
     steady : bool
-        Whether steady sliding is enough, so that the scenario's own models are not run.
+        True if steady sliding is enough, so that the scenario's own models are not run.
 
     Raises
     ------
     BadInput
-        If a key is none that can be found, a table cannot be read, or the curves depend on some keys only together.
+        If a key cannot be fitted, a table cannot be read, or the curves depend on some keys only together.
     """
     base = scenario.with_values({"record": {}})
-    chosen = [_free(base, text) for text in free]
-    if len({item.key for item in chosen}) < len(chosen):
+    free_numbers = [_free(base, text) for text in free]
+    if len({item.key for item in free_numbers}) < len(free_numbers):
         raise BadInput(["--free: a key is there twice; give each once"])
     tables = [read(path, base) for path in data]
-    problem = problem_of(tables, [groups(base, table) for table in tables], chosen, common or {})
-    if steady and base.drive.solves_motion:
-        raise BadInput(
-            [f'--steady: drive.model = "{base.drive.model}" is answered by its own runs alone; leave it out']
-        )
-    if base.drive.solves_motion or (not steady and idle(problem)):
+    problem = problem_of(tables, [groups(base, table) for table in tables], free_numbers, common or {})
+    drive = base.drive
+    if steady and drive.solves_motion:
+        raise BadInput([f'--steady: drive.model = "{drive.model}" is answered by its own runs alone; leave it out'])
+    if drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
     _refuse_entangled(problem)
     problem, best = _searched(problem)
-    alone, converged = best, best.converged
-    for _ in range(0 if steady or problem.by_run else _RUNS):
+    alone, steady = best, steady or problem.by_run
+    converged = steady and best.converged
+    for _ in range(0 if steady else _RUNS):
         before = best.x
         problem, best = with_errors(problem.compared(best.x), best.x)
         if best.covariance is None or np.all(np.abs(best.x - before) < _STAYS * np.sqrt(np.diag(best.covariance))):
+            converged = alone.converged and best.converged
             break
-    else:
-        converged = (steady or problem.by_run) and converged
-    return _assembled(scenario, problem, best, alone, converged and best.converged)
+    return _assembled(scenario, problem, best, alone, converged)
 
 
 def _searched(problem: Problem) -> tuple[Problem, Minimum]:
@@ -178,11 +175,6 @@ def _searched(problem: Problem) -> tuple[Problem, Minimum]:
     return min(minima, key=lambda item: item[0].criterion(item[1].chi_square))
 
 
-def _likely(problem: Problem, best: Minimum) -> float:
-    known = problem.freedom > 0 and not problem.estimated.any()
-    return float(chdtrc(problem.freedom, best.chi_square)) if known else math.nan
-
-
 def _poor(problem: Problem, best: Minimum) -> bool:
     """Return True if the curves lie further off than their errors."""
     freedom = problem.freedom
@@ -190,136 +182,99 @@ def _poor(problem: Problem, best: Minimum) -> bool:
 
 
 def _open(problem: Problem, best: Minimum) -> NDArray[np.int64]:
-    """Measured numbers at which the contact is open by the fit, and was not."""
+    """Return the measured numbers of a closed contact at which the contact is open by the fit."""
     return np.flatnonzero((problem.predicted(best.x) == 0.0) & (np.abs(problem.values) > 3.0 * problem.sigma))
 
 
 def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minimum, converged: bool) -> Fit:
-    """The fit with its intervals, and what to know of it."""
-    count = len(problem.free)
-    if best.covariance is None:
-        message = ("the errors could not be found: the data do not hold some of the numbers",)
-        none = Interval(math.nan, math.nan, True, True)
-        numbers = [Found(item, item.outer(float(best.x[k])), math.nan, none, item.outer(float(alone.x[k])))
-                   for k, item in enumerate(problem.free)]  # fmt: skip
-        return Fit(scenario, problem, best, tuple(numbers), np.full((count, count), np.nan), False, message)
-    spread = np.sqrt(np.diag(best.covariance))
+    """Return the fit with its intervals and remarks."""
+    count, size, known = len(problem.free), len(best.x), best.covariance is not None
+    covariance = np.full((size, size), np.nan) if best.covariance is None else best.covariance
+    spread = np.sqrt(np.diag(covariance))
     estimates = []
     for k, item in enumerate(problem.free):
-        value = item.outer(float(best.x[k]))
-        error = spread[k] * (value if item.logarithmic else 1.0)
-        estimates.append(Found(item, value, float(error), interval(problem, best, k), item.outer(float(alone.x[k]))))
-    alike = (best.covariance / np.outer(spread, spread))[:count, :count]
-    final = scenario.with_values({item.free.key: item.value for item in estimates})
-    return Fit(
-        final, problem, best, tuple(estimates), alike, converged, tuple(_remarks(problem, best, estimates, alike))
-    )
+        value, unshifted = item.outer(float(best.x[k])), item.outer(float(alone.x[k]))
+        ends = interval(problem, best, k) if known else Interval(math.nan, math.nan, True, True)
+        error = float(spread[k] * (value if item.logarithmic else 1.0))
+        estimates.append(Estimate(item, value, error, ends, unshifted))
+    alike = (covariance / np.outer(spread, spread))[:count, :count]
+    result = Fit(scenario, problem, best, tuple(estimates), alike, known and converged, ())
+    if not known:
+        return result._replace(remarks=("the errors could not be computed: the data do not hold some of the numbers",))
+    return result._replace(scenario=scenario.with_values(result.values), remarks=tuple(_remarks(result)))
 
 
-def _remarks(problem: Problem, best: Minimum, estimates: list[Found], alike: Array) -> list[str]:
-    remarks = []
-    for i, item in enumerate(estimates):
-        for j in range(i):
-            if abs(alike[i, j]) > _ALIKE:
-                pair = f"{estimates[j].free.key} and {item.free.key}"
-                remarks.append(f"the data hardly tell {pair} apart (correlation {alike[i, j]:.3f})")
-        ends = [*zip(("below", "above"), item.interval[:2], item.interval[2:], strict=True)]
-        if bound := [word for word, end, is_open in ends if is_open and not math.isnan(end)]:
-            remarks.append(
-                f"{item.free.key}: the data do not bound it {' or '.join(bound)}; its bound is given instead"
-            )
-        if lost := [word for word, end, _ in ends if math.isnan(end)]:
-            remarks.append(f"{item.free.key}: the end of its interval was not found {' or '.join(lost)}")
-    if (p_value := _likely(problem, best)) <= POOR:
-        remarks.append(
-            f"the curves lie further off than their errors (p = {p_value:.2g}): the model lacks something, a"
+def _remarks(result: Fit) -> Iterator[str]:
+    """Yield remarks on what the data do not determine and where the fit is poor."""
+    problem, fitted = result.problem, np.abs(result.problem.predicted(result.best.x))
+    for i, item in enumerate(result.numbers):
+        for other, correlation in zip(result.numbers[:i], result.correlations[i], strict=False):
+            if abs(correlation) > _ALIKE:
+                pair = f"{other.free.key} and {item.free.key}"
+                yield f"the data hardly tell {pair} apart (correlation {correlation:.3f})"
+        low, high, *open_ends = item.interval
+        for word, end, is_open in zip(("lower", "upper"), (low, high), open_ends, strict=True):
+            if math.isnan(end):
+                yield f"{item.free.key}: the {word} end of its interval could not be computed"
+            elif is_open:
+                yield f"{item.free.key}: the data do not set the {word} end of its interval; its bound is given instead"
+    if result.p_value <= POOR:
+        yield (
+            f"the curves lie further off than their errors (p = {result.p_value:.2g}), so the intervals do not hold: "
+            "the model lacks something, a number that is not free is wrong, or the errors are too small"
         )
-        remarks[-1] += (
-            " number that is not free is wrong, or the errors are too small; the intervals hold for none of these"
-        )
-    remarks += _of_other_units(problem, best)
-    if (open_there := _open(problem, best)).size:
-        rows = ", ".join(map(problem.place, open_there[:_NAMED]))
-        remarks.append(f"the contact is open by the fit where it was measured: {rows}")
-    if problem.estimated.any():
-        remarks.append("curves without errors: their scatter around the fit stands for them")
-    return remarks
-
-
-def _of_other_units(problem: Problem, best: Minimum) -> list[str]:
-    """Return a remark on each curve whose measured and fitted values differ as if one had another unit."""
-    remarks, fitted = [], np.abs(problem.predicted(best.x))
-    for number in range(int(problem.curve[-1]) + 1):
+    for number, name in enumerate(problem.names):
         here = problem.curve == number
         size, least = float(np.median(np.abs(problem.values[here]))), float(np.median(fitted[here]))
         if min(size, least) > 0.0 and not 1.0 / _OTHER_UNIT < size / least < _OTHER_UNIT:
-            name = problem.place(int(np.argmax(here))).partition(":")[0]
-            remarks.append(
-                f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario"
-            )
-    return remarks
+            yield f"{name} is {size / least:.2g} times what is fitted: check its unit, and those of the scenario"
+    if (open_rows := _open(problem, result.best)).size:
+        places = ", ".join(map(problem.place, open_rows[:_MOST_ROWS]))
+        yield f"the contact is open by the fit where it was measured: {places}"
+    if problem.estimated.any():
+        yield "curves without errors: their scatter around the fit stands for them"
 
 
 def _free(scenario: Scenario, text: str) -> Free:
     """Return the free number of a text ``KEY`` or ``KEY=LOW:HIGH``."""
     key, sign, span = text.partition("=")
-    key, known = key.strip(), quantities(scenario)
-    if key not in known or key.partition(".")[0] in _OTHER or known[key][0].whole:
-        physical = [item for item, (quantity, _) in known.items()
-                    if item.partition(".")[0] not in _OTHER and not quantity.whole]  # fmt: skip
-        near = difflib.get_close_matches(key, physical, 1, 0.5)
-        message = "is no physical number of the scenario" + (f'; did you mean "{near[0]}"?' if near else "")
-        raise BadInput([f"--free {key[:80]}: {message or 'is not there'}"])
+    key, known = key.strip(), {
+        key: (quantity, value) for key, (quantity, value) in quantities(scenario).items()
+        if key.partition(".")[0] not in _OTHER and not quantity.whole
+    }  # fmt: skip
+    if key not in known:
+        near = "".join(f'; did you mean "{name}"?' for name in difflib.get_close_matches(key, known, 1, 0.5))
+        raise BadInput([f"--free {key[:80]}: is no physical number of the scenario{near}"])
     quantity, start = known[key]
     low, high = max(quantity.at_least, quantity.above), min(quantity.at_most, quantity.below)
     if sign:
-        low, high = _span(key, span, quantity, start)
+        low, high = _span(key, span, quantity)
     elif low >= 0.0 and math.isinf(high):
-        if not start > 0.0:
-            raise BadInput([f"--free {key}: starts at 0; give it a value in the scenario, or bounds, KEY=LOW:HIGH"])
         low, high = start / _WIDE, start * _WIDE
     elif low == quantity.above and low == 0.0:
         low = high / _WIDE**2
-    if not low <= start <= high:
+    if not low <= start <= high or low == high:
         shown = f"{engineering(low, quantity.unit)} to {engineering(high, quantity.unit)}"
-        raise BadInput([f"--free {key}: the scenario's value does not lie within {shown}; start inside"])
+        cure = "start inside, or give bounds, KEY=LOW:HIGH"
+        raise BadInput([f"--free {key}: the scenario's value does not lie within {shown}; {cure}"])
     return Free(key, quantity, start, low, high)
 
 
-def _span(key: str, span: str, quantity: Quantity, start: float) -> tuple[float, float]:
-    """Bounds in a text ``LOW:HIGH``."""
-    ends = span.split(":")
-    try:
-        low, high = (quantity.read(_number(end)) for end in ends)
-    except ValueError as fault:
-        message = str(fault) if len(ends) == 2 else "takes two bounds"
-        raise BadInput(
-            [f'--free {key}={span[:60]}: {message}; write KEY=LOW:HIGH, such as "{key}={_typical(quantity, start)}"']
-        ) from None
+def _span(key: str, span: str, quantity: Quantity) -> tuple[float, float]:
+    """Return the bounds in a text ``LOW:HIGH``."""
+    name = f"--free {key}=LOW:HIGH, bound"
+    bounds = {kind: getattr(quantity, kind) for kind in ("above", "at_least", "below", "at_most")}
+    low, high = (read_option(end, name, quantity.unit, **bounds) for end in span.partition(":")[::2])
     if not low < high:
         raise BadInput([f"--free {key}={span[:60]}: the bounds are in the wrong order; write the lower one first"])
     return low, high
 
 
-def _number(text: str) -> str | float:
-    with contextlib.suppress(ValueError):
-        return float(text)
-    return text.strip()
-
-
-def _typical(quantity: Quantity, start: float) -> str:
-    """Bounds a hundred times below and above a number, or those of the quantity where these are nearer."""
-    low, high = sorted((start / _USUAL, start * _USUAL)) if start else (-1.0, 1.0)
-    ends = max(low, quantity.at_least), min(high, quantity.at_most, quantity.below)
-    return ":".join(engineering(end, quantity.unit) for end in ends)
-
-
 def _refuse_entangled(problem: Problem) -> None:
     """Refuse keys that have no effect on the curves, or only together."""
-    message = "has no effect on what was measured; fix it"
-    faults = [f"--free {key}: {message}" for key in idle(problem)]
-    for together in [] if faults else entangled(problem):
-        names = f"{', '.join(together[:-1])} and {together[-1]}"
+    faults = [f"--free {key}: has no effect on what was measured; fix it" for key in idle(problem)]
+    for keys in [] if faults else entangled(problem):
+        names = f"{', '.join(keys[:-1])} and {keys[-1]}"
         faults.append(f"--free {names}: the curves depend on them only together, as on a product; free one of them")
     if faults:
         raise BadInput(faults)
@@ -332,45 +287,40 @@ _ALONG = {"speed": ("sliding speed $V$", "m/s"), "t": ("time $t$", "s")}
 
 
 def figure(problem: Problem, best: Minimum) -> Figure:
-    """Each curve over what was varied, with error bars and the fit, above its residuals in standard errors.
+    """Draw each curve over the condition that varies, with error bars and fit, above its residuals in standard errors.
 
-    The lines are of many speeds where only the speed was varied, else they join the rows in the order of what was.
-    Grey is steady sliding alone, where the scenario's own models add to it.
+    If only the speed varies, the lines are of many speeds; otherwise they join the rows. Grey is steady sliding alone
+    if the scenario's own models add to it.
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
     off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
     curves = [(table, curve) for table in problem.tables for curve in table.curves]
     with mpl.rc_context(STYLE):
-        drawn, panels = rows([_CURVE, _RESIDUALS] * len(curves), shared=False)
-        for number, (table, curve) in enumerate(curves):
-            here, (upper, lower) = problem.curve == number, panels[2 * number : 2 * number + 2]
-            words, si, along = _along(table)
-            order, (unit, name, symbol) = np.argsort(along, kind="stable"), curve.described
-            x, y = Unit.of(along, si, logarithmic=axis_scale(along) == "log"), Unit.of(curve.values, unit)
+        picture, panels = rows([_CURVE, _RESIDUALS] * len(curves), shared=False)
+        for number, ((table, curve), upper, lower) in enumerate(zip(curves, panels[::2], panels[1::2], strict=True)):
+            here, (words, si, along), (unit, name, symbol) = problem.curve == number, _along(table), curve.described
+            scale, order = axis_scale(along), np.argsort(along, kind="stable")
+            x, y = Unit.of(along, si, logarithmic=scale == "log"), Unit.of(curve.values, unit)
             bars: Any = HOLLOW | {"color": BOTH, "elinewidth": 0.7, "zorder": 3, "label": "measured"}
-            spread = y.factor * problem.sigma[here]
-            upper.errorbar(x.factor * along, y.factor * curve.values, yerr=spread, **bars)
-            lines = [(fitted, BOTH, "fit")]
-            if np.any(problem.shift):
-                lines.append((alone, REFERENCE, "in steady sliding"))
+            upper.errorbar(x.factor * along, y.factor * curve.values, yerr=y.factor * problem.sigma[here], **bars)
             fine, smooth = problem.between(best.x, table, curve.name)
-            for values, colour, label in lines:
+            lines = [(fitted, BOTH, "fit", 2.0), (alone, REFERENCE, "in steady sliding", 1.8)]
+            for values, color, label, zorder in lines[: 2 if np.any(problem.shift) else 1]:
                 line, over = values[here][order], along[order]
                 if fine.size:  # what is added to steady sliding is known at the rows
                     line, over = smooth + np.interp(fine, over, line - alone[here][order]), fine
-                upper.plot(x.factor * over, y.factor * line, color=colour, linewidth=0.9, label=label,
-                           zorder=2 if colour == BOTH else 1.8)  # fmt: skip
+                look: Any = {"color": color, "label": label, "zorder": zorder, "linewidth": 0.9}
+                upper.plot(x.factor * over, y.factor * line, **look)
             upper.set_ylabel(y.label(f"{name.partition(',')[0]} ${symbol}$"))
             upper.tick_params(labelbottom=False)
             lower.plot(x.factor * along, off[here], color=BOTH, **HOLLOW)
             lower.axhline(0.0, **GUIDE)
             lower.margins(y=0.15)
             lower.set_ylabel("residual ($\\sigma$)")
-            for panel, text in ((upper, ""), (lower, x.label(words))):
-                across(panel, x.factor * along, text, axis_scale(along), 0.05)
-            if not number:
-                legend(upper)
-    return drawn
+            across(upper, x.factor * along, "", scale, 0.05)
+            across(lower, x.factor * along, x.label(words), scale, 0.05)
+        legend(panels[0])
+    return picture
 
 
 def refuse_units(tables: Sequence[Measured], units: Sequence[str]) -> None:
@@ -378,24 +328,20 @@ def refuse_units(tables: Sequence[Measured], units: Sequence[str]) -> None:
     try:
         with in_units(units):
             for table in tables:
-                _, si, along = _along(table)
-                for values, unit in ((along, si), *((curve.values, curve.described[0]) for curve in table.curves)):
-                    Unit.of(values, unit)
+                for unit in (_along(table)[1], *(curve.described[0] for curve in table.curves)):
+                    Unit.of(1.0, unit)
     except ValueError as fault:
         raise BadInput([f"--units: {fault}"]) from None
 
 
 def _along(table: Measured) -> tuple[str, str, Array]:
-    """Words, unit and values of what varies from row to row."""
-    varied = [(name, values) for name, values in table.conditions.items() if np.ptp(values) > 0.0]
+    """Return words, unit and values of the condition that varies most from row to row."""
+    varied = {name: values for name, values in table.conditions.items() if np.ptp(values) > 0.0}
     if not varied:
         return "row", "1", np.arange(1.0, table.rows + 1.0)
-    name, values = max(varied, key=lambda item: len(np.unique(item[1])))
-    if name == "held":
-        name = HELD[table.held]
-        return name.replace("_", " "), "N" if table.held == "load" else "m", values
-    words, unit = _ALONG.get(name, (name, "1"))
-    return words, unit, values
+    name = max(varied, key=lambda name: len(np.unique(varied[name])))
+    held = HELD[table.held].replace("_", " "), "N" if table.held == "load" else "m"
+    return *({"held": held} | _ALONG).get(name, (name, "1")), varied[name]
 
 
 #: First words of a line of the scenarios that are written here, by which they may be replaced.
@@ -410,7 +356,7 @@ def carried_out(
     scenario: Scenario, data: Sequence[Path], free: Sequence[str], common: Sequence[str], stem: Path, replace: bool,
     steady: bool, judged: bool, units: Sequence[str] = (),
 ) -> tuple[Fit, list[Shown]]:  # fmt: skip
-    """Fit, compare mechanisms if wanted, and write the files.
+    """Fit, compare mechanisms if wanted, write the files, and return the tables to print.
 
     Arguments are those of ``sim.study.fit.fit``, with ``common`` as texts ``"COLUMN=2 %"``, of ``claim`` and of the
     figure.
@@ -418,16 +364,15 @@ def carried_out(
     pairs = [pair.partition("=")[::2] for pair in common]
     sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
     outputs = claim(scenario, data, stem, replace)
-    refuse_units([read(path, scenario) for path in data] if units else [], units)
+    if units:
+        refuse_units([read(path, scenario) for path in data], units)
     result = fit(scenario, data, free, sizes, steady)
     verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
     save(scenario, result, data, outputs, verdict, units)
     shown: list[Shown] = [(_table(result), f"\n{_explanation(result)}\n")]
     if verdict is not None:
-        doubt = (
-            "; but even the scenario as it is lies off: perhaps none of these is true" if result.p_value <= POOR else ""
-        )
-        shown.append((_comparison(verdict), f"\n{verdict.words}{doubt}\n"))
+        doubt = "; but even the scenario as it is lies off: perhaps none of these is true"
+        shown.append((_comparison(verdict), f"\n{verdict.words}{doubt if result.p_value <= POOR else ''}\n"))
     return result, [*shown, ([], "\n".join(map(str, outputs)))]
 
 
@@ -440,60 +385,48 @@ class Outputs(NamedTuple):
 
 
 def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -> Outputs:
-    """The files to be written, ``<stem>_fit.toml`` and so on; refused where they exist, unless they are replaced.
+    """Return the files to be written, ``<stem>_fit.toml`` and so on; refuse older ones unless they are replaced.
 
-    Even then no scenario is replaced but one that a fit has made.
+    A scenario is replaced only if a fit has written it.
     """
     outputs = Outputs(*(stem.with_name(f"{stem.name}_fit.{ending}") for ending in Outputs._fields))
-    read = [*files_read(scenario), *data]
-    for path in outputs:
-        if not (replace and path == outputs.toml and _made_here(path, read)):
-            files.claim(path, replace, read)
+    inputs = [*files_read(scenario), *data]
+    toml = outputs.toml
+    written_here = toml.is_file() and _MADE.encode() in toml.read_bytes()
+    if not (replace and written_here) or toml.resolve() in [path.resolve() for path in inputs]:
+        files.claim(toml, replace, inputs)
+    for path in outputs[1:]:
+        files.claim(path, replace, inputs)
     return outputs
 
 
-def _made_here(path: Path, read: Sequence[Path]) -> bool:
-    """Return True if a file is a scenario that a fit has written, and no input."""
-    if not path.is_file() or any(item.exists() and path.samefile(item) for item in read):
-        return False
-    with path.open("rb") as file:
-        return any(line.startswith(_MADE.encode()) for line in file)
-
-
 def _table(fit: Fit) -> list[dict[str, str]]:
-    """One row for each number found, in units that suit it."""
+    """Return one row for each estimate, in units that suit it."""
     rows = []
     for item in fit.numbers:
-        nothing = item.interval.low_open and not item.interval.high_open and item.error > abs(item.value)
-        factor, unit = scaled(item.interval.high if nothing else item.value, item.free.quantity.unit)
-        shown = concise(factor * item.value, factor * item.error)
-        shown = f"below {factor * item.interval.high:.3g}" if nothing else shown
-        row = {"key": item.free.key, "value": f"{shown} {unit}".rstrip()}
-        ends = zip(item.interval[:2], item.interval[2:], strict=True)
-        low, high = (_end(factor * end, is_open) for end, is_open in ends)
-        row[f"{LEVEL:.0%} interval"] = f"{low} to {high}"
-        row["start"] = engineering(item.free.start, item.free.quantity.unit)
-        shift = (item.value - item.steady) / item.error if item.error > 0.0 else math.nan
-        alone = engineering(item.steady, item.free.quantity.unit)
-        row["steady sliding alone"] = f"{alone} ({-shift:+.1f} errors)" if abs(shift) > 0.05 else alone
-        rows.append(row)
+        ends, si = item.interval, item.free.quantity.unit
+        is_limit = ends.low_open and not ends.high_open and item.error > abs(item.value)
+        factor, unit = scaled(ends.high if is_limit else item.value, si)
+        value = f"below {factor * ends.high:.3g}" if is_limit else concise(factor * item.value, factor * item.error)
+        marks = (" (bound)" if is_open else "" for is_open in ends[2:])
+        low, high = (f"{factor * end:.4g}{mark}" for end, mark in zip(ends[:2], marks, strict=True))
+        shift = (item.steady - item.value) / item.error if item.error > 0.0 else math.nan
+        alone = engineering(item.steady, si) + (f" ({shift:+.1f} errors)" if abs(shift) > 0.05 else "")
+        rows.append({
+            "key": item.free.key, "value": f"{value} {unit}".rstrip(), f"{LEVEL:.0%} interval": f"{low} to {high}",
+            "start": engineering(item.free.start, si), "steady sliding alone": alone,
+        })  # fmt: skip
     return rows
-
-
-def _end(end: float, is_open: bool) -> str:
-    """One end of an interval, which the data, a bound or nothing sets."""
-    return "unknown" if math.isnan(end) else f"{end:.4g}" + (" (bound)" if is_open else "")
 
 
 def _explanation(fit: Fit) -> str:
     """Return the quality of the fit and the remarks on its numbers."""
-    problem, best = fit.problem, fit.best
     likely = f", p = {fit.p_value:.2g}" if math.isfinite(fit.p_value) else ""
-    lines = [f"chi^2 {best.chi_square:.4g} at {problem.freedom} degrees of freedom{likely}, AICc {fit.aicc:.4g}"]
+    chi_square, freedom = fit.best.chi_square, fit.problem.freedom
+    lines = [f"chi^2 {chi_square:.4g} at {freedom} degrees of freedom{likely}, AICc {fit.aicc:.4g}", *fit.remarks]
     if not fit.converged:
         lines.append("the fit has not converged: start nearer, give bounds, or free fewer keys")
-    tables = [f"{table.path}: {table.rows} rows, {table.ranges}" for table in problem.tables]
-    return "\n".join([*lines, *fit.remarks, *tables])
+    return "\n".join(lines + [f"{table.path}: {table.rows} rows, {table.ranges}" for table in fit.problem.tables])
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:
@@ -510,72 +443,57 @@ def _comparison(verdict: Verdict) -> list[dict[str, str]]:
 
 
 def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[str, Any]:
-    """All numbers of a fit [SI]."""
+    """Return all numbers of a fit [SI]; those that are not known are None."""
+    shares = fit.best.x[len(fit.numbers) :]
     result: dict[str, Any] = {
         "scenario": fit.scenario.source.path,
         "data": [str(path) for path in data],
         "level": LEVEL,
-        "numbers": {item.free.key: _described(item) for item in fit.numbers},
+        "numbers": {
+            item.free.key: {
+                "value": item.value, "unit": item.free.quantity.unit, "standard_error": item.error,
+                **item.interval._asdict(), "start": item.free.start, "steady_sliding_alone": item.steady,
+            }
+            for item in fit.numbers
+        },
         "correlations": {"keys": [item.free.key for item in fit.numbers], "matrix": fit.correlations.tolist()},
-        "common_errors": _common(fit),
+        "common_errors": {name: size * x for (name, size), x in zip(fit.problem.common.items(), shares, strict=True)},
         "chi_square": fit.best.chi_square,
         "degrees_of_freedom": fit.problem.freedom,
         "p_value": fit.p_value,
         "aicc": fit.aicc,
         "converged": fit.converged,
-        "remarks": list(fit.remarks),
-    }
+        "remarks": fit.remarks,
+    }  # fmt: skip
     if verdict is not None:
         judged = [item._asdict() for item in verdict.judged]
         result["mechanisms"] = {"sufficient": verdict.sufficient, "words": verdict.words, "judged": judged}
-    return _without_nan(result)
-
-
-def _described(item: Found) -> dict[str, Any]:
-    ends = item.interval._asdict()
-    described = {"value": item.value, "unit": item.free.quantity.unit, "standard_error": item.error, **ends}
-    return described | {"start": item.free.start, "steady_sliding_alone": item.steady}
-
-
-def _common(fit: Fit) -> dict[str, float]:
-    """Return the estimated relative errors that curves share."""
-    shares = fit.best.x[len(fit.problem.free) :]
-    return {name: float(size * x) for (name, size), x in zip(fit.problem.common.items(), shares, strict=True)}
-
-
-def _without_nan(value: Any) -> Any:
-    """A document in which a number that is not known is null, as JSON has it."""
-    if isinstance(value, dict):
-        return {key: _without_nan(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    known: dict[str, Any] = json.loads(json.dumps(result), parse_constant=lambda _: None)
+    return known
 
 
 def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
-    """The scenario as it was given, its question first, with the values found, for a file in a folder."""
+    """Return the scenario as it was written, its opening comment first, with the estimates, for a file in a folder."""
     source = scenario.origin
-    text = source.text or written(_plain(json.loads(scenario_json(scenario))))
-    tables = copy.deepcopy(parse(text, source.path))
-    changed = source.overrides | {
-        item.free.key: item.value if item.free.quantity.unit == "1" else f"{item.value:.12g} {item.free.quantity.unit}"
-        for item in fit.numbers
-    }
-    for key, value in changed.items():
+    text = source.text or written(json.loads(scenario_json(scenario), object_pairs_hook=_present))
+    tables, numbers = copy.deepcopy(parse(text, source.path)), dict[str, Any]()
+    for item in fit.numbers:
+        unit = item.free.quantity.unit
+        numbers[item.free.key] = item.value if unit == "1" else f"{item.value:.12g} {unit}"
+    for key, value in (source.overrides | numbers).items():
         set_key(tables, key.split("."), value)
     above = Path(source.path).parent
     if source.path and above.resolve() != folder.resolve():
         _move(tables, above, folder)
-    keys = ", ".join(item.free.key for item in fit.numbers)
     comment = itertools.takewhile(lambda line: line.startswith("#"), text.splitlines())
     question = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
     opening = f"{question}#\n" if question else ""
-    return f"{opening}{_MADE}: {keys} are calibrated to measured curves.\n{written(tables)}"
+    return f"{opening}{_MADE}: {', '.join(numbers)} are calibrated to measured curves.\n{written(tables)}"
 
 
-def _plain(value: Any) -> Any:
-    """Tables without the keys that are left out."""
-    return {key: _plain(item) for key, item in value.items() if item is not None} if isinstance(value, dict) else value
+def _present(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the table of pairs of keys and values, without the keys that are left out."""
+    return {key: value for key, value in pairs if value is not None}
 
 
 def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
@@ -588,12 +506,7 @@ def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
 
 
 def save(
-    scenario: Scenario,
-    fit: Fit,
-    data: Sequence[Path],
-    outputs: Outputs,
-    verdict: Verdict | None,
-    units: Sequence[str] = (),
+    scenario: Scenario, fit: Fit, data: Sequence[Path], outputs: Outputs, verdict: Verdict | None, units: Sequence[str]
 ) -> None:
     """Write scenario, numbers and figure, each whole."""
     picture = io.BytesIO()

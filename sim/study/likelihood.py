@@ -11,7 +11,7 @@ error that curves share is one more number, known to be 0 within its size.
 
 import functools
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -84,11 +84,12 @@ def read(path: Path, scenario: Scenario) -> Measured:
     path : Path
         CSV with a header such as ``speed [mm/s], contact_area [mm^2], contact_area_error [mm^2]``: conditions,
         variables of a dataset, and beside these their standard errors, in the same dimension or in ``[%]``.
-        Conditions are ``t``, ``speed``, what holds the sphere (``normal_load``, ``indentation`` or ``displacement``),
-        or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. Of a slider behind a
-        spring or under a force the speed is no condition but a curve; ``stage_speed`` is that of a steady stage.
+        Conditions are ``t``, ``speed``, the prescribed quantity of the mount (``normal_load``, ``indentation`` or
+        ``displacement``), or numbers of the scenario by their names in a dataset, such as ``solid_shear_modulus``. The
+        speed of a slider behind a spring or under a force is no condition but a curve; ``stage_speed`` is that of a
+        steady stage.
     scenario : Scenario
-        What the curves are compared with.
+        The scenario that is compared with the curves.
 
     Raises
     ------
@@ -96,32 +97,37 @@ def read(path: Path, scenario: Scenario) -> Measured:
         With one line.
     """
     at, outcomes = _conditions(scenario), _outcomes(scenario)
-    known = {**{name: quantity for name, (_, quantity) in at.items()}, **outcomes}
+    known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
     result = read_measured(path, known, outcomes)
     conditions = {at[name][0]: points.values for name, points in result.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in result.items() if name not in at)
-    unclear = _unclear(scenario, conditions)
-    unclear = unclear or _against(conditions, curves)
-    if not curves:
-        unclear = 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
-    nothing = [name for name, values, errors in curves if errors is None and not np.any(values)]
-    if nothing:
-        unclear = (
-            unclear or f"{nothing[0]} is 0 in all rows, which has no scatter of its own; give errors, or leave it out"
-        )
-    if unclear:
-        raise BadInput([f"{path}: {unclear}"])
-    extremes = ((name, points.values.min(), points.values.max(), known[name].unit) for name, points in result.items())
-    ranges = ", ".join(f"{name} {low:.4g} to {high:.4g} {unit}" for name, low, high, unit in extremes)
+    for fault in _faults(scenario, conditions, curves):
+        raise BadInput([f"{path}: {fault}"])
+    ranges = ", ".join(
+        f"{name} {points.values.min():.4g} to {points.values.max():.4g} {known[name].unit}"
+        for name, points in result.items()
+    )
     return Measured(path, scenario.contact.kind, conditions, curves, ranges)
 
 
-def _against(conditions: dict[str, Array], curves: tuple[Curve, ...]) -> str:
-    """Return the fault in the signs of forces and speeds; "" if there is none."""
-    for name, values, _ in curves:
+def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curve, ...]) -> Iterator[str]:
+    """Yield the faults of a table: missing conditions, curves without information and opposite signs."""
+    if not curves:
+        yield 'no column was measured; name one as a variable of a dataset, such as "contact_area [mm^2]"'
+    drive, contact = scenario.drive, scenario.contact
+    if drive.solves_motion:
+        varies = not {"drive.stage", "drive.force"} & quantities(scenario).keys()
+    else:
+        varies = drive.model != "steady" and "speed" not in conditions
+    if "t" in conditions and len(conditions.keys() & {"speed", "held"}):
+        yield "the scenario has the speed and the load at each time; leave out t, or the columns of these"
+    elif "t" not in conditions and (not conditions or varies or ("held" not in conditions and contact.changes)):
+        yield f'no column has the conditions of each row; add "t [s]", or "speed [mm/s]" and "{HELD[contact.kind]}"'
+    for name, values, errors in curves:
         if name in ("friction_force", "shear_stress") and np.all(values * conditions.get("speed", 1.0) < 0.0):
-            return f"{name} has the sign of the speed; turn the sign of one of them"
-    return ""
+            yield f"{name} has the sign of the speed; turn the sign of one of them"
+        if errors is None and not np.any(values):
+            yield f"{name} is 0 in all rows, so that it has no scatter; give errors, or leave it out"
 
 
 def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
@@ -149,58 +155,27 @@ def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
             for item in recorded if item.name not in _NOT_MEASURED}  # fmt: skip
 
 
-def _unclear(scenario: Scenario, conditions: dict[str, Array]) -> str:
-    """Return the column that a table lacks for the speed or the load of its rows, in words; "" if it is complete."""
-    drive, contact = scenario.drive, scenario.contact
-    if "t" in conditions:
-        columns = [name for name in ("speed", "held") if name in conditions]
-        message = "times already say the speed and the load, by the scenario; leave out t, or these columns"
-        return message if columns else ""
-    if drive.solves_motion and not {"drive.stage", "drive.force"} & quantities(scenario).keys():
-        return f'what drives the slider changes during the run (drive.model = "{drive.model}"); add a column "t [s]"'
-    if "speed" not in conditions and drive.model != "steady" and not drive.solves_motion:
-        message = f'the speed changes during the run (drive.model = "{drive.model}")'
-        return f'{message}; add a column "speed [mm/s]", or "t [s]"'
-    if "held" not in conditions and contact.changes:
-        return f'contact.{contact.kind} changes during the run; add a column "{HELD[contact.kind]}", or "t [s]"'
-    column = "t [s]" if drive.solves_motion else "speed [mm/s]"
-    return "" if conditions else f'no column says where the points were taken; add for example "{column}"'
-
-
 #: Values of keys, by their dotted names.
 Values = Mapping[str, float]
 
 _READ = {item.name: item.read for item in VARIABLES}
 
 
-def changed(scenario: Scenario, values: Values) -> Scenario:
-    """A scenario with some numbers changed and nothing checked, in microseconds, for values within their bounds."""
-    tree: dict[str, Any] = {}
+def changed(part: Any, values: Values) -> Any:
+    """Return a scenario or a part with some numbers changed within their bounds; unchecked, because this is quick."""
+    names, aliases = _fields(cast(Hashable, type(part)))
+    result = object.__new__(type(part))
+    result.__dict__.update({name: getattr(part, name) for name in names})
     for key, value in values.items():
-        *tables, last = key.split(".")
-        table = tree
-        for name in tables:
-            table = table.setdefault(name, {})
-        table[last] = value
-    result: Scenario = _changed(scenario, tree)
+        first, _, rest = key.partition(".")
+        name = aliases.get(first, first)
+        result.__dict__[name] = changed(getattr(result, name), {rest: value}) if rest else value
     return result
 
 
-def _changed(part: Any, tree: dict[str, Any]) -> Any:
-    """A part with numbers changed, and tables in it."""
-    attributes, names = _keys(cast(Hashable, type(part)))
-    values = {name: getattr(part, name) for name in attributes}
-    for key, value in tree.items():
-        name = names.get(key, key)
-        values[name] = _changed(values[name], value) if isinstance(value, dict) else value
-    changed_part = object.__new__(type(part))
-    changed_part.__dict__.update(values)
-    return changed_part
-
-
 @functools.cache
-def _keys(table: type) -> tuple[list[str], dict[str, str]]:
-    """Names of a table's values, and by the key of a file where that is another one."""
+def _fields(table: Any) -> tuple[list[str], dict[str, str]]:
+    """Return the names of a table's values, and those by the key of a file if the key differs."""
     declared = getattr(table, "__pydantic_fields__", {})
     return [item.name for item in fields(table)], {item.alias: name for name, item in declared.items() if item.alias}
 
@@ -238,20 +213,15 @@ def _group(scenario: Scenario, table: Measured, rows: NDArray[np.int64]) -> Grou
     if "t" in table.conditions:
         time = table.conditions["t"][rows]
     if "held" in table.conditions:
-        scenario = scenario.with_values(
-            {f"contact.{scenario.contact.kind}": _course(time, table.conditions["held"][rows])}
-        )
+        held = table.conditions["held"][rows]
+        course = float(held[0]) if np.all(held == held[0]) else {"time": time, "value": held}
+        scenario = scenario.with_values({f"contact.{scenario.contact.kind}": course})
     if "speed" in table.conditions:
         speed = table.conditions["speed"][rows]
     else:
         instants = np.repeat(time, 2) if "t" in table.conditions else np.zeros(2 * len(rows))
         speed = scenario.drive.pieces(instants, scenario.clock.duration).joined.last[::2]
     return Group(scenario, rows, time[:, np.newaxis], speed[:, np.newaxis])
-
-
-def _course(time: Array, values: Array) -> Any:
-    """Return the course of the mount at the rows, a number if it is constant."""
-    return float(values[0]) if np.all(values == values[0]) else {"time": time, "value": values}
 
 
 def steady_course(scenario: Scenario, time: Array, speed: Array) -> Trajectory:
@@ -300,41 +270,33 @@ def _radius_by(theory: str, scenario: Scenario, course: Trajectory, values: Valu
     return compare(np.abs(course.stress), load if at_load else base, *rest, **numbers)[theory]
 
 
-class Sampled(NamedTuple):
-    """Means over members of each variable at the rows of a table, and their standard errors, 0 where none differ."""
+def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool) -> dict[str, Array]:
+    """Return means and standard errors by the scenario's own models, with the noise of its seed, shapes (2, rows).
 
-    mean: dict[str, Array]
-    error: dict[str, Array]
-
-
-def by_runs(result: list[Group], values: Values, names: list[str], by_time: bool) -> Sampled:
-    """Return the means by the scenario's own models at the rows of a table, with the noise of its seed.
-
-    Where rows have times, or only speeds and the drive passes through these, they are read along the scenario's run;
-    else each row is a run of its own at a steady speed, of the stage if there is one, of which the second half counts.
+    Rows with times are read along the scenario's run, and so are rows with speeds alone if the drive passes through
+    these. Otherwise each row is a run at a steady speed, or of the steady stage, whose second half counts.
 
     Raises
     ------
     BadInput
         If the run does not reach the speed of a row, or passes it twice.
     """
-    count = sum(len(group.rows) for group in result)
-    sampled = Sampled(*({name: np.full(count, np.nan) for name in names} for _ in range(2)))
-    for group in result:
+    count = sum(len(group.rows) for group in groups)
+    result = {name: np.full((2, count), np.nan) for name in names}
+    for group in groups:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
-        runs: list[tuple[NDArray[np.int64], Scenario, Weights]] = []
-        driven = scenario.drive.solves_motion
-        if by_time or not (driven or scenario.drive.model == "steady" or scenario.contact.changes):
-            runs.append((group.rows, scenario, functools.partial(_places, group, by_time)))
+        drive = scenario.drive
+        if by_time or not (drive.solves_motion or drive.model == "steady" or scenario.contact.changes):
+            runs = [(group.rows, _members(scenario, names, functools.partial(_places, group, by_time)))]
         else:
-            runs += [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
-        for rows, point, places in runs:
-            for name, members in _members(point, names, places).items():
-                mean = members.mean(axis=1)
-                spread = members.std(axis=1, ddof=1) if members.shape[1] > 1 else 0.0 * mean
-                sampled.mean[name][rows] = mean
-                sampled.error[name][rows] = spread / math.sqrt(members.shape[1])
-    return sampled
+            points = (_still(scenario, group, k) for k in range(len(group.rows)))
+            runs = [(group.rows[k : k + 1], _members(point, names, _second_half)) for k, point in enumerate(points)]
+        for rows, sampled in runs:
+            for name, members in sampled.items():
+                size = members.shape[1]
+                spread = members.std(axis=1, ddof=1) if size > 1 else np.zeros(len(rows))
+                result[name][:, rows] = members.mean(axis=1), spread / math.sqrt(size)
+    return result
 
 
 def _still(scenario: Scenario, group: Group, row: int) -> Scenario:
@@ -479,43 +441,33 @@ class Problem:
 
     @property
     def bounds(self) -> list[tuple[float, float]]:
-        return [(item.inner(item.low), item.inner(item.high)) for item in self.free] + [(-math.inf, math.inf)] * len(
-            self.common
-        )
+        ends = [(item.inner(item.low), item.inner(item.high)) for item in self.free]
+        return ends + [(-math.inf, math.inf)] * len(self.common)
 
     def numbers(self, x: Array) -> dict[str, float]:
-        """Values of the free keys and of those that make the mechanism."""
-        return {item.key: item.outer(float(number)) for item, number in zip(self.free, x, strict=False)} | dict(
-            self.fixed
-        )
+        """Return the values of the free keys and of those that make the mechanism."""
+        return {item.key: item.outer(float(value)) for item, value in zip(self.free, x, strict=False)} | {**self.fixed}
 
     def steady(self, x: Array) -> Array:
-        """All curves in steady sliding, or by runs."""
-        numbers, result = self.numbers(x), []
+        """Return all curves in steady sliding, or by runs."""
         if self.by_run:
-            return self._joined(self.sampled(x))[0]
+            return self.sampled(x)[0]
+        numbers, result = self.numbers(x), []
         for table, table_groups in zip(self.tables, self.groups, strict=True):
             names = [curve.name for curve in table.curves]
-            columns = {name: np.empty(table.rows) for name in names}
+            columns = np.empty((len(names), table.rows))
             for group in table_groups:
-                for name, values in by_steady_sliding(group, numbers, names, self.theory).items():
-                    columns[name][group.rows] = values
-            result += [columns[name] for name in names]
+                columns[:, group.rows] = [*by_steady_sliding(group, numbers, names, self.theory).values()]
+            result.append(columns.ravel())
         return np.concatenate(result)
 
-    def sampled(self, x: Array) -> list[Sampled]:
-        """The curves of each table by the scenario's own models."""
-        numbers, pairs = self.numbers(x), zip(self.tables, self.groups, strict=True)
-        return [by_runs(table_groups, numbers, [curve.name for curve in table.curves], "t" in table.conditions)
-                for table, table_groups in pairs]  # fmt: skip
-
-    def _joined(self, sampled: Sequence[Sampled]) -> tuple[Array, Array]:
-        """Means and standard errors of all curves."""
-        means_and_errors: list[list[Array]] = [[], []]
-        for table, result in zip(self.tables, sampled, strict=True):
-            for joined, part in zip(means_and_errors, result, strict=True):
-                joined += [part[curve.name] for curve in table.curves]
-        return np.concatenate(means_and_errors[0]), np.concatenate(means_and_errors[1])
+    def sampled(self, x: Array) -> Array:
+        """Return all curves by the scenario's own models and their standard errors, shape (2, numbers)."""
+        result = []
+        for table, table_groups in zip(self.tables, self.groups, strict=True):
+            names = [curve.name for curve in table.curves]
+            result += [*by_runs(table_groups, self.numbers(x), names, "t" in table.conditions).values()]
+        return np.concatenate(result, axis=1)
 
     def predicted(self, x: Array) -> Array:
         """All curves, with the shift and the common errors."""
@@ -537,15 +489,18 @@ class Problem:
         group = table_groups[0]._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
         return fine[:, 0], by_steady_sliding(group, self.numbers(x), [name], self.theory)[name]
 
+    @property
+    def names(self) -> list[str]:
+        """Return the names of all curves."""
+        return [curve.name for table in self.tables for curve in table.curves]
+
     def of(self, name: str) -> NDArray[np.bool_]:
         """Return True at the numbers of a variable."""
-        names = [curve.name for table in self.tables for curve in table.curves]
-        return np.array([item == name for item in names])[self.curve]
+        return np.array([item == name for item in self.names])[self.curve]
 
     def place(self, number: int) -> str:
-        """Variable and row of one of all numbers."""
-        name = [curve.name for table in self.tables for curve in table.curves][self.curve[number]]
-        return f"{name}: row {number - int(np.argmax(self.curve == self.curve[number])) + 1}"
+        """Return the variable and the row of one of all numbers."""
+        return f"{self.names[self.curve[number]]}: row {number - int(np.argmax(self.curve == self.curve[number])) + 1}"
 
     def residuals(self, x: Array) -> Array:
         """Deviations over errors, and the common errors over their sizes."""
@@ -565,11 +520,10 @@ class Problem:
         return size + 2.0 * count * (count + 1) / left if left > 0 else math.inf
 
     def compared(self, x: Array) -> "Problem":
-        """This problem with the shift from steady sliding at x to what the scenario's own models give there."""
-        mean, noise = self._joined(self.sampled(x))
-        if not np.all(np.isfinite(mean)):
-            message = "has no value in the run with what was found: is the contact open there?"
-            raise BadInput([f"{self.place(int(np.flatnonzero(~np.isfinite(mean))[0]))} {message}"])
+        """Return this problem with the shift from steady sliding at x to the scenario's own models there."""
+        mean, noise = self.sampled(x)
+        for number in np.flatnonzero(~np.isfinite(mean)):
+            raise BadInput([f"{self.place(int(number))} has no value in a run of the fit: is the contact open there?"])
         return replace(self, shift=mean - self.steady(x), noise=noise)
 
 
@@ -675,32 +629,34 @@ def interval(problem: Problem, best: Minimum, k: int) -> Interval:
     ``lmfit.conf_interval`` gives no interval if a bound and not the data ends it, and widens all by an estimated
     variance where the errors are known; so the ends are sought here.
     """
-    freedom = problem.freedom
-    known = stats.f.ppf(LEVEL, 1, freedom) if problem.estimated.any() else stats.chi2.ppf(LEVEL, 1)
-    ends = [_end(problem, best, k, sign, math.sqrt(known)) for sign in (-1.0, 1.0)]
-    (low, low_open), (high, high_open) = ends
+    estimated = problem.estimated.any()
+    rise = math.sqrt(stats.f.ppf(LEVEL, 1, problem.freedom) if estimated else stats.chi2.ppf(LEVEL, 1))
+    (low, low_open), (high, high_open) = (_end(problem, best, k, sign, rise) for sign in (-1.0, 1.0))
     return Interval(problem.free[k].outer(low), problem.free[k].outer(high), low_open, high_open)
 
 
 def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> tuple[float, bool]:
-    """One end of an interval, and whether it is only the bound of the number."""
+    """Return one end of an interval, and True if it is only the bound of the number."""
     assert best.covariance is not None
-    bound = problem.bounds[k][0 if sign < 0.0 else 1]
-    spread = math.sqrt(best.covariance[k, k])
+    lowest, highest = np.transpose(problem.bounds)
+    bound, spread = (lowest if sign < 0.0 else highest)[k], math.sqrt(best.covariance[k, k])
     along = best.covariance[:, k] / spread  # where the rest goes with this number
     room, near, far, start = abs(bound - best.x[k]), 0.0, rise * spread, best.x
-    known = {0.0: -rise}
 
+    @functools.cache
     def above(distance: float) -> float:
-        """Root of what the sum of squares has risen there, over the end's; 0 where it is near enough."""
+        """Return the root of the rise of the sum of squares beyond that of the end; 0 where it is near enough."""
         nonlocal start
-        if distance not in known:
-            held = bound if distance == room else best.x[k] + sign * distance
-            guess = _nearest(problem, (start, best.x + along * (held - best.x[k]) / spread), k, held)
-            result = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
-            root, start = math.sqrt(max(result.chi_square - best.chi_square, 0.0)), result.x
-            known[distance] = 0.0 if abs(root / rise - 1.0) < _END else root - rise
-        return known[distance]
+        if distance == 0.0:
+            return -rise
+        held = bound if distance == room else best.x[k] + sign * distance
+        starts = np.array([start, best.x + along * (held - best.x[k]) / spread])
+        starts[:, k] = held
+        # if the data do not bound a number, the straight way to it leads out of the bounds
+        guess = min(np.clip(starts, lowest, highest), key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
+        result = minimum(problem, guess, {k: held}, precision=_END_SQUARES)
+        root, start = math.sqrt(max(result.chi_square - best.chi_square, 0.0)), result.x
+        return 0.0 if abs(root / rise - 1.0) < _END else root - rise
 
     for _ in range(_MOST):
         far = min(far, room)
@@ -714,32 +670,22 @@ def _end(problem: Problem, best: Minimum, k: int, sign: float, rise: float) -> t
     return math.nan, True
 
 
-def _nearest(problem: Problem, starts: Iterable[Array], k: int, held: float) -> Array:
-    """The start, within all bounds and with one number held, at which the curves are nearest already.
-
-    Where the data do not bound a number, the straight way to it leads out of all that can be.
-    """
-    low, high = np.transpose(problem.bounds)
-    within = [np.clip(np.where(np.arange(len(low)) == k, held, start), low, high) for start in starts]
-    return min(within, key=lambda x: float(np.sum(problem.residuals(x) ** 2)))
-
-
 def problem_of(
     tables: Sequence[Measured], groups: Sequence[list[Group]], free: Sequence[Free], common: dict[str, float]
 ) -> Problem:
-    """The problem of some tables; ``BadInput`` where they hold fewer numbers than are free."""
+    """Return the problem of some tables; ``BadInput`` if they hold fewer numbers than are free."""
     curves = [curve for table in tables for curve in table.curves]
-    for name in common:
-        if name not in {curve.name for curve in curves}:
-            raise BadInput([f"--common {name}: no such curve; measured: {', '.join(curve.name for curve in curves)}"])
+    names = [curve.name for curve in curves]
+    for name in common.keys() - names:
+        raise BadInput([f"--common {name}: no such curve; measured: {', '.join(names)}"])
     values = np.concatenate([curve.values for curve in curves])
     if len(values) <= len(free):
-        message = f"{len(values)} measured number{'s' if len(values) > 1 else ''} cannot tell {len(free)} free"
-        raise BadInput([f"{tables[0].path}: {message}; measure more, or free fewer keys"])
-    guesses = [np.full(len(c.values), 0.01 * max(float(np.abs(c.values).max()), 1e-300)) for c in curves]
-    sigma = [guess if curve.errors is None else curve.errors for curve, guess in zip(curves, guesses, strict=True)]
-    unknown = [np.full(len(curve.values), curve.errors is None) for curve in curves]
+        cure = "measure more, or free fewer keys"
+        raise BadInput([f"{tables[0].path}: measured numbers: {len(values)}, free keys: {len(free)}; {cure}"])
     number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
-    zero = np.zeros(len(values))
-    columns = np.concatenate(sigma), number, np.concatenate(unknown), zero, zero
-    return Problem(tuple(tables), tuple(groups), tuple(free), dict(common), values, *columns, {})
+    guesses = [0.01 * max(float(np.abs(curve.values).max()), 1e-300) for curve in curves]
+    errors = [guess if curve.errors is None else curve.errors for curve, guess in zip(curves, guesses, strict=True)]
+    sigma = np.concatenate([np.broadcast_to(error, len(c.values)) for error, c in zip(errors, curves, strict=True)])
+    estimated, zero = np.array([curve.errors is None for curve in curves])[number], np.zeros(len(values))
+    parts = tuple(tables), tuple(groups), tuple(free), dict(common)
+    return Problem(*parts, values, sigma, number, estimated, zero, zero, {})

@@ -119,8 +119,9 @@ def test_steady_sliding_is_what_a_run_at_a_steady_speed_ends_in():
         alone = likelihood.by_steady_sliding(group, {}, names)
         sampled = likelihood.by_runs([group], {}, names, False)
         for name in names:
-            assert_allclose(alone[name], sampled.mean[name], rtol=1e-12, atol=0, equal_nan=False, err_msg=label)
-            assert np.all(sampled.error[name] == 0.0)
+            mean, error = sampled[name]
+            assert_allclose(alone[name], mean, rtol=1e-12, atol=0, equal_nan=False, err_msg=label)
+            assert np.all(error == 0.0)
 
 
 def test_rows_have_the_load_and_the_solid_of_their_own():
@@ -324,8 +325,8 @@ def test_a_steady_stage_stands_for_the_speed(tmp_path):
 def test_what_a_driven_slider_cannot_be_fitted_to_is_refused(tmp_path):
     scene = load(BEHIND)
     for column, steady, said in (
-        ("contact_load [mN]", False, 'add a column "t \\[s\\]"'),
-        ("speed [mm/s]", False, "where the points were taken|changes during the run"),
+        ("contact_load [mN]", False, 'add "t \\[s\\]"'),
+        ("speed [mm/s]", False, 'add "t \\[s\\]"'),
         ("t [s]", True, "--steady: drive.model"),
     ):
         path = table(tmp_path / "one.csv", {column: np.array([0.02, 0.03])}, {"spring_force": np.ones(2)})
@@ -345,9 +346,9 @@ def test_members_shift_the_fit_and_their_error_joins_the_datas(tmp_path, truth):
     found = fit(scene, [path], ["shear.spectrum.rms", "bonds.stress"])
     (rms, _), noise = found.numbers, found.problem.noise
     assert found.converged and abs(rms.value - rms.steady) > rms.error and np.all(noise[6:9] > 0.0)
-    again = likelihood.by_runs(found.problem.groups[0], found.values, ["contact_area"], False)
-    assert_allclose(found.problem.predicted(found.best.x)[:10], again.mean["contact_area"], rtol=2e-4)
-    assert_allclose(noise[:10], again.error["contact_area"], rtol=0.05)
+    mean, error = likelihood.by_runs(found.problem.groups[0], found.values, ["contact_area"], False)["contact_area"]
+    assert_allclose(found.problem.predicted(found.best.x)[:10], mean, rtol=2e-4)
+    assert_allclose(noise[:10], error, rtol=0.05)
 
 
 def test_the_figure_shows_curves_fit_and_residuals(curves):
@@ -428,7 +429,7 @@ def test_a_number_that_the_data_do_not_bound_ends_at_its_bound(tmp_path, truth):
         ("clock.step", "no physical number"),
         ("bonds.stress=1:2", "start inside"),
         ("bonds.stress=2 kPa:1 kPa", "wrong order"),
-        ("bonds.critical_speed=0:1 m/s", r'must be above 0 m/s.*"bonds.critical_speed=100 µm/s:1 m/s"'),
+        ("bonds.critical_speed=0:1 m/s", "LOW:HIGH, bound 0: must be above 0 m/s"),
     ],
 )
 def test_what_cannot_be_freed_is_refused(free, said, curves):
@@ -620,10 +621,10 @@ BAD = {
     "no unit of an area": ("speed [mm/s],contact_area [mm]\n1,2\n3,4\n", "not a unit of m"),
     "misspelt": ("speed [mm/s],contact_arae [mm^2]\n1,2\n3,4\n", 'did you mean "contact_area"'),
     "no curve": ("speed [mm/s]\n1\n3\n", "no column was measured"),
-    "no condition": ("contact_area [mm^2]\n0.04\n0.05\n", "where the points were taken"),
+    "no condition": ("contact_area [mm^2]\n0.04\n0.05\n", "add \"t [s]\""),
     "area below 0": (f"{HEADER}\n1,0.04\n2,-0.04\n", "line 3: contact_area must be at least 0 m^2"),
     "nothing but 0": (f"{HEADER}\n1,0\n2,0\n3,0\n", "contact_area is 0 in all rows"),
-    "one point": (f"{HEADER}\n1,0.04\n", "1 measured number cannot tell 1 free"),
+    "one point": (f"{HEADER}\n1,0.04\n", "free fewer keys"),
     "time and speed": ("t [s],speed [mm/s],contact_area [mm^2]\n0,1,2\n1,2,3\n", "leave out t"),
     "against the speed": ("speed [mm/s],friction_force [mN]\n-1,2\n-2,3\n", "has the sign of the speed"),
 }  # fmt: skip
