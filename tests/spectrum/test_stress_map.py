@@ -30,8 +30,8 @@ def files(tmp_path):
     return Files(tmp_path)
 
 
-def read(files, **given):
-    return TypeAdapter(StressMap).validate_python(given, context={"files": files})
+def read(files, **keys):
+    return TypeAdapter(StressMap).validate_python(keys, context={"files": files})
 
 
 def written(files, name, field=FIELD):
@@ -51,18 +51,18 @@ def written(files, name, field=FIELD):
 @pytest.mark.parametrize("name", ["map.csv", "map.npy", "map.nc"])
 def test_the_energy_of_a_map_is_that_of_its_file(files, name):
     keys = {} if name.endswith(".nc") else {"pixel": "5 um", "pixel_y": "7 um"}
-    found = read(files, file=written(files, name), **keys)
+    result = read(files, file=written(files, name), **keys)
     exact = surface_energy(FIELD, (24 * PIXEL, 16 * PIXEL_Y), G, NU)
-    assert_allclose(found.surface_energy(G, NU), exact, rtol=1e-12)
-    assert_allclose(found.mean, FIELD.mean(), rtol=1e-12)
-    assert_allclose(found.rms, FIELD.std(), rtol=1e-12)
-    assert_allclose(found.field, FIELD - FIELD.mean(), rtol=0.0, atol=1e-9)
+    assert_allclose(result.surface_energy(G, NU), exact, rtol=1e-12)
+    assert_allclose(result.mean, FIELD.mean(), rtol=1e-12)
+    assert_allclose(result.rms, FIELD.std(), rtol=1e-12)
+    assert_allclose(result.field, FIELD - FIELD.mean(), rtol=0.0, atol=1e-9)
     turned = read(files, file=name, rows="x", **keys)  # which exchanges x and y, where the file does not name them
     shape = (24, 16) if name.endswith(".nc") else (16, 24)
     assert turned.shape == shape
-    again = TypeAdapter(StressMap).validate_python(TypeAdapter(StressMap).dump_python(found))
-    assert again == found and hash(again) == hash(found)
-    assert len(TypeAdapter(StressMap).dump_python(found, mode="json")["values"]) == 64  # a digest, not the numbers
+    again = TypeAdapter(StressMap).validate_python(TypeAdapter(StressMap).dump_python(result))
+    assert again == result and hash(again) == hash(result)
+    assert len(TypeAdapter(StressMap).dump_python(result, mode="json")["values"]) == 64  # a digest, not the numbers
 
 
 def test_a_window_keeps_the_rms_and_takes_the_seam(files):
@@ -87,10 +87,10 @@ def test_the_stress_of_a_contact_in_a_mask_is_that_of_a_free_disc(files, pixels)
     for phase in (0.0, 0.5 * math.pi):
         wave = np.cos(3.831705970207512 * x + phase)[:, None] * np.ones(x.size)
         keys = {"file": written(files, "map.csv", np.where(inside, wave, np.nan)), "pixel": 1.0 / pixels, "mask": True}
-        found = read(files, **keys)
-        assert_allclose(found.inside, inside.mean(), rtol=1e-12)
-        assert np.all(found.field[~inside] == 0.0)
-        energy.append(found.surface_energy(1.0, NU))
+        result = read(files, **keys)
+        assert_allclose(result.inside, inside.mean(), rtol=1e-12)
+        assert np.all(result.field[~inside] == 0.0)
+        energy.append(result.surface_energy(1.0, NU))
     # pixels at the edge are inside or not: that shifts it by less than a fifth of a pixel, and E goes as a to 3 at most
     exact = ripple_energy(1.0, 3.831705970207512, 0.0, 1.0, 1.0, NU)
     assert_allclose(np.mean(energy), exact, rtol=3 * 0.2 / pixels)
@@ -101,18 +101,18 @@ def test_a_uniform_disc_stores_the_closed_form():
     for pixels in (20, 80):
         x = (np.arange(-2 * pixels, 2 * pixels) + 0.5) / pixels
         disc = (np.hypot(x[:, None], x) < 1.0).astype(float)
-        found = free_energy_of_map(3.0 * disc, 2e-3 / pixels, G) * (8e-3) ** 2
-        error.append(found / disc_tangential_energy(2e-3, 3.0, G) - 1.0)
+        result = free_energy_of_map(3.0 * disc, 2e-3 / pixels, G) * (8e-3) ** 2
+        error.append(result / disc_tangential_energy(2e-3, 3.0, G) - 1.0)
     assert abs(error[0]) < 3 * 0.2 / 20
     assert abs(error[1]) < 3 * 0.2 / 80
 
 
 def test_the_noise_of_a_map_is_reported(files):
-    found = read(files, file=written(files, "map.csv"), pixel="5 um", noise="2 kPa")
+    result = read(files, file=written(files, "map.csv"), pixel="5 um", noise="2 kPa")
     exact = 3 * math.asinh(1.0) / (4 * math.pi) * 2e3**2 * 5e-6 / G
-    assert_allclose(found.noise_energy(G), exact, rtol=1e-14)
+    assert_allclose(result.noise_energy(G), exact, rtol=1e-14)
     quiet = read(files, file="map.csv", pixel="5 um")
-    assert quiet.surface_energy(G) == found.surface_energy(G)
+    assert quiet.surface_energy(G) == result.surface_energy(G)
 
 
 def test_the_radial_spectrum_of_a_map_is_that_of_the_measured_one(files):
@@ -128,45 +128,57 @@ class Payload:
         return os.mkdir, ("was-executed",)
 
 
-def hostile(files, kind):
-    """A file that is no map: of pickled objects, cut short, of another array, or of declared sizes."""
-    path = files.folder / f"{kind}.npy"
-    if kind == "pickled":
-        np.save(path, np.array([[Payload()] * 9] * 9, dtype=object), allow_pickle=True)
-    elif kind == "pickle":
-        path.write_bytes(pickle.dumps(Payload()))
-    elif kind == "zipped":
-        with path.open("wb") as file:
-            np.savez(file, FIELD)
-    elif kind == "complex":
-        np.save(path, FIELD + 1j)
-    elif kind == "records":
-        np.save(path, np.zeros(9, dtype=[("a", float), ("b", float)]))
-    elif kind == "flat":
-        np.save(path, np.arange(64.0))
-    elif kind == "empty":
-        np.save(path, np.zeros((0, 9)))
-    elif kind == "many":
-        np.save(path, np.stack([FIELD, FIELD]))
-    else:
-        np.save(path, FIELD)
-        whole = path.read_bytes()
-        cut = {"short": whole[:-8], "huge": whole.replace(b"(24, 16)", b"(24,999)"), "head": whole[:20]}
-        cut["vast"] = whole.replace(b"'shape': (24, 16), }   ", b"'shape': (99999999, 9)}")
-        path.write_bytes(cut[kind])
-    return path.name
+WRONG_ARRAYS = {
+    "pickled": np.array([[Payload()] * 9] * 9, dtype=object),
+    "complex": FIELD + 1j,
+    "flat": np.arange(64.0),
+    "empty": np.zeros((0, 9)),
+    "many": np.stack([FIELD, FIELD]),
+}
 
 
-@pytest.mark.parametrize(
-    "kind",
-    ["pickled", "pickle", "zipped", "complex", "records", "flat", "empty", "many", "short", "huge", "vast", "head"],
-)
-def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files, kind, monkeypatch):
+def test_an_array_that_is_no_map_is_refused_and_nothing_in_it_is_executed(files, monkeypatch):
     monkeypatch.chdir(files.folder)
-    with pytest.raises(ValidationError) as refused:
-        read(files, file=hostile(files, kind), pixel=1e-6)
-    assert kind in str(refused.value)
-    assert not (files.folder / "was-executed").exists()
+    for kind, array in WRONG_ARRAYS.items():
+        np.save(files.folder / f"{kind}.npy", array, allow_pickle=True)
+    np.save(files.folder / "whole.npy", FIELD)
+    whole = (files.folder / "whole.npy").read_bytes()
+    wrong_bytes = {
+        "pickle": pickle.dumps(Payload()),
+        "short": whole[:-8],
+        "head": whole[:20],
+        "vast": whole.replace(b"'shape': (24, 16), }   ", b"'shape': (99999999, 9)}"),
+    }
+    for kind, content in wrong_bytes.items():
+        (files.folder / f"{kind}.npy").write_bytes(content)
+    for kind in WRONG_ARRAYS | wrong_bytes:
+        with pytest.raises(ValidationError, match=kind):
+            read(files, file=f"{kind}.npy", pixel=1e-6)
+        assert not (files.folder / "was-executed").exists()
+
+
+WRONG_KEYS = [  # field, keys, fault
+    (FIELD, {}, "give pixel"),
+    (FIELD, {"pixel": "0 um"}, "above 0"),
+    (FIELD, {"pixel": 1e-6, "window": "box"}, "'none' or 'hann'"),
+    (np.where(FIELD < 0.0, np.nan, FIELD), {"pixel": 1e-6}, "gaps .* mask = true"),
+    (FIELD, {"pixel": 1e-6, "mask": True, "window": "hann"}, "leave it out beside mask"),
+    (FIELD, {"pixel": 1e-6, "mask": True, "pixel_y": 2e-6}, "square pixels"),
+    (FIELD * np.inf, {"pixel": 1e-6, "mask": True}, "finite"),
+    (FIELD * 0.0 + 3.0, {"pixel": 1e-6}, "the same everywhere"),
+    (FIELD[:7], {"pixel": 1e-6}, "too small"),
+    (FIELD, {"pixel": 1e-6, "values": "YQ=="}, "values .* leave it out"),
+]
+
+
+WRONG_DATASETS = [  # change, keys, fault
+    (lambda data: data.rename(shear_map="heights"), {}, 'no variable "shear_map"'),
+    (lambda data: data.assign(shear_map=data.shear_map.assign_attrs(units="m")), {}, "not a unit of Pa"),
+    (lambda data: data.expand_dims(member=2), {}, "2 maps"),
+    (lambda data: data, {"pixel": "6 um"}, "5e-06 m apart, not 6e-06 m"),
+    (lambda data: data.assign_coords(x=data.x**2), {}, "not spaced by one step"),
+    (lambda data: data.isel(x=0), {}, "no two dimensions"),
+]
 
 
 @posix
@@ -176,50 +188,12 @@ def test_a_pipe_is_not_waited_for(files):
         read(files, file="pipe.npy", pixel=1e-6)
 
 
-def with_gap():
-    field = FIELD.copy()
-    field[3, 4] = np.nan
-    return field
-
-
-@pytest.mark.parametrize(
-    ("field", "given", "words"),
-    [
-        (FIELD, {}, 'the map has no coordinates; give pixel, such as "0.5 um"'),
-        (FIELD, {"pixel": "0 um"}, "above 0"),
-        (FIELD, {"pixel": 1e-6, "window": "box"}, "'none' or 'hann'"),
-        (FIELD, {"pixel": 1e-6, "rows": "z"}, "'y' or 'x'"),
-        (FIELD, {"pixel": 1e-6, "noise": -1.0}, "at least 0"),
-        (with_gap(), {"pixel": 1e-6}, "gaps .nan.; with mask = true they are what lies outside"),
-        (with_gap(), {"pixel": 1e-6, "mask": True, "window": "hann"}, "leave it out beside mask"),
-        (with_gap(), {"pixel": 1e-6, "mask": True, "pixel_y": 2e-6}, "square pixels"),
-        (FIELD * np.inf, {"pixel": 1e-6, "mask": True}, "finite"),
-        (FIELD * np.nan, {"pixel": 1e-6, "mask": True}, "the same everywhere"),
-        (FIELD * 0.0 + 3.0, {"pixel": 1e-6}, "the same everywhere, so that nothing fluctuates"),
-        (FIELD[:7], {"pixel": 1e-6}, "7 points along a side is too small"),
-        (FIELD[:1, :1], {"pixel": 1e-6}, "1 points along a side is too small"),
-        (FIELD, {"pixel": 1e-6, "values": "YQ=="}, "values is read from the file; leave it out"),
-    ],
-)
-def test_a_map_that_cannot_be_the_field_is_refused_with_the_cure(files, field, given, words):
-    with pytest.raises(ValidationError, match=words):
-        read(files, file=written(files, "map.csv", field), **given)
-
-
-@pytest.mark.parametrize(
-    ("change", "given", "words"),
-    [
-        (lambda d: d.rename(shear_map="heights"), {}, r'no variable "shear_map"; name it'),
-        (lambda d: d.assign(shear_map=d.shear_map.assign_attrs(units="m")), {}, "not a unit of Pa"),
-        (lambda d: d.expand_dims(member=2), {}, "it holds 2 maps; save the one"),
-        (lambda d: d, {"pixel": "6 um"}, "5e-06 m apart, not 6e-06 m as pixel has it"),
-        (lambda d: d.assign_coords(x=d.x**2), {}, "not spaced by one step"),
-        (lambda d: d.isel(x=0), {}, "no two dimensions"),
-    ],
-)
-def test_a_dataset_that_is_no_map_is_refused_with_the_cure(files, change, given, words):
-    name = written(files, "map.nc")
-    whole = xr.load_dataset(files.folder / name)
-    change(whole).to_netcdf(files.folder / "changed.nc")
-    with pytest.raises(ValidationError, match=words):
-        read(files, file="changed.nc", **given)
+def test_a_map_that_cannot_be_the_field_is_refused_with_the_cure(files):
+    for field, keys, fault in WRONG_KEYS:
+        with pytest.raises(ValidationError, match=fault):
+            read(files, file=written(files, "map.csv", field), **keys)
+    whole = xr.load_dataset(files.folder / written(files, "map.nc"))
+    for change, keys, fault in WRONG_DATASETS:
+        change(whole).to_netcdf(files.folder / "changed.nc")
+        with pytest.raises(ValidationError, match=fault):
+            read(files, file="changed.nc", **keys)
