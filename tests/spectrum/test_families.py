@@ -128,15 +128,26 @@ def test_nothing_lies_outside_the_cut_offs():
 
 
 def test_density_broadcasts_and_is_even():
+    qx, qy = np.linspace(-3, 3, 5)[:, None], np.linspace(-2, 2, 4)
     for spectrum in WITH_DENSITY.values():
-        qx, qy = np.linspace(-3, 3, 5)[:, None], np.linspace(-2, 2, 4)
         density = spectrum.density(qx, qy)
         assert density.shape == (5, 4)
         assert_allclose(density, density[::-1, ::-1], rtol=1e-14, atol=0)
-        assert np.ndim(spectrum.density(1.0, 2.0)) == 0
         energies = spectrum.surface_energy(np.array([1.0, 2.0])[:, None], np.array([0.0, 0.3, 0.5]))
         assert energies.shape == (2, 3)
         assert_allclose(energies[0], 2 * energies[1], rtol=1e-15, atol=0)
+
+
+def test_an_anisotropic_gaussian_has_its_first_length_along_the_angle_or_is_isotropic():
+    a, b, angle, q = 0.5, 2.0, 0.4, np.array([0.3, 1.0, 2.0])
+    spectrum = AnisotropicGaussian(1.3, a, b, angle)
+    for direction, length in [(angle, a), (angle + math.pi / 2, b)]:
+        exact = math.pi * a * b * 1.3**2 * np.exp(-((q * length) ** 2) / 4)
+        density = spectrum.density(q * math.cos(direction), q * math.sin(direction))
+        assert_allclose(density, exact, rtol=1e-14, atol=0)
+    equal, isotropic = AnisotropicGaussian(1.3, 0.8, 0.8, 2.0), Gaussian(1.3, 0.8)
+    assert_allclose(equal.surface_energy(1.0, 0.3), isotropic.surface_energy(1.0, 0.3), rtol=1e-14, atol=0)
+    assert_allclose(equal.density(1.0, 2.0), isotropic.density(1.0, 2.0), rtol=1e-14, atol=0)
 
 
 def test_energy_at_poisson_one_half_has_the_known_coefficient():
@@ -150,22 +161,6 @@ def test_energy_at_poisson_one_half_has_the_known_coefficient():
         (Ripple(1.0, TURN, 0.7), (1 + math.sin(0.7) ** 2) / 8),
     ]:
         assert_allclose(spectrum.surface_energy(1.0), exact, rtol=1e-15, atol=0)
-
-
-def test_energy_matches_the_tabulated_seven_digits():
-    for spectrum, seven_digits in (
-        [(VonKarman(1.0, 1.0, h), e) for h, e in [(0.1, 0.1040438), (0.3, 0.2586699), (0.8, 0.5123748), (1, 0.5890486)]]
-        + [
-            (SelfAffine(1.0, h, TURN / 0.5, TURN / 1.3, TURN / 40.0), e)
-            for h, e in [(0, 0.1185192), (0.3, 0.1899818), (0.8, 0.2751208), (1, 0.2956922)]
-        ]
-        + [(SelfAffine(1.0, h, TURN, TURN, TURN / 100.0), e) for h, e in [(0.3, 0.1500007), (0.8, 0.2309135)]]
-        + [
-            (AnisotropicGaussian(1.0, a, b), e)
-            for a, b, e in [(1, 3, 0.4888006), (3, 1, 0.5811675), (1, 100, 0.9861138), (100, 1, 1.5491804)]
-        ]
-    ):
-        assert_allclose(spectrum.surface_energy(1.0), seven_digits, rtol=0, atol=5.001e-8)
 
 
 def test_self_affine_energy_is_the_textbook_quotient():
@@ -194,42 +189,15 @@ def test_hurst_one_half_has_the_exponential_density():
     assert_allclose(ISOTROPIC["exponential"].radial_density(q), exact, rtol=1e-14, atol=0)
 
 
-def test_equal_lengths_make_the_anisotropic_gaussian_isotropic():
-    for angle in (0.0, 0.3, 2.0):
-        both = AnisotropicGaussian(1.3, 0.8, 0.8, angle), Gaussian(1.3, 0.8)
-        energies = [s.surface_energy(1.0, 0.3) for s in both]
-        assert_allclose(energies[0], energies[1], rtol=1e-14, atol=0)
-        assert_allclose(both[0].density(1.0, 2.0), both[1].density(1.0, 2.0), rtol=1e-14, atol=0)
-
-
-def test_a_quarter_turn_exchanges_the_two_lengths():
-    turned, exchanged = AnisotropicGaussian(1.0, 0.5, 2.0, math.pi / 2), AnisotropicGaussian(1.0, 2.0, 0.5)
-    assert_allclose(turned.surface_energy(1.0, 0.3), exchanged.surface_energy(1.0, 0.3), rtol=1e-14, atol=0)
-    assert_allclose(turned.density(1.0, 2.0), exchanged.density(1.0, 2.0), rtol=1e-14, atol=0)
-
-
-def test_the_first_length_lies_along_the_angle():
-    a, b, angle, q = 0.5, 2.0, 0.4, np.array([0.3, 1.0, 2.0])
-    spectrum = AnisotropicGaussian(1.3, a, b, angle)
-    for direction, length in [(angle, a), (angle + math.pi / 2, b)]:
-        exact = math.pi * a * b * 1.3**2 * np.exp(-((q * length) ** 2) / 4)
-        found = spectrum.density(q * math.cos(direction), q * math.sin(direction))
-        assert_allclose(found, exact, rtol=1e-14, atol=0)
-
-
 def test_endless_streaks_store_energy_as_the_logarithm_of_their_length():
     energies = [AnisotropicGaussian(1.0, 1.0, b).surface_energy(1.0) for b in (1e4, 1e6, 1e8)]
     assert_allclose(np.diff(energies)[1], np.diff(energies)[0], rtol=1e-6, atol=0)
 
 
 def test_energy_of_a_ripple_falls_with_poisson_ratio_only_along_sliding():
-    along, across = Ripple(2.0, 3.0, 0.0), Ripple(2.0, 3.0, math.pi / 2)
-    q = TURN / 3.0
-    assert_allclose(along.surface_energy(1.5, 0.3), 4.0 * 0.7 / (4 * 1.5 * q), rtol=1e-15, atol=0)
-    assert_allclose(across.surface_energy(1.5, 0.3), 4.0 / (4 * 1.5 * q), rtol=1e-15, atol=0)
-
-
-def test_a_ripple_refuses_to_give_a_density():
+    for angle, exact in [(0.0, 0.7), (math.pi / 2, 1.0)]:
+        energy = Ripple(2.0, 3.0, angle).surface_energy(1.5, 0.3)
+        assert_allclose(energy, exact * 4.0 / (4 * 1.5 * TURN / 3.0), rtol=1e-15, atol=0)
     with pytest.raises(ValueError, match="no density"):
         Ripple(1.0, 1.0).density(0.0, 0.0)
 
@@ -242,39 +210,26 @@ def test_a_narrow_band_is_a_ring():
 def test_a_spectrum_survives_dumping_and_reading():
     for spectrum in ALL.values():
         for reader in (TypeAdapter(type(spectrum)), TypeAdapter(Spectrum)):
-            dumped = reader.dump_python(spectrum)
-            again = reader.validate_python(dumped)
+            again = reader.validate_python(reader.dump_python(spectrum))
             assert again == spectrum
             assert reader.validate_json(reader.dump_json(spectrum)) == spectrum
             assert hash(again) == hash(spectrum)
-
-
-def test_quantities_may_carry_units():
-    read = TypeAdapter(Spectrum).validate_python
-    assert read({"model": "ripple", "amplitude": "3 kPa", "wavelength": "2 mm", "angle": "180 deg"}) == Ripple(
-        3000.0, 0.002, math.pi
-    )
+    ripple = {"model": "ripple", "amplitude": "3 kPa", "wavelength": "2 mm", "angle": "180 deg"}
+    assert TypeAdapter(Spectrum).validate_python(ripple) == Ripple(3000.0, 0.002, math.pi)
 
 
 def test_a_wrong_spectrum_is_refused_with_the_cure():
-    for given, words in [
+    self_affine = {"model": "self_affine", "rms": 1, "hurst": 1, "longest": 5, "rolloff": 3, "shortest": 1}
+    gaussian = {"model": "gaussian", "rms": 1, "length": 1}
+    for keys, fault in [
         ({"model": "band", "rms": 1, "longest": 1, "shortest": 2}, "longest .* is shorter than shortest"),
-        ({"model": "band", "rms": 1, "longest": 2, "shortest": 2}, "leaves no band"),
-        (
-            {"model": "self_affine", "rms": 1, "hurst": 1, "longest": 2, "rolloff": 3, "shortest": 1},
-            "longest .* is shorter than rolloff",
-        ),
-        (
-            {"model": "self_affine", "rms": 1, "hurst": 1, "longest": 5, "rolloff": 3, "shortest": 4},
-            "rolloff .* is shorter than shortest",
-        ),
-        ({"model": "self_affine", "rms": 1, "hurst": 1, "longest": 2, "rolloff": 2, "shortest": 2}, "no band"),
-        ({"model": "self_affine", "rms": 1, "hurst": 1.1, "longest": 5, "rolloff": 3, "shortest": 1}, "at most 1"),
-        ({"model": "von_karman", "rms": 1, "length": 1, "hurst": 0}, "above 0"),
-        ({"model": "gaussian", "rms": 0, "length": 1}, "above 0"),
-        ({"model": "gaussian", "rms": 1, "length": "1 Pa"}, "not a unit of m"),
-        ({"model": "gaussian", "rms": 1, "length": 1, "lenght": 1}, "lenght"),
-        ({"model": "ripple", "amplitude": -1, "wavelength": 1}, "at least 0"),
+        (self_affine | {"rolloff": 6}, "longest .* is shorter than rolloff"),
+        (self_affine | {"shortest": 4}, "rolloff .* is shorter than shortest"),
+        (self_affine | {"longest": 1, "rolloff": 1}, "no band"),
+        (self_affine | {"hurst": 1.1}, "at most 1"),
+        (gaussian | {"rms": 0}, "above 0"),
+        (gaussian | {"length": "1 Pa"}, "not a unit of m"),
+        (gaussian | {"lenght": 1}, "lenght"),
     ]:
-        with pytest.raises(ValidationError, match=words):
-            TypeAdapter(Spectrum).validate_python(given)
+        with pytest.raises(ValidationError, match=fault):
+            TypeAdapter(Spectrum).validate_python(keys)
