@@ -19,6 +19,15 @@ def drawn(shape, size=100_000, step=0):
     return gammas([shape], Noise(3, "shear", np.arange(50)).at(step), size // 50)
 
 
+def test_a_member_draws_the_same_in_any_batch_and_seeds_parts_and_steps_differ():
+    alone = numbers(SHAPES, [11], step=5)
+    assert np.array_equal(numbers(SHAPES, [3, 11, 40], step=5)[1:2], alone)
+    assert np.array_equal(numbers(SHAPES, [11, 3], step=5)[:1], alone)
+    for other in ({"members": [12]}, {"seed": 8}, {"part": "bonds"}, {"step": 1}):
+        address = {"members": [11], "step": 5} | other
+        assert not np.any(np.isin(alone, numbers(SHAPES, **address)))
+
+
 def test_the_numbers_follow_the_gamma_law():
     for shape in SHAPES:
         sample = drawn(shape).ravel()
@@ -38,12 +47,12 @@ def test_fine_bins_and_far_tails_have_their_share(shape, draws):
     edges = np.concatenate([law.ppf(tails), law.ppf(inner[inner <= 0.5]), law.isf(1.0 - inner[inner > 0.5]),
                             law.isf(tails[::-1])])  # fmt: skip
     share = np.diff(np.concatenate([[0.0], tails, inner, 1.0 - tails[::-1], [1.0]]))
-    seen = np.zeros(len(share))
+    counts = np.zeros(len(share))
     for step in range(draws // 10**6):
-        seen += np.bincount(np.searchsorted(edges, drawn(shape, 10**6, step).ravel()), minlength=len(seen))
-    fits(seen, draws * share)
+        counts += np.bincount(np.searchsorted(edges, drawn(shape, 10**6, step).ravel()), minlength=len(counts))
+    fits(counts, draws * share)
     for place, tail in enumerate(tails, 1):
-        for count in (seen[:place].sum(), seen[-place:].sum()):
+        for count in (counts[:place].sum(), counts[-place:].sum()):
             chances = poisson.cdf(count, draws * tail), poisson.sf(count - 1, draws * tail)
             assert min(chances) > 0.5 * FIVE_SIGMA
 
@@ -54,21 +63,8 @@ def test_shapes_mixed_in_one_step_keep_their_laws():
     for column, shape in enumerate(shapes):
         assert kstest(sample[:, column], gamma(shape).cdf).pvalue > FIVE_SIGMA
     centred = (sample - shapes) / np.sqrt(shapes)
-    found = centred.T @ centred / len(centred)
-    assert np.abs(found[np.triu_indices(4, 1)]).max() < 5.0 / np.sqrt(len(centred))
-
-
-def test_a_member_draws_the_same_alone_and_in_any_batch():
-    alone = numbers(SHAPES, [11], step=5)
-    assert np.array_equal(numbers(SHAPES, [3, 11, 40], step=5)[1:2], alone)
-    assert np.array_equal(numbers(SHAPES, [11, 3], step=5)[:1], alone)
-    assert not np.any(np.isin(numbers(SHAPES, [12], step=5), alone))
-
-
-def test_seeds_parts_and_steps_differ():
-    base = numbers(SHAPES)
-    for other in (numbers(SHAPES, seed=8), numbers(SHAPES, part="bonds"), numbers(SHAPES, step=1)):
-        assert not np.any(np.isin(base, other))
+    correlations = centred.T @ centred / len(centred)
+    assert np.abs(correlations[np.triu_indices(4, 1)]).max() < 5.0 / np.sqrt(len(centred))
 
 
 def test_the_next_number_and_the_next_member_are_uncorrelated():

@@ -14,7 +14,7 @@ def numbers(members, step, count, seed=7, part="shear"):
     return Noise(seed, part, np.array(members)).normals(step, count)
 
 
-def test_a_member_draws_the_same_alone_and_in_any_batch():
+def test_a_number_depends_on_its_address_only():
     for kind in ["normals", "uniforms"]:
 
         def drawn(members):
@@ -22,63 +22,55 @@ def test_a_member_draws_the_same_alone_and_in_any_batch():
 
         assert np.array_equal(drawn([3, 11, 40])[1:2], drawn([11]))
         assert np.array_equal(drawn([11, 3])[:1], drawn([11]))
-
-
-def test_a_step_can_be_asked_for_in_any_order():
     noise = Noise(7, "shear", np.arange(4))
     late, early = noise.normals(90_000, 5), noise.normals(2, 5)
     assert np.array_equal(late, numbers(range(4), 90_000, 5))
     assert np.array_equal(early, numbers(range(4), 2, 5))
-
-
-def test_how_many_numbers_are_drawn_changes_none():
     assert np.array_equal(numbers([3], 5, 100)[:, :7], numbers([3], 5, 7))
 
 
 def test_a_stream_begins_at_the_words_of_numpys_philox():
     for seed, member in [(0, 0), (7, 3), (2**64 - 1, 10**7), (2**63 + 5, 2**40)]:
         for step, lane in [(0, 0), (1, 0), (10**9, 3)]:
-            found = states_at([(seed, PARTS["bonds"], member, step, lane)])
+            state = states_at([(seed, PARTS["bonds"], member, step, lane)])[0]
             counter = step + (member << 128) + ((256 + lane) << 192)  # which numpy raises by one before it draws
             generator = np.random.Philox(key=np.array([seed, PARTS["bonds"]], dtype=np.uint64), counter=counter - 1)
-            assert np.array_equal(found[0], generator.random_raw(4))
+            assert np.array_equal(state, generator.random_raw(4))
+
+
+#: State, and the words that follow it: published outputs of the program by Blackman & Vigna, in hexadecimal digits.
+WORDS = [
+    (
+        (1, 2, 3, 4),
+        "2800001 3800067 cc00003800067 cc201994400b2 8012a2019ac433cd 8a69978acdee33ba c271134733154abd "
+        "ac2ba09179169e97 dbf3190a8f073fd8 9105f14ab2229220",
+    ),
+    (
+        (0, 0, 0, 1),
+        "800000 800011 2200000800011 2200044000020 22000448008a1 1102100802208a0 114002284200880 402896644a64095 "
+        "8a14a0a244acc891 8c88ba4680b20495",
+    ),
+]
 
 
 def test_words_are_those_of_the_authors_program():
-    for state, wanted in [
-        (
-            (1, 2, 3, 4),
-            (
-                41943041,
-                58720359,
-                3588806011781223,
-                3591011842654386,
-                9228616714210784205,
-                9973669472204895162,
-                14011001112246962877,
-                12406186145184390807,
-                15849039046786891736,
-                10450023813501588000,
-            ),
-        ),
-        (
-            (0, 0, 0, 1),
-            (
-                0x0000000000800000,
-                0x0000000000800011,
-                0x0002200000800011,
-                0x0002200044000020,
-                0x00022000448008A1,
-                0x01102100802208A0,
-                0x0114002284200880,
-                0x0402896644A64095,
-                0x8A14A0A244ACC891,
-                0x8C88BA4680B20495,
-            ),
-        ),
-    ]:
-        # outputs of the program by Blackman & Vigna that implementations in other languages publish
-        assert words_from([state], 10)[0].tolist() == list(wanted)
+    for state, words in WORDS:
+        assert words_from([state], 10)[0].tolist() == [int(word, 16) for word in words.split()]
+
+
+def test_the_normals_have_normal_moments_and_no_correlation():
+    sample = Noise(5, "shear", np.arange(100)).normals(1, 20_000)
+    assert kstest(sample.ravel(), "norm").pvalue > FIVE_SIGMA
+    for power, moment, spread in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0), (6, 15.0, 10170.0)):
+        assert abs(np.mean(sample**power) - moment) < 5.0 * np.sqrt(spread / sample.size)
+    for lag in (1, 2, 3):
+        products = sample[:, lag:] * sample[:, :-lag]
+        assert abs(products.mean()) < 5.0 / np.sqrt(products.size)
+    source = Noise(1, "shear", np.arange(50))
+    sample = np.stack([source.normals(step, 8).ravel() for step in range(1, 401)])
+    correlations = np.corrcoef(sample.T)[np.triu_indices(400, 1)]
+    # between members and steps: 79,800 correlations of 400 numbers have the mean square 1/400
+    assert abs(np.mean(correlations**2) * 400 - 1.0) < 5.0 * np.sqrt(2.0 / correlations.size)
 
 
 def test_the_layers_of_the_ziggurat_have_equal_areas_under_the_curve():
@@ -95,17 +87,17 @@ def test_the_layers_of_the_ziggurat_have_equal_areas_under_the_curve():
 @pytest.mark.parametrize("draws", [4 * 10**6, pytest.param(2 * 10**8, marks=pytest.mark.verify)])
 def test_the_normals_have_the_normal_law_in_fine_bins_and_far_tails(draws):
     edges, source = np.round(np.arange(-6.0, 6.005, 0.01), 2), Noise(5, "shear", np.arange(1000))
-    seen = np.zeros(len(edges) + 1)
+    counts = np.zeros(len(edges) + 1)
     for step in range(draws // 10**6):
         sample = source.normals(step, 1000).ravel()
-        seen += np.bincount(np.searchsorted(edges, sample), minlength=len(seen))
+        counts += np.bincount(np.searchsorted(edges, sample), minlength=len(counts))
     below = norm.cdf(-edges[edges >= 0.0])[::-1]  # of the lower half, as exact as it is small
     half = draws * np.diff(np.append(0.0, below))
-    fits(seen, np.append(half, half[::-1]))
+    fits(counts, np.append(half, half[::-1]))
     # about the first width, 3.654, where a tail begins, and down to a probability of 1e-6 in both
     for level in (3.6, 3.66, 4.0, 4.5, 4.9):
         first = np.searchsorted(edges, level - 0.005)
-        for count in (seen[first + 1 :].sum(), seen[: len(edges) - first].sum()):
+        for count in (counts[first + 1 :].sum(), counts[: len(edges) - first].sum()):
             mean = draws * norm.sf(level)
             assert min(poisson.cdf(count, mean), poisson.sf(count - 1, mean)) > 0.5 * FIVE_SIGMA
 
@@ -117,29 +109,11 @@ def test_what_lies_beyond_the_layers_has_the_law_of_a_tail():
     assert kstest(norm.sf(np.abs(sample)) / norm.sf(noise._WIDTHS[1]), "uniform").pvalue > FIVE_SIGMA
 
 
-def test_the_normals_have_normal_moments_and_follow_each_other_without_correlation():
-    sample = Noise(5, "shear", np.arange(100)).normals(1, 20_000)
-    assert kstest(sample.ravel(), "norm").pvalue > FIVE_SIGMA
-    for power, moment, spread in ((1, 0.0, 1.0), (2, 1.0, 2.0), (3, 0.0, 15.0), (4, 3.0, 96.0), (6, 15.0, 10170.0)):
-        assert abs(np.mean(sample**power) - moment) < 5.0 * np.sqrt(spread / sample.size)
-    for lag in (1, 2, 3):
-        products = sample[:, lag:] * sample[:, :-lag]
-        assert abs(products.mean()) < 5.0 / np.sqrt(products.size)
-
-
 def test_seeds_parts_members_and_steps_differ():
     base = numbers([1], 1, 4)
     for other in (numbers([1], 1, 4, seed=8), numbers([1], 1, 4, part="bonds"), numbers([2], 1, 4), numbers([1], 2, 4)):
         assert not np.any(np.isin(base, other))
     assert len(np.unique([states_at([(7, 2, 3, 4, lane)])[0, 0] for lane in range(4)])) == 4
-
-
-def test_numbers_are_uncorrelated_between_members_and_steps():
-    source = Noise(1, "shear", np.arange(50))
-    sample = np.stack([source.normals(step, 8).ravel() for step in range(1, 401)])
-    correlations = np.corrcoef(sample.T)[np.triu_indices(400, 1)]
-    # 79,800 correlations of 400 numbers each have the standard deviation 1/20; their mean square is 1/400 on average
-    assert abs(np.mean(correlations**2) * 400 - 1.0) < 5.0 * np.sqrt(2.0 / correlations.size)
 
 
 NEIGHBOURS = {"seed": 0, "part": 1, "member": 2, "step": 3, "lane": 4}
@@ -162,8 +136,8 @@ def test_bytes_of_neighbouring_streams_are_equally_frequent_and_so_are_pairs(nei
         byte = ((neighbours >> np.uint64(shift)) & np.uint64(255)).astype(int)
         fits(np.bincount(byte.ravel(), minlength=256), np.full(256, byte.size / 256.0))
         # serial test: with the next word of the stream, and with the same one of the next stream
-        for one, other in ((byte[:, :-1], byte[:, 1:]), (byte[:-1], byte[1:])):
-            fits(np.bincount((256 * one + other).ravel(), minlength=65536), np.full(65536, one.size / 65536.0))
+        for first, second in ((byte[:, :-1], byte[:, 1:]), (byte[:-1], byte[1:])):
+            fits(np.bincount((256 * first + second).ravel(), minlength=65536), np.full(65536, first.size / 65536.0))
 
 
 @pytest.mark.verify
@@ -189,12 +163,12 @@ def test_birthdays_of_neighbouring_streams_have_spacings_that_agree_as_often_as_
 
 @pytest.mark.verify
 def test_neighbouring_streams_differ_in_half_of_their_bits(neighbours):
-    for one, other in ((neighbours[:-1], neighbours[1:]), (neighbours[:, :-1], neighbours[:, 1:])):
-        different = np.bitwise_count(one ^ other).ravel()
+    for first, second in ((neighbours[:-1], neighbours[1:]), (neighbours[:, :-1], neighbours[:, 1:])):
+        different = np.bitwise_count(first ^ second).ravel()
         fits(np.bincount(different, minlength=65), different.size * binom.pmf(np.arange(65), 64, 0.5))
     # each bit of a word against each of the word of the next stream: 4096 correlations
     some = np.ascontiguousarray(neighbours[:, :32])
     bits = np.unpackbits(some.view(np.uint8), axis=1).reshape(*some.shape, 64) - 0.5
-    one, other = bits[:-1].reshape(-1, 64), bits[1:].reshape(-1, 64)
-    found = 4.0 * (one.T @ other) / len(one)
-    assert np.abs(found).max() * np.sqrt(len(one)) < norm.isf(0.5 * FIVE_SIGMA / found.size)
+    first, second = bits[:-1].reshape(-1, 64), bits[1:].reshape(-1, 64)
+    correlations = 4.0 * (first.T @ second) / len(first)
+    assert np.abs(correlations).max() * np.sqrt(len(first)) < norm.isf(0.5 * FIVE_SIGMA / correlations.size)
