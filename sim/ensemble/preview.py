@@ -29,12 +29,11 @@ from sim.scenario.schema import distinct, entries
 from sim.units.quantity import read_option
 from sim.units.terminal import duration
 
-# Rough costs of one core [s]: a start with its table, a process that shares the work; a byte of the dataset, of it
-# compressed, of a map that is drawn; a point of a sweep, a part; a mode pair that is made; a record of a batch, of a
-# member.
+# Rough costs of one core [s]: a start with its table, a process that shares the work; a byte of the dataset that
+# is compressed, of a map that is drawn; a point of a sweep; a mode pair that is made; a record of a batch, of a member.
 _START, _WORKER = 2.5, 1.2
-_BYTE, _PACKED_BYTE, _MAP_BYTE = 16e-9, 32e-9, 2e-9
-_POINT, _PART, _MODE, _RECORD, _RECORD_OF_MEMBER = 4e-3, 2e-3, 5e-6, 5e-6, 2e-7
+_BYTE, _MAP_BYTE = 48e-9, 2e-9
+_POINT, _MODE, _RECORD, _RECORD_OF_MEMBER = 4e-3, 5e-6, 5e-6, 2e-7
 # Rough memory [byte]: a process with its libraries, more of it for a table; a mode pair while it is made and while it
 # is used. Copies of a part while it is computed, and of the dataset while it is written or read.
 _PROCESS, _TABLE, _OF_MODE_MADE, _OF_MODE, _COPIES_OF_PART, _COPIES = 160e6, 100e6, 520.0, 160.0, 3.0, 2.0
@@ -50,12 +49,6 @@ _TRIED, _WORTH_TRYING, _LONG = 0.25, 1.0, 10.0
 _LITTLE = 1e-4
 #: Keys that are listed elsewhere than among the quantities.
 _ELSEWHERE = ("name", "sweep", *(f"{part}.model" for part in Parts._fields))
-_ERRORS = {
-    "cell_error": "error of the cell",
-    "banded_error": "error of the bands",
-    "member_spread": "spread of a member",
-}
-
 Rows = list[tuple[str, ...]]
 
 
@@ -83,21 +76,15 @@ def forecast(plan: Plan, jobs: int, pace: float = 1.0, shares: int = 1, left: fl
     """Estimate the needs of a run, or of one of some shares of it.
 
     ``pace`` is the measured time of some steps over their counted time, ``left`` the fraction of steps that are not
-    done yet. The disk also holds the parts of steps that are done.
+    done yet. The disk also holds the parts of steps that are done. A share makes no dataset.
     """
-    points, parts = plan.points, len(plan.packs) * len(plan.groups()) * len(plan.blocks(plan.points[0]))
-    packed = plan.maps if plan.scenario.record.compression == "none" else plan.bytes
-    modes = _MODE * max(_mode_pairs(point) for point in spread(points, 2))
-    steps = left * (pace * counted(plan) + parts * _PART) / shares
-    alone = _START + modes + len(points) * _POINT
-    disk = _parts(plan) / shares
-    if shares == 1:  # a share makes no dataset
-        alone += plan.bytes * _BYTE + packed * _PACKED_BYTE
-        disk += plan.file_bytes
+    modes = _MODE * max(_mode_pairs(point) for point in spread(plan.points, 2))
+    steps, whole = left * pace * counted(plan) / shares, shares == 1
+    alone = _START + modes + len(plan.points) * _POINT + whole * plan.bytes * _BYTE
     started = _WORKER + modes if jobs > 1 else 0.0
-    return Forecast(
-        alone + jobs * started + steps, alone + started + steps / jobs, memory(plan, jobs), plan.file_bytes, disk
-    )
+    cpu, clock = alone + jobs * started + steps, alone + started + steps / jobs
+    disk = _parts(plan) / shares + whole * plan.file_bytes
+    return Forecast(cpu, clock, memory(plan, jobs), plan.file_bytes, disk)
 
 
 def tabulated(plan: Plan) -> bool:
@@ -132,10 +119,7 @@ def counted_block(point: Scenario, members: np.ndarray, block: Block, speeds: np
 
 def memory(plan: Plan, jobs: int) -> float:
     """Estimate the largest memory of all processes together [byte]: libraries, and blocks or the dataset."""
-    block = 0.0
-    for point in spread(plan.points, 2):
-        pairs, states = _mode_pairs(point), 16.0 * plan.group * state_numbers(point)
-        block = max(block, _OF_MODE_MADE * pairs, _OF_MODE * pairs + states + _COPIES_OF_PART * _part(plan, point))
+    block = max(_block(plan, point) for point in spread(plan.points, 2))
     dataset = _COPIES * min(plan.bytes, _BUILT_IN_MEMORY) + (_TABLE if tabulated(plan) else 0.0)
     return (jobs + 1 if jobs > 1 else 1) * _PROCESS + max(jobs * block, dataset)
 
@@ -144,11 +128,13 @@ def _mode_pairs(point: Scenario) -> int:
     return point.process.pairs if point.fluctuations.keeps_modes else 0
 
 
-def _part(plan: Plan, point: Scenario) -> float:
-    """Return the size of the largest part [byte]."""
+def _block(plan: Plan, point: Scenario) -> float:
+    """Return the memory of a block while it is computed [byte]: modes, states, and copies of its part."""
     numbers = plan.group * max(1, plan.records_of_block(point)) * len(plan.variables) * len(plan.packs[0])
     drawn = min(1.0, plan.snapshots_of_block(point) / len(point.record.maps)) if point.record.maps else 0.0
-    return 8.0 * numbers + drawn * map_bytes(point, plan.group)
+    part, pairs = 8.0 * numbers + drawn * map_bytes(point, plan.group), _mode_pairs(point)
+    states = 16.0 * plan.group * state_numbers(point)
+    return max(_OF_MODE_MADE * pairs, _OF_MODE * pairs + states + _COPIES_OF_PART * part)
 
 
 def _parts(plan: Plan) -> float:
@@ -296,9 +282,8 @@ def _tried(plan: Plan, point: Scenario, most: float) -> tuple[float, float]:
         end = time.perf_counter()
         if block.end == last or (count > 2 and end - began + 2.0 * (end - start) > most):
             break
-        following = max(1, 2 * block.end)
-        if following > stride:  # it ends at a record
-            following = stride * math.ceil(following / stride)
+        following = max(1, 2 * block.end)  # a long block ends at a record
+        following = stride * math.ceil(following / stride) if following > stride else following
         block = Block(block.end, min(last, following), stride)
     point.release()
     speeds = point.speeds(5, block.end / last)[2:]
@@ -366,19 +351,17 @@ def _span(values: Sequence[float], unit: str = "", digits: str = ".4g") -> str:
 def _models(plan: Plan) -> Rows:
     """Return the model of each part, its origin, and its description."""
     source = plan.scenario.origin
-    tables = tomllib.loads(source.text.removeprefix("\ufeff").replace("\r\n", "\n"))
-    changed = {key.partition(".")[0] for key in source.overrides}
-    swept = {key for axis in plan.scenario.sweep for key in axis.keys}
+    origins = dict.fromkeys(Parts._fields, "left out, so the simplest" if source.text else "given")
+    origins |= dict.fromkeys(tomllib.loads(source.text.removeprefix("\ufeff").replace("\r\n", "\n")), "in the file")
+    origins |= {key.partition(".")[0]: "changed by an override" for key in source.overrides}
+    origins |= {key: "swept" for axis in plan.scenario.sweep for key in axis.keys}
     rows: Rows = []
     for place, name in enumerate(Parts._fields):
-        why = "in the file" if name in tables else "left out, so the simplest" if source.text else "given"
-        why = "swept" if name in swept else "changed by an override" if name in changed else why
         models: dict[str, tuple[str, ...]] = {}
         for point in plan.points:
             part = getattr(point, name)
-            if part.model not in models:
-                models[part.model] = (name, part.model, why, _meaning(part))
-            if name in ("bonds", "shear") and name in point.why:
+            models.setdefault(part.model, (name, part.model, origins[name], _meaning(part)))
+            if name in point.why:
                 chosen = f"→ {point.chosen[place].model}"
                 models[chosen] = ("", chosen, "chosen", point.why[name])
         rows += models.values()
@@ -404,37 +387,31 @@ def _quantities(points: Sequence[Scenario]) -> Rows:
             continue
         unit = "" if quantity is None or quantity.unit == "1" else quantity.unit
         meaning = "" if quantity is None or key.endswith(quantity.meaning) else quantity.meaning
-        if isinstance(value, tuple | bool):
-            span = f", {_span(value, unit)}" if quantity and isinstance(value, tuple) else ""
-            value = f"{len(value)} values{span}" if isinstance(value, tuple) else str(value).lower()
-        columns.setdefault(key, (unit, meaning, []))[2].append(value)
+        if isinstance(value, tuple):
+            value = f"{len(value)} values" + (f", {_span(value, unit)}" if quantity else "")
+        columns.setdefault(key, (unit, meaning, []))[2].append(str(value).lower() if isinstance(value, bool) else value)
     order = list(dict.fromkeys(key.partition(".")[0] for key in columns))
     rows: Rows = []
     for key in sorted(columns, key=lambda key: order.index(key.partition(".")[0])):
         unit, meaning, values = columns[key]
         different = list(dict.fromkeys(values))
-        if all(isinstance(value, int | float) for value in different):
-            shown = _span(different, unit, ".6g" if isinstance(different[0], float) else "")
-        else:
+        if isinstance(different[0], str):
             shown = ", ".join(different[:_MOST_WORDS]) + (", ..." if len(different) > _MOST_WORDS else "")
+        else:
+            shown = _span(different, unit, ".6g" if isinstance(different[0], float) else "")
         rows.append((key, shown, f"{meaning} ({len(different)} values)" if len(different) > 1 else meaning))
     return rows
 
 
 def _contact(points: Sequence[Scenario]) -> Rows:
     """Return radius and pull-off load of the contact with all its bonds and without fluctuations."""
-    rows: Rows = []
     closed = [point.rest_radius for point in points if math.isfinite(point.rest_radius)]
-    if closed:
-        rows.append(("JKR radius", _span(closed, "m")))
-    if len(closed) < len(points):
-        share = f" at {len(points) - len(closed)} of {len(points)} points" if closed else ""
-        rows.append(("open", f"beyond pull-off{share}"))
-    loaded = [point for point in points if point.contact.load is not None]
-    if loaded:
-        loads = [float(jkr.pull_off_load(point.adhesion.work, point.sphere.radius)) for point in loaded]
-        rows.append(("pull-off load", _span(loads, "N")))
-    return rows
+    lost, loaded = len(points) - len(closed), [point for point in points if point.contact.load is not None]
+    loads = [float(jkr.pull_off_load(point.adhesion.work, point.sphere.radius)) for point in loaded]
+    rows: Rows = [("JKR radius", _span(closed, "m"))] if closed else []
+    if lost:
+        rows.append(("open", f"beyond pull-off at {lost} of {len(points)} points"))
+    return [*rows, ("pull-off load", _span(loads, "N"))] if loads else rows
 
 
 def _fluctuations(points: Sequence[Scenario]) -> Rows:
@@ -444,30 +421,28 @@ def _fluctuations(points: Sequence[Scenario]) -> Rows:
         return []
     powers = [_power(point) for point in points]
     rms = [math.sqrt(power * spectrum.variance) for power, spectrum in zip(powers, spectra, strict=True)]
-    plane = [float(point.fluctuations.spectrum.surface_energy(*point.solid.effective)) for point in points]
-    energies = [power * energy for power, energy in zip(powers, plane, strict=True)]
+    energies = [
+        power * float(spectrum.surface_energy(*point.solid.effective))
+        for power, spectrum, point in zip(powers, spectra, points, strict=True)
+    ]
     settled = any(spectrum.bond_made for spectrum in spectra)
     when = "in steady sliding at the last speed" if settled else "at amplitude 1"
     rows = {"rms of the stress": f"{_span(rms, 'Pa')} {when}"}
     rows["stored energy"] = f"{_span(energies, 'J/m^2')} {when}, on the infinite plane"
     cells = {point.fluctuations.side(point.setting.cell): point for point in points}
-    sides = [side for side in cells if math.isfinite(side)]
-    if sides:
+    if sides := [side for side in cells if math.isfinite(side)]:
         ratios = [side / point.rest_radius for side, point in cells.items() if point.rest_radius > 0.0]
         rows["cell"] = _span(sides, "m") + (f", {_span(ratios)} times the JKR radius" if ratios else "")
-    errors: dict[str, list[float]] = {}
-    for point in points:
-        for name, value in point.process.known_errors().items():
-            errors.setdefault(name, []).append(value)
-    for start, title in _ERRORS.items():
-        names = [name for name in errors if name.startswith(start)]
-        each = (f"{name.removeprefix(f'{start}_').replace('_', ' ')} {_percent(errors.pop(name))}" for name in names)
-        rows |= {title: ", ".join(each)} if names else {}
-    rows |= {name.replace("_", " "): _span(values, "", ",.0f") for name, values in errors.items()}
+    known = [point.process.known_errors() for point in points]
+    for name in dict.fromkeys(itertools.chain(*known)):
+        values = [errors[name] for errors in known if name in errors]
+        relative = name.startswith(("cell_error", "member_spread", "banded_error"))
+        rows[name.replace("_", " ")] = (
+            f"{round(100.0 * max(values, key=abs), 7):+.2g} %" if relative else _span(values, "", ",.0f")
+        )
     # a map that is the field has an rms and an energy of its own
     rows |= dict(detail for point in points[::-1] for detail in point.fluctuations.details(point.setting))
-    modes = [cast(ModalProcess, point.process).modes for point in points if point.fluctuations.keeps_modes]
-    if modes:
+    if modes := [cast(ModalProcess, point.process).modes for point in points if point.fluctuations.keeps_modes]:
         pairs, grid = _span([each.qx.size for each in modes], "", ","), _span([each.points for each in modes], "", ",")
         rows["modes"] = f"{pairs} pairs on a grid of {grid} points a side"
     return [*rows.items()]
@@ -481,58 +456,32 @@ def _power(point: Scenario) -> float:
     return float(settled.frozen[0] + settled.varying[0])
 
 
-def _percent(values: list[float]) -> str:
-    value = max(values, key=abs)
-    return f"{100.0 * value:+.2g} %" if abs(value) > 1e-9 else "none"
-
-
 def _slider(points: Sequence[Scenario]) -> Rows:
     """Return the stiffness of the contact, and that of the spring below which sliding is unstable."""
     rows: dict[tuple[str, str], list[float]] = {}
     for point in points:
-        drive, (yields, slope) = cast(Spring, point.drive), cast(Spring, point.drive).yields(*point.solid.effective)
-        radius, speeds = math.sqrt(point.contact_area / math.pi), np.abs(point.speeds(41))
-        firm = 1.0 / (yields + slope / radius) if yields + slope > 0.0 else math.inf
-        rows.setdefault(("contact k_t", "N/m"), []).append(firm)
+        drive, speeds = cast(Spring, point.drive), np.abs(point.speeds(41))
+        yields, slope = drive.yields(*point.solid.effective)
+        compliance = yields + slope / math.sqrt(point.contact_area / math.pi)
+        rows.setdefault(("contact k_t", "N/m"), []).append(1.0 / compliance if compliance else math.inf)
         if not drive.spring:
             continue
         if drive.mass > 0.0:
             frequency = math.sqrt(drive.spring / drive.mass) / (2.0 * math.pi)
             rows.setdefault(("natural frequency", "Hz, of mass and spring"), []).append(frequency)
-        bonds, body = point.population, slider_body(point, speeds)
-        bare = Body(body.area, body.area_growth, body.stress_growth)
-        sticking, stretching = cast(Rate, bonds), cast(Cohort | FirstMoment, bonds)
-        alone = stretching.onset(speeds, bare) if bonds.stretched else sticking.onset(speeds, body)
+        bonds, body = cast(Rate | Cohort | FirstMoment, point.population), slider_body(point, speeds)
+        delayed = bonds.onset(speeds, body)
+        alone = bonds.onset(speeds, Body(*body[:3])) if bonds.stretched else delayed
         if np.isnan(alone.stiffness).all():
             continue
         worst = int(np.nanargmax(alone.stiffness))
-        at = f", at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
-        rows.setdefault(("oscillates below", f"N/m of the spring{at}"), []).append(float(alone.stiffness[worst]))
-        if not bonds.stretched:
-            continue
-        delays = {"mass": drive.mass, "damping": drive.damping, "viscosity": drive.viscosity, "k_t": yields + slope}
-        *others, last = [name for name, amount in delays.items() if amount > 0.0] or [""]
-        if last:
-            name = f"with {', '.join(others)}{' and ' if others else ''}{last}"
-            behind = stretching.onset(speeds, body).stiffness
-            if np.isnan(behind).all():
-                rows.setdefault((name, "never"), [])
-            elif np.nanmax(behind) < math.inf:
-                rows.setdefault((name, "N/m of the spring"), []).append(float(np.nanmax(behind)))
-            else:
-                text = "behind any spring: k_t is so soft that the interface jumps by itself"
-                rows.setdefault((name, text), [])
-        if drive.mass == 0.0 and (grows := stretching.amplitude(speeds)) is not None:
-            text = "suddenly, with large slips; on the way back they last to a stiffer spring"
-            if grows[worst] > 0.0:
-                text = f"gradually: friction swings by {grows[worst]:.3g} √(1 − K/K_c) of itself"
-            rows.setdefault(("sets in there", f"{text} (mean field, constant area)"), [])
-        area = np.asarray(body.area)[worst]
-        soft = 4.0 * math.pi * point.solid.effective[0] * float(area / alone.stiffness[worst])
-        if 0.5 * soft < 2.0 * radius:
-            text = "m and longer: such waves along the sliding oscillate by themselves, across half as long ones"
-            rows.setdefault(("half-space", text), []).append(soft)
-    return [(name, f"{_span(values)} {text}" if values else text) for (name, text), values in rows.items()]
+        at = f"at {speeds[worst]:.3g} m/s, with {alone.frequency[worst] / (2.0 * math.pi):.3g} Hz"
+        rows.setdefault(("oscillates below", f"N/m of the spring, {at}"), []).append(float(alone.stiffness[worst]))
+        if bonds.stretched:
+            text = "N/m of the spring; 0: never, inf: behind any"
+            stiffness = float(np.nanmax([0.0, *delayed.stiffness]))
+            rows.setdefault(("with mass, damping, viscosity, k_t", text), []).append(stiffness)
+    return [(name, f"{_span(values)} {text}") for (name, text), values in rows.items()]
 
 
 def slider_body(point: Scenario, speeds: Array) -> Body:

@@ -378,10 +378,6 @@ class _Stretched(_BondModel):
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
         return self.rupture.resolved_onset(speed, *recipe, body)
 
-    def amplitude(self, speed: Array) -> Array | None:
-        """Return the growth of the oscillations beyond their onset at speeds [m/s], or None without a law of it."""
-        return None
-
     def _bonding(self, bound: Array, stretch: Array, square: Array, breaking: Array, lost: Array) -> Bonding:
         """Return the readings of a population of these moments per site.
 
@@ -451,9 +447,6 @@ class FirstMoment(_OverArea, _Separable):
     def onset(self, speed: Array, body: Body) -> Onset:
         recipe = self.bond_stiffness, self.rebinding_rate, self.site_density
         return self.rupture.first_moment_onset(speed, *recipe, body)
-
-    def amplitude(self, speed: Array) -> Array:
-        return self.rupture.first_moment_amplitude(speed, self.bond_stiffness, self.rebinding_rate)
 
     def remarks(self, setting: Setting) -> list[str]:
         excess = self.rupture.first_moment_excess(self.bond_stiffness, self.rebinding_rate)

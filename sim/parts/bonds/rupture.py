@@ -20,7 +20,6 @@ from sim.laws.schallamach import (
     catch_moments,
     constant_moments,
     cut_off_moments,
-    first_moment_amplitude,
     first_moment_onset,
     first_moment_peak,
     resolved_onset,
@@ -87,10 +86,6 @@ class _Law:
         """Return the onset of oscillations behind a spring at speeds [m/s], as the law ``first_moment_onset``."""
         return Onset(*np.full((2, *speed.shape), np.nan))
 
-    def first_moment_amplitude(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> Array:
-        """Return the growth of oscillations beyond their onset at speeds [m/s], as ``first_moment_amplitude``."""
-        return np.full(speed.shape, np.nan)
-
     @property
     def pathways(self) -> list[tuple[float, float]]:
         """Pathways of rupture as of the law ``resolved_onset``; none if force opens no pathway."""
@@ -152,10 +147,6 @@ class Bell(_Law):
     ) -> Onset:
         law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate, site_density
         return cast(Onset, first_moment_onset(speed, *law, body))
-
-    def first_moment_amplitude(self, speed: Array, bond_stiffness: float, rebinding_rate: float) -> Array:
-        law = self.zero_force_rate, self.bell_force, bond_stiffness, rebinding_rate
-        return cast(Array, first_moment_amplitude(speed, *law))
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
