@@ -19,19 +19,21 @@ test: $(STAMP)
 
 PARALLEL = -n 2 --dist worksteal
 
-# `make verify` runs all groups with their long checks, `make verify GROUP=bonds` one of them.
-GROUP ?= laws fields bonds contacts runs lowest
-laws = --doctest-modules --ignore=sim/__main__.py sim tests/laws tests/numerics tests/units
-fields = tests/spectrum tests/parts/shear
-bonds = tests/parts/bonds
-contacts = tests/parts/contact tests/parts/drive
-rooms = $(filter-out tests/parts tests/helpers tests/__pycache__, $(patsubst %/,%,$(wildcard tests/*/)))
-runs = $(filter-out $(laws) $(fields), $(rooms)) $(wildcard tests/test_*.py)
+# `make verify` runs all groups with their long checks, `make verify GROUP=parts` one of them.
+GROUP ?= laws parts runs lowest
+laws = --doctest-modules --ignore=sim/__main__.py sim tests/laws tests/numerics tests/spectrum tests/units
+parts = tests/parts
+folders = $(filter-out tests/helpers tests/__pycache__, $(patsubst %/,%,$(wildcard tests/*/)))
+runs = $(filter-out $(laws) $(parts), $(folders)) $(wildcard tests/test_*.py)
 
 verify:
 	$(MAKE) EXTRAS=test,lint,verify $(GROUP:%=.verify-%)
 
-# What reads and writes, with the lowest versions of all that pyproject.toml allows.
+.PHONY: .verify-laws .verify-parts .verify-runs .verify-lowest
+.verify-laws .verify-parts .verify-runs: .verify-%: $(STAMP)
+	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
+
+# The tests of `make test` with the lowest versions of all libraries that pyproject.toml allows.
 LOWEST = .venv-lowest
 .verify-lowest: $(STAMP)
 	test -x $(LOWEST)/bin/python || $(BIN)/python -m venv $(LOWEST)
@@ -39,12 +41,8 @@ LOWEST = .venv-lowest
 	  p = tomllib.load(open("pyproject.toml", "rb"))["project"]; \
 	  print(*(r.replace(">=", "==") for r in p["dependencies"] + p["optional-dependencies"]["test"]))')
 	$(LOWEST)/bin/python -m pip install -q --disable-pip-version-check --no-deps -e .
-	$(LOWEST)/bin/python -m pytest $(PARALLEL) tests/ensemble/test_netcdf.py tests/ensemble/test_provenance.py tests/units \
-	  tests/scenario/test_reader.py tests/analysis/test_correlation.py
-
-.PHONY: .verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs .verify-lowest
-.verify-laws .verify-fields .verify-bonds .verify-contacts .verify-runs: .verify-%: $(STAMP)
-	$(BIN)/python -m pytest $(PARALLEL) -m "verify or not verify" --timeout=3600 $($*)
+	-$(LOWEST)/bin/sim warm
+	$(LOWEST)/bin/python -m pytest $(PARALLEL) tests
 
 # `make bench` measures all rows of docs/speed.md, `make bench ROWS="modal disc"` those of some groups.
 bench: $(STAMP)
