@@ -10,11 +10,11 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import netCDF4
 import pytest
 import xarray as xr
-from click.testing import CliRunner
 from helpers.cases import posix
 from helpers.commands import SCENE, sim
 
@@ -36,9 +36,6 @@ def here(tmp_path, monkeypatch):
     return tmp_path
 
 
-# --- processes of their own: exit codes and imports ---
-
-
 def loaded(*arguments):
     """The modules that a command imports."""
     code = (
@@ -57,26 +54,12 @@ def complaints(errors):
     return [line for line in lines if not line.startswith(("compiling", "making"))]
 
 
-def test_help_imports_nothing_heavy():
-    heavy = {
-        "numpy",
-        "scipy",
-        "numba",
-        "pydantic",
-        "pint",
-        "xarray",
-        "netCDF4",
-        "matplotlib",
-        "rich",
-        "tomllib",
-        "json",
-    }
-    assert not loaded("--help") & heavy
-    assert not loaded("run", "--help") & heavy
-
-
-def test_check_and_a_run_without_its_table_import_neither_xarray_nor_figures_nor_statistics(here):
-    heavy = {"xarray", "pandas", "matplotlib", "scipy.stats", "rich", "dask"}
+def test_help_check_and_a_run_without_its_table_import_only_what_they_need(here):
+    figures = {"xarray", "matplotlib", "rich"}
+    numbers = {"numpy", "scipy", "numba", "pydantic", "pint", "netCDF4", "tomllib", "json"}
+    for command in ("--help",), ("run", "--help"):
+        assert not loaded(*command) & (figures | numbers)
+    heavy = {"pandas", "scipy.stats", "dask"} | figures
     assert not loaded("check", LENS) & heavy
     assert not loaded("run", "scene.toml", "--no-table", "--quiet") & heavy
     assert Path("outputs/scene.nc").exists()
@@ -103,17 +86,14 @@ def test_an_order_to_stop_keeps_what_is_computed(here, orders):
         run.send_signal(order)
     _, errors = run.communicate(timeout=60)
     assert run.returncode == (130 if len(orders) > 1 else 75)
-    assert complaints(errors) == [
-        "stopping when the running blocks end; once more stops at once",
-        "stopped; what was computed is kept: the same command with --resume goes on",
-    ]
+    assert [line.startswith("stop") for line in complaints(errors)] == [True, True] and "--resume" in errors
     assert not (here / "outputs" / "scene.nc").exists()
     assert "simulating" in Path("outputs/scene.nc.log").read_text(encoding="utf-8")
     kept = {part: part.stat().st_mtime_ns for part in parts.glob("*.npz")}
     assert kept
     other = sim(*long[:-1], 'sweep={"contact.load"={from=1e-3, to=4e-3, count=100}}', "--resume")
     assert other.exit_code == 2
-    assert "outputs/scene.nc.parts is of another run: scenario.sweep.contact.load was [0.001, 0.00" in other.stderr
+    assert "outputs/scene.nc.parts" in other.stderr and "scenario.sweep.contact.load" in other.stderr
     assert {part: part.stat().st_mtime_ns for part in parts.glob("*.npz")} == kept
 
 
@@ -129,37 +109,34 @@ def test_a_reader_that_leaves_at_once_is_no_error(here):
     assert Path("x.csv").exists()
 
 
-# --- run ---
-
-
 def test_bad_input_ends_with_2_one_line_a_fault_and_nothing_written(here):
     Path("bad.toml").write_text(SCENE.replace("4 mN", "4 kg").replace("members", "memebrs"), encoding="utf-8")
     before = sorted(here.iterdir())
     done = sim("run", "bad.toml")
-    assert done.exit_code == 2
-    assert done.stdout == ""
-    assert done.stderr.splitlines() == [
-        'bad.toml: contact.load: has the unit "kg", which is not a unit of N; write for example "4 mN"',
-        'bad.toml: ensemble.memebrs: is not a key; did you mean "members"?',
-    ]
+    assert (done.exit_code, done.stdout) == (2, "")
+    keys = [line.split(": ")[:2] for line in done.stderr.splitlines()]
+    assert keys == [["bad.toml", "contact.load"], ["bad.toml", "ensemble.memebrs"]]
     assert sorted(here.iterdir()) == before
 
 
-def test_run_writes_the_dataset_into_a_new_folder_and_ends_with_its_path(here):
-    done = sim("run", "scene.toml", "-o", "new/folder/x.nc")
+def test_run_writes_the_dataset_and_its_log_into_a_new_folder_and_ends_with_its_path(here):
+    done = sim("run", "scene.toml", "-o", "new/folder/x.nc", "--seed", 99, "--members", 2, "--set", "contact.load=2 mN")
     assert done.exit_code == 0
-    assert done.stdout.splitlines()[-1] == "new/folder/x.nc"
-    assert len(done.stdout.splitlines()) > 3
+    assert done.stdout.splitlines()[-1] == "new/folder/x.nc" and len(done.stdout.splitlines()) > 3
     assert sorted(path.name for path in (here / "new/folder").iterdir()) == ["x.nc", "x.nc.log"]
     with xr.open_dataset("new/folder/x.nc") as dataset:
-        assert dataset.sizes["member"] == 3
+        assert dataset.sizes["member"] == 2 and dataset.attrs["seed"] == "99"
+        assert float(dataset["contact_load"]) == 2e-3
+        assert json.loads(dataset.attrs["scenario_overrides"])["contact.load"] == "2 mN"
     entry = json.loads(Path("new/folder/x.nc.log").read_text(encoding="utf-8"))
-    assert entry["arguments"] == ["run", "scene.toml", "-o", "new/folder/x.nc"]
+    assert entry["arguments"][:4] == ["run", "scene.toml", "-o", "new/folder/x.nc"]
     assert list(entry["stages"]) == ["loading", "simulating", "writing", "table"]
     assert 0.0 < sum(entry["stages"].values()) <= entry["seconds"] + 0.05
     assert sim("run", "scene.toml", "-o", "new/folder/x.nc", "--force", "--no-table").exit_code == 0
     last = json.loads(Path("new/folder/x.nc.log").read_text(encoding="utf-8").splitlines()[-1])
     assert list(last["stages"]) == ["loading", "simulating", "writing"]
+    quiet = sim("run", "scene.toml", "--quiet")
+    assert (quiet.exit_code, quiet.output) == (0, "") and Path("outputs/scene.nc").exists()
 
 
 def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, monkeypatch):
@@ -180,23 +157,15 @@ def test_stages_of_a_long_run_and_the_first_compilation_have_their_line(capsys, 
         shown.advance(30)
         shown.begin("writing")
     assert capsys.readouterr().err.splitlines() == ["30 % of 100 member-steps, 2 min left", "writing"]
-
-
-def test_a_terminal_has_a_bar_with_the_stage_and_the_fraction_that_is_done(capsys, monkeypatch):
-    monkeypatch.setattr(sys.stdout, "isatty", lambda: True)
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.undo()
+    for stream in (sys.stdout, sys.stderr):
+        monkeypatch.setattr(stream, "isatty", lambda: True)
     monkeypatch.setenv("COLUMNS", "120")
     with terminal.progress_bar(100) as shown:
         shown.begin("simulating")
         shown.advance(30)
-    printed = "".join(capsys.readouterr())
+    printed = "".join(capsys.readouterr())  # a terminal has a bar
     assert "simulating" in printed and "30%" in printed
-
-
-def test_run_writes_into_outputs_and_quietly_if_asked(here):
-    done = sim("run", "scene.toml", "--quiet")
-    assert (done.exit_code, done.output) == (0, "")
-    assert (here / "outputs" / "scene.nc").exists()
 
 
 def test_an_output_that_exists_is_refused_before_anything_is_computed(here, monkeypatch):
@@ -206,21 +175,10 @@ def test_an_output_that_exists_is_refused_before_anything_is_computed(here, monk
     with monkeypatch.context() as patched:
         patched.setattr("sim.ensemble.simulate.run", None)  # computing would fail
         done = sim(*other)
-    assert done.exit_code == 73
-    assert done.stderr.splitlines() == ["x.nc exists; replace it with --force or name another file"]
+    assert done.exit_code == 73 and "--force" in done.stderr
     assert Path("x.nc").read_bytes() == content
     assert sim(*other, "--force", "--quiet").exit_code == 0
     assert Path("x.nc").read_bytes() != content
-
-
-def test_seed_members_and_set_reach_the_run(here):
-    done = sim("run", "scene.toml", "--seed", 99, "--members", 2, "--set", "contact.load=2 mN", "--quiet")
-    assert done.exit_code == 0
-    with xr.open_dataset("outputs/scene.nc") as dataset:
-        assert dataset.attrs["seed"] == "99"
-        assert dataset.sizes["member"] == 2
-        assert float(dataset["contact_load"]) == 2e-3
-        assert json.loads(dataset.attrs["scenario_overrides"])["contact.load"] == "2 mN"
 
 
 @posix
@@ -245,15 +203,18 @@ def test_a_run_that_cannot_begin_names_the_fault_with_its_code_and_writes_nothin
 
 
 @posix
-def test_a_table_that_a_scenario_reads_is_never_its_output(here):
+def test_a_table_that_a_scenario_reads_is_never_its_output_and_a_log_no_link_to_a_file_of_others(here):
     text = "time [s], speed [m/s]\n0, 1e-3\n1, 2e-3\n"
-    Path("v.csv").write_text(text, encoding="utf-8")
+    for name in ("v.csv", "mine"):
+        Path(name).write_text(text, encoding="utf-8")
     Path("link.nc").symlink_to("v.csv")
     for where in ('drive={ model="table", file="v.csv" }', 'sweep={ drive=[{ model="table", file="v.csv" }] }'):
         for name in ("v.csv", "link.nc"):
             done = sim("run", "scene.toml", "--set", where, "-o", name, "--force")
-            assert (done.exit_code, done.stderr.startswith(f"{name}: the command reads")) == (2, True)
-            assert Path("v.csv").read_text(encoding="utf-8") == text
+            assert (done.exit_code, done.stderr.startswith(f"{name}: ")) == (2, True)
+    Path("x.nc.log").symlink_to("mine")
+    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
+    assert [Path(name).read_text(encoding="utf-8") for name in ("v.csv", "mine")] == [text, text]
 
 
 def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
@@ -285,54 +246,24 @@ def test_nothing_after_the_rename_makes_a_failure_of_a_run(here, monkeypatch):
     assert sim("stats", "x.nc").exit_code == 0
 
 
-@posix
-def test_a_log_is_no_link_to_a_file_of_others(here):
-    Path("mine").write_text("mine", encoding="utf-8")
-    Path("x.nc.log").symlink_to("mine")
-    assert sim("run", "scene.toml", "-o", "x.nc", "--quiet").exit_code == 0
-    assert Path("mine").read_text(encoding="utf-8") == "mine"
-
-
-def test_a_folder_that_cannot_be_written_ends_with_74(here, monkeypatch):
-    def refuse(self, *_, **__):
-        raise PermissionError(13, "Permission denied", str(self))
-
-    monkeypatch.setattr(Path, "mkdir", refuse)
-    done = sim("run", "scene.toml", "-o", "locked/x.nc")
-    assert done.exit_code == 74
-    assert done.stderr.strip() == "locked: Permission denied"
-
-
-def test_a_full_disk_ends_with_74_and_its_reason(here, monkeypatch):
-    def full(*_, **__):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("numpy.savez", full)
+@pytest.mark.parametrize(
+    ("name", "fault", "code", "start"),
+    [
+        ("pathlib.Path.mkdir", PermissionError(13, "Permission denied", "outputs"), 74, "outputs: "),
+        ("numpy.savez", OSError(28, "No space left on device"), 74, "outputs/scene.nc.parts: "),
+        ("sim.ensemble.simulate.run", MemoryError(), 1, "there is not enough memory; "),
+    ],
+)
+def test_trouble_of_the_system_has_its_code_and_names_the_place(here, monkeypatch, name, fault, code, start):
+    monkeypatch.setattr(name, Mock(side_effect=fault))
     done = sim("run", "scene.toml")
-    assert done.exit_code == 74
-    assert done.stderr.startswith("outputs/scene.nc.parts: No space left on device; ")
+    assert done.exit_code == code and done.stderr.startswith(start)
     assert not Path("outputs/scene.nc").exists()
 
 
-def test_too_little_memory_is_printed(here, monkeypatch):
-    def greedy(*_, **__):
-        raise MemoryError
-
-    monkeypatch.setattr("sim.ensemble.simulate.run", greedy)
-    done = sim("run", "scene.toml")
-    assert done.exit_code == 1
-    assert done.stderr.startswith("there is not enough memory; ")
-
-
 def test_a_fault_of_our_own_is_not_hidden(here, monkeypatch):
-    def broken(*_, **__):
-        raise RuntimeError("ours")
-
-    monkeypatch.setattr("sim.ensemble.simulate.run", broken)
+    monkeypatch.setattr("sim.ensemble.simulate.run", Mock(side_effect=RuntimeError("ours")))
     assert isinstance(sim("run", "scene.toml").exception, RuntimeError)
-
-
-# --- --set ---
 
 
 def test_a_value_of_set_is_toml_or_else_text():
@@ -343,58 +274,43 @@ def test_a_value_of_set_is_toml_or_else_text():
         assert cli._values((f"contact.load={text}",), "--set") == {"contact.load": value}
 
 
-# --- check, new, schema, paper ---
-
-
 def test_check_prints_and_writes_nothing(here):
     done = sim("check", "scene.toml")
-    assert done.exit_code == 0
-    assert done.stdout.startswith("a scene\n")
-    assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
-    assert sim("check", "nope.toml").exit_code == 2
+    assert done.exit_code == 0 and done.stdout.startswith("a scene\n")
     changed = sim("check", "scene.toml", "--set", 'bonds={ model = "none" }', "--set", 'drive.from="2 mm/s"')
-    assert "bonds    none         changed by an override" in changed.stdout
+    assert re.search("bonds +none +changed", changed.stdout)
+    assert sim("check", "nope.toml").exit_code == 2
+    assert sorted(path.name for path in here.iterdir()) == ["scene.toml"]
 
 
 def test_new_writes_a_scenario_that_runs(here):
     done = sim("new", "mine")
-    assert (done.exit_code, done.stdout) == (0, "mine.toml: run it with `sim run mine.toml`\n")
+    assert done.exit_code == 0 and done.stdout.startswith("mine.toml: ")
     assert sim("run", "mine.toml", "--quiet", "--members", 2).exit_code == 0
-    again = sim("new", "mine.toml")
-    assert (again.exit_code, again.stderr) == (73, "mine.toml exists; name another file\n")
-    nowhere = sim("new", "no/where.toml")
-    assert (nowhere.exit_code, nowhere.stderr) == (74, "no/where.toml: No such file or directory\n")
     assert sim("new").stdout.startswith("first.toml: ")
-
-
-def test_schema_is_json(here):
-    schema = json.loads(sim("schema").stdout)
-    assert schema["title"] == "sim scenario"
-    assert set(schema["required"]) == {"clock", "solid", "sphere", "adhesion", "contact"}
+    for name, code in (("mine.toml", 73), ("no/where.toml", 74)):
+        again = sim("new", name)
+        assert again.exit_code == code and again.stderr.startswith(name)
 
 
 def test_paper_ends_with_1_if_anything_fails(monkeypatch):
     line = paper.Check("a", "1", computed=1.0, expected=1.0, error=0.0, tolerance=1e-12)
-    wrong = line._replace(computed=1.1, error=0.1)
-    monkeypatch.setattr(paper, "checks", lambda: [line])
-    done = sim("paper")
-    assert done.exit_code == 0
-    assert done.stdout.splitlines()[-1] == "1 of 1 hold"
-    monkeypatch.setattr(paper, "checks", lambda: [line, wrong])
-    done = sim("paper")
-    assert done.exit_code == 1
-    assert "FAILS" in done.stdout
-    assert done.stdout.splitlines()[-1] == "1 of 2 hold"
+    for lines, code, last in (
+        ([line], 0, "1 of 1 hold"),
+        ([line, line._replace(computed=1.1, error=0.1)], 1, "1 of 2 hold"),
+    ):
+        monkeypatch.setattr(paper, "checks", lambda: lines)
+        done = sim("paper")
+        assert (done.exit_code, done.stdout.splitlines()[-1], "FAILS" in done.stdout) == (code, last, code == 1)
 
 
-def test_a_wrong_command_ends_with_2():
+def test_a_wrong_command_ends_with_2_and_the_schema_is_json():
     for arguments in ([], ["nope"], ["run"], ["run", "--nope"]):
         done = sim(*arguments)
         assert (done.exit_code, "Traceback" in done.output) == (2, False)
     assert sim("--version").stdout.startswith("sim, version ")
-
-
-# --- stats, plot ---
+    required = json.loads(sim("schema").stdout)["required"]
+    assert set(required) == {"clock", "solid", "sphere", "adhesion", "contact"}
 
 
 @pytest.fixture(scope="module")
@@ -406,22 +322,10 @@ def dataset(tmp_path_factory):
     return folder / "x.nc"
 
 
-def test_stats_prints_a_table_and_writes_csv(dataset, here):
-    done = sim("stats", dataset, "--csv", "new/table.csv")
-    assert done.exit_code == 0
-    assert done.stdout.splitlines()[-1] == "new/table.csv"
-    header, *rows = csv.reader(Path("new/table.csv").read_text(encoding="utf-8").splitlines())
-    assert len({len(row) for row in (header, *rows)}) == 1 and sum("contact_area" in row for row in rows) == 11
-    assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
-
-
 def test_no_number_of_a_table_is_cut_short(capsys):
-    rows = [{"a long heading": "1.23456789(12)" * 9, "[mm/s]": "[bold]2[/bold]"}] * 2
-    cli.print_rows(rows)
+    cli.print_rows([{"a long heading": "1.23456789(12)" * 9, "[mm/s]": "[bold]2[/bold]"}] * 2)
     printed = capsys.readouterr().out
-    assert printed.count("1.23456789(12)" * 9) == 2
-    assert "[mm/s]" in printed
-    assert "[bold]2[/bold]" in printed
+    assert printed.count("1.23456789(12)" * 9) == 2 and "[mm/s]" in printed and "[bold]2[/bold]" in printed
     cli.print_rows([])
 
 
@@ -449,7 +353,7 @@ def test_an_existing_file_is_replaced_only_if_asked(made, monkeypatch):
     ):
         before = content(made)
         done = sim(*arguments)
-        assert (done.exit_code, done.stderr) == (73, f"{file} exists; replace it with --force or name another file\n")
+        assert done.exit_code == 73 and done.stderr.startswith(file) and "--force" in done.stderr
         assert content(made) == before
         if arguments[0] != "converge":
             assert sim(*arguments, "--force").exit_code == 0
@@ -481,12 +385,16 @@ def test_an_older_picture_stays_whole_if_the_new_one_fails(made, monkeypatch):
 
     before = content(made)
     monkeypatch.setattr("matplotlib.figure.Figure.savefig", full)
-    done = sim("plot", "x.nc", "--force")
-    assert (done.exit_code, done.stderr) == (74, ".: No space left on device\n")
+    assert sim("plot", "x.nc", "--force").exit_code == 74
     assert content(made) == before
 
 
-def test_plot_writes_a_picture_beside_the_dataset_or_where_asked(dataset, here):
+def test_stats_writes_a_table_and_plot_a_picture_beside_the_dataset_or_where_asked(dataset, here):
+    done = sim("stats", dataset, "--csv", "new/table.csv")
+    assert (done.exit_code, done.stdout.splitlines()[-1]) == (0, "new/table.csv")
+    header, *rows = csv.reader(Path("new/table.csv").read_text(encoding="utf-8").splitlines())
+    assert len({len(row) for row in (header, *rows)}) == 1 and sum("contact_area" in row for row in rows) == 11
+    assert sim("stats", dataset, "--csv", "scene.toml/table.csv").exit_code == 74
     done = sim("plot", dataset, "time", "-o", "new/picture.svg")
     assert (done.exit_code, done.stdout) == (0, "new/picture.svg\n")
     assert Path("new/picture.svg").read_text(encoding="utf-8").startswith("<?xml")
@@ -494,48 +402,28 @@ def test_plot_writes_a_picture_beside_the_dataset_or_where_asked(dataset, here):
     assert dataset.with_suffix(".png").exists()
 
 
-def test_a_figure_that_cannot_be_drawn_is_refused_in_one_line(dataset, here):
+def test_a_figure_or_a_table_that_cannot_be_made_is_refused_in_one_line(dataset, here):
     for arguments, code, message in (
-        (["banana"], 2, "known: "),
-        (["map"], 2, "x.nc: "),
-        (["-o", "picture.xyz"], 2, "xyz"),
-        (["-o", "scene.toml/picture.png"], 74, "scene.toml"),
+        (["plot", dataset, "banana"], 2, "known: "),
+        (["plot", dataset, "map"], 2, "x.nc: "),
+        (["plot", dataset, "-o", "picture.xyz"], 2, "xyz"),
+        (["plot", dataset, "-o", "scene.toml/picture.png"], 74, "scene.toml"),
+        (["stats", "nope.nc"], 2, "nope.nc: "),
+        (["plot", "."], 2, ".: "),
+        (["stats", "scene.toml"], 2, "`sim run`"),
     ):
-        done = sim("plot", dataset, *arguments)
+        done = sim(*arguments)
         assert (done.exit_code, message in done.stderr, len(done.stderr.splitlines())) == (code, True, 1)
 
 
-def test_a_file_that_is_no_dataset_is_refused_in_one_line(dataset, here):
-    Path("cut.nc").write_bytes(dataset.read_bytes()[: dataset.stat().st_size // 2])
-    with netCDF4.Dataset("foreign.nc", "w") as foreign:
-        foreign.createDimension("x", 3)
-    for name in ("stats", "plot"):
-        for file, cure in (
-            ("nope.nc", "name a dataset"),
-            (".", "name a dataset"),
-            ("scene.toml", "name the dataset that `sim run` makes of it"),
-            ("cut.nc", "run the scenario again"),
-            ("foreign.nc", "name one of its outputs"),
-        ):
-            done = sim(name, file)
-            assert (done.exit_code, done.stdout, len(done.stderr.splitlines())) == (2, "", 1)
-            assert done.stderr.startswith(f"{file}: ") and cure in done.stderr
-
-
-def test_converge_prints_a_table_a_recommendation_and_its_files(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "scene.toml"
+def test_converge_prints_a_table_a_recommendation_and_its_files(here):
     starter = (Path(cli.__file__).parent / "starter.toml").read_text(encoding="utf-8")
-    path.write_text(starter.replace('duration = "2 s"', 'duration = "0.2 s"'), encoding="utf-8")
-    found = CliRunner().invoke(
-        cli.cli, ["converge", str(path), "--budget", "0.5 s", "--tolerance", "2 %"], catch_exceptions=False
-    )
-    assert found.exit_code == 0
-    assert "banded" in found.output and "2 %" in found.output
-    assert (tmp_path / "outputs" / "scene-converge.nc").exists()
-    assert (tmp_path / "outputs" / "scene-converge.png").exists()
-    refused = CliRunner().invoke(cli.cli, ["converge", str(path), "--budget", "2 kg"])
-    assert refused.exception is not None and "budget" in str(refused.exception)
+    Path("scene.toml").write_text(starter.replace('duration = "2 s"', 'duration = "0.2 s"'), encoding="utf-8")
+    done = sim("converge", "scene.toml", "--budget", "0.5 s", "--tolerance", "2 %")
+    assert done.exit_code == 0 and "banded" in done.output and "2 %" in done.output
+    assert Path("outputs/scene-converge.nc").exists() and Path("outputs/scene-converge.png").exists()
+    refused = sim("converge", "scene.toml", "--budget", "2 kg")
+    assert refused.exit_code == 2 and "budget" in refused.stderr
 
 
 def test_a_reduced_file_has_a_table_and_names_what_a_figure_misses(here):
@@ -549,28 +437,22 @@ def test_a_reduced_file_has_a_table_and_names_what_a_figure_misses(here):
     assert 'add "shear_stress" to record.quantities' in drawn.output
 
 
-# --- terminals ---
-
 MARKS = "\x1b]0;x\x07\x9b31m\u202e\u2066"
 
 
-def test_a_terminal_without_utf_8_gets_replacements(here):
+def test_a_terminal_without_utf_8_gets_replacements(here, monkeypatch):
     Path("scene.toml").write_text(SCENE.replace("a scene", "τ1 → ∮"), encoding="utf-8")
     command = [sys.executable, "-m", "sim", "check", "scene.toml"]
     environment = os.environ | {"PYTHONIOENCODING": "cp1252"}
     done = subprocess.run(command, env=environment, capture_output=True, timeout=120, check=False)
     assert (done.returncode, complaints(done.stderr.decode())) == (0, [])
     assert b"?" in done.stdout
-
-
-def test_a_table_on_a_terminal_without_utf_8_has_replacements(monkeypatch):
-    """What ``sim converge`` and ``sim paper`` print goes the same way."""
-    terminal = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
-    monkeypatch.setattr(sys, "stdout", terminal)
+    screen = io.TextIOWrapper(io.BytesIO(), encoding="ascii")  # and so does a table
+    monkeypatch.setattr(sys, "stdout", screen)
     monkeypatch.setattr(cli.cli, "main", lambda **how: cli.print_rows([{"τ": "→"}]))
     cli.main()
-    terminal.flush()
-    assert terminal.buffer.getvalue() == b"?\n?\n"
+    screen.flush()
+    assert screen.buffer.getvalue() == b"?\n?\n"
 
 
 def test_no_control_character_of_a_scenario_or_a_dataset_reaches_the_terminal(dataset, here):
@@ -597,9 +479,9 @@ def test_everything_is_printed_by_one_function():
 
 
 def test_max_memory_is_honoured_and_refused_with_the_least_where_it_is_too_little(here, monkeypatch):
-    for given, said in (("5 m", "--max-memory 5 m"), ("-1 GB", "above"), ("much", "4 GB")):
-        refused = sim("run", "scene.toml", "--max-memory", given)
-        assert (refused.exit_code, said in refused.stderr) == (2, True)
+    for text in ("5 m", "-1 GB", "much"):
+        refused = sim("run", "scene.toml", "--max-memory", text)
+        assert (refused.exit_code, "--max-memory" in refused.stderr) == (2, True)
     refused = sim("run", "scene.toml", "--max-memory", "9 MB")
     assert refused.exit_code == 1
     assert re.search(r"takes \d+ MB of memory at least, of which 9 MB are allowed \(--max-memory\)", refused.stderr)
@@ -607,6 +489,4 @@ def test_max_memory_is_honoured_and_refused_with_the_least_where_it_is_too_littl
     assert sim("run", "scene.toml", "--max-memory", "4 GB", "--no-table").exit_code == 0
     monkeypatch.setattr(preview, "_MOST_TABULATED", 0.0)
     large = sim("run", "scene.toml", "--force")
-    assert large.exit_code == 0
-    assert "`sim stats` prints the table" in large.stderr
-    assert large.stdout == "outputs/scene.nc\n"
+    assert (large.exit_code, large.stdout) == (0, "outputs/scene.nc\n") and "`sim stats`" in large.stderr
