@@ -21,7 +21,7 @@ from sim.laws.schallamach import (
     first_moment_peak,
     first_moment_stress,
     start_up_force,
-)
+)  # fmt: skip
 from sim.scenario.reader import load
 
 FOLDER = Path(__file__).parent.parent / "scenarios"
@@ -119,20 +119,14 @@ def test_a_ripple_of_375_kpa_brings_the_contact_onto_hertz():
     masked = dataset["shear_spectrum_amplitude"].values >= 375.158e3
     assert_allclose(dataset["contact_radius"].values[masked], hertz[masked], rtol=1e-13)
     assert np.all(dataset["contact_radius"].values[~masked] > hertz[~masked] * (1.0 + 1e-4))
-    assert_allclose(
-        float(dataset["work_of_adhesion"].sel(shear_spectrum_amplitude=375e3)),
-        42e-3 * (1 - (375 / 375.157768) ** 2),
-        rtol=1e-6,
-    )
+    work = float(dataset["work_of_adhesion"].sel(shear_spectrum_amplitude=375e3))
+    assert_allclose(work, 42e-3 * (1 - (375 / 375.157768) ** 2), rtol=1e-6)
 
 
-def test_a_uniform_stress_changes_no_radius():
-    radii = at("uniform_stress")["contact_radius"]
+def test_a_uniform_stress_changes_no_radius_and_the_friction_of_the_tip_follows_the_jkr_area_into_tension():
+    radii = four("uniform_stress")["contact_radius"]
     assert np.all(radii == radii.isel(bonds_stress=0))
-
-
-def test_the_friction_of_the_tip_follows_the_jkr_area_into_tension():
-    dataset = at("afm_tip").isel(t=-1)
+    dataset = four("afm_tip").isel(t=-1)
     assert_allclose(dataset["friction_force"], 0.9e9 * dataset["contact_area"], rtol=1e-14)
     open_ = dataset["contact_load"] < dataset["jkr_pull_off_load"]
     assert np.all(dataset["in_contact"] == ~open_)
@@ -173,6 +167,11 @@ def bell(dataset):
     """Rates, force and stiffness of a scenario's bonds, as the laws take them."""
     names = ("rupture_zero_force_rate", "rupture_bell_force", "bond_stiffness", "rebinding_rate")
     return tuple(float(dataset[f"bonds_{name}"]) for name in names)
+
+
+def mean_field(dataset):
+    """Numbers of ``bell`` and the density of the sites."""
+    return *bell(dataset), float(dataset["bonds_site_density"])
 
 
 def speed_of_steps(dataset):
@@ -244,11 +243,6 @@ def test_the_field_that_bonds_make_is_their_force_squared_and_costs_little():
     assert_allclose(paid, jkr.radius_at_load(4e-3, work * fraction[-1] - energy[-1], 2e-3, 6.4e6), rtol=1e-12)
     lost = 1.0 - np.square(paid / unpaid)
     assert np.all(lost > 0.0) and lost.max() < 0.002
-
-
-def mean_field(dataset):
-    """Rates, force, stiffness and density of a scenario's bonds, as the laws of mean field take them."""
-    return *bell(dataset), float(dataset["bonds_site_density"])
 
 
 def strengths(dataset, name="shear_stress"):
@@ -402,12 +396,7 @@ def test_a_measured_pattern_is_paid_at_the_edge_of_the_contact():
     radius, modulus, load = dataset["contact_radius"], float(dataset["contact_modulus"]), 4e-3
     rate = jkr.energy_release_rate(radius.values, load, 2e-3, modulus)
     assert_allclose(rate, dataset["work_of_adhesion"].values, rtol=1e-9)
-    field = load_field("own_map")
+    field = np.loadtxt(FOLDER / "own_map.csv", delimiter=",").T  # x along axis 0
     plane = at("own_map", shear={"model": "mapped", "field": {"file": "own_map.csv", "pixel": "8 um"}})
     exact = surface_energy(field, (72 * 8e-6, 44 * 8e-6), 1.6e6)
     assert_allclose(plane["fluctuation_energy"], exact, rtol=1e-12)
-
-
-def load_field(name):
-    """The map of a scenario as its file has it, x along axis 0."""
-    return np.loadtxt(FOLDER / f"{name}.csv", delimiter=",").T

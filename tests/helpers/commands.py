@@ -41,20 +41,15 @@ SCENE = f"{LENS}{RAMP}{COUNTED}[ensemble]\nmembers = 3\n"
 
 
 def sim(*arguments):
-    """A command as ``main`` runs it, in this process: exit code, output, errors."""
-    return CliRunner().invoke(_main(), list(map(str, arguments)))
-
-
-def _main():
-    """``cli.main`` as a click command, so that the runner can catch what it prints."""
+    """Run a command as ``main`` runs it, in this process; return exit code, output and errors."""
 
     @click.command(context_settings={"ignore_unknown_options": True, "help_option_names": []})
-    @click.argument("arguments", nargs=-1, type=click.UNPROCESSED)
-    def run(arguments):
-        before, sys.argv = sys.argv, ["sim", *arguments]
+    @click.argument("words", nargs=-1, type=click.UNPROCESSED)
+    def run(words):
+        before, sys.argv = sys.argv, ["sim", *words]
         try:
             cli.main()
         finally:
             sys.argv = before
 
-    return run
+    return CliRunner().invoke(run, list(map(str, arguments)))

@@ -1,14 +1,12 @@
 """Small runs and their drawn lines, for the tests of figures."""
 
+from helpers.lens import scene
+
 from sim.ensemble.simulate import run
 from sim.parts import drive
-from sim.parts.bonds import models as bonds
-from sim.parts.contact import Equilibrium
-from sim.parts.contact.models import Adhesion, Solid, Sphere
 from sim.parts.shear import models as shear
 from sim.parts.shear.process import Onset, Time
-from sim.scenario.clock import Clock, Ensemble, Record
-from sim.scenario.scenario import Scenario
+from sim.scenario.clock import Ensemble, Record
 from sim.spectrum.families import Band
 
 CELL = 0.24e-3
@@ -26,27 +24,11 @@ _RUNS = {}
 
 
 def simulated(**changes):
-    """A small run, made once for all tests: change a copy of it."""
+    """Return a small run, made once for all tests: change a copy of it."""
     key = repr(sorted(changes.items()))
     if key not in _RUNS:
-        _RUNS[key] = _simulated(changes)
+        _RUNS[key] = run(scene(**{"shear": field()} | changes))
     return _RUNS[key]
-
-
-def _simulated(changes):
-    parts = {
-        "clock": Clock(duration=0.4, step=0.02),
-        "solid": Solid(shear_modulus=1.6e6),
-        "sphere": Sphere(radius=2e-3),
-        "adhesion": Adhesion(work=42e-3),
-        "contact": Equilibrium(load=4e-3),
-        "drive": RAMP,
-        "bonds": bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=3e5),
-        "shear": field(),
-        "ensemble": Ensemble(members=6),
-        "seed": 2003,
-    }
-    return run(Scenario(**{**parts, **changes}))
 
 
 def mapped(members=1, spectrum=None, **changes):
@@ -56,13 +38,15 @@ def mapped(members=1, spectrum=None, **changes):
 
 
 def drawn(panel, colour, style="-"):
-    """Data of the line of a colour and a style; what stands in the legend alone has none."""
-    (line,) = (
-        line
-        for line in panel.lines
-        if (line.get_color(), line.get_linestyle()) == (colour, style) and len(line.get_xdata())
-    )
-    return line.get_data()
+    """Return data of the line of a colour and a style; a line of the legend alone has none."""
+    (data,) = data_of(panel, colour, style)
+    return data
+
+
+def data_of(panel, colour, style="-"):
+    """Return data of all lines of a colour and a style."""
+    lines = [line for line in panel.lines if (line.get_color(), line.get_linestyle()) == (colour, style)]
+    return [line.get_data() for line in lines if len(line.get_xdata())]
 
 
 def lines_of(panel):

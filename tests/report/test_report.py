@@ -20,7 +20,6 @@ from scipy import special
 from sim import analysis
 from sim.analysis.observables import full_area
 from sim.ensemble.simulate import run
-from sim.parts import drive
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
 from sim.plots import kinds
@@ -30,7 +29,6 @@ from sim.report.report import agreement, fit_of
 from sim.scenario.clock import Clock, Ensemble, Record
 from sim.scenario.reader import load
 
-REVERSING = drive.Table(time=(0.0, 0.1, 0.1, 0.3, 0.3, 0.4), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3))
 VOID = {"meta", "link", "img", "br", "hr", "input"}
 TAGS = {
     "html", "head", "meta", "title", "style", "body", "main", "header", "h1", "h2", "p", "b", "code", "pre", "div",
@@ -128,9 +126,6 @@ def shipped(name, **changes):
     return run(load(Path(__file__).parents[2] / "scenarios" / f"{name}.toml", changes))
 
 
-# -- the page ---------------------------------------------------------------------------------
-
-
 def test_a_page_has_a_caption_for_each_figure_and_the_numbers_of_the_statistics(ramp):
     page = harmless(Page(html(ramp)))
     assert [tag for tag, _ in page.elements].count("svg") == len(page.words("b")) == 1
@@ -140,17 +135,20 @@ def test_a_page_has_a_caption_for_each_figure_and_the_numbers_of_the_statistics(
 
 
 @pytest.mark.usefixtures("bare")
-def test_every_shape_of_dataset_has_its_page():
+def test_every_shape_of_dataset_has_its_page(tmp_path):
     for changes in [
         {"sweep": {"contact.load": [1e-3, 4e-3]}, "record": Record(per_member=False)},
         {"contact": Equilibrium(load=-1.0), "shear": shear.Uniform(), "ensemble": Ensemble(members=1)},
         {"drive": STEADY, "clock": Clock(duration=0.02, step=0.02)},
     ]:
         harmless(Page(html(simulated(**changes))))
+    for log in ("", "no JSON\n", '{"seconds": "x"}\n', "[1]\n", '{"began": 1, "seconds": 1}\n', "\xff\n"):
+        (tmp_path / "x.nc.log").write_bytes(log.encode("latin-1"))
+        assert report.cost(tmp_path / "x.nc.log") == {}  # a log that cannot be read costs only its table
 
 
 @pytest.mark.usefixtures("unwritten")
-def test_the_figures_of_a_page_are_those_that_show_more_of_a_run():
+def test_the_figures_of_a_page_are_those_that_show_more_of_a_run_and_others_have_a_reason(monkeypatch, smooth):
     course = {"time": [0.0, 0.02, 0.02, 0.06], "value": [2e-4, 2e-4, 2e-3, 2e-3]}
     stepped = shipped("velocity_step", **{"drive.stage": course}, clock={"duration": "60 ms", "step": "1 ms"})
     crept = shipped("creep", clock={"duration": "0.1 s", "step": "2 ms"}, sweep={"drive.force": [4e-3, 8e-3]})
@@ -163,15 +161,9 @@ def test_the_figures_of_a_page_are_those_that_show_more_of_a_run():
     ):
         drawings = [drawing.kind for drawing in report.drawings(dataset)]
         assert drawings[0] == best and shown <= {*drawings} and not left_out & {*drawings}
-
-
-def test_a_figure_that_cannot_be_drawn_is_left_out_with_the_reason(monkeypatch, smooth):
     draw = report.kinds.draw
     monkeypatch.setattr(report.kinds, "draw", lambda dataset, kind: draw(dataset, "map"))
     assert ["no stress maps" in drawing.lacks for drawing in report.drawings(smooth)] == [True]
-
-
-# -- figures as SVG ---------------------------------------------------------------------------
 
 
 def test_images_are_within_the_page_and_ink_and_paper_are_its_own(ramp):
@@ -211,9 +203,6 @@ def test_a_figure_is_laid_out_in_the_style_in_which_it_is_saved():
     saved.savefig(io.BytesIO(), format="svg")
     for laid_out, drawn in zip(figure.axes, saved.axes, strict=True):
         assert laid_out.get_position().bounds == drawn.get_position().bounds
-
-
-# -- measured points, and a fit ---------------------------------------------------------------
 
 
 def measured_about(dataset, *distances):
@@ -303,18 +292,19 @@ def test_a_fit_is_a_table_and_costs_a_degree_of_freedom_if_it_is_of_these_points
         assert len(table) == count and table[-1]["degrees of\nfreedom"] == freedom
 
 
-@pytest.mark.usefixtures("bare")
-def test_a_file_that_is_no_result_of_a_fit_is_refused_in_one_line(here):
+@pytest.mark.usefixtures("unwritten")
+def test_a_file_that_is_no_result_of_a_fit_and_hostile_headings_are_refused_in_one_line(here):
     faults = ["", "{}", "[1]", '{"numbers": {}}', "[" * 10**5, "\xff", json.dumps(FIT | {"numbers": {"a": 1}}),
               json.dumps(FIT | {"chi_square": None}), json.dumps(FIT | {"correlations": {}})]  # fmt: skip
-    for text in faults:
-        Path("m_fit.json").write_bytes(text.encode("latin-1"))
-        result = sim("report", "x.nc", "--fit", "m_fit.json")
-        assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1) and "m_fit.json" in result.stderr
+    columns = ("<script>alert(1)</script>", "x" * 10**6, "area_ratio [<b>]", "area\x1b[31m_ratio", "$\\frac{1}{0}$")
+    cases = [("--fit", text) for text in faults]
+    cases += [("--data", f"speed [mm/s], {column}\n1, 0.9\n") for column in columns]
+    for option, text in cases:
+        Path("file").write_bytes(text.encode("latin-1"))
+        result = sim("report", "x.nc", option, "file")
+        assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1) and len(result.stderr) < 400
+        assert "file" in result.stderr and "\x1b" not in result.stderr
     assert not Path("x.html").exists()
-
-
-# -- errors, cost, question, repetition -------------------------------------------------------
 
 
 def test_error_estimates_stand_beside_the_errors_that_were_measured():
@@ -333,9 +323,8 @@ def test_error_estimates_stand_beside_the_errors_that_were_measured():
 
 def test_the_question_is_the_first_paragraph_of_the_scenarios_comment_else_its_name(ramp):
     text = "# Why\n# so?\n#\n# Because\n# of that.\n#\n# Really.\nname = 'x'\n# no more\n"
-    asked = report.question(ramp.assign_attrs(scenario_toml=text, title="x"))
-    assert asked == ("x", "Why so?", ["Because of that.", "Really."])
-    assert report.question(ramp.assign_attrs(scenario_toml="", title="x")) == ("x", "x", [])
+    for toml, question, rest in ((text, "Why so?", ["Because of that.", "Really."]), ("", "x", [])):
+        assert report.question(ramp.assign_attrs(scenario_toml=toml, title="x")) == ("x", question, rest)
 
 
 @pytest.mark.usefixtures("bare")
@@ -357,12 +346,10 @@ def test_the_page_of_a_file_has_its_scenario_cost_and_the_commands_that_repeat_i
         assert first.equals(again)
 
 
-# -- hostile files and bad input --------------------------------------------------------------
-
 MARKUP = "</pre></style><script>alert(1)</script><img src=x onerror=alert(1)>{{ 7 * 7 }}\"'&lt;"
 
 
-def test_markup_in_a_file_is_shown_and_does_nothing(here):
+def test_markup_in_a_file_in_measured_data_and_in_a_fit_is_shown_and_does_nothing(here):
     with netCDF4.Dataset("x.nc", "a") as file:
         file.title = MARKUP
         file.scenario_toml = f"# {MARKUP}\n#\n# {MARKUP}\n\x1b]0;x\x07\u202e\nname = '{MARKUP}'\n"
@@ -375,74 +362,29 @@ def test_markup_in_a_file_is_shown_and_does_nothing(here):
                 variable.symbol = "<b>"
     log = f'{{"began": "{MARKUP[:40]}", "seconds": 1, "stages": {{"<b>": 2}}}}\n'
     Path("x.nc.log").write_text(log, encoding="utf-8")
-    assert sim("report", "x.nc", "--force").exit_code == 0
+    table = "d\u202e{{ 7 * 7 }}.csv"
+    Path(table).write_text("speed [mm/s], area_ratio, area_ratio_error\n1, 0.9, 0.1\n9, 0.8, 0.1\n", encoding="utf-8")
+    correlations = {"keys": [MARKUP, "<b>"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}
+    path = fit(numbers={MARKUP: NUMBER}, data=[MARKUP], remarks=[MARKUP], correlations=correlations)
+    assert sim("report", "x.nc", "--data", table, "--fit", path).exit_code == 0
     text = Path("x.html").read_text(encoding="utf-8")
     page = harmless(Page(text))
     assert page.words("h1") == [MARKUP] and page.words("title")[0] == MARKUP
     assert [words for words in page.words("pre") if MARKUP in words and r"\x1b]0;x\x07\u202e" in words]
-    assert "49" not in page.words("h1")[0] and "\x1b" not in text
-    assert [attributes for tag, attributes in page.elements if tag == "style"] == [{}]
-
-
-def test_markup_in_measured_data_and_a_fit_is_shown_and_does_nothing(here):
-    name = "<img src=x onerror=alert(1)>\x1b[31m\u202e{{ 7 * 7 }}.csv"
-    Path(name).write_text("speed [mm/s], area_ratio, area_ratio_error\n1, 0.9, 0.1\n9, 0.8, 0.1\n", encoding="utf-8")
-    correlations = {"keys": [MARKUP, "<b>"], "matrix": [[1.0, 0.5], [0.5, 1.0]]}
-    path = fit(numbers={MARKUP: NUMBER}, data=[MARKUP], remarks=[MARKUP], correlations=correlations)
-    assert sim("report", "x.nc", "--data", name, "--fit", path).exit_code == 0
-    text = Path("x.html").read_text(encoding="utf-8")
-    page = harmless(Page(text))
     assert "\x1b" not in text and "\u202e" not in text
-    assert any(r"onerror=alert(1)>\x1b[31m" in paragraph for paragraph in page.words("p"))
+    assert [attributes for tag, attributes in page.elements if tag == "style"] == [{}]
+    assert any(r"d\u202e{{ 7 * 7 }}" in paragraph for paragraph in page.words("p"))
     assert {MARKUP, "<b>"} <= set(page.words("th")) and MARKUP in page.words("p") and "49" not in page.words("p")
-
-
-def test_hostile_headings_of_measured_data_are_refused_in_one_short_line(here):
-    for column in (
-        "<script>alert(1)</script>",
-        "x" * 10**6,
-        "area_ratio [<b>]",
-        "area\x1b[31m_ratio",
-        "$\\frac{1}{0}$",
-    ):
-        Path("d.csv").write_text(f"speed [mm/s], {column}\n1, 0.9\n", encoding="utf-8")
-        result = sim("report", "x.nc", "--data", "d.csv")
-        assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1) and len(result.stderr) < 400
-        assert result.stderr.startswith("d.csv: ") and "\x1b" not in result.stderr and not Path("x.html").exists()
-
-
-def test_a_log_that_cannot_be_read_costs_only_its_table(tmp_path):
-    for log in ("", "no JSON\n", '{"seconds": "x"}\n', "[1]\n", '{"began": 1, "seconds": 1}\n', "\xff\n"):
-        (tmp_path / "x.nc.log").write_bytes(log.encode("latin-1"))
-        assert report.cost(tmp_path / "x.nc.log") == {}
 
 
 @pytest.mark.usefixtures("bare")
 def test_a_page_is_replaced_only_if_asked_and_never_the_dataset(here):
     Path("x.html").write_text("mine", encoding="utf-8")
-    result = sim("report", "x.nc")
-    assert result.exit_code == 73 and "x.html" in result.stderr
-    assert Path("x.html").read_text(encoding="utf-8") == "mine"
-    assert sim("report", "x.nc", "-o", "x.nc", "--force").exit_code == 2
-    assert sim("report", "x.nc", "-o", "none/of/it/x.html").exit_code == 0
+    for arguments, code in (((), 73), (("-o", "x.nc", "--force"), 2), (("-o", "none/of/it/x.html"), 0)):
+        assert sim("report", "x.nc", *arguments).exit_code == code
+        assert Path("x.html").read_text(encoding="utf-8") == "mine"
     assert sim("report", "x.nc", "--force").exit_code == 0 and "<h1>" in Path("x.html").read_text(encoding="utf-8")
 
-
-@pytest.mark.usefixtures("bare")
-def test_a_file_that_is_no_dataset_is_refused_in_one_line_and_nothing_is_written(here):
-    content = Path("x.nc").read_bytes()
-    Path("short.nc").write_bytes(content[: len(content) // 2])
-    with netCDF4.Dataset("other.nc", "w") as file:
-        file.title = "another program's"
-    before = sorted(path.name for path in here.iterdir())
-    for name in ("short.nc", "other.nc", "scene.toml", "missing.nc"):
-        result = sim("report", name)
-        assert (result.exit_code, result.stdout, len(result.stderr.splitlines())) == (2, "", 1), name
-        assert name in result.stderr
-    assert sorted(path.name for path in here.iterdir()) == before
-
-
-# -- in a browser, and how large it is --------------------------------------------------------
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
