@@ -1,7 +1,6 @@
 """Events of a run: slips, jumps of the speed, onset of sliding, detachment, masking, friction peaks, cycles."""
 
 import contextlib
-import functools
 import itertools
 import math
 from typing import Any
@@ -25,7 +24,7 @@ from sim.analysis.dataset import (
     with_trajectories,
     word,
 )
-from sim.analysis.observables import KEPT, masks, ordered, pure
+from sim.analysis.observables import KEPT, labelled, masks, ordered, pure
 
 #: Fall of the spring's force over its largest in the run that makes a slip.
 LEAST = 0.02
@@ -208,8 +207,8 @@ def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset
     beyond_one = (counted.sum("slip") - 1.0).clip(0.0)
     spread = ((apart**2).sum("slip") / beyond_one.where(beyond_one > 0.0)) ** 0.5
     text = "standard deviation of the displacements in slips over their mean"
-    means["slip_spread"] = (spread / means["slip_amplitude"]).assign_attrs(units="1", long_name=text)
-    counts = counted.sum("slip").astype(float).assign_attrs(units="1", long_name="number of slips")
+    means["slip_spread"] = pure(spread / means["slip_amplitude"], text)
+    counts = pure(counted.sum("slip").astype(float), "number of slips")
     first, last = begins.where(counted).min("slip"), begins.where(counted).max("slip")
     has_many = last > first
     end = dataset["t"].where(dataset["spring_force"].notnull()).max("t")
@@ -217,9 +216,7 @@ def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset
     path = abs(dataset["stage_position"].diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
     slid = abs(dataset["slider_position"].astype(float).diff("t")).cumsum("t").reindex(t=dataset["t"], fill_value=0.0)
     work, gone, went = (_between(dataset, values, first, last) for values in (dataset["drive_work"], path, slid))
-    kinetic = (work / gone.where(went > 0.5 * gone)).assign_attrs(
-        units="N", long_name="work of the stage over its path"
-    )
+    kinetic = labelled(work / gone.where(went > 0.5 * gone), "N", "work of the stage over its path")
     every = means.drop_vars(["slip_time", "slip_speed"]).assign(slip_count=counts, kinetic_friction=kinetic)
     return every.assign(_between_speeds(dataset, each_slip) if several_speeds else {}).map(ordered, keep_attrs=True)
 
@@ -229,9 +226,10 @@ def _between_speeds(dataset: xr.Dataset, each_slip: xr.Dataset) -> dict[str, xr.
     turn, later = abs(dataset["stage_speed"]).idxmax("t"), each_slip["recurrence_time"].notnull()
     before = each_slip["slip_time"] <= turn
     chosen = later & before, later.shift(slip=1, fill_value=False) & ~before & each_slip["slip_time"].notnull()
-    speeds = (each_slip["slip_speed"].where(which).min("slip") for which in chosen)
-    ends = zip(_ENDS.items(), speeds, strict=True)
-    return {name: speed.assign_attrs(units="m/s", long_name=text) for (name, text), speed in ends}
+    return {
+        name: labelled(each_slip["slip_speed"].where(which).min("slip"), "m/s", text)
+        for (name, text), which in zip(_ENDS.items(), chosen, strict=True)
+    }
 
 
 def varies(dataset: xr.Dataset) -> bool:
@@ -266,8 +264,7 @@ def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = L
     ascending = sizes.copy(data=np.sort(sizes.to_numpy(), axis=-1))
     count, rank = ascending.count("rank"), xr.DataArray(np.arange(sizes.sizes["rank"]), dims="rank")
     share = (1.0 - rank / count).where(ascending.notnull())
-    text = "share of the slips that are as large"
-    return xr.Dataset({of: ascending, "share_as_large": share.assign_attrs(units="1", long_name=text)})
+    return xr.Dataset({of: ascending, "share_as_large": pure(share, "share of the slips that are as large")})
 
 
 def _beginning(dataset: xr.Dataset) -> float:
@@ -294,11 +291,13 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
     last = (time < when).sum("t").clip(2) - 1
     now, before = force.isel(t=last), force.isel(t=last - 1)
     slope = (now - before) / (time.isel(t=last) - time.isel(t=last - 1))
-    at = (now + slope * (when - time.isel(t=last))).drop_vars("t")
-    away = gone.drop_vars("t").astype(float).assign_attrs(units="1", long_name="members that ran away", symbol="")
-    when = when.drop_vars("t").assign_attrs(units="s", long_name="time of the runaway, of those that ran away")
-    at = at.assign_attrs(units="N", long_name="force at which nothing held the body any longer")
-    return xr.Dataset({"ran_away": away, "runaway_after": when, "static_friction": at}).map(ordered, keep_attrs=True)
+    limit = now + slope * (when - time.isel(t=last))
+    result = {
+        "ran_away": pure(gone.astype(float), "members that ran away"),
+        "runaway_after": labelled(when, "s", "time of the runaway, of those that ran away"),
+        "static_friction": labelled(limit, "N", "force at which the slider lost stability"),
+    }
+    return xr.Dataset({name: values.drop_vars("t") for name, values in result.items()})
 
 
 def _between(dataset: xr.Dataset, values: xr.DataArray, first: xr.DataArray, last: xr.DataArray) -> xr.DataArray:
@@ -451,18 +450,15 @@ def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
 
 def _of_each(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any, *read: str) -> xr.Dataset:
     """Apply a function to the trajectories ``read`` of each member; describe its results by units and meanings."""
-    first = dataset[read[-1]]
-    outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in first.dims]
-    block = functools.partial(_block, described=described, of=of, read=read)
-    return in_pieces(with_trajectories(dataset, *read), outer, block)
-
-
-def _block(dataset: xr.Dataset, described: dict[str, tuple[str, str]], of: Any, read: tuple[str, ...]) -> xr.Dataset:
-    series = [dataset[name].astype(float).broadcast_like(dataset[read[-1]]) for name in read]
     dims: Any = {"input_core_dims": [["t"]] * len(read), "output_core_dims": [[]] * len(described), "vectorize": True}
-    results = xr.apply_ufunc(of, *series, **dims)
-    about = ((name, values, *described[name]) for name, values in zip(described, results, strict=True))
-    return xr.Dataset({name: values.assign_attrs(units=unit, long_name=text) for name, values, unit, text in about})
+
+    def applied(piece: xr.Dataset) -> xr.Dataset:
+        series = [piece[name].astype(float).broadcast_like(piece[read[-1]]) for name in read]
+        results = zip(described.items(), xr.apply_ufunc(of, *series, **dims), strict=True)
+        return xr.Dataset({name: labelled(values, *about) for (name, about), values in results})
+
+    outer = [name for name in (*sweep_dims(dataset), MEMBERS) if name in dataset[read[-1]].dims]
+    return in_pieces(with_trajectories(dataset, *read), outer, applied)
 
 
 # --- all events of a run, once per member ---
@@ -518,10 +514,8 @@ def events(dataset: xr.Dataset) -> xr.Dataset:
         if f"dissipated_energy{suffix}" in dataset:
             lost = dataset[f"dissipated_energy{suffix}"].isel(t=-1, drop=True).astype(float)
             text = "energy dissipated by opening and closing, in all"
-            result[f"total_dissipated{suffix}"] = lost.assign_attrs(units="J", long_name=text, symbol="W")
-        for name in ("pull_off_load", "pull_off_time"):
-            if name + suffix in dataset:
-                result[name + suffix] = dataset[name + suffix].astype(float)
+            result[f"total_dissipated{suffix}"] = labelled(lost, "J", text, "W")
+    result = result.assign({name: dataset[name].astype(float) for name in dataset if str(name).startswith("pull_off_")})
     with contextlib.suppress(ValueError), answered():
         result = result.merge(loop_energy(dataset).mean("cycle", keep_attrs=True))
     return result
@@ -532,9 +526,14 @@ def _openings(dataset: xr.Dataset) -> xr.Dataset:
         return xr.Dataset()
     first = dataset["detachment_time"].astype(float).fillna(np.inf).min("t")  # the latest opening so far never falls
     ever = first < np.inf
-    text = "time of the first detachment, of the contacts that detached"
-    first = first.where(ever).assign_attrs(units="s", long_name=text, symbol="t_d")
-    return xr.Dataset({"ever_detached": pure(ever.astype(float), "contacts that detached"), "first_detachment": first})
+    return xr.Dataset(
+        {
+            "ever_detached": pure(ever.astype(float), "contacts that detached"),
+            "first_detachment": labelled(
+                first.where(ever), "s", "time of the first detachment, of the contacts that detached", "t_d"
+            ),
+        }
+    )
 
 
 def _masks(dataset: xr.Dataset) -> xr.Dataset:
@@ -549,7 +548,7 @@ def _masks(dataset: xr.Dataset) -> xr.Dataset:
         ever = masked == 1.0
         text = "time at which adhesion was first masked, of the contacts in which it was"
         first = dataset["t"].isel(t=ever.argmax("t")).drop_vars("t").where(ever.any("t"))
-        result["first_masked"] = ordered(first).assign_attrs(units="s", long_name=text)
+        result["first_masked"] = labelled(first, "s", text)
     return xr.Dataset(result)
 
 
@@ -601,9 +600,8 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
         if suffix:
             error = dataset[f"{source}_sem"].isel(t=at)
             described[f"{name}_sem"] = (error, unit, error.attrs["long_name"])
-        for key, (values, units, words) in described.items():
-            values = values.where(known).drop_vars("t", errors="ignore")
-            result[key] = ordered(values).assign_attrs(units=units, long_name=words)
+        for key, (values, *about) in described.items():
+            result[key] = labelled(values.where(known).drop_vars("t", errors="ignore"), *about)
     return xr.Dataset(result)
 
 
@@ -622,24 +620,25 @@ def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
     to the ends, in parts of it, by more than noise may.
     """
 
-    def sizes(some: xr.Dataset) -> xr.DataArray:
-        return abs(some[name].astype(float)).where(some["slides"])
+    def magnitude(piece: xr.Dataset) -> xr.DataArray:
+        return abs(piece[name].astype(float)).where(piece["slides"])
 
-    def mean(some: xr.Dataset) -> xr.Dataset:
-        return xr.Dataset({"mean": sizes(some).mean(MEMBERS)})
+    def mean(piece: xr.Dataset) -> xr.Dataset:
+        return xr.Dataset({"mean": magnitude(piece).mean(MEMBERS)})
 
-    def each(some: xr.Dataset) -> xr.Dataset:
-        values = sizes(some)
-        at = values.fillna(-1.0).argmax("t")
-        first, last = _ends(values)
-        result = {"at": at, "size": values.isel(t=at), "first": first, "last": last}
-        result |= {"peak": values.isel(t=some["top"])} if "top" in some else {}
-        return xr.Dataset({name: values.drop_vars("t", errors="ignore") for name, values in result.items()})
+    def largest(piece: xr.Dataset) -> xr.Dataset:
+        values = magnitude(piece)
+        known, at = values.notnull(), values.fillna(-1.0).argmax("t")
+        last = values.sizes["t"] - 1 - known.isel(t=slice(None, None, -1)).argmax("t")
+        result = {"at": at, "size": values.isel(t=at)}
+        result |= {"first": values.isel(t=known.argmax("t")), "last": values.isel(t=last)}
+        result |= {"peak": values.isel(t=piece["top"])} if "top" in piece else {}
+        return xr.Dataset({key: number.drop_vars("t", errors="ignore") for key, number in result.items()})
 
     dims, is_ensemble = sweep_dims(recorded), recorded.sizes.get(MEMBERS, 1) > 1
     if is_ensemble:
         recorded = recorded.assign(top=in_pieces(recorded, ("t",), mean)["mean"].fillna(-1.0).argmax("t"))
-    result = in_pieces(recorded, (*dims, MEMBERS), each)
+    result = in_pieces(recorded, (*dims, MEMBERS), largest)
     ends = result["first"], result["last"]
     above = [result["size"] / (1.0 + _ROUNDING) > end for end in ends]
     if is_ensemble:
@@ -649,13 +648,6 @@ def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
         above = [higher & fall for higher, fall in zip(above, falls, strict=True)]
     first, last = above
     return result.assign(known=last & (~ramp | first))
-
-
-def _ends(values: xr.DataArray) -> tuple[xr.DataArray, xr.DataArray]:
-    """The first and the last value that is there."""
-    known = values.notnull()
-    first, last = known.argmax("t"), values.sizes["t"] - 1 - known.isel(t=slice(None, None, -1)).argmax("t")
-    return values.isel(t=first), values.isel(t=last)
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
@@ -720,8 +712,7 @@ def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
         values = _per_cycle(series.astype(float), period, dataset["t"], count).where(missing == 0.0)
         values = values.where(~(abs(values) < rounding), 0.0)
         result[f"{name}{suffix}"] = values.assign_attrs(units="J", long_name=f"{text}, over a cycle", symbol="")
-    cycle = xr.DataArray(np.arange(1, count + 1), dims="cycle", attrs={"long_name": "number of the cycle"})
-    return xr.Dataset(result, {"cycle": cycle})
+    return xr.Dataset(result, {"cycle": ("cycle", np.arange(1, count + 1), {"long_name": "number of the cycle"})})
 
 
 def cycles_of(dataset: xr.Dataset) -> xr.DataArray:

@@ -26,7 +26,8 @@ from sim.analysis.dataset import (
 from sim.laws import jkr
 
 KEPT = ("mean", "std", "sem")
-_ENDINGS = tuple(f"_{kind}" for kind in KEPT)
+#: Endings of a variable of each member, and of those of its recorded statistics.
+_ENDINGS = ("", *(f"_{kind}" for kind in KEPT))
 
 #: Shares of the area after that lost to bonds, in the order of charging: radius before each, and what it is lost to.
 _LOSSES = {
@@ -50,9 +51,14 @@ def ordered(variable: xr.DataArray) -> xr.DataArray:
     return variable.transpose(..., *(name for name in (MEMBERS, "t") if name in variable.dims))
 
 
+def labelled(values: xr.DataArray, unit: str, text: str, symbol: str = "") -> xr.DataArray:
+    """Return values with members and time last, with their unit and meaning."""
+    return ordered(values).assign_attrs(units=unit, long_name=text, symbol=symbol)
+
+
 def pure(values: xr.DataArray, text: str, symbol: str = "") -> xr.DataArray:
-    """A pure number, described."""
-    return ordered(values).assign_attrs(units="1", long_name=text, symbol=symbol)
+    """Return pure numbers with their meaning."""
+    return labelled(values, "1", text, symbol)
 
 
 def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
@@ -86,7 +92,7 @@ def bond_work(dataset: xr.Dataset) -> xr.DataArray:
     share = setting(dataset, "adhesion.bond_share")
     fraction = dataset["bond_fraction" if "bond_fraction" in dataset else "bond_fraction_mean"]
     left = setting(dataset, "adhesion.work") * (1.0 - share + share * fraction)
-    return ordered(left).assign_attrs(units="J/m^2", symbol="Δγ", long_name="work of adhesion of the bonds left")
+    return labelled(left, "J/m^2", "work of adhesion of the bonds left", "Δγ")
 
 
 def share_observables(dataset: xr.Dataset) -> xr.Dataset:
@@ -132,31 +138,14 @@ def share_observables(dataset: xr.Dataset) -> xr.Dataset:
     return xr.Dataset(shares, attrs=dataset.attrs)
 
 
-def charged_in_turn(dataset: xr.Dataset) -> xr.Dataset:
-    """The shares of JKR's area that fluctuations and bonds take if the fluctuations are charged first.
-
-    Returns
-    -------
-    xarray.Dataset
-        ``lost_to_fluctuations_first``, ``lost_to_bonds_last``, which add up to ``lost_to_bonds`` and
-        ``lost_to_fluctuations``, and ``order_of_charging``, what one order gives the fluctuations more than the
-        other. Each is of one member, whose noise both orders share: so is the error of their difference.
+def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
+    """Return the share that fluctuations take if they are charged first; see ``charges``.
 
     Raises
     ------
     ValueError
-        If the dataset does not say: members were not recorded, or the contact is on a disc of finite radius.
-
-    Notes
-    -----
-    Fluctuations alone leave w = Δγ(1) - χ ΔΓ. Where no equilibrium with that exists, the area is 0.
+        If members were not recorded, or the contact is on a disc of finite radius.
     """
-    charged = share_observables(dataset)
-    return xr.Dataset(_in_turn(charged, _charged_first(plain(dataset))), attrs=dataset.attrs)
-
-
-def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
-    """The share that fluctuations take if they are charged first; see ``charged_in_turn``."""
     if "fluctuation_energy" not in dataset or bool((word(dataset, "shear.contact", "plane") != "plane").any()):
         raise ValueError("the other order of charging needs the fluctuation energy of each member, on a plane")
     try:
@@ -178,14 +167,6 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
     return pure((full - alone) / full, "share of JKR's area lost to fluctuations, which are charged first")
 
 
-def _in_turn(charged: xr.Dataset, first: xr.DataArray) -> dict[str, xr.DataArray]:
-    """The shares of ``charged_in_turn``, of those in the other order."""
-    lost = charged["lost_to_bonds"] + charged["lost_to_fluctuations"]
-    last = pure(lost - first, "share of JKR's area lost to broken bonds, after the fluctuations")
-    more = pure(first - charged["lost_to_fluctuations"], "what fluctuations take more if they are charged first")
-    return {"lost_to_fluctuations_first": first, "lost_to_bonds_last": last, "order_of_charging": more}
-
-
 def observables(dataset: xr.Dataset) -> xr.Dataset:
     """Every recorded trajectory, per member where members differ, and what follows from them.
 
@@ -195,7 +176,7 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     """
     dataset = plain(dataset)
     result = dataset.drop_vars([n for n, v in dataset.data_vars.items() if "t" not in v.dims])
-    for suffix in ("", *(f"_{kind}" for kind in KEPT)):
+    for suffix in _ENDINGS:
         if f"contact_area{suffix}" in result and set(_REFERENCES) <= set(result):
             ratio = result[f"contact_area{suffix}"].astype(float, copy=False) / full_area(dataset)
             result[f"area_ratio{suffix}"] = pure(ratio, "contact area over JKR's", "A/A_JKR")
@@ -208,23 +189,40 @@ def observables(dataset: xr.Dataset) -> xr.Dataset:
     return result.drop_vars([n for n in result if str(n).startswith(("in_contact", "masked"))])
 
 
-def all_observables(dataset: xr.Dataset) -> xr.Dataset:
-    """``observables``, with the shares of the lost area where they are known, in both orders of charging."""
-    return chosen_observables(dataset, None)
-
-
 def charges(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
     """Return the shares of the lost area in both orders of charging, as far as they are known.
 
-    The differences between both orders are left out if ``names`` holds none of them.
+    Parameters
+    ----------
+    dataset : xarray.Dataset
+        As ``sim run`` writes it.
+    names : collection of str, optional
+        Shares that are needed. The differences between both orders are left out if none of them is among these.
+
+    Returns
+    -------
+    xarray.Dataset
+        The ``share_observables``; ``lost_to_fluctuations_first`` and ``lost_to_bonds_last``, which add up to
+        ``lost_to_bonds`` and ``lost_to_fluctuations``; and ``order_of_charging``, the share by which the fluctuations
+        take more if they are charged first. Both orders are of one member and share its noise, so the error of their
+        difference is that of the members' differences.
+
+    Notes
+    -----
+    Fluctuations alone leave w = Δγ(1) - χ ΔΓ. Where no equilibrium with that exists, the area is 0.
     """
     shares = xr.Dataset()
     with contextlib.suppress(ValueError), answered():
         shares = share_observables(dataset)
-        first = _charged_first(dataset)
-        if names is None or not _DIFFERENCES.isdisjoint(names):
-            return shares.assign(_in_turn(shares, first))
+        first, later = _charged_first(dataset), shares["lost_to_fluctuations"]
         shares = shares.assign(lost_to_fluctuations_first=first)
+        if names is None or not _DIFFERENCES.isdisjoint(names):
+            last = pure(
+                shares["lost_to_bonds"] + later - first,
+                "share of JKR's area lost to broken bonds, after the fluctuations",
+            )
+            more = pure(first - later, "what fluctuations take more if they are charged first")
+            return shares.assign(lost_to_bonds_last=last, order_of_charging=more)
     return shares
 
 
@@ -235,26 +233,25 @@ def restricted(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset
     sources = {source for name in names for source in _SOURCES.get(name, (name,))} | set(_REFERENCES)
     if _shares_among(names):
         sources |= {*_SOURCES_OF_SHARES, *(radius for radius, _ in _LOSSES.values())}
-    return with_trajectories(dataset, *(f"{name}{kind}" for name in sources for kind in ("", *_ENDINGS)))
+    return with_trajectories(dataset, *(f"{name}{ending}" for name in sources for ending in _ENDINGS))
 
 
 def chosen_observables(dataset: xr.Dataset, names: Collection[str] | None) -> xr.Dataset:
-    """Return the observables ``names``, with their statistics if only these were recorded; all of them if None."""
+    """Return the observables ``names``, or their statistics if only these were recorded.
+
+    If ``names`` is None, return all observables, and the shares of the lost area in both orders if they are known.
+    """
     result = observables(dataset)
-    if names is None or _shares_among(names):
-        result = result.merge(charges(dataset, names))
     if names is None:
-        return result
-    return result[[key for key in result if str(key) in names or str(key).removesuffix(_ending(str(key))) in names]]
+        return result.merge(charges(dataset))
+    if _shares_among(names):
+        result = result.merge(charges(dataset, names))
+    wanted = {f"{name}{ending}" for name in names for ending in _ENDINGS}
+    return result[[name for name in result if name in wanted]]
 
 
 def _shares_among(names: Collection[str]) -> bool:
     return any(name.startswith(("lost_to", "order_of")) for name in names)
-
-
-def _ending(key: str) -> str:
-    """Return the ending of a recorded statistic, "" for another variable."""
-    return next((ending for ending in _ENDINGS if key.endswith(ending)), "")
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:

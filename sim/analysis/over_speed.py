@@ -19,7 +19,7 @@ from sim.analysis.dataset import (
     sweep_dims,
     with_trajectories,
 )
-from sim.analysis.observables import observables, reference_radii
+from sim.analysis.observables import labelled, observables, reference_radii
 from sim.analysis.statistics import LEVEL, of_second_half, over_members
 
 #: Shares of JKR's area whose loss has a speed.
@@ -28,8 +28,6 @@ LOSSES = (0.05, 0.5)
 _CURVES = ("contact_area", "friction_force", "shear_stress")
 #: Groups of members that are left out in turn, and means of them, at most.
 _GROUPS, _MOST_MEANS = 64, 2**22
-_WORDS = {f"speed_at_{100.0 * loss:.0f}_percent_lost": f"lost {100.0 * loss:.0f} % of JKR's" for loss in LOSSES}
-_WORDS["speed_halfway_to_hertz"] = "lost half of what it can, down to Hertz's"
 _ENDS = {"": "", "_low": "lower end of the 95 % interval of the ", "_high": "upper end of the 95 % interval of the "}
 #: Within how many standard errors of a level speeds are near it.
 _NEAR = 4.0
@@ -112,28 +110,17 @@ def crossing(speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: n
     if not mean[0] > 0.0 >= mean[first]:
         return Crossing(math.nan, math.nan, math.nan)
     error = float(groups[:, first].std(ddof=1)) / math.sqrt(len(groups)) if has_error else 0.0
-    window = _about(first, np.abs(mean) <= _NEAR * error)
+    far = np.flatnonzero(np.abs(mean) > _NEAR * error)
+    window = slice(max(far[far < first - 1], default=-1) + 1, min(far[far > first], default=len(mean)))
     x, mean = np.log(speeds[window]), mean[window]
     at = float(_zero(x, mean))
     if not has_error:
         return Crossing(math.exp(at), math.nan, math.nan)
-    each = weights[:, None]
+    weight, free = weights[:, None], len(groups) - 1.0
     above = groups[:, window] - np.broadcast_to(level, speeds.shape)[window]
-    without = _zero(x, (mean - each * above) / (1.0 - each))
-    half = special.stdtrit(len(groups) - 1.0, 0.5 + 0.5 * LEVEL) * math.sqrt(
-        (len(groups) - 1.0) * float(np.var(without))
-    )
+    without = _zero(x, (mean - weight * above) / (1.0 - weight))
+    half = special.stdtrit(free, 0.5 + 0.5 * LEVEL) * math.sqrt(free * float(np.var(without)))
     return Crossing(*map(math.exp, (at, at - half, at + half)))
-
-
-def _about(first: int, near: np.ndarray) -> slice:
-    """The places about a first one and that before it, and those beside them that are near without a gap."""
-    low, high = first - 1, first + 1
-    while low > 0 and near[low - 1]:
-        low -= 1
-    while high < len(near) and near[high]:
-        high += 1
-    return slice(low, high)
 
 
 def _zero(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -176,16 +163,19 @@ def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
         return xr.Dataset()
     radii = reference_radii(dataset)
     hertz = (radii["radius_hertz"] / radii["radius_jkr"]) ** 2
-    levels = {f"speed_at_{100.0 * loss:.0f}_percent_lost": 1.0 - loss + 0.0 * hertz for loss in LOSSES}
-    levels["speed_halfway_to_hertz"] = 0.5 * (1.0 + hertz)
+    levels = [
+        (f"speed_at_{100.0 * loss:.0f}_percent_lost", 1.0 - loss + 0.0 * hertz, f"{100.0 * loss:.0f} % of JKR's")
+        for loss in LOSSES
+    ]
+    levels.append(("speed_halfway_to_hertz", 0.5 * (1.0 + hertz), "half of what it can, down to Hertz's"))
     groups, sizes = _group_means(dataset, along)
     dims, result = [[along], ["group", along], ["group"], [along]], {}
-    for name, level in levels.items():
+    for name, level, loss in levels:
         inputs = speed, groups, sizes, level + 0.0 * speed
-        ends = xr.apply_ufunc(crossing, *inputs, input_core_dims=dims, output_core_dims=[[]] * 3, vectorize=True)
-        for end, values in zip(("", "_low", "_high"), ends, strict=True):
-            text = f"{_ENDS[end]}sliding speed at which the mean contact area has {_WORDS[name]}"
-            result[name + end] = values.assign_attrs(units="m/s", long_name=text)
+        crossings = xr.apply_ufunc(crossing, *inputs, input_core_dims=dims, output_core_dims=[[]] * 3, vectorize=True)
+        for (end, text), speeds in zip(_ENDS.items(), crossings, strict=True):
+            text = f"{text}sliding speed at which the mean contact area has lost {loss}"
+            result[name + end] = labelled(speeds, "m/s", text)
     return xr.Dataset(result)
 
 

@@ -2,7 +2,7 @@
 
 import math
 import warnings
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,11 +14,10 @@ from sim.analysis.dataset import MEMBERS, in_pieces, is_stationary, plain, stead
 from sim.analysis.events import events
 from sim.analysis.observables import (
     KEPT,
-    all_observables,
     charges,
     chosen_observables,
+    labelled,
     observables,
-    ordered,
     pure,
     reference_radii,
     restricted,
@@ -222,26 +221,24 @@ def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
         ``correlation_time_below`` [s] with the sweep's dimensions.
     """
     energy = dataset.get("fluctuation_energy")
-    times = [xr.full_like(dataset["contact_modulus"], math.nan) for _ in range(3)]
+    sweep = dataset["contact_modulus"]
+    times = np.full((3, *sweep.shape), math.nan)
     if energy is not None and MEMBERS in energy.dims and dataset.sizes["t"] > 1:
         step = float(dataset["t"][1] - dataset["t"][0])
         energy = energy.isel({MEMBERS: slice(members_for_memory(energy.sizes[MEMBERS], energy.sizes["t"]))})
-        all_points = steady_points(dataset).broadcast_like(dataset["contact_modulus"])
-        steady = all_points.transpose(*sweep_dims(dataset)).to_numpy()
-        for point in np.ndindex(steady.shape):
-            if steady[point]:
-                values = energy.isel(dict(zip(sweep_dims(dataset), point, strict=True))).to_numpy()
-                estimate = integral_time(values.astype(float, copy=False), step)
-                for each, number in zip(times, estimate, strict=True):
-                    each[point] = number
+        steady = steady_points(dataset).broadcast_like(sweep).transpose(*sweep.dims).to_numpy()
+        for point in (point for point in np.ndindex(steady.shape) if steady[point]):
+            values = energy.isel(dict(zip(sweep.dims, point, strict=True))).to_numpy()
+            times[:, *point] = integral_time(values.astype(float, copy=False), step)
     about = "integral correlation time of the fluctuation energy"
-    texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"what the {about} is below"}
-    result = xr.Dataset()
-    for (suffix, text), numbers in zip(texts.items(), times, strict=True):
-        result[f"correlation_time{suffix}"] = numbers
-        result[f"correlation_time{suffix}"].attrs = {"units": "s", "long_name": text}
-    result["correlation_time"].attrs["symbol"] = "t_c"
-    return result
+    texts = {"": about, "_sem": f"standard error of the {about}", "_below": f"upper limit of the {about}"}
+    described = zip(texts.items(), times, strict=True)
+    return xr.Dataset(
+        {
+            f"correlation_time{suffix}": labelled(sweep.copy(data=numbers), "s", text, "" if suffix else "t_c")
+            for (suffix, text), numbers in described
+        }
+    )
 
 
 # --- members, at each time and sweep value ---
@@ -374,14 +371,14 @@ def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
                     result[f"{stem}_{end}"] = variable.copy(data=at).assign_attrs(long_name=text)
             continue
         for kind, values in _statistics_of(variable.astype(float), quantiles).items():
-            result[f"{name}_{kind}"] = values.assign_attrs(described(kind, variable))
+            result[f"{name}_{kind}"] = values.assign_attrs(_attributes(kind, variable))
     return xr.Dataset(result)
 
 
-def described(kind: str, variable: xr.DataArray) -> dict[str, Any]:
-    """Attributes of a statistic of an observable."""
-    other = {"units": _UNITS[kind], "symbol": ""} if kind in _UNITS else {}
-    return variable.attrs | other | {"long_name": f"{_OF[kind]} of {variable.attrs.get('long_name', variable.name)}"}
+def _attributes(kind: str, variable: xr.DataArray) -> dict[str, Any]:
+    """Return the attributes of a statistic of an observable."""
+    unit = {"units": _UNITS[kind], "symbol": ""} if kind in _UNITS else {}
+    return variable.attrs | unit | {"long_name": f"{_OF[kind]} of {variable.attrs.get('long_name', variable.name)}"}
 
 
 def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.DataArray]:
@@ -398,8 +395,8 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
     first_member = variable.isel({MEMBERS: 0}, drop=True)
     result = {kind: first_member.copy(data=data) for kind, data in _moments(str(variable.name), values, count).items()}
     if quantiles:
-        for kind, data in _quantiles(values, count).items():
-            result[kind] = first_member.expand_dims(quantile=list(QUANTILES)).copy(data=data)
+        levels = first_member.expand_dims(quantile=list(QUANTILES))
+        result |= {kind: levels.copy(data=data) for kind, data in _quantiles(values, count).items()}
     return result
 
 
@@ -523,7 +520,7 @@ def shares(dataset: xr.Dataset) -> xr.Dataset:
         Statistics (``…_mean``, ``…_std``, ``…_sem``, ``…_quantile``) over the members of
         ``lost_to_bonds`` and ``lost_to_fluctuations``, with ``contact.reversible`` above zero
         ``lost_to_mean_stress``, in a rate-dependent contact ``lost_to_lag``; of the other order of charging, see
-        ``sim.analysis.observables.charged_in_turn``; and ``radius_jkr``, ``radius_hertz``
+        ``sim.analysis.observables.charges``; and ``radius_jkr``, ``radius_hertz``
         [m] and ``area_ratio_hertz`` at each sweep value, and time where what holds the sphere changes.
         nan where the contact with the full work of adhesion is open.
 
@@ -747,45 +744,43 @@ def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> x
     dataset = plain(dataset)
     dims, late = sweep_dims(dataset), dataset.isel(t=slice(dataset.sizes["t"] // 2, None))
     step = float(dataset["t"][-1] - dataset["t"][-2]) if dataset.sizes["t"] > 1 else 0.0
-    shape, result = tuple(dataset.sizes[dim] for dim in dims), dict[str, xr.DataArray]()
+    sweep, result = xr.full_like(dataset["contact_modulus"], np.nan, float), dict[str, xr.DataArray]()
     for name in chosen_observables(restricted(late, names).isel(t=[-1]), names):
         variable = _observable(late, str(name))
         values = _rows(variable, dims)
         statistics = _over_time(values.reshape(-1, *values.shape[-2:]), step, str(name), MEMBERS in variable.dims)
         for kind, numbers in statistics.items():
-            numbers = numbers.reshape((*shape, *numbers.shape[1:]))
-            result[f"{name}_{kind}"] = _statistic(dataset, kind, variable, numbers)
+            shaped = sweep.expand_dims(quantile=list(QUANTILES), axis=-1) if kind.startswith("quantile") else sweep
+            shaped = shaped.copy(data=numbers.reshape(shaped.shape))
+            result[f"{name}_{kind}"] = shaped.assign_attrs(_attributes(kind, variable))
     if "speed_mean" in result and {"slider_position", "spring_force"} <= set(dataset):  # a slider that may slip
-        for at, known in _of_the_way(dataset, dims):
-            for kind, value in known.items():
-                result[f"speed_{kind}"].values[at] = value
+        mean, error = _mean_speeds(late["slider_position"], dims)
+        known, margin = np.isfinite(mean), WIDE * error
+        for kind, speeds in {"mean": mean, "sem": error, "low": mean - margin, "high": mean + margin}.items():
+            result[f"speed_{kind}"] = result[f"speed_{kind}"].where(~known, speeds)
     return xr.Dataset(result)
 
 
-def _of_the_way(dataset: xr.Dataset, dims: tuple[str, ...]) -> Iterator[tuple[tuple[int, ...], dict[str, float]]]:
-    """Mean speed of a slider [m/s] with its error, by place in the sweep: slips come and go between two records.
+def _mean_speeds(position: xr.DataArray, dims: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the mean speed of a slider at each point of the sweep, and its standard error [m/s]; nan after a runaway.
 
-    It is the way over the time, whose ends are anywhere in stick and slip: the way's spread about a steady one gives
-    the error.
+    It is the displacement over the time, because slips come and go between two records. Both ends are anywhere in
+    stick and slip: the spread of the displacement about steady sliding gives the error.
     """
-    last, late = dataset.sizes["t"] - 1, dataset.sizes["t"] // 2
-    records = np.unique(np.linspace(late, last, _PLACES).astype(int)) - late
-    way = dataset["slider_position"].isel(t=slice(late, None)).load().isel(t=records)
-    time, ways = way["t"].to_numpy() - float(way["t"][0]), _rows(way, dims)
-    for at in np.ndindex(ways.shape[:-2]):
-        if np.isnan(ways[at]).any():  # after a runaway there is none
-            continue
-        speeds = (ways[at][:, -1] - ways[at][:, 0]) / time[-1]
-        off = np.std(ways[at] - speeds[:, np.newaxis] * time, axis=-1)
-        mean, error = float(np.mean(speeds)), float(np.sqrt(2.0 * np.mean(off**2) / len(speeds)) / time[-1])
-        yield at, {"mean": mean, "sem": error, "low": mean - WIDE * error, "high": mean + WIDE * error}
+    records = np.unique(np.linspace(0, position.sizes["t"] - 1, _PLACES).astype(int))
+    position = position.compute().isel(t=records)
+    time, positions = position["t"].to_numpy() - float(position["t"][0]), _rows(position, dims)
+    speeds = (positions[..., -1] - positions[..., 0]) / time[-1]
+    off = np.std(positions - speeds[..., np.newaxis] * time, axis=-1)
+    error = np.sqrt(2.0 * np.mean(off**2, axis=-1) / off.shape[-1]) / time[-1]
+    return np.where(np.isnan(positions).any(axis=(-2, -1)), np.nan, np.mean(speeds, axis=-1)), error
 
 
 def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
     """The ``distribution`` of observables; of a dataset of statistics alone, those of their means over that time."""
     if "contact_radius" in dataset:
         return distribution(dataset, names)
-    return summary(settled(all_observables(dataset)), quantiles=False)
+    return summary(settled(chosen_observables(dataset, None)), quantiles=False)
 
 
 def _observable(dataset: xr.Dataset, name: str) -> xr.DataArray:
@@ -799,14 +794,6 @@ def _rows(variable: xr.DataArray, dims: tuple[str, ...]) -> np.ndarray:
     """Values of an observable with all dimensions of the sweep, shape (..., members, records)."""
     missing = [name for name in (*dims, MEMBERS) if name not in variable.dims]
     return variable.expand_dims(missing).transpose(*dims, MEMBERS, "t").to_numpy().astype(float, copy=False)
-
-
-def _statistic(dataset: xr.Dataset, kind: str, variable: xr.DataArray, numbers: np.ndarray) -> xr.DataArray:
-    """Return a statistic of an observable at all points of the sweep, described."""
-    result = xr.full_like(dataset["contact_modulus"], np.nan, float)
-    if kind.startswith("quantile"):
-        result = result.expand_dims(quantile=list(QUANTILES), axis=-1)
-    return result.copy(data=numbers).assign_attrs(described(kind, variable))
 
 
 # --- lifetimes, of which some are longer than the run ---
@@ -903,19 +890,19 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
     passage = (first + share * (last - first)).where(crossed.any("t"))
     passage = passage.where(side != 0.0, float(times[0]))
     text = f"time at which the {observable.attrs.get('long_name', observable.name)} first crosses {level:.6g}"
-    return ordered(passage).assign_attrs(units="s", long_name=text)
+    return labelled(passage, "s", text)
 
 
 def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
     """Median times of the first detachment and masking, in a stationary run rates, from the ``events`` of a dataset."""
-    of = xr.Dataset()
+    result = xr.Dataset()
     for event, name, words in (
         ("first_detachment", "detached", "detached"),
         ("first_masked", "masked", "had their adhesion masked"),
     ):
         if event in event_times:
-            of = of.merge(lifetimes(dataset, event_times[event], name, words), compat="no_conflicts")
-    return of if is_stationary(dataset) else of.drop_vars([name for name in of if "_rate" in str(name)])
+            result.update(lifetimes(dataset, event_times[event], name, words))
+    return result if is_stationary(dataset) else result.drop_vars([name for name in result if "_rate" in str(name)])
 
 
 def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:
@@ -942,12 +929,13 @@ def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -
     watched = float(dataset["t"][-1] - dataset["t"][0])
     values = np.moveaxis(times.to_numpy() - float(dataset["t"][0]), times.get_axis_num(MEMBERS), -1)
     first_member, result = times.isel({MEMBERS: 0}, drop=True), {}
-    every = np.array([lifetime(members, watched) for members in values.reshape(-1, values.shape[-1])])
-    half, rate = f"time by which half of the members have {words}", f"rate at which members have {words}"
-    for k, field in enumerate(Lifetime._fields):
-        stem, _, end = field.partition("_")
-        key = "_".join(filter(None, [f"half_{name}" if stem == "half" else f"{name}_rate", end]))
-        text = f"{'' if not end else f'{end} end of the 95 % interval of the '}{half if stem == 'half' else rate}"
-        about = {"units": "s" if stem == "half" else "1/s", "long_name": text}
-        result[key] = first_member.copy(data=every[:, k].reshape(first_member.shape)).assign_attrs(about)
+    estimates = iter(np.array([lifetime(members, watched) for members in values.reshape(-1, values.shape[-1])]).T)
+    for key, unit, text in (
+        (f"half_{name}", "s", f"time by which half of the members have {words}"),
+        (f"{name}_rate", "1/s", f"rate at which members have {words}"),
+    ):
+        for end in ("", "low", "high"):
+            about = f"{end} end of the 95 % interval of the {text}" if end else text
+            numbers = first_member.copy(data=next(estimates).reshape(first_member.shape))
+            result[f"{key}_{end}" if end else key] = labelled(numbers, unit, about)
     return xr.Dataset(result)

@@ -75,9 +75,7 @@ _COLUMNS = (
     _Column("lost_to_fluctuations", "lost to\nfluct."),
     _Column("lost_to_fluctuations_first", "fluct.\nfirst", meaning="lost to fluctuations if charged before the bonds"),
     _Column("lost_to_mean_stress", "lost to\nstress"),
-    _Column(
-        "lost_to_lag", "lost to\nlag", meaning="as the edge is behind equilibrium, below zero where it retreats late"
-    ),
+    _Column("lost_to_lag", "lost to\nlag", meaning="by the edge's lag; negative where it retreats late"),
     _Column("friction_force", "F"),
     _Column("fraction_detached", "open"),
     _Column("fraction_masked", "masked", meaning="closed contacts without any work of adhesion left"),
@@ -104,7 +102,7 @@ _EVENTS = (
     _Column("peak_friction_speed", "at V ", math.nan),
     _Column("peak_friction_time", "after ", math.nan),
     _Column(
-        "direct_effect", "direct\neffect", math.nan, meaning="rise of friction after the first jump of the speed up"
+        "direct_effect", "direct\neffect", math.nan, meaning="rise of friction at the first jump to a higher speed"
     ),
     _Column("step_overshoot", "over-\nshoot", math.nan, meaning="then, over the level at which friction settles"),
     _Column("step_length", "settled\nwithin", math.nan, meaning="sliding distance until 1/e of the overshoot is left"),
@@ -112,9 +110,7 @@ _EVENTS = (
     _Column("area_at_threshold", "A/A0\nthere", math.nan, meaning="contact area there over that at rest"),
     _Column("area_by_law", "A0 − αQ²\nover A0", math.nan, meaning="there, by a fit up to half of the threshold"),
     _Column("incipient_alpha", "α", math.nan),
-    _Column(
-        "slip_count", "slips", meaning="falls of the spring's force by 2 % or more, means over them; times of records"
-    ),
+    _Column("slip_count", "slips", meaning="falls of the spring's force by 2 % or more; times are those of records"),
     _Column("slips_from", "slips\nfrom", math.nan, meaning="speed of the stage at the first slip that another follows"),
     _Column("slips_down_to", "slips\ndown to", math.nan, meaning="as it gets slower, at the last that follows another"),
     _Column("ran_away", "ran away,\nof members"),
@@ -168,11 +164,11 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     stay = [c.name for c in _COLUMNS if c.changing and (steady if c.name == "stage_speed" else held)]
     columns = [column for column in _COLUMNS if column.name not in stay]
     means, points = _tabulated(dataset, rows, [column.name for column in columns])
-    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
-    cells = _places(means, {name: index for name, index in points.items() if name != "t" or not whole})
-    speeds = dataset.get("drive_speed", xr.DataArray())
-    same = whole and any(name in points for name in speeds.dims)  # V is a column already
-    cells |= _shown(means, points, [column for column in columns if not (same and column.name == "speed")])
+    one_row_each = _has_one_row_each(dataset)
+    cells = _places(means, {name: index for name, index in points.items() if name != "t" or not one_row_each})
+    if one_row_each and any(name in points for name in dataset.get("drive_speed", xr.DataArray()).dims):
+        columns = [column for column in columns if column.name != "speed"]  # V is a column already
+    cells |= _shown(means, points, columns)
     times, errors, below = (_at(means[f"correlation_time{kind}"], points) for kind in ("", "_sem", "_below"))
     if np.any(np.isfinite(times) | np.isfinite(below)):
         ((heading, texts),) = _cells(_MEMORY.heading, "s", np.where(np.isnan(times), below, times), errors).items()
@@ -182,9 +178,8 @@ def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
 
 def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, str]]) -> list[str]:
     """Return notes on the rows of ``table`` and ``highlights``: sample of the means, number of rows, symbols."""
-    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
-    points = math.prod(dataset.sizes[name] for name in sweep_dims(dataset))
-    phrases = [words] if (words := averaging(dataset, whole)) else []
+    one_row_each, points = _has_one_row_each(dataset), dataset["contact_modulus"].size
+    phrases = [words] if (words := averaging(dataset, one_row_each)) else []
     if "runaway_time" in dataset and (gone := int(dataset["runaway_time"].isel(t=-1).notnull().sum())):
         why = "nothing held the body"
         if "stage_speed" in dataset:
@@ -193,7 +188,7 @@ def notes(dataset: xr.Dataset, rows: list[dict[str, str]], once: list[dict[str, 
     if any("(" in cell for row in rows for cell in row.values()):
         phrases.append("in brackets the standard error in the last digits, wider where members are few")
     lines = ["; ".join(phrases)] if phrases else []
-    for shown, total in ((rows, points if whole else points * dataset.sizes["t"]), (once, points)):
+    for shown, total in ((rows, points if one_row_each else points * dataset.sizes["t"]), (once, points)):
         if 0 < len(shown) < total:
             lines.append(f"{len(shown)} of {total} rows shown; all: --all, or --csv FILE; chosen: --where KEY=VALUE")
     headings = {re.sub(r"[ \n]\([^()]*\)$", "", heading) for row in (*rows[:1], *once[:1]) for heading in row}
@@ -226,7 +221,8 @@ def highlights(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
         how much it dissipated, and the friction peak of a start or a ramp.
     """
     statistics_once = once(dataset)
-    points = _points(dataset.sizes, _thinned(dataset, rows))
+    sizes = dataset["contact_modulus"].sizes
+    points = _points(sizes, _thinned(sizes, rows))
     shown = _shown(statistics_once, points, (column for column in _EVENTS if _of_drive(dataset, column.name)))
     cells = _places(dataset, points)
     for heading, texts in shown.items():
@@ -272,19 +268,13 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
     for name, heading, dull, *_ in columns:
         if f"{name}_mean" not in means:
             continue
-        mean, sem = _at(means[f"{name}_mean"], points), _error(means, name, points)
+        mean, low, high = (_at(means.get(f"{name}_{kind}"), points) for kind in ("mean", "low", "high"))
         unit = means[f"{name}_mean"].attrs.get("units", "1")
         if unit == "1" and name not in _NO_SHARES:  # differences of areas leave rounding behind
             unit, mean = "%", np.where(np.abs(mean) < _ROUNDING, 0.0, mean)
         if not np.all((mean == dull) | np.isnan(mean)):
-            cells |= _cells(heading, unit, mean, sem)
+            cells |= _cells(heading, unit, mean, (high - low) / (2.0 * WIDE))  # of few members above the standard error
     return cells
-
-
-def _error(means: xr.Dataset, name: str, points: Points) -> np.ndarray:
-    """Half of the 95 % interval in errors of a normal law: the standard error, wider where few members tell it."""
-    low, high = (_at(means.get(f"{name}_{end}"), points) for end in ("low", "high"))
-    return (high - low) / (2.0 * WIDE)
 
 
 def _at(variable: xr.DataArray | None, points: Points) -> np.ndarray:
@@ -300,10 +290,9 @@ def _rows(cells: Columns) -> list[dict[str, str]]:
 
 def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dataset, Points]:
     """Statistics of observables to tabulate, and the index of each row in every dimension of sweep and time."""
-    memory, counts = correlation_time(dataset), _thinned(dataset, rows)
+    memory, counts = correlation_time(dataset), _thinned(dataset["contact_modulus"].sizes, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
-    whole = bool(sweep_dims(dataset)) and _lasts(dataset)
-    if whole:
+    if _has_one_row_each(dataset):
         result = of_second_half(dataset, names)
     else:
         if counts["t"] < dataset.sizes["t"]:  # of the records only those that are shown, none after all have ended
@@ -316,6 +305,11 @@ def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dat
             for kind in ("mean", "low", "high"):
                 result[f"normal_load_{kind}"] = dataset["applied_load"].fillna(result[f"normal_load_{kind}"])
     return result.merge(memory), _points({**result.sizes, "t": result.sizes.get("t", 1)}, counts)
+
+
+def _has_one_row_each(dataset: xr.Dataset) -> bool:
+    """Return True if each point of a sweep has one row, its mean over the second half of the run."""
+    return bool(sweep_dims(dataset)) and _lasts(dataset)
 
 
 def _lasts(dataset: xr.Dataset) -> bool:
@@ -338,11 +332,11 @@ def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
     return {name: xr.DataArray(index.ravel(), dims="row") for name, index in zip(counts, chosen, strict=True)}
 
 
-def _thinned(dataset: xr.Dataset, rows: int, names: tuple[str, ...] | None = None) -> dict[str, int]:
+def _thinned(sizes: Mapping[Any, int], rows: int) -> dict[str, int]:
     """Return numbers of values of the sweep's dimensions that make at most ``rows`` points, two of each at least."""
-    counts = {name: dataset.sizes[name] for name in (sweep_dims(dataset) if names is None else names)}
+    counts = dict(sizes)
     while math.prod(counts.values()) > rows and max(counts.values()) > 2:
-        counts[max(counts, key=lambda name: counts[name])] -= 1
+        counts[max(counts, key=counts.__getitem__)] -= 1
     return counts
 
 
@@ -377,8 +371,7 @@ def spread(dataset: xr.Dataset) -> list[dict[str, str]]:
 
 def _spreads(dataset: xr.Dataset) -> bool:
     """Return True for one stationary run of members that differ."""
-    single = all(dataset.sizes[name] == 1 for name in sweep_dims(dataset))
-    return single and MEMBERS in dataset.sizes and _lasts(dataset)
+    return dataset["contact_modulus"].size == 1 and MEMBERS in dataset.sizes and _lasts(dataset)
 
 
 def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
@@ -405,10 +398,10 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
 def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
     """At which speeds the area is lost, a row for each point of the sweep of other keys; none where it is not."""
     speeds = as_means(loss_speeds(dataset))
-    sizes = {name: dataset.sizes[name] for name in sweep_dims(dataset) if name in speeds.dims}
-    points = _points(sizes, _thinned(speeds[list(speeds)], rows, tuple(sizes)))
-    whose = "stage" if speed_name(dataset) == "stage_speed" else "V"
-    shown = _shown(speeds, points, [column._replace(heading=column.heading.format(whose)) for column in _LOSSES])
+    sizes = {name: size for name, size in dataset["contact_modulus"].sizes.items() if name in speeds.dims}
+    points = _points(sizes, _thinned(sizes, rows))
+    symbol = "stage" if speed_name(dataset) == "stage_speed" else "V"
+    shown = _shown(speeds, points, [column._replace(heading=column.heading.format(symbol)) for column in _LOSSES])
     return _rows(_places(dataset, points) | shown) if shown else []
 
 
@@ -427,20 +420,13 @@ def once(dataset: xr.Dataset) -> xr.Dataset:
 # --- a long table for other programs, and a data frame ---
 
 
-#: Columns of statistics, and the endings of their names in a dataset, with the place of a quantile.
-_ENDINGS: dict[str, tuple[str, int]] = {
-    "mean": ("mean", 0),
-    "error": ("sem", 0),
-    "low": ("low", 0),
-    "high": ("high", 0),
-}
-_ENDINGS |= {"sd": ("std", 0), "skewness": ("skewness", 0)}
+#: Columns of statistics, and the endings of their names in a dataset in which each quantile is a variable.
+_ENDINGS = {"mean": "mean", "error": "sem", "low": "low", "high": "high", "sd": "std", "skewness": "skewness"}
 _ENDINGS |= {
-    f"q{100 * level:02.0f}{end}": (f"quantile{end}", place)
-    for place, level in enumerate(QUANTILES) for end in ("", "_low", "_high")
-}  # fmt: skip
-_ENDINGS |= {"effective_samples": ("effective_samples", 0), "correlation_time": ("correlation_time", 0)}
-_ENDINGS |= {"correlation_time_error": ("correlation_time_sem", 0)}
+    name: name for level in QUANTILES for end in ("", "_low", "_high") for name in [f"q{100 * level:02.0f}{end}"]
+}
+_ENDINGS |= {"effective_samples": "effective_samples", "correlation_time": "correlation_time"}
+_ENDINGS |= {"correlation_time_error": "correlation_time_sem"}
 
 
 def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
@@ -489,9 +475,10 @@ def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         groups.append((shares(dataset), members))
     groups.append((spread, half))
-    frames = [
-        _long(dataset, each, str(key), over) for each, over in groups for key in each if str(key).endswith("_mean")
-    ]
+    frames = []
+    for group, over in groups:
+        flat = _flat(group)
+        frames += [_long(dataset, flat, str(key), over) for key in flat if str(key).endswith("_mean")]
     columns = [*map(str, dataset["contact_modulus"].coords), "t", "speed", "quantity", "unit", "over", *_ENDINGS]
     return [name for name in columns if any(name in frame for frame in frames)], frames
 
@@ -499,11 +486,7 @@ def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
 def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.DataFrame:
     """Rows of the statistics of a quantity, the name of whose mean is given."""
     name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "t") if n in group[key].dims]
-    columns = {}
-    for column, (ending, place) in _ENDINGS.items():
-        if f"{name}_{ending}" in group:  # xarray's get would look for similar names
-            values = group[f"{name}_{ending}"]
-            columns[column] = values.isel(quantile=place, drop=True) if "quantile" in values.dims else values
+    columns = {column: group[f"{name}_{end}"] for column, end in _ENDINGS.items() if f"{name}_{end}" in group}
     if speed_name(dataset) in dataset:
         speed = speed_of(dataset)
         speed = speed if "t" in dims else speed.isel(t=0, drop=True).where(steady_points(dataset))
@@ -522,16 +505,18 @@ def frame(dataset: xr.Dataset) -> pd.DataFrame:
     result = statistics(dataset)
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         result = result.merge(shares(dataset))
-    flat: dict[str, xr.DataArray] = {}
-    for key, variable in result.data_vars.items():
-        if "quantile" in variable.dims:  # each is a variable of its own
-            stem, _, end = str(key).rpartition("_quantile")
-            flat |= {
-                f"{stem}_q{100 * level:02.0f}{end}": variable.sel(quantile=level, drop=True) for level in QUANTILES
-            }
-        else:
-            flat[str(key)] = variable
-    long = xr.Dataset(flat)
-    table = long.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
-    table.attrs["units"] = {str(name): each.attrs.get("units", "1") for name, each in long.variables.items()}
+    flat = _flat(result)
+    table = flat.to_dataframe(dim_order=[*sweep_dims(dataset), "t"]).reset_index()
+    table.attrs["units"] = {str(name): variable.attrs.get("units", "1") for name, variable in flat.variables.items()}
     return table
+
+
+def _flat(statistics: xr.Dataset) -> xr.Dataset:
+    """Return statistics in which each quantile is a variable."""
+    flat: dict[str, xr.DataArray] = {}
+    for key, variable in statistics.data_vars.items():
+        stem, _, end = str(key).rpartition("_quantile")
+        levels = QUANTILES if "quantile" in variable.dims else ()
+        flat |= {f"{stem}_q{100 * level:02.0f}{end}": variable.sel(quantile=level, drop=True) for level in levels}
+        flat |= {} if levels else {str(key): variable}
+    return xr.Dataset(flat)

@@ -10,14 +10,14 @@ from helpers.lens import LOAD, MODULUS, RADIUS, WORK, scene
 
 from sim import analysis
 from sim.analysis import dataset as dataset_module, over_speed
-from sim.analysis.observables import charged_in_turn, observables, share_observables
+from sim.analysis.observables import charges, observables
 from sim.ensemble.simulate import run
 from sim.laws import jkr
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
-from sim.scenario.clock import Clock, Ensemble, Record
+from sim.scenario.clock import Clock, Record
 
 SPEEDS = np.geomspace(1e-3, 1e3, 61)
 NAMES = ("speed_at_5_percent_lost", "speed_at_50_percent_lost", "speed_halfway_to_hertz")
@@ -142,24 +142,24 @@ def test_speeds_of_fluctuating_members_have_an_error_and_statistics_alone_none()
 )
 def test_both_orders_of_charging_add_up_to_the_same_loss(contact):
     dataset = run(scene(contact=contact))
-    charged, other = share_observables(dataset), charged_in_turn(dataset)
-    both = charged["lost_to_bonds"] + charged["lost_to_fluctuations"]
-    again = other["lost_to_fluctuations_first"] + other["lost_to_bonds_last"]
-    np.testing.assert_allclose(again - both, 0.0, rtol=0, atol=1e-14)
-    assert float(abs(other["order_of_charging"]).max()) > 1e-3
+    shares = charges(dataset)
+    bonds_first = shares["lost_to_bonds"] + shares["lost_to_fluctuations"]
+    fluctuations_first = shares["lost_to_fluctuations_first"] + shares["lost_to_bonds_last"]
+    np.testing.assert_allclose(fluctuations_first - bonds_first, 0.0, rtol=0, atol=1e-14)
+    assert float(abs(shares["order_of_charging"]).max()) > 1e-3
 
 
 def test_fluctuations_alone_leave_the_area_of_their_work():
     dataset = lens.ramp()
     left = jkr_area(WORK - dataset["fluctuation_energy"].to_numpy())
-    found = charged_in_turn(dataset)["lost_to_fluctuations_first"]
+    found = charges(dataset)["lost_to_fluctuations_first"]
     np.testing.assert_allclose(found, 1.0 - left / jkr_area(WORK), rtol=0, atol=1e-14)
     unbroken = run(scene(bonds=bonds.Unbroken()))
-    np.testing.assert_allclose(charged_in_turn(unbroken)["order_of_charging"], 0.0, atol=1e-14)
+    np.testing.assert_allclose(charges(unbroken)["order_of_charging"], 0.0, atol=1e-14)
 
 
 def test_the_error_of_the_difference_of_orders_is_that_of_what_members_share():
-    shared, charged = analysis.shares(lens.ramp()), charged_in_turn(lens.ramp())
+    shared, charged = analysis.shares(lens.ramp()), charges(lens.ramp())
     apart = np.hypot(shared["lost_to_fluctuations_sem"], shared["lost_to_fluctuations_first_sem"])
     differ = float(charged["order_of_charging"].isel(t=-8).std("member", ddof=1)) / math.sqrt(6.0)
     np.testing.assert_allclose(shared["order_of_charging_sem"][-8], differ, rtol=1e-9)
@@ -168,5 +168,3 @@ def test_the_error_of_the_difference_of_orders_is_that_of_what_members_share():
 
 def test_where_the_other_order_is_not_known_it_is_left_out():
     assert "order_of_charging_mean" not in analysis.shares(run(scene(record=Record(per_member=False))))
-    with pytest.raises(ValueError, match="each member"):
-        charged_in_turn(run(scene(record=Record(per_member=False), ensemble=Ensemble(members=4))))
