@@ -91,20 +91,6 @@ def test_static_friction_ages_as_the_bonds_of_an_empty_contact_come_and_saturate
             assert_allclose(stress[started + k], SITES * BELL.bell_force * exact, rtol=1e-4)
 
 
-def test_friction_passes_zero_once_after_each_reversal_of_the_slider():
-    turns = drive.Table(time=(0.0, 0.04, 0.04, 0.08, 0.08, 0.12), speed=(2e-3, 2e-3, -2e-3, -2e-3, 2e-3, 2e-3))
-    for name in ["rate, bell", "cohort", "cohort, cut-off", "tracked"]:
-        members = 200 if name == "tracked" else 1
-        parts = {"bonds": BONDS[name], "drive": turns, "clock": Clock(duration=0.12, step=1e-3)}
-        force = marched("friction_force", members, **parts).mean(axis=1)
-        assert force[40] > 0.0 and force[80] < 0.0 and force[120] > 0.0
-        for begin in (40, 80):  # bonds are unloaded before they are loaded
-            assert np.sum(np.diff(np.sign(force[begin : begin + 21])) != 0) == 1
-        if members == 1:
-            tolerance = getattr(BONDS[name], "tolerance", 1e-6)
-            assert_allclose([-force[80], force[120]], force[40], rtol=2.0 * tolerance)
-
-
 # --- bonds and the area
 
 DEAD = Constant(rate=1e-9)

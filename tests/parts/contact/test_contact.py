@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from helpers.scenes import scene
 from numpy.testing import assert_allclose, assert_array_equal
+from scipy.optimize import brentq
 
 from sim.engine import march, trajectory_of
 from sim.ensemble.variables import VARIABLES
@@ -22,7 +23,7 @@ from sim.parts.shear.process import Onset
 from sim.scenario.clock import Clock
 from sim.scenario.scenario import Scenario
 from sim.spectrum.families import AnisotropicGaussian, Band, Gaussian, Ripple, SelfAffine, VonKarman
-from sim.spectrum.radial import Margin, marginal_energy
+from sim.spectrum.radial import Margin, disc_energy, marginal_energy
 
 WORK = 1.0 / math.pi
 GAUGE = {variable.name: variable for variable in VARIABLES}
@@ -74,52 +75,38 @@ def test_the_control_takes_the_values_of_its_course_at_the_clock_times():
 # --- pull-off ---
 
 
+def on_the_branch(a, stiffness):
+    """Load, indentation and displacement of an equilibrium."""
+    load, depth = a**3 - math.sqrt(6.0 * a**3), a**2 - 2.0 / 3.0 * math.sqrt(6.0 * a)
+    return load, depth, depth + (load / stiffness if stiffness else math.nan)
+
+
 def fold(stiffness):
-    """Radius, load and indentation of the last contact: P'(a) + k delta'(a) = 0 by bisection."""
+    """Radius of the last contact: P'(a) + k delta'(a) = 0."""
 
     def slope(a):
         load = 3.0 * a**2 - 1.5 * math.sqrt(6.0 * a)
         depth = 2.0 * a - math.sqrt(6.0 * a) / (3.0 * a)
         return depth if math.isinf(stiffness) else load + stiffness * depth
 
-    low, high = 0.5, 1.2
-    for _ in range(80):
-        middle = 0.5 * (low + high)
-        low, high = (middle, high) if slope(middle) < 0.0 else (low, middle)
-    a = 0.5 * (low + high)
-    return a, a**3 - math.sqrt(6.0 * a**3), a**2 - 2.0 / 3.0 * math.sqrt(6.0 * a)
-
-
-def limit(control, stiffness=math.inf):
-    _, load, depth = fold(0.0 if control == "load" else stiffness)
-    return {"load": load, "indentation": depth, "displacement": depth + load / stiffness}[control]
-
-
-LIMITS = [("load", None), ("indentation", None), *(("displacement", k) for k in (0.1, 0.5, 1.0, 2.0, 5.0, 10.0, 100.0))]
+    return brentq(slope, 0.5, 1.2, xtol=1e-15)
 
 
 def test_the_contact_opens_between_the_last_step_before_the_limit_and_the_next():
-    for control, stiffness in LIMITS:
-        last = limit(control, stiffness or math.inf)
-        near = {"from": last + 3e-12, "to": last - 3e-12}
-        scenario = maugis(Equilibrium(**{control: near}, stiffness=stiffness), 12, 6.0)
+    displaced = [("displacement", k) for k in (0.1, 1.0, 5.0, 100.0)]
+    for control, stiffness in [("load", 0.0), ("indentation", math.inf), *displaced]:
+        a = fold(stiffness)
+        last = on_the_branch(a, stiffness)[list(HELD).index(control)]
+        values = np.linspace(last + 3e-12, last - 3e-12, 13)
+        machine = {"stiffness": stiffness} if control == "displacement" else {}
+        scenario = maugis(Equilibrium(**{control: {"from": values[0], "to": values[-1]}}, **machine), 12, 6.0)
         radius, when = course(scenario, "contact_radius", "detachment_time")
         first_open = int(np.argmax(radius == 0.0))
-        values = np.linspace(last + 3e-12, last - 3e-12, 13)
-        assert values[first_open - 1] >= last - 1e-13
-        assert values[first_open] <= last + 1e-13
-        assert_allclose(radius[first_open - 1], fold(0.0 if control == "load" else stiffness or math.inf)[0], rtol=1e-5)
+        assert values[first_open] - 1e-13 <= last <= values[first_open - 1] + 1e-13
+        assert_allclose(radius[first_open - 1], a, rtol=1e-5)
         assert np.all(radius[first_open:] == 0.0)
         assert np.isnan(when[:first_open]).all()
         assert np.all(when[first_open:] == scenario.clock.time(first_open))
-
-
-def test_a_contact_that_is_open_from_the_start_never_detached():
-    for control, (more, _) in HELD.items():
-        names = ("contact_radius", "in_contact", "normal_load", "masked", "detachment_time")
-        *zeros, when = course(maugis(Equilibrium(**{control: -5.0}, **more), 3), *names)
-        assert_array_equal(zeros, 0.0)
-        assert np.isnan(when).all()
 
 
 # --- what follows a detachment ---
@@ -173,22 +160,15 @@ def test_a_contact_that_begins_out_of_touch_jumps_in_whatever_follows_a_pull_off
 # --- dissipation ---
 
 
-def released(a, stiffness, reversible=0.0):
-    """Energy of an equilibrium over that of the open contact at the same displacement."""
-    depth = a**2 - 2.0 / 3.0 * math.sqrt(6.0 * a)
-    load = a**3 - math.sqrt(6.0 * a**3)
-    elastic = 0.75 * (a * depth**2 - 2.0 / 3.0 * a**3 * depth + a**5 / 5.0)
-    return elastic + (0.0 if math.isinf(stiffness) else load**2 / (2.0 * stiffness)) - a**2
-
-
 def touching(stiffness):
     """Radius at a displacement of zero."""
-    low, high = 1.3, 2.0
-    for _ in range(80):
-        a = 0.5 * (low + high)
-        displacement = a**2 - 2 / 3 * math.sqrt(6 * a) + (a**3 - math.sqrt(6 * a**3)) / stiffness
-        low, high = (a, high) if displacement < 0.0 else (low, a)
-    return 0.5 * (low + high)
+    return brentq(lambda a: on_the_branch(a, stiffness)[2], 1.3, 2.0, xtol=1e-15)
+
+
+def released(a, stiffness):
+    """Energy of an equilibrium over that of the open contact at the same displacement."""
+    load, depth, _ = on_the_branch(a, stiffness)
+    return elastic_energy(a, depth, maugis(Equilibrium(load=1.0)).bodies) + load**2 / (2.0 * stiffness) - a**2
 
 
 @pytest.mark.parametrize("stiffness", [0.3, 5.0, math.inf])
@@ -197,8 +177,9 @@ def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(steps, stiff
     """To first order in the step: each of the two jumps comes within a step of its place, where at most the
     pull-off load of 1.5 acts; the trapezoidal rule takes half of either jump, and is of second order elsewhere
     but at the fold, where the load has a square root: of order 3/2."""
-    exact = released(fold(stiffness)[0], stiffness) - released(touching(stiffness), stiffness)
-    reach = 2.0 - 2.0 * limit("displacement", stiffness) if math.isfinite(stiffness) else 3.0
+    last = fold(stiffness)
+    exact = released(last, stiffness) - released(touching(stiffness), stiffness)
+    reach = 2.0 - 2.0 * on_the_branch(last, stiffness)[2] if math.isfinite(stiffness) else 3.0
     held = {"from": 1.0, "to": 1.0 - reach, "cycles": 1}
     control = {"indentation": held} if math.isinf(stiffness) else {"displacement": held, "stiffness": stiffness}
     scenario = maugis(Equilibrium(**control, after_pull_off="reattach"), steps)
@@ -210,47 +191,31 @@ def test_the_loop_of_load_and_displacement_holds_what_is_dissipated(steps, stiff
     assert_allclose(loop, lost[-1], rtol=0.0, atol=6.0 * width)
 
 
-def fold_of(control, work_at, start, stop):
-    """Lowest control that a contact bears whose work of adhesion falls with its radius: on a fine scan of radii."""
-    a = np.linspace(start, stop, 400_001)
-    w = work_at(a)
-    depth = a**2 - np.sqrt(2.0 * math.pi * w * a / 0.75)
-    load = 2.0 * 0.75 * a * (depth - a**2 / 3.0)
-    values = load if control == "load" else depth
-    place = int(np.argmin(values))
-    return a[place], values[place], depth[place]
-
-
-def test_a_partly_reversible_contact_comes_off_at_its_own_fold():
-    for fall in [0.1, 0.5, 1.0]:
-        # w = w0 (1 - c a): the stress at which alpha 6 tau^2/(pi E*) = c w0
-        alpha = 0.2
-        tau = math.sqrt(fall * WORK * math.pi * 0.75 / (6.0 * alpha))
-        _, last, _ = fold_of("load", lambda a, c=fall: WORK * (1.0 - c * a), 1e-3, 0.999 / fall if fall > 0.5 else 1.5)
-        if fall in (0.1, 1.0):
-            assert_allclose(last, {0.1: -1.337, 1.0: -0.506}[fall], atol=5e-4)
-        contact = Equilibrium(load={"from": last + 6e-8, "to": last - 6e-8}, reversible=alpha)
-        scenario = maugis(contact, 12, bonds=bonds.Unbroken(stress=tau))
-        radius, work, load = course(scenario, "contact_radius", "work_of_adhesion", "normal_load")
-        assert_array_equal(radius[:5] > 0.0, True)
-        assert_array_equal(radius[8:], 0.0)
-        a = radius[:5]
-        assert_allclose(work[:5], WORK * (1.0 - fall * a), rtol=1e-13)
-        assert_allclose((a**3 - load[:5]) ** 2 / (6.0 * a**3) * WORK, work[:5], rtol=1e-12)
-
-
-def test_what_adhesion_pays_for_the_mean_stress_is_not_dissipated_at_pull_off():
+def test_a_partly_reversible_contact_comes_off_at_its_own_fold_and_keeps_the_energy_of_its_stress():
     """The energy of adhesion is the integral of the work left: -w0 A + alpha 4 tau^2 a^3/E*."""
-    alpha, fall = 0.2, 0.5
-    tau = math.sqrt(fall * WORK * math.pi * 0.75 / (6.0 * alpha))
-    a, last, _ = fold_of("indentation", lambda a: WORK * (1.0 - fall * a), 1e-3, 1.5)
-    paid = alpha * 4.0 * tau**2 * a**3 / 0.75
-    exact = elastic_energy(a, last, maugis(Equilibrium(load=1.0)).bodies) - math.pi * a**2 * WORK + paid
-    contact = Equilibrium(indentation={"from": last + 6e-6, "to": last - 6e-6}, reversible=alpha)
-    scenario = maugis(contact, 12, bonds=bonds.Unbroken(stress=tau))
-    lost = course(scenario, "dissipated_energy")[0]
-    assert_allclose(lost[-1], exact, rtol=2e-5)
-    assert lost[0] == 0.0
+    alpha = 0.2
+    for fall, control in product([0.1, 0.5, 1.0], ["load", "indentation"]):
+        # w = w0 (1 - c a): the stress at which alpha 6 tau^2/(pi E*) = c w0; the fold on a fine scan of radii
+        tau = math.sqrt(fall * WORK * math.pi * 0.75 / (6.0 * alpha))
+        a = np.linspace(1e-3, 0.999 / fall if fall > 0.5 else 1.5, 400_001)
+        depth = a**2 - np.sqrt(2.0 * math.pi * WORK * (1.0 - fall * a) * a / 0.75)
+        values = {"load": 2.0 * 0.75 * a * (depth - a**2 / 3.0), "indentation": depth}[control]
+        place = int(np.argmin(values))
+        ends = {"from": values[place] + 6e-8, "to": values[place] - 6e-8}
+        contact = Equilibrium(**{control: ends}, reversible=alpha)
+        scenario = maugis(contact, 12, bonds=bonds.Unbroken(stress=tau))
+        names = "contact_radius", "work_of_adhesion", "normal_load", "dissipated_energy"
+        radius, work, load, lost = course(scenario, *names)
+        assert_array_equal(radius[8:], 0.0)
+        closed = radius[:5]
+        assert np.all(closed > 0.0)
+        assert_allclose(work[:5], WORK * (1.0 - fall * closed), rtol=1e-13)
+        assert_allclose((closed**3 - load[:5]) ** 2 / (6.0 * closed**3) * WORK, work[:5], rtol=1e-12)
+        if control == "indentation":
+            adhesive = math.pi * a[place] ** 2 * WORK - alpha * 4.0 * tau**2 * a[place] ** 3 / 0.75
+            exact = elastic_energy(a[place], values[place], scenario.bodies) - adhesive
+            assert lost[0] == 0.0
+            assert_allclose(lost[-1], exact, rtol=2e-5)
 
 
 def test_what_a_free_sphere_dissipates_as_it_jumps_in_at_a_load():
@@ -377,9 +342,8 @@ def test_work_that_falls_through_zero_leaves_hertz_and_comes_back():
 
 def test_a_lifted_contact_opens_where_no_work_is_left():
     radius, work, masked = course(pulse(Equilibrium(indentation=-1e-8)), "contact_radius", "work_of_adhesion", "masked")
-    first = int(np.argmax(work <= 0.0))
-    assert np.all(radius[first:] == 0.0)
-    assert_array_equal(masked, 0.0)  # what is open is not Hertz's
+    assert np.all(radius[np.argmax(work <= 0.0) :] == 0.0)
+    assert_array_equal(masked, 0.0)  # an open contact is not Hertz's
 
 
 def test_a_sphere_laid_down_without_adhesion_makes_hertzs_contact():
@@ -437,8 +401,6 @@ def test_a_disc_is_where_its_release_rate_is_the_work_that_its_own_amplitude_lea
 
 def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
     """-int w dA = -w0 A + DeltaGamma int dE: the mean over the disc, not its edge, enters the energy."""
-    from sim.spectrum.radial import disc_energy
-
     spectrum = Gaussian(rms=0.05, length=0.3)
     plane = float(spectrum.surface_energy(0.1875))
     part = shear.Mean(spectrum=spectrum, contact="disc")

@@ -58,22 +58,24 @@ def test_standard_error_of_a_share_is_that_of_its_members(ramp):
 
 
 def test_shares_of_a_sweep_are_those_of_its_points():
-    for contact, sweep in [
-        (Equilibrium(load=LOAD), {"contact.load": [1e-3, 1.6e-2]}),
-        (Equilibrium(indentation=1e-6), {"contact.indentation": [1e-6, 4e-6]}),
-        (
-            Equilibrium(load=LOAD),
-            [{"sphere.radius": 1e-3, "contact.load": 1e-3}, {"sphere.radius": 4e-3, "contact.load": 8e-3}],
-        ),
-        (Equilibrium(load=LOAD), {"adhesion.work": [2e-2, 8e-2], "adhesion.bond_share": [0.3, 1.0]}),
-    ]:
-        swept = scene(contact=contact, sweep=sweep)
-        together = analysis.shares(run(swept))
+    for sweep in (
+        {"contact.load": [1e-3, 1.6e-2]},
+        [{"sphere.radius": 1e-3, "contact.load": 1e-3}, {"sphere.radius": 4e-3, "contact.load": 8e-3}],
+        {"adhesion.work": [2e-2, 8e-2], "adhesion.bond_share": [0.3, 1.0]},
+        {"contact": [{"model": "rate_dependent", "indentation": 1e-6, "front_speed": 1.0},
+                     {"model": "equilibrium", "load": {"from": 4e-3, "to": 1e-3}, "reversible": 0.02}]},
+    ):  # fmt: skip
+        swept = scene(sweep=sweep)
+        dataset = run(swept)
+        together, ratio = analysis.share_observables(dataset), analysis.observables(dataset)["area_ratio"]
+        dims = [name for name in ratio.dims if name not in ("member", "t")]
         for k, point in enumerate(swept.points()):
-            alone, dims = analysis.shares(run(point)), together["radius_jkr"].dims
-            where = dict(zip(dims, np.unravel_index(k, [together.sizes[name] for name in dims]), strict=True))
-            for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean", "lost_to_fluctuations_sem", "radius_jkr"):
-                np.testing.assert_array_equal(together[name].isel(where), alone[name])
+            place = dict(zip(dims, np.unravel_index(k, [ratio.sizes[name] for name in dims]), strict=True))
+            alone = run(point)
+            np.testing.assert_array_equal(ratio.isel(place), analysis.observables(alone)["area_ratio"])
+            shares = analysis.share_observables(alone)
+            for name in together:  # a mechanism that a point lacks takes nothing there
+                np.testing.assert_array_equal(together[name].isel(place) - shares.get(name, 0.0), 0.0)
 
 
 def test_shares_are_unknown_where_there_is_no_contact_at_rest():
@@ -82,51 +84,30 @@ def test_shares_are_unknown_where_there_is_no_contact_at_rest():
     assert bool(found["lost_to_bonds_mean"].isnull().all()) and math.isnan(found["area_ratio_hertz"])
 
 
-def test_shares_of_bonds_that_differ_need_each_member():
-    few = scene(
-        bonds=bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100), record=Record(per_member=False)
-    )
-    with pytest.raises(ValueError, match="per_member = true"):
-        analysis.shares(run(few))
-
-
-def test_a_contact_table_that_is_swept_whole_has_the_shares_of_its_points():
-    controls = [{"model": "equilibrium", "load": 1e-3},
-                {"model": "rate_dependent", "indentation": 1e-6, "front_speed": 1.0},
-                {"model": "equilibrium", "load": {"from": 4e-3, "to": 1e-3}, "reversible": 0.02}]  # fmt: skip
-    swept = scene(sweep={"contact": controls})
-    together = run(swept)
-    for k, point in enumerate(swept.points()):
-        alone = run(point)
-        lost, left = analysis.share_observables(together).isel(contact=k), analysis.share_observables(alone)
-        for name in lost:
-            np.testing.assert_array_equal(lost[name] - left.get(name, 0.0), 0.0)
-        ratio = analysis.observables(together)["area_ratio"].isel(contact=k)
-        np.testing.assert_array_equal(ratio, analysis.observables(alone)["area_ratio"])
+def test_shares_of_what_differs_between_members_need_each_member():
+    for parts in (
+        {"bonds": bonds.Counted(critical_speed=1e-2, rebinding_rate=500.0, sites=100)},
+        {"contact": Equilibrium(load=LOAD, reversible=0.02)},
+        {"contact": RateDependent(load=LOAD, front_speed=1e-3)},
+    ):
+        with pytest.raises(ValueError, match="per_member = true"):
+            analysis.shares(run(scene(record=Record(per_member=False), **parts)))
 
 
 # -- what the mean stress takes -------------------------------------------------------------------
 
-HELD = {
-    "load": (Equilibrium, {"load": LOAD}, lambda w: jkr.radius_at_load(LOAD, w, RADIUS, MODULUS)),
-    "indentation": (Equilibrium, {"indentation": 2e-6}, lambda w: jkr.radius_at_indentation(2e-6, w, RADIUS, MODULUS)),
-    "machine": (
-        Equilibrium,
-        {"displacement": 3e-6, "stiffness": 2e3},
-        lambda w: jkr.radius_at_displacement(3e-6, 2e3, w, RADIUS, MODULUS),
-    ),
-}
-
 
 def test_mean_stress_is_charged_after_bonds_and_fluctuations():
-    for control in HELD:
-        part, held, law = HELD[control]
+    for control, radius in (
+        ({"load": LOAD}, lambda w: jkr.radius_at_load(LOAD, w, RADIUS, MODULUS)),
+        ({"indentation": 2e-6}, lambda w: jkr.radius_at_indentation(2e-6, w, RADIUS, MODULUS)),
+    ):
         field = shear.Mean(spectrum=Band(rms=80e3, longest=60e-6, shortest=24e-6))
         population = bonds.Steady(critical_speed=1e-2, stress=1e5)
-        dataset = run(scene(contact=part(**held, reversible=0.03), bonds=population, shear=field))
+        dataset = run(scene(contact=Equilibrium(**control, reversible=0.03), bonds=population, shear=field))
         found = analysis.shares(dataset)
         bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
-        areas = [law(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
+        areas = [radius(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
         areas.append((dataset["contact_radius"].to_numpy()) ** 2)
         names = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
         for name, before, after in zip(names, areas[:-1], areas[1:], strict=True):
@@ -182,18 +163,10 @@ def test_an_edge_that_has_still_to_close_is_its_lags_loss():
     np.testing.assert_array_equal(lost["lost_to_fluctuations"][10:], 0.0)
 
 
-def test_shares_of_a_contact_that_lags_or_pays_for_its_stress_need_its_members():
-    for contact in [Equilibrium(load=LOAD, reversible=0.02), RateDependent(load=LOAD, front_speed=1e-3)]:
-        few = scene(contact=contact, record=Record(per_member=False))
-        with pytest.raises(ValueError, match="per_member = true"):
-            analysis.shares(run(few))
-
-
 # -- a sphere that is moved -----------------------------------------------------------------------
 
 MOVED = {
-    "load": {"load": {"from": 4e-3, "to": -0.3e-3}},
-    "load, log": {"load": {"from": 1e-3, "to": 8e-3, "scale": "log", "cycles": 2}},
+    "load": {"load": {"from": 1e-3, "to": 8e-3, "scale": "log", "cycles": 2}},
     "load in a table": {"load": {"time": [0.0, 0.1, 0.4], "value": [1e-3, 8e-3, -0.2e-3]}},
     "indentation": {"indentation": {"from": 2e-6, "to": -0.4e-6, "cycles": 1}},
     "displacement": {"displacement": {"from": 3e-6, "to": -0.5e-6, "cycles": 3}, "stiffness": 2e3},
@@ -247,11 +220,16 @@ def test_jkrs_contact_comes_off_and_closes_by_the_same_policy():
 def test_a_sphere_that_its_bonds_let_go_under_a_changing_load_stays_their_loss():
     """Where no member is in contact nothing records the load; the scenario tells it."""
     pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.3e-3})
-    dataset = run(scene(contact=pulled, bonds=bonds.Steady(critical_speed=1e-2), shear=shear.Uniform()))
-    assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
-    found = analysis.shares(dataset)
-    np.testing.assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12)
-    assert float(found["lost_to_bonds_mean"][-1]) == 1.0
+    for record in (Record(), Record(per_member=False)):
+        parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": shear.Uniform(), "record": record}
+        dataset = run(scene(contact=pulled, **parts))
+        assert dataset["in_contact"].to_numpy()[[0, -1]].tolist() == [1, 0]
+        np.testing.assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.3e-3, 21), rtol=1e-12)
+        rows = analysis.table(dataset, 3)
+        (name,) = (name for name in rows[0] if name.startswith("P\n"))
+        assert [float(row[name]) for row in rows] == [-100.0, -200.0, -300.0]
+    dataset = run(scene(contact=pulled, **(parts | {"record": Record()})))
+    assert float(analysis.shares(dataset)["lost_to_bonds_mean"][-1]) == 1.0
     assert float(analysis.observables(dataset)["area_ratio"][-1]) == 0.0
 
 
@@ -265,14 +243,3 @@ def test_shares_end_where_a_trajectory_stops():
         np.testing.assert_array_equal(
             lost[name].isnull(), gone | analysis.reference_radii(dataset)["radius_jkr"].isnull()
         )
-
-
-def test_the_load_of_an_open_contact_stands_in_the_table():
-    for record in [Record(), Record(per_member=False)]:
-        pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.5e-3})
-        dataset = run(scene(contact=pulled, shear=shear.Uniform(), record=record))
-        np.testing.assert_allclose(dataset["applied_load"], np.linspace(-0.1e-3, -0.5e-3, 21), rtol=1e-12)
-        assert int(dataset["in_contact"][-1]) == 0
-        rows = analysis.table(dataset, 3)
-        (name,) = (name for name in rows[0] if name.startswith("P\n"))
-        assert [float(row[name]) for row in rows] == [-100.0, -300.0, -500.0]

@@ -4,20 +4,19 @@ Every law is held against that of all modes of the cell: the distribution of Σ 
 characteristic function, the covariance Σ w² e^(−2∫λdt), and a plain simulation of each mode.
 """
 
+import functools
 import itertools
 import math
 from itertools import product
 
 import numpy as np
 import pytest
-from helpers.cases import some
 from helpers.scenes import CELL, SPECTRUM, advanced, scene
 from numpy.testing import assert_allclose
 from scipy.interpolate import CubicSpline
-from scipy.stats import expon, kstest, ncx2
+from scipy.stats import chi2, kstest, ncx2
 
-from sim.engine import march, pack, unpack
-from sim.ensemble import simulate as ensemble
+from sim.engine import march
 from sim.numerics.noise import Noise
 from sim.parts import drive
 from sim.parts.bonds import models as bonds
@@ -53,20 +52,13 @@ def process_of(name, correlation=None, tolerance=0.01, amplitude=None):
         points=points,
         tolerance=tolerance,
     )
-    found = modes(spectrum, CELL, points)
-    return recipe.process(G, poisson_ratio, 1.0), found.energies(G, poisson_ratio), np.hypot(found.qx, found.qy)
+    pairs = modes(spectrum, CELL, points)
+    return recipe.process(G, poisson_ratio, 1.0), pairs.energies(G, poisson_ratio), np.hypot(pairs.qx, pairs.qy)
 
 
 def moved(step, path=0.0, duration=1.0):
     """A step of given length [m] and duration [s]."""
     return drive.Steady(speed=path / duration).motion(step, 0.0, duration, duration)
-
-
-def starts(process, draws, seed=5):
-    """Stationary draws: the start of the members at many steps, each with numbers of its own."""
-    noise = Noise(seed, "shear", np.arange(MEMBERS))
-    found = [process.start(moved(step), UNLOADED, noise).energy for step in range(draws // MEMBERS)]
-    return np.concatenate(found)
 
 
 def distribution(weights, shapes, at):
@@ -96,11 +88,6 @@ def law_of(weights, shapes=1.0):
     return CubicSpline(table, distribution(weights, shapes, table))
 
 
-def ks_bound(draws):
-    """Distance of an empirical distribution that five standard deviations allow (Kolmogorov's law)."""
-    return math.sqrt(math.log(2.0 / FIVE_SIGMA) / (2.0 * draws))
-
-
 def test_the_inverted_characteristic_function_is_the_hypoexponential_law():
     weights = np.array([0.3, 0.5, 0.8, 1.1, 1.7, 2.0])
     at = np.linspace(0.0, 60.0, 200)
@@ -110,36 +97,24 @@ def test_the_inverted_characteristic_function_is_the_hypoexponential_law():
         others = np.delete(weights, i)
         beyond += np.exp(-at / weight) * np.prod(weight / (weight - others))
     assert_allclose(distribution(weights, 1.0, at), 1.0 - beyond, rtol=0, atol=1e-11)
-    # equal weights: Erlang, and degrees of freedom that are no whole number: chi-square
-    from scipy.stats import chi2
-
+    # degrees of freedom that are no whole number: chi-square
     assert_allclose(distribution(np.full(1, 0.5), 8.3, at), chi2(16.6).cdf(4.0 * at), rtol=0, atol=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("name", "tolerance"),
-    some(list(itertools.product(SPECTRA, (0.1, 0.01))), *((name, 0.01) for name in SPECTRA), ("band", 0.1)),
-)
 @pytest.mark.parametrize("draws", [20_000, pytest.param(100_000, marks=pytest.mark.verify)])
-def test_stationary_draws_follow_the_law_of_all_modes(draws, name, tolerance):
-    process, weights, _ = process_of(name, tolerance=tolerance)
-    exact, banded = law_of(weights), law_of(process.bands.weight, 0.5 * process.bands.freedom)
-    changed = np.max(np.abs(banded(banded.x) - exact(banded.x)))
-    assert changed < 0.1 * tolerance
-    sample = starts(process, draws)
-    assert kstest(sample, banded).pvalue > FIVE_SIGMA
-    if tolerance == 0.01:
-        assert changed < 0.1 * ks_bound(draws)  # far below what so many draws can see
-        assert kstest(sample, exact).pvalue > FIVE_SIGMA
-    error = np.sqrt(np.sum(weights**2) / draws)
-    assert abs(sample.mean() - weights.sum()) < 5.0 * error
-
-
-def test_one_ripple_is_exponentially_distributed():
-    part = shear.Banded(spectrum=Ripple(amplitude=1e5, wavelength=24e-6), correlation=Slip(length=1.0), cell=CELL)
-    sample = starts(part.process(G, 0.5, 1.0), 100_000)
-    exact = 1e5**2 * 24e-6 / (16.0 * np.pi * G)
-    assert kstest(sample, expon(scale=exact).cdf).pvalue > FIVE_SIGMA
+def test_stationary_draws_follow_the_law_of_all_modes(draws):
+    noise, seen = Noise(5, "shear", np.arange(MEMBERS)), math.sqrt(math.log(2.0 / FIVE_SIGMA) / (2.0 * draws))
+    for name, tolerance in [*itertools.product(SPECTRA, [0.01]), ("band", 0.1)]:
+        process, weights, _ = process_of(name, tolerance=tolerance)
+        exact, banded = law_of(weights), law_of(process.bands.weight, 0.5 * process.bands.freedom)
+        changed = np.max(np.abs(banded(banded.x) - exact(banded.x)))
+        assert changed < 0.1 * tolerance
+        sample = np.ravel([process.start(moved(step), UNLOADED, noise).energy for step in range(draws // MEMBERS)])
+        assert kstest(sample, banded).pvalue > FIVE_SIGMA
+        if tolerance == 0.01:
+            assert changed < 0.1 * seen  # far below what so many draws can see, by Kolmogorov's law
+            assert kstest(sample, exact).pvalue > FIVE_SIGMA
+        assert abs(sample.mean() - weights.sum()) < 5.0 * np.sqrt(np.sum(weights**2) / draws)
 
 
 @pytest.mark.parametrize("name", ["band", "self-affine"])
@@ -174,12 +149,9 @@ def stepped(process, start, durations, seed=1):
 
 def test_any_division_of_a_step_gives_the_noncentral_chi_square_law():
     for durations, start, freedom in product([(0.4,), (0.2, 0.2), (0.01, 0.09, 0.3)], [0.0, 30.0], [2.0, 2.7, 40.3]):
-        found = stepped(lone(freedom), start, durations)
         keep, renewed = math.exp(-2.0 * 0.4), -math.expm1(-2.0 * 0.4)
-        assert (
-            kstest(found / renewed, lambda x, k=freedom, c=keep * start / renewed: ncx2.cdf(x, k, c)).pvalue
-            > FIVE_SIGMA
-        )
+        sample = stepped(lone(freedom), start, durations) / renewed
+        assert kstest(sample, ncx2.cdf, args=(freedom, keep * start / renewed)).pvalue > FIVE_SIGMA
 
 
 def test_a_step_of_any_length_has_the_exact_moments():
@@ -196,200 +168,104 @@ def test_a_step_of_any_length_has_the_exact_moments():
             assert abs(change.var() - spread) < 5.0 * np.sqrt((fourth + 2.0 * spread**2) / change.size) + rounding**2
 
 
-def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit():
-    for correlation in [Slip(length=1e-6), Wave(waves=1.0)]:
-        process, _, _ = process_of("self-affine", correlation)
-        noise = Noise(5, "shear", np.arange(20))
-        first = process.start(moved(0), UNLOADED, noise)
-        state = first
-        for step in range(1, 4):
-            state = advanced(process, state, moved(step, 0.0), UNLOADED, noise)
-            assert np.array_equal(state.values, first.values)
-            assert np.array_equal(state.energy, first.energy)
-
-
 def two_times(process, step_of, draws, seed=6, members=MEMBERS):
     """ΔΓ at the two ends of one step of all draws, shape (2, draws); ``step_of`` a step's number gives its motion."""
-    noise, found = Noise(seed, "shear", np.arange(members)), []
+    noise, energies = Noise(seed, "shear", np.arange(members)), []
     for pair in range(draws // members):
         before = process.start(moved(2 * pair), UNLOADED, noise)
         after = advanced(process, before, step_of(2 * pair + 1), UNLOADED, noise)
-        found.append((before.energy, after.energy))
-    return np.concatenate(found, axis=1)
+        energies.append((before.energy, after.energy))
+    return np.concatenate(energies, axis=1)
 
 
-def all_modes(weights, exponents, draws, rng):
-    """The same of every mode by itself: Σ w |a|² with complex amplitudes that keep e^(−exponent)."""
-    pairs, parts = len(weights), []
-    for _ in range(draws // MEMBERS):
-        first, fresh = (
-            (rng.standard_normal((MEMBERS, pairs)) + 1j * rng.standard_normal((MEMBERS, pairs))) / np.sqrt(2.0)
-            for _ in range(2)
-        )
-        second = np.exp(-exponents) * first + np.sqrt(-np.expm1(-2.0 * exponents)) * fresh
-        parts.append([np.sum(weights * np.abs(a) ** 2, axis=1) for a in (first, second)])
-    return np.concatenate(parts, axis=1)
+@pytest.mark.parametrize("ratio", [1e-6, 1e-3, 1.0, 1e3, 1e6])
+def test_the_joint_law_of_two_times_is_that_of_all_modes(ratio):
+    draws = 20_000
+    memories = [Wave(waves=0.5)]
+    memories += [Time(time=1e-3), Slip(length=2e-6), Diffusion(diffusivity=1e-9)] if ratio == 1.0 else []
+    for correlation in memories:
+        process, weights, wavenumbers = process_of("band", correlation, tolerance=0.001)
+        longest, kind = wavenumbers.min(), type(correlation)  # the longest wave keeps e^(−ratio) of its amplitude
+        path = {Slip: 2e-6, Wave: math.pi / longest}.get(kind, 0.0)
+        duration = {Time: 1e-3, Diffusion: 1e9 / longest**2}.get(kind, 1.0)
+        exponents = ratio * (wavenumbers / longest) ** correlation.power
+        step = functools.partial(moved, path=ratio * path, duration=ratio * duration)
+        first, second = two_times(process, step, draws)
+        before, after = first - weights.sum(), second - weights.sum()
+        exact = np.sum(weights**2 * np.exp(-2.0 * exponents))
+        assert abs(np.mean(before * after) - exact) < 5.0 * np.std(before * after) / np.sqrt(draws)
+        change = (after - before) ** 2
+        exact = 2.0 * np.sum(weights**2 * -np.expm1(-2.0 * exponents))
+        assert abs(change.mean() - exact) < 5.0 * change.std() / np.sqrt(draws)
+        # every mode by itself: Σ w |a|² with complex amplitudes that keep e^(−exponent), both scaled by √2
+        rng, products = np.random.default_rng(3), []
+        for _ in range(draws // MEMBERS):
+            a, fresh = rng.standard_normal((2, 2, MEMBERS, len(weights)))
+            later = np.exp(-exponents) * a + np.sqrt(-np.expm1(-2.0 * exponents)) * fresh
+            products.append(0.25 * math.prod(np.sum(weights * x**2, axis=(0, 2)) for x in (a, later)))
+        for share in (0.1, 0.5, 0.9):
+            below = np.mean(first * second < np.quantile(products, share))
+            assert abs(below - share) < 5.0 * np.sqrt(share * (1.0 - share) * 2.0 / draws)
 
 
-def check_joint(found, plain, weights, exponents):
-    """Covariance, mean square change, and quantiles of the product of two times."""
-    draws = found.shape[1]
-    before, after = found - weights.sum()
-    exact = np.sum(weights**2 * np.exp(-2.0 * exponents))
-    assert abs(np.mean(before * after) - exact) < 5.0 * np.std(before * after) / np.sqrt(draws)
-    change = (after - before) ** 2
-    exact = 2.0 * np.sum(weights**2 * -np.expm1(-2.0 * exponents))
-    assert abs(change.mean() - exact) < 5.0 * change.std() / np.sqrt(draws)
-    products, others = found[0] * found[1], plain[0] * plain[1]
-    for share in (0.1, 0.5, 0.9):
-        below = np.mean(products < np.quantile(others, share))
-        assert abs(below - share) < 5.0 * np.sqrt(share * (1.0 - share) * (1 / draws + 1 / plain.shape[1]))
+def march_energies(part, motion, population=None):
+    population = population or bonds.Unbroken(stress=2e5)
+    scenario = scene(shear=part, drive=motion, bonds=population, clock=Clock(duration=5e-3, step=1e-3))
+    states = list(march(scenario, np.arange(3)))
+    return states, np.array([state.shear.energy for state in states])
 
 
-@pytest.mark.parametrize(
-    ("name", "ratio"),
-    some(
-        list(itertools.product(["time", "slip", "wave", "diffusion"], [1e-6, 1e-3, 1.0, 1e3, 1e6])),
-        ("time", 1.0), ("slip", 1.0), ("diffusion", 1.0), *(("wave", ratio) for ratio in [1e-6, 1e-3, 1.0, 1e3, 1e6]),
-    ),
-)  # fmt: skip
-def test_the_joint_law_of_two_times_is_that_of_all_modes(name, ratio):
-    correlation = {"time": Time(time=1e-3), "slip": Slip(length=2e-6), "wave": Wave(waves=0.5)}
-    correlation = (correlation | {"diffusion": Diffusion(diffusivity=1e-9)})[name]
-    process, weights, wavenumbers = process_of("band", correlation, tolerance=0.001)
-    # the longest wave keeps e^(−ratio) of its amplitude
-    path = {"slip": 2e-6, "wave": 0.5 * 2.0 * np.pi / wavenumbers.min()}.get(name, 0.0)
-    duration = {"time": 1e-3, "diffusion": 1e9 / wavenumbers.min() ** 2}.get(name, 1.0)
-    exponents = ratio * (wavenumbers / wavenumbers.min()) ** correlation.power
-    plain = all_modes(weights, exponents, 20_000, np.random.default_rng(3))
-    found = two_times(process, lambda step: moved(step, ratio * path, ratio * duration), 20_000)
-    check_joint(found, plain, weights, exponents)
+def test_amplitude_multiplies_the_unit_process_or_the_mean_of_the_cell_at_once():
+    recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Wave(waves=1.0), "tolerance": 0.1}
+    mean = modes(SPECTRUM, CELL, None).energies(G).sum()
+    population = bonds.Steady(critical_speed=2e-3, stress=4e5)
+    for motion in (drive.Steady(speed=4e-3), drive.Ramp(start=1e-4, stop=2e-2, scale="log")):
+        _, unit = march_energies(shear.Banded(**recipe), motion, population)
+        for amplitude in (Constant(), Onset(speed=2e-3, width=0.3, floor=0.1), Stress(reference=1e5)):
+            for kind, energy, rtol in (("gaussian", unit, 1e-14), ("fixed", np.full((6, 1), mean), 1e-12)):
+                part = shear.Banded(**recipe, amplitude=amplitude, mode_amplitudes=kind)
+                states, grown = march_energies(part, motion, population)
+                factors = [amplitude.factor(state.drive.speed, state.bonding.strength) for state in states]
+                assert_allclose(grown, energy * np.square(factors), rtol=rtol, atol=0)
 
 
-def march_energies(part, members, clock, motion, population=None, seed=5):
-    scenario = scene(shear=part, drive=motion, bonds=population or bonds.Unbroken(stress=2e5), clock=clock, seed=seed)
-    states = list(march(scenario, np.arange(members)))
-    return states, np.array([np.broadcast_to(state.shear.energy, members) for state in states])
-
-
-def test_amplitude_multiplies_the_unit_process_at_once():
-    for motion, kind in product(
-        [drive.Steady(speed=4e-3), drive.Ramp(start=1e-4, stop=2e-2, scale="log")], ["constant", "onset", "stress"]
-    ):
-        growths = {
-            "constant": Constant(),
-            "onset": Onset(speed=2e-3, width=0.3, floor=0.1),
-            "stress": Stress(reference=1e5),
-        }
-        amplitude, population = growths[kind], bonds.Steady(critical_speed=2e-3, stress=4e5)
-        recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Wave(waves=1.0)}
-        clock = Clock(duration=5e-3, step=1e-3)
-        _, unit = march_energies(shear.Banded(**recipe), 3, clock, motion, population)
-        states, grown = march_energies(shear.Banded(**recipe, amplitude=amplitude), 3, clock, motion, population)
-        for before, after, state in zip(unit, grown, states, strict=True):
-            stress = state.bonding.strength
-            assert_allclose(after, before * amplitude.factor(state.drive.speed, stress) ** 2, rtol=1e-14, atol=0)
+def relaxing(amplitude, motion, times):
+    """The weights of all modes, and ΔΓ of draws at some times, shape (times, draws), with a memory of 1 ms."""
+    process, weights, _ = process_of("self-affine", Time(time=1e-3), amplitude=amplitude)
+    noise, energies = Noise(4, "shear", np.arange(MEMBERS)), []
+    for run in range(50):
+        state = process.start(motion.motion(8 * run, 0.0, 0.0, times[-1]), UNLOADED, noise)
+        energies.append([state.energy])
+        for i, ends in enumerate(itertools.pairwise(times), 1):
+            state = advanced(process, state, motion.motion(8 * run + i, *ends, times[-1]), UNLOADED, noise)
+            energies[-1].append(state.energy)
+    return weights, np.concatenate(energies, axis=1)
 
 
 def test_relaxing_amplitude_follows_the_law_of_all_modes_after_a_jump():
     # g is constant after the jump: equal rates keep the unit field's law, times g0² e^(−2s) + g1² (1 − e^(−2s))
-    amplitude = Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True)
-    process, weights, _ = process_of("self-affine", Time(time=1e-3), amplitude=amplitude)
-    motion = drive.Table(time=(0.0, 1e-3, 1e-3, 1.0), speed=(1e-5, 1e-5, 1.0, 1.0))
-    noise, found = Noise(4, "shear", np.arange(MEMBERS)), []
     times = (0.0, 1e-3, 1.2e-3, 1.7e-3, 9e-3)
-    for run in range(50):
-        state = process.start(motion.motion(8 * run, 0.0, 0.0, 1.0), UNLOADED, noise)
-        energies = [state.energy]
-        for i in range(4):
-            state = advanced(
-                process, state, motion.motion(8 * run + i + 1, times[i], times[i + 1], 1.0), UNLOADED, noise
-            )
-            energies.append(state.energy)
-        found.append(energies)
+    jump = drive.Table(time=(0.0, 1e-3, 1e-3, 1.0), speed=(1e-5, 1e-5, 1.0, 1.0))
+    weights, samples = relaxing(Onset(speed=1e-3, width=0.05, floor=0.5, relaxing=True), jump, times)
     law = law_of(weights)
-    for time, sample in zip(times, np.concatenate(found, axis=1), strict=True):
-        kept = math.exp(-2.0 * max(time - 1e-3, 0.0) / 1e-3)
-        size = 0.25 * kept + 1.0 * (1.0 - kept)
+    for time, sample in zip(times, samples, strict=True):
+        left = math.exp(-2.0 * max(time - 1e-3, 0.0) / 1e-3)
+        size = 0.25 * left + 1.0 * (1.0 - left)
         assert abs(sample.mean() - size * weights.sum()) < 5.0 * size * np.sqrt(np.sum(weights**2) / sample.size)
         assert kstest(sample / size, law).pvalue > FIVE_SIGMA
 
 
 def test_relaxing_amplitude_renews_with_the_mean_variance_of_the_ends_of_a_step():
     amplitude = Onset(speed=2e-3, width=0.5, floor=0.1, relaxing=True)
-    process, weights, _ = process_of("self-affine", Time(time=1e-3), amplitude=amplitude)
     ramp, times = drive.Ramp(start=5e-4, stop=2e-2), np.linspace(0.0, 4e-3, 4)
-    noise, found = Noise(9, "shear", np.arange(MEMBERS)), []
-    for run in range(50):
-        state = process.start(ramp.motion(8 * run, 0.0, 0.0, 4e-3), UNLOADED, noise)
-        energies = [state.energy]
-        for i in range(3):
-            motion = ramp.motion(8 * run + i + 1, times[i], times[i + 1], 4e-3)
-            state = advanced(process, state, motion, UNLOADED, noise)
-            energies.append(state.energy)
-        found.append(energies)
+    weights, samples = relaxing(amplitude, ramp, times)
     squares = [amplitude.factor(ramp.motion(1, time, time, 4e-3).speed, 0.0)[0] ** 2 for time in times]
     sizes = [squares[0]]
     for before, after in itertools.pairwise(squares):
         renewed = -math.expm1(-2.0 * times[1] / 1e-3)
         sizes.append(sizes[-1] + renewed * (0.5 * (before + after) - sizes[-1]))
-    for size, sample in zip(sizes, np.concatenate(found, axis=1), strict=True):
+    for size, sample in zip(sizes, samples, strict=True):
         assert abs(sample.mean() - size * weights.sum()) < 5.0 * size * np.sqrt(np.sum(weights**2) / sample.size)
-
-
-def test_members_restarts_and_records_leave_every_bit():
-    for relaxing, correlation in product(
-        [False, True], [Time(time=2e-3), Slip(length=5e-6), Wave(waves=1.0), Diffusion(diffusivity=1e-9)]
-    ):
-        part = shear.Banded(
-            spectrum=SPECTRA["self-affine"][0],
-            cell=CELL,
-            correlation=correlation,
-            amplitude=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=relaxing),
-        )
-        parts = {
-            "shear": part,
-            "drive": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
-            "bonds": bonds.Counted(
-                critical_speed=1e-2, rebinding_rate=500.0, sites=40, stress=2e5, start_from="steady"
-            ),
-        }
-        scenario, members = scene(5, 6, **parts), 5
-        straight = list(march(scenario, np.arange(members)))
-        for batch in ([3], [4, 3], [0, 3, 200, 10**6]):
-            row = batch.index(3)
-            for together, state in zip(straight, march(scenario, np.array(batch)), strict=True):
-                for one, other in zip(pack(together).values(), pack(state).values(), strict=True):
-                    if one.ndim and len(one) == members:
-                        assert np.array_equal(other[row], one[3], equal_nan=True)
-        restarted = list(march(scenario, np.arange(members), unpack(scenario, pack(straight[2]))))
-        for one, other in zip(straight[3:], restarted, strict=True):
-            left, right = pack(one), pack(other)
-            assert all(np.array_equal(left[key], right[key], equal_nan=True) for key in left)
-        often = ensemble.run(scenario)
-        seldom = ensemble.run(scene(5, clock=Clock(duration=6e-3, step=1e-3, record=3e-3), **parts))
-        assert np.array_equal(often["fluctuation_energy"].isel(t=[0, 3, 6]).values, seldom["fluctuation_energy"].values)
-        assert np.array_equal(often["fluctuation_energy"].values.T, [state.shear.energy for state in straight])
-
-
-def test_fixed_amplitudes_store_the_cells_mean_at_all_times():
-    for name in SPECTRA:
-        spectrum, points, _ = SPECTRA[name]
-        amplitude = Onset(speed=2e-3, width=0.3, floor=0.1)
-        part = shear.Banded(
-            spectrum=spectrum,
-            cell=CELL,
-            points=points,
-            correlation=Slip(length=1e-6),
-            amplitude=amplitude,
-            mode_amplitudes="fixed",
-            tolerance=0.1,
-        )
-        states, found = march_energies(part, 2, Clock(duration=4e-3, step=1e-3), drive.Ramp(start=1e-4, stop=1e-2))
-        mean = modes(spectrum, CELL, points).energies(G).sum()
-        for state, energy in zip(states, found, strict=True):
-            assert state.shear.energy.shape == (1,)
-            assert_allclose(energy, amplitude.factor(state.drive.speed, 0.0)[0] ** 2 * mean, rtol=1e-12, atol=0)
 
 
 def test_bands_are_grouped_once_for_all_sizes_and_moduli_and_kept_for_a_whole_sweep(monkeypatch):
@@ -403,37 +279,36 @@ def test_bands_are_grouped_once_for_all_sizes_and_moduli_and_kept_for_a_whole_sw
         )
         return part.process(modulus, 0.5, cell).bands
 
-    one = bands()
+    unit = bands()
     for rms, modulus in itertools.product((1e-3, 3.7e5), (1e6, 5e9)):
-        other = bands(rms, modulus)
-        assert_allclose(other.weight, one.weight * (rms / 2e5) ** 2 * (1e6 / modulus), rtol=1e-14)
-        assert (other.freedom is one.freedom, other.errors) == (True, one.errors)
+        scaled = bands(rms, modulus)
+        assert_allclose(scaled.weight, unit.weight * (rms / 2e5) ** 2 * (1e6 / modulus), rtol=1e-14)
+        assert (scaled.freedom is unit.freedom, scaled.errors) == (True, unit.errors)
     assert len(calls) == 1
     for cell in 2 * [CELL * (1.0 + k / 40.0) for k in range(40)]:
         bands(cell=cell)
     assert len(calls) == 40
 
 
+def test_a_contact_at_rest_keeps_its_energy_to_the_last_bit():
+    part = shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Wave(waves=1.0))
+    _, energies = march_energies(part, drive.Steady(speed=0.0))
+    assert np.all(energies == energies[0])
+
+
 def test_a_ripple_of_no_amplitude_stores_nothing():
     part = shear.Banded(spectrum=Ripple(amplitude=0.0, wavelength=24e-6), cell=CELL, correlation=Slip(length=1e-6))
-    _, found = march_energies(part, 2, Clock(duration=3e-3, step=1e-3), drive.Steady(speed=1e-3))
-    assert np.all(found == 0.0)
-
-
-def banded(spectrum=SPECTRUM, **keys):
-    return shear.Banded(spectrum=spectrum, correlation=Slip(length=1e-6), **({"cell": CELL} | keys))
+    assert np.all(march_energies(part, drive.Steady(speed=1e-3))[1] == 0.0)
 
 
 def test_bad_input_is_refused_at_its_key():
     for keys, key in (
-        ({"tolerance": 0.0}, "tolerance"),
         ({"tolerance": np.nan}, "tolerance"),
-        ({"tolerance": "5 mm"}, "tolerance"),
         ({"tolerence": 0.1}, "tolerence"),
         ({"mode_amplitudes": "fixed", "amplitude": Stress(reference=1.0, relaxing=True)}, "mode_amplitudes"),
     ):
         with pytest.raises(ValueError, match=key):
-            banded(**keys)
+            shear.Banded(spectrum=SPECTRUM, correlation=Slip(length=1e-6), cell=CELL, **keys)
 
 
 @pytest.mark.verify
@@ -443,19 +318,21 @@ def test_errors_of_a_thousand_seeds_are_standard_normal(correlation):
     process, weights, wavenumbers = process_of(
         "self-affine", {"slip": Slip(length=2e-6), "wave": Wave(waves=0.1)}[correlation], tolerance=0.001
     )
-    kept = np.exp(-2e-6 * (wavenumbers / (0.2 * np.pi) if correlation == "wave" else np.full(len(weights), 1 / 2e-6)))
-    draws, mean, variance, covariance = 2000, weights.sum(), np.sum(weights**2), np.sum(weights**2 * kept)
+    squared = np.exp(
+        -2e-6 * (wavenumbers / (0.2 * np.pi) if correlation == "wave" else np.full(len(weights), 1 / 2e-6))
+    )
+    draws, mean, variance, covariance = 2000, weights.sum(), np.sum(weights**2), np.sum(weights**2 * squared)
     # E[x²y²] less σ⁴ + 2 cov² is the joint cumulant Σ w⁴ (4 ρ² + 2 ρ⁴) of two squared moduli of correlation ρ²
     spreads = {
         "mean": variance,
         "variance": 2.0 * variance**2 + np.sum(6.0 * weights**4),
-        "covariance": variance**2 + covariance**2 + np.sum(weights**4 * (4.0 * kept + 2.0 * kept**2)),
+        "covariance": variance**2 + covariance**2 + np.sum(weights**4 * (4.0 * squared + 2.0 * squared**2)),
     }
     scores = {name: [] for name in spreads}
     for seed in range(1000):
         before, after = two_times(process, lambda step: moved(step, 1e-6), draws, seed, members=20) - mean
-        found = {"mean": before, "variance": before**2 - variance, "covariance": before * after - covariance}
-        for name, values in found.items():
+        samples = {"mean": before, "variance": before**2 - variance, "covariance": before * after - covariance}
+        for name, values in samples.items():
             scores[name].append(values.mean() / np.sqrt(spreads[name] / draws))
     for name, values in scores.items():
         values = np.array(values)

@@ -70,22 +70,19 @@ def pixel_by_quadrature(spectrum, ix, iy):
     ],
 )
 def test_a_pixel_cut_by_the_cut_offs_has_the_integral_of_the_density(name, pixels):
-    spectrum = CUT_OFF[name]
-    reach = 9
-    found = spectrum.pixels(TURN, reach)
-    for ix, iy in pixels:
-        # inner end points with a square root leave quad with 1e-9 at worst
-        exact = pixel_by_quadrature(spectrum, ix, iy)
-        assert_allclose(found[reach + ix, iy], exact, rtol=1e-9, atol=1e-13 * spectrum.variance)
+    # inner end points with a square root leave quad with 1e-9 at worst
+    exact = [pixel_by_quadrature(CUT_OFF[name], *pixel) for pixel in pixels]
+    ix, iy = np.transpose(pixels)
+    variances = CUT_OFF[name].pixels(TURN, 9)[9 + ix, iy]
+    assert_allclose(variances, exact, rtol=1e-9, atol=1e-13 * CUT_OFF[name].variance)
 
 
 def test_a_pixel_of_a_smooth_spectrum_has_the_integral_of_the_density():
-    for name in SMOOTH:
-        spectrum = SMOOTH[name]
-        found = spectrum.pixels(TURN, 7)
-        for ix, iy in [(0, 0), (1, 0), (-1, 1), (0, 2), (-3, 2), (7, 7), (-7, 6)]:
-            exact = pixel_by_quadrature(spectrum, ix, iy)
-            assert_allclose(found[7 + ix, iy], exact, rtol=1e-9, atol=1e-14 * spectrum.variance)
+    pixels = [(0, 0), (1, 0), (-1, 1), (0, 2), (-3, 2), (7, 7), (-7, 6)]
+    ix, iy = np.transpose(pixels)
+    for spectrum in SMOOTH.values():
+        exact = [pixel_by_quadrature(spectrum, *pixel) for pixel in pixels]
+        assert_allclose(spectrum.pixels(TURN, 7)[7 + ix, iy], exact, rtol=1e-9, atol=1e-14 * spectrum.variance)
 
 
 def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions():
@@ -101,32 +98,16 @@ def test_pixels_of_an_isotropic_gaussian_are_products_of_error_functions():
         assert_allclose(pixels[positive], exact[positive], rtol=1e-11, atol=1e-18)
 
 
-def test_all_pixels_together_hold_the_variance_of_a_spectrum_that_ends():
-    for spectrum in CUT_OFF.values():
-        pixels = spectrum.pixels(TURN, 10)
-        assert_allclose(whole_plane(pixels), spectrum.variance, rtol=1e-13, atol=0)
-
-
 def whole_plane(pixels):
     return math.fsum(pixels[:, 1:].ravel()) * 2 + math.fsum(pixels[:, 0])
 
 
-def test_all_pixels_together_hold_the_share_of_a_gaussian_inside_the_square():
-    for name in ["gaussian", "anisotropic"]:
-        spectrum, reach = SMOOTH[name], 3
-        pixels = spectrum.pixels(TURN, reach)
-        edge = TURN * (reach + 0.5) / 2
-        lengths = (spectrum.length,) * 2 if name == "gaussian" else (spectrum.length_x, spectrum.length_y)
-        share = math.prod(special.erf(edge * length) for length in lengths)
-        assert_allclose(whole_plane(pixels), spectrum.variance * share, rtol=1e-13, atol=0)
-
-
-def test_pixels_add_up_to_the_one_large_pixel_that_they_fill():
+def test_all_pixels_together_hold_the_variance_or_that_of_the_large_pixel_that_they_fill():
+    for spectrum in CUT_OFF.values():
+        assert_allclose(whole_plane(spectrum.pixels(TURN, 10)), spectrum.variance, rtol=1e-13, atol=0)
     for spectrum in (CUT_OFF | SMOOTH).values():
-        reach = 4
-        pixels = spectrum.pixels(TURN, reach)
-        large = spectrum.pixels(TURN * (2 * reach + 1), 0)
-        assert_allclose(whole_plane(pixels), large[0, 0], rtol=1e-12, atol=0)
+        large = spectrum.pixels(TURN * 9, 0)[0, 0]
+        assert_allclose(whole_plane(spectrum.pixels(TURN, 4)), large, rtol=1e-12, atol=0)
 
 
 def test_far_pixels_keep_their_relative_accuracy():
@@ -140,25 +121,20 @@ def test_far_pixels_keep_their_relative_accuracy():
             assert_allclose(pixels[reach + ix, iy], exact, rtol=1e-11, atol=0)
 
 
-def test_modes_are_one_of_each_pair_sorted_by_length():
-    found = modes(AFFINE, 1.0)
-    lattice = set(zip(found.ix.tolist(), found.iy.tolist(), strict=True))
-    assert len(lattice) == len(found.ix)
-    assert not lattice & {(-ix, -iy) for ix, iy in lattice}
-    assert all(iy > 0 or (iy == 0 and ix > 0) for ix, iy in lattice)
-    assert np.all(np.diff(found.ix**2 + found.iy**2) >= 0)
-    assert_allclose(np.hypot(found.qx, found.qy), TURN * np.hypot(found.ix, found.iy), rtol=1e-15, atol=0)
-    assert np.all(found.variance > 0.0)
-
-
-def test_modes_are_all_pixels_that_meet_the_annulus_and_no_other():
-    found = set(zip(*(index.tolist() for index in (modes(AFFINE, 1.0).ix, modes(AFFINE, 1.0).iy)), strict=True))
+def test_modes_are_one_of_each_pair_of_pixels_that_meet_the_annulus_sorted_by_length():
+    pairs = modes(AFFINE, 1.0)
+    lattice = list(zip(pairs.ix.tolist(), pairs.iy.tolist(), strict=True))
     low, high = AFFINE.support[0] / TURN, AFFINE.support[1] / TURN
+    meeting = set()
     for ix, iy in itertools.product(range(-11, 12), range(12)):
         nearest = math.hypot(max(abs(ix) - 0.5, 0), max(iy - 0.5, 0))
         farthest = math.hypot(abs(ix) + 0.5, iy + 0.5)
-        meets = nearest < high and farthest > low and (iy > 0 or ix > 0)
-        assert ((ix, iy) in found) == meets
+        if nearest < high and farthest > low and (iy > 0 or ix > 0):
+            meeting.add((ix, iy))
+    assert sorted(lattice) == sorted(meeting)
+    assert np.all(np.diff(pairs.ix**2 + pairs.iy**2) >= 0)
+    assert_allclose(np.hypot(pairs.qx, pairs.qy), TURN * np.hypot(pairs.ix, pairs.iy), rtol=1e-15, atol=0)
+    assert np.all(pairs.variance > 0.0)
 
 
 def test_variance_of_a_cell_lacks_only_the_pixel_around_zero():
@@ -182,25 +158,18 @@ def test_energies_of_pairs_are_compliance_times_density_over_area():
 
 
 def test_a_smooth_spectrum_loses_the_energy_around_zero():
-    for poisson_ratio, spectrum in product(
-        [0.5, 0.3], [Gaussian(1.3, 1.0), AnisotropicGaussian(1.3, 1.0, 1.6, angle=0.7)]
-    ):
-        # -(2 - ν)/(8π) 3.900265 C(0)/(G L); the pixel's curvature adds a term in 1/L²
-        beta = (mpmath.zeta(0.5, 0.25) - mpmath.zeta(0.5, 0.75)) / 2
-        constant = float(-4 * mpmath.zeta(0.5) * beta)  # minus the lattice sum of 1/|n|
-        deficit = (2 - poisson_ratio) / (8 * math.pi) * constant * float(spectrum.density(0.0, 0.0))
-        rest = []
+    # -(2 - ν)/(8π) 3.900265 C(0)/(G L); the pixel's curvature adds a term in 1/L²
+    beta = (mpmath.zeta(0.5, 0.25) - mpmath.zeta(0.5, 0.75)) / 2
+    constant = float(-4 * mpmath.zeta(0.5) * beta)  # minus the lattice sum of 1/|n|
+    for nu, spectrum in product([0.5, 0.3], [Gaussian(1.3, 1.0), AnisotropicGaussian(1.3, 1.0, 1.6, angle=0.7)]):
+        deficit = (2 - nu) / (8 * math.pi) * constant * float(spectrum.density(0.0, 0.0))
+        exact, rest = spectrum.surface_energy(1.0, nu), []
         for cell in (40.0, 80.0):
-            found = modes(spectrum, cell, int(6 * cell))
-            exact = spectrum.surface_energy(1.0, poisson_ratio)
-            rest.append(np.sum(found.energies(1.0, poisson_ratio)) - exact + deficit / cell)
+            pairs = modes(spectrum, cell, int(6 * cell))
+            error = np.sum(pairs.energies(1.0, nu)) - exact
+            assert_allclose(pairs.errors(1.0, nu)["cell_error_energy"], error / exact, rtol=1e-9, atol=0)
+            rest.append(error + deficit / cell)
             assert abs(rest[-1]) < 0.05 * deficit / cell * (40.0 / cell)
-            assert_allclose(
-                found.errors(1.0, poisson_ratio)["cell_error_energy"],
-                (rest[-1] - deficit / cell) / exact,
-                rtol=1e-9,
-                atol=0,
-            )
         assert 3.5 < rest[0] / rest[1] < 4.5  # second order
 
 
@@ -210,29 +179,19 @@ def test_energy_of_a_spectrum_with_cut_offs_converges_with_the_cell():
     assert errors[1] < errors[0] / 8  # second order would be 16, less the lattice's own irregularity
 
 
-def test_a_ripple_is_one_pair_of_its_own():
-    ripple = Ripple(3.0, 0.25, angle=math.pi)
-    found = modes(ripple, 1.0)
-    assert (found.ix.tolist(), found.iy.tolist(), found.on_lattice) == ([4], [0], True)
-    assert found.variance.tolist() == [4.5]
-    assert found.errors()["cell_error_variance"] == 0.0
-    for nu in (0.5, 0.3):
-        assert_allclose(found.energies(1.7, nu).sum(), ripple.surface_energy(1.7, nu), rtol=1e-15, atol=0)
-
-
-def test_a_ripple_that_does_not_fit_keeps_its_own_energy_and_says_so():
-    for angle in [0.0, 0.3, 1.2, math.pi / 2, 2.5, -0.4, math.pi]:
-        ripple = Ripple(3.0, 0.26, angle)
-        found = modes(ripple, 1.0)
-        assert not found.on_lattice
-        assert found.qy[0] > 0.0 or (found.qy[0] == 0.0 and found.qx[0] > 0.0)
-        assert_allclose(found.energies(1.7, 0.3).sum(), ripple.surface_energy(1.7, 0.3), rtol=1e-14, atol=0)
-        assert_allclose(np.abs(found.qx**2 + found.qy**2), (TURN / 0.26) ** 2, rtol=1e-14, atol=0)
-
-
-def test_a_ripple_of_no_amplitude_is_still_a_pair_without_errors():
-    found = modes(Ripple(0.0, 0.25), 1.0)
-    assert set(found.errors().values()) == {0.0}
+def test_a_ripple_is_one_pair_with_the_energy_of_the_ripple_whether_it_fits_or_not():
+    pairs = modes(Ripple(3.0, 0.25, angle=math.pi), 1.0)
+    assert (pairs.ix.tolist(), pairs.iy.tolist(), pairs.on_lattice) == ([4], [0], True)
+    assert pairs.variance.tolist() == [4.5]
+    assert set(modes(Ripple(0.0, 0.25), 1.0).errors().values()) == {0.0}
+    for wavelength, angle, nu in product([0.25, 0.26], [0.0, 0.3, 1.2, math.pi / 2, 2.5, -0.4, math.pi], [0.5, 0.3]):
+        ripple = Ripple(3.0, wavelength, angle)
+        pairs = modes(ripple, 1.0)
+        assert not pairs.on_lattice or wavelength == 0.25
+        assert pairs.errors()["cell_error_variance"] == 0.0
+        assert pairs.qy[0] > 0.0 or (pairs.qy[0] == 0.0 and pairs.qx[0] > 0.0)
+        assert_allclose(pairs.energies(1.7, nu).sum(), ripple.surface_energy(1.7, nu), rtol=1e-14, atol=0)
+        assert_allclose(pairs.qx**2 + pairs.qy**2, (TURN / wavelength) ** 2, rtol=1e-14, atol=0)
 
 
 def test_without_points_the_grid_is_the_smallest_even_one_that_holds_the_spectrum():
@@ -273,20 +232,16 @@ def test_a_circle_that_only_touches_pixels_adds_none():
     assert (1, 1) in zip(touched.ix, touched.iy, strict=True)
 
 
-def test_a_spectrum_without_an_end_asks_for_points():
-    with pytest.raises(ValueError, match="give points"):
-        modes(Gaussian(1.0, 0.1), 1.0)
-
-
-def test_a_cell_without_modes_is_refused():
-    with pytest.raises(ValueError, match="make the cell longer"):
-        modes(Band(1.0, longest=9.0, shortest=8.0), 1.0)
-    with pytest.raises(ValueError, match="make the cell longer"):
-        modes(AnisotropicGaussian(1.0, 1.0, 2000.0, angle=0.8), 1.0, 8)
-    with pytest.raises(ValueError, match="at least 3"):
-        modes(Gaussian(1.0, 0.1), 1.0, 2)
-    with pytest.raises(ValueError, match="positive length"):
-        modes(AFFINE, 0.0)
+def test_a_cell_without_modes_is_refused_with_the_cure():
+    for spectrum, cell, points, cure in (
+        (Gaussian(1.0, 0.1), 1.0, None, "give points"),
+        (Band(1.0, longest=9.0, shortest=8.0), 1.0, None, "make the cell longer"),
+        (AnisotropicGaussian(1.0, 1.0, 2000.0, angle=0.8), 1.0, 8, "make the cell longer"),
+        (Gaussian(1.0, 0.1), 1.0, 2, "at least 3"),
+        (AFFINE, 0.0, None, "positive length"),
+    ):
+        with pytest.raises(ValueError, match=cure):
+            modes(spectrum, cell, points)
 
 
 def test_the_spread_is_that_of_the_number_of_equal_pairs():

@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from scipy.integrate import quad
 
 from sim.engine import march
-from sim.parts.bonds import Steady as Weakening, Unbroken
-from sim.parts.contact.models import Adhesion
+from sim.parts.bonds import Unbroken
 from sim.parts.drive import Ramp, Spring, Steady, Table
 from sim.parts.exchange import Motion, Motions
 from sim.parts.shear import Banded, Mean
@@ -38,11 +37,11 @@ def amplitudes(law, *blocks, speed=0.0):
     """g at the ends of all steps of some blocks of motions, the first from a given speed."""
     start = np.full(1, speed)
     past, _ = law.started(Motion(0, 0.0, 0.0, start, start, start, start), start)
-    found = []
+    ends = []
     for motions in blocks:
         past, amplitude = law.followed(past, motions, start)
-        found.extend(amplitude[:, 0])
-    return np.array(found)
+        ends.extend(amplitude[:, 0])
+    return np.array(ends)
 
 
 def law(length=SPEED * PERIOD / SHORT, floor=0.0):
@@ -100,16 +99,11 @@ def test_sliding_at_one_speed_has_the_floor_from_the_first_step_on():
 def test_a_step_of_the_speed_is_forgotten_with_the_slip():
     # from speed v to r v at once: with w = e^(−s/l), A0 = (w + (1 − w)/r) l/v, A1 = l, A2 = (w + (1 − w) r) l v
     length, ratio, slip = 1e-6, 8.0, np.array([0.1, 0.5, 1.0, 3.0, 9.0]) * 1e-6
-    steps = np.diff(slip, prepend=0.0)
-    found = []
-    past, _ = law(length).started(Motion(0, 0.0, 0.0, *[np.full(1, SPEED)] * 4), np.zeros(1))
-    for path in steps:
-        duration = path / (ratio * SPEED)
-        past, amplitude = law(length).followed(past, moved([path], [path**2 / duration], duration), np.zeros(1))
-        found.append(amplitude.item() ** 2)
+    speed, paths = ratio * SPEED, np.diff(slip, prepend=0.0)
+    ends = amplitudes(law(length), *(moved([path], [path * speed], path / speed) for path in paths), speed=SPEED)
     left = np.exp(-slip / length)
     exact = 1.0 - 1.0 / ((left + (1.0 - left) / ratio) * (left + (1.0 - left) * ratio))
-    assert_allclose(found, exact, rtol=1e-12)
+    assert_allclose(ends**2, exact, rtol=1e-12)
 
 
 def test_the_error_of_a_step_falls_with_its_square():
@@ -136,37 +130,6 @@ def test_the_error_of_a_step_falls_with_its_square():
         errors.append(state.shear.amplitude[0] ** 2 - exact)
     assert_allclose([errors[0] / errors[1], errors[1] / errors[2]], 4.0, rtol=0.02)
     assert abs(errors[-1]) < 1e-3 * exact
-
-
-#: Stick and slip behind a massless spring in closed form: strength, critical speed, damping, stiffness, stage speed.
-STRENGTH, SLOW, DAMPING, STIFF, STAGE = 1e-2, 1e-3, 0.4, 100.0, 1e-3
-
-
-def test_bonds_that_weaken_with_speed_make_unsteady_sliding_behind_a_spring():
-    still = scene(1, bonds=Unbroken(stress=1.0))
-    bonds = Weakening(critical_speed=SLOW, stress=STRENGTH / still.contact_area)
-    drive = Spring(stage=STAGE, stiffness=STIFF, damping=DAMPING, contact_stiffness="rigid", tolerance=1e-9)
-    shear = Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=law(1e3), paid_by_adhesion=0.0)
-    lowest = math.sqrt(STRENGTH * SLOW / DAMPING) - SLOW  # where the friction is least
-    least, highest = 2.0 * math.sqrt(STRENGTH * SLOW * DAMPING) - DAMPING * SLOW, STRENGTH / DAMPING - SLOW
-
-    def pace(v):  # dt/dv of a slip
-        return (DAMPING - STRENGTH * SLOW / (SLOW + v) ** 2) / (STIFF * (STAGE - v))
-
-    lasts, slip, square = (quad(lambda v, j=j: v**j * pace(v), highest, lowest, epsrel=1e-11)[0] for j in range(3))
-    stick = (STRENGTH - least) / (STIFF * STAGE)
-    step = 2e-4
-    duration = STRENGTH / (STIFF * STAGE) + 2.5 * stick + 3.0 * lasts
-    clock = Clock(duration=step * round(duration / step), step=step)
-    same_area = Adhesion(work=42e-3, bond_share=0.0)
-    moving = scene(1, clock=clock, drive=drive, bonds=bonds, shear=shear, adhesion=same_area)
-    states = list(march(moving, np.arange(1)))
-    weight, mean, spread, _ = states[-1].shear.past[0]
-    assert states[-1].drive.speed[0] == 0.0
-    assert_allclose([weight * mean, spread + weight * mean**2], [3.0 * slip, 3.0 * square], rtol=1e-5)
-    # all steps count from the one in which the first slip begins to the one in which the last ends
-    assert 3.0 * lasts + 2.0 * stick <= weight * (1.0 + 1e-9) <= 3.0 * lasts + 2.0 * stick + 2.0 * step
-    assert_allclose(states[-1].shear.amplitude[0] ** 2, 1.0 - (3.0 * slip) ** 2 / (weight * 3.0 * square), rtol=1e-5)
 
 
 def test_a_mass_behind_a_spring_on_coulomb_friction_has_three_halves_of_the_square_of_its_mean_speed():
