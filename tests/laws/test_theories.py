@@ -1,6 +1,6 @@
 """Theories of a contact under shear: their own closed states, one another, fifty digits, and never a wrong branch.
 
-Tolerances: u = 2^-53. A crossing of G and the straight line is found to a few roundings of the two
+Tolerances: u = 2^-53. A crossing of G and the straight line is radii to a few roundings of the two
 sides, which move it by their relative error over the relative difference of the slopes: that is
 computed with each exact root (``amplification``) and is of order 1 but near a fold.
 """
@@ -97,42 +97,31 @@ def random_states(count, seed, at_load, decades=6.0):
 
 
 CONTROLS = [(True, reversible.radius_at_load_reversible), (False, reversible.radius_at_indentation_reversible)]
-UNCORRECTED = [(True, theories.uncorrected_at_load), (False, theories.uncorrected_at_indentation)]
-
-
-def assert_agrees(computed, exact, amplification):
-    """Right to twelve roundings, amplified; near the fold either answer will do."""
-    if exact is None:
-        assert math.isnan(computed) or amplification < 1e-12
-        return
-    room = 12.0 * U * (1.0 + abs(amplification))
-    if room < 1e-3:
-        assert abs(computed / exact - 1) < room if exact > 0 else computed == 0.0
 
 
 @pytest.mark.parametrize("count", some([25, 80], 25))
-@pytest.mark.parametrize(("at_load", "law"), CONTROLS)
-def test_reversible_radius_against_sixty_digits(at_load, law, count):
-    for state in zip(*random_states(count, 41, at_load), strict=True):
-        level, work, stress, reversible, sphere_radius, modulus, poisson_ratio = map(float, state)
-        line = -reversible * shear_coefficient(poisson_ratio) * stress**2 / modulus
-        exact = exact_crossing(level, at_load, (work, sphere_radius, modulus), line)
-        assert_agrees(float(law(*state)), *exact)
-
-
-@pytest.mark.parametrize("count", some([25, 60], 25))
-@pytest.mark.parametrize(("at_load", "law"), UNCORRECTED)
-def test_uncorrected_radius_against_sixty_digits(at_load, law, count):
-    for state in zip(*random_states(count, 42, at_load), strict=True):
-        level, work, stress, _, sphere_radius, modulus, poisson_ratio = map(float, state)
-        line = shear_coefficient(poisson_ratio) * stress**2 / modulus
-        exact = exact_crossing(level, at_load, (work, sphere_radius, modulus), line)
-        assert_agrees(float(law(level, work, stress, sphere_radius, modulus, poisson_ratio)), *exact)
+def test_radii_with_a_work_linear_in_the_radius_to_sixty_digits(count):
+    for at_load, law, seed, sign in [
+        (True, reversible.radius_at_load_reversible, 41, -1.0),
+        (False, reversible.radius_at_indentation_reversible, 41, -1.0),
+        (True, theories.uncorrected_at_load, 42, 1.0),
+        (False, theories.uncorrected_at_indentation, 42, 1.0),
+    ]:
+        for level, work, stress, share, *body, poisson_ratio in zip(*random_states(count, seed, at_load), strict=True):
+            shares = [share] if sign < 0.0 else []  # the uncorrected result counts all of the shear energy
+            line = sign * math.prod(shares) * shear_coefficient(poisson_ratio) * stress**2 / body[1]
+            exact, amplification = exact_crossing(level, at_load, (work, *body), line)
+            computed = float(law(level, work, stress, *shares, *body, poisson_ratio))
+            room = 12.0 * U * (1.0 + abs(amplification))
+            if exact is None:  # near the fold either answer will do
+                assert math.isnan(computed) or amplification < 1e-12
+            elif room < 1e-3:
+                assert abs(computed / exact - 1) < room if exact > 0 else computed == 0.0
 
 
 def test_near_the_fold_of_a_reversible_contact_only_half_the_digits_are_lost():
     for distance in [1e-3, 1e-6, 1e-9, 1e-12]:
-        # the lowest load is found from P(a) in sixty digits, w = w0 (1 - a/2) in Maugis units
+        # the lowest load is radii from P(a) in sixty digits, w = w0 (1 - a/2) in Maugis units
         line = 0.5 / math.pi
         stress = math.sqrt(line * 0.75 * math.pi / 6.0)
         with mpmath.workdps(60):
@@ -242,14 +231,34 @@ def test_small_forces_shrink_the_area_by_savkoor_briggs_coefficient():
     loss = math.pi * (before**2 - after**2) / force**2
     # the next term is of relative order (force/limit)^2 = 1e-8; the loss is 1e-8 of the area: 1e-16/1e-8
     assert_allclose(loss, theories.savkoor_briggs_shrinkage(5.0, 1.0, 1.0, 4.0, 0.3), rtol=1e-7, atol=0)
-
-
-def test_sahlis_law_with_savkoor_briggs_coefficient_is_savkoor_briggs_at_small_forces():
+    # Sahli's law with that coefficient; they part at (force/limit)^4
     shrinkage = theories.savkoor_briggs_shrinkage(5.0, **UNIT)
     force = 0.01 * theories.savkoor_briggs_limit(5.0, 1.0, 1.0)
     sahli = theories.sahli_at_load(5.0, 1.0, force, shrinkage, 1.0, 4.0)
-    # they part at (force/limit)^4
     assert_allclose(sahli, theories.savkoor_briggs_at_load(5.0, 1.0, force, 1.0, 4.0), rtol=1e-8, atol=0)
+
+
+def test_a_contact_behind_any_stiffness_is_the_contact_at_its_load():
+    load = np.array([0.0, 5.0])
+    exact = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
+    indentation = jkr.indentation_under_load(exact, load, 1.0, 4.0)
+    for stiffness in [1e-3, 1.0, 1e6]:
+        displacement = indentation + load / stiffness
+        radius = reversible.radius_at_displacement_reversible(displacement, stiffness, 1.0, 1.0, 0.3, 1.0, 4.0)
+        assert_allclose(radius, exact, rtol=200 * U, atol=0)
+        bare = reversible.radius_at_displacement_reversible(displacement, stiffness, 1.0, 1.0, 0.0, 1.0, 4.0)
+        assert_array_equal(bare, jkr.radius_at_displacement(displacement, stiffness, 1.0, 1.0, 4.0))
+    load = np.array([-1.5, 0.0, 5.0])
+    exact = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
+    indentation = jkr.indentation_under_load(exact, load, 1.0, 4.0)
+    for stiffness in [0.0, 1e-3, 1.0, 30.0, 1e6, math.inf]:
+        displacement = indentation + load / stiffness if stiffness > 0.0 else 0.0 * load
+        radius = exact if stiffness > 0.0 else exact[1]  # no stiffness bears no load
+        # the search needs a radius on the right and one on the left of the answer
+        bracket, rest = (1.3 * radius, 0.5 * radius), (1.0, 1.0, 0.3, 0.0, 1.0, 4.0, 0.5)
+        shrunk = reversible.shrunk_at_displacement(*bracket, displacement, stiffness, *rest)
+        # a displacement of load/stiffness carries the rest in its last digits only, as the load asks for
+        assert_allclose(shrunk, radius, rtol=40 * U, atol=0)
 
 
 def test_sahlis_area_at_a_stress_is_that_at_its_force_and_never_below_hertz():
@@ -264,29 +273,25 @@ def test_sahlis_area_at_a_stress_is_that_at_its_force_and_never_below_hertz():
 
 
 def test_a_held_force_gives_the_radius_of_its_stress_up_to_the_limit():
+    stress = np.linspace(0.0, 3.0, 61)
+    at_load = theories.compare_at_load, 5.0
+    at_indentation = theories.compare_at_indentation, 1.0
     for poisson_ratio in [0.0, 0.3, 0.5]:
-        stress = np.linspace(0.0, 3.0, 61)
-        ends = []
-        for compare, stuck, spread, level in [
-            (theories.compare_at_load, theories.savkoor_briggs_at_load, theories.reversible_force_at_load, 5.0),
-            (
-                theories.compare_at_indentation,
-                theories.savkoor_briggs_at_indentation,
-                theories.reversible_force_at_indentation,
-                1.0,
-            ),
+        for (compare, level), name, law in [
+            (at_load, "savkoor_briggs", theories.savkoor_briggs_at_load),
+            (at_load, "reversible_force", theories.reversible_force_at_load),
+            (at_indentation, "savkoor_briggs", theories.savkoor_briggs_at_indentation),
+            (at_indentation, "reversible_force", theories.reversible_force_at_indentation),
         ]:
             radii = compare(stress, level, **UNIT, poisson_ratio=poisson_ratio)
-            for name, law in [("savkoor_briggs", stuck), ("reversible_force", spread)]:
-                adhesive = radii[name] > radii["hertz"]
-                force = math.pi * radii[name][adhesive] ** 2 * stress[adhesive]
-                again = law(level, 1.0, force, 1.0, 4.0, poisson_ratio)
-                # the amplification towards the limit is below 40 on this grid
-                assert_allclose(again, radii[name][adhesive], rtol=500 * U, atol=0)
-                assert np.all(np.diff(force) > 0.0)
-                assert law(level, 1.0, 1.2 * force[-1], 1.0, 4.0, poisson_ratio) == radii["hertz"][-1]
-                ends.append(adhesive.sum())
-        assert all(5 < end < 60 for end in ends)
+            adhesive = radii[name] > radii["hertz"]
+            force = math.pi * radii[name][adhesive] ** 2 * stress[adhesive]
+            again = law(level, 1.0, force, 1.0, 4.0, poisson_ratio)
+            # the amplification towards the limit is below 40 on this grid
+            assert_allclose(again, radii[name][adhesive], rtol=500 * U, atol=0)
+            assert np.all(np.diff(force) > 0.0)
+            assert law(level, 1.0, 1.2 * force[-1], 1.0, 4.0, poisson_ratio) == radii["hertz"][-1]
+            assert 5 < adhesive.sum() < 60
 
 
 def test_energy_of_the_mean_stress_per_new_area_is_the_work_along_the_edge():
@@ -294,64 +299,20 @@ def test_energy_of_the_mean_stress_per_new_area_is_the_work_along_the_edge():
         radius, stress, shear_modulus = np.array([1e-6, 1.2e-4, 3.0]), 3e5, 1.6e6
         modulus = halfspace.contact_modulus(shear_modulus, poisson_ratio)
         edge = halfspace.disc_edge_mean_displacement(radius, stress, shear_modulus, poisson_ratio)
-        found = reversible.mean_stress_energy(radius, stress, modulus, poisson_ratio)
-        assert_allclose(found, stress * edge, rtol=1e-14, atol=0)
+        energy = reversible.mean_stress_energy(radius, stress, modulus, poisson_ratio)
+        assert_allclose(energy, stress * edge, rtol=1e-14, atol=0)
         # and two thirds of it, over the whole disc, what the disc stores
         stored = halfspace.disc_tangential_energy(radius, stress, shear_modulus, poisson_ratio)
-        assert_allclose(2.0 / 3.0 * found * math.pi * radius**2, stored, rtol=1e-14, atol=0)
-
-
-def test_a_contact_behind_a_spring_is_the_contact_at_its_load():
-    for stiffness in [1e-3, 1.0, 1e6]:
-        load = np.array([0.0, 5.0])
-        exact = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
-        displacement = jkr.indentation_under_load(exact, load, 1.0, 4.0) + load / stiffness
-        found = reversible.radius_at_displacement_reversible(displacement, stiffness, 1.0, 1.0, 0.3, 1.0, 4.0)
-        assert_allclose(found, exact, rtol=200 * U, atol=0)
-        bare = reversible.radius_at_displacement_reversible(displacement, stiffness, 1.0, 1.0, 0.0, 1.0, 4.0)
-        assert_array_equal(bare, jkr.radius_at_displacement(displacement, stiffness, 1.0, 1.0, 4.0))
-
-
-def test_the_search_behind_any_stiffness_finds_the_contact_at_its_load():
-    for stiffness in [0.0, 1e-3, 1.0, 30.0, 1e6, math.inf]:
-        load = np.array([-1.5, 0.0, 5.0])
-        exact = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
-        indentation = jkr.indentation_under_load(exact, load, 1.0, 4.0)
-        displacement = indentation + load / stiffness if stiffness > 0.0 else 0.0 * load
-        wanted = exact if stiffness > 0.0 else exact[1]  # no stiffness bears no load
-        # the search needs a radius on the right and one on the left of the answer
-        rest = (displacement, stiffness, 1.0, 1.0, 0.3, 0.0, 1.0, 4.0, 0.5)
-        # a displacement of load/stiffness carries the rest in its last digits only, as the load asks for
-        assert_allclose(
-            reversible.shrunk_at_displacement(1.3 * wanted, 0.5 * wanted, *rest), wanted, rtol=40 * U, atol=0
-        )
-
-
-def test_release_rate_behind_any_stiffness_is_convex_in_the_radius():
-    rng = np.random.default_rng(46)
-    soft, a = 10.0 ** rng.uniform(-4.0, 4.0, (2, 4000))
-    displacement = rng.choice([-1.0, 1.0], 4000) * 10.0 ** rng.uniform(-3.0, 8.0, 4000)
-
-    def release(a):
-        return (a**2 - displacement + 2.0 / 3.0 * soft * a**3) ** 2 / (a * (1.0 + soft * a) ** 2)
-
-    middle, sides = release(a), 0.5 * (release(0.9 * a) + release(1.1 * a))
-    assert np.all(sides > middle)
-
-
-def total_energy(a, load, stress, reversible, work, sphere_radius, modulus):
-    """Potential at a load, with adhesion and what it pays of the shear energy."""
-    normal = jkr.potential_at_load(-load, 0.0, a, work, sphere_radius, modulus)
-    return normal + reversible * 4.0 * stress**2 * a**3 / modulus
+        assert_allclose(2.0 / 3.0 * energy * math.pi * radius**2, stored, rtol=1e-14, atol=0)
 
 
 def test_the_reversible_contact_sits_in_a_minimum_of_the_energy():
     load = np.array([-1.5, -0.5, 0.0, 5.0])
-    a = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
-    assert np.all(np.isfinite(a))
-    lowest = total_energy(a, load, 1.0, 0.3, **UNIT)
-    for factor in (0.98, 0.999, 1.001, 1.02):
-        assert np.all(total_energy(factor * a, load, 1.0, 0.3, **UNIT) > lowest)
+    radius = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
+    factor = np.array([[1.0], [0.98], [0.999], [1.001], [1.02]])
+    # potential at a load, with the adhesion and the share of the shear energy that it pays for
+    energy = jkr.potential_at_load(-load, 0.0, factor * radius, **UNIT) + 0.3 * 4.0 * (factor * radius) ** 3 / 4.0
+    assert np.all(energy[1:] > energy[0])
 
 
 def test_pulling_a_reversible_contact_spends_what_its_energies_gain():
@@ -423,16 +384,11 @@ def assert_sound(at_load, law, states):
         assert np.all(rate[known] >= (work - line * wider)[known] - 1e-9 * work[known])
 
 
-def test_random_states_are_never_on_a_wrong_branch():
+@pytest.mark.parametrize("seeds", some([range(44, 45), range(100, 200)], range(44, 45)))
+def test_random_states_are_never_on_a_wrong_branch(seeds):
     for at_load, law in CONTROLS:
-        assert_sound(at_load, law, random_states(100_000, 44, at_load))
-
-
-@pytest.mark.verify
-def test_ten_million_random_states_are_never_on_a_wrong_branch():
-    for at_load, law in CONTROLS:
-        for seed in range(20):
-            assert_sound(at_load, law, random_states(500_000, 100 + seed, at_load))
+        for seed in seeds:
+            assert_sound(at_load, law, random_states(100_000, seed, at_load))
 
 
 STRANGE = [0.0, -0.0, 5e-324, 1e-300, 1e-20, 1.0, 3.0, 1e20, 1e300, math.inf, -1.0, -1e300, -math.inf, math.nan]
@@ -455,12 +411,12 @@ def test_no_input_raises_or_hangs_and_no_contact_is_narrower_than_hertz(count):
         (theories.compare_at_load, (shear, level, work)),
         (theories.compare_at_indentation, (shear, level, work)),
     ]:
-        found = law(*first, *rest, *([other, spare] if law is theories.compare_at_load else []))
-        found = np.array(list(found.values())) if isinstance(found, dict) else found
-        assert not np.any(found < 0.0)
+        radii = law(*first, *rest, *([other, spare] if law is theories.compare_at_load else []))
+        radii = np.array(list(radii.values())) if isinstance(radii, dict) else radii
+        assert not np.any(radii < 0.0)
         # cube roots differ by a rounding; a denormal work has too few digits for a fold to be measured from
         floor = np.where(work == 5e-324, 0.0, (1.0 - 4 * U) * hertz["indentation" in law.__name__])
-        assert not np.any(found < floor)
+        assert not np.any(radii < floor)
 
 
 def test_without_adhesion_every_theory_but_the_uncorrected_is_hertz():
@@ -468,9 +424,6 @@ def test_without_adhesion_every_theory_but_the_uncorrected_is_hertz():
     for name in radii.keys() - {"uncorrected"}:
         assert_array_equal(radii[name], radii["hertz"])
     assert np.all(radii["uncorrected"] >= radii["hertz"])
-    assert np.isnan(reversible.radius_at_load_reversible(-1.0, -0.1, 1.0, 0.5, 1.0, 4.0))
-
-
-def test_a_negative_fraction_has_no_answer():
-    assert np.isnan(reversible.radius_at_load_reversible(5.0, 1.0, 1.0, -0.1, 1.0, 4.0))
+    # no contact is left, or a negative share has no answer
+    assert np.all(np.isnan(reversible.radius_at_load_reversible([-1.0, 5.0], [-0.1, 1.0], 1.0, [0.5, -0.1], 1.0, 4.0)))
     assert np.isnan(reversible.radius_at_indentation_reversible(1.0, 1.0, 1.0, -0.1, 1.0, 4.0))
