@@ -7,7 +7,6 @@ import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.laws import halfspace, jkr
-from sim.laws.halfspace import disc_displacement
 
 LENS = {"sphere_radius": 2e-3, "modulus": 6.4e6}
 STATES = [(1.2e-4, 7.2e-6), (1.2e-4, 5.0e-6), (7e-5, 0.0), (5e-5, -7e-7)]  # radius, indentation: the first is Hertz's
@@ -78,21 +77,28 @@ def exact_displacement(r, radius, indentation, sphere_radius):
 
 
 def test_displacement_and_gap_outside_against_fifty_digits():
-    for radius, indentation in STATES[1:]:
-        for ratio in [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 4.0, 9.0, 1e3, 1e6]:
+    for ratio in [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 4.0, 9.0, 1e3, 1e6]:
+        for radius, indentation in STATES[1:]:
             # 1.0198 is where the series of the gap ends, 4.04 where that of the displacement begins
             r = radius * ratio
             hertz, punch, opening = exact_displacement(r, radius, indentation, 2e-3)
             u = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
             assert abs(u - (hertz + punch)) < 3e-15 * (abs(hertz) + abs(punch))
-            # sqrt(r^2 - a^2) is that of r - a, exact for the r given; the series hold 1e-14 where they meet
+            # sqrt(r^2 - a^2) is that of r - a, exact for this r; the series hold 1e-14 where they meet
             assert abs(halfspace.gap(r, radius, indentation, 2e-3) / opening - 1) < 2e-14
+        if ratio <= 1e3:
+            hertz_opening = exact_displacement(ratio, 1.0, 1.0, 1.0)[2]
+            assert abs(halfspace.gap(ratio, 1.0, 1.0, 1.0) / hertz_opening - 1) < 2e-14
 
 
-def test_hertz_opens_beside_its_edge_as_fifty_digits_say():
-    for ratio in [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 1e3]:
-        opening = exact_displacement(ratio, 1.0, 1.0, 1.0)[2]
-        assert abs(halfspace.gap(ratio, 1.0, 1.0, 1.0) / opening - 1) < 2e-14
+def test_surfaces_overlap_only_beside_a_contact_pressed_beyond_hertz():
+    rng = np.random.default_rng(6)
+    radius = 10.0 ** rng.uniform(-9.0, -1.0, 4000)
+    sphere_radius = radius * 10.0 ** rng.uniform(0.0, 4.0, 4000)
+    indentation = radius**2 / sphere_radius * rng.uniform(-3.0, 1.0, 4000)
+    r = radius * (1.0 + 10.0 ** rng.uniform(-15.0, 6.0, 4000))
+    assert np.all(halfspace.gap(r, radius, indentation, sphere_radius) >= 0.0)
+    assert halfspace.gap(1.001, 1.0, 1.5, 1.0) < 0.0
 
 
 def test_far_away_the_surface_feels_only_the_load():
@@ -113,33 +119,22 @@ def test_the_surface_is_continuous_at_the_edge_and_follows_the_sphere_inside():
         assert_array_equal(halfspace.gap(np.linspace(0.0, 1.0, 9) * radius, radius, indentation, 2e-3), 0.0)
 
 
-def test_surfaces_never_overlap_where_the_edge_pulls():
-    rng = np.random.default_rng(6)
-    radius = 10.0 ** rng.uniform(-9.0, -1.0, 4000)
-    sphere_radius = radius * 10.0 ** rng.uniform(0.0, 4.0, 4000)
-    indentation = radius**2 / sphere_radius * rng.uniform(-3.0, 1.0, 4000)
-    r = radius * (1.0 + 10.0 ** rng.uniform(-15.0, 6.0, 4000))
-    assert np.all(halfspace.gap(r, radius, indentation, sphere_radius) >= 0.0)
-
-
-def test_a_contact_pressed_beyond_hertz_would_overlap_beside_its_edge():
-    assert halfspace.gap(1.001, 1.0, 1.5, 1.0) < 0.0
-
-
 def test_the_work_of_the_pressure_is_the_elastic_energy():
     radius, indentation = lens_contact()
-
-    def density(r):
-        u = halfspace.normal_displacement(r, radius, indentation, 2e-3)
-        return 0.5 * halfspace.pressure(r, radius, indentation, **LENS) * u
-
-    energy = over_the_contact(density, radius)
+    energy = over_the_contact(
+        lambda r: (
+            0.5
+            * halfspace.pressure(r, radius, indentation, **LENS)
+            * halfspace.normal_displacement(r, radius, indentation, 2e-3)
+        ),
+        radius,
+    )
     exact = jkr.potential_at_indentation(-indentation, 0.0, radius, 0.0, **LENS)
     # four parts of alternating sign, each below ten times the sum
     assert_allclose(energy, exact, rtol=1e-13, atol=0)
 
 
-def test_the_shear_carries_the_friction_and_its_displacement_the_energy():
+def test_profiles_and_map_of_the_shear_are_the_displacement_of_the_disc():
     radius, stress, shear_modulus = 1.2e-4, 3e5, 1.6e6
     assert_array_equal(halfspace.shear_stress([0.0, radius, 1.01 * radius], radius, stress), [stress, stress, 0.0])
     assert np.isnan(halfspace.shear_stress(math.nan, radius, stress))
@@ -147,12 +142,8 @@ def test_the_shear_carries_the_friction_and_its_displacement_the_energy():
     assert_array_equal(along, along[::-1])
     assert_allclose(along[4], 0.75 * stress * radius / shear_modulus, rtol=1e-14, atol=0)
     assert_allclose(across[6] / along[4], 0.424413181578387 / 0.75, rtol=1e-13, atol=0)
-
-
-def test_the_map_holds_both_profiles():
-    x, v = halfspace.tangential_map(1.2e-4, 3e5, 1.6e6, poisson_ratio=0.3, points=33, extent=3.0)
-    along, across = halfspace.tangential_profiles(x, 1.2e-4, 3e5, 1.6e6, poisson_ratio=0.3)
-    assert x[0] == -x[-1] == -3.0 * 1.2e-4
-    assert_array_equal(v[:, 16], along)
-    assert_array_equal(v[16], across)
-    assert_array_equal(v[20, 7], disc_displacement(x[20], x[7], 1.2e-4, 3e5, 1.6e6, 0.3))
+    rest = radius, stress, shear_modulus, 0.3
+    x, v = halfspace.tangential_map(*rest, points=33, extent=3.0)
+    assert x[0] == -x[-1] == -3.0 * radius
+    assert_array_equal([v[:, 16], v[16]], halfspace.tangential_profiles(x, *rest))
+    assert_array_equal(v[20, 7], halfspace.disc_displacement(x[20], x[7], *rest))
