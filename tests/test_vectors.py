@@ -18,18 +18,18 @@ MODELS = {"drive": scenes.DRIVES, "bonds": scenes.BONDS, "shear": scenes.SHEARS,
 
 
 def digests():
-    """A digest of the last state of a scene for every model of every part, and for bonds under a drive they feel."""
+    """A digest of the last state of a scene for every model of every part, and for bonds that move the slider."""
     cases = [USUAL | {part: name} for part, models in MODELS.items() for name in models]
     cases += [USUAL | {"drive": "spring with mass", "bonds": name} for name in scenes.BONDS]
-    found = {}
+    results = {}
     for case in cases:
         case = case if scenes.go_together(case) else case | {"bonds": "rate, bell"}
         *_, state = march(
             scenes.scene(steps=20, **{part: MODELS[part][name] for part, name in case.items()}), np.arange(3)
         )
         text = b"".join(np.ascontiguousarray(array).tobytes() for array in pack(state).values())
-        found[" ".join(case.values())] = hashlib.sha256(text).hexdigest()
-    return found
+        results[" ".join(case.values())] = hashlib.sha256(text).hexdigest()
+    return results
 
 
 @pytest.mark.verify
@@ -48,10 +48,10 @@ def test_states_are_those_of_kernels_for_any_x86_64_and_of_numpy_without_vectors
         "used = np._core._multiarray_umath; used = [used.__cpu_features__[name] for name in used.__cpu_dispatch__]; "
     )
     code += "print(json.dumps([config.CPU_NAME, any(used), test_vectors.digests()]))"
-    ran = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", code], env=os.environ | plain, capture_output=True, text=True, check=True
     )
-    target, vectors, found = json.loads(ran.stdout)
+    target, vectors, results = json.loads(process.stdout)
     assert target == "x86-64"
     assert not vectors
-    assert found == digests()
+    assert results == digests()
