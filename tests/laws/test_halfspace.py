@@ -141,9 +141,9 @@ def test_displacement_at_the_centre_and_on_the_edge():
 def test_far_from_the_disc_only_its_force_is_felt():
     x, y, a = 3e3, -4e3, 2.0
     force = np.pi * a**2 * 0.7
-    wanted = force * halfspace.point_displacement(x, y, 1.3, 0.4)
+    exact = force * halfspace.point_displacement(x, y, 1.3, 0.4)
     # the next term of the multipole series is of order (a/r)^2
-    assert_allclose(halfspace.disc_displacement(x, y, a, 0.7, 1.3, 0.4), wanted, rtol=(a / 5e3) ** 2, atol=0)
+    assert_allclose(halfspace.disc_displacement(x, y, a, 0.7, 1.3, 0.4), exact, rtol=(a / 5e3) ** 2, atol=0)
 
 
 def test_displacement_is_continuous_across_the_edge():

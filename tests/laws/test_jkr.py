@@ -188,8 +188,8 @@ def test_hertz_is_the_limit_of_vanishing_work():
         assert_allclose(jkr.radius_at_indentation(indentation, work, 2e-3, 6.4e6), hertz[1], rtol=1e-12, atol=0)
     # to first order the radius exceeds Hertz's by the square root of the work
     small = jkr.radius_at_indentation(indentation, 1e-14, 2e-3, 6.4e6) / hertz[1] - 1.0
-    wanted = math.sqrt(2 * math.pi * 1e-14 * 1e-4 / 6.4e6) * 2e-3 / (2 * 1e-4**2)
-    assert_allclose(small, wanted, rtol=2.0 * wanted, atol=0)
+    first_order = math.sqrt(2 * math.pi * 1e-14 * 1e-4 / 6.4e6) * 2e-3 / (2 * 1e-4**2)
+    assert_allclose(small, first_order, rtol=2.0 * first_order, atol=0)
 
 
 def test_no_input_raises_or_hangs():
@@ -220,8 +220,8 @@ def test_the_slope_of_a_potential_integrates_to_it():
         (jkr.potential_at_load, jkr.potential_slope_at_load, 1.4),
     ]:
         gained = integral(lambda a: slope(control, radius=a, **POTENTIAL), 0.8, 1.9)
-        wanted = potential(control, radius=1.9, **POTENTIAL) - potential(control, radius=0.8, **POTENTIAL)
-        assert_allclose(gained, wanted, rtol=1e-12, atol=0)
+        difference = potential(control, radius=1.9, **POTENTIAL) - potential(control, radius=0.8, **POTENTIAL)
+        assert_allclose(gained, difference, rtol=1e-12, atol=0)
 
 
 def test_the_tractive_force_is_the_slope_of_the_potential_over_separation():

@@ -164,10 +164,10 @@ def test_an_infinite_stiffness_is_an_indentation():
     last = jkr.pull_off_indentation(work, sphere_radius, modulus)
     indentation = last * (1.0 - random.choice([-1.0, 1.0], 10_000) * 10.0 ** random.uniform(-6, 6, 10_000))
     computed = jkr.radius_at_displacement(indentation, math.inf, work, sphere_radius, modulus)
-    wanted = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
-    assert_allclose(computed, wanted, rtol=40 * U + 24 * U * 1e3, atol=0)
+    at_grips = jkr.radius_at_indentation(indentation, work, sphere_radius, modulus)
+    assert_allclose(computed, at_grips, rtol=40 * U + 24 * U * 1e3, atol=0)
     far = indentation > 0.5 * last
-    assert_allclose(computed[far], wanted[far], rtol=40 * U + 24 * U / math.sqrt(0.5), atol=0)
+    assert_allclose(computed[far], at_grips[far], rtol=40 * U + 24 * U / math.sqrt(0.5), atol=0)
     assert_allclose(jkr.pull_off_displacement(math.inf, work, sphere_radius, modulus), last, rtol=20 * U, atol=0)
 
 
@@ -201,12 +201,12 @@ def test_radius_to_fifty_digits_with_half_of_them_lost_towards_the_fold(distance
     stiffness = float(soft * contact_stiffness(**rest))
     last = float(jkr.pull_off_displacement(stiffness, **rest))
     displacement = last * (1.0 - distance)
-    wanted, fold = exact(displacement, stiffness, **rest)
+    exact_radius, fold = exact(displacement, stiffness, **rest)
     assert abs(last / fold - 1) < 16 * U
     nearness = float((fold - displacement) / fold)
     if nearness < 1e-13:  # 1 - distance is rounded, too
         return
-    error = float(abs(jkr.radius_at_displacement(displacement, stiffness, **rest) / wanted - 1))
+    error = float(abs(jkr.radius_at_displacement(displacement, stiffness, **rest) / exact_radius - 1))
     assert error < 20 * U + 12 * U / math.sqrt(nearness)
     assert error < 1e-12 or nearness < 1e-5
 

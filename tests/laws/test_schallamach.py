@@ -388,8 +388,8 @@ def test_lifetimes_solve_the_equations_of_first_passage():
                     matrix[k, k + 1] = -up[k]
             exact = float(mp.lu_solve(matrix, mp.ones(bonds, 1))[bonds - 1])
         # three roundings a bond, and those of F/(i f_b) up to 30 in the exponent
-        got = law.cluster_lifetime(bonds, force * 1e-11, 50.0, 1e-11, beta * 50.0)
-        assert_allclose(got, exact / 50.0, rtol=3e-14, atol=0)
+        lifetime = law.cluster_lifetime(bonds, force * 1e-11, 50.0, 1e-11, beta * 50.0)
+        assert_allclose(lifetime, exact / 50.0, rtol=3e-14, atol=0)
 
 
 def test_large_clusters():

@@ -141,14 +141,14 @@ def test_near_the_fold_of_a_reversible_contact_only_half_the_digits_are_lost():
 
 
 def test_pull_off_load_where_the_work_falls_with_the_radius():
-    for fall, wanted in [(0.1, -1.337), (1.0, -0.506)]:
+    for fall, last_load in [(0.1, -1.337), (1.0, -0.506)]:
         # w = w0 (1 - fall a) in Maugis units
         stress = math.sqrt(fall / math.pi * 0.75 * math.pi / 6.0)
         load = np.linspace(-1.6, 0.0, 16001)
         radius = reversible.radius_at_load_reversible(load, 1.0 / math.pi, stress, 1.0, 1.0, 0.75)
         assert np.all(np.diff(np.isnan(radius).astype(int)) <= 0)
         # printed to three decimals, and the loads are 1e-4 apart
-        assert abs(load[np.isfinite(radius)][0] - wanted) < 6e-4
+        assert abs(load[np.isfinite(radius)][0] - last_load) < 6e-4
 
 
 def test_the_uncorrected_result_at_its_known_states():

@@ -37,8 +37,8 @@ def test_forward_is_the_integral_over_the_cell():
         x = grid.position
         for i, j in [(0, 0), (1, 2), (points - 2, 3)]:
             phase = np.exp(-1j * (qx[i, 0] * x[:, None] + qy[0, j] * x[None, :]))
-            wanted = np.sum(field * phase) * grid.spacing**2
-            assert_allclose(grid.forward(field)[i, j], wanted, rtol=1e-12, atol=0)
+            exact = np.sum(field * phase) * grid.spacing**2
+            assert_allclose(grid.forward(field)[i, j], exact, rtol=1e-12, atol=0)
 
 
 def test_wavevectors_tell_along_from_across():

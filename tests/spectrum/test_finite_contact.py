@@ -260,11 +260,11 @@ def test_energies_of_a_sum_are_a_square_with_the_cross_energy_in_it():
     # (tau0 + tau1): E = E0 + cross + E1; the cross term by displacement and by convolution differ at the edge only
     field = gaussian_maps(1, 96, 2.0, 0.3, seed=5)[0]
     a, tau0 = 0.9, 0.7
-    own = halfspace.disc_energy_of_map(field, 2.0, a, 1.0)
+    fluctuation = halfspace.disc_energy_of_map(field, 2.0, a, 1.0)
     mean = halfspace.disc_energy_of_map(np.full_like(field, tau0), 2.0, a, 1.0)
-    cross = halfspace.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - own - mean
+    cross = halfspace.disc_energy_of_map(field + tau0, 2.0, a, 1.0) - fluctuation - mean
     direct = halfspace.cross_energy_of_map(field, 2.0, a, tau0, 1.0)
-    assert abs(cross - direct) < 0.3 * (2 / 96 / a) ** 2 * 2 * math.sqrt(own * mean)
+    assert abs(cross - direct) < 0.3 * (2 / 96 / a) ** 2 * 2 * math.sqrt(fluctuation * mean)
 
 
 def gaussian_maps(members, points, cell, xi, seed):

@@ -41,8 +41,8 @@ def written(files, name, field=FIELD):
         np.save(path, field.T)
     elif name.endswith(".nc"):
         axes = {"x": np.arange(field.shape[0]) * PIXEL * 1e6, "y": np.arange(field.shape[1]) * PIXEL_Y * 1e6}
-        one = xr.Dataset({"shear_map": (("y", "x"), field.T * 1e-3, {"units": "kPa"})})
-        one.assign_coords({k: (k, v, {"units": "um"}) for k, v in axes.items()}).to_netcdf(path)
+        data = xr.Dataset({"shear_map": (("y", "x"), field.T * 1e-3, {"units": "kPa"})})
+        data.assign_coords({k: (k, v, {"units": "um"}) for k, v in axes.items()}).to_netcdf(path)
     else:
         np.savetxt(path, field.T, delimiter=",", fmt="%.17g")
     return name
