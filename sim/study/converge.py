@@ -69,8 +69,6 @@ _PARTS = {
     "bonds": ("bond model", "bonds", BONDS, "s"),
     "step": ("clock step", "clock", LINES[3], "^"),
 }
-#: Variables of the dataset that the figure shows.
-_DRAWN = ("part", "own", "time", "error", "standard_error")
 #: Unit and meaning of the variables of the dataset, by attribute of ``Setting``.
 _DESCRIBED = {
     "part": ("", "part of the scene that the setting changes"),
@@ -239,23 +237,22 @@ def _fluctuates(scenario: Scenario) -> bool:
 
 
 def _timed(scenario: Scenario, seconds: float) -> float:
-    """Return the CPU time of the scene's run [s]: the median of three pieces, timed in about some seconds."""
+    """Return the CPU time of the scene's run [s], by the last three of the pieces that are run in some seconds."""
     members, last = scenario.ensemble.members if _fluctuates(scenario) else 1, scenario.clock.steps
     full = min(together(scenario), members)
     batch, began = min(full, _FEWEST), time.process_time()
     follow(scenario, MemberNoise.of(scenario.seed, np.arange(batch)), None, range(1, 2))
     if (time.process_time() - began) * full / batch < 0.25 * seconds:
         batch = full
-    noise, paces, piece, state = MemberNoise.of(scenario.seed, np.arange(batch)), list[float](), 1, None
-    for _ in range(4):  # the first fills the caches
-        count, began = 0, time.process_time()
-        while (spent := time.process_time() - began) < 0.25 * seconds:
-            before = state.step if state is not None and state.step < last else 0
-            steps = range(before + 1, min(before + piece, last) + 1)
-            state, _ = follow(scenario, noise, state if before else None, steps)
-            count, piece = count + len(steps), min(2 * piece, _PIECE)
-        paces.append(spent / count)
-    return -(-members // full) * last * full / batch * float(np.median(paces[1:]))
+    noise, paces, piece, step, state = MemberNoise.of(scenario.seed, np.arange(batch)), list[float](), 1, 0, None
+    began = now = time.process_time()
+    while len(paces) < 4 or now < began + seconds:
+        steps = range(step + 1, min(step + piece, last) + 1)
+        state, _ = follow(scenario, noise, state if step else None, steps)
+        before, now = now, time.process_time()
+        paces.append((now - before) / len(steps))
+        step, piece = steps[-1] % last, min(2 * piece, _PIECE)
+    return -(-members // full) * last * full / batch * float(np.median(paces[-3:]))
 
 
 def _records(scenario: Scenario) -> range:
@@ -325,37 +322,36 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> tupl
     error, standard_error : array, shape (4, 4)
         For each quantity and statistic, in units of the largest mean, for the spread of ΔΓ of its largest spread.
     """
-    influences, statistics = [], []
-    for sample in (values, reference):
-        mean, spread = (np.nan_to_num(of(sample, axis=1, keepdims=True)) for of in (np.mean, np.std))
-        spread = np.where(spread > 1e-12 * np.abs(mean), spread, 0.0)
-        off = np.where(spread > 0.0, sample - mean, 0.0)
-        of_spread = np.divide(off**2 - spread**2, 2.0 * spread, out=np.zeros(off.shape), where=spread > 0.0)
-        influences.append(np.stack([off, of_spread], axis=1))
-        statistics.append(np.stack([mean, spread], axis=1))
-    influence, difference = (one - two for one, two in (influences, statistics))
+    (moments, influence), (exact, of_exact) = _moments(values), _moments(reference)
+    difference, influence = moments - exact, influence - of_exact
     if known is not None:
-        off = influences[1][:, 0]
+        off = of_exact[:, 0]
         along, variance = (np.sum(off[of] * off[_ENERGY], axis=0) for of in (_RADIUS, _ENERGY))
         slope = np.zeros((4, 2, 1, off.shape[2]))
         slope[_RADIUS, 0, 0] = np.divide(along, variance, out=np.zeros(variance.shape), where=variance > 0.0)
         slope[_RADIUS, 1] = np.abs(slope[_RADIUS, 0])
-        exact, of_exact = (known[:2, np.newaxis, np.newaxis] * of[1][_ENERGY] for of in (statistics, influences))
-        difference = difference + slope * (exact - difference[_ENERGY])
-        influence = influence + slope * (of_exact - influence[_ENERGY])
+        of_mean_and_spread = known[:2, np.newaxis, np.newaxis]
+        difference = difference + slope * (of_mean_and_spread * exact[_ENERGY] - difference[_ENERGY])
+        influence = influence + slope * (of_mean_and_spread * of_exact[_ENERGY] - influence[_ENERGY])
     count, size = influence.shape[2], np.abs(difference[:, :, 0])
     deviation = np.sqrt(np.sum(influence**2, axis=2) / (count * max(count - 1, 1)))
-    unit = np.repeat(np.abs(statistics[1][:, :1, 0]).max(axis=2), 2, axis=1)
-    if (spread := statistics[1][_ENERGY, 1].max()) > 0.0:
-        unit[_ENERGY, 1] = spread
-    largest = size.argmax(axis=2)[..., np.newaxis]
-    found = np.full((2, 4, 4), np.nan)
-    for place, numbers in enumerate((size, deviation)):
-        at_largest = np.take_along_axis(numbers, largest, axis=2)[..., 0]
-        found[place, :, :2] = np.divide(at_largest, unit, out=np.zeros((4, 2)), where=unit > 0.0)
+    unit = np.repeat(np.abs(exact[:, :1, 0]).max(axis=2), 2, axis=1)
+    unit[_ENERGY, 1] = exact[_ENERGY, 1].max() or unit[_ENERGY, 1]
+    largest, result = size.argmax(axis=2)[..., np.newaxis], np.full((2, 4, 4), np.nan)
+    at_largest = np.take_along_axis(np.stack([size, deviation]), largest[np.newaxis], axis=3)[..., 0]
+    result[:, :, :2] = np.divide(at_largest, unit, out=np.zeros((2, 4, 2)), where=unit > 0.0)
     if known is not None:
-        found[:, _ENERGY] = np.abs(known), np.zeros(4)
-    return found[0], found[1]
+        result[:, _ENERGY] = np.abs(known), np.zeros(4)
+    return result[0], result[1]
+
+
+def _moments(sample: Array) -> tuple[Array, Array]:
+    """Return mean and spread over the members, shape (4, 2, 1, times), and the influence of each member on them."""
+    mean, spread = (np.nan_to_num(of(sample, axis=1, keepdims=True)) for of in (np.mean, np.std))
+    spread = np.where(spread > 1e-12 * np.abs(mean), spread, 0.0)
+    off = np.where(spread > 0.0, sample - mean, 0.0)
+    on_spread = np.divide(off**2 - spread**2, 2.0 * spread, out=np.zeros(off.shape), where=spread > 0.0)
+    return np.stack([mean, spread], axis=1), np.stack([off, on_spread], axis=1)
 
 
 def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[str]) -> list[Setting]:
@@ -478,17 +474,19 @@ def choices(dataset: xr.Dataset) -> list[Choice]:
 
     Errors add up, and so does the time that each change adds to a step; clock steps multiply it.
     """
-    part, own, cost = (dataset[name].to_numpy() for name in ("part", "own", "time"))
-    kinds = [np.flatnonzero(part == kind) for kind in _PARTS if kind in part]
-    groups = [sorted(of_part.tolist(), key=lambda row: -own[row]) for of_part in kinds]
-    written, combined = float(cost[groups[-1][0]]), list[Choice]()
-    for chosen_rows in itertools.product(*groups):
-        *changed, step = cost[list(chosen_rows)].tolist()
-        total = max(written + sum(each - written for each in changed), 0.2 * min([written, *changed])) * step / written
-        error = np.nan_to_num(dataset["error"].to_numpy()[list(chosen_rows)]).sum(axis=0)
-        deviation = np.sqrt(np.nansum(dataset["standard_error"].to_numpy()[list(chosen_rows)] ** 2, axis=0))
+    names = ("part", "own", "time", "error", "standard_error")
+    part, is_written, cost, errors, deviations = (dataset[name].to_numpy() for name in names)
+    groups = [np.flatnonzero(part == kind) for kind in _PARTS if kind in part]
+    groups = [group[np.argsort(-is_written[group], kind="stable")] for group in groups]
+    reference, combined = float(cost[groups[-1][0]]), list[Choice]()
+    for chosen_rows in itertools.product(*(group.tolist() for group in groups)):
+        place = list(chosen_rows)
+        *changed, step = cost[place].tolist()
+        total = max(reference + sum(each - reference for each in changed), 0.2 * min([reference, *changed]))
+        error = np.nan_to_num(errors[place]).sum(axis=0)
+        deviation = np.sqrt(np.nansum(deviations[place] ** 2, axis=0))
         bound = float(np.max(error + _SURE * deviation))
-        combined.append(Choice(chosen_rows, float(f"{total:.2g}"), error, deviation, bound))
+        combined.append(Choice(chosen_rows, float(f"{total * step / reference:.2g}"), error, deviation, bound))
     return combined
 
 
@@ -527,28 +525,26 @@ def table(dataset: xr.Dataset) -> list[dict[str, str]]:
 def explanation(dataset: xr.Dataset) -> str:
     """Return the subject of the study and the meaning of the table's columns, in sentences."""
     swept, left_out = dataset.attrs["swept"], dataset.attrs["left_out"].replace("\n", "; ")
-    lines = [
-        "Each row changes one thing of the scene (* marks it as it is written). time: CPU time of its run on one core.",
-        "(%): largest difference from a finer setting, and its standard error; of ΔΓ beyond its mean in its own units.",
-    ]
-    lines += [f"The values of {swept} are those of the tables; choose others by --set."] * bool(swept)
-    return "\n".join(lines + [f"Left out: {left_out}."] * bool(left_out))
+    return (
+        "Each row changes one thing of the scene (* marks it as it is written). time: CPU time of its run on one core."
+        "\n(%): largest difference from a finer setting, its standard error; of ΔΓ beyond its mean in its own units."
+        + f"\nThe values of {swept} are those of the tables; choose others by --set." * bool(swept)
+        + f"\nLeft out: {left_out}." * bool(left_out)
+    )
 
 
 def recommendation(dataset: xr.Dataset) -> str:
     """Return the cheapest combination that keeps the accepted error, in words and with the lines to write."""
     tolerance, tried = float(dataset.attrs["tolerance"]), choices(dataset)
-    own, (best, good) = tried[0], chosen(tried, tolerance)
-    cost, name = (
-        engineering(best.time, "s"),
-        "It" if best is own else f"“{', '.join(dataset['row'].values[list(best.rows)])}”",
-    )
+    written, (best, good) = tried[0], chosen(tried, tolerance)
+    name = "It" if best is written else f"“{', '.join(dataset['row'].values[list(best.rows)])}”"
     verdict = "is the cheapest combination that keeps" if good else "comes nearest; none is shown to keep"
-    lines = [f"As it is written the scene is {_off(own)}."]
-    lines.append(f"{name} {verdict} {100.0 * tolerance:.4g} %: {_off(best)}, {cost} of CPU time.")
+    cost = f"{engineering(best.time, 's')} of CPU time"
+    lines = [f"As it is written the scene is {_off(written)}."]
+    lines.append(f"{name} {verdict} {100.0 * tolerance:.4g} %: {_off(best)}, {cost}.")
     if not good and float(np.max(best.error)) <= tolerance:
         lines.append("The noise of the samples is too large; a larger budget reduces it.")
-    changed = [dataset.isel(row=row) for row, before in zip(best.rows, own.rows, strict=True) if row != before]
+    changed = [dataset.isel(row=row) for row in best.rows if row not in written.rows]
     toml = [f"\n[{_PARTS[str(row['part'].values)][1]}]\n{row['toml'].values}" for row in changed]
     return "\n".join([*lines, *["Write:"] * bool(toml), *toml])
 
@@ -580,22 +576,23 @@ def figure(dataset: xr.Dataset) -> Figure:
     Bars are two standard errors. Exact settings are drawn at a tenth of the smallest error. A ring marks
     the scene, a star the recommended combination.
     """
+    names, tolerance = ("part", "own", "time", "error", "standard_error"), float(dataset.attrs["tolerance"])
+    part, is_written, cost, error, deviation = (dataset[name].to_numpy() for name in names)
+    size, best = np.nan_to_num(error).reshape(len(part), -1), chosen(choices(dataset), tolerance)[0]
+    at = np.arange(len(part)), size.argmax(axis=1)
+    off, bars = size[at], deviation.reshape(size.shape)[at]
+    floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
+    off = np.maximum(off, floor)
     with mpl.rc_context(STYLE):
         picture, (panel,) = rows([3.0])
-        part, own, cost, error, deviation = (dataset[name].to_numpy() for name in _DRAWN)
-        size, tolerance = np.nan_to_num(error).reshape(len(part), -1), float(dataset.attrs["tolerance"])
-        at, best = size.argmax(axis=1)[:, np.newaxis], chosen(choices(dataset), tolerance)[0]
-        off, bars = (np.take_along_axis(of, at, 1)[:, 0] for of in (size, deviation.reshape(size.shape)))
-        floor = 0.1 * min([tolerance, *off[off > _ROUNDING]])
-        off = np.maximum(off, floor)
-        for name, (words, _, colour, marker) in _PARTS.items():
-            look: Any = {"color": colour, "marker": marker, "markersize": 3.6, "linewidth": 0.6, "label": words}
+        for name, (words, _, color, marker) in _PARTS.items():
+            look: Any = {"color": color, "marker": marker, "markersize": 3.6, "linewidth": 0.6, "label": words}
             if np.any(here := part == name):
                 panel.errorbar(cost[here], off[here], yerr=_SURE * bars[here], **look)
-        panel.plot(cost[own == 1], off[own == 1], "o", color="none", mec="black", markersize=7.5, label="as written")
-        panel.plot(
-            [best.time], [max(best.bound, floor)], "*", color="black", markersize=7.0, zorder=5, label="recommended"
-        )
+        ring: Any = {"color": "none", "mec": "black", "markersize": 7.5, "label": "as written"}
+        star: Any = {"color": "black", "markersize": 7.0, "zorder": 5, "label": "recommended"}
+        panel.plot(cost[is_written == 1], off[is_written == 1], "o", **ring)
+        panel.plot([best.time], [max(best.bound, floor)], "*", **star)
         panel.axhline(tolerance, color=REFERENCE, linestyle="--", linewidth=0.8, label="accepted")
         panel.set(xscale="log", yscale="log", xlabel="CPU time of the run (s)", ylabel="largest error (bottom: exact)")
         legend(panel)
