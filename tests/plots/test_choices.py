@@ -37,9 +37,6 @@ def loads():
     return simulated(shear=shear.Uniform(), sweep=LOADS)
 
 
-# -- a member, a time -------------------------------------------------------------------------
-
-
 def test_a_member_is_drawn_alone_and_one_that_does_not_exist_is_refused(ramp):
     figure = rendered(draw(ramp, "time", member=3))
     radius = ramp["contact_radius"].isel(member=3)
@@ -79,9 +76,6 @@ def test_the_profile_at_a_time_is_that_of_the_nearest_record():
         draw(dataset, "profile", at="3 mm")
 
 
-# -- axes -------------------------------------------------------------------------------------
-
-
 def test_curves_are_drawn_over_what_was_chosen():
     for x, variable, factor, label in [
         ("time", "t", 1e3, "time $t$ (ms)"),
@@ -109,11 +103,17 @@ def test_a_swept_key_that_is_chosen_goes_along_the_axis_and_the_others_make_curv
     assert_allclose(radius, 1e6 * dataset["contact_radius"].isel(contact_load=1, t=-1), rtol=1e-14)
 
 
-def test_an_unknown_axis_is_refused_with_the_known_ones(ramp):
-    with pytest.raises(ValueError, match=r'over "slider_positon"; did you mean "slider_position"\?'):
-        draw(ramp, "time", x="slider_positon")
-    with pytest.raises(ValueError, match=r'over "zzz"; choose of: t, speed, .*contact_radius'):
-        draw(ramp, "time", x="zzz")
+def test_a_choice_that_a_kind_does_not_take_is_refused_with_what_it_takes(ramp):
+    for kind, choices, words in (
+        ("time", {"x": "slider_positon"}, '"slider_position"'),
+        ("time", {"x": "zzz"}, "t, speed, .*contact_radius"),
+        ("profile", {"x": "t"}, "x; it takes: at$"),
+        ("theories", {"data": "x.csv"}, "data; it takes none"),
+        ("curve", {"units": ("mm",)}, '"mm"'),
+        ("curve", {"units": ("parsnip",)}, '"parsnip"'),
+    ):
+        with pytest.raises(ValueError, match=words):
+            draw(ramp, kind, **choices)
 
 
 def test_absolute_areas_stand_in_place_of_shares(ramp):
@@ -132,19 +132,7 @@ def test_axes_have_the_units_chosen_for_their_dimension(ramp):
     assert friction.get_xlabel() == "sliding speed $V$ (µm/s)" and friction.get_ylabel() == "friction $F$ (kN)"
     assert area.get_ylabel().endswith("(mm²)")
     assert_allclose(drawn(friction, pictures.BOTH)[0], 1e6 * ramp["speed"], rtol=1e-14)
-    for unit in ("mm", "parsnip"):
-        with pytest.raises(ValueError, match=f'no axis of this figure can be in "{unit}"'):
-            draw(ramp, "curve", units=(unit,))
 
-
-def test_a_choice_that_a_kind_does_not_take_is_refused(ramp):
-    with pytest.raises(ValueError, match=r'the figure "profile" has no choice of x; it takes: at$'):
-        draw(ramp, "profile", x="t")
-    with pytest.raises(ValueError, match='"theories" has no choice of data; it takes none but member and units'):
-        draw(ramp, "theories", data="x.csv")
-
-
-# -- measured points --------------------------------------------------------------------------
 
 HEADER = "speed [mm/s], contact_area [mm^2], contact_area_error [%], friction_force [mN]"
 
@@ -215,29 +203,22 @@ def test_a_loop_has_measured_points_in_every_panel(table):
         assert_allclose(off, min((measured - crossings) / 2e-6, key=abs), rtol=1e-9)
     (label,) = (one for one in legend_of(loaded)[0] if one.startswith("measured, $"))
     assert label.endswith(" of 2 (nearest branch)")
-
-
-def test_a_contact_in_equilibrium_has_one_branch_of_radii_there_and_back(table):
-    there_and_back = Equilibrium(load={"from": 1e-4, "to": 1e-3, "cycles": 1})
+    there_and_back = Equilibrium(load={"from": 1e-4, "to": 1e-3, "cycles": 1})  # one branch of radii
     dataset = simulated(contact=there_and_back, drive=STEADY, shear=shear.Uniform())
-    path = table("normal_load [mN], contact_radius [um], contact_radius_error [um]\n0.3, 70, 2\n0.5, 90, 2\n")
     (label,) = (one for one in legend_of(draw(dataset, "loop", data=path).axes[2])[0] if one.startswith("measured, $"))
     assert label.endswith(" of 2")
 
 
 def test_a_table_of_which_nothing_can_be_drawn_is_refused(ramp, table):
-    for text, said in [
-        ("contact_area [mm^2]\n0.04\n", r'no column "speed", which the figure is drawn over; add it, or choose --x'),
-        ("speed [mm/s], contact_aera [mm^2]\n1, 0.04\n", r'"contact_aera" is neither .* did you mean "contact_area"'),
-        ("speed [mm/s], contact_area [mN]\n1, 0.04\n", r"contact_area.* not a unit of m\^2"),
-        ("speed [mm/s], indentation [um]\n1, 1\n", "no row is of what is drawn.*speed, indentation"),
-        ("speed [mm/s], contact_area [mm^2], contact_load [N]\n1, 0.04, 1\n", "no row is of what is drawn"),
+    for text, words in [
+        ("contact_area [mm^2]\n0.04\n", '"speed".*--x'),
+        ("speed [mm/s], contact_aera [mm^2]\n1, 0.04\n", '"contact_aera".*"contact_area"'),
+        ("speed [mm/s], contact_area [mN]\n1, 0.04\n", r"contact_area.*m\^2"),
+        ("speed [mm/s], indentation [um]\n1, 1\n", "no row.*speed, indentation"),
+        ("speed [mm/s], contact_area [mm^2], contact_load [N]\n1, 0.04, 1\n", "no row"),
     ]:
-        with pytest.raises(ValueError, match=said):
+        with pytest.raises(ValueError, match=words):
             draw(ramp, "curve", data=table(text))
-
-
-# -- in Python and by the command -------------------------------------------------------------
 
 
 def test_the_first_panel_is_drawn_in_axes_that_are_given(loads, table):
@@ -264,10 +245,7 @@ def test_the_command_takes_the_choices_and_replaces_no_table(loads, table, tmp_p
     assert (tmp_path / "x-curve.png").read_bytes()[:4] == b"\x89PNG"
     assert command("plot", "x.nc", "time", "--data", path, "-o", path, "--force").exit_code == 2
     assert path.read_text(encoding="utf-8").startswith("speed")
-    assert (
-        command("plot", "x.nc", "--at", "1 s", "curve", "--force")
-        .stderr.strip()
-        .endswith("it takes: x, absolute, data, ax")
-    )
+    refused = command("plot", "x.nc", "--at", "1 s", "curve", "--force").stderr
+    assert refused.strip().endswith("it takes: x, absolute, data, ax")
     listed = " ".join(command("plot", "--help").stdout.split())
     assert "over speed. --x --absolute --data" in listed

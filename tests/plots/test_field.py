@@ -52,15 +52,9 @@ def test_map_of_a_ripple_and_its_displacement_have_the_closed_amplitudes():
 
 def test_arrow_points_where_the_slider_goes():
     for speed, text in [(4e-3, r"sliding $\longrightarrow$"), (-4e-3, r"$\longleftarrow$ sliding"), (0.0, "at rest")]:
-        amplitude = Stress(reference=3e5)
-        dataset = simulated(
-            drive=drive.Steady(speed=speed),
-            shear=field(shear.Mapped, amplitude=amplitude),
-            record=Record(maps=(0.4,)),
-            ensemble=Ensemble(members=1),
-        )
-        panel = plots.draw(dataset, "map").axes[0]
-        assert text in [label.get_text() for label in panel.texts]
+        parts = {"shear": field(shear.Mapped, amplitude=Stress(reference=3e5)), "record": Record(maps=(0.4,))}
+        dataset = simulated(drive=drive.Steady(speed=speed), ensemble=Ensemble(members=1), **parts)
+        assert text in [label.get_text() for label in plots.draw(dataset, "map").axes[0].texts]
 
 
 def test_measured_spectrum_is_the_one_asked_for():
@@ -108,20 +102,18 @@ def test_spectrum_of_a_sweep_takes_the_swept_number():
     np.testing.assert_allclose(np.nanmax(swept), np.nanmax(base) / 9.0, rtol=1e-12)
 
 
-def test_a_dataset_without_maps_says_how_to_record_them():
-    for kind in ["map", "spectrum"]:
-        with pytest.raises(ValueError, match=r'\[record\] maps = \["1 s"\]'):
-            plots.draw(simulated(), kind)
-
-
-def test_a_spectrum_that_cannot_be_compared_says_why():
-    with pytest.raises(ValueError, match="single wave"):
-        plots.draw(mapped(spectrum=Ripple(amplitude=3e5, wavelength=24e-6)), "spectrum")
+def test_maps_and_spectra_that_cannot_be_drawn_say_why():
     resting = simulated(
         drive=drive.Steady(), shear=field(shear.Mapped), record=Record(maps=(0.4,)), ensemble=Ensemble(members=1)
     )
-    with pytest.raises(ValueError, match="holds no stress"):
-        plots.draw(resting, "spectrum")
+    for dataset, kind, words in (
+        (simulated(), "map", r'\[record\] maps = \["1 s"\]'),
+        (simulated(), "spectrum", r'\[record\] maps = \["1 s"\]'),
+        (mapped(spectrum=Ripple(amplitude=3e5, wavelength=24e-6)), "spectrum", "single wave"),
+        (resting, "spectrum", "no stress"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            plots.draw(dataset, kind)
     assert plots.draw(resting, "map").axes
 
 

@@ -30,9 +30,6 @@ def found(ramp):
     return analysis.statistics(ramp)
 
 
-# -- what is drawn ----------------------------------------------------------------------------
-
-
 def test_curve_shows_the_mean_area_over_speed_and_what_each_mechanism_takes(ramp, found):
     figure = rendered(plots.draw(ramp, "curve"))
     shares = analysis.shares(ramp)
@@ -55,15 +52,9 @@ def test_curve_shows_the_mean_area_over_speed_and_what_each_mechanism_takes(ramp
     _, bonded = drawn(energies, pictures.BONDS, "-.")
     assert_allclose(bonded, 1e3 * analysis.bond_work(ramp), rtol=1e-14)
     assert_allclose(drawn(friction, pictures.BOTH)[1], 1e3 * found["friction_force_mean"], rtol=1e-14)
-
-
-def test_bands_reach_from_the_5_to_the_95_percent_quantile(ramp, found):
-    panel = plots.draw(ramp, "time").axes[0]
-    quantiles = 1e6 * found["contact_radius_quantile"]
-    # no quantile lies outside of its band, and the band reaches no further
-    band = panel.collections[0].get_paths()[0].vertices
-    assert band[:, 1].min() == quantiles.sel(quantile=0.05).min()
-    assert band[:, 1].max() == quantiles.sel(quantile=0.95).max()
+    band = plots.draw(ramp, "time").axes[0].collections[0].get_paths()[0].vertices[:, 1]
+    quantiles = 1e6 * found["contact_radius_quantile"].sel(quantile=[0.05, 0.95])
+    assert (band.min(), band.max()) == (quantiles[{"quantile": 0}].min(), quantiles[{"quantile": 1}].max())
 
 
 def test_sweep_shows_the_second_half_against_the_swept_key():
@@ -79,17 +70,12 @@ def test_sweep_shows_the_second_half_against_the_swept_key():
 
 
 def test_further_swept_keys_are_further_curves_with_their_values():
-    dataset = simulated(
-        drive=STEADY, shear=shear.Uniform(), sweep={"contact.load": [0.0, 4e-3], "sphere.radius": ["1 mm", "2 mm"]}
-    )
+    keys = {"contact.load": [0.0, 4e-3], "sphere.radius": ["1 mm", "2 mm"]}
+    dataset = simulated(drive=STEADY, shear=shear.Uniform(), sweep=keys)
     panel = plots.draw(dataset).axes[0]
     assert legend_of(panel)[0] == ["$R$ = 1 mm", "$R$ = 2 mm", "JKR", "Hertz"]
-    assert_allclose(
-        drawn(panel, pictures.LINES[1])[1], 1e6 * dataset["contact_radius"].isel(sphere_radius=1, t=-1), rtol=1e-14
-    )
-
-
-# -- open contacts, categories, curves upon each other ----------------------------------------
+    radius = 1e6 * dataset["contact_radius"].isel(sphere_radius=1, t=-1)
+    assert_allclose(drawn(panel, pictures.LINES[1])[1], radius, rtol=1e-14)
 
 
 def test_lines_break_where_the_contact_is_open_and_a_cross_tells_where():
@@ -161,9 +147,6 @@ def test_a_fluctuation_energy_too_small_to_see_has_a_panel_of_its_own(ramp):
     assert len(plots.draw(ramp, "curve").axes) == 3
 
 
-# -- which figure -----------------------------------------------------------------------------
-
-
 def test_default_figure_fits_the_dataset():
     loads, start = {"contact.load": [1e-3, 4e-3]}, drive.Start(rest=0.1, speed=1e-3)
     moved = {"contact": Equilibrium(load={"from": 0.0, "to": 4e-3}), "sweep": {"sphere.radius": [1e-3, 2e-3]}}
@@ -181,16 +164,6 @@ def test_default_figure_fits_the_dataset():
         ({"drive": STEADY, "sweep": {"contact.reversible": [0.0, 0.1]}}, "theories"),
     ):
         assert plots.default(simulated(shear=shear.Uniform(), **changes)) == kind, changes
-
-
-def test_figures_that_need_a_sweep_or_a_ramp_name_the_cure_and_other_figures(ramp):
-    with pytest.raises(ValueError, match=r"\[sweep\].*drawn as: theories, stress, friction, curve, time, profile"):
-        plots.draw(ramp, "sweep")
-    with pytest.raises(ValueError, match=r'\[drive\] model = "ramp"'):
-        plots.draw(simulated(drive=STEADY, shear=shear.Uniform()), "curve")
-
-
-# -- many curves, jumps of the speed ----------------------------------------------------------
 
 
 def test_many_curves_along_one_number_have_a_colour_bar_in_place_of_names():
@@ -282,36 +255,21 @@ def test_a_figure_of_what_was_not_recorded_names_the_quantity_and_the_key():
         with pytest.raises(ValueError, match=f'^{name} was not recorded; add "{name}" to record.quantities'):
             plots.draw(dataset, kind)
     assert plots.default(dataset) == "time" and rendered(plots.draw(dataset))
+    with pytest.raises(ValueError, match=r"\[sweep\].*drawn as: theories, stress, friction, curve, time, profile"):
+        plots.draw(simulated(), "sweep")
+    with pytest.raises(ValueError, match=r'\[drive\] model = "ramp"'):
+        plots.draw(simulated(drive=STEADY, shear=shear.Uniform()), "curve")
 
 
-# -- saving -----------------------------------------------------------------------------------
-
-
-@pytest.fixture(scope="module")
-def saved(ramp, tmp_path_factory):
-    """A figure drawn and saved twice, with matplotlib's settings before and after."""
-    folder, before = tmp_path_factory.mktemp("figures"), mpl.rcParams.copy()
+def test_equal_figures_give_equal_files_of_one_or_two_columns_and_leave_matplotlib_alone(ramp, tmp_path):
+    before = mpl.rcParams.copy()
     for name in ("first", "second"):
         figure = plots.draw(ramp, "friction")
         for suffix in ("png", "pdf"):
-            figure.savefig(folder / f"{name}.{suffix}")
-    return folder, before, mpl.rcParams.copy()
-
-
-def test_equal_figures_give_equal_files(saved):
-    folder, _, _ = saved
+            figure.savefig(tmp_path / f"{name}.{suffix}")
     for suffix in ("png", "pdf"):
-        assert (folder / f"first.{suffix}").read_bytes() == (folder / f"second.{suffix}").read_bytes()
-
-
-def test_figures_are_one_or_two_columns_wide_at_200_dpi(saved):
-    folder, _, _ = saved
-    plots.draw(mapped(), "map").savefig(folder / "map.png")
-    widths = [int.from_bytes((folder / f"{name}.png").read_bytes()[16:20], "big") for name in ("first", "map")]
-    assert widths == [680, 1400]
-
-
-def test_drawing_leaves_the_settings_of_matplotlib_alone_and_needs_no_pyplot(saved):
-    _, before, after = saved
-    assert after == before
-    assert "matplotlib.pyplot" not in sys.modules  # no test imports it
+        assert (tmp_path / f"first.{suffix}").read_bytes() == (tmp_path / f"second.{suffix}").read_bytes()
+    plots.draw(mapped(), "map").savefig(tmp_path / "map.png")
+    widths = [int.from_bytes((tmp_path / f"{name}.png").read_bytes()[16:20], "big") for name in ("first", "map")]
+    assert widths == [680, 1400]  # at 200 dpi
+    assert mpl.rcParams.copy() == before and "matplotlib.pyplot" not in sys.modules  # no test imports it

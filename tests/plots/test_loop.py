@@ -57,29 +57,20 @@ def thick(panel):
     return np.hstack([first, np.array(later)[:, 1:]])
 
 
-# -- what is drawn ----------------------------------------------------------------------------
-
-
-def test_load_and_radius_stand_over_the_indentation_and_break_where_the_contact_is_open(grips):
-    loads, radii, _ = rendered(plots.draw(grips, "loop")).axes
+def test_load_and_radius_stand_over_the_indentation_and_each_other_and_break_where_the_contact_is_open(grips):
+    loads, radii, over_load = rendered(plots.draw(grips, "loop")).axes
     closed = grips["in_contact"].to_numpy() == 1
     assert radii.get_xlabel() == r"indentation $\delta$ (µm)" and not closed.all()
-    for panel, name, factor in ((loads, "normal_load", 1e6), (radii, "contact_radius", 1e6)):
-        x, y = thick(panel)
-        assert_allclose(x, 1e6 * grips["indentation"], rtol=1e-14)
-        assert_allclose(y, np.where(closed, factor * grips[name], np.nan), rtol=1e-14)
+    radius = np.where(closed, 1e6 * grips["contact_radius"], np.nan)
+    for panel, x, y in (
+        (loads, "indentation", np.where(closed, 1e6 * grips["normal_load"], np.nan)),
+        (radii, "indentation", radius),
+        (over_load, "normal_load", radius),
+    ):
+        assert_allclose(thick(panel), [1e6 * grips[x], y], rtol=1e-14)
     (thin,) = (line for line in loads.lines if line.get_linewidth() == 0.4)
     np.testing.assert_array_equal(thin.get_ydata(), np.where(closed, np.nan, 0.0))
-
-
-def test_the_radius_stands_over_the_load_with_every_equilibrium_too(grips):
-    panel = plots.draw(grips, "loop").axes[2]
-    closed = grips["in_contact"].to_numpy() == 1
-    load, radius = thick(panel)
-    assert panel.get_xlabel() == "normal load $P$ (µN)" and panel.get_ylabel() == "contact radius $a$ (µm)"
-    assert_allclose(load, 1e6 * grips["normal_load"], rtol=1e-14)
-    assert_allclose(radius, np.where(closed, 1e6 * grips["contact_radius"], np.nan), rtol=1e-14)
-    load, radius = drawn(panel, pictures.REFERENCE, "--")
+    load, radius = drawn(over_load, pictures.REFERENCE, "--")
     assert_allclose(load, 1e6 * jkr.load_at_radius(1e-6 * radius, *JKR), rtol=1e-12, atol=1e-12)
 
 
@@ -146,12 +137,8 @@ def test_crosses_rings_and_dotted_verticals_tell_where_the_contact_jumps(machine
     ends = sorted((path[0, 0], path[1, 1]) for path in verticals.get_segments())
     assert_allclose(ends, sorted(zip(x[[*off, *on]], load[[*off, *on]], strict=True)), rtol=1e-14)
     assert len(radii.collections[0].get_segments()) == 4
-
-
-def test_a_dead_load_has_no_jump_to_draw_but_a_cross():
-    dataset = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}), clock=COARSE)
-    loads, radii, _ = plots.draw(dataset, "loop").axes
-    assert radii.get_xlabel() == r"indentation $\delta$ (µm)"
+    dead = moved(Equilibrium(load={"from": 1e-3, "to": -1e-3, "cycles": 1}), clock=COARSE)
+    loads = plots.draw(dead, "loop").axes[0]  # a dead load has no jump to draw, but a cross
     assert not loads.collections and len(marks(loads, "x")) == 1 and not marks(loads, "o")
 
 
@@ -165,9 +152,7 @@ def test_the_legend_tells_the_energy_of_a_trip_and_the_loop(machine):
     # a jump drawn as a straight line between two records costs half its load times their distance, twice a cycle
     assert_allclose(loop, spent, rtol=0, atol=2 * 0.5 * 1.5 * np.pi * 42e-3 * 2e-3 * RECORD)
     (entry,) = plots.draw(machine, "loop").axes[0].get_legend().get_texts()
-    assert entry.get_text() == (
-        rf"simulated: $W$ = {1e12 * float(spent):.3g} pJ, $\oint\,P\,\mathrm{{d}}\Delta$ = {1e12 * float(loop):.3g} pJ"
-    )
+    assert all(f"{1e12 * float(energy):.3g} pJ" in entry.get_text() for energy in (spent, loop))
 
 
 def test_a_way_without_return_or_that_stops_tells_what_was_lost_in_all():
@@ -215,15 +200,11 @@ def test_every_shape_of_dataset_can_be_drawn():
         assert base.get_ylabel().startswith("base") and lines_of(base)
 
 
-# -- which figure -----------------------------------------------------------------------------
-
-
 def test_loop_is_what_fits_where_the_sphere_is_moved_and_refused_where_it_stays(grips):
     assert plots.default(grips) == "loop"
     stays = moved(Equilibrium(load=4e-3))
     assert "loop" not in plots.drawable(stays) and "loop" in plots.drawable(grips)
-    cure = r'no loop; move it: \[contact\] indentation = \{ from = "2 um", .*drawn as: theories, time'
-    with pytest.raises(ValueError, match=cure):
+    with pytest.raises(ValueError, match=r"\[contact\] indentation = .*drawn as: theories, time"):
         plots.draw(stays, "loop")
 
 

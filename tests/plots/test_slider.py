@@ -116,11 +116,9 @@ def test_the_area_on_the_way_to_sliding_lies_beside_the_law_fitted_to_its_beginn
 
 
 def test_figures_of_a_slider_are_refused_with_the_cure_where_they_cannot_be_drawn():
-    for kind, of, cure in [
-        ("creep", "pull", "force"),
-        ("stability", "pull", "drive.stiffness"),
-        ("stability", "creep", "spring"),
+    for kind, of, cure in (
+        ("creep", "pull", "force"), ("stability", "pull", "drive.stiffness"), ("stability", "creep", "spring"),
         ("incipient", "map", "rest"),
-    ]:
+    ):  # fmt: skip
         with pytest.raises(ValueError, match=cure):
             draw(driven(of), kind)

@@ -49,21 +49,12 @@ def starts():
     return started(sweep={"drive.rest": [0.5, 1.0], "drive.speed": [1e-7, 3e-7, 1e-6]})
 
 
-# -- over the speed ---------------------------------------------------------------------------
-
-
-def test_stress_and_bonds_are_drawn_over_the_speed(ramp):
+def test_stress_and_bonds_are_drawn_over_the_speed_beside_the_exact_law_and_the_mean_field(ramp):
     stress, fraction = rendered(plots.draw(ramp, "stress")).axes
-    speed, values = drawn(stress, pictures.BOTH)
-    assert_allclose(speed, 1e6 * ramp["speed"], rtol=1e-14)
-    assert_allclose(values, 1e-3 * ramp["shear_stress"], rtol=1e-14)
+    assert_allclose(drawn(stress, pictures.BOTH), [1e6 * ramp["speed"], 1e-3 * ramp["shear_stress"]], rtol=1e-14)
     assert_allclose(drawn(fraction, pictures.BOTH)[1], ramp["bond_fraction"], rtol=1e-14)
     assert stress.get_ylabel() == r"shear stress $\tau_0$ (kPa)"
     assert (fraction.get_xlabel(), fraction.get_xscale()) == ("sliding speed $V$ (µm/s)", "log")
-
-
-def test_the_exact_law_and_the_mean_field_are_beside_the_simulated(ramp):
-    stress, fraction = plots.draw(ramp, "stress").axes
     speed, exact = drawn(stress, PALE)
     assert_allclose(exact, 1e-3 * schallamach.bell_stress(1e-6 * speed, *LAW, 9e16), rtol=1e-12)
     speed, field = drawn(stress, pictures.REFERENCE, "--")
@@ -145,9 +136,6 @@ def test_every_kind_of_sliding_can_be_drawn():
         assert stress and all(np.isfinite(np.asarray(line.get_ydata(), float)).any() for line in stress)
 
 
-# -- rest and start ---------------------------------------------------------------------------
-
-
 def test_stress_is_drawn_since_the_start_at_the_longest_rest(starts):
     panel, _ = rendered(plots.draw(starts, "stress")).axes
     slides = starts["t"].to_numpy() > 1.0 + 1e-9
@@ -192,10 +180,7 @@ def test_peaks_that_the_run_does_not_resolve_are_hollow():
     )
     assert_allclose(hollow, [1000.0], rtol=1e-12)
     assert "not resolved" in legend_of(panel)[0]
-
-
-def test_a_stress_that_still_rises_at_the_end_has_no_peak_yet():
-    (rising,) = starts_of(started(drive=drive.Start(rest=1.9, speed=1e-7)))
+    (rising,) = starts_of(started(drive=drive.Start(rest=1.9, speed=1e-7)))  # at the end there is no peak yet
     assert not rising.resolved and rising.peak == rising.stress[-1]
 
 
@@ -226,9 +211,6 @@ def test_a_key_that_is_not_swept_is_no_axis():
     ):
         figure = plots.draw(started(sweep=sweep, clock=Clock(duration=2.0, step=0.02)))
         assert [panel.get_xlabel() for panel in figure.axes] == words
-
-
-# -- what cannot be drawn ---------------------------------------------------------------------
 
 
 def test_a_dataset_without_stress_or_speeds_is_refused_with_the_cure():

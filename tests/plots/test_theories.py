@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.pictured import RAMP, STEADY, rendered, simulated
+from helpers.pictured import RAMP, STEADY, data_of, rendered, simulated
 from matplotlib.patches import Circle
 from numpy.testing import assert_allclose
 
@@ -30,13 +30,8 @@ def plain(**changes):
 
 def curve_of(panel, name):
     _, colour, style = rival_figures._THEORIES[name]
-    (line,) = (
-        x for x in panel.lines if (x.get_color(), x.get_linestyle()) == (colour, style) and len(x.get_xdata()) > 2
-    )
-    return line.get_data()
-
-
-# -- theories -----------------------------------------------------------------------------------
+    (data,) = (data for data in data_of(panel, colour, style) if len(data[0]) > 2)
+    return data
 
 
 def test_every_theory_is_drawn_as_far_as_adhesion_holds():
@@ -121,17 +116,15 @@ def test_the_fraction_is_the_datasets_own_and_its_points_lie_on_the_theories():
     assert len(stress) == 6
 
 
-def test_a_sphere_that_is_not_held_at_a_number_is_refused_with_the_cure():
-    for contact in [Equilibrium(displacement=1e-6, stiffness=100.0), Equilibrium(load={"from": 0.0, "to": 4e-3})]:
-        with pytest.raises(ValueError, match=r"load = .4 mN., or with an indentation; .*drawn as: .*time, profile"):
-            plots.draw(plain(contact=contact), "theories")
-
-
-def test_without_adhesion_or_contact_there_is_nothing_to_compare():
-    with pytest.raises(ValueError, match="no adhesion"):
-        plots.draw(plain(adhesion=Adhesion(work=0.0)), "theories")
-    with pytest.raises(ValueError, match=r"no contact at rest.*drawn as: time$"):
-        plots.draw(plain(contact=Equilibrium(load=-1.0)), "theories")
+def test_what_cannot_be_compared_is_refused_with_the_cure():
+    for changes, words in (
+        ({"contact": Equilibrium(displacement=1e-6, stiffness=100.0)}, "load = .*indentation; .*drawn as: .*profile"),
+        ({"contact": Equilibrium(load={"from": 0.0, "to": 4e-3})}, "load = .*indentation; .*drawn as: .*profile"),
+        ({"adhesion": Adhesion(work=0.0)}, "no adhesion"),
+        ({"contact": Equilibrium(load=-1.0)}, "no contact at rest.*drawn as: time$"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            plots.draw(plain(**changes), "theories")
 
 
 def test_every_scene_at_a_load_can_be_compared():
@@ -145,16 +138,9 @@ def test_every_scene_at_a_load_can_be_compared():
             assert panel.get_ylim()[0] < points[1].min() and points[1].max() < panel.get_ylim()[1]
 
 
-# -- profiles ---------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def slid():
     return simulated(ensemble=Ensemble(members=2))
-
-
-def data_of(panel, colour, style="-"):
-    return [line.get_data() for line in panel.lines if (line.get_color(), line.get_linestyle()) == (colour, style)]
 
 
 def test_pressure_is_that_of_the_first_member_at_the_last_time_and_at_rest(slid):
@@ -221,9 +207,6 @@ def test_every_contact_has_profiles():
         ((x, p),) = data_of(pressure, pictures.BOTH)
         (_, low), (_, high) = data_of(surfaces, pictures.BOTH)
         inside = np.abs(x) < 0.999e6 * radius
-        assert (
-            np.isfinite(p[inside]).all()
-            and p[inside].any()
-            and not np.nan_to_num(p[np.abs(x) > 1.001e6 * radius]).any()
-        )
+        outside = np.nan_to_num(p[np.abs(x) > 1.001e6 * radius])
+        assert np.isfinite(p[inside]).all() and p[inside].any() and not outside.any()
         assert np.all(low[inside] == high[inside]) and np.all(low <= high)
