@@ -16,6 +16,54 @@ CRITICAL, HEALING = 1e-2, 200.0
 EXPONENTS = 10.0 ** np.arange(-9, 10)  # rate x duration
 
 
+def test_the_onset_of_mean_field_is_that_of_the_eigenvalues_and_solves_the_characteristic_equation():
+    for speed, beta, stiffness, frequency in [
+        (10.0, 1.0, 0.0390213, 4.691569),
+        (20.0, 1.0, 0.0515158, 9.999753),
+        (50.0, 10.0, 0.1823410, 24.876979),
+        (100.0, 1.0, 0.0378665, 46.056227),
+    ]:
+        onset = law.first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, law.Body(1.0))
+        assert_allclose(onset, (stiffness, frequency), rtol=2e-6)
+        assert np.isnan(law.first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, law.Body(1.0))).all()
+    for body in [
+        law.Body(1.0),
+        law.Body(1.0, area_growth=0.5),
+        law.Body(1.0, mass=1e-2),
+        law.Body(1.0, mass=1e-3, contact_stiffness=0.05),
+        law.Body(1.0, damping=2e-3),
+        law.Body(1.0, mass=1e-3, damping=1e-3, contact_stiffness=0.05),
+        law.Body(2.0, viscosity=5e-4),
+        law.Body(2.0, 0.5, -0.1, 1e-3, 1e-3, 1e-4, 0.5, 0.5),
+    ]:
+        stiffness, frequency = law.first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, body)
+        # bonds N and stretches x of a site, slip and body: small motions of the equations of the closure themselves
+        tilt = 1.7455280027406994  # x e^x = 10
+        rate, turns = 10.0 / tilt, 1j * frequency
+        bound = 1.0 / (1.0 + rate)
+        rows = [[turns + 1.0 + rate, bound * rate], [tilt * turns / bound, turns + rate * (1.0 + tilt)]]
+        more, stretched = np.linalg.solve(rows, [0.0, turns])
+        moment = bound * stretched + tilt * more
+        spread = body.area_growth * more / bound + body.stress_growth * moment / (bound * tilt)
+        force = body.area * (bound * tilt + 10.0 * body.viscosity)
+        pulls = body.area * (moment + body.viscosity * turns) + force * spread
+        slip = 1.0 + (pulls - body.contact_growth * force * spread) / body.contact_stiffness
+        spring = stiffness + body.damping * turns + body.mass * turns**2
+        assert abs(spring * slip + pulls) < 1e-12 * abs(pulls), body
+
+
+def test_mass_yielding_contacts_and_damping_move_the_onset():
+    def onset(area=1.0, **body):
+        return law.first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, law.Body(area, **body))
+
+    assert_allclose(onset(mass=[1e-3, 1e-2]).stiffness, (0.0610321013, 0.2591294488), rtol=1e-8)
+    assert_allclose(onset(mass=[0.0, 1e-3], contact_stiffness=0.05).stiffness, (0.1777133504, 0.1997241668), rtol=1e-8)
+    assert_allclose(onset(damping=[1e-3, 2e-3]).stiffness, (0.0319311178, 0.0241019898), rtol=1e-8)
+    assert_allclose(onset(area=2.0, viscosity=5e-4).stiffness, 2.0 * onset(damping=5e-4).stiffness, rtol=1e-12)
+    assert onset(contact_stiffness=0.03).stiffness == math.inf
+    assert np.isnan(onset(damping=10.0)).all() and np.isnan(onset(viscosity=10.0, contact_stiffness=0.03)).all()
+
+
 def test_the_steady_fraction_is_that_of_the_paper_with_its_limits():
     speed = np.array([1e-3, 1e-2, -1e-2, 0.0, -0.0, np.inf, -np.inf])
     assert_allclose(law.steady_fraction(speed, 1e-2), [10 / 11, 0.5, 0.5, 1.0, 1.0, 0.0, 0.0], rtol=1e-15, atol=0)
@@ -455,38 +503,21 @@ def test_arguments_broadcast():
     assert_array_equal(whole, [law.bell_moments(v, 1.0, 1.0, 1.0, 1.0).force for v in (1.0, 10.0)])
 
 
-def test_the_onset_of_oscillations_is_that_of_the_closures_eigenvalues():
-    for speed, beta, stiffness, frequency in [
-        (10.0, 1.0, 0.0390213, 4.691569),
-        (20.0, 1.0, 0.0515158, 9.999753),
-        (50.0, 10.0, 0.1823410, 24.876979),
-        (100.0, 1.0, 0.0378665, 46.056227),
-    ]:
-        onset = law.first_moment_onset(speed, 1.0, 1.0, 1.0, beta, 1.0, law.Body(1.0))
-        assert_allclose(onset, (stiffness, frequency), rtol=2e-6)
-        assert np.isnan(law.first_moment_onset(0.5, 1.0, 1.0, 1.0, beta, 1.0, law.Body(1.0))).all()
-
-
 def test_the_onset_of_bonds_resolved_by_stretch_is_that_of_the_characteristic_equation():
-    for beta, speed, stiffness, frequency in [
+    for beta, speed, *exact in [
         (0.1, 5.0, 0.00320497, 2.00008),
         (0.1, 20.0, 0.00436311, 8.59175),
         (1.0, 5.0, 0.00559440, 1.08232),
         (1.0, 10.0, 0.0295565, 4.25784),
-        (1.0, 20.0, 0.0352161, 8.66919),
         (1.0, 100.0, 0.0205200, 36.2893),
         (10.0, 20.0, 0.00714525, 2.71580),
-        (10.0, 100.0, 0.127572, 39.1448),
         (10.0, 1000.0, 0.0408748, 281.987),
     ]:
         onset = law.resolved_onset([speed, -speed], [(1.0, 1.0)], 1.0, beta, 1.0, law.Body(1.0))
-        assert_allclose(onset, np.transpose([(stiffness, frequency)] * 2), rtol=5e-6)
+        assert_allclose(onset, np.transpose([exact] * 2), rtol=5e-6)
         # of rates, forces and sites only ratios count
-        assert_allclose(
-            law.resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, law.Body(0.2)).stiffness,
-            stiffness,
-            rtol=5e-6,
-        )
+        scaled = law.resolved_onset(6.0 * speed, [(2.0, 3.0)], 1.0, 2.0 * beta, 5.0, law.Body(0.2))
+        assert_allclose(scaled.stiffness, exact[0], rtol=5e-6)
 
 
 def test_oscillations_of_bonds_resolved_by_stretch_set_in_beyond_the_maximum_of_friction_alone():
@@ -524,45 +555,3 @@ def test_oscillations_set_in_gradually_at_high_speeds_and_suddenly_at_low_ones()
     assert_allclose(amplitude([-100.0, 50.0]), [amplitude(100.0), amplitude(50.0)], rtol=1e-12)
     # of the rates and forces only ratios count
     assert_allclose(law.first_moment_amplitude(100.0, 3.0, 2.0, 6.0, 3.0), amplitude(100.0), rtol=1e-13)
-
-
-def test_area_mass_and_a_contact_that_yields_raise_the_stiffness_at_the_onset():
-    def onset(**body):
-        return law.first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, law.Body(1.0, **body))
-
-    massive, steps = [0.0, 1e-3], {"contact_stiffness": 0.05}
-    assert_allclose(onset(area_growth=0.5), (0.0986672601, 6.4985274731), rtol=1e-9)
-    assert_allclose(onset(mass=[1e-3, 1e-2]).stiffness, (0.0610321013, 0.2591294488), rtol=1e-8)
-    assert_allclose(onset(mass=massive, **steps).stiffness, (0.1777133504, 0.1997241668), rtol=1e-8)
-    assert_allclose(onset(mass=1e-2, contact_stiffness=0.2).stiffness, 0.2685882190, rtol=1e-8)
-    assert onset(contact_stiffness=0.03).stiffness == math.inf
-
-
-def test_damping_holds_softer_springs_and_so_does_a_viscous_interface_whose_contact_does_not_yield():
-    def onset(**body):
-        return law.first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, law.Body(**({"area": 1.0} | body)))
-
-    assert_allclose(onset(damping=1e-3), (0.0319311178, 4.1845576357), rtol=1e-8)
-    assert_allclose(onset(damping=2e-3), (0.0241019898, 3.5927135646), rtol=1e-8)
-    assert_allclose(onset(mass=1e-3, damping=1e-3), (0.0494416404, 4.1845576357), rtol=1e-8)
-    softer = onset(mass=1e-3, damping=1e-3, contact_stiffness=0.05)
-    assert_allclose(softer, (0.1924327975, 4.6670599625), rtol=1e-8)
-    assert_allclose(onset(area=2.0, viscosity=5e-4).stiffness, 2.0 * onset(damping=5e-4).stiffness, rtol=1e-12)
-    assert np.isnan(onset(damping=10.0)).all() and np.isnan(onset(viscosity=10.0, contact_stiffness=0.03)).all()
-
-
-def test_what_holds_a_spring_solves_the_characteristic_equation_with_all_its_terms():
-    body = law.Body(2.0, 0.5, -0.1, 1e-3, 1e-3, 1e-4, 0.5, 0.5)
-    stiffness, frequency = law.first_moment_onset(10.0, 1.0, 1.0, 1.0, 1.0, 1.0, body)
-    # bonds N and stretches x of a site, slip and body: small motions of the equations of the closure themselves
-    tilt = 1.7455280027406994  # x e^x = 10
-    rate, turns = 10.0 / tilt, 1j * frequency
-    bound = 1.0 / (1.0 + rate)
-    rows = [[turns + 1.0 + rate, bound * rate], [tilt * turns / bound, turns + rate * (1.0 + tilt)]]
-    more, stretched = np.linalg.solve(rows, [0.0, turns])
-    moment = bound * stretched + tilt * more
-    spread = 0.5 * more / bound - 0.1 * moment / (bound * tilt)
-    force = 2.0 * (bound * tilt + 1e-3)
-    pulls = 2.0 * (moment + 1e-4 * turns) + force * spread
-    way = 1.0 + (pulls - 0.5 * force * spread) / 0.5
-    assert abs((stiffness + 1e-3 * turns + 1e-3 * turns**2) * way + pulls) < 1e-12 * abs(pulls)
