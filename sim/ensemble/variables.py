@@ -7,7 +7,6 @@ import numpy as np
 
 from sim.engine import State, Trajectory, balance
 from sim.laws import jkr
-from sim.parts import extremes
 from sim.parts.contact.balance import (
     BONDS_ONLY,
     CLOSED,
@@ -20,6 +19,7 @@ from sim.parts.contact.balance import (
     Shares,
 )
 from sim.parts.drive import READINGS
+from sim.parts.extremes import column
 from sim.scenario.scenario import Scenario
 
 
@@ -117,25 +117,25 @@ def _equilibrium_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     return _where_closed(course, EQUILIBRIUM, scene.contact.equilibrium(_control(scene, course), terms))
 
 
-def _pulled(state: State, column: int, sign: float) -> np.ndarray:
+def _pulled(state: State, name: str, sign: float) -> np.ndarray:
     """Return a column of the largest pull; nan for a contact that was never pulled."""
     pull = state.extremes.pull
-    return np.where(pull[:, extremes.LARGEST] > 0.0, sign * pull[:, column], np.nan)
+    return np.where(column("largest", pull) > 0.0, sign * column(name, pull), np.nan)
 
 
 #: Quantities of a whole run, read at its end.
 LARGEST = (
     Variable("peak_stress", "Pa", "largest magnitude of the mean shear stress of the run, that of the highest start;"
-          " open contacts count", "tau_p", "bonds", lambda scene, state: state.extremes.stress[:, extremes.LARGEST]),
+          " open contacts count", "tau_p", "bonds", lambda scene, state: column("largest", state.extremes.stress)),
     Variable("peak_friction", "N", "largest magnitude of the friction force of the run, that of the highest start",
-          "F_p", "contact", lambda scene, state: state.extremes.friction[:, extremes.LARGEST]),
+          "F_p", "contact", lambda scene, state: column("largest", state.extremes.friction)),
     Variable("peak_time", "s", "time of the largest shear stress", "t_p", "bonds",
-          lambda scene, state: state.extremes.stress[:, extremes.WHEN]),
+          lambda scene, state: column("time", state.extremes.stress)),
     Variable("pull_off_load", "N", "lowest normal load that the contact bore, a tension; nan without one", "P_min",
-          "contact", lambda scene, state: _pulled(state, extremes.LARGEST, -1.0),
+          "contact", lambda scene, state: _pulled(state, "largest", -1.0),
           lambda scene: scene.contact.makes_load, "a load that changes"),
     Variable("pull_off_time", "s", "time of the lowest normal load", "t_min", "contact",
-          lambda scene, state: _pulled(state, extremes.WHEN, 1.0),
+          lambda scene, state: _pulled(state, "time", 1.0),
           lambda scene: scene.contact.makes_load, "a load that changes"),
 )  # fmt: skip
 
@@ -189,8 +189,8 @@ VARIABLES: tuple[Variable, ...] = (
 
 def _driven(name: str, unit: str, long_name: str, symbol: str) -> Variable:
     """Return a quantity of a drive that solves the motion of the slider; those of the stage need a spring."""
-    column, sprung = READINGS.index(name), name.startswith("stage_")
-    described = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., column]
+    place, sprung = READINGS.index(name), name.startswith("stage_")
+    described = name, unit, long_name, symbol, "drive", lambda scene, course: course.driven[..., place]
     if sprung:
         return Variable(*described, lambda scene: scene.drive.model == "spring", 'drive.model = "spring"')
     return Variable(*described, lambda scene: scene.drive.solves_motion, 'drive.model = "spring" or "force"')

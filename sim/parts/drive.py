@@ -17,19 +17,8 @@ from pydantic import Field
 from pydantic.dataclasses import dataclass
 
 from sim.parts.exchange import Array, Motion, Motions, Setting, Times
+from sim.units import tables
 from sim.units.quantity import Quantity
-from sim.units.tables import (
-    Course,
-    Number,
-    Pieces,
-    Prescribed,
-    Table as Rows,
-    at_once,
-    linear_pieces,
-    over_time,
-    prescribed,
-    table_pieces,
-)
 
 _SPEED = Quantity("m/s", "sliding speed", "V")
 
@@ -89,7 +78,7 @@ class _Sliding:
     def remarks(self, setting: Setting) -> list[str]:
         return []
 
-    def pieces(self, ends: Array, duration: float) -> Pieces:
+    def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the speed in the intervals between some times [s], in pieces."""
         raise NotImplementedError
 
@@ -120,8 +109,8 @@ class Steady(_Sliding):
 
     end: ClassVar[float] = math.inf
 
-    def pieces(self, ends: Array, duration: float) -> Pieces:
-        return Number(self.speed).pieces(ends, duration)
+    def pieces(self, ends: Array, duration: float) -> tables.Pieces:
+        return tables.Number(self.speed).pieces(ends, duration)
 
 
 @dataclass(frozen=True, config={"extra": "forbid"})
@@ -143,13 +132,13 @@ class Start(_Sliding):
         still = "the slider rests for the whole run: shorten drive.rest or lengthen clock.duration"
         return [still] if self.rest >= setting.times.duration else []
 
-    def pieces(self, ends: Array, duration: float) -> Pieces:
+    def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         times, speeds = np.array([0.0, self.rest, self.rest]), np.array([0.0, 0.0, self.speed])
-        return table_pieces(times, speeds, ends, duration)
+        return tables.table_pieces(times, speeds, ends, duration)
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid", "populate_by_name": True})
-class Ramp(Course, _Sliding):
+class Ramp(tables.Course, _Sliding):
     """A speed that goes from one value to another over the whole run, linearly or logarithmically.
 
     In a scenario file the two ends are called ``from`` and ``to``.
@@ -161,7 +150,7 @@ class Ramp(Course, _Sliding):
 
 
 @dataclass(frozen=True, kw_only=True, config={"extra": "forbid"})
-class Table(Rows, _Sliding):
+class Table(tables.Table, _Sliding):
     """A speed tabulated over time, linear between the rows; two rows at one time are a jump.
 
     In a scenario file ``file`` names a CSV with the columns ``time`` and ``speed``, each with its
@@ -172,13 +161,13 @@ class Table(Rows, _Sliding):
     column: ClassVar[str] = "speed"
     values_in: ClassVar[str] = "speed"
 
-    speed: Annotated[tuple[Annotated[float, _SPEED], ...], at_once(_SPEED)]
+    speed: Annotated[tuple[Annotated[float, _SPEED], ...], tables.at_once(_SPEED)]
     model: Literal["table"] = "table"
 
 
 _STAGE_SPEED = Quantity("m/s", "speed of the stage", "V")
-_Stage = over_time(_STAGE_SPEED, "speed")
-_Force = over_time(Quantity("N", "tangential force on the body", "Q"), "force")
+_Stage = tables.over_time(_STAGE_SPEED, "speed")
+_Force = tables.over_time(Quantity("N", "tangential force on the body", "Q"), "force")
 _Stiffness = Annotated[float, Quantity("N/m", "stiffness of the spring", "K", above=0)]
 _Mass = Annotated[float, Quantity("kg", "mass of the body", "m", at_least=0)]
 _Damping = Annotated[float, Quantity("N s/m", "damping of the body", "c", at_least=0)]
@@ -274,7 +263,7 @@ class _Driven:
         return self.mass + self.damping + self.viscosity == 0.0
 
     @property
-    def course(self) -> Prescribed:
+    def course(self) -> tables.Prescribed:
         """Prescribed course over time."""
         raise NotImplementedError
 
@@ -307,7 +296,7 @@ class _Driven:
             return 0.0, 4.0 * (2.0 - poisson_ratio) / (3.0 * math.pi**2 * shear_modulus)
         return (0.0, 0.0) if self.contact_stiffness == "rigid" else (1.0 / float(self.contact_stiffness), 0.0)
 
-    def driven(self, ends: Array, duration: float) -> Pieces:
+    def driven(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the prescribed speed of the stage or force in the intervals between some times [s]."""
         return self.course.pieces(ends, duration)
 
@@ -333,10 +322,10 @@ class Force(_Driven):
     model: Literal["force"] = "force"
 
     @property
-    def course(self) -> Prescribed:
-        return prescribed(self.force)
+    def course(self) -> tables.Prescribed:
+        return tables.prescribed(self.force)
 
-    def pieces(self, ends: Array, duration: float) -> Pieces:
+    def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         return _zeros(ends)
 
 
@@ -358,8 +347,8 @@ class Spring(_Driven):
         return self.stiffness
 
     @property
-    def course(self) -> Prescribed:
-        return prescribed(self.stage)
+    def course(self) -> tables.Prescribed:
+        return tables.prescribed(self.stage)
 
     @property
     def end(self) -> float:
@@ -371,10 +360,10 @@ class Spring(_Driven):
     def _first_speed(self, duration: float) -> float:
         return self.first(duration) if self.start == "steady" else 0.0
 
-    def driven(self, ends: Array, duration: float) -> Pieces:
+    def driven(self, ends: Array, duration: float) -> tables.Pieces:
         return self.pieces(ends, duration)
 
-    def pieces(self, ends: Array, duration: float) -> Pieces:
+    def pieces(self, ends: Array, duration: float) -> tables.Pieces:
         """Return the speed of the stage in the intervals between some times [s], in pieces."""
         after = self.start_after
         if after <= ends[0]:
@@ -384,19 +373,19 @@ class Spring(_Driven):
         rests, cut = ends[ends < after], ends[ends > after]
         still = _zeros(np.append(rests, after))
         moving = _shifted(self.course.pieces(np.append(0.0, cut - after), duration - after), after)
-        pieces = Pieces(*(np.concatenate(pair) for pair in zip(still, moving, strict=True)))
+        pieces = tables.Pieces(*(np.concatenate(pair) for pair in zip(still, moving, strict=True)))
         return pieces._replace(interval=np.searchsorted(ends, 0.5 * (pieces.start + pieces.stop)) - 1)
 
 
-def _shifted(pieces: Pieces, time: float) -> Pieces:
+def _shifted(pieces: tables.Pieces, time: float) -> tables.Pieces:
     """Return pieces that begin later by a time [s]."""
     return pieces._replace(start=pieces.start + time, stop=pieces.stop + time)
 
 
-def _zeros(ends: Array) -> Pieces:
+def _zeros(ends: Array) -> tables.Pieces:
     """Return pieces of zero in the intervals between some times [s]."""
     none = np.zeros(len(ends) - 1)
-    return linear_pieces(np.arange(len(none)), ends[:-1], ends[1:], none, none)
+    return tables.linear_pieces(np.arange(len(none)), ends[:-1], ends[1:], none, none)
 
 
 Drive = Annotated[Steady | Start | Ramp | Table | Force | Spring, Field(discriminator="model")]

@@ -14,12 +14,12 @@ _READ = "Array(float64, 2, 'A', readonly=True), "
 _OF_THE_STRESS = "stress", "stiffness", "relaxation"
 #: Change over a step, by the slope at one of its ends, over the value, up to which a cubic holds.
 _RESOLVED = 5.0
-#: Columns of a running maximum: the last value but one, the last value, the maximum so far, and its time [s].
-BEFORE, LAST, LARGEST, WHEN = range(4)
+#: Row of a running maximum: the last value but one, the last value, the maximum so far, and its time [s].
+MAXIMUM = np.dtype([(name, float) for name in ("before", "last", "largest", "time")])
 
 
 class Extremes(NamedTuple):
-    """Running maxima over the clock steps, each of shape (rows, 4); NaN counts as 0; ties keep the first.
+    """Running maxima over the clock steps, rows of ``MAXIMUM``; NaN counts as 0; ties keep the first.
 
     ``stress`` is that of the shear stress [Pa] and ``friction`` that of the friction force [N], in magnitude; ``pull``
     is that of the tensile load of a closed contact [N], followed where the control makes the load.
@@ -34,6 +34,12 @@ def first(bonding: Bonding, radius: Array, pull: Array) -> Extremes:
     """Maxima at t = 0 of the bonds' stress, of friction over a contact radius [m] and of a pull [N]."""
     stress = np.abs(bonding.stress)
     return Extremes(*(_started(np.nan_to_num(values)) for values in (stress, stress * (np.pi * radius**2), pull)))
+
+
+def column(name: str, maxima: Array) -> Array:
+    """Return a column of running maxima by its name in ``MAXIMUM``."""
+    values: Array = maxima.view(MAXIMUM)[:, 0][name]
+    return values
 
 
 def _started(values: Array) -> Array:
@@ -100,21 +106,20 @@ def _follow(stresses, stiffness, relaxation, radii, pulls, first, speed, times, 
             value0, slope0, area0 = _load(k, i, *bonds, _of(first, k, i), radii)
             value1, slope1, area1 = _load(k + 1, i, *bonds, _of(speed, k, i), radii)
             if i < len(stress):
-                _keep(value1, slope0, slope1, time, step, stress[i])
+                _keep(value1, slope0, slope1, time, step, stress[i].view(MAXIMUM)[0])
             growth = (area1 - area0) / step
             rise, slope = area0 * slope0 + growth * value0, area1 * slope1 + growth * value1
-            _keep(value1 * area1, rise, slope, time, step, friction[i])
+            _keep(value1 * area1, rise, slope, time, step, friction[i].view(MAXIMUM)[0])
         for i in range(len(pull)):
-            _keep(_of(pulls, k, i), math.nan, math.nan, time, step, pull[i])
+            _keep(_of(pulls, k, i), math.nan, math.nan, time, step, pull[i].view(MAXIMUM)[0])
 
 
 @device
 def _keep(now, rise, slope, time, step, maximum):
     """Replace a maximum by that after a value ``now`` at ``time``; slopes at both ends of the step, nan if unknown."""
-    before, last, largest, when = maximum[BEFORE], maximum[LAST], maximum[LARGEST], maximum[WHEN]
-    now = 0.0 if math.isnan(now) else now
-    if now > largest:
-        largest, when = now, time
+    before, last, now = maximum.before, maximum.last, 0.0 if math.isnan(now) else now
+    if now > maximum.largest:
+        maximum.largest, maximum.time = now, time
     peak, back = -math.inf, 0.0
     steepest, larger = rise if rise > -slope else -slope, last if last > now else now  # max compiles for long
     if rise > 0.0 > slope and step * steepest < _RESOLVED * larger:
@@ -122,9 +127,9 @@ def _keep(now, rise, slope, time, step, maximum):
     elif math.isnan(rise + slope) and last >= before and last > now and before > 0.5 * last and now > 0.5 * last:
         back = 1.0 - 0.5 * (before - now) / (before - 2.0 * last + now)
         peak = last - 0.25 * (before - now) * (1.0 - back)
-    if peak > largest:
-        largest, when = peak, time - back * step
-    maximum[BEFORE], maximum[LAST], maximum[LARGEST], maximum[WHEN] = last, now, largest, when
+    if peak > maximum.largest:
+        maximum.largest, maximum.time = peak, time - back * step
+    maximum.before, maximum.last = last, now
 
 
 @device

@@ -1,7 +1,6 @@
 """Running maxima: exact for parabolas, honest about jumps, the same after a restart."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from sim.parts import extremes
@@ -14,16 +13,16 @@ def followed(samples, step=0.5, slopes=None, radii=(ONE, ONE)):
     """Running maximum of a stress given by its values, slopes where they are known; friction over a growing area."""
     zero, slopes = np.zeros(1), slopes or [np.full(1, np.nan)] * len(samples)
     bondings = [Bonding(zero, np.asarray(one), zero, zero, slope) for one, slope in zip(samples, slopes, strict=True)]
-    found = extremes.first(bondings[0], radii[0], zero)
-    whole = _after(found, bondings, radii, step, 1)
+    maxima = extremes.first(bondings[0], radii[0], zero)
+    whole = _after(maxima, bondings, radii, step, 1)
     for number in range(1, len(bondings)):
-        found = _after(found, bondings[number - 1 : number + 1], radii, step, number)
-    for one, other in zip(found, whole, strict=True):
+        maxima = _after(maxima, bondings[number - 1 : number + 1], radii, step, number)
+    for one, other in zip(maxima, whole, strict=True):
         assert_array_equal(one, other)
-    return found
+    return maxima
 
 
-def _after(found, bondings, radii, step, number):
+def _after(maxima, bondings, radii, step, number):
     """Maxima after a block of steps."""
     steps = len(bondings) - 1
     still, times = np.zeros((steps, 1)), step * np.arange(number, number + steps)[:, None]
@@ -31,39 +30,39 @@ def _after(found, bondings, radii, step, number):
     bonding = Bonding(*(np.array(values[1:]) for values in zip(*bondings, strict=True)))
     # the radius jumps at the beginning of a step: only the last row of a block is its end
     ends = np.repeat(radii[1][None], steps, axis=0)
-    return extremes.after(found, (bondings[0], radii[0]), bonding, ends, still, motions)
+    return extremes.after(maxima, (bondings[0], radii[0]), bonding, ends, still, motions)
 
 
-def stress(*given):
-    return followed(*given).stress
+def stress(*course):
+    return followed(*course).stress
 
 
 def test_a_parabola_is_found_between_its_samples():
     top, where = np.array([3.0, 7.0]), np.array([1.2, 2.9])
     times = 0.5 * np.arange(9)
-    found = stress([top - 0.1 * (t - where) ** 2 for t in times])
-    assert_allclose(found[:, extremes.LARGEST], top, rtol=1e-14)
-    assert_allclose(found[:, extremes.WHEN], where, rtol=1e-12)
+    maxima = stress([top - 0.1 * (t - where) ** 2 for t in times])
+    assert_allclose(extremes.column("largest", maxima), top, rtol=1e-14)
+    assert_allclose(extremes.column("time", maxima), where, rtol=1e-12)
 
 
 def test_a_cubic_is_found_between_its_samples_by_values_and_slopes():
     top, where = np.array([2.0, 7.0]), np.array([1.6, 2.9])
     away = [t - where for t in 0.5 * np.arange(7)]
-    found = stress([top - 0.05 * u**2 * (1.5 - u) for u in away], 0.5, [0.15 * u * (u - 1.0) for u in away])
-    assert_allclose(found[:, extremes.LARGEST], top, rtol=1e-14)
-    assert_allclose(found[:, extremes.WHEN], where, rtol=1e-12)
+    maxima = stress([top - 0.05 * u**2 * (1.5 - u) for u in away], 0.5, [0.15 * u * (u - 1.0) for u in away])
+    assert_allclose(extremes.column("largest", maxima), top, rtol=1e-14)
+    assert_allclose(extremes.column("time", maxima), where, rtol=1e-12)
 
 
 def test_a_jump_keeps_its_sample():
     for samples in ([0.0, 0.0, 5.0, 4.9], [4.0, 4.9, 5.0, 0.0, 1.0], [1.0, 5.0]):
-        found = stress([np.array([value]) for value in samples])
-        assert found[0, extremes.LARGEST] == 5.0
-        assert found[0, extremes.WHEN] == 0.5 * samples.index(5.0)
+        maxima = stress([np.array([value]) for value in samples])
+        assert extremes.column("largest", maxima)[0] == 5.0
+        assert extremes.column("time", maxima)[0] == 0.5 * samples.index(5.0)
 
 
 def test_nothing_is_larger_than_nan():
-    found = stress([np.array([np.nan]), np.array([2.0]), np.array([np.nan])])
-    assert found[0, extremes.LARGEST] == 2.0
+    maxima = stress([np.array([np.nan]), np.array([2.0]), np.array([np.nan])])
+    assert extremes.column("largest", maxima)[0] == 2.0
 
 
 def peak_errors(counts, known):
@@ -72,8 +71,8 @@ def peak_errors(counts, known):
     for count in counts:
         times = 0.013 + np.linspace(0.0, 3.0, count + 1)
         slopes = [np.array([(np.cos(t) - np.sin(t)) * np.exp(-t)]) for t in times] if known else None
-        found = stress([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count, slopes)
-        errors.append(abs(found[0, extremes.LARGEST] / exact - 1.0))
+        maxima = stress([np.array([np.sin(t) * np.exp(-t)]) for t in times], 3.0 / count, slopes)
+        errors.append(abs(extremes.column("largest", maxima)[0] / exact - 1.0))
     return np.array(errors)
 
 
@@ -85,19 +84,17 @@ def test_the_error_is_of_third_order_in_the_step_and_of_fourth_with_slopes():
     assert np.all(errors < (3.0 / counts) ** 4 / 90.0) and errors[-1] < errors[0] / 100.0  # h⁴ f⁗/384, f⁗ = 4 f
 
 
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_peak_within_the_first_step_from_zero_is_found(sign):
+def test_a_peak_within_the_first_step_from_zero_is_found():
     """Hermite's cubic from 0 with slope 1 to 0.3 with slope −0.01, of either sign."""
-    slopes = [np.array([sign]), np.array([sign * -0.01])]
-    found = stress([np.zeros(1), np.array([sign * 0.3])], 1.0, slopes)
-    t = np.linspace(0.0, 1.0, 100_001)
+    sign, t = np.array([1.0, -1.0]), np.linspace(0.0, 1.0, 100_001)
+    maxima = stress([np.zeros(2), 0.3 * sign], 1.0, [sign, -0.01 * sign])
     cubic = 0.3 * t**2 * (3.0 - 2.0 * t) + t * (1.0 - t) ** 2 - 0.01 * t**2 * (t - 1.0)
-    assert_allclose(found[0, extremes.LARGEST], cubic.max(), rtol=1e-9)
+    assert_allclose(extremes.column("largest", maxima), cubic.max(), rtol=1e-9)
 
 
 def test_slopes_that_no_cubic_could_follow_leave_the_sample():
-    found = stress([np.zeros(1), np.ones(1)], 1.0, [np.full(1, 30.0), np.full(1, -1.0)])
-    assert found[0, extremes.LARGEST] == 1.0
+    maxima = stress([np.zeros(1), np.ones(1)], 1.0, [np.full(1, 30.0), np.full(1, -1.0)])
+    assert extremes.column("largest", maxima)[0] == 1.0
 
 
 def test_one_row_for_all_members_is_each_members_own():
@@ -109,7 +106,7 @@ def test_one_row_for_all_members_is_each_members_own():
 def test_friction_grows_with_the_area_within_a_step():
     """Stress 1 − (t − 1/2)² over an area that doubles in a step of 1: cubic, (1 + t)(3/4 + t − t²)."""
     values, slopes = [np.array([0.75]), np.array([0.75])], [np.array([1.0]), np.array([-1.0])]
-    found = followed(values, 1.0, slopes, (ONE, np.sqrt(2.0) * ONE))
+    maxima = followed(values, 1.0, slopes, (ONE, np.sqrt(2.0) * ONE))
     top = 0.5 * np.sqrt(7.0 / 3.0)  # where 7/4 − 3 t² is 0: 0.76
-    assert_allclose(found.stress[0, extremes.LARGEST :], [1.0, 0.5], rtol=1e-14)
-    assert_allclose(found.friction[0, extremes.LARGEST :], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)
+    assert_allclose(maxima.stress[0, 2:], [1.0, 0.5], rtol=1e-14)
+    assert_allclose(maxima.friction[0, 2:], [(1.0 + top) * (0.75 + top - top**2), top], rtol=1e-14)

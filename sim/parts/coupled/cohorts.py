@@ -3,7 +3,7 @@
 In a sub-step h the slider goes straight to a node at γ h and straight on to one at h, γ = 2 − √2 (TR-BDF2): speeds and
 accelerations at the nodes follow from the positions by the trapezoidal rule and by the second backward difference,
 and one scalar equation a node, the balance of forces, gives the slip. So the scheme is L-stable and the same for mass,
-damping, viscosity and 1/k_t of zero and of any size. What bonds survive on a straight way is exact; that the true way
+damping, viscosity and 1/k_t of zero and of any size. What bonds survive on a straight path is exact; that the true path
 bends is taken into their mean stretch on it, with the curvature of the sub-step before, whose change is the error.
 """
 
@@ -15,37 +15,7 @@ import numpy as np
 from sim.numerics.jit import device, kernel
 from sim.parts.bonds.cohorts import carry, inside, read_row, rules_of, settle, steepen, sum_row, try_step, write_row
 from sim.parts.bonds.rupture import hazard_integral, hazard_time, rate_at
-from sim.parts.coupled.row import (
-    COLUMNS,
-    ENERGIES,
-    INPUTS,
-    LEAST,
-    MOST_STEPS,
-    NUMBERS,
-    OUTPUTS,
-    ROW,
-    SLIP,
-    SOME,
-    Contact,
-    Slider,
-    area_or_last,
-    compliance,
-    contact_area,
-    contact_at,
-    driven,
-    elastic,
-    from_units,
-    later,
-    next_step,
-    pieces_to,
-    pull_on,
-    record,
-    run_away,
-    slider_in,
-    slip_free,
-    slips_free,
-    to_units,
-)
+from sim.parts.coupled import mechanics
 from sim.parts.drive import ENERGY
 
 GAMMA = 2.0 - math.sqrt(2.0)
@@ -56,12 +26,12 @@ PARTS = (0.5 + (GAMMA - 1.0) * _MIDDLE, _MIDDLE, 0.5 - GAMMA * _MIDDLE)
 #: Start or node of a sub-step: slip and displacement of the body since its start, area, shear displacement, radius,
 #: share bound, sum of the stretches, of their squares and of those times the rupture rate, share cut since the node
 #: before, speed of a body with mass.
-NODE = record("slip body area sheared radius bound moment square lost cut body_speed")
+NODE = mechanics.record("slip body area sheared radius bound moment square lost cut body_speed")
 #: Turns of the secant method; share of the slope of a fresh elastic bond below which a sub-step is too long.
 _TURNS, _FALLING = 25, 0.02
 #: The same where slip alone breaks bonds: their force may hardly rise.
 _FLAT = 1e-7
-#: Largest mean bend of a way [stretch].
+#: Largest mean bend of a path [stretch].
 _MOST_BENT = 0.2
 #: Births in a sub-step over the tolerance of the bonds below which its length is no matter to them.
 _FEW_BIRTHS = 0.1
@@ -93,35 +63,35 @@ def sums_at(pool, count, unit, rules, node):
 
 
 @device
-def _try_motion(pool, count, way, duration, off, free, rules):
+def _try_motion(pool, count, shift, duration, off, free, rules):
     """Return the bonds after a trial: their share, sum of stretches, births early and late, factor of the step.
 
     Below 1 the factor refuses the step, as births are not good to the tolerance of the bonds.
     """
-    early, late, factor = try_step(pool, count, way, way / duration, duration, off, free, rules)
-    limit, far = rules.limit, 2.0 / 3.0 * way - 4.0 / 3.0 * off
+    early, late, factor = try_step(pool, count, shift, shift / duration, duration, off, free, rules)
+    limit, far = rules.limit, 2.0 / 3.0 * shift - 4.0 / 3.0 * off
     bound, moment = early + late, early * far
     if limit < math.inf:
         for i in range(count):
-            low = max(pool[1, i] + way - 0.5 * pool[2, i], -limit)
-            high = min(pool[1, i] + way + 0.5 * pool[2, i], limit)
+            low = max(pool[1, i] + shift - 0.5 * pool[2, i], -limit)
+            high = min(pool[1, i] + shift + 0.5 * pool[2, i], limit)
             bound += pool[4, i]
             moment += pool[4, i] * 0.5 * (low + high)
         return bound, moment, early, late, factor
     for i in range(count):
         bound += pool[4, i]
-        moment += pool[4, i] * (pool[1, i] + way)
+        moment += pool[4, i] * (pool[1, i] + shift)
     return bound, moment, early, late, factor
 
 
 @device
-def _cut(pool, count, way, duration, rules):
-    """Return the share of the sites whose bonds reach the limit of their stretch on a way."""
+def _cut(pool, count, shift, duration, rules):
+    """Return the share of the sites whose bonds reach the limit of their stretch in a displacement."""
     cut = 0.0
     for i in range(count):
-        most = math.fabs(pool[1, i] + way) + 0.5 * pool[2, i]
+        most = math.fabs(pool[1, i] + shift) + 0.5 * pool[2, i]
         if most > rules.limit:
-            cut += pool[0, i] * math.exp(-hazard_integral(pool[1, i], way, duration, rules.law)) - pool[4, i]
+            cut += pool[0, i] * math.exp(-hazard_integral(pool[1, i], shift, duration, rules.law)) - pool[4, i]
     return max(cut, 0.0)
 
 
@@ -146,9 +116,9 @@ def start_of(row, node, yields, slider):
 @device
 def begin_sub_step(row, node, start, slider, contact):
     """Set the contact at the start of a sub-step, whose bonds are known, and return its ``start_of``."""
-    node.radius, node.area, _, _ = contact_area(node.bound, node.moment, start, row.radius, contact)
+    node.radius, node.area, _, _ = mechanics.contact_area(node.bound, node.moment, start, row.radius, contact)
     node.sheared = row.sheared
-    yields, _ = compliance(node.radius, slider)
+    yields, _ = mechanics.compliance(node.radius, slider)
     return start_of(row, node, yields, slider)
 
 
@@ -184,22 +154,22 @@ def before_node(place, nodes, at_start, start, step, row, slider):
 
 
 @device
-def balance(way, bound, moment, before, after, approach, start, row, slider, contact):
+def balance(shift, bound, moment, before, after, approach, start, row, slider, contact):
     """Return the excess force at a node with these bonds, its slope if they stay, and the tolerance of the slip.
 
     What belongs to the slip is written to the node.
     """
     stiffness, mass, damping, viscosity = slider.stiffness, slider.mass, slider.damping, slider.viscosity
     time, rate, momentum, tolerance = approach.time, approach.rate, approach.momentum, slider.tolerance
-    radius, area, _, by_moment = contact_area(bound, moment, time, row.radius, contact)
+    radius, area, _, by_moment = mechanics.contact_area(bound, moment, time, row.radius, contact)
     if not area >= 0.0:
         return math.nan, math.nan, math.nan
-    yields, _ = compliance(radius, slider)
-    slip = before.slip + way
+    yields, _ = mechanics.compliance(radius, slider)
+    slip = before.slip + shift
     stress = moment + viscosity * (rate * slip - approach.offset)
     force = area * stress
     body = slip + yields * force - row.sheared
-    pull = pull_on(time, start, body, row, slider)
+    pull = mechanics.pull_on(time, start, body, row, slider)
     over = force + (damping + mass * rate) * (rate * body - approach.body_offset) - momentum - pull
     grows = area * (bound + viscosity * rate) + by_moment * stress * bound
     loads = stiffness + rate * (damping + mass * rate)
@@ -207,9 +177,10 @@ def balance(way, bound, moment, before, after, approach, start, row, slider, con
     after.sheared = yields * force
     if mass > 0.0:  # by its momentum: differences of positions are roundings in the shortest sub-steps
         after.body_speed = (momentum + pull - force) / (damping + mass * rate)
-    firm = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0) / (area * (bound + SOME)) if area > 0.0 else 1.0
+    firmest, bears = max(stiffness, 1.0 / yields if yields > 0.0 else 0.0), area * (bound + mechanics.SOME)
+    firm = firmest / bears if area > 0.0 else 1.0
     none, slope = 1e-3 * tolerance / max(1.0, firm), grows + loads * (1.0 + yields * grows)
-    if mass + damping > 0.0:  # what is left of the forces is work on the body, whose way may be the longer
+    if mass + damping > 0.0:  # what is left of the forces is work on the body, whose displacement may be the longer
         none = min(none, 1e-3 * tolerance * (math.fabs(force) + math.fabs(pull)) / slope)
     roundings = math.fabs(slip) + yields * math.fabs(force) + math.fabs(row.sheared)
     return over, slope, max(none, 1e-15 * roundings)
@@ -222,34 +193,34 @@ def go_to_node(place, nodes, at_start, pool, count, start, step, row, slider, co
     A number below zero where there is no balance of forces or its slope is not that of a short sub-step.
     """
     approach = before_node(place, nodes, at_start, start, step, row, slider)
-    duration, way = approach.duration, approach.slip
+    duration, shift = approach.duration, approach.slip
     before, after = nodes[place - 1], nodes[place]
     bent = -row.acceleration * duration * duration / 12.0
     off = unit * min(max(bent, -_MOST_BENT), _MOST_BENT)
-    free, ahead = max(0.0, 1.0 - before.bound), way >= 0.0
-    steepen(pool, count, way, off, rules)
-    last_way, last_over, slope = 0.0, 0.0, 0.0
+    free, ahead = max(0.0, 1.0 - before.bound), shift >= 0.0
+    steepen(pool, count, shift, off, rules)
+    last_shift, last_over, slope = 0.0, 0.0, 0.0
     for turn in range(_TURNS):
-        if (way >= 0.0) != ahead:
-            ahead = way >= 0.0
-            steepen(pool, count, way, off, rules)
-        bound, moment, early, late, factor = _try_motion(pool, count, unit * way, duration, off, free, rules)
+        if (shift >= 0.0) != ahead:
+            ahead = shift >= 0.0
+            steepen(pool, count, shift, off, rules)
+        bound, moment, early, late, factor = _try_motion(pool, count, unit * shift, duration, off, free, rules)
         over, elasticity, none = balance(
-            way, bound, moment / unit, before, after, approach, start, row, slider, contact
+            shift, bound, moment / unit, before, after, approach, start, row, slider, contact
         )
         if turn == 0:
             slope = elasticity
-        elif math.fabs(way - last_way) > 1e-9 * (1.0 + math.fabs(way)):
-            slope = (over - last_over) / (way - last_way)
+        elif math.fabs(shift - last_shift) > 1e-9 * (1.0 + math.fabs(shift)):
+            slope = (over - last_over) / (shift - last_shift)
         if not slope > (_FALLING if rules.limit == math.inf else _FLAT) * elasticity:
             return -1, 0.0
         if math.fabs(over / slope) <= none:
-            after.cut = _cut(pool, count, unit * way, duration, rules) if rules.limit < math.inf else 0.0
-            count = carry(pool, count, unit * way, off, early, late, rules)
+            after.cut = _cut(pool, count, unit * shift, duration, rules) if rules.limit < math.inf else 0.0
+            count = carry(pool, count, unit * shift, off, early, late, rules)
             sums_at(pool, count, unit, rules, after)
             return count, factor
-        last_way, last_over = way, over
-        way -= over / slope
+        last_shift, last_over = shift, over
+        shift -= over / slope
     return -1, 0.0
 
 
@@ -259,7 +230,7 @@ def accept_nodes(row, nodes, start, step, slider, limit, energy):
     damping, viscosity = slider.damping, slider.viscosity
     firms = np.empty(3)
     for i in range(3):
-        yields, _ = compliance(nodes[i].radius, slider)
+        yields, _ = mechanics.compliance(nodes[i].radius, slider)
         firms[i] = 1.0 / yields if yields > 0.0 else 0.0
     speeds = slopes(nodes[0].slip, nodes[1].slip, nodes[2].slip, step)
     bodies = slopes(nodes[0].body, nodes[1].body, nodes[2].body, step)
@@ -267,8 +238,8 @@ def accept_nodes(row, nodes, start, step, slider, limit, energy):
     firmer = slopes(firms[0], firms[1], firms[2], step)
     for i in range(3):
         node, share, time = nodes[i], PARTS[i] * step, start + PLACES[i] * step
-        pull = pull_on(time, start, node.body, row, slider)
-        energy.work += share * pull * (bodies[i] if slider.forced > 0.0 else driven(time, slider)[1])
+        pull = mechanics.pull_on(time, start, node.body, row, slider)
+        energy.work += share * pull * (bodies[i] if slider.forced > 0.0 else mechanics.driven(time, slider)[1])
         energy.damping += share * damping * bodies[i] * bodies[i]
         energy.viscosity += share * node.area * viscosity * speeds[i] * speeds[i]
         energy.rupture += share * 0.5 * node.area * node.lost
@@ -279,7 +250,7 @@ def accept_nodes(row, nodes, start, step, slider, limit, energy):
                 energy.rupture += 0.25 * (nodes[i - 1].area + node.area) * node.cut * limit * limit
             row.path += math.fabs(node.slip - nodes[i - 1].slip)
     last = nodes[2]
-    row.spring_force = pull_on(start + step, start, last.body, row, slider)
+    row.spring_force = mechanics.pull_on(start + step, start, last.body, row, slider)
     row.speed, row.sheared, row.radius = speeds[2], last.sheared, last.radius
     row.body_speed = last.body_speed if slider.mass > 0.0 else bodies[2]
     row.bound, row.moment = last.bound, last.moment
@@ -297,7 +268,7 @@ def longest(row, unit, rules):
     life = hazard_time(0.0, speed, 1.0, rules.law)
     most = life * (7.0 * rules.tolerance) ** (1.0 / 3.0)
     most = min(most, 0.75 * rules.cell / speed) if speed > 0.0 else most
-    few = _FEW_BIRTHS * rules.tolerance * (row.bound + SOME) / rules.rebinding
+    few = _FEW_BIRTHS * rules.tolerance * (row.bound + mechanics.SOME) / rules.rebinding
     return max(most, few)
 
 
@@ -317,9 +288,7 @@ def bend_of(nodes, step, row, slider):
 def stored_energy(row, square, time, slider, contact):
     """Return the elastic and kinetic energy of spring, body, contact and bonds."""
     stiffness, mass, viscosity = slider.stiffness, slider.mass, slider.viscosity
-    _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
-    if not area >= 0.0:  # equilibrium was lost on the way
-        area = math.pi * row.radius * row.radius / contact.area
+    _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     energy = 0.5 * mass * row.body_speed * row.body_speed + 0.5 * area * square
     energy += 0.5 * row.sheared * area * (row.moment + viscosity * row.speed)
     return energy + 0.5 * row.spring_force * row.spring_force / stiffness if stiffness > 0.0 else energy
@@ -332,11 +301,11 @@ _AROUND = 8.0
 
 
 @device
-def _at_once(pool, count, way, unit, rules):
+def _at_once(pool, count, shift, unit, rules):
     """Return the share bound and the sum of the stretches after a displacement, without bonds beyond the limit."""
     bound, moment, limit = 0.0, 0.0, rules.limit
     for i in range(count):
-        x, half = pool[1, i] + unit * way, 0.5 * pool[2, i]
+        x, half = pool[1, i] + unit * shift, 0.5 * pool[2, i]
         pool[4, i] = pool[0, i] * inside(x, pool[2, i], limit)
         bound += pool[4, i]
         moment += pool[4, i] * 0.5 * (max(x - half, -limit) + min(x + half, limit))
@@ -344,13 +313,13 @@ def _at_once(pool, count, way, unit, rules):
 
 
 @device
-def _lacking(way, pool, count, row, time, slider, contact, unit, rules):
+def _lacking(shift, pool, count, row, time, slider, contact, unit, rules):
     """Return the missing force after a displacement at once; area, radius, u, displacement of the body."""
-    bound, moment = _at_once(pool, count, way, unit, rules)
-    radius, area, _, _ = contact_area(bound, moment, time, row.radius, contact)
-    yields, _ = compliance(radius, slider)
+    bound, moment = _at_once(pool, count, shift, unit, rules)
+    radius, area, _, _ = mechanics.contact_area(bound, moment, time, row.radius, contact)
+    yields, _ = mechanics.compliance(radius, slider)
     sheared = yields * area * moment
-    body = way + sheared - row.sheared
+    body = shift + sheared - row.sheared
     lacks = row.spring_force - slider.stiffness * body - area * moment
     return lacks if row.spring_force > 0.0 else -lacks, area, radius, sheared, body
 
@@ -364,11 +333,10 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
     sense, step, limit = math.copysign(1.0, row.spring_force), 0.5 * rules.cell / unit, rules.limit / unit
     here, area, _, _, _ = _lacking(0.0, pool, count, row, time, slider, contact, unit, rules)
     near, _, _, _, _ = _lacking(sense * _TRIED * limit, pool, count, row, time, slider, contact, unit, rules)
-    if not (
-        near > here or here > _TRIED * math.fabs(row.spring_force)
-    ):  # merged stretches reach a little beyond the limit
+    # merged stretches reach a little beyond the limit
+    if not (near > here or here > _TRIED * math.fabs(row.spring_force)):
         return -1
-    way, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
+    shift, low, high, begun = 0.0, 0.0, _TRIED * limit, near > 0.0
     while high < 2.0 * limit:
         low, high = high, high + min(high, step)
         lacks, _, _, _, _ = _lacking(sense * high, pool, count, row, time, slider, contact, unit, rules)
@@ -382,22 +350,19 @@ def _slip_event(row, pool, count, time, slider, contact, unit, rules, node, ener
             middle = 0.5 * (low + high)
             lacks, _, _, _, _ = _lacking(sense * middle, pool, count, row, time, slider, contact, unit, rules)
             low, high = (middle, high) if lacks > 0.0 else (low, middle)
-        way = sense * high
+        shift = sense * high
     elif slider.stiffness > 0.0:
-        way = row.spring_force / slider.stiffness + row.sheared
+        shift = row.spring_force / slider.stiffness + row.sheared
     else:
         return -1
-    _, after, radius, sheared, body = _lacking(way, pool, count, row, time, slider, contact, unit, rules)
+    _, after, radius, sheared, body = _lacking(shift, pool, count, row, time, slider, contact, unit, rules)
     if not after >= 0.0:
         return -1
     stored, bound = stored_energy(row, node.square, time, slider, contact), node.bound
-    count = carry(pool, count, unit * way, 0.0, 0.0, 0.0, rules)
+    count = carry(pool, count, unit * shift, 0.0, 0.0, 0.0, rules)
     sums_at(pool, count, unit, rules, node)
     row.radius, row.sheared, row.bound, row.moment = radius, sheared, node.bound, node.moment
-    row.spring_force -= slider.stiffness * body
-    row.position += body
-    row.slip += way
-    row.path += math.fabs(way)
+    mechanics.displace(row, shift, body, slider)
     row.acceleration = 0.0
     broken = 0.25 * (area + after) * (bound - node.bound) * limit * limit
     energy.rupture += broken
@@ -424,11 +389,11 @@ def _break_stretched(row, pool, count, time, reach, slider, contact, unit, rules
     if left == count:
         return -1
     stored = stored_energy(row, node.square, time, slider, contact)
-    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
+    _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     sums_at(pool, left, unit, rules, node)
     row.bound, row.moment, row.acceleration = node.bound, node.moment, 0.0
-    row.radius, node.area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
-    yields, _ = compliance(row.radius, slider)
+    row.radius, node.area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
+    yields, _ = mechanics.compliance(row.radius, slider)
     row.speed, row.body_speed, _ = start_of(row, node, yields, slider)
     broken = 0.5 * area * gone * limit * limit
     energy.rupture += broken
@@ -440,12 +405,12 @@ def _break_stretched(row, pool, count, time, reach, slider, contact, unit, rules
 def _break_all(row, pool, time, brief, slider, contact, unit, rules, node, energy):
     """Break all bonds at once and slip, where nothing delays the interface, if they last less than ``brief``."""
     k = rate_at(unit * node.moment / node.bound, rules.law) if node.bound > 0.0 else 0.0
-    if not (k * brief > 1.0 and slips_free(row, slider)):
+    if not (k * brief > 1.0 and mechanics.slips_free(row, slider)):
         return False
     stored = stored_energy(row, node.square, time, slider, contact)
-    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
+    _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     broken = 0.5 * area * node.square
-    slip_free(row, time, slider, contact)
+    mechanics.slip_free(row, time, slider, contact)
     pool[0, 0], pool[1, 0], pool[2, 0] = row.bound, 0.0, 0.0
     sums_at(pool, 1, unit, rules, node)
     row.acceleration = 0.0
@@ -465,12 +430,12 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
     start, length = 0.0, slider.length
     brittle = slider.mass + slider.damping + slider.viscosity == 0.0
     sums_at(pool, count, unit, rules, nodes[0])
-    for _ in range(MOST_STEPS):
+    for _ in range(mechanics.MOST_STEPS):
         left = length - start
-        step = next_step(row, left, length, longest(row, unit, rules))
-        if left <= LEAST * length:
+        step = mechanics.next_step(row, left, length, longest(row, unit, rules))
+        if left <= mechanics.LEAST * length:
             return length, count, travelled, settled
-        if not step > LEAST * length:
+        if not step > mechanics.LEAST * length:
             slid, row.next_step = row.slip, 0.0
             if _break_all(row, pool, start, _BRIEF * length, slider, contact, unit, rules, nodes[0], energy):
                 count = settled = 1
@@ -478,7 +443,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             elif contact.stays > 0.0:
                 return start, count, travelled, settled
             else:
-                contact = later(contact, 0.0, 1.0)
+                contact = mechanics.later(contact, 0.0, 1.0)
             continue
         saved[:, :count] = pool[:3, :count]
         first = nodes[0]
@@ -489,7 +454,7 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
                 2, nodes, at_start, pool, new_count, start, step, row, slider, contact, unit, rules
             )
             factor = min(factor, other)
-        way, bend, error = nodes[2].slip, 0.0, math.inf
+        shift, bend, error = nodes[2].slip, 0.0, math.inf
         if new_count >= 0:
             bend, error = bend_of(nodes, step, row, slider)
         grows = min(factor, 4.0, max(0.1, 0.9 * error ** (-1.0 / 3.0))) if error > 0.0 else min(factor, 4.0)
@@ -510,9 +475,9 @@ def _piece(row, bonds, slider, contact, unit, rules, room, energy):
             continue
         accept_nodes(row, nodes, start, step, slider, rules.limit / unit, energy)
         count, row.acceleration = new_count, bend
-        travelled += unit * way
+        travelled += unit * shift
         if count > 1.25 * settled + 16.0 or count + 4 > pool.shape[1]:
-            direction = -1.0 if way < 0.0 else 1.0
+            direction = -1.0 if shift < 0.0 else 1.0
             count = settled = settle(pool[0], pool[1], pool[2], count, direction, travelled, rules)
             sums_at(pool, count, unit, rules, first)
         else:
@@ -532,13 +497,13 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
     count = read_row(pool, weight, stretch, width, share)
     time, going, travelled, settled = 0.0, True, lattice[0], lattice[1]
     for p in range(len(pieces)):
-        slider, from_here = slider_in(slider, pieces[p]), later(contact, time, contact.stays)
+        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, contact.stays)
         reached, worked, slid, before = 0.0, energy.work, row.slip, energy.stored
         sums_at(pool, count, unit, rules, nodes[0])
         if p > 0:
             before = stored_energy(row, nodes[0].square, 0.0, slider, from_here)
         row.bound, row.moment = nodes[0].bound, nodes[0].moment
-        going = elastic(row, 0.0, slider, from_here, energy)
+        going = mechanics.elastic(row, 0.0, slider, from_here, energy)
         if going:
             for i in range(count):
                 pool[1, i] += unit * (row.slip - slid)
@@ -567,7 +532,7 @@ def _through(row, energy, pieces, slider, contact, unit, share, rules, bonds, ro
 
 
 @kernel(
-    f"void({INPUTS}, {NUMBERS}, {OUTPUTS}, float64[::1], float64[::1],"
+    f"void({mechanics.ARGUMENTS}, float64[::1], float64[::1],"
     " float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, ::1], float64[:, :, ::1])"
 )
 def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, width, lattice, sums):
@@ -577,22 +542,23 @@ def advance_cohorts(inputs, numbers, outputs, share, rules, weight, stretch, wid
     as in ``mean_field.advance_rows``.
     """
     rows, energies, bare, pieces, clock, units, work = inputs
-    slider, contact, (reached, spent) = Slider(*numbers[0]), Contact(*numbers[2]), outputs
-    rules, most, unit = rules_of(rules), weight.shape[1] + 520, units[SLIP]
-    columns, booked, nodes = np.empty(COLUMNS), np.empty(ENERGIES), np.zeros(3, NODE)
-    row, energy, room = columns.view(ROW)[0], booked.view(ENERGY)[0], (np.empty((9, most)), np.empty((3, most)), nodes)
+    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.Contact(*numbers[2]), outputs
+    rules, most, unit = rules_of(rules), weight.shape[1] + 520, units[mechanics.SLIP]
+    columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
+    row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
+    room = np.empty((9, most)), np.empty((3, most)), nodes
     for m in range(len(rows)):
         stop, left = 0, share[m % share.size]
         bonds = weight[m], stretch[m], width[m], lattice[m]
         for k in range(len(clock)):
-            start, stop = stop, pieces_to(k, stop, pieces)
-            to_units(columns, booked, rows[m], energies[m], units, work)
+            start, stop = stop, mechanics.pieces_to(k, stop, pieces)
+            mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(row.runaway_time):
-                now = contact_at(contact, bare[m], clock[k], row)
+                now = mechanics.contact_at(contact, bare[m], clock[k], row)
                 time, going = _through(row, energy, pieces[start:stop], slider, now, unit, left, rules, bonds, room)
                 if not going:
-                    run_away(row, booked, clock[k, 0] + time)
+                    mechanics.run_away(row, booked, clock[k, 0] + time)
                 left = 1.0
-            from_units(columns, booked, rows[m], energies[m], units, work)
+            mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]
             sum_row(weight[m], stretch[m], width[m], rules, room[0][4], sums[:, k, m])

@@ -12,23 +12,12 @@ import numpy as np
 
 from sim.laws.reversible import mean_stress_energy
 from sim.numerics.noise import Noise
+from sim.parts.bonds import models
 from sim.parts.bonds.cohorts import Cohorts, numbers_of
-from sim.parts.bonds.models import (
-    Ages,
-    Cohort,
-    Counted,
-    FirstMoment,
-    Population,
-    Rate,
-    Steady,
-    Stretches,
-    Tracked,
-    Unbroken,
-)
 from sim.parts.bonds.tracked import AGAIN, Tracks
 from sim.parts.coupled.cohorts import advance_cohorts
 from sim.parts.coupled.mean_field import advance_rows
-from sim.parts.coupled.row import COLUMNS, ROW, Contact, Inputs, Law, Slider
+from sim.parts.coupled.mechanics import COLUMNS, ROW, Contact, Inputs, Law, Slider
 from sim.parts.coupled.tracked import advance_tracks
 from sim.parts.drive import ENERGY, Driven, Force, Spring
 from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sliding, Times
@@ -37,7 +26,7 @@ from sim.parts.exchange import Array, Bonding, Flags, Motions, Mount, Parts, Sli
 _STRETCH = 1e-9
 #: Columns of a row that are measured by a stretch.
 _STRETCHED = ["body_speed", "sheared", "moment", "speed", "position", "slip", "path", "acceleration"]
-#: Relative difference up to which two radii are the same equilibrium, found on two ways.
+#: Relative difference up to which two radii are the same equilibrium, found by two methods.
 _SAME = 1e-9
 #: Numbers of slider, bonds and contact.
 _Numbers = tuple[tuple[float, ...], tuple[float, ...], tuple[float, ...]]
@@ -81,9 +70,9 @@ class StepContact(NamedTuple):
     area: float
 
 
-#: Bonds that are solved together with a slider; those with a stretch.
-_Driven = FirstMoment | Cohort | Tracked | Unbroken | Steady | Rate | Counted
-_WITH_STRETCH = FirstMoment | Cohort | Tracked
+#: Bonds that are solved together with a slider; of them those with a stretch first.
+_WITH_STRETCH = models.FirstMoment | models.Cohort | models.Tracked
+_Driven = _WITH_STRETCH | models.Unbroken | models.Steady | models.Rate | models.Counted
 
 
 def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: float) -> tuple[float, float]:
@@ -96,8 +85,8 @@ def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: fl
     if not isinstance(bonds, _WITH_STRETCH):
         force = bonds.stress * contact.area
         slow = drive.mass / step + drive.damping + drive.viscosity * contact.area
-        way = force / drive.spring if drive.spring else max(most, force) * step / slow
-        return min(way, _renewing(bonds)), force
+        shift = force / drive.spring if drive.spring else max(most, force) * step / slow
+        return min(shift, _renewing(bonds)), force
     law, bears = bonds.law, bonds.site_density * bonds.bond_stiffness * contact.area
     if law.softness > 0.0:
         stretch = 1.0 / law.softness
@@ -110,7 +99,7 @@ def _units(drive: Force | Spring, bonds: _Driven, contact: StepContact, step: fl
 
 def _renewing(bonds: _Driven) -> float:
     """Return the displacement on which sliding renews bonds of the rate equation, V_c/h [m], infinite for others."""
-    return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, Rate) else math.inf
+    return bonds.critical_speed / bonds.rebinding_rate if isinstance(bonds, models.Rate) else math.inf
 
 
 def load(parts: Parts, slider: Sliding, bonding: Bonding, contact: StepContact, duration: float) -> Driven:
@@ -187,8 +176,8 @@ def advance(
     motions = Motions(
         steps.start, ends[1:, np.newaxis], spans, reached["slip"], path, first, after.speed, after.position, unsteady
     )
-    if isinstance(bonds, Counted):
-        end, drawn = bonds.advance(cast(Population, population), motions, contact.radius, noise)
+    if isinstance(bonds, models.Counted):
+        end, drawn = bonds.advance(cast(models.Population, population), motions, contact.radius, noise)
         stress = np.where(after.speed != 0.0, drawn.stress, bonding.stress)
         bonding = Bonding(drawn.fraction, stress, stress)
     return after, motions, end, with_contact_stress(parts, bonding, after.speed)
@@ -210,14 +199,14 @@ def _advanced(
     """
     shape, rows = outputs[0].shape[1:], inputs.rows.view(ROW)[:, 0]
     reached = dict(zip(ROW.names or (), outputs[0], strict=True))
-    if isinstance(bonds, Cohort):
-        ages = cast(Ages, population)
+    if isinstance(bonds, models.Cohort):
+        ages = cast(models.Ages, population)
         share, area_radius = bonds.diluted(ages.area_radius, radius)
         cohorts, sums = Cohorts(*(array.copy() for array in ages.cohorts)), np.empty((5, *shape))
         rules = numbers_of(bonds.law, bonds.rebinding_rate, bonds.tolerance, math.inf)
         advance_cohorts(tuple(inputs), numbers, outputs, share, rules, *cohorts, sums)
-        return Ages(cohorts, area_radius), bonds.read(sums)
-    if isinstance(bonds, Tracked):
+        return models.Ages(cohorts, area_radius), bonds.read(sums)
+    if isinstance(bonds, models.Tracked):
         tracks = cast(Tracks, population)
         tracks = tracks._replace(frame=tracks.frame.copy())
         frames = np.empty((*shape, tracks.frame.shape[1]))
@@ -225,21 +214,22 @@ def _advanced(
         if advance_tracks(tuple(inputs), numbers, outputs, tuple(tracks), *lives, frames):
             raise RuntimeError(AGAIN)
         return tracks, bonds.read(frames)
-    if isinstance(bonds, FirstMoment):
-        stretches = cast(Stretches, population)
+    if isinstance(bonds, models.FirstMoment):
+        stretches = cast(models.Stretches, population)
         share, area_radius = bonds.diluted(stretches.area_radius, radius)
         rows["bound"], rows["moment"] = stretches.bound * share, stretches.stretch * share
     else:
-        before = cast(Population, population)
+        before = cast(models.Population, population)
         share, area_radius = bonds.diluted(before.area_radius, radius)
         rows["bound"] = bonds.bonding(before).fraction * share
     advance_rows(tuple(inputs), numbers, outputs)
     bound, moment = reached["bound"], reached["moment"]
-    if isinstance(bonds, FirstMoment):
-        return Stretches(bound[-1].copy(), moment[-1].copy(), area_radius), bonds.bonding(Stretches(bound, moment))
+    if isinstance(bonds, models.FirstMoment):
+        end = models.Stretches(bound[-1].copy(), moment[-1].copy(), area_radius)
+        return end, bonds.bonding(models.Stretches(bound, moment))
     stretch = float(inputs.units.view(ROW)["slip"][0])
     stress = bonds.stress / stretch * moment
-    return Population(bound[-1].copy(), np.sign(stress[-1]), area_radius), Bonding(bound, stress, stress)
+    return models.Population(bound[-1].copy(), np.sign(stress[-1]), area_radius), Bonding(bound, stress, stress)
 
 
 def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
@@ -248,10 +238,10 @@ def steps_until_contact_changes(slider: Driven, radius: Array) -> int:
     return int(np.argmax(apart)) + 1 if apart[:-1].any() else len(apart)
 
 
-def _agree(own_radius: Array, radius: Array) -> Flags:
+def _agree(slider_radius: Array, radius: Array) -> Flags:
     """True where two radii of a contact differ by rounding alone, or both are those of an open one."""
     size = np.fmax(radius, 0.0)
-    same: Flags = np.abs(own_radius - size) <= _SAME * size
+    same: Flags = np.abs(slider_radius - size) <= _SAME * size
     return same
 
 
@@ -266,8 +256,8 @@ def _numbers(drive: Force | Spring, bonds: _Driven, contact: StepContact, units:
         law, of_rest = bonds.law, bonds.bound_at_rest
         breaking = Law(law.rate, 1.0 if law.softness > 0.0 else 0.0, stretch / law.limit, bonds.rebinding_rate, 1.0)
     else:
-        slows = stretch / bonds.critical_speed if isinstance(bonds, Steady) else 0.0
-        binding = bonds.rebinding_rate if isinstance(bonds, Rate) else 0.0
+        slows = stretch / bonds.critical_speed if isinstance(bonds, models.Steady) else 0.0
+        binding = bonds.rebinding_rate if isinstance(bonds, models.Rate) else 0.0
         breaking, of_rest = Law(0.0, 0.0, stretch / _renewing(bonds), binding, 1.0, 1.0, slows), 1.0
     mean_stress = 0.0
     if contact.reversible:

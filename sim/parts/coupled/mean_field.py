@@ -5,58 +5,17 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.coupled.radau import (
-    NODE_VALUES,
-    RATES,
-    accept,
-    kinetics,
-    newton,
-    share_after_rest,
-    share_left,
-    sum_over,
-    try_sub_step,
-)
-from sim.parts.coupled.row import (
-    COLUMNS,
-    ENERGIES,
-    INPUTS,
-    LEAST,
-    MOST_STEPS,
-    NUMBERS,
-    OUTPUTS,
-    ROW,
-    Contact,
-    Law,
-    Slider,
-    area_or_last,
-    compliance,
-    contact_area,
-    contact_at,
-    displace,
-    driven,
-    elastic,
-    free_ways,
-    from_units,
-    later,
-    next_step,
-    pieces_to,
-    pull_on,
-    run_away,
-    slider_in,
-    slip_free,
-    slips_free,
-    to_units,
-)
+from sim.parts.coupled import mechanics, radau
 from sim.parts.drive import ENERGY
 
-#: Way over the cut-off stretch on which bonds are tried, and that within which they may slip at once.
+#: Slip over the cut-off stretch on which bonds are tried, and that within which they may slip at once.
 _TRIED, NEAR = 1e-7, 1e-3
 
 
 @device
 def stored_in(row, time, slider, law, contact):
     """Return the elastic and kinetic energy of spring, body, contact and bonds."""
-    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
+    _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     stiffness, viscosity = slider.stiffness, slider.viscosity
     energy = 0.5 * slider.mass * row.body_speed * row.body_speed
     energy += 0.5 * row.sheared * area * (row.moment + viscosity * row.speed)
@@ -68,28 +27,21 @@ def stored_in(row, time, slider, law, contact):
 
 
 @device
-def _lacking(way, row, time, slider, law, contact):
+def _lacking(shift, row, time, slider, law, contact):
     """Return the missing force of the bonds after a displacement at once, or the missing displacement of the body.
 
-    Also N, M, radius, area, u then, and the way of the body.
+    Also N, M, radius, area, u then, and the displacement of the body.
     """
-    left, sense = math.exp(-math.fabs(way) * law.cuts), math.copysign(1.0, row.moment)
+    left, sense = math.exp(-math.fabs(shift) * law.cuts), math.copysign(1.0, row.moment)
     bound, moment = row.bound * left, (row.moment * left + sense * row.bound * (1.0 - left) / law.cuts) * left
-    radius, area, _, _ = contact_area(bound, moment, time, row.radius, contact)
-    yields, _ = compliance(radius, slider)
+    radius, area, _, _ = mechanics.contact_area(bound, moment, time, row.radius, contact)
+    yields, _ = mechanics.compliance(radius, slider)
     sheared = yields * area * moment
-    body = way + sheared - row.sheared
+    body = shift + sheared - row.sheared
+    lacks = sense * (row.spring_force - slider.stiffness * body - area * moment)
     if slider.mass + slider.damping > 0.0:
-        return -sense * body, bound, moment, radius, area, sheared, 0.0
-    return (
-        sense * (row.spring_force - slider.stiffness * body - area * moment),
-        bound,
-        moment,
-        radius,
-        area,
-        sheared,
-        body,
-    )
+        lacks, body = -sense * body, 0.0
+    return lacks, bound, moment, radius, area, sheared, body
 
 
 @device
@@ -98,7 +50,7 @@ def slip_event(row, time, reach, slider, law, contact, energy):
 
     That counts which does so within a ``reach`` in units of the cut-off stretch.
 
-    The force of such bonds over the way has one hump, so that there is one such place.
+    The force of such bonds over the slip has one hump, so that there is one such place.
     """
     if not slider.stiffness + slider.mass + slider.damping > 0.0:
         return False
@@ -121,13 +73,13 @@ def slip_event(row, time, reach, slider, law, contact, energy):
     _, bound, moment, radius, area, sheared, body = _lacking(sense * high, row, time, slider, law, contact)
     if not area >= 0.0:
         return False
-    # on the way ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
+    # in a slip ds the share ds/l of the bonds breaks, stretched by twice the mean: 3/2 n κ M²/(N l) is lost with it
     left, mean = math.exp(-high * law.cuts), sense * row.moment
     later = mean * left + row.bound * limit * (1.0 - left)
     broken = 0.25 * (first + area) * (1.0 - left) * (mean * mean + mean * later + later * later) / row.bound
     before = stored_in(row, time, slider, law, contact)
     row.bound, row.moment, row.radius, row.sheared = bound, moment, radius, sheared
-    displace(row, sense * high, body, slider)
+    mechanics.displace(row, sense * high, body, slider)
     energy.rupture += broken
     energy.snaps += before - stored_in(row, time, slider, law, contact) - broken
     return True
@@ -139,13 +91,13 @@ def break_all(row, time, brief, slider, law, contact, energy):
 
     Bonds that are stretched the more the fewer are left break ever faster, all of them in no time; whether that is so.
     """
-    _, _, _, _, k, _ = kinetics(row.bound, row.moment, 0.0, law)
-    if not (k * brief > 1.0 and slips_free(row, slider)):
+    _, _, _, _, k, _ = radau.kinetics(row.bound, row.moment, 0.0, law)
+    if not (k * brief > 1.0 and mechanics.slips_free(row, slider)):
         return False
     before = stored_in(row, time, slider, law, contact)
-    _, area, _, _ = area_or_last(row.bound, row.moment, time, row, contact)
+    _, area, _, _ = mechanics.area_or_last(row.bound, row.moment, time, row, contact)
     broken = 0.5 * area * row.moment * row.moment / row.bound
-    slip_free(row, time, slider, contact)
+    mechanics.slip_free(row, time, slider, contact)
     energy.rupture += broken
     energy.snaps += before - stored_in(row, time, slider, law, contact) - broken
     return True
@@ -155,7 +107,7 @@ def break_all(row, time, brief, slider, law, contact, energy):
 _BRIEF = 1e-9
 #: Places in a piece at which a slider that sticks is looked at, and halvings that place when it leaves.
 _PLACES, _HALVINGS = 32, 60
-#: Shares of bonds and of a piece beyond which equilibrium is looked for where there is no way on, and most changes
+#: Shares of bonds and of a piece beyond which equilibrium is looked for where no sub-step is accepted, and most changes
 #: between stick and slip in a piece.
 _NEXT_TO, _CHANGES = 1e-6, 10_000
 #: Turns in which area and stress of a slider at rest settle.
@@ -169,25 +121,25 @@ def _piece(row, slider, law, contact, nodes, energy):
     A contact that loses its equilibrium in a sub-step keeps its radius to the end of the clock step.
     """
     start, length = 0.0, slider.length
-    yields, _ = compliance(row.radius, slider)
+    yields, _ = mechanics.compliance(row.radius, slider)
     brittle = law.cuts > 0.0 and slider.viscosity == 0.0 and (slider.mass + slider.damping == 0.0 or yields > 0.0)
-    for _ in range(MOST_STEPS):
+    for _ in range(mechanics.MOST_STEPS):
         left = length - start
-        step = next_step(row, left, length, math.inf)
-        if not step > LEAST * length:
+        step = mechanics.next_step(row, left, length, math.inf)
+        if not step > mechanics.LEAST * length:
             gone = break_all(row, start, _BRIEF * length, slider, law, contact, energy)
             if contact.stays > 0.0 and not gone:
                 return start
-            contact, nodes.last_step = (contact, 0.0) if gone else (later(contact, 0.0, 1.0), nodes.last_step)
+            contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
-        grows, stands = try_sub_step(row, start, step, slider, law, contact, nodes)
-        if not stands:
+        grows, accepted = radau.try_sub_step(row, start, step, slider, law, contact, nodes)
+        if not accepted:
             row.next_step = step * grows
             if brittle and step < _BRIEF * length and slip_event(row, start, NEAR, slider, law, contact, energy):
                 row.next_step, nodes.last_step = 1e-6 * length, 0.0
             continue
-        accept(row, start, step, slider, law, contact, nodes, energy)
+        radau.accept(row, start, step, slider, law, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         if brittle and slip_event(row, start + step, 0.0, slider, law, contact, energy):
             row.next_step, nodes.last_step = 1e-6 * length, 0.0
@@ -200,9 +152,9 @@ def _piece(row, slider, law, contact, nodes, energy):
 @device
 def _slips(time, start, row, slider, law, contact):
     """Return the pull beyond the strength of the bonds at a time, if nothing has moved since the start."""
-    share = share_after_rest(row.bound, time - start, law)
-    _, area, _, _ = area_or_last(share, share, time, row, contact)
-    return math.fabs(pull_on(time, start, 0.0, row, slider)) - area * share
+    share = radau.share_after_rest(row.bound, time - start, law)
+    _, area, _, _ = mechanics.area_or_last(share, share, time, row, contact)
+    return math.fabs(mechanics.pull_on(time, start, 0.0, row, slider)) - area * share
 
 
 @device
@@ -225,12 +177,12 @@ def _rest(row, start, settles, slider, law, contact, energy):
                     low = middle
             break
         before = time
-    first, last = row.spring_force, pull_on(end, start, 0.0, row, slider)
+    first, last = row.spring_force, mechanics.pull_on(end, start, 0.0, row, slider)
     if slider.forced == 0.0:
         energy.work += 0.5 * (last - first) * (last + first) / slider.stiffness
-    moment, share = 0.0, share_after_rest(row.bound, end - start, law)
+    moment, share = 0.0, radau.share_after_rest(row.bound, end - start, law)
     for _ in range(_FEW_TURNS):  # the stress takes a little of the area, if adhesion pays for it
-        radius, area, _, _ = area_or_last(share, moment, end, row, contact)
+        radius, area, _, _ = mechanics.area_or_last(share, moment, end, row, contact)
         moment = last / area if area > 0.0 else 0.0
     row.spring_force, row.bound, row.radius, row.moment = last, share, radius, moment
     row.speed, row.body_speed = 0.0, 0.0
@@ -245,13 +197,13 @@ def _jump(row, time, slider, law, contact):
     """
     damping, viscosity = slider.damping, slider.viscosity
     pull, speed = math.fabs(row.spring_force), 0.0
-    _, area, _, _ = area_or_last(0.0, 0.0, time, row, contact)
+    _, area, _, _ = mechanics.area_or_last(0.0, 0.0, time, row, contact)
     if not damping + area * viscosity > 0.0:  # an open contact
         return 0.0
     speed = pull / (damping + area * viscosity)
     for _ in range(100):
-        share = row.bound * share_left(law.sense * speed, law)
-        _, area, by_bound, by_moment = area_or_last(share, share, time, row, contact)
+        share = row.bound * radau.share_left(law.sense * speed, law)
+        _, area, by_bound, by_moment = mechanics.area_or_last(share, share, time, row, contact)
         bears = damping + area * viscosity
         slope = bears - law.slows * share * share * (area + (by_bound + by_moment) * (share + viscosity * speed))
         change = (bears * speed + area * share - pull) / slope
@@ -265,22 +217,22 @@ def _jump(row, time, slider, law, contact):
 def _slide(row, start, slider, along, contact, nodes, energy):
     """Slip until the speed comes to zero or the piece ends. Return the time reached; negative without a solution."""
     length, sense = slider.length, along.sense
-    for _ in range(MOST_STEPS):
+    for _ in range(mechanics.MOST_STEPS):
         left = length - start
-        step = next_step(row, left, length, math.inf)
-        if not step > LEAST * length:
+        step = mechanics.next_step(row, left, length, math.inf)
+        if not step > mechanics.LEAST * length:
             row.next_step = 0.0
             left = row.bound * (1.0 - _NEXT_TO), start + _NEXT_TO * length
-            _, area, _, _ = contact_area(left[0], row.moment, left[1], row.radius, contact)
+            _, area, _, _ = mechanics.contact_area(left[0], row.moment, left[1], row.radius, contact)
             if not area >= 0.0:  # lost: the radius stays for the rest of the clock step
-                contact = later(contact, 0.0, 1.0)
+                contact = mechanics.later(contact, 0.0, 1.0)
                 continue
             return start if slider.mass == 0.0 or row.speed == 0.0 else -1.0
-        grows, stands = try_sub_step(row, start, step, slider, along, contact, nodes)
-        if not stands:
+        grows, accepted = radau.try_sub_step(row, start, step, slider, along, contact, nodes)
+        if not accepted:
             row.next_step = step * grows
             continue
-        speed = sum_over(RATES, 2, nodes.slip) / step * sense
+        speed = radau.sum_over(radau.RATES, 2, nodes.slip) / step * sense
         stops = speed <= 0.0
         if stops and row.speed == 0.0:
             row.next_step = 0.25 * step
@@ -289,9 +241,9 @@ def _slide(row, start, slider, along, contact, nodes, energy):
             near, above, far, below, side = 0.0, row.speed * sense, step, speed, 0
             for _ in range(100):
                 step = near + (far - near) * (above / (above - below))
-                if not newton(row, start, step, slider, along, contact, nodes):
+                if not radau.newton(row, start, step, slider, along, contact, nodes):
                     break
-                speed = sum_over(RATES, 2, nodes.slip) / step * sense
+                speed = radau.sum_over(radau.RATES, 2, nodes.slip) / step * sense
                 if math.fabs(speed) <= 1e-13 * math.fabs(row.speed) or far - near <= 1e-15 * far:
                     break
                 if speed > 0.0:
@@ -302,7 +254,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                     far, below = step, speed
                     above *= 0.5 if side < 0 else 1.0
                     side = -1
-        accept(row, start, step, slider, along, contact, nodes, energy)
+        radau.accept(row, start, step, slider, along, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         start = length if step == left else start + step
         if stops:
@@ -331,11 +283,11 @@ def _sticking_piece(row, slider, law, contact, nodes, energy):
             if stuck > 100:
                 return start
         sense = math.copysign(1.0, row.spring_force if rests else row.speed)
-        along = Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
+        along = mechanics.Law(law.rate, law.softness, law.cuts, law.binding, law.scale, sense, law.slows)
         if rests:
             speed = sense * _jump(row, start, slider, along, contact) if slider.mass == 0.0 else 0.0
             row.speed = row.body_speed = speed
-            row.bound *= share_left(speed, along)
+            row.bound *= radau.share_left(speed, along)
             row.moment = sense * row.bound
         start = _slide(row, start, slider, along, contact, nodes, energy)
         if start < 0.0:
@@ -350,22 +302,23 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
     """Go through a clock step; return the time reached, and False if stability is lost."""
     is_open, time, worked, going = row.radius == 0.0, 0.0, energy.work, True
     for p in range(len(pieces)):
-        slider = slider_in(slider, pieces[p])
+        slider = mechanics.slider_in(slider, pieces[p])
         nodes.last_step = 0.0
         if is_open and law.sense != 0.0 and slider.mass + slider.damping + slider.forced == 0.0:
-            slip, _ = free_ways(row, slider)  # as nothing else holds an open contact, it goes along with the stage
-            displace(row, slip, slip, slider)
-            row.speed = row.body_speed = driven(0.0, slider)[1]
+            # as nothing else holds an open contact, it goes along with the stage
+            slip, _ = mechanics.free_shifts(row, slider)
+            mechanics.displace(row, slip, slip, slider)
+            row.speed = row.body_speed = mechanics.driven(0.0, slider)[1]
             row.spring_force = 0.0
             if law.slows != 0.0:
                 row.bound = 1.0 / (1.0 + law.slows * math.fabs(row.speed))
         if p == 0:
             if law.sense == 0.0:
-                going = elastic(row, 0.0, slider, contact, energy)
+                going = mechanics.elastic(row, 0.0, slider, contact, energy)
             elif slider.forced > 0.0:
-                row.spring_force = driven(0.0, slider)[1]
+                row.spring_force = mechanics.driven(0.0, slider)[1]
             energy.area += energy.work - worked - stored_in(row, 0.0, slider, law, contact) + energy.stored
-        ahead, reached = later(contact, time, contact.stays), 0.0
+        ahead, reached = mechanics.later(contact, time, contact.stays), 0.0
         if going and law.sense == 0.0:
             reached = _piece(row, slider, law, ahead, nodes, energy)
         elif going:
@@ -377,7 +330,7 @@ def _clock_step(row, slider, law, contact, pieces, nodes, energy):
     return time, True
 
 
-@kernel(f"void({INPUTS}, {NUMBERS}, {OUTPUTS})")
+@kernel(f"void({mechanics.ARGUMENTS})")
 def advance_rows(inputs, numbers, outputs):
     """Advance all rows and their energies through some clock steps, each row by itself.
 
@@ -386,21 +339,21 @@ def advance_rows(inputs, numbers, outputs):
     any longer ends there.
     """
     rows, energies, bare, pieces, clock, units, work = inputs
-    slider, law, contact = Slider(*numbers[0]), Law(*numbers[1]), Contact(*numbers[2])
+    slider, law, contact = mechanics.Slider(*numbers[0]), mechanics.Law(*numbers[1]), mechanics.Contact(*numbers[2])
     reached, spent = outputs
-    columns, booked, nodes = np.empty(COLUMNS), np.empty(ENERGIES), np.empty(1, NODE_VALUES)
-    row, energy = columns.view(ROW)[0], booked.view(ENERGY)[0]
+    columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.empty(1, radau.NODE_VALUES)
+    row, energy = columns.view(mechanics.ROW)[0], booked.view(ENERGY)[0]
     for m in range(len(rows)):
         stop = 0
         for k in range(len(clock)):
-            start, stop = stop, pieces_to(k, stop, pieces)
-            to_units(columns, booked, rows[m], energies[m], units, work)
+            start, stop = stop, mechanics.pieces_to(k, stop, pieces)
+            mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if law.sense != 0.0:
                 row.moment = math.copysign(row.bound, row.speed) if row.speed != 0.0 else 0.0
             if math.isnan(row.runaway_time):
-                now = contact_at(contact, bare[m], clock[k], row)
+                now = mechanics.contact_at(contact, bare[m], clock[k], row)
                 time, going = _clock_step(row, slider, law, now, pieces[start:stop], nodes[0], energy)
                 if not going:
-                    run_away(row, booked, clock[k, 0] + time)
-            from_units(columns, booked, rows[m], energies[m], units, work)
+                    mechanics.run_away(row, booked, clock[k, 0] + time)
+            mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m] = rows[m], energies[m]

@@ -18,7 +18,7 @@ import math
 import numpy as np
 
 from sim.numerics.jit import device, inlined
-from sim.parts.coupled.row import FEW, SOME, compliance, contact_area, driven, pull_on
+from sim.parts.coupled.mechanics import FEW, SOME, compliance, contact_area, driven, pull_on
 
 _S6 = math.sqrt(6.0)
 NODES = np.array([(4.0 - _S6) / 10.0, (4.0 + _S6) / 10.0, 1.0])
@@ -390,7 +390,7 @@ def try_sub_step(row, start, step, slider, law, contact, nodes):
 def accept(row, start, step, slider, law, contact, nodes, energy):
     """Add an accepted sub-step to the row: integrals of the powers by the method, state at its end."""
     damping, viscosity = slider.damping, slider.viscosity
-    way, speed, body = 0.0, 0.0, 0.0
+    shift, speed, body = 0.0, 0.0, 0.0
     follows = contact.stays == 0.0
     first, firm = math.pi * row.radius * row.radius / contact.area, 0.0
     if follows:
@@ -431,8 +431,8 @@ def accept(row, start, step, slider, law, contact, nodes, energy):
             energy.rupture += share * area * moment * speed
         energy.area -= SHARES[i] * 0.5 * (square * spreads + sheared * sheared * firms)
         row.squared_speed += share * speed * speed
-        row.path += math.fabs(nodes.slip[i] - way)
-        way = nodes.slip[i]
+        row.path += math.fabs(nodes.slip[i] - shift)
+        shift = nodes.slip[i]
     row.spring_force, row.body_speed, row.speed = (
         nodes.pulls[2] - slider.stiffness * (nodes.slip[2] + nodes.sheared[2]),
         body,

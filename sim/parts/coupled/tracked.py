@@ -1,9 +1,9 @@
 """Rows of sliders and bonds followed one by one through a clock step, from one rupture or binding to the next.
 
 Between two events the number of bonds stays and their force is linear in the slip, so that a sub-step of the scheme in
-``cohorts`` is try_sub_step on sums alone; the bonds, whose arrays are spent, then go its way once. It ends at the next
-event. What does not hold the slider back is set right at once after an event: it slips as far as the bonds that are
-left have it, and bond after bond where slip itself breaks them.
+``cohorts`` is tried on sums alone. The bonds, whose arrays are spent, are displaced once it is accepted. A sub-step
+ends at the next event. If nothing delays the slip, forces are balanced at once after an event: the slider slips as far
+as the bonds that are left allow, and bond after bond if slip itself breaks them.
 """
 
 import math
@@ -12,52 +12,15 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.numerics.jit import device, kernel
-from sim.parts.bonds.tracked import (
-    BOUND as BONDS,
-    COLUMNS as FRAME,
-    SENSE,
-    SLIDER,
-    SPENT,
-    SQUARES,
-    STEPS,
-    SUM,
-    TRACKS,
-    next_cut,
-    next_event,
-    one_step,
-    room,
-)
+from sim.parts.bonds import tracked
+from sim.parts.coupled import mechanics
 from sim.parts.coupled.cohorts import NODE, accept_nodes, balance, before_node, begin_sub_step, bend_of, stored_energy
-from sim.parts.coupled.row import (
-    COLUMNS,
-    ENERGIES,
-    INPUTS,
-    LEAST,
-    MOST_STEPS,
-    NUMBERS,
-    OUTPUTS,
-    ROW,
-    SLIP,
-    Contact,
-    Slider,
-    compliance,
-    contact_area,
-    contact_at,
-    elastic,
-    from_units,
-    later,
-    next_step,
-    pieces_to,
-    run_away,
-    slider_in,
-    to_units,
-)
 from sim.parts.drive import ENERGY
 from sim.parts.exchange import Array
 
 #: Slip over that to which bonds are stretched below which it is a rounding: back and forth it would have them turn.
 _ROUNDING = 1e-13
-#: Length over a clock step's in which bonds go a way at once.
+#: Length over a clock step's in which bonds are displaced at once.
 _AT_ONCE = 1e-18
 #: Turns in which a node or an event is found, and trials of a sub-step.
 _TURNS, _TRIALS = 20, 200
@@ -79,19 +42,19 @@ class Ground(NamedTuple):
 def _sums(tracks, ground, node):
     """Compute the share bound, sum of the stretches and of their squares over the sites, stretches over their unit."""
     frame, unit, sites = tracks[2], ground.unit, ground.sites
-    number, slider, births = frame[BONDS], frame[SLIDER], frame[SUM]
+    number, slider, births = frame[tracked.BOUND], frame[tracked.SLIDER], frame[tracked.SUM]
     node.bound = number / sites
-    node.moment = frame[SENSE] * (number * slider - births) / (sites * unit)
-    squares = slider * (number * slider - 2.0 * births) + frame[SQUARES]
+    node.moment = frame[tracked.SENSE] * (number * slider - births) / (sites * unit)
+    squares = slider * (number * slider - 2.0 * births) + frame[tracked.SQUARES]
     node.square = max(squares, 0.0) / (sites * unit * unit)
 
 
 @device
-def _go(tracks, way, duration, ground):
+def _go(tracks, shift, duration, ground):
     """Advance the bonds by a displacement of the slider in a time."""
-    (bonds, soonest, frame), (events, ways, durations, laid, after) = tracks, ground.space
-    ways[0], durations[0] = way * ground.unit, duration
-    one_step(bonds, soonest, frame, ways, durations, ground.law, ground.address, events, laid, after)
+    (bonds, soonest, frame), (events, shifts, durations, laid, after) = tracks, ground.space
+    shifts[0], durations[0] = shift * ground.unit, duration
+    tracked.one_step(bonds, soonest, frame, shifts, durations, ground.law, ground.address, events, laid, after)
 
 
 @device
@@ -101,26 +64,26 @@ def _same(node, bound, total):
 
 
 @device
-def _set_right(line, time, tracks, slider, contact, ground, energy, node):
+def _rebalance(line, time, tracks, slider, contact, ground, energy, node):
     """Slip at once to where bonds bear the pull, as far as nothing delays it; True if there is such a place."""
-    row, trial, worked, unit, limit = line[0], np.empty(1, ROW), energy.work, ground.unit, ground.law[2]
-    for _ in range(MOST_STEPS):
+    row, trial, worked, unit, limit = line[0], np.empty(1, mechanics.ROW), energy.work, ground.unit, ground.law[2]
+    for _ in range(mechanics.MOST_STEPS):
         energy.work = worked
         _sums(tracks, ground, node)
         row.bound, row.moment = node.bound, node.moment
         trial[0] = row
-        if not elastic(trial[0], time, slider, contact, energy):
+        if not mechanics.elastic(trial[0], time, slider, contact, energy):
             return False
         slip, square = trial[0].slip - row.slip, node.square
         if not math.fabs(slip) > _ROUNDING * (math.fabs(node.moment) + node.bound):
             line[0] = trial[0]
             return True
-        nearest = next_cut(tracks, slip, limit) / unit if limit < math.inf else math.inf
+        nearest = tracked.next_cut(tracks, slip, limit) / unit if limit < math.inf else math.inf
         whole = nearest >= math.fabs(slip)
         slip = slip if whole else math.copysign(nearest * (1.0 + 1e-12) + 1e-12 * limit / unit, slip)
         _go(tracks, slip, _AT_ONCE * slider.length, ground)
         total, expected = row.moment + row.bound * slip, square + slip * (2.0 * row.moment + row.bound * slip)
-        _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
+        _, area, _, _ = mechanics.contact_area(row.bound, row.moment, time, row.radius, contact)
         _sums(tracks, ground, node)
         broken = not _same(node, row.bound, total)
         if broken:
@@ -141,24 +104,24 @@ def _set_right(line, time, tracks, slider, contact, ground, energy, node):
 def _try(nodes, at_start, start, step, row, slider, contact):
     """Find the nodes of a sub-step in which no bond breaks or is made; True if there are any.
 
-    The first guess is never taken: on the way to the next event, which may be as short as any, what is no slip may
+    The first guess is never taken: before the next event, which may be as short as any, what is no slip may
     still be a speed.
     """
     for place in (1, 2):
         approach = before_node(place, nodes, at_start, start, step, row, slider)
         before, after = nodes[place - 1], nodes[place]
-        way, bound, is_solved = approach.slip, before.bound, False
+        shift, bound, is_solved = approach.slip, before.bound, False
         for turn in range(_TURNS):
-            total = before.moment + bound * way
-            over, slope, none = balance(way, bound, total, before, after, approach, start, row, slider, contact)
+            total = before.moment + bound * shift
+            over, slope, none = balance(shift, bound, total, before, after, approach, start, row, slider, contact)
             if not slope > 0.0:
                 return False
             if turn > 0 and math.fabs(over / slope) <= none:
                 after.bound, after.moment = bound, total
-                after.square = before.square + way * (2.0 * before.moment + bound * way)
+                after.square = before.square + shift * (2.0 * before.moment + bound * shift)
                 is_solved = True
                 break
-            way -= over / slope
+            shift -= over / slope
         if not is_solved:
             return False
     return True
@@ -169,17 +132,17 @@ def _after_event(line, time, tracks, slider, contact, ground, energy, nodes):
     """Balance the forces after a bond has formed or broken; return True if possible, and the contact then."""
     row, node, area_before = line[0], nodes[0], nodes[2].area
     row.acceleration = 0.0
-    _, area, _, _ = contact_area(row.bound, row.moment, time, row.radius, contact)
+    _, area, _, _ = mechanics.contact_area(row.bound, row.moment, time, row.radius, contact)
     area = area if area >= 0.0 else area_before  # else no equilibrium is left
     energy.area -= 0.5 * node.square * (area - area_before)
     before, worked, lost = stored_energy(row, node.square, time, slider, contact), energy.work, energy.rupture
-    yields, _ = compliance(row.radius, slider)
+    yields, _ = mechanics.compliance(row.radius, slider)
     if yields > 0.0 and slider.viscosity == 0.0:  # it is sheared as by the bonds before
         before += 0.5 * row.sheared * (row.sheared / yields - area * row.moment)
-    is_balanced = _set_right(line, time, tracks, slider, contact, ground, energy, node)
+    is_balanced = _rebalance(line, time, tracks, slider, contact, ground, energy, node)
     if not is_balanced and contact.stays == 0.0:
-        contact = later(contact, 0.0, 1.0)
-        is_balanced = _set_right(line, time, tracks, slider, contact, ground, energy, node)
+        contact = mechanics.later(contact, 0.0, 1.0)
+        is_balanced = _rebalance(line, time, tracks, slider, contact, ground, energy, node)
     after = stored_energy(row, node.square, time, slider, contact)
     energy.snaps += before - after + energy.work - worked - (energy.rupture - lost)
     return is_balanced, contact
@@ -193,17 +156,17 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
     """
     start, length, unit, law = 0.0, slider.length, ground.unit, ground.law
     row, first, last = line[0], nodes[0], nodes[2]
-    for _ in range(MOST_STEPS):
+    for _ in range(mechanics.MOST_STEPS):
         left = length - start
-        if left <= LEAST * length:
+        if left <= mechanics.LEAST * length:
             return length
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         at_start = begin_sub_step(row, first, start, slider, contact)
-        step = next_step(row, left, length, math.inf)
+        step = mechanics.next_step(row, left, length, math.inf)
         whole, bend, grows, cut, turns = step, 0.0, 0.0, False, 0
         for _ in range(_TRIALS):
-            if not step > LEAST * length:
+            if not step > mechanics.LEAST * length:
                 break
             if not _try(nodes, at_start, start, step, row, slider, contact):
                 step, cut = 0.25 * step, False
@@ -214,16 +177,16 @@ def _piece(line, tracks, slider, contact, ground, nodes, energy):
                 step, cut = step * grows, False
                 continue
             whole = step if not cut else whole
-            soon = next_event(tracks, last.slip * unit / step, whole, law)
+            soon = tracked.next_event(tracks, last.slip * unit / step, whole, law)
             if turns < _TURNS and (soon < (1.0 - _NEAR) * step or (cut and soon > step)):
                 cut, turns = soon < whole, turns + 1
-                step = min(max(soon * (1.0 + 0.5 * _NEAR), 2.0 * LEAST * length), whole)
+                step = min(max(soon * (1.0 + 0.5 * _NEAR), 2.0 * mechanics.LEAST * length), whole)
                 continue
             break
-        if not step > LEAST * length:
+        if not step > mechanics.LEAST * length:
             if contact.stays > 0.0:
                 return start
-            contact = later(contact, 0.0, 1.0)
+            contact = mechanics.later(contact, 0.0, 1.0)
             row.next_step = 0.0
             continue
         accept_nodes(row, nodes, start, step, slider, math.inf, energy)
@@ -247,13 +210,13 @@ def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
     """Take a row and its bonds through a clock step; return the time reached, and False if stability is lost."""
     row, time, first = line[0], 0.0, nodes[0]
     for p in range(len(pieces)):
-        slider, from_here = slider_in(slider, pieces[p]), later(contact, time, contact.stays)
+        slider, from_here = mechanics.slider_in(slider, pieces[p]), mechanics.later(contact, time, contact.stays)
         worked, before, lost = energy.work, energy.stored, energy.rupture
         _sums(tracks, ground, first)
         row.bound, row.moment = first.bound, first.moment
         if p > 0:
             before = stored_energy(row, first.square, 0.0, slider, from_here)
-        if not _set_right(line, 0.0, tracks, slider, from_here, ground, energy, first):
+        if not _rebalance(line, 0.0, tracks, slider, from_here, ground, energy, first):
             return time, False
         after = stored_energy(row, first.square, 0.0, slider, from_here)
         energy.area += energy.work - worked - after + before - (energy.rupture - lost)
@@ -267,7 +230,7 @@ def _through(line, energy, pieces, slider, contact, tracks, ground, nodes):
     return time, True
 
 
-@kernel(f"int64({INPUTS}, {NUMBERS}, {OUTPUTS}, {TRACKS}, UniTuple(float64, 4), uint64, uint64[:], float64[:, :, ::1])")
+@kernel(f"int64({mechanics.ARGUMENTS}, {tracked.TRACKS}, UniTuple(float64, 4), uint64, uint64[:], float64[:, :, ::1])")
 def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames):
     """Advance all rows, their energies and their bonds, in place, through some clock steps, each row by itself.
 
@@ -276,26 +239,26 @@ def advance_tracks(inputs, numbers, outputs, tracks, law, seed, members, frames)
     zero, or ``SPENT`` if the bonds have been advanced already.
     """
     rows, energies, bare, pieces, clock, units, work = inputs
-    slider, contact, (reached, spent) = Slider(*numbers[0]), Contact(*numbers[2]), outputs
+    slider, contact, (reached, spent) = mechanics.Slider(*numbers[0]), mechanics.Contact(*numbers[2]), outputs
     birth, due, life, soonest, stamp, frame = tracks
     for m in range(len(rows)):
-        if stamp[m] != np.int64(frame[m, STEPS]):
-            return SPENT
-    space = room(), np.empty(1), np.empty(1), np.empty(FRAME + 1), np.empty((FRAME, 1))
-    columns, booked, nodes = np.empty(COLUMNS), np.empty(ENERGIES), np.zeros(3, NODE)
-    line, energy = columns.view(ROW), booked.view(ENERGY)[0]
+        if stamp[m] != np.int64(frame[m, tracked.STEPS]):
+            return tracked.SPENT
+    space = tracked.room(), np.empty(1), np.empty(1), np.empty(tracked.COLUMNS + 1), np.empty((tracked.COLUMNS, 1))
+    columns, booked, nodes = np.empty(mechanics.COLUMNS), np.empty(mechanics.ENERGIES), np.zeros(3, NODE)
+    line, energy = columns.view(mechanics.ROW), booked.view(ENERGY)[0]
     for m in range(len(rows)):
         stop, bonds = 0, ((birth[m], due[m], life[m]), soonest[m], frame[m])
-        ground = Ground(units[SLIP], np.float64(due.shape[1]), law, (seed, members[m]), space)
+        ground = Ground(units[mechanics.SLIP], np.float64(due.shape[1]), law, (seed, members[m]), space)
         for k in range(len(clock)):
-            start, stop = stop, pieces_to(k, stop, pieces)
-            to_units(columns, booked, rows[m], energies[m], units, work)
+            start, stop = stop, mechanics.pieces_to(k, stop, pieces)
+            mechanics.to_units(columns, booked, rows[m], energies[m], units, work)
             if math.isnan(line[0].runaway_time):
-                now = contact_at(contact, bare[m], clock[k], line[0])
+                now = mechanics.contact_at(contact, bare[m], clock[k], line[0])
                 time, going = _through(line, energy, pieces[start:stop], slider, now, bonds, ground, nodes)
                 if not going:
-                    run_away(line[0], booked, clock[k, 0] + time)
-            from_units(columns, booked, rows[m], energies[m], units, work)
+                    mechanics.run_away(line[0], booked, clock[k, 0] + time)
+            mechanics.from_units(columns, booked, rows[m], energies[m], units, work)
             reached[:, k, m], spent[k, m], frames[k, m] = rows[m], energies[m], frame[m]
-        stamp[m] = np.int64(frame[m, STEPS])
+        stamp[m] = np.int64(frame[m, tracked.STEPS])
     return 0

@@ -1,4 +1,4 @@
-"""Row of slider and bonds in the units of a step; the contact that it stands on; elastic slips that take no time."""
+"""Mechanics of slider and contact in the units of a step: their records, the contact area, slips that take no time."""
 
 import math
 from typing import NamedTuple
@@ -26,12 +26,12 @@ COLUMNS = len(ROW.names or ())
 SLIP = (ROW.names or ()).index("slip")
 ENERGIES = len(ENERGY.names or ())
 _STORED = (ENERGY.names or ()).index("stored")
-#: Types of ``Inputs``, of the numbers of slider, bonds and contact, and of what rows and energies come to.
-INPUTS = (
-    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64))"
+#: Types of ``Inputs``, of the numbers of slider, bonds and contact, and of rows and energies at the end of each step.
+ARGUMENTS = (
+    "Tuple((float64[:, ::1], float64[:, ::1], float64[::1], float64[:, ::1], float64[:, ::1], float64[::1], float64)), "
+    "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 12))), "
+    "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 )
-NUMBERS = "Tuple((UniTuple(float64, 12), UniTuple(float64, 7), UniTuple(float64, 12)))"
-OUTPUTS = "Tuple((float64[:, :, ::1], float64[:, :, ::1]))"
 
 
 class Slider(NamedTuple):
@@ -184,11 +184,11 @@ def driven(time, slider):
 
 
 @device
-def pull_on(time, start, way, row, slider):
-    """Return the spring force after a displacement ``way`` of the body since ``start``, or the prescribed force."""
+def pull_on(time, start, shift, row, slider):
+    """Return the spring force after a displacement ``shift`` of the body since ``start``, or the prescribed force."""
     if slider.forced > 0.0:
         return driven(time, slider)[1]
-    return row.spring_force + slider.stiffness * (driven(time, slider)[0] - driven(start, slider)[0] - way)
+    return row.spring_force + slider.stiffness * (driven(time, slider)[0] - driven(start, slider)[0] - shift)
 
 
 #: Shares of sites bound below which their relative error is no matter, and below which forces are those of so many.
@@ -295,7 +295,7 @@ def elastic(row, time, slider, contact, energy):
     row.spring_force = driven(time, slider)[1] if forced > 0.0 else row.spring_force
     if (slider.viscosity > 0.0 and row.radius > 0.0) or (held_back and yields == 0.0):
         return True
-    slip, bound, moment, way, radius, area = 0.0, row.bound, row.moment, 0.0, row.radius, 0.0
+    slip, bound, moment, shift, radius, area = 0.0, row.bound, row.moment, 0.0, row.radius, 0.0
     for _ in range(40):
         radius, area, _, by_moment = contact_area(bound, moment + bound * slip, time, radius, contact)
         if not area >= 0.0:
@@ -303,8 +303,8 @@ def elastic(row, time, slider, contact, energy):
         yields, _ = compliance(radius, slider)
         force = area * (moment + bound * slip)
         slope = (area + by_moment * (moment + bound * slip)) * bound
-        way = 0.0 if held_back else slip + yields * force - row.sheared
-        over = slip + yields * force - row.sheared if held_back else stiffness * way + force - row.spring_force
+        shift = 0.0 if held_back else slip + yields * force - row.sheared
+        over = slip + yields * force - row.sheared if held_back else stiffness * shift + force - row.spring_force
         slope = 1.0 + yields * slope if held_back else stiffness * (1.0 + yields * slope) + slope
         if not slope > 0.0:
             return over == 0.0
@@ -313,11 +313,11 @@ def elastic(row, time, slider, contact, energy):
             break
     moment += bound * slip
     row.moment, row.sheared, row.radius = moment, yields * area * moment, radius
-    row.position += way
+    row.position += shift
     row.slip += slip
     row.path += math.fabs(slip)
-    energy.work += row.spring_force * way if forced > 0.0 else 0.0
-    row.spring_force -= 0.0 if forced > 0.0 else stiffness * way
+    energy.work += row.spring_force * shift if forced > 0.0 else 0.0
+    row.spring_force -= 0.0 if forced > 0.0 else stiffness * shift
     return True
 
 
@@ -329,7 +329,7 @@ def slips_free(row, slider):
 
 
 @device
-def free_ways(row, slider):
+def free_shifts(row, slider):
     """Return the displacements of an interface without bonds, and of its body, to where no force acts."""
     body = 0.0 if slider.mass + slider.damping > 0.0 else row.spring_force / slider.stiffness
     return body + row.sheared, body
@@ -338,7 +338,7 @@ def free_ways(row, slider):
 @device
 def slip_free(row, time, slider, contact):
     """Slip at once, with next to no bonds, to where no force acts on the interface."""
-    slip, body = free_ways(row, slider)
+    slip, body = free_shifts(row, slider)
     radius, area, _, _ = contact_area(FEW, 0.0, time, row.radius, contact)
     row.bound, row.moment, row.sheared, row.radius = FEW, 0.0, 0.0, radius if area >= 0.0 else row.radius
     displace(row, slip, body, slider)
