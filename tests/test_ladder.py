@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.scenes import BELL, BONDS, CELL, CUT_OFF, SPECTRUM, STRETCHED, scene
+from helpers.scenes import BELL, BONDS, BY_SLIP, CUT_OFF, SPECTRUM, STRETCHED, scene
 from numpy.testing import assert_allclose
 
 from sim.engine import march
@@ -14,7 +14,7 @@ from sim.parts.bonds import models as bonds, tracked as tracks
 from sim.parts.bonds.rupture import Bell, Constant, CutOff
 from sim.parts.contact import Equilibrium
 from sim.parts.shear import models as shear
-from sim.parts.shear.process import Onset, Slip, Wave
+from sim.parts.shear.process import Onset, Slip
 from sim.scenario.clock import Record
 from sim.spectrum.families import Gaussian
 
@@ -93,65 +93,33 @@ def test_bell_bonds_become_those_of_a_constant_rate_to_first_order_as_the_bell_f
     assert_allclose(errors[1] / errors[2], 10.0, rtol=0.01)
 
 
-def test_the_first_moment_is_exact_where_the_rate_is_constant():
-    # cohorts resolve what the first moment closes: the same number and stress, also past a reversal
-    turns = drive.Table(time=(0.0, 3e-3, 3e-3, 6e-3, 6e-3, 9e-3), speed=(2e-3, 2e-3, -8e-3, -8e-3, 0.0, 0.0))
-    recipe = {"rupture": Constant(rate=200.0), **STRETCHED, "start_from": "empty"}
-    for tolerance in (1e-2, 1e-4, 1e-6):
-        closed, resolved = bonds.FirstMoment(**recipe), bonds.Cohort(**recipe, tolerance=tolerance)
-        for one, other in zip(marched(closed, turns), marched(resolved, turns), strict=True):
-            assert_allclose(other[0], one[0], rtol=tolerance, atol=1e-15)
-            assert_allclose(other[1], one[1], rtol=tolerance, atol=tolerance * 4e4)  # stress passes zero; its scale
-    assert abs(one[1]) > 0.0
-
-
-def marched(part, motion):
-    """Bond fraction and stress after each step."""
-    states = march(scene(bonds=part, drive=motion), np.arange(1))
-    return [(state.bonding.fraction[0], state.bonding.stress[0]) for state in states]
-
-
 @pytest.mark.parametrize("speed", [1e-4, 8e-3, 1.0])
 def test_bonds_that_only_a_stretch_breaks_are_the_papers_steady_law(speed):
     # N0/(1 + V/Vc) with Vc = l k_on, at once from the steady start and for ever; each bond half stretched on average
     recipe = {"rupture": CutOff(stretch=20e-6), **STRETCHED}
-    steady = last(
-        bonds=bonds.Steady(critical_speed=20e-6 * STRETCHED["rebinding_rate"]), drive=drive.Steady(speed=speed)
-    )
+    law = bonds.Steady(critical_speed=20e-6 * STRETCHED["rebinding_rate"])
+    steady = last(bonds=law, drive=drive.Steady(speed=speed))
     full = 0.5 * STRETCHED["site_density"] * STRETCHED["bond_stiffness"] * 20e-6
     for start, steps in (("steady", 8), ("empty", 100))[: 1 if speed < 1e-3 else 2]:  # the slowest live for 0.2 s
         part = bonds.Cohort(**recipe, start_from=start)
         state = last(steps=steps, bonds=part, drive=drive.Steady(speed=speed)).bonding
         assert_allclose(state.fraction, steady.bonds.bound, rtol=1e-4)
         assert_allclose(state.stress, full * steady.bonds.bound, rtol=1e-4)
-    tracked = bonds.Tracked(**recipe, sites=400)
-    state = last(400, bonds=tracked, drive=drive.Steady(speed=speed))
-    share = steady.bonds.bound[0]
-    error = math.sqrt(share * (1.0 - share) / 400 / 400)
-    assert abs(state.bonding.fraction.mean() - share) < 5.0 * error
 
 
-@pytest.mark.parametrize(
-    ("left_open", "chosen"),
-    [
+def test_bonds_left_open_are_the_depth_that_is_chosen():
+    linear = {"critical_speed": 1e-2, "rebinding_rate": 5.0, "sites": 30}
+    bell, constant = ({"rupture": rupture, **STRETCHED} for rupture in (BELL, Constant(rate=9.0)))
+    for left_open, chosen in (
         (BONDS["auto, few sites"], bonds.Tracked(rupture=CUT_OFF, **STRETCHED, sites=20)),
         (BONDS["auto, many sites"], bonds.Rate(critical_speed=1e-2, rebinding_rate=500.0, stress=2e5)),
-        (
-            bonds.Auto(critical_speed=1e-2, rebinding_rate=5.0, sites=30),
-            bonds.Counted(critical_speed=1e-2, rebinding_rate=5.0, sites=30),
-        ),
-        (bonds.Auto(rupture=BELL, **STRETCHED), bonds.Cohort(rupture=BELL, **STRETCHED)),
-        (
-            bonds.Auto(rupture=Constant(rate=9.0), **STRETCHED),
-            bonds.FirstMoment(rupture=Constant(rate=9.0), **STRETCHED),
-        ),
-    ],
-    ids=["tracked", "rate", "counted", "cohort", "first moment"],
-)
-def test_bonds_left_open_are_the_depth_that_is_chosen(left_open, chosen):
-    assert scene(bonds=left_open).population == chosen
-    one, other = (last(3, bonds=part).contact.radius for part in (left_open, chosen))
-    assert np.array_equal(one, other)
+        (bonds.Auto(**linear), bonds.Counted(**linear)),
+        (bonds.Auto(**bell), bonds.Cohort(**bell)),
+        (bonds.Auto(**constant), bonds.FirstMoment(**constant)),
+    ):
+        assert scene(bonds=left_open).population == chosen
+        one, other = (last(3, bonds=part).contact.radius for part in (left_open, chosen))
+        assert np.array_equal(one, other)
 
 
 def test_mean_fluctuations_become_uniform_as_their_rms_vanishes():
@@ -178,58 +146,35 @@ def test_modal_fluctuations_become_the_mean_as_the_cell_grows():
 
 
 def test_the_ensemble_mean_of_modal_energies_is_the_cells_own():
-    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6))
-    members = 2000
+    part, members = shear.Modal(**BY_SLIP), 2000
     state = last(members, shear=part)
     pairs = scene(shear=part).process.modes.energies(1.6e6)
     assert abs(state.shear.energy.mean() - pairs.sum()) < 5.0 * np.sqrt(np.sum(pairs**2) / members)
 
 
-def test_banded_fluctuations_become_modal_as_the_tolerance_falls():
-    # every cumulant tends to that of the sum over modes; the first two are exact at any tolerance
-    recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Wave(waves=2.0)}
-    pairs = scene(shear=shear.Modal(**recipe)).process.modes.energies(1.6e6)
-    exact = np.array([math.factorial(n - 1) * np.sum(pairs**n) for n in range(1, 7)])
-    before = np.full(4, np.inf)
-    for tolerance in (0.5, 0.1, 0.02, 0.004):
-        bands = scene(shear=shear.Banded(**recipe, tolerance=tolerance)).process.bands
-        found = [
-            math.factorial(n - 1) * 0.5 * np.sum(bands.weight**n * bands.freedom) for n in range(1, 7)
-        ]  # of ½ weight × chi-square
-        errors = np.abs(found / exact - 1.0)
-        assert np.all(errors[:2] < 1e-13)
-        assert np.all(errors[2:4] <= tolerance)
-        assert np.all(errors[2:] < before)
-        before = errors[2:]
-
-
 def test_auto_is_the_depth_that_it_chooses():
-    recipe = {"spectrum": SPECTRUM, "cell": CELL, "correlation": Slip(length=5e-6)}
     for auto, chosen in (
         (shear.Auto(spectrum=SPECTRUM), shear.Mean(spectrum=SPECTRUM)),
-        (shear.Auto(**recipe), shear.Banded(**recipe)),
+        (shear.Auto(**BY_SLIP), shear.Banded(**BY_SLIP)),
     ):
         assert scene(shear=auto).fluctuations == chosen
         assert np.array_equal(last(3, shear=auto).shear.energy, last(3, shear=chosen).shear.energy)
-    maps = Record(maps=(2e-3,))
-    assert scene(shear=shear.Auto(**recipe), record=maps).fluctuations == shear.Mapped(**recipe)
-    assert scene(shear=shear.Auto(**recipe), record=maps).process.modes.points > 2
+    mapped = scene(shear=shear.Auto(**BY_SLIP), record=Record(maps=(2e-3,)))
+    assert mapped.fluctuations == shear.Mapped(**BY_SLIP)
+    assert mapped.process.modes.points > 2
 
 
 def test_modal_with_fixed_amplitudes_is_the_mean_with_the_cells_error():
     amplitude = Onset(speed=2e-3, width=0.3)
-    part = shear.Modal(
-        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=amplitude, mode_amplitudes="fixed"
-    )
+    part = shear.Modal(**BY_SLIP, amplitude=amplitude, mode_amplitudes="fixed")
     error = scene(shear=part).process.known_errors()["cell_error_energy"]
     mean = last(shear=shear.Mean(spectrum=SPECTRUM, amplitude=amplitude)).shear.energy
     assert_allclose(last(shear=part).shear.energy, mean * (1.0 + error), rtol=1e-12)
 
 
 def test_energy_that_adhesion_does_not_pay_leaves_jkr_bit_for_bit():
-    part = shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), paid_by_adhesion=0.0)
-    found = last(4, shear=part).contact.radius
-    assert np.array_equal(found, np.full(4, jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)))
+    radii = last(4, shear=shear.Modal(**BY_SLIP, paid_by_adhesion=0.0)).contact.radius
+    assert np.array_equal(radii, np.full(4, jkr.radius_at_load(4e-3, 42e-3, 2e-3, 6.4e6)))
 
 
 def test_a_uniform_stress_of_any_size_changes_nothing():
@@ -244,10 +189,3 @@ def test_a_contact_at_the_indentation_of_a_load_is_the_contact_at_that_load():
         radius = last(contact=Equilibrium(indentation=depth)).contact.radius
         assert_allclose(radius, at_load, rtol=1e-11)
         assert_allclose(jkr.load_at_radius(radius, 42e-3, 2e-3, 6.4e6), load, rtol=1e-10, atol=1e-14)
-
-
-def test_a_masked_contact_is_hertz():
-    part = shear.Mean(spectrum=Gaussian(rms=1e6, length=1e-5))
-    state = last(shear=part)
-    assert state.contact.work[0] < 0.0
-    assert_allclose(state.contact.radius, (3 * 4e-3 * 2e-3 / (4 * 6.4e6)) ** (1 / 3), rtol=1e-14)

@@ -1,6 +1,7 @@
 """Scenes of a lens behind a spring or under a force, in units of its bonds, and what a march of them reads."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -24,37 +25,19 @@ LOAD = 4e-3
 WORK = LOAD / (math.pi * R)
 
 
-def scenario(
-    duration,
-    steps,
-    drive,
-    share=0.0,
-    rupture=BELL,
-    rebinding=1.0,
-    start="bonded",
-    members=1,
-    make=FirstMoment,
-    **contact,
-):
+def scenario(duration, steps, drive, share=0.0, start="bonded", members=1, make=FirstMoment, **keys):
     """A lens whose bonds, as made of their recipe, carry ``share`` of the work of adhesion."""
+    bonds = {"rupture": keys.pop("rupture", BELL), "rebinding_rate": keys.pop("rebinding", 1.0), "start_from": start}
     return Scenario(
         clock=Clock(duration=duration, step=duration / steps),
         solid=Solid(shear_modulus=MODULUS / 4.0),
         sphere=Sphere(radius=R),
         adhesion=Adhesion(work=WORK, bond_share=share),
-        contact=Equilibrium(**({"load": LOAD} | contact)),
-        bonds=make(
-            rupture=rupture, bond_stiffness=KAPPA, rebinding_rate=rebinding, site_density=DENSITY, start_from=start
-        ),
+        contact=Equilibrium(**({"load": LOAD} | keys)),
+        bonds=make(**bonds, bond_stiffness=KAPPA, site_density=DENSITY),
         drive=drive,
         ensemble=Ensemble(members=members),
     )
-
-
-def fields(scene):
-    """The tables of a scene that a changed copy takes over."""
-    names = ("clock", "solid", "sphere", "adhesion", "contact", "bonds", "drive", "ensemble")
-    return {name: getattr(scene, name) for name in names}
 
 
 AREA = math.pi * jkr.radius_at_load(LOAD, WORK, R, MODULUS) ** 2
@@ -68,16 +51,12 @@ HELD = COULOMB * AREA
 
 def spring(stiffness, speed=10.0, mass=0.0, damping=0.0, contact=math.inf, viscosity=0.0, **keys):
     """A spring drive in units of all sites bound: stiffness and k_t over n κ A, speed in stretches a second."""
+    held = contact if isinstance(contact, str) else "rigid" if contact == math.inf else contact * STIFF
     return Spring(
         stage=speed * STRETCH if isinstance(speed, float) else speed, stiffness=stiffness * STIFF, mass=mass * STIFF,
         damping=damping * STIFF, viscosity=viscosity * DENSITY * KAPPA,
-        contact_stiffness=_held_by(contact), **keys,
+        contact_stiffness=held, **keys,
     )  # fmt: skip
-
-
-def _held_by(contact):
-    """k_t in units of all sites bound, rigid if infinite."""
-    return contact if isinstance(contact, str) else "rigid" if contact == math.inf else contact * STIFF
 
 
 def force(load, **keys):
@@ -103,36 +82,11 @@ def reached(states, *names):
     return np.array([[getattr(getattr(state, parts[n]), n)[0] / units[n] for n in names] for state in states])
 
 
-def turning(**keys):
-    """A spring on a stage that rests, goes there and back, and stops."""
-    speeds = (10.0, 10.0, -10.0, -10.0, 0.0, 0.0)
-    stage = {"time": (0.0, 2.0, 2.0, 4.0, 4.0, 9.0), "value": tuple(v * STRETCH for v in speeds)}
-    return spring(0.2, stage, start_after=1.0, **keys)
-
-
-def check_turned(states, read):
-    """A march of 8 in 16 steps under ``turning``: the stage's way, the signs of the stress, the energies."""
-    assert_allclose(read["stage_position"][[2, 6, 10, 16]] / STRETCH, [0.0, 20.0, 0.0, 0.0], atol=1e-12)
-    assert states[6].bonding.stress[0] > 0.0 > states[10].bonding.stress[0]
-    assert abs(states[16].bonding.stress[0]) < 0.2 * abs(states[10].bonding.stress[0])
-    assert residual(read) < 1e-5
-
-
 #: A load that pulls the contact off and comes back, and what the contact does then.
 PULLED_OFF = {
     "load": {"time": (0.0, 0.95, 1.1, 2.0, 2.0, 9.0), "value": (LOAD, LOAD, -LOAD, -LOAD, LOAD, LOAD)},
     "after_pull_off": "reattach",
 }
-
-
-def check_pulled_off(states, read):
-    """A march of 3 in 30 steps under ``PULLED_OFF``: no force while the contact is open, and one again at the end."""
-    open_ = np.isnan([state.contact.radius[0] for state in states])
-    assert open_[11:20].all()
-    assert not open_[21:].any()
-    assert_allclose(read["spring_force"][12:20], 0.0, atol=1e-12 * UNIT)
-    assert read["spring_force"][-1] > 0.05 * UNIT
-    assert np.isfinite(read["energy_residual"]).all()
 
 
 def fastest(straight, speed=10.0):
@@ -168,7 +122,7 @@ def check_blocks(scene, states, every=1):
 def stuck(duration, steps, bonds, drive, share=0.0, members=1, **contact):
     """A lens whose bonds have no stretch; their strength and the unit of length make the unit of stiffness."""
     scene = scenario(duration, steps, spring(1.0, mass=1.0), share=share, members=members, **contact)
-    return Scenario(**{**fields(scene), "bonds": bonds, "drive": drive})
+    return replace(scene, bonds=bonds, drive=drive)
 
 
 def pulled(stiffness=1.0, speed=1.0, mass=0.0, damping=0.0, **keys):

@@ -20,6 +20,11 @@ from sim.spectrum.families import Band, Gaussian, Ripple, SelfAffine
 
 SPECTRUM = Band(rms=120e3, longest=120e-6, shortest=60e-6)
 CELL = 0.24e-3
+#: Recipes of fluctuations on a cell, renewed by slip or in time; amplitudes.
+ON_CELL = {"spectrum": SPECTRUM, "cell": CELL}
+BY_SLIP, IN_TIME = ON_CELL | {"correlation": Slip(length=5e-6)}, ON_CELL | {"correlation": Time(time=2e-3)}
+BY_WAVES = ON_CELL | {"correlation": Wave(waves=2.0)}
+ONSET = {"speed": 2e-3, "width": 0.3, "floor": 0.1}
 
 DRIVES = {
     "steady": drive.Steady(speed=2e-3),
@@ -30,16 +35,11 @@ DRIVES = {
     "table": drive.Table(time=(0.0, 0.003, 0.003, 0.02), speed=(1e-3, 1e-3, 2e-2, 0.0)),
     "spring": Spring(stage=2e-2, stiffness=100.0, start="steady"),
     "spring with mass": Spring(
-        stage={"from": 1e-2, "to": -1e-2, "cycles": 1},
-        stiffness=200.0,
-        start_after=1e-3,
-        mass=1e-4,
-        damping=0.1,
-        viscosity=1e5,
-        contact_stiffness="rigid",
+        stage={"from": 1e-2, "to": -1e-2, "cycles": 1}, start_after=1e-3, stiffness=200.0, mass=1e-4, damping=0.1,
+        viscosity=1e5, contact_stiffness="rigid",
     ),
     "force": Force(force={"from": 0.0, "to": 3e-3}, damping=0.1, contact_stiffness="rigid"),
-}
+}  # fmt: skip
 #: Bonds whose life at rest is 5 ms and that feel their force from a stretch of 10 µm on, 0.2 MPa at the most.
 BELL = Bell(zero_force_rate=200.0, bell_force=4e-12)
 CUT_OFF = CutOff(stretch=20e-6, rate=50.0)
@@ -63,57 +63,37 @@ BONDS = {
 SHEARS = {
     "uniform": shear.Uniform(),
     "mean": shear.Mean(spectrum=Gaussian(rms=1e5, length=5e-6), amplitude=Stress(reference=2e5)),
-    "modal, time, constant": shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3)),
-    "modal, slip, onset": shear.Modal(
-        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=Onset(speed=2e-3, width=0.3, floor=0.1)
-    ),
-    "modal, wave, relaxing stress": shear.Modal(
-        spectrum=SPECTRUM, cell=CELL, correlation=Wave(waves=2.0), amplitude=Stress(reference=2e5, relaxing=True)
-    ),
-    "modal, fixed": shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), mode_amplitudes="fixed"),
+    "modal, time, constant": shear.Modal(**IN_TIME),
+    "modal, slip, onset": shear.Modal(**BY_SLIP, amplitude=Onset(**ONSET)),
+    "modal, wave, relaxing stress": shear.Modal(**BY_WAVES, amplitude=Stress(reference=2e5, relaxing=True)),
+    "modal, fixed": shear.Modal(**IN_TIME, mode_amplitudes="fixed"),
     "mapped, diffusion, constant": shear.Mapped(
-        spectrum=SPECTRUM, cell=CELL, points=12, correlation=Diffusion(diffusivity=1e-9), amplitude=ConstantAmplitude()
+        **ON_CELL, points=12, correlation=Diffusion(diffusivity=1e-9), amplitude=ConstantAmplitude()
     ),
     "mapped, fixed, stress": shear.Mapped(
-        spectrum=SPECTRUM,
-        cell=CELL,
-        points=13,
-        correlation=Slip(length=1e-5),
+        **ON_CELL | {"correlation": Slip(length=1e-5), "points": 13, "mode_amplitudes": "fixed"},
         amplitude=Stress(reference=2e5),
-        mode_amplitudes="fixed",
     ),
-    "banded, slip, onset": shear.Banded(
-        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=Onset(speed=2e-3, width=0.3, floor=0.1)
-    ),
+    "banded, slip, onset": shear.Banded(**BY_SLIP, amplitude=Onset(**ONSET)),
     "banded, wave, relaxing stress": shear.Banded(
-        spectrum=SPECTRUM,
-        cell=CELL,
-        tolerance=0.1,
-        correlation=Wave(waves=2.0),
-        amplitude=Stress(reference=2e5, relaxing=True),
+        **BY_WAVES, tolerance=0.1, amplitude=Stress(reference=2e5, relaxing=True)
     ),
-    "banded, relaxing slip rate": shear.Banded(
-        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=SlipRate(floor=0.1, relaxing=True)
-    ),
+    "banded, relaxing slip rate": shear.Banded(**BY_SLIP, amplitude=SlipRate(floor=0.1, relaxing=True)),
     "mean, slip rate": shear.Mean(spectrum=SPECTRUM, amplitude=SlipRate(memory_length=2e-6)),
-    "modal, fixed, slip rate": shear.Modal(
-        spectrum=SPECTRUM, cell=CELL, correlation=Slip(length=5e-6), amplitude=SlipRate(), mode_amplitudes="fixed"
-    ),
-    "banded, fixed": shear.Banded(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), mode_amplitudes="fixed"),
-    "modal on a disc": shear.Modal(spectrum=SPECTRUM, cell=CELL, correlation=Time(time=2e-3), contact="disc"),
+    "modal, fixed, slip rate": shear.Modal(**BY_SLIP, amplitude=SlipRate(), mode_amplitudes="fixed"),
+    "banded, fixed": shear.Banded(**IN_TIME, mode_amplitudes="fixed"),
+    "modal on a disc": shear.Modal(**IN_TIME, contact="disc"),
     "mean on a disc": shear.Mean(spectrum=Gaussian(rms=1e5, length=2e-5), contact="disc", paid_by_adhesion=0.5),
-    "auto with correlation": shear.Auto(spectrum=SPECTRUM, cell=CELL, correlation=Diffusion(diffusivity=1e-9)),
+    "auto with correlation": shear.Auto(**ON_CELL, correlation=Diffusion(diffusivity=1e-9)),
     "auto without correlation": shear.Auto(spectrum=SPECTRUM),
     "modal ripple": shear.Modal(
         spectrum=Ripple(amplitude=1e5, wavelength=24e-6), cell=CELL, points=32, correlation=Slip(length=1e-5)
     ),
     "modal self-affine": shear.Modal(
         spectrum=SelfAffine(rms=1e5, hurst=0.8, longest=120e-6, rolloff=100e-6, shortest=50e-6),
-        cell=CELL,
-        correlation=Wave(waves=1.0),
-        amplitude=Onset(speed=2e-3, width=0.3, floor=0.1, relaxing=True),
+        cell=CELL, correlation=Wave(waves=1.0), amplitude=Onset(**ONSET, relaxing=True),
     ),
-}
+}  # fmt: skip
 CONTACTS = {
     "load": Equilibrium(load=4e-3),
     "tension": Equilibrium(load=-0.3e-3),
@@ -127,13 +107,11 @@ CONTACTS = {
     "indentation in a table": Equilibrium(indentation={"time": [0.0, 5e-3, 1.0], "value": [2e-6, -2e-6, -2e-6]}),
     "rate_dependent": RateDependent(load=4e-3, front_speed=1e-2),
     "rate-dependent cycle": RateDependent(
-        indentation={"from": 1e-6, "to": -2e-6, "cycles": 1},
-        front_speed=1e-2,
-        heal_speed=1e-3,
+        indentation={"from": 1e-6, "to": -2e-6, "cycles": 1}, front_speed=1e-2, heal_speed=1e-3,
         after_pull_off="reattach",
     ),
     "partly reversible": Equilibrium(load=4e-3, reversible=0.02),
-}
+}  # fmt: skip
 
 
 def go_together(case):

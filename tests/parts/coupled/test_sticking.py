@@ -1,30 +1,13 @@
 """Sliders on bonds without a stretch that take time: a linear rate equation, and a finite number of them."""
 
+import itertools
 import math
 
 import numpy as np
 import pytest
-from helpers.driven import (
-    AREA,
-    COULOMB,
-    HELD,
-    LOAD,
-    MODULUS,
-    PULLED_OFF,
-    STRETCH,
-    WORK,
-    R,
-    check_blocks,
-    check_members,
-    check_onset,
-    fastest,
-    jolted,
-    marched,
-    mode_of,
-    pulled,
-    residual,
-    stuck,
-)  # fmt: skip
+from helpers import driven
+from helpers.cases import some
+from helpers.driven import COULOMB, HELD, STRETCH, marched, pulled, residual, stuck
 from numpy.testing import assert_allclose
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
@@ -37,12 +20,12 @@ from sim.parts.drive import Force
 
 #: Rate at which free sites bind, and critical speed in stretches a second.
 BINDING, CRITICAL = 2.0, 0.5
+LINEAR = {"critical_speed": CRITICAL * STRETCH, "rebinding_rate": BINDING, "stress": COULOMB}
 
 
 def renewed(start="bonded", **keys):
     """Bonds of the linear rate equation."""
-    recipe = {"critical_speed": CRITICAL * STRETCH, "rebinding_rate": BINDING, "stress": COULOMB}
-    return Rate(**recipe, start_from=start, **keys)
+    return Rate(**LINEAR, start_from=start, **keys)
 
 
 def reached(states):
@@ -107,13 +90,13 @@ def test_disturbances_neither_grow_nor_fade_at_the_onset_and_do_so_on_its_sides(
     steps, step = 200, 2.0 * math.pi / frequency / 25.0
 
     def growth(stiffness):
-        stage = jolted(1.0, step, 1.00001)
+        stage = driven.jolted(1.0, step, 1.00001)
         drive = pulled(stiffness, stage, mass, damping, start="steady", tolerance=1e-11)
         scene = stuck(steps * step, steps, renewed("steady"), drive)
         passed = follow(scene, MemberNoise.of(scene.seed, np.arange(1)), None, range(steps + 1))[1]
-        return mode_of(passed.fraction[steps // 3 :, 0], step, frequency, 3 if mass else 2)
+        return driven.mode_of(passed.fraction[steps // 3 :, 0], step, frequency, 3 if mass else 2)
 
-    check_onset(growth, onset, frequency)
+    driven.check_onset(growth, onset, frequency)
 
 
 def test_a_force_moves_a_body_after_a_rest_where_it_exceeds_the_strength_that_has_healed():
@@ -139,14 +122,13 @@ def test_the_missing_energy_falls_with_the_tolerance_while_the_area_follows_the_
         assert missing[2] < 0.1 * missing[1] < 0.1 * missing[0]
 
 
-@pytest.mark.parametrize("area", ["present", "carried"])
-def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip(area):
-    for keys in [{"damping": 0.05}, {"mass": 0.01, "damping": 0.05}]:
+def test_a_member_is_the_same_alone_and_restarted_in_the_middle_of_a_slip():
+    for area, keys in itertools.product(("present", "carried"), ({"damping": 0.05}, {"mass": 0.01, "damping": 0.05})):
         scene = stuck(12.0, 240, renewed(area=area), pulled(1.0, 0.3, **keys), share=0.5)
         straight = list(march(scene, np.arange(3)))
-        check_members(scene, straight, fastest(straight, 0.3))
+        driven.check_members(scene, straight, driven.fastest(straight, 0.3))
         if area == "present":
-            check_blocks(scene, straight, 4)
+            driven.check_blocks(scene, straight, 4)
 
 
 def test_a_stage_that_turns_pulls_the_body_both_ways_and_leaves_it_at_rest():
@@ -165,7 +147,7 @@ def test_a_stage_that_turns_pulls_the_body_both_ways_and_leaves_it_at_rest():
 def test_a_contact_that_pays_for_its_mean_stress_follows_it_within_the_sub_steps(bonds):
     for keys in [{"damping": 0.05}, {"mass": 0.01, "damping": 0.05}]:
         # at rest with all its strength the stress takes this of the work of adhesion
-        share = 6.0 * COULOMB**2 * math.sqrt(AREA / math.pi) / (math.pi * MODULUS) / WORK
+        share = 6.0 * COULOMB**2 * math.sqrt(driven.AREA / math.pi) / (math.pi * driven.MODULUS) / driven.WORK
         missing = []
         for tolerance in (1e-5, 1e-8):
             drive = pulled(1.0, 0.3, tolerance=tolerance, **keys)
@@ -176,17 +158,17 @@ def test_a_contact_that_pays_for_its_mean_stress_follows_it_within_the_sub_steps
             missing.append(residual(read))
             assert missing[-1] < tolerance
         stress = np.abs([state.bonding.stress[0] for state in states[1:]])
-        exact = radius_at_load_reversible(LOAD, WORK, stress, 0.3 / share, R, MODULUS)
+        exact = radius_at_load_reversible(driven.LOAD, driven.WORK, stress, 0.3 / share, driven.R, driven.MODULUS)
         assert_allclose(radii, exact, rtol=1e-9)
         assert np.min(radii) < 0.97 * np.max(radii)
         assert missing[1] < missing[0]
-        check_blocks(scene, states)
+        driven.check_blocks(scene, states)
 
 
 @pytest.mark.parametrize("bonds", [renewed(), Steady(critical_speed=STRETCH, stress=COULOMB)])
 def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_it_up_again(bonds):
     for keys in [{"damping": 0.1}, {"mass": 0.05}, {"viscosity": 0.1 * COULOMB / STRETCH}]:
-        scene = stuck(3.0, 30, bonds, pulled(1.0, 1.0, **keys), share=0.5, **PULLED_OFF)
+        scene = stuck(3.0, 30, bonds, pulled(1.0, 1.0, **keys), share=0.5, **driven.PULLED_OFF)
         states, read = marched(scene)
         open_ = np.isnan([state.contact.radius[0] for state in states])
         assert open_[15:20].all()
@@ -195,18 +177,15 @@ def test_a_contact_that_is_pulled_off_lets_the_slider_go_and_takes_it_up_again(b
         assert residual(read) < 1e-5
         if "viscosity" in keys:  # which nothing bears in an open contact
             assert_allclose(read["spring_force"][16:20], 0.0, atol=1e-12 * HELD)
-        check_blocks(scene, states)
+        driven.check_blocks(scene, states)
 
 
 def counted(sites, start="bonded"):
     """A finite number of bonds with the rates of the linear equation."""
-    recipe = {"critical_speed": CRITICAL * STRETCH, "rebinding_rate": BINDING, "stress": COULOMB}
-    return Counted(**recipe, sites=sites, start_from=start)
+    return Counted(**LINEAR, sites=sites, start_from=start)
 
 
-@pytest.mark.parametrize(
-    "keys", [{"damping": 0.3}, pytest.param({"mass": 0.05, "damping": 0.3}, marks=pytest.mark.verify)]
-)
+@pytest.mark.parametrize("keys", some([{"damping": 0.3}, {"mass": 0.05, "damping": 0.3}], {"damping": 0.3}))
 def test_very_many_counted_bonds_move_as_the_rate_equation_to_first_order_in_the_clock_step(keys):
     def force(bonds, steps):
         return marched(stuck(4.0, steps, bonds, pulled(1.0, 0.5, **keys)))[1]["spring_force"][:: steps // 40] / HELD
@@ -231,14 +210,11 @@ def test_counted_bonds_of_a_slider_fluctuate_as_independent_sites_in_steady_slid
 def test_counted_bonds_at_rest_carry_the_pull_up_to_their_strength_and_are_the_same_in_any_batch():
     scene = stuck(6.0, 240, counted(40), pulled(1.0, 0.5, damping=0.05), share=0.5, members=3)
     straight = list(march(scene, np.arange(3)))
-    check_members(scene, straight, fastest(straight, 0.5))
-    force, bound, rest = (
-        np.array(values)
-        for values in zip(
-            *((state.drive.spring_force, state.bonding.fraction, state.drive.speed == 0.0) for state in straight[1:]),
-            strict=True,
-        )
+    driven.check_members(scene, straight, driven.fastest(straight, 0.5))
+    force, rest = (
+        np.array([getattr(state.drive, name) for state in straight[1:]]) for name in ("spring_force", "speed")
     )
+    bound, rest = np.array([state.bonding.fraction for state in straight[1:]]), rest == 0.0
     assert 0.3 < np.mean(rest) < 1.0
     areas = np.array([np.pi * state.contact.radius**2 for state in straight[1:]])
     stress = np.array([state.bonding.stress for state in straight[1:]])

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from helpers.driven import AREA, STRETCH, UNIT, force, marched, residual, scenario, spring  # fmt: skip
+from helpers.driven import AREA, STRETCH, UNIT, force, marched, residual, scenario, spring
 from numpy.testing import assert_allclose
 
 from sim import run
@@ -15,7 +15,7 @@ from sim.parts.bonds import Cohort, Tracked
 from sim.parts.bonds.rupture import Constant, CutOff
 
 
-def driven(duration, steps, drive, sites, **keys):
+def tracked(duration, steps, drive, sites, **keys):
     """A lens whose bonds are followed one by one."""
     return scenario(duration, steps, drive, make=functools.partial(Tracked, sites=sites), **keys)
 
@@ -29,7 +29,7 @@ def forces(states):
 def test_bonds_that_share_a_force_and_are_not_remade_all_break_in_the_time_of_a_pure_death_process(sites, load, mean):
     # i bonds break at the rate i exp(f/i): the mean is the sum of exp(-f/i)/i, its variance that of the squares
     members = np.arange(4000)
-    bound, lonely = (driven(8.0, 2, force(load / sites), sites, rebinding=rate) for rate in (1e15, 1e-15))
+    bound, lonely = (tracked(8.0, 2, force(load / sites), sites, rebinding=rate) for rate in (1e15, 1e-15))
     states = list(march(lonely, members, next(march(bound, members))))
     each = [math.exp(-load / i) / i for i in range(1, sites + 1)]
     assert_allclose(sum(each), mean, rtol=1e-9)
@@ -39,18 +39,13 @@ def test_bonds_that_share_a_force_and_are_not_remade_all_break_in_the_time_of_a_
 
 @pytest.mark.parametrize("rupture", [{}, {"rupture": CutOff(stretch=STRETCH)}, {"rupture": Constant(rate=1.0)}])
 def test_the_energies_of_every_slider_are_balanced_and_bonds_snap_where_nothing_delays_them(rupture):
-    for keys in [
-        {},
-        {"damping": 0.01},
-        {"mass": 1e-3, "damping": 1e-3},
-        {"contact": 0.2},
-        {"contact": 0.2, "viscosity": 0.01},
-        {"contact": 0.3, "mass": 1e-2},
-    ]:
+    alone = {}, {"damping": 0.01}, {"mass": 1e-3, "damping": 1e-3}
+    yielding = {"contact": 0.2}, {"contact": 0.2, "viscosity": 0.01}, {"contact": 0.3, "mass": 1e-2}
+    for keys in alone + yielding:
         missing = []
         for tolerance in (1e-6, 1e-8):
             drive = spring(0.2, tolerance=tolerance, **keys)
-            _, read = marched(driven(8.0, 8, drive, 100, share=0.3, **rupture))
+            _, read = marched(tracked(8.0, 8, drive, 100, share=0.3, **rupture))
             missing.append(residual(read))
         assert missing[0] < 1e-3
         assert missing[1] < max(0.3 * missing[0], 1e-10)
@@ -59,14 +54,14 @@ def test_the_energies_of_every_slider_are_balanced_and_bonds_snap_where_nothing_
 
 
 def test_many_bonds_above_the_onset_fluctuate_as_one_over_the_root_of_their_number_about_the_cohorts():
-    lens, keys = (2.0, 20), {"start": "steady"}
+    clock, keys = (2.0, 20), {"start": "steady"}
     drive = spring(0.3, start="steady")
     make = functools.partial(Cohort, tolerance=1e-5)
-    mean = forces(list(march(scenario(*lens, drive, make=make, **keys), np.arange(1))))[10:, 0]
+    mean = forces(list(march(scenario(*clock, drive, make=make, **keys), np.arange(1))))[10:, 0]
     spreads, biases = [], []
     cases = (25, 200), (400, 60)
     for sites, members in cases:
-        found = forces(list(march(driven(*lens, drive, sites, **keys), np.arange(members))))[10:]
+        found = forces(list(march(tracked(*clock, drive, sites, **keys), np.arange(members))))[10:]
         error = np.std(found, axis=1) / math.sqrt(members)
         spreads.append(np.mean(np.std(found, axis=1)))
         biases.append(np.mean(found.mean(axis=1) - mean))
@@ -78,12 +73,12 @@ def test_many_bonds_above_the_onset_fluctuate_as_one_over_the_root_of_their_numb
 
 @pytest.mark.verify
 def test_above_the_onset_the_mean_force_of_few_bonds_is_off_by_one_over_their_number():
-    lens, drive = (2.0, 20), spring(0.3, start="steady")
+    clock, drive = (2.0, 20), spring(0.3, start="steady")
     make = functools.partial(Cohort, tolerance=1e-6)
-    mean = forces(list(march(scenario(*lens, drive, make=make, start="steady"), np.arange(1))))[10:].mean()
+    mean = forces(list(march(scenario(*clock, drive, make=make, start="steady"), np.arange(1))))[10:].mean()
     off, errors, spreads = [], [], []
     for sites, members in ((25, 8000), (100, 4000)):
-        found = forces(list(march(driven(*lens, drive, sites, start="steady"), np.arange(members))))[10:]
+        found = forces(list(march(tracked(*clock, drive, sites, start="steady"), np.arange(members))))[10:]
         own = found.mean(axis=0) - mean
         off.append(sites * own.mean())
         errors.append(sites * own.std(ddof=1) / math.sqrt(members))
@@ -111,7 +106,7 @@ def test_below_the_onset_period_size_and_peak_of_slips_approach_those_of_the_coh
 
 
 def test_a_state_that_has_been_advanced_is_not_advanced_again():
-    scene = driven(1.0, 4, spring(1.0), 10)
+    scene = tracked(1.0, 4, spring(1.0), 10)
     states = march(scene, np.arange(1), keep=False)
     first, _ = next(states), next(states)
     with pytest.raises(RuntimeError, match="advanced already"):
