@@ -6,6 +6,7 @@ import numpy as np
 
 from sim.numerics.jit import device, kernel
 from sim.parts.coupled import mechanics, radau
+from sim.parts.coupled.radau import accept, try_sub_step  # by name: numba inlines no attribute of a module
 from sim.parts.drive import ENERGY
 
 #: Slip over the cut-off stretch on which bonds are tried, and that within which they may slip at once.
@@ -133,13 +134,13 @@ def _piece(row, slider, law, contact, nodes, energy):
             contact, nodes.last_step = (contact, 0.0) if gone else (mechanics.later(contact, 0.0, 1.0), nodes.last_step)
             row.next_step = 0.0
             continue
-        grows, accepted = radau.try_sub_step(row, start, step, slider, law, contact, nodes)
+        grows, accepted = try_sub_step(row, start, step, slider, law, contact, nodes)
         if not accepted:
             row.next_step = step * grows
             if brittle and step < _BRIEF * length and slip_event(row, start, NEAR, slider, law, contact, energy):
                 row.next_step, nodes.last_step = 1e-6 * length, 0.0
             continue
-        radau.accept(row, start, step, slider, law, contact, nodes, energy)
+        accept(row, start, step, slider, law, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         if brittle and slip_event(row, start + step, 0.0, slider, law, contact, energy):
             row.next_step, nodes.last_step = 1e-6 * length, 0.0
@@ -228,7 +229,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                 contact = mechanics.later(contact, 0.0, 1.0)
                 continue
             return start if slider.mass == 0.0 or row.speed == 0.0 else -1.0
-        grows, accepted = radau.try_sub_step(row, start, step, slider, along, contact, nodes)
+        grows, accepted = try_sub_step(row, start, step, slider, along, contact, nodes)
         if not accepted:
             row.next_step = step * grows
             continue
@@ -254,7 +255,7 @@ def _slide(row, start, slider, along, contact, nodes, energy):
                     far, below = step, speed
                     above *= 0.5 if side < 0 else 1.0
                     side = -1
-        radau.accept(row, start, step, slider, along, contact, nodes, energy)
+        accept(row, start, step, slider, along, contact, nodes, energy)
         row.next_step = max(row.next_step, step * grows) if step == left else step * grows
         start = length if step == left else start + step
         if stops:
