@@ -36,7 +36,7 @@ WHOLE: Shard = (1, 1)
 _MANIFEST, _DATASET, _LOCK, _STATE, _STATES = "manifest.json", "dataset.nc", "output.lock", "state.", "states"
 _SHARD = re.compile(r"([1-9][0-9]{0,5})/([1-9][0-9]{0,5})")
 #: Names of the files that a run makes in its folder, whole or on the way.
-_OURS = re.compile(r"manifest\.json|dataset\.nc|.*\.(lock|held)|point\d+-group\d+-block\d+\.npz|\..*\.tmp")
+_OURS = re.compile(r"manifest\.json|dataset\.nc|.*\.(lock|held)(\..+)?|point\d+-group\d+-block\d+\.npz|\..*\.tmp")
 _FORMAT, _OLDER = "parts of a run of sim, 3", "parts of a run of sim, 2"
 #: Seconds for which a run that begins waits while another one begins.
 _PATIENCE = 10.0

@@ -92,9 +92,7 @@ def claim(
             with contextlib.suppress(FileNotFoundError):
                 os.stat(folder / name)  # which refuses names that are too long
         if not device:
-            descriptor, trial = tempfile.mkstemp(dir=folder)  # the rights of a folder do not say that this works
-            os.close(descriptor)
-            os.unlink(trial)
+            tempfile.TemporaryFile(dir=folder).close()  # the rights of a folder do not say that this works
     except UnicodeEncodeError:
         shown = str(path).encode(errors="replace").decode()
         raise BadInput([f"{shown}: the name is not UTF-8 text; name another file"]) from None
