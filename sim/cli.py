@@ -394,7 +394,7 @@ def paper() -> None:
 
     results = checks()
     print_rows([line.row for line in results])
-    failed = sum(not line.passed for line in results)
+    failed = sum(not line.holds for line in results)
     say(f"{len(results) - failed} of {len(results)} hold")
     sys.exit(FAILED if failed else DONE)
 

@@ -155,9 +155,9 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
     chosen_models = {"shear": _table(scenario.fluctuations), "bonds": _table(scenario.population)}
     base = scenario.with_values(chosen_models | {"record": {}})
     accepted = tolerance or float(_table(scenario.shear).get("tolerance", 0.01))
-    own, half = _at_step(base, 1.0), began + 0.5 * budget_seconds
-    found = [_admitted(*changes, base, left_out, half) for changes in _tried(base)]
-    building, settings = time.process_time() - began, [*itertools.chain(*found), own]
+    written, half = _at_step(base, 1.0), began + 0.5 * budget_seconds
+    settings = [row for changes in _tried(base) for row in _admitted(*changes, base, left_out, half)] + [written]
+    building = time.process_time() - began
     for row in settings:  # compiles, which is not counted
         follow(row.scenario, MemberNoise.of(base.seed, np.arange(1)), None, range(1, 2))
     end = time.process_time() + budget_seconds - building
@@ -169,7 +169,7 @@ def converge(scenario: Scenario, budget_seconds: float, tolerance: float | None 
         until = now + (end - now - _STEPS * budget_seconds) / (len(parts) - place)
         judged += _judged(base, [row for row in settings if row.part == part], until, left_out)
     means = [row for row in judged if row.part == "bonds" and "sites" not in _table(row.scenario.bonds)]
-    judged += _judged_steps(own, [own, *means][-1], accepted, end)
+    judged += _judged_steps(written, [written, *means][-1], accepted, end)
     return _dataset(scenario, judged, accepted, left_out)
 
 
@@ -205,21 +205,21 @@ def _admitted(part: str, changes: dict[str, Any], base: Scenario, left_out: list
 
     After some CPU time of the process, ``end`` [s], only the setting of the scene itself is built.
     """
-    given, label = _table(getattr(base, part)), " ".join(f"{value}" for value in changes.values())
+    table_now, label = _table(getattr(base, part)), " ".join(f"{value}" for value in changes.values())
     admitted = tables(keys(Scenario)[part].annotation).values()
     kinds = [keys(kind).keys() for kind in admitted if model(kind) == changes["model"]]
-    declared = max(kinds, key=lambda names: ("rupture" in given) == ("rupture" in names))
-    own = given.items() >= changes.items()
+    declared = max(kinds, key=lambda names: ("rupture" in table_now) == ("rupture" in names))
+    is_written = table_now.items() >= changes.items()
     try:
-        if time.process_time() > end and not own:
+        if time.process_time() > end and not is_written:
             raise ValueError("does not fit into the budget")
-        changed = base.with_values({part: {key: given[key] for key in given.keys() & declared} | changes})
+        changed = base.with_values({part: {key: table_now[key] for key in table_now.keys() & declared} | changes})
         changed.process  # noqa: B018 - some models are refused only when their modes are made
     except ValueError as fault:
         left_out.append(f"{label}: " + str(fault).partition("\n")[0])
         return []
     toml = "\n".join(f"{key} = {json.dumps(value)}" for key, value in changes.items())
-    return [Setting(label, part, changed, toml, int(own))]
+    return [Setting(label, part, changed, toml, int(is_written))]
 
 
 def _at_step(scenario: Scenario, ratio: float) -> Setting:
@@ -278,7 +278,7 @@ def _run(scenario: Scenario, count: int, steps: range, end: float = math.inf) ->
                 raise TimeoutError
             state, course = follow(scenario, noise, state, piece)
             read = (_READ[name](scenario, course) for name in QUANTITIES)
-            courses.append([np.broadcast_to(found, (len(piece), len(members))).T for found in read])
+            courses.append([np.broadcast_to(variable, (len(piece), len(members))).T for variable in read])
         values.append(np.concatenate(courses, axis=2))
     return np.concatenate(values, axis=1)
 
@@ -428,7 +428,7 @@ def _at_steps(rows: Sequence[Setting], count: int) -> list[Array]:
     return [_run(scenario, count, _records(scenario)) for scenario in scenarios]
 
 
-def _judged_steps(own: Setting, finest: Setting, accepted: float, end: float) -> list[Setting]:
+def _judged_steps(written: Setting, finest: Setting, accepted: float, end: float) -> list[Setting]:
     """Return clock steps with their errors: halved until two agree, or until the next does not fit into the time.
 
     The bonds are those of the finest model, which any model of small error resembles.
@@ -439,7 +439,7 @@ def _judged_steps(own: Setting, finest: Setting, accepted: float, end: float) ->
     pace, left = finest.time / (exact.ensemble.members if noisy else 1), end - time.process_time()
     count = max(min(_NUMBERS // exact.clock.steps, together(exact), int(left / (32.0 * pace))), 4) if noisy else 1
     if count * pace * sum(1.0 / row.ratio for row in rows) > left:
-        _leave_out(own, [])
+        _leave_out(written, [])
     while True:
         began = time.process_time()
         runs, rest = _at_steps(rows, count), np.zeros((4, 4))
@@ -452,7 +452,7 @@ def _judged_steps(own: Setting, finest: Setting, accepted: float, end: float) ->
         rows.insert(0, _at_step(exact, 0.5 * rows[0].ratio))
     for row, run in zip(rows, runs, strict=True):
         row.error, row.standard_error = _errors(run, runs[0])
-        row.error, row.members, row.time = row.error + rest, count, own.time / row.ratio
+        row.error, row.members, row.time = row.error + rest, count, written.time / row.ratio
     return rows[::-1]
 
 

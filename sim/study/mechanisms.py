@@ -111,7 +111,7 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
 
 
 def _verdict(judged: list[Judged]) -> tuple[str, str]:
-    """The mechanism that is sufficient, "" if the data cannot tell, and that in words."""
+    """Return the mechanism that is sufficient, "" if the data cannot tell, and that in words."""
     whole, *others = judged
     if not others:
         return "", "there is no other mechanism to compare with"
@@ -121,14 +121,15 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     if not left:
         return WHOLE, f"the data prefer {WHOLE}: every other mechanism is rejected"
     first, ahead = left[0], whole.aicc - left[0].aicc
-    evidence = f"p = {first.p_value:.2g}, AICc {abs(ahead):.2g} {'lower' if ahead > 0.0 else 'higher'} than of {WHOLE}"
     if len(left) > 1 or (first.name not in _PARTS and ahead < _WORSE):
-        names = " and ".join(item.name for item in left)
-        return "", f"the data cannot tell: {names} {'is' if len(left) == 1 else 'are'} not rejected, nor is {WHOLE}"
+        return "", f"the data cannot tell: not rejected are {WHOLE}, {', '.join(item.name for item in left)}"
+    evidence = f"(p = {first.p_value:.2g}, AICc {-ahead:+.2g} from {WHOLE})"
     if first.name not in _PARTS:
-        return first.name, f"the data prefer {first.name} ({evidence}) and reject the others"
-    message = f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well ({evidence})"
-    return first.name, message + (": measure more" if first.p_value <= _RARE else "")
+        return first.name, f"the data prefer {first.name} {evidence} and reject the others"
+    return (
+        first.name,
+        f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well {evidence}",
+    )
 
 
 def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
@@ -157,9 +158,7 @@ def _lacking(problem: Problem) -> str:
     """Return advice if the curves or the scenario cannot distinguish bonds, fluctuations and theories; else ""."""
     all_groups = [group for groups in problem.groups for group in groups]
     if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in all_groups):
-        message = "the curves were measured at rest, where every mechanism is JKR's contact: they tell its work of"
-        cure = 'measure while it slides, with a column "speed [mm/s]"'
-        return f"{message} adhesion and its modulus alone; to compare mechanisms, {cure}"
+        return 'curves at rest tell no mechanism from another; measure while it slides, with a column "speed [mm/s]"'
     lacks = [item for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts]
     return "\n".join(
         f"no {name} act in the scenario; to compare with them, add for example {table}" for name, table in lacks
@@ -176,18 +175,14 @@ def _less(problem: Problem, fixed: dict[str, float], *without: str) -> Problem:
 
 def _starts(problem: Problem) -> list[Array]:
     """Return starts of the search: a theory's own number at several sizes, as most contacts bear only some."""
-    if not problem.theory or problem.theory not in _THEORIES or not _THEORIES[problem.theory][1]:
+    if not problem.free or problem.free[-1] not in (_ALPHA, _LAMBDA):
         return [problem.start]
-    starts = []
-    for size in (0.01, 0.1, 0.5):
-        start = problem.start
-        start[len(problem.free) - 1] = size
-        starts.append(start)
-    return starts
+    last = np.arange(len(problem.start)) == len(problem.free) - 1
+    return [np.where(last, size, problem.start) for size in (0.01, 0.1, 0.5)]
 
 
 def _least(problem: Problem, starts: list[Array], precision: float = 1e-8) -> Minimum:
-    """The least of the minima from several starts."""
+    """Return the least of the minima from several starts."""
     minima = (minimum(problem, start, precision=precision) for start in starts)
     return min(minima, key=lambda item: item.chi_square)
 

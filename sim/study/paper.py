@@ -69,7 +69,7 @@ class Check(NamedTuple):
     tolerance: float
 
     @property
-    def passed(self) -> bool:
+    def holds(self) -> bool:
         """True if the error is within the tolerance; False for nan."""
         return self.error <= self.tolerance
 
@@ -77,7 +77,7 @@ class Check(NamedTuple):
     def row(self) -> dict[str, str]:
         """The line as a row of a table, by its headings."""
         return {
-            "": "ok" if self.passed else "FAILS",
+            "": "ok" if self.holds else "FAILS",
             "equation": self.equation,
             "what": self.name,
             "computed": f"{self.computed:.9g}",

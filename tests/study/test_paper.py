@@ -10,7 +10,7 @@ from sim.study.paper import Check, checks
 def test_every_line_of_the_paper_holds():
     lines = checks()
     assert len(lines) >= 30
-    assert [line.name for line in lines if not line.passed] == []
+    assert [line.name for line in lines if not line.holds] == []
 
 
 def test_lines_say_what_they_compare():
@@ -30,9 +30,9 @@ def test_nothing_passes_on_a_loose_tolerance_but_the_printed_numbers():
 
 
 def test_a_wrong_value_and_a_nan_fail():
-    assert not Check("", "", 1.1, 1.0, 0.1, 1e-3).passed
-    assert not Check("", "", math.nan, 1.0, math.nan, 1e-3).passed
-    assert not paper._check("", "", [1.0, math.nan, 2.0], [1.0, 1.0, 2.0]).passed
+    assert not Check("", "", 1.1, 1.0, 0.1, 1e-3).holds
+    assert not Check("", "", math.nan, 1.0, math.nan, 1e-3).holds
+    assert not paper._check("", "", [1.0, math.nan, 2.0], [1.0, 1.0, 2.0]).holds
     worst = paper._check("", "", [1.0, 1.5, 2.0], [1.0, 1.0, 2.0])
     assert (worst.computed, worst.expected, worst.error) == (1.5, 1.0, 0.5)
 
@@ -66,7 +66,7 @@ LAWS = (
 def test_a_law_that_is_wrong_by_a_millionth_fails_its_section(monkeypatch):
     for module, law, section in LAWS:
         right = getattr(module, law)
-        assert all(paper._check(*row).passed for row in section())
+        assert all(paper._check(*row).holds for row in section())
         with monkeypatch.context() as patched:
             patched.setattr(module, law, lambda *values, right=right, **named: right(*values, **named) * (1.0 + 1e-6))
-            assert not all(paper._check(*row).passed for row in section()), law
+            assert not all(paper._check(*row).holds for row in section()), law
