@@ -44,14 +44,14 @@ def _binomials(trials, chance, seed, part, members, step, drawn):
 
 
 @kernel("void(float64[::1], float64, float64, float64[::1])")
-def _log_chances(number, trials, chance, found):
+def _log_chances(number, trials, chance, result):
     for i in range(number.size):
-        found[i] = _log_chance(number[i], trials, chance)
+        result[i] = _log_chance(number[i], trials, chance)
 
 
 @kernel("void(float64, float64, float64[::1])")
-def _hats(spread, chance, found):
-    found[0], found[1], found[2], found[3] = _hat(spread, chance)
+def _hats(spread, chance, result):
+    result[0], result[1], result[2], result[3] = _hat(spread, chance)
 
 
 @kernel("void(uint64, uint64, uint64[::1], int64, float64[::1])")
@@ -99,24 +99,24 @@ def tails(address):
 
 def hat(spread, chance):
     """Constants a, b, α and v_r of the rejection of binomials."""
-    found = np.empty(4)
-    _hats(spread, chance, found)
-    return found
+    result = np.empty(4)
+    _hats(spread, chance, result)
+    return result
 
 
 def log_chances(number, trials, chance):
     """Logarithms of chances as rejection takes them."""
     number = np.array(number, dtype=float)
-    found = np.empty(number.shape)
-    _log_chances(number, trials, chance, found)
-    return found
+    result = np.empty(number.shape)
+    _log_chances(number, trials, chance, result)
+    return result
 
 
-def fits(seen, wanted):
+def fits(counted, expected):
     """Whether counts have their expected values, by Pearson's χ²; cells of few are put together."""
-    few = wanted < 10.0
-    seen, wanted = (np.append(counts[~few], counts[few].sum()) for counts in (seen, wanted))
-    if wanted[-1] < 10.0:
-        seen, wanted = seen[:-1], wanted[:-1]
-    assert len(wanted) > 1
-    assert chi2.sf(np.sum((seen - wanted) ** 2 / wanted), len(wanted) - 1) > FIVE_SIGMA
+    few = expected < 10.0
+    counted, expected = (np.append(counts[~few], counts[few].sum()) for counts in (counted, expected))
+    if expected[-1] < 10.0:
+        counted, expected = counted[:-1], expected[:-1]
+    assert len(expected) > 1
+    assert chi2.sf(np.sum((counted - expected) ** 2 / expected), len(expected) - 1) > FIVE_SIGMA

@@ -103,30 +103,30 @@ def test_cohorts_at_a_cut_off_lose_stiffness_to_the_bonds_that_break():
     for speed in [1e-3, 4e-3, -4e-3]:
         # steady: a density k_on (1 − N)/V e^(−k x/V) up to the limit l, by its mean over a cell of l/1000
         part, limit = bonds.Cohort(rupture=CUT_OFF, **STRETCHED, tolerance=1e-6), CUT_OFF.stretch
-        found = part.steady(np.array([speed]))
-        bound, pace = found.fraction * part.bound_at_rest, CUT_OFF.rate * limit / abs(speed)
+        result = part.steady(np.array([speed]))
+        bound, pace = result.fraction * part.bound_at_rest, CUT_OFF.rate * limit / abs(speed)
         breaking = STRETCHED["rebinding_rate"] * float(1.0 - bound[0]) * limit / abs(speed) * np.exp(-pace)
         scale = STRETCHED["site_density"] * STRETCHED["bond_stiffness"]
         assert_allclose(
-            found.stiffness, scale * (bound - breaking), rtol=0, atol=scale * breaking * (1e-3 * pace + 1e-5)
+            result.stiffness, scale * (bound - breaking), rtol=0, atol=scale * breaking * (1e-3 * pace + 1e-5)
         )
 
 
 def test_the_steady_state_has_the_sign_of_its_speed():
     speeds = np.array([-2e-3, 0.0, 2e-3])
     for part in (BONDS[name] for name in ("none", "steady", "rate", "counted", "rate, bell", "cohort", "tracked")):
-        found = part.steady(speeds)
-        assert_array_equal(np.sign(found.stress), [-1.0, 0.0, 1.0])
-        assert_allclose(found.strength * np.sign(speeds), found.stress, rtol=1e-15)
-        assert np.all(found.strength >= 0.0)
+        result = part.steady(speeds)
+        assert_array_equal(np.sign(result.stress), [-1.0, 0.0, 1.0])
+        assert_allclose(result.strength * np.sign(speeds), result.stress, rtol=1e-15)
+        assert np.all(result.strength >= 0.0)
     assert bonds.Unbroken(stress=2e5).steady(speeds[1:2]).strength == 2e5  # at rest they bear up to their strength
 
 
 def test_bonds_carried_with_the_area_need_the_contact_of_the_step_before_and_others_do_not():
     # under another load the bonds differ if and only if they feed back
     for name, part in (BONDS | {"cohort, bell": bonds.Cohort(rupture=BELL, **STRETCHED)}).items():
-        one, other = (
+        at_load, at_indentation = (
             records(["bond_fraction"], bonds=part, contact=contact, shear=SHEARS["modal, time, constant"])[0]
             for contact in (CONTACTS["load"], CONTACTS["indentation"])
         )
-        assert np.array_equal(one, other) != scene(bonds=part).population.feeds_back, name
+        assert np.array_equal(at_load, at_indentation) != scene(bonds=part).population.feeds_back, name

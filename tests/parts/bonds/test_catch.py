@@ -58,8 +58,8 @@ def test_the_law_has_bells_and_the_constant_rate_as_limits():
     speeds = np.array([0.0, *SPEEDS])
     bell = bell_moments(speeds, 5.0, 6e-12, STIFFNESS, BINDING)
     assert_allclose(catch_moments(speeds, 0.0, 3e-12, 5.0, 6e-12, STIFFNESS, BINDING), bell, rtol=1e-11)
-    found = catch_moments(speeds, 200.0, math.inf, 5.0, math.inf, STIFFNESS, BINDING)
-    assert_allclose(found, constant_moments(speeds, 205.0, STIFFNESS, BINDING), rtol=1e-11)
+    result = catch_moments(speeds, 200.0, math.inf, 5.0, math.inf, STIFFNESS, BINDING)
+    assert_allclose(result, constant_moments(speeds, 205.0, STIFFNESS, BINDING), rtol=1e-11)
     assert catch_lives(speeds, *RATES, STIFFNESS).mean.shape == speeds.shape
 
 
@@ -71,10 +71,10 @@ def test_force_holds_catch_bonds_before_it_breaks_them():
 def test_cohorts_in_steady_sliding_obey_the_law():
     for speed, tolerance in product(SPEEDS, [1e-3, 1e-5]):
         part = bonds.Cohort(rupture=CATCH, **STRETCHED, tolerance=tolerance)
-        found, (bound, force, square) = part.steady(np.array([speed])), by_quadrature(speed)
-        assert_allclose(found.fraction * part.bound_at_rest, bound, rtol=tolerance)
-        assert_allclose(found.stress, STRETCHED["site_density"] * force, rtol=tolerance)
-        assert_allclose(found.frozen + found.varying, STRETCHED["site_density"] * square, rtol=10.0 * tolerance)
+        result, (bound, force, square) = part.steady(np.array([speed])), by_quadrature(speed)
+        assert_allclose(result.fraction * part.bound_at_rest, bound, rtol=tolerance)
+        assert_allclose(result.stress, STRETCHED["site_density"] * force, rtol=tolerance)
+        assert_allclose(result.frozen + result.varying, STRETCHED["site_density"] * square, rtol=10.0 * tolerance)
 
 
 def test_cohorts_do_not_depend_on_the_clock_step():

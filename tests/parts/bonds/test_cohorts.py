@@ -56,8 +56,8 @@ def life_of(eps):
     return math.log1p(eps) / eps
 
 
-def worst(found, exact):
-    return np.max(np.abs(found / exact - 1.0))
+def worst(result, exact):
+    return np.max(np.abs(result / exact - 1.0))
 
 
 # ---- steady sliding
@@ -188,8 +188,8 @@ def test_ageing_at_rest_is_an_exponential():
 def test_a_step_without_duration_only_stretches():
     start = steady(BELL, 1.0, 1.0, 1e-4)
     moved = advance(start, np.array([0.5]), 0.0, BELL, 1.0, 1e-4)
-    number, one, two = moments(start)
-    assert_allclose(moments(moved), [number, one + 0.5 * number, two + one + 0.25 * number], rtol=1e-14, atol=0)
+    number, first, second = moments(start)
+    assert_allclose(moments(moved), [number, first + 0.5 * number, second + first + 0.25 * number], rtol=1e-14, atol=0)
 
 
 def test_dilution_frees_sites_that_bind_anew():
@@ -223,9 +223,9 @@ def test_any_rates_and_slips_give_shares_between_zero_and_one(exponents, kind, s
 def test_steps_of_extreme_length_have_their_limits():
     for fast, bind in product([1e-9, 1e9], [1e-9, 1e9]):
         rupture = RuptureRate(fast, 1.0, math.inf)
-        found = advance(empty(rupture, 1e-4), np.array([1.0]), 1.0, rupture, bind, 1e-4).weight.sum()
+        result = advance(empty(rupture, 1e-4), np.array([1.0]), 1.0, rupture, bind, 1e-4).weight.sum()
         grown = -math.expm1(-bind) if fast < 1.0 else bind / (bind + fast)
-        assert_allclose(found, grown, rtol=1e-4, atol=0)
+        assert_allclose(result, grown, rtol=1e-4, atol=0)
 
 
 # ---- cost, rows

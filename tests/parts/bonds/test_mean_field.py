@@ -184,8 +184,8 @@ def test_transients_are_those_of_an_integrator_of_another_form():
         first = steady(before, BELL, beta) if start == "steady" else resting(BELL, beta)
         for share in (0.1, 1.0):
             exact = reference(first[0][0], first[1][0], speed, share * duration, beta)
-            found = slide(first, speed, share * duration, BELL, beta)
-            assert_allclose([found[0][0], found[1][0]], exact, rtol=TRANSIENT, atol=0)
+            result = slide(first, speed, share * duration, BELL, beta)
+            assert_allclose([result[0][0], result[1][0]], exact, rtol=TRANSIENT, atol=0)
 
 
 def test_the_first_bonds_of_an_empty_contact():
@@ -197,8 +197,8 @@ def test_the_first_bonds_of_an_empty_contact():
         duration = 3.0 / (1.0 + eps)
         exact = reference(bound, moment, eps, duration - first, beta)
         empty = np.zeros(1), np.zeros(1)
-        found = slide(empty, eps, duration, BELL, beta)
-        assert_allclose([found[0][0], found[1][0]], exact, rtol=TRANSIENT, atol=0)
+        result = slide(empty, eps, duration, BELL, beta)
+        assert_allclose([result[0][0], result[1][0]], exact, rtol=TRANSIENT, atol=0)
         begun = slide(empty, eps, first, BELL, beta)
         assert_allclose([begun[0][0], begun[1][0]], [bound, moment], rtol=2.0 * (beta + 2.0) ** 2 * 1e-12, atol=0)
 
@@ -256,8 +256,8 @@ def test_the_method_is_of_fifth_order_and_its_error_estimate_of_fourth():
 
 def test_the_method_forgets_the_start_in_an_endless_step():
     # N' = k_on (1 - N) - k N with a stretch too small to matter: what is left of the start goes as 1/step
-    found = [_rosenbrock(0.9, 1e-30, step, 0.0, 1.0, 3.0, np.empty((8, 2)))[:2] for step in (1e4, 1e7)]
-    left = np.array(found) - [0.75, 0.0]
+    result = [_rosenbrock(0.9, 1e-30, step, 0.0, 1.0, 3.0, np.empty((8, 2)))[:2] for step in (1e4, 1e7)]
+    left = np.array(result) - [0.75, 0.0]
     assert_allclose(left[1] / left[0], 1e-3, rtol=0.01, atol=0)
     assert np.max(np.abs(left[1] / [0.15, 1e-30])) < 1e-5
 
@@ -284,8 +284,8 @@ def test_what_has_no_answer_is_nan_and_does_not_hang():
 
 
 def test_softness_and_a_limit_together_are_refused():
-    both = RuptureRate(1.0, 1.0, 1.0)
+    softness_and_limit = RuptureRate(1.0, 1.0, 1.0)
     with pytest.raises(ValueError, match="use one of them"):
-        advance(0.5, 0.1, 0.1, 0.1, 1.0, both, 1.0)
+        advance(0.5, 0.1, 0.1, 0.1, 1.0, softness_and_limit, 1.0)
     with pytest.raises(ValueError, match="use one of them"):
-        steady(1.0, both, 1.0)
+        steady(1.0, softness_and_limit, 1.0)

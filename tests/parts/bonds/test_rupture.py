@@ -32,10 +32,10 @@ def test_the_integral_is_that_of_the_rupture_along_the_way():
 def test_a_bond_breaks_when_its_integral_has_reached_the_threshold():
     for (stretch, speed, softness), time in product(WAYS, [1e-9, 0.2, 1.1]):
         threshold = rupture_integral(stretch, speed * time, time, 0.6, softness)
-        found = time_to_rupture(stretch, speed, threshold, 0.6, softness, math.inf)
+        result = time_to_rupture(stretch, speed, threshold, 0.6, softness, math.inf)
         # the answer is as good as the threshold, whose rounding e^(softness x) undoes where the stretch shrinks
         worse = math.exp(softness * max(0.0, abs(stretch) - abs(stretch + speed * time)))
-        assert_allclose(found, time, rtol=4e-15 * worse * (1.0 + softness * abs(stretch)), atol=0)
+        assert_allclose(result, time, rtol=4e-15 * worse * (1.0 + softness * abs(stretch)), atol=0)
 
 
 def test_a_cut_off_ends_a_bond_at_its_stretch_ahead():

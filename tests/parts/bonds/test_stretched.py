@@ -181,13 +181,13 @@ def test_sites_of_the_slider_keep_a_pattern_and_forget_what_differs():
     scenario = scene(members, steps=16, shear=shear.Modal(**CELLED), **steady)
     states = list(march(scenario, np.arange(members)))
     first, then = (complex_amplitudes(scenario.process, states[k].shear) for k in (0, 16))
-    kept = np.real(np.mean(first * then.conj(), axis=None)) / np.mean(np.abs(first) ** 2)
+    correlation = np.real(np.mean(first * then.conj(), axis=None)) / np.mean(np.abs(first) ** 2)
     _, force, square = bell_moments(2.0 * PACE, *RATES, BINDING)
     frozen = force**2 / square
     assert 0.1 < frozen < 0.9
     power = np.abs(first) ** 2
     effective = np.sum(power) ** 2 / np.sum(power**2)
-    assert abs(kept - frozen - (1.0 - frozen) * math.exp(-8.0)) < 5.0 / math.sqrt(effective)
+    assert abs(correlation - frozen - (1.0 - frozen) * math.exp(-8.0)) < 5.0 / math.sqrt(effective)
 
 
 def test_a_few_bonds_give_each_member_its_own_field():

@@ -68,8 +68,8 @@ def has_the_law(tracks, exact):
     """The three moments, each within five of its standard errors over all sites."""
     fraction, _, second, fourth = exact
     count = tracks.due.size
-    found = bound(tracks).sum() / count, mean_stretch(tracks).mean(), mean_square_stretch(tracks).mean()
-    for value, mean, square in zip(found, exact, (fraction, second, fourth), strict=False):
+    result = bound(tracks).sum() / count, mean_stretch(tracks).mean(), mean_square_stretch(tracks).mean()
+    for value, mean, square in zip(result, exact, (fraction, second, fourth), strict=False):
         assert abs(value - mean) < 5.0 * math.sqrt((square - mean**2) / count)
 
 
@@ -171,9 +171,9 @@ def test_reversals_and_rests_have_the_law_of_the_renewal_equation():
     for n in range(0, len(speeds), 40):
         tracks = go(tracks, speeds[n] * 40 * step, 40 * step, BELL, rebinding)
         at = n + 40
-        found = bound(tracks)[0] / sites, mean_stretch(tracks)[0], mean_square_stretch(tracks)[0]
+        result = bound(tracks)[0] / sites, mean_stretch(tracks)[0], mean_square_stretch(tracks)[0]
         # no site's stretch exceeds 3 by much: moments per site vary by less than these
-        for value, moment, error in zip(found, exact, (0.5, 1.2, 3.0), strict=True):
+        for value, moment, error in zip(result, exact, (0.5, 1.2, 3.0), strict=True):
             assert abs(value - moment[at]) < 5.0 * error / math.sqrt(sites) + 2e-4
 
 

@@ -417,16 +417,16 @@ def test_a_disc_dissipates_at_pull_off_what_its_own_energy_leaves():
 def test_what_a_rate_dependent_edge_dissipates_under_a_load_is_no_matter_of_the_least_radius(monkeypatch, steps):
     # below the radius at pull-off the falling load gains energy like 1/radius; that is not the edge's
     pulled = RateDependent(load={"from": 1e-3, "to": -1e-3}, front_speed=1e-3)
-    found = []
+    result = []
     for spot in (1e-3, 1e-2):
         monkeypatch.setattr(front, "_SPOT", spot)
         scenario = scene(1, steps, contact=pulled)
         *_, last = march(scenario, np.arange(1))
         assert np.isnan(last.contact.radius[0])
-        found.append(last.contact.dissipated[0])
-    assert_allclose(found[0], found[1], rtol=1e-12)
+        result.append(last.contact.dissipated[0])
+    assert_allclose(result[0], result[1], rtol=1e-12)
     adhesive = 42e-3 * np.pi * 1.2e-4**2
-    assert 0.0 < found[0] < 10.0 * adhesive
+    assert 0.0 < result[0] < 10.0 * adhesive
 
 
 def test_a_contact_that_closes_again_starts_without_the_bonds_it_carried():

@@ -32,29 +32,29 @@ def test_shares_and_what_is_left_add_up_to_one_in_every_member(ramp):
 
 
 def test_bonds_alone_take_what_their_work_takes():
-    found = analysis.shares(run(scene(shear=shear.Uniform(), bonds=bonds.Steady(critical_speed=1e-2))))
+    shares = analysis.shares(run(scene(shear=shear.Uniform(), bonds=bonds.Steady(critical_speed=1e-2))))
     speed = np.geomspace(1e-5, 1e-1, 21)
     area = [jkr.radius_at_load(LOAD, w, RADIUS, MODULUS) ** 2 for w in (WORK, WORK / (1.0 + speed / 1e-2))]
     # the loss is a difference of areas: its rounding is that of one
-    np.testing.assert_allclose(found["lost_to_bonds_mean"], 1.0 - area[1] / area[0], rtol=1e-12, atol=1e-15)
-    np.testing.assert_array_equal(found["lost_to_fluctuations_mean"], 0.0)
+    np.testing.assert_allclose(shares["lost_to_bonds_mean"], 1.0 - area[1] / area[0], rtol=1e-12, atol=1e-15)
+    np.testing.assert_array_equal(shares["lost_to_fluctuations_mean"], 0.0)
 
 
 def test_fluctuations_alone_take_all_of_adhesion_when_they_mask_it():
     masking = shear.Mean(spectrum=Band(rms=1e6, longest=60e-6, shortest=24e-6))
-    found = analysis.shares(run(scene(adhesion=Adhesion(work=WORK, bond_share=0.0), shear=masking)))
+    shares = analysis.shares(run(scene(adhesion=Adhesion(work=WORK, bond_share=0.0), shear=masking)))
     hertz, full = jkr.hertz_radius_at_load(LOAD, RADIUS, MODULUS), jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
-    np.testing.assert_allclose(found["lost_to_bonds_mean"], 0.0, rtol=0, atol=1e-15)
-    np.testing.assert_allclose(found["lost_to_fluctuations_mean"], 1.0 - (hertz / full) ** 2, rtol=1e-13)
-    np.testing.assert_allclose(found["area_ratio_hertz"], (hertz / full) ** 2, rtol=1e-13)
-    np.testing.assert_allclose([found["radius_jkr"], found["radius_hertz"]], [full, hertz], rtol=1e-13)
+    np.testing.assert_allclose(shares["lost_to_bonds_mean"], 0.0, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(shares["lost_to_fluctuations_mean"], 1.0 - (hertz / full) ** 2, rtol=1e-13)
+    np.testing.assert_allclose(shares["area_ratio_hertz"], (hertz / full) ** 2, rtol=1e-13)
+    np.testing.assert_allclose([shares["radius_jkr"], shares["radius_hertz"]], [full, hertz], rtol=1e-13)
 
 
 def test_standard_error_of_a_share_is_that_of_its_members(ramp):
-    found, lost = analysis.shares(ramp), analysis.share_observables(ramp)["lost_to_fluctuations"].to_numpy()
-    np.testing.assert_allclose(found["lost_to_fluctuations_sem"], lost.std(axis=0, ddof=1) / math.sqrt(6), rtol=1e-10)
+    shares, lost = analysis.shares(ramp), analysis.share_observables(ramp)["lost_to_fluctuations"].to_numpy()
+    np.testing.assert_allclose(shares["lost_to_fluctuations_sem"], lost.std(axis=0, ddof=1) / math.sqrt(6), rtol=1e-10)
     # a mean-field population does not fluctuate: nothing but rounding is left
-    np.testing.assert_allclose(found["lost_to_bonds_sem"], 0.0, rtol=0, atol=1e-15)
+    np.testing.assert_allclose(shares["lost_to_bonds_sem"], 0.0, rtol=0, atol=1e-15)
 
 
 def test_shares_of_a_sweep_are_those_of_its_points():
@@ -80,8 +80,8 @@ def test_shares_of_a_sweep_are_those_of_its_points():
 
 def test_shares_are_unknown_where_there_is_no_contact_at_rest():
     lifted = Equilibrium(load=1.5 * float(jkr.pull_off_load(WORK, RADIUS)))
-    found = analysis.shares(run(scene(contact=lifted, shear=shear.Uniform())))
-    assert bool(found["lost_to_bonds_mean"].isnull().all()) and math.isnan(found["area_ratio_hertz"])
+    shares = analysis.shares(run(scene(contact=lifted, shear=shear.Uniform())))
+    assert bool(shares["lost_to_bonds_mean"].isnull().all()) and math.isnan(shares["area_ratio_hertz"])
 
 
 def test_shares_of_what_differs_between_members_need_each_member():
@@ -105,25 +105,25 @@ def test_mean_stress_is_charged_after_bonds_and_fluctuations():
         field = shear.Mean(spectrum=Band(rms=80e3, longest=60e-6, shortest=24e-6))
         population = bonds.Steady(critical_speed=1e-2, stress=1e5)
         dataset = run(scene(contact=Equilibrium(**control, reversible=0.03), bonds=population, shear=field))
-        found = analysis.shares(dataset)
+        shares = analysis.shares(dataset)
         bonded = WORK / (1.0 + np.geomspace(1e-5, 1e-1, 21) / 1e-2)
         areas = [radius(w) ** 2 for w in (np.full(21, WORK), bonded, bonded - dataset["fluctuation_energy"].to_numpy())]
         areas.append((dataset["contact_radius"].to_numpy()) ** 2)
         names = ("lost_to_bonds", "lost_to_fluctuations", "lost_to_mean_stress")
         for name, before, after in zip(names, areas[:-1], areas[1:], strict=True):
             # the work is put together again from its parts, near the fluctuations' onset of masking to 1e-12 of itself
-            np.testing.assert_allclose(found[f"{name}_mean"], (before - after) / areas[0], rtol=1e-9, atol=1e-12)
-        assert 0.01 < float(found["lost_to_mean_stress_mean"].max()) < 0.5
+            np.testing.assert_allclose(shares[f"{name}_mean"], (before - after) / areas[0], rtol=1e-9, atol=1e-12)
+        assert 0.01 < float(shares["lost_to_mean_stress_mean"].max()) < 0.5
 
 
 def test_mean_stress_alone_takes_what_the_reversible_law_says():
     part = Equilibrium(load=LOAD, reversible=0.02)
-    found = analysis.shares(run(scene(contact=part, bonds=bonds.Unbroken(stress=3e5), shear=shear.Uniform())))
+    shares = analysis.shares(run(scene(contact=part, bonds=bonds.Unbroken(stress=3e5), shear=shear.Uniform())))
     full = jkr.radius_at_load(LOAD, WORK, RADIUS, MODULUS)
     left = reversible.radius_at_load_reversible(LOAD, WORK, 3e5, 0.02, RADIUS, MODULUS)
-    np.testing.assert_allclose(found["lost_to_mean_stress_mean"], 1.0 - (left / full) ** 2, rtol=1e-11)
+    np.testing.assert_allclose(shares["lost_to_mean_stress_mean"], 1.0 - (left / full) ** 2, rtol=1e-11)
     for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
-        np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(shares[name], 0.0, rtol=0, atol=1e-13)
 
 
 def test_the_equilibrium_of_a_lagging_edge_is_at_its_own_radius():
@@ -141,9 +141,9 @@ def test_what_a_rate_dependent_edge_has_still_to_lose_is_no_ones_loss():
     jump = drive.Table(time=(0.0, 0.1, 0.1, 0.4), speed=(0.0, 0.0, 1e-2, 1e-2))
     part = RateDependent(load=LOAD, front_speed=1e-4)
     population = bonds.Steady(critical_speed=1e-2)
-    found = analysis.shares(run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform())))
-    np.testing.assert_allclose(found["lost_to_fluctuations_mean"], 0.0, rtol=0, atol=1e-13)
-    lag, lost = found["lost_to_lag_mean"].to_numpy(), found["lost_to_bonds_mean"].to_numpy()
+    shares = analysis.shares(run(scene(contact=part, drive=jump, bonds=population, shear=shear.Uniform())))
+    np.testing.assert_allclose(shares["lost_to_fluctuations_mean"], 0.0, rtol=0, atol=1e-13)
+    lag, lost = shares["lost_to_lag_mean"].to_numpy(), shares["lost_to_bonds_mean"].to_numpy()
     np.testing.assert_allclose(lag[:5], 0.0, rtol=0, atol=1e-13)
     assert lag.min() < -0.3 * lost[-1]  # the area is still there that the bonds no longer pay for
     assert np.all(np.diff(lag[6:]) > 0.0)
@@ -178,10 +178,10 @@ def test_a_moved_sphere_with_all_its_adhesion_loses_nothing():
         dataset = run(scene(contact=Equilibrium(**MOVED[control]), bonds=bonds.Unbroken(), shear=shear.Uniform()))
         assert np.ptp(dataset["contact_area"].to_numpy()) > 0.5 * float(dataset["contact_area"].max())
         np.testing.assert_allclose(analysis.observables(dataset)["area_ratio"], 1.0, rtol=1e-13)
-        found = analysis.shares(dataset)
+        shares = analysis.shares(dataset)
         for name in ("lost_to_bonds_mean", "lost_to_fluctuations_mean"):
-            np.testing.assert_allclose(found[name], 0.0, rtol=0, atol=1e-13)
-        np.testing.assert_allclose(found["radius_jkr"], dataset["contact_radius"], rtol=1e-13)
+            np.testing.assert_allclose(shares[name], 0.0, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(shares["radius_jkr"], dataset["contact_radius"], rtol=1e-13)
 
 
 @pytest.mark.parametrize("control", MOVED)

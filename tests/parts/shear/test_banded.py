@@ -103,7 +103,7 @@ def test_the_inverted_characteristic_function_is_the_hypoexponential_law():
 
 @pytest.mark.parametrize("draws", [20_000, pytest.param(100_000, marks=pytest.mark.verify)])
 def test_stationary_draws_follow_the_law_of_all_modes(draws):
-    noise, seen = Noise(5, "shear", np.arange(MEMBERS)), math.sqrt(math.log(2.0 / FIVE_SIGMA) / (2.0 * draws))
+    noise, detectable = Noise(5, "shear", np.arange(MEMBERS)), math.sqrt(math.log(2.0 / FIVE_SIGMA) / (2.0 * draws))
     for name, tolerance in [*itertools.product(SPECTRA, [0.01]), ("band", 0.1)]:
         process, weights, _ = process_of(name, tolerance=tolerance)
         exact, banded = law_of(weights), law_of(process.bands.weight, 0.5 * process.bands.freedom)
@@ -112,7 +112,7 @@ def test_stationary_draws_follow_the_law_of_all_modes(draws):
         sample = np.ravel([process.start(moved(step), UNLOADED, noise).energy for step in range(draws // MEMBERS)])
         assert kstest(sample, banded).pvalue > FIVE_SIGMA
         if tolerance == 0.01:
-            assert changed < 0.1 * seen  # far below what so many draws can see, by Kolmogorov's law
+            assert changed < 0.1 * detectable  # far below what so many draws can see, by Kolmogorov's law
             assert kstest(sample, exact).pvalue > FIVE_SIGMA
         assert abs(sample.mean() - weights.sum()) < 5.0 * np.sqrt(np.sum(weights**2) / draws)
 

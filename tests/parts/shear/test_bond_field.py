@@ -103,4 +103,4 @@ def test_a_map_of_the_bonds_field_has_the_energy_of_its_modes():
     field, noise = process(), Noise(3, "shear", np.arange(2))
     state = field.start(moved(0), bonding(0.8, 0.6), noise)
     maps = field.maps(state, np.zeros(1), 2)
-    assert_allclose([surface_energy(one, CELL, G) for one in maps], state.energy, rtol=1e-12)
+    assert_allclose([surface_energy(field_map, CELL, G) for field_map in maps], state.energy, rtol=1e-12)

@@ -139,22 +139,22 @@ def test_modes_are_one_of_each_pair_of_pixels_that_meet_the_annulus_sorted_by_le
 
 def test_variance_of_a_cell_lacks_only_the_pixel_around_zero():
     spectrum = Gaussian(2.0, 0.1)
-    found = modes(spectrum, 1.0, 64)
+    pairs = modes(spectrum, 1.0, 64)
     lost = special.erf(math.pi * 0.1 / 2) ** 2
-    assert_allclose(found.errors()["cell_error_variance"], -lost, rtol=1e-12, atol=0)
+    assert_allclose(pairs.errors()["cell_error_variance"], -lost, rtol=1e-12, atol=0)
     inside = modes(AFFINE, 1.0)
     assert abs(inside.errors()["cell_error_variance"]) < 1e-14
 
 
 def test_energies_of_pairs_are_compliance_times_density_over_area():
-    found = modes(Band(1.3, longest=1 / 4, shortest=1 / 12), 2.5)
+    pairs = modes(Band(1.3, longest=1 / 4, shortest=1 / 12), 2.5)
     nu, modulus = 0.3, 1.7
-    inside = np.hypot(found.ix, found.iy) / 2.5
+    inside = np.hypot(pairs.ix, pairs.iy) / 2.5
     inside = (inside > 4.4) & (inside < 11.6)  # pixels of constant density
-    q = np.hypot(found.qx, found.qy)
-    compliance = (1 - nu + nu * (found.qy / q) ** 2) / (modulus * q)
-    exact = compliance * found.spectrum.density(found.qx, found.qy) / 2.5**2
-    assert_allclose(found.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0)
+    q = np.hypot(pairs.qx, pairs.qy)
+    compliance = (1 - nu + nu * (pairs.qy / q) ** 2) / (modulus * q)
+    exact = compliance * pairs.spectrum.density(pairs.qx, pairs.qy) / 2.5**2
+    assert_allclose(pairs.energies(modulus, nu)[inside], exact[inside], rtol=1e-11, atol=0)
 
 
 def test_a_smooth_spectrum_loses_the_energy_around_zero():
@@ -196,22 +196,22 @@ def test_a_ripple_is_one_pair_with_the_energy_of_the_ripple_whether_it_fits_or_n
 
 def test_without_points_the_grid_is_the_smallest_even_one_that_holds_the_spectrum():
     for spectrum in [AFFINE, Band(1.0, 1 / 2, 1 / 8), Ripple(1.0, 0.25)]:
-        found = modes(spectrum, 1.0)
-        assert found.points % 2 == 0
-        reach = max(np.max(np.abs(found.ix)), np.max(found.iy))
-        assert reach == found.points // 2 - 1
-        smaller = modes(spectrum, 1.0, found.points - 1)  # odd, and just as far
-        assert np.array_equal(smaller.variance, found.variance)
-        with pytest.raises(ValueError, match=f"at least {found.points - 1} points"):
-            modes(spectrum, 1.0, found.points - 2)
+        pairs = modes(spectrum, 1.0)
+        assert pairs.points % 2 == 0
+        reach = max(np.max(np.abs(pairs.ix)), np.max(pairs.iy))
+        assert reach == pairs.points // 2 - 1
+        smaller = modes(spectrum, 1.0, pairs.points - 1)  # odd, and just as far
+        assert np.array_equal(smaller.variance, pairs.variance)
+        with pytest.raises(ValueError, match=f"at least {pairs.points - 1} points"):
+            modes(spectrum, 1.0, pairs.points - 2)
 
 
 def test_nyquist_and_zero_are_left_out():
     for points in [16, 17]:
-        found = modes(VonKarman(1.0, 0.2, 0.5), 1.0, points)
+        pairs = modes(VonKarman(1.0, 0.2, 0.5), 1.0, points)
         reach = (points - 1) // 2
-        assert len(found.ix) == ((2 * reach + 1) ** 2 - 1) // 2
-        assert np.max(np.abs(found.ix)) == np.max(found.iy) == reach
+        assert len(pairs.ix) == ((2 * reach + 1) ** 2 - 1) // 2
+        assert np.max(np.abs(pairs.ix)) == np.max(pairs.iy) == reach
 
 
 def test_the_set_of_modes_does_not_depend_on_the_rms():
