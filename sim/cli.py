@@ -139,11 +139,7 @@ def cli() -> None:
 @_MEMBERS
 @click.option("-j", "--jobs", type=click.IntRange(1), help="Processes; default one a core, fewer for short runs.")
 @click.option("--scheduler", default="", metavar="ADDRESS", help="Work on the cluster of this scheduler of dask.")
-@click.option(
-    "--max-memory",
-    metavar="SIZE",
-    help="Memory for all processes, such as 4 GB; default SIM_MAX_MEMORY or what is free.",
-)
+@click.option("--max-memory", metavar="SIZE", help="Memory of all processes; default SIM_MAX_MEMORY or what is free.")
 @click.option("--max-time", metavar="TIME", help="Stop in time, such as 8 h, and go on later with --resume.")
 @click.option("--shard", metavar="I/N", help="Only share I of N, for job arrays; the last one makes the file.")
 @click.option("--force", is_flag=True, help="Replace an existing output, or an unfinished run of it.")
@@ -151,9 +147,8 @@ def cli() -> None:
 @click.option("--quiet", is_flag=True, help="Print nothing but errors.")
 @click.option("--no-table", "bare", is_flag=True, help="End without reading the dataset back for its table.")
 def run(
-    scenario: Path, output: Path | None, changes: tuple[str, ...], seed: int | None, members: int | None,
-    jobs: int | None, scheduler: str, max_memory: str | None, max_time: str | None, shard: str | None, force: bool,
-    resume: bool, quiet: bool, bare: bool,
+    scenario: Path, output: Path | None, jobs: int | None, scheduler: str, max_memory: str | None, max_time: str | None,
+    shard: str | None, force: bool, resume: bool, quiet: bool, bare: bool, **overrides: Any,
 ) -> None:  # fmt: skip
     """Run a scenario with its ensemble and its sweep, into a netCDF file."""
     target = output or Path("outputs") / f"{scenario.stem}.nc"
@@ -166,7 +161,7 @@ def run(
     until = time.monotonic() + read_option(max_time, "--max-time", "s", above=0, typical="8 h")
     memory = read_option(max_memory, "--max-memory", "byte", above=0, typical="4 GB")
     with slow_stage("making modes and bands of the fluctuations", quiet):
-        scene = _load(scenario, changes, seed, members)
+        scene = _load(scenario, **overrides)
     if force and resume:
         raise click.UsageError("--resume goes on with an unfinished run, --force throws it away: give one of them")
 
@@ -231,12 +226,12 @@ def _print_tables(tables: list[list[dict[str, str]]], notes: list[str]) -> None:
 @_SET
 @_SEED
 @_MEMBERS
-def check(scenario: Path, changes: tuple[str, ...], seed: int | None, members: int | None) -> None:
+def check(scenario: Path, **overrides: Any) -> None:
     """Preview a run: models, quantities in SI, error estimates, and the time, memory and file that it takes."""
     from sim.ensemble.preview import preview
 
     _announce_compiling()
-    say(preview(_load(scenario, changes, seed, members)))
+    say(preview(_load(scenario, **overrides)))
 
 
 @cli.command()
@@ -364,24 +359,21 @@ def converge(
 @cli.command(epilog="Exit codes: 0 done; 1 not converged; 2 bad input; 73 an output exists; 74 trouble with files.")
 @click.argument("scenario", type=_PATH)
 @click.argument("data", type=_PATH, nargs=-1, required=True)
-@click.option("--free", "keys", multiple=True, required=True, metavar="KEY[=LOW:HIGH]", help="A number to be found.")
+@click.option("--free", multiple=True, required=True, metavar="KEY[=LOW:HIGH]", help="A number to be found.")
 @click.option("--common", multiple=True, metavar="COLUMN=SIZE", help="An error that a column's points share, as 2 %.")
 @click.option("--steady", is_flag=True, help="Steady sliding is enough: do not run the scenario's own models.")
 @click.option("--compare", "judged", is_flag=True, help="Also which mechanism or theory is sufficient for the data.")
-@click.option("-o", "--output", "stem", type=_PATH, help="STEM of STEM_fit.toml, .json, .png; default the scenario's.")
+@click.option("-o", "--output", type=_PATH, help="STEM of STEM_fit.toml, .json, .png; default the scenario's.")
 @click.option("--units", multiple=True, metavar="UNIT", help="Unit of axes of its dimension in the figure, as um/s.")
 @_SET
 @_FORCE
-def fit(
-    scenario: Path, data: tuple[Path, ...], keys: tuple[str, ...], common: tuple[str, ...], steady: bool, judged: bool,
-    stem: Path | None, units: tuple[str, ...], changes: tuple[str, ...], force: bool,
-) -> None:  # fmt: skip
+def fit(scenario: Path, output: Path | None, changes: tuple[str, ...], force: bool, **options: Any) -> None:
     """Calibrate numbers of a scenario to measured curves: CSV columns named as variables of a dataset, with units."""
     _announce_compiling()
-    scene, target = _load(scenario, changes), stem or scenario.with_suffix("")
+    scene, stem = _load(scenario, changes), output or scenario.with_suffix("")
     from sim.study import fit
 
-    result, shown = fit.carried_out(scene, data, keys, common, target, force, steady, judged, units)
+    result, shown = fit.carried_out(scene, stem=stem, replace=force, **options)
     for rows, text in shown:
         print_table(rows, text)
     sys.exit(DONE if result.converged else FAILED)

@@ -80,10 +80,6 @@ class Piece(NamedTuple):
     members: list[slice]
     names: list[str]
 
-    def of_sweep(self, values: np.ndarray) -> np.ndarray:
-        """Return the values of a part, without the axis of points if nothing is swept."""
-        return values if self.where else values[0]
-
 
 @dataclass
 class Outline:
@@ -108,7 +104,16 @@ class Outline:
 def outline(plan: Plan) -> Outline:
     """Return the dataset of a plan without the numbers of its parts."""
     content = Outline(attributes=attributes(plan))
-    _add_dimensions(content, plan)
+    for place, axis in enumerate(plan.scenario.sweep):
+        content.sizes[variable_name(axis.keys[0])] = len(axis.values)
+        _add_sweep_coordinates(content, plan, axis, math.prod(_sweep_shape(plan)[place + 1 :]))
+    if plan.per_member and any(map(plan.varies, plan.variables)):
+        content.sizes["member"] = plan.members
+        described = "1", "number of the ensemble member", "", np.arange(plan.members)
+        content.add("member", "i4", ("member",), *described, standard_name="realization")
+    clock = plan.points[0].clock
+    content.sizes["t"] = clock.records
+    content.add("t", "f8", ("t",), "s", "time since the start", "t", clock.times)
     _add_numbers(content, plan)
     for variable in plan.variables + plan.largest:
         content.places[variable.name] = _add_recorded(content, plan, variable)
@@ -140,23 +145,9 @@ def variable_name(key: str) -> str:
     return key.replace(".", "_")
 
 
-def _add_dimensions(content: Outline, plan: Plan) -> None:
-    scene = plan.points[0]
-    for axis in plan.scenario.sweep:
-        content.sizes[variable_name(axis.keys[0])] = len(axis.values)
-        _add_sweep_coordinates(content, plan, axis)
-    if plan.per_member and any(map(plan.varies, plan.variables)):
-        content.sizes["member"] = plan.members
-        described = "1", "number of the ensemble member", "", np.arange(plan.members)
-        content.add("member", "i4", ("member",), *described, standard_name="realization")
-    content.sizes["t"] = scene.clock.records
-    content.add("t", "f8", ("t",), "s", "time since the start", "t", scene.clock.times)
-
-
-def _add_sweep_coordinates(content: Outline, plan: Plan, axis: Axis) -> None:
-    """Add the swept values as coordinates: numbers in SI, anything else as a label."""
-    place = plan.scenario.sweep.index(axis)
-    stride, along = math.prod(_sweep_shape(plan)[place + 1 :]), (variable_name(axis.keys[0]),)
+def _add_sweep_coordinates(content: Outline, plan: Plan, axis: Axis, stride: int) -> None:
+    """Add the swept values, points a stride apart, as coordinates: numbers in SI, anything else as a label."""
+    along = (variable_name(axis.keys[0]),)
     points = [quantities(plan.points[i * stride]) for i in range(len(axis.values))]
     for position, key in enumerate(axis.keys):
         if all(key in numbers for numbers in points):
@@ -187,19 +178,22 @@ def scenario_json(scenario: Scenario, per_member: bool | None = None) -> str:
     return json.dumps(dumped | sweep, sort_keys=True, default=str)
 
 
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 def attributes(plan: Plan) -> dict[str, Any]:
     """Return the global attributes: the scenario and the versions that ran it."""
     scene, source = plan.scenario, plan.scenario.origin
-    resolved = scenario_json(scene, plan.per_member)
-    digest = hashlib.sha256(resolved.encode()).hexdigest()[:16]
+    resolved, sim_version = scenario_json(scene, plan.per_member), _version("sliding-sim")
     versions = {name: _version(name) for name in ("numpy", "scipy", "numba")}
-    sim_version = _version("sliding-sim")
-    files = {n: {"sha256": hashlib.sha256(t.encode()).hexdigest(), "text": t} for n, t in source.files.items()}
+    packages = ", ".join(f"{name} {version}" for name, version in versions.items())
+    files = {name: {"sha256": _digest(text), "text": text} for name, text in source.files.items()}
     return {
         "Conventions": "CF-1.11",
         "title": scene.name,
         "source": f"sliding-sim {sim_version}, simulation of an adhesive sliding interface",
-        "history": f"sim run; scenario {digest}; {', '.join(f'{n} {version}' for n, version in versions.items())}",
+        "history": f"sim run; scenario {_digest(resolved)[:16]}; {packages}",
         "references": "N. Menga, G. Carbone, D. Dini, arXiv:1710.06506; J. Mech. Phys. Solids 112 (2018) 145 and"
         " 133 (2019) 103744 (corrigendum)",
         "scenario_toml": source.text,
@@ -249,27 +243,25 @@ def _add_numbers(content: Outline, plan: Plan) -> None:
 
 def _add_recorded(content: Outline, plan: Plan, recorded: Variable) -> Place:
     """Add the variables of a quantity that is recorded at each record, or once a run."""
-    shape, varies, whole = _sweep_shape(plan), plan.varies(recorded), recorded in plan.largest
+    record, sweep, name, whole = plan.scenario.record, _sweep_names(plan), recorded.name, recorded in plan.largest
+    varies = plan.varies(recorded)
     each = varies and plan.per_member
-    dimensions = (*_sweep_names(plan), *(("member",) if each else ()), *(() if whole else ("t",)))
-    chunks = (
-        *((1,) * (len(shape) - 1) + (len(plan.packs[0]),) if shape else ()),
-        *((plan.group,) if each else ()),
-        max(1, plan.records_of_block(plan.points[0])),
-    )
+    dimensions = (*sweep, *(["member"] if each else []), *([] if whole else ["t"]))
+    block = {"member": plan.group, "t": max(1, plan.records_of_block(plan.points[0]))}
+    block |= dict.fromkeys(sweep[-1:], len(plan.packs[0]))
+    chunks = None if whole else tuple(block.get(dimension, 1) for dimension in dimensions)
     prescribed = any(variable.name == SPEED and not plan.varies(variable) for variable in plan.variables)
     names = {}
     for statistic, of in (_STATISTICS if varies and not each else {"": ""}).items():
-        kind = "f4" if plan.scenario.record.precision == "float32" and not (statistic or whole) else "f8"
-        more: dict[str, Any] = {} if whole else {"compression": plan.scenario.record.compression}
-        if not whole and recorded.name != SPEED and prescribed:
-            more["coordinates"] = SPEED
-        if recorded.name == "in_contact" and not statistic:
-            kind, more = "i1", {"compression": more["compression"].replace("digits", "zlib")}
-            more |= {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
-        names[statistic] = "_".join(filter(None, (recorded.name, statistic)))
+        kind = "f4" if record.precision == "float32" and not (statistic or whole) else "f8"
+        compression: str = "zlib" if whole else record.compression
+        more: dict[str, Any] = {"coordinates": SPEED} if prescribed and not whole and name != SPEED else {}
+        if name == "in_contact" and not statistic:
+            kind, compression = "i1", compression.replace("digits", "zlib")
+            more = {"units": "", "flag_values": np.array([0, 1], "i1"), "flag_meanings": _FLAGS}
+        names[statistic] = "_".join(filter(None, (name, statistic)))
         described = recorded.unit, f"{of} {recorded.long_name}".strip(), recorded.symbol
-        content.add(names[statistic], kind, dimensions, *described, None, None if whole else chunks, **more)
+        content.add(names[statistic], kind, dimensions, *described, None, chunks, compression, **more)
     return Place(names, each, not whole)
 
 
@@ -295,14 +287,14 @@ def _add_maps(content: Outline, plan: Plan) -> None:
 
 def in_memory(outline: Outline, parts: Blocks) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, Any]]]:
     """Return dimensions, values and attributes of each variable, by name."""
-    arrays = {}
-    for name, described in outline.variables.items():
-        shape = [outline.sizes[size] for size in described.dimensions]
-        arrays[name] = np.empty(shape, object if described.kind is str else described.kind)
-        if described.values is not None:
-            arrays[name][...] = described.values
-    _fill(outline, parts, arrays)
-    return {name: (each.dimensions, arrays[name], each.attributes) for name, each in outline.variables.items()}
+    content = {}
+    for name, (kind, dimensions, attributes, values, *_) in outline.variables.items():
+        array = np.empty([outline.sizes[size] for size in dimensions], object if kind is str else kind)
+        if values is not None:
+            array[...] = values
+        content[name] = dimensions, array, attributes
+    _fill(outline, parts, {name: array for name, (_, array, _) in content.items()})
+    return content
 
 
 def write(outline: Outline, parts: Blocks, path: Path) -> None:
@@ -347,23 +339,24 @@ def _fill(outline: Outline, parts: Blocks, variables: Mapping[str, Any]) -> None
     """Put the numbers of the parts into variables, or into arrays."""
     for piece in outline.pieces:
         pools: dict[str, list[np.ndarray]] = {}
+        rank = 1 if piece.where else 0  # the axis of members: without a sweep there is none of its points
         for rows, part in zip(piece.members, piece.names, strict=True):
-            for key, values in parts.load(part).items():
+            for key, stored in parts.load(part).items():
                 name, _, snapshot = key.partition("@")
-                place = outline.places.get(name)
+                place, values = outline.places.get(name), stored if rank else stored[0]
                 if place is None:
                     continue
                 if snapshot:
-                    drawn = slice(rows.start, rows.start + values.shape[1])
-                    variables[name][(*piece.where, drawn, int(snapshot))] = piece.of_sweep(values)
+                    drawn = slice(rows.start, rows.start + values.shape[rank])
+                    variables[name][(*piece.where, drawn, int(snapshot))] = values
                 elif "" in place.names:
-                    variables[name][place.axes(piece, rows)] = piece.of_sweep(values if place.each else values[:, 0])
+                    variables[name][place.axes(piece, rows)] = values if place.each else values.take(0, rank)
                 else:
-                    pools.setdefault(name, []).append(np.moveaxis(values, 1, 0))
+                    pools.setdefault(name, []).append(np.moveaxis(values, rank, 0))
         for name, groups in pools.items():
             place = outline.places[name]
             for statistic, values in pooled(groups).items():
-                variables[place.names[statistic]][place.axes(piece)] = piece.of_sweep(values)
+                variables[place.names[statistic]][place.axes(piece)] = values
 
 
 def moments(values: np.ndarray) -> np.ndarray:

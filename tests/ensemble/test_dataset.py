@@ -43,56 +43,47 @@ def test_the_dataset_is_what_the_engine_marched():
     dataset = ensemble.run(scenario)
     for record, state in enumerate(march(scenario, np.arange(5))):
         for variable in Plan.of(scenario).variables:
-            found = dataset[variable.name].isel(t=record).values
-            assert np.array_equal(
-                np.atleast_1d(found), np.ravel(variable.read(scenario, trajectory_of(scenario, state))), equal_nan=True
-            ), variable.name
+            recorded = np.atleast_1d(dataset[variable.name].isel(t=record).values)
+            marched = np.ravel(variable.read(scenario, trajectory_of(scenario, state)))
+            np.testing.assert_array_equal(recorded, marched, err_msg=variable.name)
 
 
 def test_every_variable_has_unit_and_long_name_and_stands_on_its_page():
     scenario = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
     dataset = ensemble.run(scenario)
     page = Path(__file__).parents[2].joinpath("docs", "dataset.md").read_text(encoding="utf-8")
-    given = {variable_name(key) for key in quantities(scenario)}
+    numbers = {variable_name(key) for key in quantities(scenario)}
     for name, variable in dataset.variables.items():
-        assert name in given or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.variables"
+        assert name in numbers or f"| `{name}` |" in page, f"{name}: declare it in sim.ensemble.variables"
         assert variable.attrs["long_name"], name
         assert "units" in variable.attrs or "flag_values" in variable.attrs, name
     assert set(dataset.attrs) >= {"Conventions", "title", "history", "scenario_toml", "seed", "sim_version"}
 
 
-def test_the_file_opens_lazily_and_equals_the_run_in_memory(tmp_path):
-    scenario = replace(sample(), sweep=read_sweep({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]}))
-    path = ensemble.run(scenario, tmp_path / "out.nc")
-    with sim.open(path) as from_disk:
+def swept(sweep, **parts):
+    return replace(sample(**parts), sweep=read_sweep(sweep))
+
+
+def test_a_file_written_at_once_or_in_parts_equals_the_run_in_memory(tmp_path, monkeypatch):
+    scenario = swept({"contact.load": [1e-3, 4e-3], "adhesion.bond_share": [0.0, 1.0]})
+    whole = ensemble.run(scenario)
+    with sim.open(ensemble.run(scenario, tmp_path / "small.nc")) as from_disk:
         assert from_disk["contact_radius"].dims == ("contact_load", "adhesion_bond_share", "member", "t")
         assert from_disk["speed"].dims == ("contact_load", "adhesion_bond_share", "t")
-        xr.testing.assert_identical(from_disk.load(), ensemble.run(scenario))
-    assert sorted(file.name for file in tmp_path.iterdir()) == ["out.nc"]
-
-
-def test_a_large_dataset_is_written_by_another_process_with_the_same_content(tmp_path, monkeypatch):
-    path = ensemble.run(sample(), tmp_path / "small.nc")
+        xr.testing.assert_identical(from_disk.load(), whole)
+    assert [file.name for file in tmp_path.iterdir()] == ["small.nc"]
     monkeypatch.setattr(datasets, "_IN_MEMORY", 0)
-    with sim.open(path) as small, sim.open(ensemble.run(sample(), tmp_path / "large.nc")) as large:
-        xr.testing.assert_identical(small, large)
-
-
-def test_parts_of_any_shape_give_the_same_numbers(monkeypatch):
-    whole = ensemble.run(sample())
     monkeypatch.setattr(plans, "_GROUP", 2)
     monkeypatch.setattr(plans, "_PART_NUMBERS", 60)
-    pieces = ensemble.run(sample())
-    xr.testing.assert_identical(whole, pieces)
+    with sim.open(ensemble.run(scenario, tmp_path / "large.nc")) as large:
+        xr.testing.assert_identical(large.load(), whole)
 
 
 def test_recording_seldom_gives_the_same_numbers():
     often = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3)))
     seldom = ensemble.run(sample(clock=Clock(duration=6e-3, step=1e-3, record=3e-3)))
     for variable in Plan.of(sample()).variables:
-        assert np.array_equal(
-            often[variable.name].isel(t=[0, 3, 6]).values, seldom[variable.name].values, equal_nan=True
-        )
+        np.testing.assert_array_equal(often[variable.name].isel(t=[0, 3, 6]), seldom[variable.name])
 
 
 def test_statistics_in_place_of_members_are_those_of_the_members(monkeypatch):
@@ -137,70 +128,49 @@ def test_maps_are_those_of_the_members_and_times_asked_for(tmp_path):
 
 
 def test_a_detached_contact_is_zero_and_not_in_contact():
-    dataset = ensemble.run(
-        sample(contact=CONTACTS["tension"].__class__(load=-1e-3), shear=shear.Uniform(), bonds=BONDS["none"])
-    )
+    tension = CONTACTS["tension"].__class__(load=-1e-3)
+    dataset = ensemble.run(sample(contact=tension, shear=shear.Uniform(), bonds=BONDS["none"]))
     for name in ("contact_radius", "contact_area", "friction_force", "in_contact", "normal_load"):
         assert np.all(dataset[name] == 0), name
     assert np.all(np.isnan(dataset["indentation"]))
 
 
 def test_swept_models_are_labelled():
-    scenario = replace(
-        sample(),
-        sweep=read_sweep(
-            {
-                "shear": [
-                    {"model": "uniform"},
-                    {"model": "mean", "spectrum": {"model": "gaussian", "rms": "1e5 Pa", "length": "5 um"}},
-                ]
-            }
-        ),
-    )
-    dataset = ensemble.run(scenario)
+    spectrum = {"model": "gaussian", "rms": "1e5 Pa", "length": "5 um"}
+    dataset = ensemble.run(swept({"shear": [{"model": "uniform"}, {"model": "mean", "spectrum": spectrum}]}))
     assert list(dataset["shear"].values) == ["uniform", "mean"]
     assert dataset["fluctuation_energy"].isel(shear=0).max() == 0.0 < dataset["fluctuation_energy"].isel(shear=1).min()
 
 
 def test_zipped_sweeps_have_one_dimension_and_all_their_coordinates():
-    scenario = replace(
-        sample(),
-        sweep=read_sweep(
-            [{"contact.load": "1 mN", "sphere.radius": "1 mm"}, {"contact.load": "4 mN", "sphere.radius": "2 mm"}]
-        ),
-    )
-    dataset = ensemble.run(scenario)
-    assert_allclose(dataset["contact_load"], [1e-3, 4e-3])
-    assert dataset["sphere_radius"].dims == ("contact_load",)
-    assert_allclose(dataset["sphere_radius"], [1e-3, 2e-3])
-    rows = [{"sphere.radius": 2e-3, "contact.load": load} for load in (1e-3, 4e-3)]  # a key may keep one value
-    dataset = ensemble.run(replace(sample(), sweep=read_sweep(rows)))
-    assert dataset["contact_radius"].dims == ("sphere_radius", "member", "t")
-    assert_allclose(dataset["sphere_radius"], [2e-3, 2e-3])
+    for radii in ([1e-3, 2e-3], [2e-3, 2e-3]):  # a key may keep one value
+        rows = [
+            {"contact.load": load, "sphere.radius": radius} for load, radius in zip((1e-3, 4e-3), radii, strict=True)
+        ]
+        dataset = ensemble.run(swept(rows))
+        assert_allclose(dataset["contact_load"], [1e-3, 4e-3])
+        assert dataset["contact_radius"].dims == ("contact_load", "member", "t")
+        assert dataset["sphere_radius"].dims == ("contact_load",)
+        assert_allclose(dataset["sphere_radius"], radii)
 
 
-def test_an_existing_output_is_kept(tmp_path):
-    path = tmp_path / "out.nc"
-    path.write_text("precious", encoding="utf-8")
-    with pytest.raises(ensemble.OutputExists, match="replace"):
-        ensemble.run(sample(), path)
-    assert path.read_text(encoding="utf-8") == "precious"
-    ensemble.run(sample(), path, replace=True)
-    assert xr.open_dataset(path).attrs["sim_version"]
-
-
-def test_a_run_that_fails_leaves_the_older_output(tmp_path, monkeypatch):
+def test_an_older_output_is_kept_unless_it_is_replaced_by_a_run_that_succeeds(tmp_path, monkeypatch):
     path = ensemble.run(sample(), tmp_path / "out.nc")
     before = path.read_bytes()
+    with pytest.raises(ensemble.OutputExists):
+        ensemble.run(sample(seed=6), path)
 
     def broken(*arguments):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(datasets, "_fill", broken)
-    with pytest.raises(StoreTrouble, match="No space left"):
+    with monkeypatch.context() as patched, pytest.raises(StoreTrouble, match="No space left"):
+        patched.setattr(datasets, "_fill", broken)
         ensemble.run(sample(seed=6), path, replace=True)
     assert path.read_bytes() == before
     assert not list(tmp_path.glob(".out*"))
+    ensemble.run(sample(seed=6), path, replace=True)
+    with sim.open(path) as dataset:
+        assert dataset.attrs["seed"] == "6"
 
 
 def test_a_full_disk_is_told_with_its_reason(tmp_path, room, monkeypatch, capsys):
@@ -208,61 +178,54 @@ def test_a_full_disk_is_told_with_its_reason(tmp_path, room, monkeypatch, capsys
     monkeypatch.setattr(sys, "argv", ["sim", "run", str(lens), "--members", "2", "-o", str(output), "--quiet"])
     with room(20_000), pytest.raises(SystemExit) as done:
         cli.main()
-    said = capsys.readouterr().err
-    assert done.value.code == 74, said
-    assert "File too large" in said
-    assert len(said.splitlines()) == 1
+    message = capsys.readouterr().err
+    assert done.value.code == 74, message
+    assert "File too large" in message and len(message.splitlines()) == 1
     assert not output.exists()
 
 
-def test_threads_give_the_datasets_of_one_after_the_other(tmp_path):
+def test_threads_give_the_datasets_of_one_after_the_other_and_datasets_can_be_pickled(tmp_path):
     scenarios = [sample(members=2, seed=seed) for seed in range(4)]
     alone = [ensemble.run(scenario) for scenario in scenarios]
 
     def whole(number):
         with sim.open(ensemble.run(scenarios[number], tmp_path / f"{number}.nc")) as dataset:
-            return ensemble.run(scenarios[number]), dataset.load()
+            again = pickle.loads(pickle.dumps(dataset))
+            try:
+                return ensemble.run(scenarios[number]), dataset.load(), again.load()
+            finally:
+                again.close()
 
     with ThreadPoolExecutor(4) as pool:
-        for expected, found in zip(alone, pool.map(whole, range(4)), strict=True):
-            for dataset in found:
+        for expected, datasets_of_thread in zip(alone, pool.map(whole, range(4)), strict=True):
+            for dataset in datasets_of_thread:
                 xr.testing.assert_identical(dataset, expected)
-
-
-def test_datasets_can_be_pickled(tmp_path):
-    dataset = ensemble.run(sample())
-    xr.testing.assert_identical(pickle.loads(pickle.dumps(dataset)), dataset)
-    with sim.open(ensemble.run(sample(), tmp_path / "out.nc")) as lazy:
-        again = pickle.loads(pickle.dumps(lazy))
-        xr.testing.assert_identical(again.load(), dataset)
-        again.close()
+    xr.testing.assert_identical(pickle.loads(pickle.dumps(alone[0])), alone[0])
 
 
 def test_runs_join_along_a_key_by_xarrays_own_means():
-    base, names = sample(), [variable.name for variable in Plan.of(sample()).variables]
-    swept = replace(base, sweep=read_sweep({"contact.load": [1e-3, 2e-3, 4e-3]}))
-    whole = ensemble.run(swept)
-    runs = [ensemble.run(point).set_coords("contact_load") for point in swept.points()]
+    scenario = swept({"contact.load": [1e-3, 2e-3, 4e-3]})
+    names, whole = [variable.name for variable in Plan.of(scenario).variables], ensemble.run(scenario)
+    runs = [ensemble.run(point).set_coords("contact_load") for point in scenario.points()]
     joined = xr.concat(runs, "contact_load", data_vars="minimal")[names]
     assert joined["speed"].dims == ("t",)  # all runs have the same
     xr.testing.assert_equal(joined.drop_vars("speed"), whole[names].drop_vars("speed"))
-    two = ensemble.run(replace(base, sweep=read_sweep({"contact.load": [1e-3, 2e-3]})))
-    joined = xr.combine_by_coords(
-        [runs[2][names].expand_dims("contact_load"), two[names]], combine_attrs="drop_conflicts"
-    )
+    two = ensemble.run(swept({"contact.load": [1e-3, 2e-3]}))
+    datasets_to_join = [runs[2][names].expand_dims("contact_load"), two[names]]
+    joined = xr.combine_by_coords(datasets_to_join, combine_attrs="drop_conflicts")
     xr.testing.assert_equal(joined, whole[names])
 
 
 def test_no_variable_that_is_recorded_has_the_name_of_a_key():
     mapped = sample(shear=MAPPED, record=Record(maps=(2e-3,)))
-    own = {variable_name(key) for key in quantities(mapped)}
-    found = {
+    numbers = {variable_name(key) for key in quantities(mapped)}
+    names = {
         variable_name(".".join((*path, key)))
         for path, field in all_tables(Scenario)
         for table in tables(field.annotation).values()
         for key in keys(table)
     }
-    assert len(found) > 50 and not found & (set(ensemble.run(mapped).variables) - own)
+    assert len(names) > 50 and not names & (set(ensemble.run(mapped).variables) - numbers)
 
 
 def test_six_digits_are_kept_in_a_plain_file(tmp_path):
@@ -302,19 +265,19 @@ def test_a_flipped_byte_of_any_variable_with_a_dimension_is_an_error(tmp_path):
 
 
 def test_a_variable_is_there_where_its_condition_holds():
-    felt = {"bonds": BONDS["rate, bell"]}
+    bell = {"bonds": BONDS["rate, bell"]}
     driven, stage = set(READINGS), {"stage_position", "stage_speed"}
     scenes = [
         (set(), sample()),
         ({"fluctuations_radius"}, sample(contact=CONTACTS["partly reversible"])),
         ({"equilibrium_radius"}, sample(contact=CONTACTS["rate_dependent"])),
         ({"applied_load"}, sample(contact=CONTACTS["load there and back"])),
-        (driven, sample(drive=DRIVES["spring"], **felt)),
-        (driven - stage, sample(drive=DRIVES["force"], **felt)),
+        (driven, sample(drive=DRIVES["spring"], **bell)),
+        (driven - stage, sample(drive=DRIVES["force"], **bell)),
     ]
     some = set.union(*(names for names, _ in scenes))
     assert some == {variable.name for variable in VARIABLES if variable.condition}
     for names, scenario in scenes:
-        found = set(ensemble.run(scenario).variables)
-        assert found & some == names
-        assert {variable.name for variable in VARIABLES if not variable.condition} <= found
+        variables = set(ensemble.run(scenario).variables)
+        assert variables & some == names
+        assert {variable.name for variable in VARIABLES if not variable.condition} <= variables

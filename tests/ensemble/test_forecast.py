@@ -150,10 +150,6 @@ def test_more_members_take_more_time_in_proportion_and_no_more_memory():
     assert_allclose([memory(many, jobs) for jobs in (1, 4)], [memory(few, jobs) for jobs in (1, 4)], rtol=0.1)
 
 
-def test_sizes_have_units_that_fit():
-    assert [size(count) for count in (4, 4e3, 2.34e6, 5e9)] == ["4 byte", "4 kB", "2.3 MB", "5 GB"]
-
-
 # --- processes of their own ---
 
 

@@ -4,7 +4,6 @@ import json
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
 import xarray as xr
 from helpers.scenes import scene
 from pydantic import TypeAdapter
@@ -25,20 +24,13 @@ def reread(dataset, folder):
     return load(folder / "again.toml", json.loads(dataset.attrs["scenario_overrides"]))
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda lens: lens,
-        lambda lens: lens.with_values({"adhesion.work": 0.03}),
-        lambda lens: lens.with_values({"contact.load": 1e-3}).with_values({"contact": {"load": 2e-3}}),
-    ],
-    ids=["as read", "with a value", "with values twice"],
-)
-def test_text_and_overrides_give_the_scenario_that_was_run(change, tmp_path):
-    scenario = change(load(LENS, SHORT))
-    dataset = run(scenario)
-    assert dataset.attrs["scenario_toml"] == LENS.read_text(encoding="utf-8")
-    assert scenario_json(reread(dataset, tmp_path)) == scenario_json(scenario)
+def test_text_and_overrides_give_the_scenario_that_was_run(tmp_path):
+    lens = load(LENS, SHORT)
+    twice = lens.with_values({"contact.load": 1e-3}).with_values({"contact": {"load": 2e-3}})
+    for scenario in (lens, lens.with_values({"adhesion.work": 0.03}), twice):
+        dataset = run(scenario)
+        assert dataset.attrs["scenario_toml"] == LENS.read_text(encoding="utf-8")
+        assert scenario_json(reread(dataset, tmp_path)) == scenario_json(scenario)
 
 
 def test_a_point_of_a_sweep_is_described_without_the_sweep(tmp_path):
@@ -48,23 +40,16 @@ def test_a_point_of_a_sweep_is_described_without_the_sweep(tmp_path):
     assert (again.contact.load, again.sweep) == (4e-3, ())
 
 
-@pytest.mark.parametrize(
-    "changed",
-    [
-        lambda lens: replace(lens, adhesion=Adhesion(work=0.03)),
-        lambda lens: replace(lens, adhesion=Adhesion(work=0.03)).with_values({"contact.load": 1e-3}),
-        lambda lens: replace(lens, sweep=read_sweep({"contact.load": [1e-3, 2e-3]})),
-        lambda lens: scene(members=2),
-    ],
-    ids=["a part replaced", "and a value changed", "a sweep given", "made in Python"],
-)
-def test_what_no_file_describes_has_no_text_but_the_whole_resolved_scenario(changed):
-    scenario = changed(load(LENS, SHORT))
-    dataset = run(scenario)
-    assert (dataset.attrs["scenario_toml"], dataset.attrs["scenario_overrides"]) == ("", "{}")
-    again = TypeAdapter(Scenario).validate_python(json.loads(dataset.attrs["scenario_resolved"]))
-    assert again.sweep == scenario.sweep
-    xr.testing.assert_identical(run(again), dataset)
+def test_what_no_file_describes_has_no_text_but_the_whole_resolved_scenario():
+    lens = load(LENS, SHORT)
+    part_replaced = replace(lens, adhesion=Adhesion(work=0.03))
+    swept = replace(lens, sweep=read_sweep({"contact.load": [1e-3, 2e-3]}))
+    for scenario in (part_replaced.with_values({"contact.load": 1e-3}), swept, scene(members=2)):
+        dataset = run(scenario)
+        assert (dataset.attrs["scenario_toml"], dataset.attrs["scenario_overrides"]) == ("", "{}")
+        again = TypeAdapter(Scenario).validate_python(json.loads(dataset.attrs["scenario_resolved"]))
+        assert again.sweep == scenario.sweep
+        xr.testing.assert_identical(run(again), dataset)
 
 
 def test_a_zipped_sweep_is_in_the_resolved_scenario():
