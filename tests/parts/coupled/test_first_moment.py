@@ -6,21 +6,7 @@ import numpy as np
 import pytest
 from helpers import driven
 from helpers.cases import some
-from helpers.driven import (
-    AREA,
-    COULOMB,
-    HELD,
-    STRETCH,
-    UNIT,
-    force,
-    marched,
-    pulled,
-    reached,
-    residual,
-    scenario,
-    spring,
-    stuck,
-)
+from helpers.driven import AREA, HELD, STRETCH, UNIT, marched, pulled, reached, residual, scenario, spring, stuck
 from numpy.testing import assert_allclose
 from scipy.integrate import quad
 from scipy.optimize import brentq
@@ -142,7 +128,7 @@ def test_the_onset_that_is_shown_is_that_of_the_engine_with_all_that_delays_and_
 @pytest.mark.parametrize(("load", "share", "speed"), [(0.2, 0.367052999629, 0.939593030185),
                                                       (0.27, 0.265980949699, 2.80136714552)])  # fmt: skip
 def test_a_force_below_the_threshold_makes_creep(load, share, speed):
-    states, read = marched(scenario(200.0, 4, force(load)))
+    states, read = marched(scenario(200.0, 4, driven.force(load)))
     assert_allclose(reached(states[-1:], "bound")[0], share, rtol=1e-10)
     assert_allclose(states[-1].drive.speed / STRETCH, speed, rtol=1e-8)
     assert np.isnan(read["runaway_time"]).all()
@@ -151,7 +137,7 @@ def test_a_force_below_the_threshold_makes_creep(load, share, speed):
 
 @pytest.mark.parametrize(("load", "time"), [(0.28, 11.0634348789), (0.3, 2.52331513753), (0.4, 0.687585303603)])
 def test_a_force_above_the_threshold_runs_away_in_time(load, time):
-    scene = scenario(12.0, 12, force(load, tolerance=1e-8))
+    scene = scenario(12.0, 12, driven.force(load, tolerance=1e-8))
     states, read = marched(scene)
     assert_allclose(read["runaway_time"][-1], time, rtol=1e-7)
     ended = states[-1]
@@ -163,7 +149,7 @@ def test_a_force_above_the_threshold_runs_away_in_time(load, time):
 def test_a_viscous_interface_delays_what_bonds_of_a_constant_rate_take_over():
     # N stays; M' = N v − k M with η v + M = Q
     eta, load = 0.3, 0.2
-    drive = force(load, viscosity=eta * driven.DENSITY * driven.KAPPA, tolerance=1e-10)
+    drive = driven.force(load, viscosity=eta * driven.DENSITY * driven.KAPPA, tolerance=1e-10)
     scene = scenario(2.0, 10, drive, rupture=Constant(rate=1.0))
     states, read = marched(scene)
     time, rate = 0.2 * np.arange(11), 0.5 / eta + 1.0
@@ -177,7 +163,7 @@ def test_a_viscous_interface_delays_what_bonds_of_a_constant_rate_take_over():
 def test_the_half_space_yields_with_its_stiffness_in_series_with_the_bonds():
     # bonds that slip alone would break, far from it
     held = CutOff(stretch=1e6 * STRETCH)
-    drive = force(0.01, contact_stiffness="half_space", viscosity=1e-6 * driven.DENSITY * driven.KAPPA)
+    drive = driven.force(0.01, contact_stiffness="half_space", viscosity=1e-6 * driven.DENSITY * driven.KAPPA)
     states, read = marched(scenario(1.0, 4, drive, rupture=held))
     firm = math.pi**2 * driven.MODULUS / 4.0 * math.sqrt(AREA / math.pi) / 2.0
     assert_allclose(states[-1].drive.position, 0.01 * UNIT * (1.0 / firm + 1.0 / driven.STIFF), rtol=1e-7)
@@ -234,7 +220,7 @@ def test_bonds_that_a_stretch_breaks_snap_again_and_again_behind_a_soft_spring()
 
 
 def test_a_run_records_the_drive_of_each_member_and_ends_those_that_run_away():
-    scene = scenario(12.0, 12, force(0.28), members=2)
+    scene = scenario(12.0, 12, driven.force(0.28), members=2)
     dataset = sim.run(scene)
     assert dataset["friction_force"].dims == ("member", "t")
     assert_allclose(dataset["runaway_time"].isel(t=-1), 11.0634348789, rtol=1e-5)
@@ -264,7 +250,7 @@ def test_a_force_is_a_soft_spring_that_is_pulled_from_afar():
 def test_bonds_that_follow_the_speed_at_once_make_the_relaxation_cycles_of_their_closed_form(
     damping, speed, sticks, slips, least
 ):
-    bonds = Steady(critical_speed=STRETCH, stress=COULOMB)
+    bonds = Steady(critical_speed=STRETCH, stress=driven.COULOMB)
     drive = pulled(speed=speed, damping=damping, tolerance=1e-8)
     # the first slip begins where the spring has come to the strength, each further one a cycle later
     for cycles, after, left in ((0, 0.0, 1.0), (0, slips, least), (4, sticks, 1.0), (4, sticks + slips, least)):
@@ -273,13 +259,13 @@ def test_bonds_that_follow_the_speed_at_once_make_the_relaxation_cycles_of_their
         assert_allclose(read["spring_force"][-1] / HELD, left, rtol=1e-6)
         assert residual(read) < 1e-7
     most = max(state.bonding.stress[0] for state in states)
-    assert most <= COULOMB * (1.0 + 1e-12)
+    assert most <= driven.COULOMB * (1.0 + 1e-12)
 
 
 def test_coulomb_friction_with_a_mass_touches_rest_once_a_period_and_never_sticks():
     mass, speed, time = 0.01, 0.3, 10.3
     drive = pulled(speed=speed, mass=mass, tolerance=1e-10)
-    states, read = marched(stuck(1.0 / speed + time, 7, Unbroken(stress=COULOMB), drive))
+    states, read = marched(stuck(1.0 / speed + time, 7, Unbroken(stress=driven.COULOMB), drive))
     turn = time / math.sqrt(mass)
     assert_allclose(states[-1].drive.speed[0] / STRETCH, speed * (1.0 - math.cos(turn)), rtol=1e-5)
     force = 1.0 + speed * math.sqrt(mass) * math.sin(turn)
@@ -290,14 +276,14 @@ def test_coulomb_friction_with_a_mass_touches_rest_once_a_period_and_never_stick
 
 def test_a_force_holds_below_the_strength_and_above_it_makes_the_speed_that_friction_and_damping_bear():
     for mass in [0.0, 0.05]:
-        stiff, bonds = HELD / STRETCH, Steady(critical_speed=STRETCH, stress=COULOMB)
+        stiff, bonds = HELD / STRETCH, Steady(critical_speed=STRETCH, stress=driven.COULOMB)
         for load in (0.9, -0.9, 1.3, -1.3):
             keys = {"mass": mass * stiff, "damping": 0.5 * stiff, "contact_stiffness": "rigid"}
             states, read = marched(stuck(40.0, 8, bonds, Force(force=load * HELD, **keys)))
             speed = abs(states[-1].drive.speed[0]) / STRETCH
             if abs(load) < 1.0:
                 assert speed == states[-1].drive.position[0] == 0.0
-                assert_allclose(states[-1].bonding.stress[0], load * COULOMB, rtol=1e-14)
+                assert_allclose(states[-1].bonding.stress[0], load * driven.COULOMB, rtol=1e-14)
                 assert states[-1].bonds.bound[0] == 1.0
             else:
                 assert_allclose(0.5 * speed + 1.0 / (1.0 + speed), 1.3, rtol=1e-9)
@@ -309,7 +295,7 @@ def test_steady_sliding_on_falling_friction_is_stable_where_damping_outweighs_th
     for stiffness in [0.1, 10.0]:
         # m v'' + (c + F') v' + K v = 0 with F' = -V_c/(V_c + V)^2
         fall, mass, step = 1.0 / 4.0, 1.0, 0.05
-        bonds = Steady(critical_speed=STRETCH, stress=COULOMB)
+        bonds = Steady(critical_speed=STRETCH, stress=driven.COULOMB)
         for damping in (0.9 * fall, 1.1 * fall):
             stage = driven.jolted(1.0, step, 1.00001)
             drive = pulled(stiffness, stage, mass, damping, start="steady", tolerance=1e-11)
