@@ -41,18 +41,18 @@ def test_first_detachment_is_told_of_those_members_that_detached(ramp):
     times = np.full((6, 21), NAN)
     times[0, 4:], times[0, 9:] = 0.07, 0.18  # the last one so far is what is recorded
     times[1, 10:], times[2, 15:] = 0.19, 0.3
-    found = analysis.statistics(per_member(ramp, detachment_time=times))
-    np.testing.assert_allclose(found["ever_detached_mean"], 0.5, rtol=1e-14)
-    np.testing.assert_allclose(found["ever_detached_sem"], math.sqrt(0.25 / 5.0), rtol=1e-13)
-    np.testing.assert_allclose(found["first_detachment_mean"], (0.07 + 0.19 + 0.3) / 3.0, rtol=1e-13)
+    result = analysis.statistics(per_member(ramp, detachment_time=times))
+    np.testing.assert_allclose(result["ever_detached_mean"], 0.5, rtol=1e-14)
+    np.testing.assert_allclose(result["ever_detached_sem"], math.sqrt(0.25 / 5.0), rtol=1e-13)
+    np.testing.assert_allclose(result["first_detachment_mean"], (0.07 + 0.19 + 0.3) / 3.0, rtol=1e-13)
     deviation = np.std([0.07, 0.19, 0.3], ddof=1)
-    np.testing.assert_allclose(found["first_detachment_sem"], deviation / math.sqrt(3.0), rtol=1e-13)
-    np.testing.assert_allclose(found["first_detachment_quantile"], [0.082, 0.19, 0.289], rtol=1e-13)
+    np.testing.assert_allclose(result["first_detachment_sem"], deviation / math.sqrt(3.0), rtol=1e-13)
+    np.testing.assert_allclose(result["first_detachment_quantile"], [0.082, 0.19, 0.289], rtol=1e-13)
 
 
 def test_detachment_of_none_is_unknown_and_not_shown(ramp):
-    found = analysis.statistics(ramp)
-    assert float(found["ever_detached_mean"]) == 0.0 and math.isnan(found["first_detachment_mean"])
+    result = analysis.statistics(ramp)
+    assert float(result["ever_detached_mean"]) == 0.0 and math.isnan(result["first_detachment_mean"])
     assert not any("detached" in heading for row in analysis.highlights(ramp) for heading in row)
 
 
@@ -60,15 +60,15 @@ def test_time_masked_is_the_share_of_the_records_after_the_first(ramp):
     masked = np.zeros((6, 21))
     masked[:, 0] = 1.0  # no time has passed
     masked[1, 11:] = 1.0
-    found = analysis.events(per_member(ramp, masked=masked, in_contact=1))["time_masked"]
-    np.testing.assert_allclose(found, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0], rtol=1e-14)
+    result = analysis.events(per_member(ramp, masked=masked, in_contact=1))["time_masked"]
+    np.testing.assert_allclose(result, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0], rtol=1e-14)
     area = ramp["contact_area"].copy()
     area[1, 16:] = NAN
     scenario = json.loads(ramp.attrs["scenario_resolved"])
     scenario["contact"]["after_pull_off"] = "stop"
     stopped = per_member(ramp, masked=masked, in_contact=1).assign(contact_area=area)
-    found = analysis.events(stopped.assign_attrs(scenario_resolved=json.dumps(scenario)))["time_masked"]
-    np.testing.assert_allclose(found[1], 5.0 / 15.0, rtol=1e-14)
+    result = analysis.events(stopped.assign_attrs(scenario_resolved=json.dumps(scenario)))["time_masked"]
+    np.testing.assert_allclose(result[1], 5.0 / 15.0, rtol=1e-14)
 
 
 def test_the_first_masking_is_told_of_those_members_that_were_masked(ramp):
@@ -87,10 +87,10 @@ def test_times_of_a_pulled_ensemble_are_within_its_run():
     """Fluctuations open a lifted contact at random times; the file and the statistics agree."""
     lifted = Equilibrium(indentation=-0.4e-6)
     dataset = run(scene(contact=lifted, drive=drive.Steady(speed=3e-3), ensemble=Ensemble(members=24)))
-    found, opened = analysis.statistics(dataset), dataset["in_contact"] == 0
-    np.testing.assert_allclose(found["ever_detached_mean"], float(opened.any("t").mean()), rtol=1e-14)
+    result, opened = analysis.statistics(dataset), dataset["in_contact"] == 0
+    np.testing.assert_allclose(result["ever_detached_mean"], float(opened.any("t").mean()), rtol=1e-14)
     first = dataset["t"].to_numpy()[opened.argmax("t")][opened.any("t").to_numpy()]
-    np.testing.assert_allclose(found["first_detachment_mean"], first.mean(), rtol=1e-12)
+    np.testing.assert_allclose(result["first_detachment_mean"], first.mean(), rtol=1e-12)
     assert 2 <= len(first) < 24
     (row,) = analysis.highlights(dataset)
     share = 100.0 * len(first) / 24.0
@@ -113,9 +113,9 @@ def test_loop_of_a_circle_is_its_area():
     angle = 2.0 * math.pi * 2.0 * dataset["t"]
     drawn = dataset.assign(normal_load=np.cos(angle), displacement=np.sin(angle))
     # a polygon of 400 corners
-    found = analysis.loop_energy(drawn)["loop_energy"]
-    np.testing.assert_allclose(found, 200.0 * math.sin(2.0 * math.pi / 400.0), rtol=1e-12)
-    assert found["cycle"].to_numpy().tolist() == [1, 2] and found.attrs["units"] == "J"
+    result = analysis.loop_energy(drawn)["loop_energy"]
+    np.testing.assert_allclose(result, 200.0 * math.sin(2.0 * math.pi / 400.0), rtol=1e-12)
+    assert result["cycle"].to_numpy().tolist() == [1, 2] and result.attrs["units"] == "J"
 
 
 @pytest.mark.parametrize(
@@ -130,10 +130,10 @@ def test_loop_of_a_circle_is_its_area():
 def test_a_contact_that_never_opens_gives_all_back(held):
     dataset = cycled(**held)
     stored = np.trapezoid(dataset["normal_load"][:101], dataset["displacement"][:101])
-    found = analysis.loop_energy(dataset)
+    result = analysis.loop_energy(dataset)
     assert abs(stored) > 1e-12  # J, given back on the way up
-    np.testing.assert_array_equal(found["loop_energy"], 0.0)
-    np.testing.assert_array_equal(found["loop_dissipation"], 0.0)
+    np.testing.assert_array_equal(result["loop_energy"], 0.0)
+    np.testing.assert_array_equal(result["loop_dissipation"], 0.0)
     assert not any("cycle" in heading for row in analysis.highlights(dataset) for heading in row)
 
 
@@ -145,13 +145,13 @@ def test_the_loop_is_what_its_jumps_dissipate(held):
     errors = []
     for steps in (600, 2400):
         dataset = cycled(steps=steps, **held)
-        found = analysis.loop_energy(dataset)
+        result = analysis.loop_energy(dataset)
         step = 2.0 * abs(held[next(iter(held))]["to"] - 1e-6) * 2 / steps
         most = 1.5 * 2 * np.abs(dataset["normal_load"].where(dataset["displacement"] < 0.2e-6)).max() * step
-        lost = found["loop_dissipation"]
-        assert float(lost.min()) > 10.0 * float(most) and bool((found["loop_energy"] > 0.0).all())
-        assert bool((np.abs(found["loop_energy"] - lost) < most).all())
-        errors.append(float(np.abs(found["loop_energy"] - lost).max()))
+        lost = result["loop_dissipation"]
+        assert float(lost.min()) > 10.0 * float(most) and bool((result["loop_energy"] > 0.0).all())
+        assert bool((np.abs(result["loop_energy"] - lost) < most).all())
+        errors.append(float(np.abs(result["loop_energy"] - lost).max()))
         np.testing.assert_allclose(lost.sum(), dataset["dissipated_energy"][-1], rtol=1e-12)
     assert errors[1] < 0.5 * errors[0]
     headings = set(analysis.highlights(dataset)[0])
@@ -166,8 +166,8 @@ def test_a_sphere_that_flies_off_has_no_loop():
 def test_a_stopped_trajectory_has_the_loops_before_its_end():
     dataset = cycled(cycles=4, indentation={"from": 2e-6, "to": 1e-6})
     stopped = dataset["contact_radius"].where(dataset["t"] < 0.6)
-    found = analysis.loop_energy(dataset.assign(contact_radius=stopped))
-    assert found["loop_energy"].isnull().to_numpy().tolist() == [False, False, True, True]
+    result = analysis.loop_energy(dataset.assign(contact_radius=stopped))
+    assert result["loop_energy"].isnull().to_numpy().tolist() == [False, False, True, True]
 
 
 def test_loops_of_a_swept_course_are_those_of_its_points():
@@ -186,11 +186,11 @@ def test_loops_of_a_swept_course_are_those_of_its_points():
 def test_loops_of_statistics_alone_are_the_members_mean():
     held = {"contact": Equilibrium(indentation={"from": 2e-6, "to": 0.5e-6, "cycles": 2})}
     few, members = run(scene(record=Record(per_member=False), **held)), run(scene(**held))
-    found = analysis.statistics(few)["loop_energy_mean"]
+    result = analysis.statistics(few)["loop_energy_mean"]
     # the loop is a small difference of what is put in and given back
     stored = float(np.abs(members["normal_load"]).max() * np.ptp(members["displacement"].to_numpy()))
     expected = analysis.loop_energy(members)["loop_energy"].mean()
-    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-13 * stored)
+    np.testing.assert_allclose(result, expected, rtol=1e-12, atol=1e-13 * stored)
 
 
 def test_without_trips_there_is_no_loop(ramp):
@@ -205,27 +205,27 @@ def test_without_trips_there_is_no_loop(ramp):
 def test_friction_maximum_of_a_ramp_has_its_speed(ramp):
     heights = np.array([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])[:, None]
     shape = 1e5 * (1.0 - (np.arange(21) - 12.0) ** 2 / 400.0)
-    found = analysis.statistics(per_member(ramp, shear_stress=heights * shape, friction_force=-heights * shape))
-    np.testing.assert_allclose(found["peak_stress_mean"], 3.5e5, rtol=1e-14)
-    np.testing.assert_allclose(found["peak_stress_sem"], 1e5 * math.sqrt(3.5 / 6.0), rtol=1e-13)
-    np.testing.assert_allclose(found["peak_friction_mean"], 3.5e5, rtol=1e-14)  # its size: sliding back it is negative
+    result = analysis.statistics(per_member(ramp, shear_stress=heights * shape, friction_force=-heights * shape))
+    np.testing.assert_allclose(result["peak_stress_mean"], 3.5e5, rtol=1e-14)
+    np.testing.assert_allclose(result["peak_stress_sem"], 1e5 * math.sqrt(3.5 / 6.0), rtol=1e-13)
+    np.testing.assert_allclose(result["peak_friction_mean"], 3.5e5, rtol=1e-14)  # its size: sliding back it is negative
     for name in ("peak_speed_mean", "peak_friction_speed_mean"):
-        np.testing.assert_allclose(found[name], ramp["speed"][12], rtol=1e-14)
-    np.testing.assert_allclose(found["peak_time_mean"], ramp["t"][12], rtol=1e-14)
+        np.testing.assert_allclose(result[name], ramp["speed"][12], rtol=1e-14)
+    np.testing.assert_allclose(result["peak_time_mean"], ramp["t"][12], rtol=1e-14)
 
 
 @pytest.mark.parametrize("shape", ["level", "rising", "falling", "rounding"])
 def test_a_ramp_without_a_maximum_inside_has_no_peak(ramp, shape):
     n = np.arange(21.0)
     shape = {"level": 0 * n + 1, "rising": n, "falling": n[::-1], "rounding": 1 + 1e-14 * np.sin(n)}[shape]
-    found = analysis.events(per_member(ramp, shear_stress=shape, friction_force=shape))
-    assert all(bool(found[name].isnull().all()) for name in found if str(name).startswith("peak"))
+    result = analysis.events(per_member(ramp, shear_stress=shape, friction_force=shape))
+    assert all(bool(result[name].isnull().all()) for name in result if str(name).startswith("peak"))
 
 
 def test_noise_makes_no_maximum(ramp):
     noise = np.random.default_rng(3).normal(1e5, 1e3, size=(6, 21))
-    found = analysis.events(per_member(ramp, shear_stress=noise))
-    assert bool(found["peak_stress"].isnull().all())
+    result = analysis.events(per_member(ramp, shear_stress=noise))
+    assert bool(result["peak_stress"].isnull().all())
     hump = noise + 1e5 * np.exp(-((np.arange(21) - 12.0) ** 2) / 8.0)
     assert bool(analysis.events(per_member(ramp, shear_stress=hump))["peak_stress"].notnull().all())
 
@@ -243,15 +243,15 @@ def started():
 
 
 def test_static_peak_is_timed_from_the_start_of_sliding(started):
-    found = analysis.events(started)
+    result = analysis.events(started)
     for k, rest in enumerate((0.1, 0.2)):
         stress, t = started["shear_stress"][k].to_numpy(), started["t"].to_numpy()
         at = int(np.argmax(stress))
         assert stress[at] > 1.5 * stress[-1] and t[at] > rest
         # between two records it is higher, but below the lines through its neighbours: it is concave there
-        assert stress[at] <= float(found["peak_stress"][k]) < 2.0 * stress[at] - min(stress[at - 1], stress[at + 1])
-        assert abs(float(found["peak_time"][k]) - (t[at] - rest)) < 2e-3
-    assert float(found["peak_stress"][1]) > float(found["peak_stress"][0])  # more bonds after a longer rest
+        assert stress[at] <= float(result["peak_stress"][k]) < 2.0 * stress[at] - min(stress[at - 1], stress[at + 1])
+        assert abs(float(result["peak_time"][k]) - (t[at] - rest)) < 2e-3
+    assert float(result["peak_stress"][1]) > float(result["peak_stress"][0])  # more bonds after a longer rest
     rows = analysis.highlights(started)
     assert [row["drive_rest\n(ms)"] for row in rows] == ["100", "200"]
     assert {"peak of\nstress (kPa)", "peak of\nfriction (mN)", "after\n(ms)"} < set(rows[0])
@@ -289,9 +289,9 @@ def test_a_start_may_peak_at_once():
     dataset = run(
         scene(drive=part, bonds=bonds.Rate(critical_speed=1e-2, rebinding_rate=50.0, stress=3e5), shear=shear.Uniform())
     )
-    found = analysis.events(dataset)
-    np.testing.assert_allclose(found["peak_stress"], 3e5 * (0.5 + 0.5 * np.exp(-2.0)), rtol=1e-12)
-    np.testing.assert_allclose(found["peak_time"], 0.02, rtol=1e-12)
+    result = analysis.events(dataset)
+    np.testing.assert_allclose(result["peak_stress"], 3e5 * (0.5 + 0.5 * np.exp(-2.0)), rtol=1e-12)
+    np.testing.assert_allclose(result["peak_time"], 0.02, rtol=1e-12)
 
 
 def test_peaks_of_statistics_alone_are_those_of_the_mean():
@@ -301,12 +301,12 @@ def test_peaks_of_statistics_alone_are_those_of_the_mean():
     )  # fmt: skip
     parts = {"bonds": stretched, "shear": shear.Uniform(), "drive": drive.Start(rest=0.1, speed=5e-6)}
     few, members = run(scene(record=Record(per_member=False), **parts)), run(scene(**parts))
-    found, mean = analysis.statistics(few), members["shear_stress"].mean("member")
-    np.testing.assert_allclose(found["peak_stress_mean"], mean.max(), rtol=1e-12)
+    result, mean = analysis.statistics(few), members["shear_stress"].mean("member")
+    np.testing.assert_allclose(result["peak_stress_mean"], mean.max(), rtol=1e-12)
     at = int(np.argmax(mean.to_numpy()))
     error = members["shear_stress"][:, at].std(ddof=1) / math.sqrt(6.0)
-    np.testing.assert_allclose(found["peak_stress_sem"], error, rtol=1e-10)
-    np.testing.assert_allclose(found["peak_time_mean"], members["t"][at] - 0.1, rtol=1e-12)
+    np.testing.assert_allclose(result["peak_stress_sem"], error, rtol=1e-10)
+    np.testing.assert_allclose(result["peak_time_mean"], members["t"][at] - 0.1, rtol=1e-12)
 
 
 def test_other_drives_have_no_peak():

@@ -19,19 +19,19 @@ def censored(rng, end, members=64):
 
 @pytest.mark.parametrize("end", [1.0, 3.0], ids=["a third goes on", "one in twenty goes on"])
 def test_intervals_of_censored_lifetimes_hold_what_they_promise(end):
-    found = [analysis.lifetime(times, end) for times in censored(np.random.default_rng(21), end)]
+    estimates = [analysis.lifetime(times, end) for times in censored(np.random.default_rng(21), end)]
     for name, truth in (("rate", 1.0), ("half", math.log(2.0))):
-        low, high = (np.array([getattr(one, f"{name}_{side}") for one in found]) for side in ("low", "high"))
+        low, high = (np.array([getattr(time, f"{name}_{side}") for time in estimates]) for side in ("low", "high"))
         high[np.isnan(high)] = math.inf  # a median that may lie beyond the runs
         assert 0.92 < np.mean((low <= truth) & (truth <= high)) < 0.98, name
 
 
 def test_the_rate_counts_the_time_of_those_that_go_on():
-    found = analysis.lifetime(np.array([1.0, 2.0, math.nan, math.nan]), np.array([9.0, 9.0, 3.0, 4.0]))
-    np.testing.assert_allclose(found.rate, 2.0 / 10.0, rtol=1e-15)
+    result = analysis.lifetime(np.array([1.0, 2.0, math.nan, math.nan]), np.array([9.0, 9.0, 3.0, 4.0]))
+    np.testing.assert_allclose(result.rate, 2.0 / 10.0, rtol=1e-15)
     # chi-square with 4 and 6 degrees of freedom
     np.testing.assert_allclose(
-        [found.rate_low, found.rate_high], [0.48441855708793 / 20, 14.4493753354 / 20], rtol=1e-10
+        [result.rate_low, result.rate_high], [0.48441855708793 / 20, 14.4493753354 / 20], rtol=1e-10
     )
 
 
@@ -50,6 +50,6 @@ def test_a_first_passage_is_between_records_and_unknown_where_there_is_none():
         [[4.0, 3.0, 1.0, 0.0, 5.0], [0.0, 1.0, 2.0, 1.0, 0.0], [2.0, 2.0, 2.0, 2.0, 2.0], [0.0, 1.0, 1.5, 1.0, 3.5]]
     )
     paths = xr.DataArray(paths, {"t": t}, ("member", "t"), name="x")
-    found = analysis.first_passage(paths, 2.0)
-    np.testing.assert_allclose(found, [1.5, 2.0, 0.0, 3.4], rtol=1e-15)
-    assert math.isnan(analysis.first_passage(paths, 4.5)[1]) and found.attrs["units"] == "s"
+    result = analysis.first_passage(paths, 2.0)
+    np.testing.assert_allclose(result, [1.5, 2.0, 0.0, 3.4], rtol=1e-15)
+    assert math.isnan(analysis.first_passage(paths, 4.5)[1]) and result.attrs["units"] == "s"

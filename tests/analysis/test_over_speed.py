@@ -30,9 +30,9 @@ def falling(speeds):
 
 def test_a_crossing_is_exact_on_straight_lines_over_the_logarithm():
     curve = 1.0 - 0.1 * np.log(SPEEDS / SPEEDS[0])
-    found = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
-    np.testing.assert_allclose(found.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
-    assert math.isnan(found.low) and math.isnan(found.high)
+    result = analysis.crossing(SPEEDS, curve[None], np.ones(1), 0.55)
+    np.testing.assert_allclose(result.speed, SPEEDS[0] * math.exp(4.5), rtol=1e-12)
+    assert math.isnan(result.low) and math.isnan(result.high)
     for level in (1.5, -1.0):  # there from the lowest speed on; never there
         assert math.isnan(analysis.crossing(SPEEDS, curve[None], np.ones(1), level).speed)
 
@@ -47,8 +47,8 @@ def test_intervals_of_a_speed_hold_what_they_promise(groups, count, spread):
         noise = np.zeros((groups, count))
         noise[:, about] = rng.normal(size=(groups, 1)) + rng.normal(size=(groups, about.sum()))
         means = falling(speeds) + spread * math.sqrt(groups / 64.0 / 2.0) * noise
-        found = analysis.crossing(speeds, means, np.full(groups, 64.0 / groups), 0.5)
-        hits.append(found.low <= 1.0 <= found.high)
+        result = analysis.crossing(speeds, means, np.full(groups, 64.0 / groups), 0.5)
+        hits.append(result.low <= 1.0 <= result.high)
     assert 0.92 < np.mean(hits) < 0.98
 
 
@@ -69,10 +69,10 @@ def test_speeds_of_bonds_that_break_are_those_of_the_law(swept):
     if swept:
         speeds = {"drive.speed": list(np.geomspace(1e-4, 1.0, 161)), "contact.load": [LOAD, 2 * LOAD]}
         clock = Clock(duration=0.02, step=0.01)
-        found = analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, clock=clock, **quiet)))
-        found = found.isel(contact_load=0)
+        result = analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2), sweep=speeds, clock=clock, **quiet)))
+        result = result.isel(contact_load=0)
     else:
-        found = analysis.loss_speeds(
+        result = analysis.loss_speeds(
             run(
                 scene(
                     drive=drive.Ramp(start=1e-4, stop=1.0, scale="log"), clock=Clock(duration=1.6, step=0.01), **quiet
@@ -82,9 +82,9 @@ def test_speeds_of_bonds_that_break_are_those_of_the_law(swept):
     hertz = jkr_area(0.0) / jkr_area(WORK)
     for name, loss in ((NAMES[0], 0.05), (NAMES[2], 0.5 * (1.0 - hertz))):
         # the largest curvature of the loss over log V is below one: (log step)^2/8 of it between speeds
-        np.testing.assert_allclose(found[name], speed_of_loss(loss), rtol=2e-2)
-    assert math.isnan(found[NAMES[1]])  # Hertz's area is two thirds
-    assert found[NAMES[0]].attrs["units"] == "m/s"
+        np.testing.assert_allclose(result[name], speed_of_loss(loss), rtol=2e-2)
+    assert math.isnan(result[NAMES[1]])  # Hertz's area is two thirds
+    assert result[NAMES[0]].attrs["units"] == "m/s"
 
 
 @pytest.mark.parametrize("swept", [True, False], ids=["sweep", "ramp"])
@@ -95,13 +95,13 @@ def test_curves_over_the_speed_are_those_of_the_law(swept):
         moved = {"drive": drive.Steady(speed=1e-2), "sweep": {"drive.speed": [1e-4, 1e-3, 1e-2]}}
     else:
         moved = {"drive": drive.Ramp(start=1e-4, stop=1e-2), "sweep": {"contact.load": [LOAD, 2.0 * LOAD]}}
-    found = analysis.speed_curves(run(scene(**moved, **quiet)))
-    assert found["contact_area_mean"].dims == (("speed",) if swept else ("contact_load", "speed"))
-    assert found["speed"].attrs["units"] == "m/s" and float(found["speed"][-1]) == 1e-2
-    law = 3e5 / (1.0 + found["speed"] / 1e-2)
-    np.testing.assert_allclose(found["shear_stress_mean"], law.broadcast_like(found["shear_stress_mean"]), rtol=1e-12)
-    np.testing.assert_allclose(found["friction_force_mean"], found["contact_area_mean"] * law, rtol=1e-12)
-    assert float(found["contact_area_sem"].max()) > 0.0 and bool((found["friction_force_low"] > 0.0).all())
+    result = analysis.speed_curves(run(scene(**moved, **quiet)))
+    assert result["contact_area_mean"].dims == (("speed",) if swept else ("contact_load", "speed"))
+    assert result["speed"].attrs["units"] == "m/s" and float(result["speed"][-1]) == 1e-2
+    law = 3e5 / (1.0 + result["speed"] / 1e-2)
+    np.testing.assert_allclose(result["shear_stress_mean"], law.broadcast_like(result["shear_stress_mean"]), rtol=1e-12)
+    np.testing.assert_allclose(result["friction_force_mean"], result["contact_area_mean"] * law, rtol=1e-12)
+    assert float(result["contact_area_sem"].max()) > 0.0 and bool((result["friction_force_low"] > 0.0).all())
 
 
 def test_curves_over_a_speed_that_stays_are_refused_and_those_of_what_is_missing_named():
@@ -123,8 +123,8 @@ def test_a_ramp_is_read_in_pieces_of_its_time(monkeypatch):
 
 
 def test_speeds_of_fluctuating_members_have_an_error_and_statistics_alone_none():
-    found = analysis.loss_speeds(lens.ramp())
-    low, at, high = (float(found[NAMES[0] + end]) for end in ("_low", "", "_high"))
+    result = analysis.loss_speeds(lens.ramp())
+    low, at, high = (float(result[NAMES[0] + end]) for end in ("_low", "", "_high"))
     assert 1e-5 < low < at < high < 1e-1
     assert not analysis.loss_speeds(run(scene(record=Record(per_member=False))))
     assert not analysis.loss_speeds(run(scene(drive=drive.Steady(speed=1e-2))))
@@ -152,8 +152,8 @@ def test_both_orders_of_charging_add_up_to_the_same_loss(contact):
 def test_fluctuations_alone_leave_the_area_of_their_work():
     dataset = lens.ramp()
     left = jkr_area(WORK - dataset["fluctuation_energy"].to_numpy())
-    found = charges(dataset)["lost_to_fluctuations_first"]
-    np.testing.assert_allclose(found, 1.0 - left / jkr_area(WORK), rtol=0, atol=1e-14)
+    result = charges(dataset)["lost_to_fluctuations_first"]
+    np.testing.assert_allclose(result, 1.0 - left / jkr_area(WORK), rtol=0, atol=1e-14)
     unbroken = run(scene(bonds=bonds.Unbroken()))
     np.testing.assert_allclose(charges(unbroken)["order_of_charging"], 0.0, atol=1e-14)
 

@@ -50,39 +50,39 @@ def ensembles(request):
 
 
 def test_intervals_of_64_members_hold_what_they_promise(ensembles):
-    found, law = ensembles
-    assert LEAST < held(found["x_low"], found["x_high"], law.mean()) < MOST
+    result, law = ensembles
+    assert LEAST < held(result["x_low"], result["x_high"], law.mean()) < MOST
     for k, level in enumerate(LEVELS):
-        low, high = (found[f"x_quantile_{end}"].isel(quantile=k) for end in ("low", "high"))
-        assert bool((low <= found["x_quantile"].isel(quantile=k)).all()) and bool((low < high).all())
+        low, high = (result[f"x_quantile_{end}"].isel(quantile=k) for end in ("low", "high"))
+        assert bool((low <= result["x_quantile"].isel(quantile=k)).all()) and bool((low < high).all())
         assert LEAST < held(low, high, law.ppf(level)) < MOST, level
 
 
 def test_quantiles_are_those_of_the_law(ensembles):
-    found, law = ensembles
+    result, law = ensembles
     # of the k-th of n ordered numbers the exact mean share below is k/(n + 1); the place is between k's
     places = 1.0 + LEVELS * 63.0
-    below = law.cdf(found["x_quantile"]).mean(axis=1)
+    below = law.cdf(result["x_quantile"]).mean(axis=1)
     errors = np.sqrt(LEVELS * (1.0 - LEVELS) / 64.0 / ENSEMBLES)
     assert np.all(np.abs(below - places / 65.0) < 5.0 * errors)
 
 
 def test_skewness_of_a_normal_law_is_none_within_its_error():
     drawn = np.random.default_rng(15).normal(size=(64, ENSEMBLES))
-    found = analysis.summary(xr.Dataset({"x": (("member", "t"), drawn)}))["x_skewness"].to_numpy()
+    result = analysis.summary(xr.Dataset({"x": (("member", "t"), drawn)}))["x_skewness"].to_numpy()
     error = analysis.skewness_error(64)
-    assert abs(found.mean()) < 5.0 * error / math.sqrt(ENSEMBLES)
+    assert abs(result.mean()) < 5.0 * error / math.sqrt(ENSEMBLES)
     # the spread of a spread: the skewness of 64 normal numbers has an excess kurtosis of 36/64
-    assert abs(found.std() / error - 1.0) < 5.0 * math.sqrt((2.0 + 36.0 / 64.0) / 4.0 / ENSEMBLES)
-    np.testing.assert_allclose(found[:9], stats.skew(drawn[:, :9], axis=0, bias=False), rtol=1e-10)
+    assert abs(result.std() / error - 1.0) < 5.0 * math.sqrt((2.0 + 36.0 / 64.0) / 4.0 / ENSEMBLES)
+    np.testing.assert_allclose(result[:9], stats.skew(drawn[:, :9], axis=0, bias=False), rtol=1e-10)
 
 
 @pytest.mark.parametrize("members", [2, 3, 5])
 def test_few_members_widen_the_interval_of_a_mean(members):
     drawn = np.random.default_rng(12).normal(size=(members, ENSEMBLES))
-    found = analysis.summary(xr.Dataset({"x": (("member", "t"), drawn)}))
-    assert LEAST < held(found["x_low"], found["x_high"], 0.0) < MOST
-    assert held(found["x_mean"] - 1.96 * found["x_sem"], found["x_mean"] + 1.96 * found["x_sem"], 0.0) < LEAST
+    result = analysis.summary(xr.Dataset({"x": (("member", "t"), drawn)}))
+    assert LEAST < held(result["x_low"], result["x_high"], 0.0) < MOST
+    assert held(result["x_mean"] - 1.96 * result["x_sem"], result["x_mean"] + 1.96 * result["x_sem"], 0.0) < LEAST
 
 
 def test_quantiles_that_few_members_cannot_bound_have_no_interval():
@@ -97,8 +97,8 @@ def test_quantiles_that_few_members_cannot_bound_have_no_interval():
 @pytest.mark.parametrize("detached", [0.02, 0.1, 0.5])
 def test_intervals_of_a_share_of_members_hold_what_they_promise(detached):
     opened = (np.random.default_rng(13).random((64, ENSEMBLES)) < detached).astype(float)
-    found = analysis.summary(xr.Dataset({"fraction_detached": (("member", "t"), opened)}))
-    low, high = found["fraction_detached_low"], found["fraction_detached_high"]
+    result = analysis.summary(xr.Dataset({"fraction_detached": (("member", "t"), opened)}))
+    low, high = result["fraction_detached_low"], result["fraction_detached_high"]
     assert held(low, high, detached) > LEAST and float(low.min()) >= -1e-15
     none = analysis.summary(xr.Dataset({"fraction_detached": (("member",), np.zeros(64))}))
     # Wilson's bound of none in 64: z^2/(64 + z^2)
@@ -110,8 +110,8 @@ def covered(law, members, length, ensembles):
     of, exact = LAWS[law]
     shape = ensembles * members, 5 * length  # five records a correlation time
     drawn = of(ornstein_uhlenbeck(np.random.default_rng(14), *shape, math.exp(-0.2))).reshape(ensembles, members, -1)
-    found = [analysis.over_time(series) for series in drawn]
-    ends = [np.column_stack([[one[end], *one[f"quantile_{end}"]] for one in found]) for end in ("low", "high")]
+    result = [analysis.over_time(series) for series in drawn]
+    ends = [np.column_stack([[one[end], *one[f"quantile_{end}"]] for one in result]) for end in ("low", "high")]
     stated, truth = np.isfinite(ends[0]) & np.isfinite(ends[1]), np.array([[exact.mean(), *exact.ppf(LEVELS)]]).T
     hits = (ends[0] <= truth) & (truth <= ends[1])
     return [
@@ -143,27 +143,27 @@ def test_short_series_state_no_interval_of_a_quantile():
 
 def test_the_correlation_time_and_free_values_are_those_of_the_law():
     series = ornstein_uhlenbeck(np.random.default_rng(17), 64, 2000, math.exp(-0.2))
-    found = analysis.over_time(series, step=0.1)
-    assert abs(found["correlation_time"] - 0.5) < 5.0 * found["correlation_time_sem"]
+    result = analysis.over_time(series, step=0.1)
+    assert abs(result["correlation_time"] - 0.5) < 5.0 * result["correlation_time_sem"]
     # the mean of n records has the variance (1 + k)/(1 - k)/n, its estimate from 64 means the error sqrt(2/63)
     keep = math.exp(-0.2)
     exact = 64 * 2000 * (1.0 - keep) / (1.0 + keep)
-    assert abs(found["effective_samples"] / exact - 1.0) < 5.0 * math.sqrt(2.0 / 63.0)
+    assert abs(result["effective_samples"] / exact - 1.0) < 5.0 * math.sqrt(2.0 / 63.0)
 
 
 def test_white_noise_tells_as_much_as_its_values():
-    found = analysis.over_time(np.random.default_rng(18).normal(size=(1, 20_000)))
-    assert abs(found["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(found["correlation_time"])
+    result = analysis.over_time(np.random.default_rng(18).normal(size=(1, 20_000)))
+    assert abs(result["effective_samples"] / 20_000 - 1.0) < 0.1 and math.isnan(result["correlation_time"])
 
 
 @pytest.mark.parametrize("members", [40, 3, 1])
 def test_statistics_of_some_values_leave_out_those_that_are_missing(members):
     values = ornstein_uhlenbeck(np.random.default_rng(19), members, 2000, math.exp(-0.2)) ** 2
     values[0, 100:] = math.nan
-    found, known = analysis.over_time(values), values[np.isfinite(values)]
-    np.testing.assert_allclose(found["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
-    np.testing.assert_allclose(found["mean"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
-    assert math.isnan(found.get("correlation_time", math.nan)) and (members == 1) == math.isnan(found["sem"])
+    result, known = analysis.over_time(values), values[np.isfinite(values)]
+    np.testing.assert_allclose(result["quantile"], np.quantile(known, LEVELS), rtol=1e-13)
+    np.testing.assert_allclose(result["mean"], np.nanmean(values, axis=1).mean(), rtol=1e-13)
+    assert math.isnan(result.get("correlation_time", math.nan)) and (members == 1) == math.isnan(result["sem"])
 
 
 STEADY = {"drive": drive.Steady(speed=4e-3), "clock": Clock(duration=0.8, step=0.01)}
@@ -171,12 +171,12 @@ STEADY = {"drive": drive.Steady(speed=4e-3), "clock": Clock(duration=0.8, step=0
 
 def test_a_distribution_is_over_members_and_the_second_half():
     dataset = run(scene(**STEADY, ensemble=Ensemble(members=20), sweep={"contact.load": [1e-3, 4e-3]}))
-    found = analysis.distribution(dataset)
+    result = analysis.distribution(dataset)
     late = dataset["contact_area"].isel(t=slice(dataset.sizes["t"] // 2, None))
-    np.testing.assert_allclose(found["contact_area_mean"], late.mean(("member", "t")), rtol=1e-13)
-    np.testing.assert_allclose(found["contact_area_std"], late.std(("member", "t")), rtol=1e-9)
+    np.testing.assert_allclose(result["contact_area_mean"], late.mean(("member", "t")), rtol=1e-13)
+    np.testing.assert_allclose(result["contact_area_std"], late.std(("member", "t")), rtol=1e-9)
     means = late.mean("t")
-    np.testing.assert_allclose(found["contact_area_sem"], means.std("member", ddof=1) / math.sqrt(20), rtol=1e-10)
-    np.testing.assert_allclose(found["contact_area_quantile"], late.quantile(LEVELS, ("member", "t")).T, rtol=1e-13)
-    assert found["contact_area_mean"].dims == ("contact_load",) and float(found["speed_sem"].max()) == 0.0
-    assert found["contact_area_quantile_low"].attrs["units"] == "m^2"
+    np.testing.assert_allclose(result["contact_area_sem"], means.std("member", ddof=1) / math.sqrt(20), rtol=1e-10)
+    np.testing.assert_allclose(result["contact_area_quantile"], late.quantile(LEVELS, ("member", "t")).T, rtol=1e-13)
+    assert result["contact_area_mean"].dims == ("contact_load",) and float(result["speed_sem"].max()) == 0.0
+    assert result["contact_area_quantile_low"].attrs["units"] == "m^2"

@@ -12,11 +12,11 @@ LENGTH, LEVEL, OVER = 6e-6, 12e-3, 3e-3
 def recorded(**series):
     """A dataset of two members, whose second has forces of twice the first's."""
     scale = {"friction_force": [[1.0], [2.0]], "spring_force": [[1.0], [2.0]]}
-    found = {
+    result = {
         name: (("member", "t"), np.array(scale.get(name, [[1.0], [1.0]])) * values) for name, values in series.items()
     }
     count = len(next(iter(series.values())))
-    return xr.Dataset(found | {"contact_modulus": 1.0}, {"t": np.arange(count)}, {"scenario_resolved": "{}"})
+    return xr.Dataset(result | {"contact_modulus": 1.0}, {"t": np.arange(count)}, {"scenario_resolved": "{}"})
 
 
 def stepped(sense=1.0, quick=2e-3):
@@ -30,12 +30,12 @@ def stepped(sense=1.0, quick=2e-3):
 
 @pytest.mark.parametrize("sense", [1.0, -1.0])
 def test_a_jump_of_the_speed_has_the_direct_effect_and_the_length_that_friction_was_made_with(sense):
-    found = speed_step(stepped(sense))
-    np.testing.assert_allclose(found["direct_effect"], [LEVEL + OVER - 7e-3, 2 * (LEVEL + OVER - 7e-3)], rtol=1e-12)
+    result = speed_step(stepped(sense))
+    np.testing.assert_allclose(result["direct_effect"], [LEVEL + OVER - 7e-3, 2 * (LEVEL + OVER - 7e-3)], rtol=1e-12)
     # the mean of the second half lies e^-15 of the overshoot above the level
-    np.testing.assert_allclose(found["step_overshoot"], [OVER, 2 * OVER], rtol=np.exp(-15.0))
+    np.testing.assert_allclose(result["step_overshoot"], [OVER, 2 * OVER], rtol=np.exp(-15.0))
     # the slider goes a tenth of the length before the peak; a straight line between records is off by 1/800 at most
-    np.testing.assert_allclose(found["step_length"], 1.1 * LENGTH, rtol=1 / 800)
+    np.testing.assert_allclose(result["step_length"], 1.1 * LENGTH, rtol=1 / 800)
 
 
 def test_a_jump_down_or_to_where_friction_does_not_settle_says_nothing():
@@ -60,12 +60,12 @@ def test_a_stage_that_stops_or_turns_is_not_faster(then):
 
 
 def test_the_way_to_sliding_has_the_threshold_the_area_there_and_what_the_law_of_the_square_gives():
-    found = way_to_sliding(pulled())
-    np.testing.assert_allclose(found["static_threshold"], [5e-3, 10e-3], rtol=1e-12)
-    np.testing.assert_allclose(found["area_at_threshold"], 1.0 - 0.1 - 0.025, rtol=1e-12)
-    np.testing.assert_allclose(found["area_by_law"], 1.0 - 0.1, rtol=1e-12)
+    result = way_to_sliding(pulled())
+    np.testing.assert_allclose(result["static_threshold"], [5e-3, 10e-3], rtol=1e-12)
+    np.testing.assert_allclose(result["area_at_threshold"], 1.0 - 0.1 - 0.025, rtol=1e-12)
+    np.testing.assert_allclose(result["area_by_law"], 1.0 - 0.1, rtol=1e-12)
     alpha = 0.1 * 4e-8 / 5e-3**2
-    np.testing.assert_allclose(found["incipient_alpha"], [alpha, alpha / 4.0], rtol=1e-12)
+    np.testing.assert_allclose(result["incipient_alpha"], [alpha, alpha / 4.0], rtol=1e-12)
 
 
 def test_a_force_that_does_not_fall_or_begins_above_zero_has_no_threshold():
