@@ -131,7 +131,7 @@ def _chunk(variable: xr.Variable, dim: str) -> int:
 
 
 def plain(dataset: xr.Dataset) -> xr.Dataset:
-    """A dataset whose speed is a variable like others, as statistics need it."""
+    """Return a dataset whose speed is a variable, not a coordinate."""
     return dataset.reset_coords("speed") if "speed" in dataset.coords else dataset
 
 
@@ -154,7 +154,7 @@ def _guard(dataset: xr.Dataset, path: Path) -> None:
 
 @contextlib.contextmanager
 def answered() -> Iterator[None]:
-    """A context in which a quantity that a dataset lacks is refused with the key that records it.
+    """Refuse a quantity that a dataset lacks with the key that records it.
 
     Raises
     ------
@@ -172,23 +172,23 @@ def answered() -> Iterator[None]:
 
 @contextlib.contextmanager
 def where_recorded() -> Iterator[None]:
-    """A context that is left where a dataset lacks a quantity, without a refusal."""
+    """Leave this context without a refusal if a dataset lacks a quantity."""
     with contextlib.suppress(BadInput), answered():
         yield
 
 
 def sweep_dims(dataset: xr.Dataset) -> tuple[str, ...]:
-    """Names of the sweep's dimensions, outermost first."""
+    """Return the names of the sweep's dimensions, outermost first."""
     return tuple(str(name) for name in dataset["contact_modulus"].dims)
 
 
 def speed_name(dataset: xr.Dataset) -> str:
-    """Name of the speed that is prescribed: that of the stage where it pulls through a spring."""
+    """Return the name of the prescribed speed: that of the stage if it pulls through a spring."""
     return "stage_speed" if "stage_speed" in dataset else "speed"
 
 
 def speed_of(dataset: xr.Dataset) -> xr.DataArray:
-    """The speed that is prescribed, of the slider or of the stage, which is the same for all members [m/s]."""
+    """Return the prescribed speed of the slider or of the stage, which is the same for all members [m/s]."""
     speed = dataset[speed_name(dataset)]
     return speed.isel({MEMBERS: 0}, drop=True) if MEMBERS in speed.dims else speed
 
@@ -222,7 +222,7 @@ def _is_borne(dataset: xr.Dataset) -> bool:
 
 
 def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:
-    """A number of the scenario by its dotted key, with the sweep's dimensions where it is swept.
+    """Return a number of the scenario by its dotted key, with the sweep's dimensions if it is swept.
 
     Parameters
     ----------
@@ -243,7 +243,7 @@ def setting(dataset: xr.Dataset, key: str) -> xr.DataArray:
 
 
 def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
-    """A word of the scenario, such as ``"contact.after_pull_off"``, with the sweep's dimensions where it is swept.
+    """Return a word of the scenario, with the sweep's dimensions if it is swept.
 
     ``default`` where the scenario does not say it, or a table that holds it is swept whole.
     """
@@ -260,7 +260,7 @@ def word(dataset: xr.Dataset, key: str, default: str) -> xr.DataArray:
 
 
 def resolved(dataset: xr.Dataset, key: str) -> Any:
-    """Value of a dotted key in the resolved scenario: a number, a word, a table as a dict, or None.
+    """Return the value of a dotted key in the resolved scenario: a number, a word, a table as a dict, or None.
 
     Raises
     ------
@@ -279,7 +279,7 @@ def resolved(dataset: xr.Dataset, key: str) -> Any:
 
 
 def _label(dataset: xr.Dataset, key: str) -> xr.DataArray | None:
-    """The labels that a key is swept by, None where it is not."""
+    """Return the labels by which a key is swept; None if it is not swept."""
     name = key.replace(".", "_")
     swept = name in dataset.variables and dataset[name].dtype.kind in "OUST" and dataset[name].ndim == 1
     return dataset[name] if swept else None
@@ -301,7 +301,7 @@ class Control(NamedTuple):
 
 
 def control(dataset: xr.Dataset) -> Control:
-    """Control of the contact.
+    """Return the control of the contact.
 
     Raises
     ------

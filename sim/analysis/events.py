@@ -54,7 +54,7 @@ _READ = ("spring_force", "slider_position", "stage_speed", "shear_stress")
 
 
 def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
-    """Slips of a slider that a stage pulls through a spring, one by one.
+    """Return the slips of a slider that a stage pulls through a spring, one by one.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def slips(dataset: xr.Dataset, least: float = LEAST) -> xr.Dataset:
 
 
 def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stress: Any) -> np.ndarray:
-    """The slips of one member, a row each, columns ``_SLIPS``."""
+    """Return the slips of one member, a row each, columns ``_SLIPS``."""
     from scipy.signal import find_peaks  # its import is slow, and only springs need it
 
     known = np.isfinite(force) & np.isfinite(position)
@@ -144,7 +144,7 @@ def _slips(least: float, time: Any, force: Any, position: Any, stage: Any, stres
 
 
 def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float) -> int:
-    """The record at which a slip begins: at the top, or where the force falls slowly from there at its last maximum.
+    """Return the record at which a slip begins: the top, or the last maximum if the force falls slowly from the top.
 
     ``moved`` grows where the slider is as fast as in a slip.
     """
@@ -158,7 +158,7 @@ def _begin(force: np.ndarray, moved: np.ndarray, top: int, low: int, fall: float
 
 
 def _sense(stage: np.ndarray) -> np.ndarray:
-    """Sense in which the stage moves, 1 or -1; where it rests the one before, at the beginning the one after."""
+    """Return the sense in which the stage moves, 1 or -1; at rest that before it, at the beginning that after it."""
     moves = np.flatnonzero(np.nan_to_num(stage))
     if not moves.size:
         return np.ones(len(stage))
@@ -167,7 +167,7 @@ def _sense(stage: np.ndarray) -> np.ndarray:
 
 
 def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
-    """Mean stick and slip of each member, static and kinetic friction.
+    """Return the mean stick and slip of each member, static and kinetic friction.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset
 
 
 def _between_speeds(dataset: xr.Dataset, each_slip: xr.Dataset) -> dict[str, xr.DataArray]:
-    """Speeds of a stage between which slips follow each other."""
+    """Return the speeds of a stage between which slips follow each other."""
     turn, later = abs(dataset["stage_speed"]).idxmax("t"), each_slip["recurrence_time"].notnull()
     before = each_slip["slip_time"] <= turn
     chosen = later & before, later.shift(slip=1, fill_value=False) & ~before & each_slip["slip_time"].notnull()
@@ -239,7 +239,7 @@ def varies(dataset: xr.Dataset) -> bool:
 
 
 def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = LEAST) -> xr.Dataset:
-    """Distribution of the sizes of slips, those of all members together.
+    """Return the distribution of the sizes of slips of all members together.
 
     Parameters
     ----------
@@ -268,12 +268,12 @@ def slip_sizes(dataset: xr.Dataset, of: str = "slip_amplitude", least: float = L
 
 
 def _beginning(dataset: xr.Dataset) -> float:
-    """Time from which on slips count [s]: half of the run behind a stage at one speed."""
+    """Return the time from which on slips count [s]: half of the run if the stage has one speed."""
     return float(dataset["t"][-1]) / 2.0 if is_stationary(dataset) else 0.0
 
 
 def runaways(dataset: xr.Dataset) -> xr.Dataset:
-    """Members that a prescribed force sets off: whether, when, and at which force.
+    """Return which members a prescribed force sets off, when, and at which force.
 
     Parameters
     ----------
@@ -301,7 +301,7 @@ def runaways(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _between(dataset: xr.Dataset, values: xr.DataArray, first: xr.DataArray, last: xr.DataArray) -> xr.DataArray:
-    """Growth of a quantity from one time to another."""
+    """Return the growth of a quantity from one time to another."""
     values = values.astype(float).broadcast_like(dataset["spring_force"])
     dims: Any = {"input_core_dims": [[], ["t"], ["t"]], "vectorize": True}
     before, after = (xr.apply_ufunc(np.interp, time, dataset["t"], values, **dims) for time in (first, last))
@@ -331,7 +331,7 @@ _PULL = {
 
 
 def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
-    """Records before which the speed has jumped: its change stands out from those before and after.
+    """Return records before which the speed has jumped: its change stands out from those before and after.
 
     With ``turns`` also those before which it has changed its sign.
 
@@ -347,7 +347,7 @@ def jumps(speed: np.ndarray, turns: bool = False) -> np.ndarray:
 
 
 def speed_step(dataset: xr.Dataset) -> xr.Dataset:
-    """Answer of friction to the first jump of the prescribed speed to a higher one, of each member.
+    """Return the answer of friction to the first jump to a higher prescribed speed, of each member.
 
     Parameters
     ----------
@@ -371,7 +371,7 @@ def speed_step(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _rise(speed: np.ndarray) -> tuple[int, int] | None:
-    """The record at which the speed has first jumped to a higher one, and that of the next jump."""
+    """Return the record at which the speed has first jumped to a higher one, and that of the next jump."""
     places = [*jumps(speed), len(speed)]
     rises = [n for n, at in enumerate(places[:-1]) if 0.0 < speed[at - 1] * np.sign(speed[at]) < abs(speed[at])]
     return (places[rises[0]], places[rises[0] + 1]) if rises else None
@@ -399,7 +399,7 @@ def _stepped(speed: np.ndarray, force: np.ndarray, position: np.ndarray) -> tupl
 
 
 def way_to_sliding(dataset: xr.Dataset) -> xr.Dataset:
-    """Static threshold of a slider that a stage pulls from rest, and the contact area on the way there, of each member.
+    """Return the static threshold of a slider that a stage pulls from rest, and the contact area on the way there.
 
     Parameters
     ----------
@@ -432,7 +432,7 @@ def _pulled(speed: np.ndarray, force: np.ndarray, area: np.ndarray) -> tuple[flo
 
 
 def incipient_law(force: np.ndarray, area: np.ndarray) -> tuple[int, float]:
-    """The record at which a force [N] is largest before it first falls by 2 %, and alpha of A0 - alpha Q^2 [m^2/N^2].
+    """Return the record of the largest force [N] before its first fall by 2 %, and alpha of A0 - alpha Q^2 [m^2/N^2].
 
     That is fitted to the area [m^2] by least squares up to half of the largest force.
 
@@ -473,7 +473,7 @@ _PEAKS = (("peak_stress", "peak", "shear_stress", "Pa"), ("peak_friction", "peak
 
 
 def events(dataset: xr.Dataset) -> xr.Dataset:
-    """Events of a run, once per member, or once for all where they agree.
+    """Return the events of a run, once per member, or once for all if the members agree.
 
     Parameters
     ----------
@@ -537,7 +537,7 @@ def _openings(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _masks(dataset: xr.Dataset) -> xr.Dataset:
-    """Each record stands for the time since the one before; a trajectory that stopped counts up to its end."""
+    """Return how long and when adhesion was masked; each record stands for the time since the one before."""
     suffix, result = "" if "masked" in dataset else "_mean", masks(dataset)
     masked = result[f"fraction_masked{suffix}"]
     if stops := not suffix and may_stop(dataset):
@@ -553,7 +553,7 @@ def _masks(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def peaks(dataset: xr.Dataset) -> xr.Dataset:
-    """The friction peak after a start from rest, and the friction maximum of a ramp of the speed.
+    """Return the friction peak after a start from rest, and the friction maximum of a ramp of the speed.
 
     Parameters
     ----------
@@ -606,7 +606,7 @@ def peaks(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _start_of_sliding(dataset: xr.Dataset) -> xr.DataArray:
-    """When sliding starts [s]: where the scenario does not tell, at the last record before the slider moves."""
+    """Return the time at which sliding starts [s]; if no key states it, the last record before the slider moves."""
     with contextlib.suppress(KeyError):
         return setting(dataset, "drive.rest")
     first = (dataset["speed"] != 0.0).argmax("t")
@@ -614,7 +614,7 @@ def _start_of_sliding(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
-    """Largest value while it ``slides``: its ``size``, the record ``at`` which it is, whether it is ``known``.
+    """Return the largest value while it ``slides``: ``size``, record ``at``, and True in ``known`` if it is a maximum.
 
     It is one if it stands above the ends by more than rounding; and members must fall from where their mean is largest
     to the ends, in parts of it, by more than noise may.
@@ -651,7 +651,7 @@ def _maximum(recorded: xr.Dataset, name: str, ramp: xr.DataArray) -> xr.Dataset:
 
 
 def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
-    """Work put into the contact in each cycle there and back, and the energy it dissipates meanwhile.
+    """Return the work put into the contact in each cycle, and the energy dissipated in it.
 
     Parameters
     ----------
@@ -693,7 +693,7 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
-    """``loop_energy`` and ``loop_dissipation`` in each of so many cycles."""
+    """Return ``loop_energy`` and ``loop_dissipation`` in each of ``count`` cycles."""
     cycles = cycles_of(dataset)
     going = dataset[f"contact_radius{suffix}"].notnull()
     held = dataset[[f"normal_load{suffix}", f"displacement{suffix}"]].astype(float).where(going)
@@ -716,14 +716,14 @@ def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:
 
 
 def cycles_of(dataset: xr.Dataset) -> xr.DataArray:
-    """Cycles there and back of what holds the sphere, with the sweep's dimensions; 0 where it makes none."""
+    """Return the number of cycles of the control of the contact, with the sweep's dimensions; 0 if there are none."""
     with contextlib.suppress(KeyError):
         return setting(dataset, f"contact.{control(dataset).kind}.cycles")
     return xr.DataArray(0.0)
 
 
 def _per_cycle(series: xr.DataArray, period: xr.DataArray, times: xr.DataArray, count: int) -> xr.DataArray:
-    """Growth of a series in each cycle; nan beyond the last one."""
+    """Return the growth of a series in each cycle; nan beyond the last one."""
     ends = period * xr.DataArray(np.arange(count + 1), dims="end")
     ends = ends.where(ends <= times[-1] + 1e-6 * period)
     dims: Any = {"input_core_dims": [["end"], ["t"], ["t"]], "output_core_dims": [["end"]]}

@@ -47,7 +47,7 @@ _SOURCES_OF_SHARES = ("contact_area", "fluctuation_energy", "applied_load", "ind
 
 
 def ordered(variable: xr.DataArray) -> xr.DataArray:
-    """Members and time last."""
+    """Return a variable with members and time as its last dimensions."""
     return variable.transpose(..., *(name for name in (MEMBERS, "t") if name in variable.dims))
 
 
@@ -62,7 +62,7 @@ def pure(values: xr.DataArray, text: str, symbol: str = "") -> xr.DataArray:
 
 
 def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
-    """Radii of the contacts with the full work of adhesion and with none, held as the sphere is.
+    """Return the radii of the contacts with the full work of adhesion and with none, under the same control.
 
     Returns
     -------
@@ -78,12 +78,12 @@ def reference_radii(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def full_area(dataset: xr.Dataset) -> xr.DataArray:
-    """JKR's area at the full work of adhesion [m^2]; nan where that contact is open."""
+    """Return JKR's area at the full work of adhesion [m^2]; nan if that contact is open."""
     return np.pi * reference_radii(dataset)["radius_jkr"] ** 2
 
 
 def bond_work(dataset: xr.Dataset) -> xr.DataArray:
-    """Work of adhesion that the bonds left would give without fluctuations: Δγ(fraction) [J/m^2].
+    """Return the work of adhesion that the bonds left would give without fluctuations: Δγ(fraction) [J/m^2].
 
     ``work (1 - share + share * fraction)``, per member where the bonds differ between members, and
     of the mean fraction where only that was recorded.
@@ -96,7 +96,7 @@ def bond_work(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def share_observables(dataset: xr.Dataset) -> xr.Dataset:
-    """The shares of JKR's area that each mechanism takes, per member and time.
+    """Return the shares of JKR's area that each mechanism takes, per member and time.
 
     Returns
     -------
@@ -168,7 +168,7 @@ def _charged_first(dataset: xr.Dataset) -> xr.DataArray:
 
 
 def observables(dataset: xr.Dataset) -> xr.Dataset:
-    """Every recorded trajectory, per member where members differ, and what follows from them.
+    """Return every recorded trajectory, per member if members differ, and what follows from them.
 
     ``area_ratio`` is A/A_JKR, with the area of JKR's contact held as the sphere is at that time;
     ``fraction_detached`` is 1 where the contact is open, ``fraction_masked`` is 1 where it is closed though
@@ -255,7 +255,7 @@ def _shares_among(names: Collection[str]) -> bool:
 
 
 def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
-    """``fraction_masked``; of statistics alone it is known where all contacts are closed, else nan."""
+    """Return ``fraction_masked``; of statistics alone it is known if all contacts are closed, else nan."""
     text = "closed contacts without work of adhesion"
     if "masked" in dataset:
         return {"fraction_masked": pure(dataset["masked"].astype(float, copy=False), text)}
@@ -264,7 +264,7 @@ def masks(dataset: xr.Dataset) -> dict[str, xr.DataArray]:
 
 
 def settled(trajectories: xr.Dataset) -> xr.Dataset:
-    """Observables averaged over the second half of the run, one record long.
+    """Return observables averaged over the second half of the run, one record long.
 
     Each member is averaged over time first, so that a standard error over members holds whatever
     the correlation in time; a trajectory that stops, over what there is of it. Where only statistics

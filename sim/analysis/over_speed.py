@@ -35,7 +35,7 @@ _READ = {"contact_area", "jkr_radius", "hertz_radius"}
 
 
 def speed_curves(dataset: xr.Dataset, *names: str) -> xr.Dataset:
-    """Observables over the sliding speed, of a ramp or a sweep of steady speeds: A(V), F(V) and τ(V) by default.
+    """Return observables over the sliding speed, of a ramp or a sweep of steady speeds: A(V), F(V), τ(V) by default.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Crossing(NamedTuple):
 
 
 def crossing(speeds: np.ndarray, groups: np.ndarray, sizes: np.ndarray, level: np.ndarray | float) -> Crossing:
-    """Speed at which the mean of a falling quantity has first fallen to a level.
+    """Return the speed at which the mean of a falling quantity has first fallen to a level.
 
     Parameters
     ----------
@@ -130,14 +130,14 @@ def _zero(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def speed_dim(dataset: xr.Dataset) -> str | None:
-    """The sweep's dimension along which the speed changes."""
+    """Return the sweep's dimension along which the speed changes."""
     speed = speed_of(dataset).isel(t=0)
     varying = (n for n in sweep_dims(dataset) if n in speed.dims and bool((speed != speed.isel({n: 0})).any()))
     return next(varying, None)
 
 
 def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
-    """Speeds at which the mean contact area has lost 5 and 50 % of JKR's, and half of what it can down to Hertz's.
+    """Return the speeds at which the mean area has lost 5 and 50 % of JKR's, and half of the way to Hertz's.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
 
 
 def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.DataArray]:
-    """Means of A/A_JKR over groups of members, of steady speeds over the second half of the run; and their sizes."""
+    """Return means of A/A_JKR over groups of members and, at steady speeds, the second half; and sizes of groups."""
     some, outer = with_trajectories(dataset, *_READ), (*sweep_dims(dataset), *(["t"] if along == "t" else []))
     members = dataset.sizes.get(MEMBERS, 1)
     count = min(members, _GROUPS, max(2, _MOST_MEANS // math.prod(dataset.sizes[name] for name in outer)))

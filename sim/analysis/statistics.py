@@ -50,7 +50,7 @@ _NOTHING = IntegralTime(math.nan, math.nan)
 
 
 def integral_time(values: np.ndarray, step: float) -> IntegralTime:
-    """Integral correlation time of stationary trajectories: the integral of the autocorrelation.
+    """Return the integral correlation time of stationary trajectories: the integral of the autocorrelation.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def integral_time(values: np.ndarray, step: float) -> IntegralTime:
 
 
 def time_of(covariance: np.ndarray, members: int, records: int, step: float, largest: float) -> IntegralTime:
-    """The ``integral_time`` of an autocovariance of so many members, whose values are as large as ``largest``."""
+    """Return the ``integral_time`` of an autocovariance of values whose largest magnitude is ``largest``."""
     free, lags = max(members - 1, 1), np.arange(len(covariance))
     if records < 2 or not covariance[0] > (1e-10 * largest) ** 2:
         return _NOTHING
@@ -125,7 +125,7 @@ def members_for_memory(members: int, records: int) -> int:
 
 
 def autocovariance(values: np.ndarray) -> np.ndarray:
-    """Covariance of records by the number of records between them, averaged over members and times.
+    """Return the covariance by the number of records between values, averaged over members and times.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ class Inflation(NamedTuple):
 
 
 def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
-    """Variance of a mean over correlated records, in that of a mean over as many independent ones.
+    """Return the variance of a mean over correlated records, in that of a mean over as many independent ones.
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ def inflation(covariance: np.ndarray, members: int, records: int) -> Inflation:
 
 
 def correlation_time(dataset: xr.Dataset) -> xr.Dataset:
-    """Integral correlation time of the fluctuation energy ΔΓ(t) at each point of the sweep.
+    """Return the integral correlation time of the fluctuation energy ΔΓ(t) at each point of the sweep.
 
     Defined only for a stationary process: nan wherever the speed changes during the run, and where
     ``integral_time`` gives none.
@@ -332,7 +332,7 @@ def averaging(dataset: xr.Dataset, late: bool) -> str:
 
 
 def summary(trajectories: xr.Dataset, quantiles: bool = True) -> xr.Dataset:
-    """Mean, spread, quantiles and skewness over the members, each mean and quantile with its error.
+    """Return mean, spread, quantiles and skewness over the members, each mean and quantile with its error.
 
     Parameters
     ----------
@@ -401,7 +401,7 @@ def _statistics_of(variable: xr.DataArray, quantiles: bool) -> dict[str, xr.Data
 
 
 def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
-    """Statistics over the last axis, of ``count`` numbers each, that need no order."""
+    """Return the statistics over the last axis, of ``count`` numbers each, that need no order."""
     with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there are too few
         mean = np.nansum(values, axis=-1) / count
         deviations = values - mean[..., None]
@@ -418,7 +418,7 @@ def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.n
 
 
 def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:
-    """Both ends of the 95 % interval of the mean of an observable over ``count`` members; nan for a single one."""
+    """Return the ends of the 95 % interval of a mean over ``count`` members; nan for a single member."""
     count = np.asarray(count, float)
     if name not in _COUNTED:
         half = special.stdtrit(np.where(count > 1.0, count - 1.0, np.nan), 0.5 + 0.5 * LEVEL) * sem
@@ -433,13 +433,13 @@ def interval(name: str, mean: np.ndarray, sem: np.ndarray, count: np.ndarray | f
 
 
 def skewness_error(count: float) -> float:
-    """Standard error of the skewness of ``count`` numbers that follow a normal law, beyond which it tells something."""
+    """Return the standard error of the skewness of ``count`` numbers that follow a normal law."""
     n = count
     return float(np.sqrt(6.0 * n * (n - 1.0) / ((n - 2.0) * (n + 1.0) * (n + 3.0)))) if n > 2.0 else np.nan
 
 
 def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
-    """Quantiles over the last axis, whose first ``count`` numbers are in order, and both ends of their intervals."""
+    """Return quantiles of the first ``count`` numbers, which are in order, and the ends of their intervals."""
     levels = np.array(QUANTILES)
     counts, of = np.unique(count, return_inverse=True)
     places = {"quantile": levels * (counts[:, None] - 1.0)}
@@ -451,7 +451,7 @@ def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def quantile_ranks(count: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Places, from 0 on and between, in ``count`` ordered numbers, that a quantile of their law lies between.
+    """Return the places in ``count`` ordered numbers between which a quantile of their law lies, from 0 on.
 
     The number of them below the quantile is binomial. Where one tail of it cannot be as small as half of what may be
     left out, the other takes the rest; nan where there is no such interval.
@@ -472,7 +472,7 @@ def quantile_ranks(count: np.ndarray, level: np.ndarray) -> tuple[np.ndarray, np
 
 
 def values_at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Values at places along the last axis, from 0 on and between; nan where a place is."""
+    """Return the values at places along the last axis, from 0 on and between; nan where a place is nan."""
     known = places >= 0.0
     below = np.where(known, places, 0.0).astype(np.intp)
     above = np.minimum(below + 1, ordered.shape[-1] - 1)
@@ -482,7 +482,7 @@ def values_at_ranks(ordered: np.ndarray, places: np.ndarray) -> np.ndarray:
 
 
 def statistics(dataset: xr.Dataset) -> xr.Dataset:
-    """Statistics over the members of everything recorded, at each sweep value and time.
+    """Return statistics over the members of everything recorded, at each sweep value and time.
 
     Parameters
     ----------
@@ -512,7 +512,7 @@ def over_members(dataset: xr.Dataset, names: Collection[str] | None = None, quan
 
 
 def shares(dataset: xr.Dataset) -> xr.Dataset:
-    """Which share of the lost contact area comes from which mechanism.
+    """Return the shares of the lost contact area by mechanism.
 
     Returns
     -------
@@ -558,7 +558,7 @@ _LEVELS = np.array(QUANTILES)
 def _shares(
     spreads: np.ndarray, errors: np.ndarray, freedoms: np.ndarray, surely: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of the values between which those under a quantile of the law are.
+    """Return the shares of the ordered values between which each quantile of the law lies.
 
     They are those of as many free values as have the error of the share of values under it, of fewer where that error
     is not well known. There are none where the mean, which is first in each array, has too few free values for any:
@@ -573,7 +573,7 @@ def _shares(
 
 
 def over_time(values: np.ndarray, step: float = 1.0, name: str = "") -> dict[str, Any]:
-    """Statistics of a stationary observable over members and records together.
+    """Return statistics of a stationary observable over members and records together.
 
     Parameters
     ----------
@@ -725,7 +725,7 @@ def _errors(
 
 
 def distribution(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
-    """Statistics of observables over the members and the second half of the run, at each point of the sweep.
+    """Return statistics of observables over the members and the second half of the run, at each point of the sweep.
 
     Parameters
     ----------
@@ -777,7 +777,7 @@ def _mean_speeds(position: xr.DataArray, dims: tuple[str, ...]) -> tuple[np.ndar
 
 
 def of_second_half(dataset: xr.Dataset, names: Collection[str] | None = None) -> xr.Dataset:
-    """The ``distribution`` of observables; of a dataset of statistics alone, those of their means over that time."""
+    """Return the ``distribution`` of observables; of recorded statistics, the means over the second half of the run."""
     if "contact_radius" in dataset:
         return distribution(dataset, names)
     return summary(settled(chosen_observables(dataset, None)), quantiles=False)
@@ -791,7 +791,7 @@ def _observable(dataset: xr.Dataset, name: str) -> xr.DataArray:
 
 
 def _rows(variable: xr.DataArray, dims: tuple[str, ...]) -> np.ndarray:
-    """Values of an observable with all dimensions of the sweep, shape (..., members, records)."""
+    """Return values of an observable with all dimensions of the sweep, shape (..., members, records)."""
     missing = [name for name in (*dims, MEMBERS) if name not in variable.dims]
     return variable.expand_dims(missing).transpose(*dims, MEMBERS, "t").to_numpy().astype(float, copy=False)
 
@@ -815,7 +815,7 @@ class Lifetime(NamedTuple):
 
 
 def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
-    """Median and rate of an event that may come after a run's end.
+    """Return the median and the rate of an event that may come after a run's end.
 
     Parameters
     ----------
@@ -867,7 +867,7 @@ def _halves(watched: np.ndarray, happened: np.ndarray) -> list[float]:
 
 
 def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
-    """Time at which each member first crosses a level, from whichever side it begins [s]; nan where it never does.
+    """Return the time at which each member first crosses a level from either side [s]; nan if it never does.
 
     Between two records that lie on both sides of it the time is interpolated; a crossing there and back between two
     records is not seen.
@@ -894,7 +894,7 @@ def first_passage(observable: xr.DataArray, level: float) -> xr.DataArray:
 
 
 def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
-    """Median times of the first detachment and masking, in a stationary run rates, from the ``events`` of a dataset."""
+    """Return median times of first detachment and masking from ``events``, and rates if the run is stationary."""
     result = xr.Dataset()
     for event, name, words in (
         ("first_detachment", "detached", "detached"),
@@ -906,7 +906,7 @@ def half_lives(dataset: xr.Dataset, event_times: xr.Dataset) -> xr.Dataset:
 
 
 def lifetimes(dataset: xr.Dataset, times: xr.DataArray, name: str, words: str) -> xr.Dataset:
-    """Median and rate of an event, at each point of the sweep.
+    """Return the median and the rate of an event, at each point of the sweep.
 
     Parameters
     ----------

@@ -142,7 +142,7 @@ _ROUNDING = 1e-13
 
 
 def table(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
-    """The statistics in about a dozen rows for the terminal.
+    """Return the statistics in about a dozen rows for the terminal.
 
     Parameters
     ----------
@@ -245,7 +245,7 @@ def _of_drive(dataset: xr.Dataset, name: str) -> bool:
 
 
 def _places(places: xr.Dataset, points: Points) -> Columns:
-    """The columns that say where in the sweep and when each row is."""
+    """Return the columns of the place in the sweep and the time of each row."""
     cells: Columns = {}
     for name, index in points.items():
         cells |= _cells(name, places[name].attrs.get("units", "1"), places[name][index].to_numpy())
@@ -253,7 +253,7 @@ def _places(places: xr.Dataset, points: Points) -> Columns:
 
 
 def _range(quantiles: xr.DataArray, points: Points) -> Columns:
-    """The 5 and 95 % quantiles of a time, where there is a spread."""
+    """Return the 5 and 95 % quantiles of a time, if there is a spread."""
     low, high = (_at(quantiles.isel(quantile=end), points) for end in (0, -1))
     if not np.any(low < high):
         return {}
@@ -263,7 +263,7 @@ def _range(quantiles: xr.DataArray, points: Points) -> Columns:
 
 
 def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Columns:
-    """The columns that are not constant at their dull value at these points."""
+    """Return the columns that are not constant at their dull value at these points."""
     cells: Columns = {}
     for name, heading, dull, *_ in columns:
         if f"{name}_mean" not in means:
@@ -278,7 +278,7 @@ def _shown(means: xr.Dataset, points: Points, columns: Iterable[_Column]) -> Col
 
 
 def _at(variable: xr.DataArray | None, points: Points) -> np.ndarray:
-    """Values of a variable at each row; nan if there is no such variable."""
+    """Return the values of a variable at each row; nan if there is no such variable."""
     count = next(iter(points.values())).size if points else 1
     values = np.nan if variable is None else variable.isel(points, missing_dims="ignore").to_numpy()
     return np.broadcast_to(values, count)
@@ -289,7 +289,7 @@ def _rows(cells: Columns) -> list[dict[str, str]]:
 
 
 def _tabulated(dataset: xr.Dataset, rows: int, names: list[str]) -> tuple[xr.Dataset, Points]:
-    """Statistics of observables to tabulate, and the index of each row in every dimension of sweep and time."""
+    """Return statistics of observables to tabulate, and the index of each row in every dimension of sweep and time."""
     memory, counts = correlation_time(dataset), _thinned(dataset["contact_modulus"].sizes, rows)
     counts["t"] = max(1, rows // math.prod(counts.values()))
     if _has_one_row_each(dataset):
@@ -318,7 +318,7 @@ def _lasts(dataset: xr.Dataset) -> bool:
 
 
 def _last(dataset: xr.Dataset) -> int:
-    """The last record of any trajectory: those that stopped are unknown from there on."""
+    """Return the last record of any trajectory: after it all of them have stopped."""
     radius = next((dataset[name] for name in ("contact_radius", "contact_radius_mean") if name in dataset), None)
     last = dataset.sizes["t"] - 1
     if radius is None or bool(radius.isel(t=last).notnull().any()):
@@ -327,7 +327,7 @@ def _last(dataset: xr.Dataset) -> int:
 
 
 def _points(sizes: Mapping[Any, int], counts: dict[str, int]) -> Points:
-    """The index of each row in every dimension."""
+    """Return the index of each row in every dimension."""
     chosen = np.meshgrid(*(_spread(sizes[name], count) for name, count in counts.items()), indexing="ij")
     return {name: xr.DataArray(index.ravel(), dims="row") for name, index in zip(counts, chosen, strict=True)}
 
@@ -341,13 +341,13 @@ def _thinned(sizes: Mapping[Any, int], rows: int) -> dict[str, int]:
 
 
 def _spread(size: int, count: int) -> np.ndarray:
-    """At most ``count`` indices evenly over ``size``, the last included."""
+    """Return at most ``count`` indices evenly over ``size``, the last included."""
     count = min(size, max(count, 1))
     return np.rint(np.linspace(0 if count > 1 else size - 1, size - 1, count)).astype(int)
 
 
 def _cells(heading: str, unit: str, values: np.ndarray, errors: np.ndarray | float = 0.0) -> Columns:
-    """A column's cells in the unit of its largest value, under its heading with that unit."""
+    """Return a column's cells in the unit of its largest value, under its heading with that unit."""
     if values.dtype.kind not in "fi":
         return {heading: [str(value) for value in values]}
     finite = np.abs(values[np.isfinite(values)])
@@ -375,7 +375,7 @@ def _spreads(dataset: xr.Dataset) -> bool:
 
 
 def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
-    """A row of ``spread``."""
+    """Return a row of ``spread``."""
 
     def of(kind: str) -> np.ndarray:
         return means[f"{column.name}_{kind}"].to_numpy()
@@ -396,7 +396,7 @@ def _spread_of(means: xr.Dataset, column: _Column) -> dict[str, str]:
 
 
 def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
-    """At which speeds the area is lost, a row for each point of the sweep of other keys; none where it is not."""
+    """Return the speeds at which area is lost, a row for each point of the sweep of other keys, if any is lost."""
     speeds = as_means(loss_speeds(dataset))
     sizes = {name: size for name, size in dataset["contact_modulus"].sizes.items() if name in speeds.dims}
     points = _points(sizes, _thinned(sizes, rows))
@@ -406,12 +406,12 @@ def losses(dataset: xr.Dataset, rows: int = 12) -> list[dict[str, str]]:
 
 
 def as_means(speeds: xr.Dataset) -> xr.Dataset:
-    """With the ending of a mean on what has ends of an interval."""
+    """Return speeds with intervals under names of means."""
     return speeds.rename({name: f"{name}_mean" for name in speeds if not str(name).endswith(("_low", "_high"))})
 
 
 def once(dataset: xr.Dataset) -> xr.Dataset:
-    """Statistics of what a run has once."""
+    """Return statistics of the events of a run."""
     result = events(dataset)
     once = as_means(half_lives(dataset, result))
     return summary(result.assign_attrs(dataset.attrs)).merge(once, compat="no_conflicts")
@@ -450,7 +450,7 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
 
 
 def tidy(dataset: xr.Dataset) -> pd.DataFrame:
-    """All statistics, one row for each quantity, sweep value and time, in SI.
+    """Return all statistics, one row for each quantity, sweep value and time, in SI.
 
     Returns
     -------
@@ -465,7 +465,7 @@ def tidy(dataset: xr.Dataset) -> pd.DataFrame:
 
 
 def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
-    """Columns of all statistics, and those of each quantity."""
+    """Return the columns of all statistics, and the rows of each quantity."""
     members, half = (averaging(dataset, late).removeprefix("mean over the ") or "one run" for late in (False, True))
     late = is_stationary(dataset) and "contact_radius" in dataset
     spread = distribution(dataset) if late else xr.Dataset()  # first, as it keeps trajectories until it ends
@@ -484,7 +484,7 @@ def _frames(dataset: xr.Dataset) -> tuple[list[str], list[pd.DataFrame]]:
 
 
 def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.DataFrame:
-    """Rows of the statistics of a quantity, the name of whose mean is given."""
+    """Return rows of the statistics of a quantity, of which ``key`` is the mean."""
     name, dims = key.removesuffix("_mean"), [n for n in (*sweep_dims(dataset), "t") if n in group[key].dims]
     columns = {column: group[f"{name}_{end}"] for column, end in _ENDINGS.items() if f"{name}_{end}" in group}
     if speed_name(dataset) in dataset:
@@ -501,7 +501,7 @@ def _long(dataset: xr.Dataset, group: xr.Dataset, key: str, over: str) -> pd.Dat
 
 
 def frame(dataset: xr.Dataset) -> pd.DataFrame:
-    """All statistics at all times and sweep values as a data frame, one row each; ``attrs["units"]`` by column."""
+    """Return all statistics at all times and sweep values, one row each; ``attrs["units"]`` holds units by column."""
     result = statistics(dataset)
     with contextlib.suppress(ValueError), answered():  # shares are not known of every dataset
         result = result.merge(shares(dataset))
