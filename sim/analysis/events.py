@@ -193,8 +193,8 @@ def stick_slip(dataset: xr.Dataset) -> xr.Dataset:
     if "stage_speed" not in dataset or not read <= set(dataset.variables):
         return xr.Dataset()
     half, at_many_speeds = _beginning(dataset), varies(dataset)
-    some = with_trajectories(dataset, *read)
-    return in_pieces(some, (*sweep_dims(dataset), MEMBERS), lambda piece: _means(piece, half, at_many_speeds))
+    trajectories = with_trajectories(dataset, *read)
+    return in_pieces(trajectories, (*sweep_dims(dataset), MEMBERS), lambda piece: _means(piece, half, at_many_speeds))
 
 
 def _means(dataset: xr.Dataset, half: float, several_speeds: bool) -> xr.Dataset:
@@ -689,7 +689,7 @@ def loop_energy(dataset: xr.Dataset) -> xr.Dataset:
     suffix = "" if "normal_load" in dataset else "_mean"
     read = (f"{name}{suffix}" for name in ("contact_radius", "normal_load", "displacement", "dissipated_energy"))
     dims = (*sweep_dims(dataset), MEMBERS)
-    return in_pieces(with_trajectories(dataset, *read), dims, lambda some: _loops(some, suffix, count))
+    return in_pieces(with_trajectories(dataset, *read), dims, lambda piece: _loops(piece, suffix, count))
 
 
 def _loops(dataset: xr.Dataset, suffix: str, count: int) -> xr.Dataset:

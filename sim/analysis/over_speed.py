@@ -181,7 +181,7 @@ def loss_speeds(dataset: xr.Dataset) -> xr.Dataset:
 
 def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.DataArray]:
     """Return means of A/A_JKR over groups of members and, at steady speeds, the second half; and sizes of groups."""
-    some, outer = with_trajectories(dataset, *_READ), (*sweep_dims(dataset), *(["t"] if along == "t" else []))
+    areas, outer = with_trajectories(dataset, *_READ), (*sweep_dims(dataset), *(["t"] if along == "t" else []))
     members = dataset.sizes.get(MEMBERS, 1)
     count = min(members, _GROUPS, max(2, _MOST_MEANS // math.prod(dataset.sizes[name] for name in outer)))
 
@@ -195,9 +195,9 @@ def _group_means(dataset: xr.Dataset, along: str) -> tuple[xr.DataArray, xr.Data
         return xr.concat(groups, "group", coords="minimal", compat="override")
 
     if along == "t":
-        result = in_pieces(some, ("t",), lambda piece: means(ratios(piece)))
+        result = in_pieces(areas, ("t",), lambda piece: means(ratios(piece)))
     else:
-        late = some.isel(t=slice(dataset.sizes["t"] // 2, None))
+        late = areas.isel(t=slice(dataset.sizes["t"] // 2, None))
         result = means(in_pieces(late, (*outer, MEMBERS), ratios))
     sizes = np.bincount(np.arange(members) % count).astype(float)
     return result["area_ratio"].transpose("group", *outer), xr.DataArray(sizes, dims="group")

@@ -405,12 +405,12 @@ def _moments(name: str, values: np.ndarray, count: np.ndarray) -> dict[str, np.n
     with np.errstate(invalid="ignore", divide="ignore"):  # nan is the answer where there are too few
         mean = np.nansum(values, axis=-1) / count
         deviations = values - mean[..., None]
-        each = deviations * deviations
-        squares = np.nansum(each, axis=-1)
+        powers = deviations * deviations
+        squares = np.nansum(powers, axis=-1)
         std = np.sqrt(squares / np.where(count > 1.0, count - 1.0, np.nan))
         error = std / np.sqrt(count)
-        each *= deviations
-        third = np.nansum(each, axis=-1) / count
+        powers *= deviations
+        third = np.nansum(powers, axis=-1) / count
         biased = np.where(std > _ROUNDING * abs(mean), third / (squares / count) ** 1.5, np.nan)
         skewness = np.where(count > 2.0, biased * np.sqrt(count * (count - 1.0)) / (count - 2.0), np.nan)
     low, high = interval(name, mean, error, count)
@@ -441,11 +441,11 @@ def skewness_error(count: float) -> float:
 def _quantiles(ordered: np.ndarray, count: np.ndarray) -> dict[str, np.ndarray]:
     """Return quantiles of the first ``count`` numbers, which are in order, and the ends of their intervals."""
     levels = np.array(QUANTILES)
-    counts, of = np.unique(count, return_inverse=True)
+    counts, indices = np.unique(count, return_inverse=True)
     places = {"quantile": levels * (counts[:, None] - 1.0)}
     places["quantile_low"], places["quantile_high"] = quantile_ranks(counts[:, None], levels)
     return {
-        kind: np.moveaxis(values_at_ranks(ordered, place[of.reshape(count.shape)]), -1, 0)
+        kind: np.moveaxis(values_at_ranks(ordered, place[indices.reshape(count.shape)]), -1, 0)
         for kind, place in places.items()
     }
 
@@ -623,8 +623,8 @@ def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict
     points, members, _ = values.shape
     known = np.isfinite(values)
     counts = known.sum(axis=-1, dtype=float)
-    total, whole = counts.sum(axis=-1), known.all(axis=(1, 2))
-    if not whole.all():
+    total, complete = counts.sum(axis=-1), known.all(axis=(1, 2))
+    if not complete.all():
         values = np.where(known, values, np.nan)
     ordered = np.sort(values.reshape(points, -1), axis=-1)  # nan last
     levels = values_at_ranks(ordered, _LEVELS * (total[:, np.newaxis] - 1.0))
@@ -637,8 +637,8 @@ def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict
         spread = np.sqrt(_sum(deviations).sum(axis=-1) / total)
         below = [np.sum(values <= levels[:, k, np.newaxis, np.newaxis], axis=-1) / counts for k in range(len(_LEVELS))]
         del deviations, known
-        memory = [_memory(*each, step, members) for each in zip(values, levels, mean, whole, strict=True)]
-        inflated, times = (np.array(each) for each in zip(*memory, strict=True))
+        memory = [_memory(*point, step, members) for point in zip(values, levels, mean, complete, strict=True)]
+        inflated, times = (np.array(column) for column in zip(*memory, strict=True))
         spreads = np.array([spread, *np.broadcast_to(np.sqrt(_LEVELS * (1.0 - _LEVELS)), (points, len(_LEVELS))).T])
         errors, freedoms = _errors(np.array([means, *below]), spreads, np.moveaxis(inflated, -1, 0), total)
         low, high = interval(name, mean, errors[0], freedoms[0] + 1.0)
@@ -647,15 +647,15 @@ def _over_time(values: np.ndarray, step: float, name: str, differ: bool) -> dict
     ends = np.tile(_LEVELS, (2, points, 1))
     if differ:
         shares = (
-            _shares(*each, 1.0 if members >= _MANY else 0.5)
-            for each in zip(spreads.T, errors.T, freedoms.T, strict=True)
+            _shares(*point, 1.0 if members >= _MANY else 0.5)
+            for point in zip(spreads.T, errors.T, freedoms.T, strict=True)
         )
         ends = np.stack(list(shares), axis=1)
     else:
         errors[0], low, high = 0.0, mean, mean
     result = {"mean": mean, "std": spread, "sem": errors[0], "low": low, "high": high}
     result |= {"skewness": skewness, "effective_samples": effective}
-    if whole.any():
+    if complete.any():
         result |= {"correlation_time": times[:, 0], "correlation_time_sem": times[:, 1]}
     ranks = ends * (total[:, np.newaxis] - 1.0)
     ranks[~((ends >= 0.0) & (ends <= 1.0))] = np.nan
@@ -672,14 +672,14 @@ def _sum(values: np.ndarray) -> np.ndarray:
 
 
 def _memory(
-    values: np.ndarray, levels: np.ndarray, mean: float, whole: bool, step: float, members: int
+    values: np.ndarray, levels: np.ndarray, mean: float, complete: bool, step: float, members: int
 ) -> tuple[np.ndarray, tuple[float, float]]:
     """Return how many records count as one, for the mean and each quantile, with degrees of freedom; and the memory.
 
     nan if values are missing, and of many members, whose means give the errors.
     """
     inflated = np.full((2, 1 + len(levels)), np.nan)
-    if not whole:
+    if not complete:
         return inflated, (np.nan, np.nan)
     records, free = values.shape[-1], max(members - 1, 1)
     some = members if members < _MANY else members_for_memory(members, records)

@@ -441,7 +441,9 @@ def to_csv(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         as it was before.
     """
     columns, frames = _frames(dataset)
-    units = {str(name): each.attrs.get("units", "1") for name, each in dataset.coords.items()} | {"speed": "m/s"}
+    units = {str(name): variable.attrs.get("units", "1") for name, variable in dataset.coords.items()} | {
+        "speed": "m/s"
+    }
     header = [name if units.get(name, "1") == "1" else f"{name} [{units[name]}]" for name in columns]
     with output(Path(path)) as beside, beside.open("w", encoding="utf-8", newline="") as file:
         for names in (header, *[False] * (len(frames) - 1)):

@@ -142,12 +142,15 @@ def test_pieces_cover_all_of_a_dataset(monkeypatch, room, chunks):
 
 @pytest.mark.verify  # dask comes with its extra
 def test_runs_joined_as_the_page_says_have_the_table_of_a_sweep_and_of_more_members(tmp_path):
-    kept = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}
-    loads = [run(scene(contact=Equilibrium(load=load), **kept), to=tmp_path / f"{load}.nc") for load in (2e-3, 4e-3)]
+    parts = {"drive": Steady(speed=1e-2), "record": Record(quantities=["contact_area"])}
+    loads = [run(scene(contact=Equilibrium(load=load), **parts), to=tmp_path / f"{load}.nc") for load in (2e-3, 4e-3)]
     with xr.open_mfdataset(
-        loads, combine="nested", concat_dim="contact_load", preprocess=lambda one: one.set_coords("contact_load")
+        loads,
+        combine="nested",
+        concat_dim="contact_load",
+        preprocess=lambda dataset: dataset.set_coords("contact_load"),
     ) as runs:
-        swept = run(scene(sweep={"contact.load": [2e-3, 4e-3]}, **kept))
+        swept = run(scene(sweep={"contact.load": [2e-3, 4e-3]}, **parts))
         assert analysis.table(runs) == analysis.table(swept)
     how = {"data_vars": "minimal", "coords": "minimal", "compat": "override"}
     with xr.open_mfdataset(loads, combine="nested", concat_dim="member", **how) as runs:
@@ -159,8 +162,8 @@ def test_averaging_the_second_half_keeps_the_members_error(ramp):
     dims = ("member", "t")
     levels = np.array([1.0, 2.0, 4.0, 4.0, 5.0, 8.0])[:, None] * np.ones(ramp.sizes["t"])
     levels[:, : ramp.sizes["t"] // 2] = 1e9  # a start-up that must not count
-    stated = xr.Dataset({"level": (dims, levels)}, {"t": ramp["t"]})
-    result = analysis.summary(analysis.settled(stated))
+    members = xr.Dataset({"level": (dims, levels)}, {"t": ramp["t"]})
+    result = analysis.summary(analysis.settled(members))
     assert result["level_mean"].dims == ("t",) and result.sizes["t"] == 1
     np.testing.assert_allclose(result["level_mean"], 4.0, rtol=1e-14)
     np.testing.assert_allclose(result["level_sem"], math.sqrt(30.0 / 5.0 / 6.0), rtol=1e-14)

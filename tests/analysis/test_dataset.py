@@ -1,4 +1,4 @@
-"""What a dataset says about its scenario, swept or not."""
+"""Settings and words of the scenario in a dataset, swept or not."""
 
 import pytest
 from helpers.lens import RADIUS, scene

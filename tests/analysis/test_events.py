@@ -1,4 +1,4 @@
-"""What is told once of a run: detachment, masking, loops and friction peaks."""
+"""Events of a run: detachment, masking, loops and friction peaks."""
 
 import json
 import math

@@ -218,7 +218,7 @@ def test_jkrs_contact_comes_off_and_closes_by_the_same_policy():
 
 
 def test_a_sphere_that_its_bonds_let_go_under_a_changing_load_stays_their_loss():
-    """Where no member is in contact nothing records the load; the scenario tells it."""
+    """If no member is in contact, no variable records the load; the scenario states it."""
     pulled = Equilibrium(load={"from": -0.1e-3, "to": -0.3e-3})
     for record in (Record(), Record(per_member=False)):
         parts = {"bonds": bonds.Steady(critical_speed=1e-2), "shear": shear.Uniform(), "record": record}

@@ -35,7 +35,7 @@ LAWS = {
 }
 
 
-def held(low, high, truth):
+def share_holding(low, high, truth):
     """Share of intervals that hold a truth."""
     return float(np.mean((np.asarray(low) <= truth) & (truth <= np.asarray(high))))
 
@@ -51,11 +51,11 @@ def ensembles(request):
 
 def test_intervals_of_64_members_hold_what_they_promise(ensembles):
     result, law = ensembles
-    assert LEAST < held(result["x_low"], result["x_high"], law.mean()) < MOST
+    assert LEAST < share_holding(result["x_low"], result["x_high"], law.mean()) < MOST
     for k, level in enumerate(LEVELS):
         low, high = (result[f"x_quantile_{end}"].isel(quantile=k) for end in ("low", "high"))
         assert bool((low <= result["x_quantile"].isel(quantile=k)).all()) and bool((low < high).all())
-        assert LEAST < held(low, high, law.ppf(level)) < MOST, level
+        assert LEAST < share_holding(low, high, law.ppf(level)) < MOST, level
 
 
 def test_quantiles_are_those_of_the_law(ensembles):
@@ -81,8 +81,10 @@ def test_skewness_of_a_normal_law_is_none_within_its_error():
 def test_few_members_widen_the_interval_of_a_mean(members):
     drawn = np.random.default_rng(12).normal(size=(members, ENSEMBLES))
     result = analysis.summary(xr.Dataset({"x": (("member", "t"), drawn)}))
-    assert LEAST < held(result["x_low"], result["x_high"], 0.0) < MOST
-    assert held(result["x_mean"] - 1.96 * result["x_sem"], result["x_mean"] + 1.96 * result["x_sem"], 0.0) < LEAST
+    assert LEAST < share_holding(result["x_low"], result["x_high"], 0.0) < MOST
+    assert (
+        share_holding(result["x_mean"] - 1.96 * result["x_sem"], result["x_mean"] + 1.96 * result["x_sem"], 0.0) < LEAST
+    )
 
 
 def test_quantiles_that_few_members_cannot_bound_have_no_interval():
@@ -90,7 +92,7 @@ def test_quantiles_that_few_members_cannot_bound_have_no_interval():
     known = np.isfinite(low) & np.isfinite(high)
     assert np.array_equal(known, np.isfinite(low)) and np.array_equal(known, np.isfinite(high))
     # 0.95^59 = 0.0485 is the first power below what may be left out, and 2 (1/2)^6 = 0.03125
-    assert [int(np.argmax(own)) + 1 for own in known.T] == [59, 6, 59]
+    assert [int(np.argmax(level)) + 1 for level in known.T] == [59, 6, 59]
     assert np.all(low[known] >= 0.0) and np.all((high <= np.arange(0.0, 199.0)[:, None])[known])
 
 
@@ -99,7 +101,7 @@ def test_intervals_of_a_share_of_members_hold_what_they_promise(detached):
     opened = (np.random.default_rng(13).random((64, ENSEMBLES)) < detached).astype(float)
     result = analysis.summary(xr.Dataset({"fraction_detached": (("member", "t"), opened)}))
     low, high = result["fraction_detached_low"], result["fraction_detached_high"]
-    assert held(low, high, detached) > LEAST and float(low.min()) >= -1e-15
+    assert share_holding(low, high, detached) > LEAST and float(low.min()) >= -1e-15
     none = analysis.summary(xr.Dataset({"fraction_detached": (("member",), np.zeros(64))}))
     # Wilson's bound of none in 64: z^2/(64 + z^2)
     np.testing.assert_allclose(none["fraction_detached_high"], 3.841458820694124 / 67.84145882069413, rtol=1e-12)
@@ -111,22 +113,27 @@ def covered(law, members, length, ensembles):
     shape = ensembles * members, 5 * length  # five records a correlation time
     drawn = of(ornstein_uhlenbeck(np.random.default_rng(14), *shape, math.exp(-0.2))).reshape(ensembles, members, -1)
     result = [analysis.over_time(series) for series in drawn]
-    ends = [np.column_stack([[one[end], *one[f"quantile_{end}"]] for one in result]) for end in ("low", "high")]
-    stated, truth = np.isfinite(ends[0]) & np.isfinite(ends[1]), np.array([[exact.mean(), *exact.ppf(LEVELS)]]).T
+    ends = [
+        np.column_stack([[estimate[end], *estimate[f"quantile_{end}"]] for estimate in result])
+        for end in ("low", "high")
+    ]
+    has_interval, truth = np.isfinite(ends[0]) & np.isfinite(ends[1]), np.array([[exact.mean(), *exact.ppf(LEVELS)]]).T
     hits = (ends[0] <= truth) & (truth <= ends[1])
     return [
-        float(own[known].mean()) if known.any() else math.nan for own, known in zip(hits, stated, strict=True)
-    ], stated.mean(axis=1)
+        float(hit[known].mean()) if known.any() else math.nan for hit, known in zip(hits, has_interval, strict=True)
+    ], has_interval.mean(axis=1)
 
 
 @pytest.mark.verify
 @pytest.mark.parametrize("law", sorted(LAWS))
 @pytest.mark.parametrize("members", [1, 4])
 def test_intervals_of_1000_series_of_100_correlation_times_hold_what_they_promise(law, members):
-    shares, stated = covered(law, members, 100, ENSEMBLES)
+    shares, has_interval = covered(law, members, 100, ENSEMBLES)
     # one series in a thousand seems to forget so fast that it states the interval of a tail, too
-    assert all(LEAST < share < MOST for share, known in zip(shares, stated, strict=True) if known > 0.01)
-    assert np.all(stated[[0, 2]] > 0.9) and np.all(stated[[1, 3]] < 0.01 if members == 1 else stated > 0.5)
+    assert all(LEAST < share < MOST for share, known in zip(shares, has_interval, strict=True) if known > 0.01)
+    assert np.all(has_interval[[0, 2]] > 0.9) and np.all(
+        has_interval[[1, 3]] < 0.01 if members == 1 else has_interval > 0.5
+    )
 
 
 @pytest.mark.parametrize(("members", "length"), [(1, 100), (1, 10), (4, 50)])

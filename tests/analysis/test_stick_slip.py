@@ -32,7 +32,7 @@ def cycles():
     return run(scene(2, clock=Clock(duration=5.0, step=RECORD), drive=drive, bonds=bonds, adhesion=same_area))
 
 
-def made(force, stage=1.0, step=1.0):
+def with_force(force, stage=1.0, step=1.0):
     """A dataset of one member with this force of the spring and speed of the stage."""
     dataset = cycles().isel(t=slice(0, len(force)), member=slice(0, 1))
     force, stage = np.asarray(force, float), np.broadcast_to(stage, len(force)).astype(float)
@@ -116,73 +116,77 @@ def test_sliding_without_slips_has_a_kinetic_friction_alone():
 def test_slips_follow_the_sense_of_the_stage_and_reversals_are_none():
     saw = np.tile([0.0, 1.0, 2.0, 3.0, 4.0, 1.0], 3)  # falls by three after each four
     for sense in (1.0, -1.0):
-        result = analysis.slips(made(sense * saw, sense))
+        result = analysis.slips(with_force(sense * saw, sense))
         assert_allclose(result["force_drop"], [[4.0, 4.0]], rtol=1e-14)
         assert_allclose(result["static_friction"], 4.0, rtol=1e-14)
         assert_allclose(result["slip_amplitude"], 6.0, rtol=1e-14)  # the stage moves two meanwhile
         assert_allclose(result["stress_drop"], 8.0, rtol=1e-14)
     result = analysis.stick_slip(
-        made(saw, np.where(np.arange(18) < 9, 1.0, -1.0)).assign(drive_work=("t", 3.0 * np.arange(18.0)))
+        with_force(saw, np.where(np.arange(18) < 9, 1.0, -1.0)).assign(drive_work=("t", 3.0 * np.arange(18.0)))
     )
     assert_allclose(result["kinetic_friction"], 3.0, rtol=1e-14)  # over the path of the stage, not over its way
     # there and back: the force falls from 3 to -3 as the stage turns, and nothing slips
-    there = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0])
-    assert analysis.slips(made(there, np.where(np.arange(9) < 5, 1.0, -1.0))).sizes["slip"] == 0
+    there_and_back = np.array([0.0, 1.0, 2.0, 3.0, 3.0, 1.0, -1.0, -3.0, -3.0])
+    assert analysis.slips(with_force(there_and_back, np.where(np.arange(9) < 5, 1.0, -1.0))).sizes["slip"] == 0
 
 
 def test_sizes_of_slips_are_shared_out_over_all_members():
     saw = np.array([0.0, 4.0, 1.0, 4.0, 2.0, 4.0, 3.0, 4.0, 1.0, 2.0])
-    one, two = (made(sense * saw, sense * np.linspace(1.0, 1.1, 10)) for sense in (1.0, -1.0))  # no slip is left out
-    both = xr.concat([one, two], "member", data_vars="minimal", coords="minimal", compat="override", join="override")
-    result = analysis.slip_sizes(both, "force_drop")
+    forward, backward = (
+        with_force(sense * saw, sense * np.linspace(1.0, 1.1, 10)) for sense in (1.0, -1.0)
+    )  # no slip is left out
+    members = xr.concat(
+        [forward, backward], "member", data_vars="minimal", coords="minimal", compat="override", join="override"
+    )
+    result = analysis.slip_sizes(members, "force_drop")
     assert_allclose(result["force_drop"], np.repeat([1.0, 2.0, 3.0], [2, 2, 4]), rtol=1e-14)
     assert_allclose(result["share_as_large"], 1.0 - np.arange(8) / 8.0, rtol=1e-14)
-    amplitude = analysis.slips(one)["slip_amplitude"][0]
-    spread = analysis.stick_slip(one)["slip_spread"]
+    amplitude = analysis.slips(forward)["slip_amplitude"][0]
+    spread = analysis.stick_slip(forward)["slip_spread"]
     assert_allclose(spread, np.std(amplitude, ddof=1) / np.mean(amplitude), rtol=1e-12)
-    assert math.isnan(analysis.stick_slip(made(saw[:4]))["slip_spread"].item())  # of one slip
+    assert math.isnan(analysis.stick_slip(with_force(saw[:4]))["slip_spread"].item())  # of one slip
     cells = [cell for cell in analysis.highlights(cycles())[0] if cell.startswith("spread")]
     assert len(cells) == 1
 
 
 def test_what_falls_by_less_than_the_least_is_no_slip():
     saw = np.array([0.0, 2.0, 4.0, 3.95, 4.0, 3.0, 4.0, 3.5, 4.2])
-    assert analysis.slips(made(saw, 0.01)).sizes["slip"] == 2
-    assert analysis.slips(made(saw, 0.01), least=0.01).sizes["slip"] == 3
-    assert analysis.slips(made(saw, 0.01), least=0.2).sizes["slip"] == 1
+    assert analysis.slips(with_force(saw, 0.01)).sizes["slip"] == 2
+    assert analysis.slips(with_force(saw, 0.01), least=0.01).sizes["slip"] == 3
+    assert analysis.slips(with_force(saw, 0.01), least=0.2).sizes["slip"] == 1
     # a slip that lasts beyond the end of the run is not counted
-    assert analysis.slips(made([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
+    assert analysis.slips(with_force([0.0, 2.0, 4.0, 3.0, 2.0])).sizes["slip"] == 0
 
 
 def test_a_slip_after_a_slow_fall_begins_at_the_last_maximum_and_onset_and_end_need_two():
     slow = [0.0, 2.0, *np.linspace(4.0, 3.6, 9), 3.65]
     up = np.array([*slow, 1.0, 2.0, 4.0, 1.0, 2.0])
-    first = analysis.slips(made(up)).isel(member=0, slip=0)
+    first = analysis.slips(with_force(up)).isel(member=0, slip=0)
     begins = [float(first[name]) for name in ("slip_time", "static_friction", "force_drop")]
     assert_allclose(begins, [11.0, 3.65, 2.65], rtol=1e-12)
     speed = np.linspace(1.0, 1.1, len(up))
     back = slice(-2, None, -1)
-    both = made(np.append(up, [*up[[14, 15, 13, 14, 15, 16]], 2.1]), np.append(speed, speed[back][:7]))
-    result, slips = analysis.stick_slip(both), analysis.slips(both).isel(member=0)
+    up_and_down = with_force(np.append(up, [*up[[14, 15, 13, 14, 15, 16]], 2.1]), np.append(speed, speed[back][:7]))
+    result, slips = analysis.stick_slip(up_and_down), analysis.slips(up_and_down).isel(member=0)
     assert slips.sizes["slip"] == 4
     assert_allclose(result["slips_from"], speed[11], rtol=1e-14)
     assert_allclose(result["slips_down_to"], slips["slip_speed"][-1], rtol=1e-14)
-    lone = analysis.stick_slip(made(up[:14], speed[:14]))
+    lone = analysis.stick_slip(with_force(up[:14], speed[:14]))
     assert lone["slip_count"].item() == 1.0 and np.isnan(lone["slips_from"]).all()  # friction beyond its maximum
-    assert "slips_from" not in analysis.stick_slip(made(up))
+    assert "slips_from" not in analysis.stick_slip(with_force(up))
 
 
 def test_a_slider_that_only_stretches_its_spring_has_no_kinetic_friction():
-    assert np.isnan(analysis.stick_slip(made(np.arange(10.0)))["kinetic_friction"]).all()
-    assert np.all(analysis.stick_slip(made(np.ones(10)))["kinetic_friction"] == 0.0)  # at no work of the stage
+    assert np.isnan(analysis.stick_slip(with_force(np.arange(10.0)))["kinetic_friction"]).all()
+    assert np.all(analysis.stick_slip(with_force(np.ones(10)))["kinetic_friction"] == 0.0)  # at no work of the stage
 
 
 def test_a_body_that_rings_or_slows_down_does_not_slip():
     saw = np.array([0.0, 2.0, 4.0, 3.0, 2.0, 3.0, 4.0, 3.0, 2.0, 3.0])
-    assert analysis.slips(made(saw)).sizes["slip"] == 2  # the slider goes twice as far as the stage
-    assert analysis.slips(made(saw, 1.6)).sizes["slip"] == 0  # 1.625 times, less than 1 + 2/pi
+    assert analysis.slips(with_force(saw)).sizes["slip"] == 2  # the slider goes twice as far as the stage
+    assert analysis.slips(with_force(saw, 1.6)).sizes["slip"] == 0  # 1.625 times, less than 1 + 2/pi
     # upon an interface that sticks the force falls while the body's swing loads the bonds
-    rings = made(saw).assign(shear_stress=(("member", "t"), -saw[np.newaxis]))
+    rings = with_force(saw).assign(shear_stress=(("member", "t"), -saw[np.newaxis]))
     assert analysis.slips(rings).sizes["slip"] == 0
 
 

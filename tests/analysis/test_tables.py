@@ -48,10 +48,10 @@ def test_table_leaves_out_what_tells_nothing():
 
 @pytest.mark.parametrize("per_member", [True, False])
 def test_a_reduced_dataset_has_the_columns_that_it_can(per_member):
-    kept = ("fluctuation_energy", "speed")
+    recorded = ("fluctuation_energy", "speed")
     whole, some = (
         run(scene(drive=drive.Steady(speed=1e-2), record=Record(per_member=per_member, quantities=quantities)))
-        for quantities in (None, kept)
+        for quantities in (None, recorded)
     )
     rows = analysis.table(some)
     assert "A/A_JKR\n(%)" not in rows[0] and {"a\n(µm)", "ΔΓ\n(mJ/m²)"} < set(rows[0])
