@@ -1,7 +1,6 @@
 """Statistics over members at each time, over members and stationary time, of lifetimes, and correlation times."""
 
 import math
-import warnings
 from collections.abc import Collection, Mapping
 from typing import Any, NamedTuple
 
@@ -852,17 +851,21 @@ def lifetime(times: np.ndarray, ends: np.ndarray | float) -> Lifetime:
 
 
 def _halves(watched: np.ndarray, happened: np.ndarray) -> list[float]:
-    """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan."""
-    from scipy import stats  # its import takes a second
+    """Return the times at which a survival, and the ends of its interval, first are one half or less, or nan.
 
-    survival = stats.ecdf(stats.CensoredData(uncensored=watched[happened], right=watched[~happened])).sf
-    curves = [survival]
-    if happened.sum() > 1:
-        with warnings.catch_warnings(action="ignore", category=RuntimeWarning):  # no interval if it is 1 or 0
-            interval = survival.confidence_interval(LEVEL, method="log-log")
-        curves += [interval.low, interval.high]
-    below = [curve.quantiles[curve.probabilities <= 0.5] for curve in curves]
-    halves = [float(times[0]) if times.size else np.nan for times in below]
+    The numbers are those of ``scipy.stats.ecdf``, whose import would make the start of ``sim run`` a quarter longer.
+    """
+    times, places, counts = np.unique(watched, return_inverse=True, return_counts=True)
+    events, at_risk = np.bincount(places, happened), watched.size - np.cumsum(counts) + counts
+    left = at_risk - events
+    survival = left / watched.size if np.all(happened) else np.cumprod(left / at_risk)
+    with np.errstate(divide="ignore", invalid="ignore"):  # there is no interval if the survival is 1 or 0
+        logarithm = np.log(survival)
+        width = WIDE * np.sqrt(np.cumsum(events / (at_risk * left))) / np.abs(logarithm)
+        ends = [np.exp(-np.exp(np.log(-logarithm) + side * width)) for side in (1.0, -1.0)]
+    curves = [survival, *ends] if happened.sum() > 1 else [survival]
+    below = [np.flatnonzero(curve <= 0.5) for curve in curves]
+    halves = [float(times[first[0]]) if first.size else np.nan for first in below]
     return halves + [np.nan] * (3 - len(halves))
 
 

@@ -1,10 +1,12 @@
 """Lifetimes that runs end before: against exponential ones, with intervals that hold what they promise."""
 
 import math
+import warnings
 
 import numpy as np
 import pytest
 import xarray as xr
+from scipy import stats
 
 from sim import analysis
 
@@ -24,6 +26,21 @@ def test_intervals_of_censored_lifetimes_hold_what_they_promise(end):
         low, high = (np.array([getattr(time, f"{name}_{side}") for time in estimates]) for side in ("low", "high"))
         high[np.isnan(high)] = math.inf  # a median that may lie beyond the runs
         assert 0.92 < np.mean((low <= truth) & (truth <= high)) < 0.98, name
+
+
+def test_the_median_of_censored_lifetimes_is_that_of_scipys_survival():
+    rng = np.random.default_rng(5)
+    for size, end in ((5, 2.0), (20, 0.8), (64, 1.0), (200, 9.0)):
+        times = np.round(rng.exponential(size=size), 2)  # with equal ones
+        times[times > end] = math.nan
+        happened = np.isfinite(times)
+        survival = stats.ecdf(stats.CensoredData(times[happened], right=np.full(np.sum(~happened), end))).sf
+        with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):
+            interval = survival.confidence_interval(0.95, method="log-log")
+        result = analysis.lifetime(times, end)
+        for name, curve in (("half", survival), ("half_low", interval.low), ("half_high", interval.high)):
+            below = curve.quantiles[curve.probabilities <= 0.5]
+            np.testing.assert_equal(getattr(result, name), below[0] if below.size else math.nan, name)
 
 
 def test_the_rate_counts_the_time_of_those_that_go_on():
