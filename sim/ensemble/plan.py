@@ -180,8 +180,7 @@ class Plan:
     @cached_property
     def packs(self) -> list[range]:
         """Return ranges of points that are stored in one part: neighbours on the last axis with short runs."""
-        first, along = self.points[0], len(self.scenario.sweep[-1].values) if self.scenario.sweep else 1
-        together = 1
+        first, along, together = self.points[0], len(self.scenario.sweep[-1].values) if self.scenario.sweep else 1, 1
         alike = not first.record.maps and all(point.clock == first.clock for point in self.points)
         if alike and len(self.blocks(first)) == 1:
             by_work, by_records = self._pieces[1] // (first.clock.steps + 1), self._most_records // first.clock.records
@@ -240,13 +239,10 @@ class Plan:
 
     def _trajectories(self, per_member: bool) -> float:
         """Return the size of the trajectories before compression [byte]."""
-        each, total = 4.0 if self.scenario.record.precision == "float32" else 8.0, 0.0
-        for variable in self.variables:
-            rows, size = 1, each
-            if self.varies(variable):
-                rows, size = (self.members, each) if per_member else (_STATISTICS, 8.0)
-            total += rows * size * self.points[0].clock.records * len(self.points)
-        return total
+        each = 4.0 if self.scenario.record.precision == "float32" else 8.0
+        varying = self.members * each if per_member else _STATISTICS * 8.0
+        a_record = sum(varying if self.varies(variable) else each for variable in self.variables)
+        return a_record * self.points[0].clock.records * len(self.points)
 
     def varies(self, variable: Variable) -> bool:
         """True if members differ in the variable."""

@@ -95,14 +95,6 @@ def _with_work(scene: Scenario, course: Trajectory, reference: int, work: np.nda
     return _where_closed(course, reference, _control(scene, course).radius(work, np.zeros(1), 0.0, scene.bodies))
 
 
-def _jkr_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
-    return _with_work(scene, course, JKR, np.full(course.time.shape, scene.adhesion.work))
-
-
-def _bonds_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
-    return _with_work(scene, course, BONDS_ONLY, _terms(scene, course).bonded)
-
-
 def _stressless_radius(scene: Scenario, course: Trajectory) -> np.ndarray:
     if not scene.contact.reversible:
         return _equilibrium_radius(scene, course)
@@ -170,11 +162,13 @@ VARIABLES: tuple[Variable, ...] = (
     Variable("dissipated_energy", "J", "energy dissipated by the edge and the jumps of the contact", "W", "contact",
           lambda scene, course: course.dissipated),
     Variable("jkr_radius", "m", "radius in equilibrium with the full work of adhesion, under the same control and rule"
-          " after pull-off; 0 while that contact is open", "a_JKR", "control", _jkr_radius),
+          " after pull-off; 0 while that contact is open", "a_JKR", "control",
+          lambda scene, course: _with_work(scene, course, JKR, np.full(course.time.shape, scene.adhesion.work))),
     Variable("hertz_radius", "m", "radius without adhesion, under the same control; 0 where nothing presses", "a_H",
           "control", _hertz_radius),
     Variable("bonds_radius", "m", "radius in equilibrium with the work of adhesion of the bonds alone, under the same"
-          " control and rule after pull-off; 0 while that contact is open", "a_b", "bonds", _bonds_radius),
+          " control and rule after pull-off; 0 while that contact is open", "a_b", "bonds",
+          lambda scene, course: _with_work(scene, course, BONDS_ONLY, _terms(scene, course).bonded)),
     Variable("fluctuations_radius", "m", "radius in equilibrium with the work of adhesion that fluctuations leave"
           " before the mean stress takes its share, under the same control and rule after pull-off; 0 while that"
           " contact is open", "a_f", "contact", _stressless_radius,
