@@ -23,16 +23,13 @@ def disc_nodes(radius=1.0, turns=96):
     return x, y, weight
 
 
-def test_compliance_and_point_displacement_are_the_papers_at_one_half():
+def test_the_moduli_of_one_body_and_of_two_and_the_compliance_and_kernel_of_the_paper():
     x, y = np.random.default_rng(1).standard_normal((2, 50)) * 1e5
     r = np.hypot(x, y)
     assert_allclose(halfspace.compliance(x, y, 1.6e6), (1.0 + y**2 / r**2) / (2.0 * 1.6e6 * r), rtol=1e-14, atol=0)
     point = (1.0 + x**2 / r**2) / (4.0 * np.pi * 1.6e6 * r)
     assert_allclose(halfspace.point_displacement(x, y, 1.6e6), point, rtol=1e-14, atol=0)
     assert halfspace.point_displacement(0.0, 0.0, 1.0) == np.inf
-
-
-def test_contact_modulus_of_one_body_and_of_two_in_series():
     for nu in RATIOS:
         young = 2.0 * 1e6 * (1.0 + nu)
         assert_allclose(halfspace.contact_modulus(1e6, nu), young / (1.0 - nu**2), rtol=1e-15, atol=0)
@@ -85,7 +82,7 @@ def test_ripples_across_the_sliding_store_twice_the_energy_of_those_along_it():
     assert_allclose(halfspace.ripple_energy(3e5, 2e5, angle, 1.6e6), exact, rtol=1e-14, atol=0)
 
 
-def test_compliance_is_even_and_zero_without_a_wave():
+def test_compliance_is_even_and_the_transform_of_the_point_kernel():
     for nu in RATIOS:
         assert halfspace.compliance(3e4, -4e4, 1e6, nu) == halfspace.compliance(-3e4, -4e4, 1e6, nu)
         assert halfspace.compliance(-3e4, 4e4, 1e6, nu) == halfspace.compliance(-3e4, -4e4, 1e6, nu)
@@ -94,9 +91,6 @@ def test_compliance_is_even_and_zero_without_a_wave():
     # q^2 would underflow or overflow here
     assert_allclose(halfspace.compliance(0.0, 1e-200, 1e6), 1e194, rtol=1e-14, atol=0)
     assert_allclose(halfspace.compliance(1e200, 0.0, 1e6), 0.5e-206, rtol=1e-14, atol=0)
-
-
-def test_compliance_is_the_transform_of_the_point_kernel():
     for nu in RATIOS:
         for direction in [0.0, 0.7, math.pi / 2]:
             # both sides weighted by a Gaussian of unit width, which makes either integral smooth:
@@ -124,29 +118,20 @@ def exact_inside(rho, theta):
         return float((1.5 * e + skew * mpmath.cos(2 * theta)) / mpmath.pi)
 
 
-def test_displacement_inside_the_disc_is_the_paper_s():
+def test_displacement_of_a_disc_inside_at_centre_and_edge_and_far_from_it():
     for rho in [1e-8, 1e-4, 0.03, 0.3, 0.7, 0.94, 0.95, 0.999, 1.0 - 1e-9]:
         for theta in (0.0, 0.4, 1.1, math.pi / 2):
             computed = halfspace.disc_displacement(rho * math.cos(theta), rho * math.sin(theta), 1.0, 1.0, 1.0)
             # near the edge the elliptic integrals amplify the rounding of rho by the logarithm of 1 - rho
             assert_allclose(computed, exact_inside(rho, theta), rtol=3e-14, atol=0)
-
-
-def test_displacement_at_the_centre_and_on_the_edge():
     v = halfspace.disc_displacement([0.0, 2e-4, 0.0], [0.0, 0.0, 2e-4], 2e-4, 3e5, 1.6e6)
     unit = 3e5 * 2e-4 / 1.6e6
     assert_allclose(v / unit, [0.75, (1.5 + 1.0 / 6.0) / math.pi, (1.5 - 1.0 / 6.0) / math.pi], rtol=1e-14, atol=0)
-
-
-def test_far_from_the_disc_only_its_force_is_felt():
     x, y, a = 3e3, -4e3, 2.0
     force = np.pi * a**2 * 0.7
     exact = force * halfspace.point_displacement(x, y, 1.3, 0.4)
     # the next term of the multipole series is of order (a/r)^2
     assert_allclose(halfspace.disc_displacement(x, y, a, 0.7, 1.3, 0.4), exact, rtol=(a / 5e3) ** 2, atol=0)
-
-
-def test_displacement_is_continuous_across_the_edge():
     angle = np.linspace(0.0, 2.0 * np.pi, 50)
     inner, outer = (
         halfspace.disc_displacement(s * np.cos(angle), s * np.sin(angle), 1.0, 1.0, 1.0)

@@ -64,7 +64,7 @@ FOLD_AT_GRIPS = (6.0 ** (-1 / 3), -5.0 / 6.0, -3.0 * 6.0 ** (-2 / 3))
 ONLY_AT_GRIPS = (2.0 / 3.0, -28.0 / 27.0, -8.0 / 9.0)
 
 
-def test_radius_and_fold_of_the_known_states():
+def test_radius_load_indentation_and_fold_of_the_known_states():
     radius, load, indentation = np.transpose(STATES)
     assert_allclose(jkr.radius_at_load(load, **MAUGIS), radius, rtol=1e-12, atol=0)
     assert_allclose(jkr.radius_at_indentation(indentation, **MAUGIS), radius, rtol=1e-12, atol=0)
@@ -79,9 +79,6 @@ def test_radius_and_fold_of_the_known_states():
         assert_allclose(fold, levels[solve is jkr.radius_at_indentation], rtol=1e-12, atol=0)
         assert_allclose(solve(fold, **MAUGIS), radius, rtol=1e-12, atol=0)
         assert np.isnan(solve(np.nextafter(fold, -9.0), **MAUGIS))
-
-
-def test_load_and_indentation_of_the_known_states():
     radius, load, indentation = np.transpose([*STATES, FOLD_AT_LOAD, FOLD_AT_GRIPS, ONLY_AT_GRIPS])
     # atol: zero load and zero indentation are differences of numbers of order one
     assert_allclose(jkr.load_at_radius(radius, **MAUGIS), load, rtol=1e-12, atol=1e-14)
@@ -164,7 +161,7 @@ def test_load_and_indentation_are_two_views_of_one_contact():
     )
 
 
-def test_radius_at_no_or_negative_work_is_hertz():
+def test_hertz_is_the_radius_at_vanishing_no_or_negative_work():
     work, load, a = np.array([[0.0], [-0.0], [-1e-12], [-3.0], [-1e10]]), np.array([0.0, 1e-12, 1.0, 1e12]), 1e-4
     at_load = jkr.radius_at_load(load, work, 2e-3, 6.4e6)
     assert_array_equal(at_load, [jkr.hertz_radius_at_load(load, 2e-3, 6.4e6)] * 5)
@@ -177,9 +174,6 @@ def test_radius_at_no_or_negative_work_is_hertz():
     assert np.all(jkr.pull_off_indentation(work, 2e-3, 6.4e6) == 0.0)
     assert_allclose(jkr.load_at_radius(a, work, 2e-3, 6.4e6), 4 * 6.4e6 * a**3 / 6e-3, rtol=1e-14, atol=0)
     assert_allclose(jkr.indentation_at_radius(a, work, 2e-3, 6.4e6), a**2 / 2e-3, rtol=1e-14, atol=0)
-
-
-def test_hertz_is_the_limit_of_vanishing_work():
     load, indentation = 4e-3, 5e-6
     hertz = jkr.hertz_radius_at_load(load, 2e-3, 6.4e6), jkr.hertz_radius_at_indentation(indentation, 2e-3)
     assert_allclose(hertz, [(3 * load * 2e-3 / (4 * 6.4e6)) ** (1 / 3), 1e-4], rtol=1e-14, atol=0)
@@ -212,7 +206,7 @@ def integral(function, low, high):
     return half * np.sum(WEIGHTS * function(middle + half * NODES))
 
 
-def test_the_slope_of_a_potential_integrates_to_it():
+def test_the_potentials_are_legendre_transforms_with_their_slopes_and_forces():
     for potential, slope, control in [
         (jkr.potential_at_indentation, jkr.potential_slope_at_indentation, -0.8),
         (jkr.potential_at_indentation, jkr.potential_slope_at_indentation, 0.3),
@@ -222,18 +216,12 @@ def test_the_slope_of_a_potential_integrates_to_it():
         gained = integral(lambda a: slope(control, radius=a, **POTENTIAL), 0.8, 1.9)
         difference = potential(control, radius=1.9, **POTENTIAL) - potential(control, radius=0.8, **POTENTIAL)
         assert_allclose(gained, difference, rtol=1e-12, atol=0)
-
-
-def test_the_tractive_force_is_the_slope_of_the_potential_over_separation():
     middle, low, high = 0.1, -0.6, 0.8  # the potential is quadratic in s: its mid-slope is exact
     force = -jkr.load_under_indentation(1.2, -middle, POTENTIAL["sphere_radius"], POTENTIAL["modulus"])
     gained = jkr.potential_at_indentation(high, radius=1.2, **POTENTIAL) - jkr.potential_at_indentation(
         low, radius=1.2, **POTENTIAL
     )
     assert_allclose(force * (high - low), gained, rtol=1e-12, atol=0)
-
-
-def test_the_potentials_are_legendre_transforms():
     for force in [-2.0, 0.4]:
         radius = np.linspace(0.5, 2.0, 7)
         separation = -jkr.indentation_under_load(radius, -force, POTENTIAL["sphere_radius"], POTENTIAL["modulus"])

@@ -90,7 +90,7 @@ FOLDS = [
 ]
 
 
-def test_a_branch_ends_at_its_fold():
+def test_a_branch_ends_at_its_fold_in_a_jump_or_reaches_hertz_smoothly():
     for name, at_load, level, mixity, last, force in FOLDS:
         after = radius(name, level, force * (1.0 + 1e-10), mixity, at_load)
         hertz = jkr.hertz_radius_at_load(level, 1.0, MODULUS) if at_load else math.sqrt(level)
@@ -100,9 +100,6 @@ def test_a_branch_ends_at_its_fold():
         radii = radius(name, level, force * (1.0 - missing**2), mixity, at_load)
         assert_allclose(np.polynomial.Polynomial.fit(missing, radii, 5)(0.0), last, rtol=1e-8, atol=0)
         assert np.all(np.diff(radii) > 0.0)
-
-
-def test_the_scaled_angle_jumps_or_reaches_hertz_smoothly():
     for load, mixity in ((1.0, 0.2), (1.0, 0.5), (-1.0, 0.3), (0.0, 0.9), (100.0, 0.2), (100.0, 1.0)):
         limit = float(theories.scaled_angle_limit(load, WORK, mixity, 1.0))
         hertz = float(jkr.hertz_radius_at_load(load, 1.0, MODULUS)) if load >= 0.0 else math.nan
@@ -159,7 +156,7 @@ def test_limits_of_the_mixity():
                 assert 20 < np.sum(exact > np.fmax(plain(level, 0.0, *rest), 0.0)) < 400
 
 
-def test_a_small_force_costs_its_share_of_savkoor_briggs_loss():
+def test_a_small_force_costs_its_share_of_savkoor_briggs_loss_and_no_mixity_more():
     for mixity in [0.1, 0.6]:
         for name in LAWS:
             with mpmath.workdps(50):
@@ -180,9 +177,6 @@ def test_a_small_force_costs_its_share_of_savkoor_briggs_loss():
             assert_allclose(loss, float(expected) * full, rtol=2e-6, atol=0)
             computed = theories.mixities(float(expected) * full, 1.0, WORK, 1.0, MODULUS)[name]
             assert_allclose(computed, mixity, rtol=1e-13, atol=0)
-
-
-def test_no_mixity_shrinks_a_contact_more_than_full_stick_or_lets_it_grow():
     full = theories.savkoor_briggs_shrinkage(4e-3, 0.042, 2e-3, 6.4e6, 0.3)
     for computed in theories.mixities(full * np.array([-0.1, 0.0, 1.0, 1.1]), 4e-3, 0.042, 2e-3, 6.4e6, 0.3).values():
         assert_array_equal(computed, [math.nan, 0.0, 1.0, math.nan])

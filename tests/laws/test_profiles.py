@@ -26,16 +26,13 @@ def over_the_contact(values_of, radius, points=64):
     return 0.25 * math.pi * np.sum(weights * 2.0 * math.pi * r * radius * np.cos(t) * values_of(r))
 
 
-def test_the_pressure_carries_the_load():
+def test_the_pressure_carries_the_load_and_hertzs_is_johnsons():
     for radius, indentation in STATES:
         load = over_the_contact(lambda r: halfspace.pressure(r, radius, indentation, **LENS), radius)
         exact = jkr.load_under_indentation(radius, indentation, **LENS)
         # the largest part of the load is Hertz's; punch and quadrature add to it and may cancel to less
         size = jkr.load_under_indentation(radius, radius**2 / LENS["sphere_radius"], **LENS)
         assert abs(load - exact) < 1e-12 * size
-
-
-def test_the_pressure_of_hertz_is_johnsons():
     load, radius = 4e-3, float(jkr.hertz_radius_at_load(4e-3, **LENS))
     r = np.linspace(0.0, 0.99, 12) * radius
     peak = 1.5 * load / (math.pi * radius**2)
@@ -45,7 +42,7 @@ def test_the_pressure_of_hertz_is_johnsons():
     assert_allclose(computed, exact, rtol=1e-13, atol=0)
 
 
-def test_the_edge_pulls_with_the_intensity_that_the_work_of_adhesion_asks_for():
+def test_the_edge_pulls_with_the_intensity_of_the_work_and_hertz_has_no_tension():
     radius, indentation = lens_contact()
     intensity = halfspace.edge_intensity(radius, indentation, **LENS)
     # a^2/R - delta is a twelfth of its terms here
@@ -55,9 +52,6 @@ def test_the_edge_pulls_with_the_intensity_that_the_work_of_adhesion_asks_for():
         # the next terms are near/4 and Hertz's 4 a^2/(a^2 - R delta) near = 13 near of this one
         assert_allclose(pull, -intensity / math.sqrt(2.0 * math.pi * near * radius), rtol=20.0 * near, atol=0)
     assert halfspace.pressure(radius, radius, indentation, **LENS) == -math.inf
-
-
-def test_hertz_has_no_tension_and_jkr_has_at_the_edge_only():
     radius, indentation = lens_contact()
     r = np.linspace(0.0, 0.999, 200) * radius
     assert np.all(halfspace.pressure(r, radius, radius**2 / LENS["sphere_radius"], **LENS) > 0.0)
@@ -76,7 +70,7 @@ def exact_displacement(r, radius, indentation, sphere_radius):
         return hertz, punch, r**2 / (2 * big) - delta + hertz + punch
 
 
-def test_displacement_and_gap_outside_against_fifty_digits():
+def test_displacement_and_gap_outside_against_fifty_digits_overlap_only_beyond_hertz():
     for ratio in [1.0 + 2.0**-40, 1.001, 1.019, 1.021, 1.5, 4.0, 9.0, 1e3, 1e6]:
         for radius, indentation in STATES[1:]:
             # 1.0198 is where the series of the gap ends, 4.04 where that of the displacement begins
@@ -89,9 +83,6 @@ def test_displacement_and_gap_outside_against_fifty_digits():
         if ratio <= 1e3:
             hertz_opening = exact_displacement(ratio, 1.0, 1.0, 1.0)[2]
             assert abs(halfspace.gap(ratio, 1.0, 1.0, 1.0) / hertz_opening - 1) < 2e-14
-
-
-def test_surfaces_overlap_only_beside_a_contact_pressed_beyond_hertz():
     rng = np.random.default_rng(6)
     radius = 10.0 ** rng.uniform(-9.0, -1.0, 4000)
     sphere_radius = radius * 10.0 ** rng.uniform(0.0, 4.0, 4000)
@@ -101,15 +92,7 @@ def test_surfaces_overlap_only_beside_a_contact_pressed_beyond_hertz():
     assert halfspace.gap(1.001, 1.0, 1.5, 1.0) < 0.0
 
 
-def test_far_away_the_surface_feels_only_the_load():
-    radius, indentation = lens_contact()
-    r = 1e4 * radius
-    far = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
-    # the next term of the expansion is of relative order (a/r)^2 = 1e-8
-    assert_allclose(far, 4e-3 / (math.pi * LENS["modulus"] * r), rtol=1e-7, atol=0)
-
-
-def test_the_surface_is_continuous_at_the_edge_and_follows_the_sphere_inside():
+def test_the_surface_is_continuous_follows_the_sphere_inside_and_feels_the_load_far_away():
     for radius, indentation in STATES:
         inside = halfspace.normal_displacement(radius, radius, indentation, 2e-3)
         assert_allclose(inside, indentation - radius**2 / 4e-3, rtol=1e-15, atol=0)
@@ -117,6 +100,11 @@ def test_the_surface_is_continuous_at_the_edge_and_follows_the_sphere_inside():
         # the punch leaves the edge as a square root: sqrt(2e-12) of a^2/R
         assert abs(outside - inside) < 2e-6 * radius**2 / 2e-3
         assert_array_equal(halfspace.gap(np.linspace(0.0, 1.0, 9) * radius, radius, indentation, 2e-3), 0.0)
+    radius, indentation = lens_contact()
+    r = 1e4 * radius
+    far = float(halfspace.normal_displacement(r, radius, indentation, 2e-3))
+    # the next term of the expansion is of relative order (a/r)^2 = 1e-8
+    assert_allclose(far, 4e-3 / (math.pi * LENS["modulus"] * r), rtol=1e-7, atol=0)
 
 
 def test_the_work_of_the_pressure_is_the_elastic_energy():

@@ -64,21 +64,18 @@ def test_mass_yielding_contacts_and_damping_move_the_onset():
     assert np.isnan(onset(damping=10.0)).all() and np.isnan(onset(viscosity=10.0, contact_stiffness=0.03)).all()
 
 
-def test_the_steady_fraction_is_that_of_the_paper_with_its_limits():
+def test_the_steady_fraction_is_that_of_the_paper_where_the_rate_vanishes():
     speed = np.array([1e-3, 1e-2, -1e-2, 0.0, -0.0, np.inf, -np.inf])
     assert_allclose(law.steady_fraction(speed, 1e-2), [10 / 11, 0.5, 0.5, 1.0, 1.0, 0.0, 0.0], rtol=1e-15, atol=0)
     assert np.isnan(law.steady_fraction(np.nan, 1e-2))
     assert law.steady_fraction(1.0, np.inf) == 1.0
-
-
-def test_the_steady_fraction_is_where_the_rate_vanishes():
     for speed in [0.0, 1e-5, 1e-2, 10.0]:
         steady = law.steady_fraction(speed, CRITICAL)
         flow = HEALING * (1.0 - steady) + HEALING * speed / CRITICAL * steady
         assert abs(law.fraction_rate(steady, speed, CRITICAL, HEALING)) <= 4e-16 * max(flow, HEALING)
 
 
-def test_the_step_solves_the_rate_equation():
+def test_a_step_of_any_length_solves_the_rate_equation():
     for speed in [0.0, 3e-3, 0.5]:
         duration = 4e-3
         exact = solve_ivp(
@@ -86,9 +83,10 @@ def test_the_step_solves_the_rate_equation():
         )
         stepped = law.relax_fraction(0.3, speed * duration, duration, CRITICAL, HEALING)
         assert_allclose(stepped, exact.y[0, -1], rtol=1e-10, atol=0)
-
-
-def test_one_step_equals_seven_steps_of_a_seventh():
+    duration = 1e-9 / HEALING
+    gained = law.relax_fraction(0.0, 1e-3 * duration, duration, CRITICAL, HEALING)
+    # the next term of the exponential is 1e-9 of the first
+    assert_allclose(gained, law.fraction_rate(0.0, 1e-3, CRITICAL, HEALING) * duration, rtol=1e-9, atol=0)
     for start in [0.0, 0.3, 1.0]:
         for ratio in [0.0, 1e-6, 0.2, 1e9]:
             duration = EXPONENTS / (HEALING * (1.0 + ratio))
@@ -100,9 +98,6 @@ def test_one_step_equals_seven_steps_of_a_seventh():
             # nothing is left of bonds that opened e^-z ago: compare above the smallest normal number
             alive = once > 1e-300
             assert_allclose(parts[alive], once[alive], rtol=1e-12, atol=0)
-
-
-def test_a_step_keeps_the_steady_state_and_ends_in_it():
     for ratio in [0.0, 0.2, 1e9]:
         duration = EXPONENTS / HEALING
         path = ratio * CRITICAL * duration
@@ -110,16 +105,6 @@ def test_a_step_keeps_the_steady_state_and_ends_in_it():
         assert_allclose(law.relax_fraction(steady, path, duration, CRITICAL, HEALING), steady, rtol=1e-13, atol=0)
         late = law.relax_fraction([0.0, 1.0], path[-1], duration[-1], CRITICAL, HEALING)
         assert_allclose(late, steady, rtol=1e-13, atol=0)
-
-
-def test_a_short_step_is_the_rate_times_the_duration():
-    duration = 1e-9 / HEALING
-    gained = law.relax_fraction(0.0, 1e-3 * duration, duration, CRITICAL, HEALING)
-    # the next term of the exponential is 1e-9 of the first
-    assert_allclose(gained, law.fraction_rate(0.0, 1e-3, CRITICAL, HEALING) * duration, rtol=1e-9, atol=0)
-
-
-def test_special_steps():
     assert law.relax_fraction(0.37, 0.0, 0.0, CRITICAL, HEALING) == 0.37
     assert law.relax_fraction(0.37, 1.0, 1.0, CRITICAL, 0.0) == 0.37
     jump = law.relax_fraction(0.5, 1e-5, 0.0, CRITICAL, HEALING)
@@ -141,11 +126,18 @@ def test_transitions_are_those_of_the_two_state_generator():
         assert np.all((probability >= 0.0) & (probability <= 1.0))
 
 
-def test_populations_of_bonds_that_live_for_ever_or_never_or_do_not_rebind():
+def test_populations_of_equal_endless_or_no_lives():
     assert_array_equal(law.rest_share([0.0, 1.0, 3.0, 1.0], [2.0, 0.0, 1.0, math.inf]), [1.0, 0.0, 0.25, 1.0])
     assert_array_equal(law.renewal(math.inf, math.inf, math.inf, 0.0, 1.0, 1.0), [1.0, 0.0, 0.0])
     assert_array_equal(law.renewal(0.0, 0.0, 0.0, math.inf, 1.0, 1.0), [0.0, 0.0, 0.0])
     assert_array_equal(law.renewal(1.0, 0.5, 1 / 3, 1.0, 1.0, 0.0), [0.0, 0.0, 0.0])
+    speed, stretch, rate, stiffness = np.array([1e-9, 1e-3, 1.0]), 1e-6, 200.0, 1e-3
+    life = stretch / speed
+    bound, force, square = law.renewal(life, life**2 / 2, life**3 / 3, speed, stiffness, rate)
+    paper = law.steady_fraction(speed, stretch * rate)
+    assert_allclose(bound, paper, rtol=1e-15, atol=0)
+    assert_allclose(force, stiffness * stretch / 2 * paper, rtol=1e-14, atol=0)
+    assert_allclose(square, (stiffness * stretch) ** 2 / 3 * paper, rtol=1e-14, atol=0)
 
 
 @pytest.mark.parametrize("eps", some([1e-6, 1e-3, 0.3, 1.0, 30.0, 1e4, 1e8], 1e-3, 1.0, 1e4))
@@ -164,16 +156,6 @@ def test_bell_lives_to_thirty_digits_and_their_populations(eps):
     beta = np.array([0.1, 1.0, 10.0])
     exact = [life * eps**n / (lives[0] + 1 / beta) for n, life in enumerate(lives)]
     assert_allclose(law.bell_moments(eps, 1.0, 1.0, 1.0, beta), exact, rtol=1e-13, atol=0)
-
-
-def test_equal_lives_are_the_law_of_the_paper():
-    speed, stretch, rate, stiffness = np.array([1e-9, 1e-3, 1.0]), 1e-6, 200.0, 1e-3
-    life = stretch / speed
-    bound, force, square = law.renewal(life, life**2 / 2, life**3 / 3, speed, stiffness, rate)
-    paper = law.steady_fraction(speed, stretch * rate)
-    assert_allclose(bound, paper, rtol=1e-15, atol=0)
-    assert_allclose(force, stiffness * stretch / 2 * paper, rtol=1e-14, atol=0)
-    assert_allclose(square, (stiffness * stretch) ** 2 / 3 * paper, rtol=1e-14, atol=0)
 
 
 def some_bonds(count=12, seed=41):
@@ -199,16 +181,13 @@ def test_bell_lives_are_integrals_of_the_survival():
     assert_allclose(moments, law.renewal(*lives, speed, stiffness, k_on), rtol=1e-14, atol=0)
 
 
-def test_bell_bonds_of_infinite_bell_force_have_a_constant_rate():
+def test_bell_bonds_of_infinite_bell_force_at_rest_and_at_infinite_speed():
     k0, _, stiffness, k_on, speed = some_bonds()
     constant = law.constant_moments(speed, k0, stiffness, k_on)
     assert_allclose(law.bell_moments(speed, k0, math.inf, stiffness, k_on), constant, rtol=1e-14, atol=0)
     stiff = 1e9 * stiffness * speed / k0  # eps = 1e-9; the next terms are eps, 3 eps, 6 eps of the first
     assert_allclose(law.bell_moments(speed, k0, stiff, stiffness, k_on), constant, rtol=6e-9, atol=0)
     assert_allclose(constant.bound, law.rest_share(k0, k_on), rtol=1e-15, atol=0)
-
-
-def test_bell_bonds_at_rest_and_at_infinite_speed():
     k0, k_on = 20.0, 30.0
     assert_allclose(law.bell_lives(0.0, k0, 1e-11, 1e-3), [1 / k0, 1 / k0**2, 2 / k0**3], rtol=1e-15, atol=0)
     assert_allclose(law.bell_moments(0.0, k0, 1e-11, 1e-3, k_on), [0.6, 0.0, 0.0], rtol=1e-15, atol=0)
@@ -256,7 +235,7 @@ def test_no_speed_has_more_friction_than_the_peak():
             assert abs(highest.x) < 1e-6
 
 
-def test_mean_field_is_the_closure_to_fifty_digits():
+def test_mean_field_is_the_closure_to_fifty_digits_with_its_limits():
     eps, beta = np.array([0.01, 0.1, 1.0, 3.0, 10.0, 100.0, 1e3]), np.array([[0.1], [1.0], [10.0], [100.0]])
     with mp.workdps(50):
         stretch = np.array([mp.lambertw(mp.mpf(value)).real for value in eps])  # x e^x = eps
@@ -277,27 +256,6 @@ def test_mean_field_is_the_closure_to_fifty_digits():
     stress = law.first_moment_stress(speed, k0, bell_force, stiffness, k_on, 1e16)
     # rounding of the exponent, up to 11
     assert_allclose(stress, 1e16 * k_on / (k_on + rupture) * stiffness * stretch, rtol=2e-13, atol=0)
-
-
-def test_peak_and_half_population_over_all_rebinding_rates():
-    beta = np.geomspace(1e-12, 1e12, 49)
-    peak = law.bell_peak(1.0, 1.0, 1.0, beta, 1.0)
-    for factor in (0.9, 1.1):
-        assert np.all(law.bell_stress(factor * peak.speed, 1.0, 1.0, 1.0, beta, 1.0) < peak.stress)
-    assert_allclose(
-        law.bell_fraction(law.bell_critical_speed(1.0, 1.0, 1.0, beta), 1.0, 1.0, 1.0, beta), 0.5, rtol=1e-13, atol=0
-    )
-    assert_array_equal(law.bell_peak(1.0, 1.0, 1.0, [0.0, math.inf], 1.0).stress, [0.0, math.inf])
-    assert law.bell_critical_speed(1.0, 1.0, 1.0, math.inf) == math.inf
-
-
-def test_mean_field_exaggerates_the_maximum():
-    beta = [1.0, 10.0, 100.0]
-    ratio = law.first_moment_peak(1.0, 1.0, 1.0, beta, 1.0).stress / law.bell_peak(1.0, 1.0, 1.0, beta, 1.0).stress
-    assert_allclose(ratio, [1.27, 1.37, 1.47], rtol=0, atol=0.006)
-
-
-def test_limits_of_mean_field():
     assert_array_equal(law.first_moment_fraction([0.0, math.inf], 1.0, 1.0, 1.0, 1.0), [1.0, 0.0])
     assert_array_equal(law.first_moment_stress([0.0, math.inf], 1.0, 1.0, 1.0, 1.0, 1.0), [0.0, 0.0])
     # an infinite Bell force is a constant rate, for which mean field is exact
@@ -309,7 +267,22 @@ def test_limits_of_mean_field():
     assert_allclose((ratio - 1.0) / eps, 1.0, rtol=2e-3, atol=0)
 
 
-def test_cut_off_without_rate_is_the_law_of_the_paper():
+def test_peak_and_half_population_over_all_rebinding_rates_and_mean_fields_larger_peak():
+    beta = np.geomspace(1e-12, 1e12, 49)
+    peak = law.bell_peak(1.0, 1.0, 1.0, beta, 1.0)
+    for factor in (0.9, 1.1):
+        assert np.all(law.bell_stress(factor * peak.speed, 1.0, 1.0, 1.0, beta, 1.0) < peak.stress)
+    assert_allclose(
+        law.bell_fraction(law.bell_critical_speed(1.0, 1.0, 1.0, beta), 1.0, 1.0, 1.0, beta), 0.5, rtol=1e-13, atol=0
+    )
+    assert_array_equal(law.bell_peak(1.0, 1.0, 1.0, [0.0, math.inf], 1.0).stress, [0.0, math.inf])
+    assert law.bell_critical_speed(1.0, 1.0, 1.0, math.inf) == math.inf
+    beta = [1.0, 10.0, 100.0]
+    ratio = law.first_moment_peak(1.0, 1.0, 1.0, beta, 1.0).stress / law.bell_peak(1.0, 1.0, 1.0, beta, 1.0).stress
+    assert_allclose(ratio, [1.27, 1.37, 1.47], rtol=0, atol=0.006)
+
+
+def test_cut_off_is_the_law_of_the_paper_and_has_its_limits_and_friction_maximum():
     speed = np.array([0.0, 1e-6, 1e-3, 1e-2, 1.0, math.inf])
     stretch, k_on = 5e-6, 200.0
     paper = law.steady_fraction(speed, stretch * k_on)
@@ -321,9 +294,19 @@ def test_cut_off_without_rate_is_the_law_of_the_paper():
     assert force[0] == 0.0  # between the two signs of sliding
     back = law.cut_off_stress(-1e-2, 0.0, stretch, 1e-3, k_on, 1e16)
     assert_allclose(back, -2.5e7 * law.steady_fraction(1e-2, 1e-3), rtol=1e-14, atol=0)
+    assert_array_equal(law.cut_off_moments(0.0, 2.0, 1.0, 1.0, 6.0), [0.75, 0.0, 0.0])
+    assert_array_equal(law.cut_off_moments(math.inf, 2.0, 1.0, 1.0, 6.0), [0.0, 0.0, 0.0])
+    assert_array_equal(law.cut_off_fraction([0.0, math.inf], [[0.0], [2.0]], 1.0, 6.0), [[1.0, 0.0], [1.0, 0.0]])
+    far = law.cut_off_moments(3.0, 2.0, math.inf, 1.0, 6.0)
+    assert_allclose(far, law.constant_moments(3.0, 2.0, 1.0, 6.0), rtol=1e-15, atol=0)
+    wait, peak = np.array([0.1, 1.0, 10.0]), np.array([1.51372, 0.730401, 0.578097])
+    stress = law.cut_off_stress([[0.99], [1.0], [1.01]] * peak, 1.0, 1.0, 1.0, 1.0 / wait, 1.0)
+    assert_allclose(stress[1], [0.369018, 0.166299, 0.0275600], rtol=0, atol=5.1e-7)
+    assert np.all(stress[[0, 2]] < stress[1])
+    assert_allclose(law.cut_off_stress(1e8, 1.0, 1.0, 1.0, math.inf, 1.0), 0.5, rtol=1e-8, atol=0)  # the plateau
 
 
-def test_cut_off_to_fifty_digits():
+def test_cut_off_to_fifty_digits_and_as_the_renewal_of_its_survival():
     for wait in [0.0, 0.1, 1.0, 10.0]:
         for u in np.concatenate([10.0 ** np.arange(-8, 9), [0.2, 0.33, 0.3334, 0.5, 2.0]]):
             with mp.workdps(50):
@@ -337,9 +320,6 @@ def test_cut_off_to_fifty_digits():
             assert_allclose(law.cut_off_moments(u, 1.0, 1.0, 1.0, k_on), exact, rtol=1e-14, atol=0)
             expected = 1.0 if wait == 0.0 else exact[0] * (1 + wait)
             assert_allclose(law.cut_off_fraction(u, 1.0, 1.0, k_on), expected, rtol=1e-14, atol=0)
-
-
-def test_cut_off_is_the_renewal_of_its_survival():
     k0, _, stiffness, k_on, _ = some_bonds(8)
     stretch, speed = 1e-6, k0 * 1e-6 * 10.0 ** np.linspace(-1.5, 2, 8)
     last = stretch / speed * k0  # in units of 1/k0; e^-32 is left of the slowest bonds
@@ -351,20 +331,7 @@ def test_cut_off_is_the_renewal_of_its_survival():
     assert_allclose(law.cut_off_moments(speed, k0, stretch, stiffness, k_on), expected, rtol=1e-11, atol=0)
 
 
-def test_limits_and_friction_maximum_of_the_cut_off():
-    assert_array_equal(law.cut_off_moments(0.0, 2.0, 1.0, 1.0, 6.0), [0.75, 0.0, 0.0])
-    assert_array_equal(law.cut_off_moments(math.inf, 2.0, 1.0, 1.0, 6.0), [0.0, 0.0, 0.0])
-    assert_array_equal(law.cut_off_fraction([0.0, math.inf], [[0.0], [2.0]], 1.0, 6.0), [[1.0, 0.0], [1.0, 0.0]])
-    far = law.cut_off_moments(3.0, 2.0, math.inf, 1.0, 6.0)
-    assert_allclose(far, law.constant_moments(3.0, 2.0, 1.0, 6.0), rtol=1e-15, atol=0)
-    wait, peak = np.array([0.1, 1.0, 10.0]), np.array([1.51372, 0.730401, 0.578097])
-    stress = law.cut_off_stress([[0.99], [1.0], [1.01]] * peak, 1.0, 1.0, 1.0, 1.0 / wait, 1.0)
-    assert_allclose(stress[1], [0.369018, 0.166299, 0.0275600], rtol=0, atol=5.1e-7)
-    assert np.all(stress[[0, 2]] < stress[1])
-    assert_allclose(law.cut_off_stress(1e8, 1.0, 1.0, 1.0, math.inf, 1.0), 0.5, rtol=1e-8, atol=0)  # the plateau
-
-
-def test_rupture_forces_of_bell_and_evans():
+def test_rupture_forces_of_bell_and_evans_and_their_density():
     rate = 1.0 / np.array([2.0, 0.1, 1e-3])
     mean = law.bell_rupture_force(rate, 1.0, 1.0)
     assert_allclose(mean, [0.361329, 2.014643, 6.337874], rtol=0, atol=5.1e-7)
@@ -372,9 +339,6 @@ def test_rupture_forces_of_bell_and_evans():
     assert_allclose(variance, [0.080249, 0.830820, 1.591758], rtol=0, atol=5.1e-7)
     assert_array_equal(law.bell_rupture_force([0.0, -1.0], 1.0, 1.0), [0.0, -law.bell_rupture_force(1.0, 1.0, 1.0)])
     assert law.bell_rupture_force(3.0, 2.0, math.inf) == 1.5
-
-
-def test_density_of_rupture_forces():
     for z in [5.0, 0.1, 1e-6]:
         rate = 2e-11 / z  # k0 = 2/s, f_b = 1e-11 N
         top = 1e-11 * math.log1p(40.0 / z)
@@ -392,7 +356,7 @@ def test_density_of_rupture_forces():
         assert_array_equal(law.bell_rupture_force_density([-1e-11, 1e-6, math.inf], rate, 2.0, 1e-11), [0.0, 0.0, 0.0])
 
 
-def test_static_peak_to_fifty_digits():
+def test_a_start_is_elastic_first_has_its_peak_to_fifty_digits_and_is_forgotten_last():
     for eps in 10.0 ** np.arange(-6, 9):
         with mp.workdps(50):
             tilt = mp.lambertw(mp.mpf(eps)).real
@@ -404,9 +368,6 @@ def test_static_peak_to_fifty_digits():
     at_peak = law.start_up_force([[0.9], [1.0], [1.1]] * peak.time, speed, k0, force, stiffness)
     assert_allclose(at_peak[1], peak.force, rtol=1e-14, atol=0)
     assert np.all(at_peak[[0, 2]] < peak.force)
-
-
-def test_a_start_is_elastic_first_and_forgotten_last():
     assert_allclose(law.start_up_force(1e-9, 3.0, 1.0, 1.0, 2.0), 6e-9, rtol=2e-9, atol=0)  # 1 - k0 t - ...
     assert_array_equal(law.start_up_force([0.0, 1e9, math.inf], 3.0, 1.0, 1.0, 2.0), [0.0, 0.0, 0.0])
     assert_allclose(law.start_up_force(0.5, 3.0, 2.0, math.inf, 1.0), 1.5 * math.exp(-1.0), rtol=1e-15, atol=0)
@@ -414,14 +375,11 @@ def test_a_start_is_elastic_first_and_forgotten_last():
     assert_allclose(law.start_up_peak(3.0, 4.0, math.inf, 1.0), [0.25, 0.75 / math.e], rtol=1e-15, atol=0)
 
 
-def test_lifetimes_of_clusters():
+def test_lifetimes_of_clusters_large_and_small_solve_the_equations_of_first_passage():
     cases = [(5, 0.0, 0.0, 137 / 60), (2, 0.0, 1.0, 2.0), (5, 2.0, 1.0, 1.1504943644695798)]
     cases += [(10, 5.0, 1.0, 0.8210570712132322), (10, 0.0, 0.5, 16.07684151785714)]
     for bonds, force, beta, exact in cases:
         assert_allclose(law.cluster_lifetime(bonds, force, 1.0, 1.0, beta), exact, rtol=1e-14, atol=0)
-
-
-def test_lifetimes_solve_the_equations_of_first_passage():
     for bonds, force, beta in [(1, 3.0, 2.0), (7, 4.0, 0.3), (40, 30.0, 2.0), (40, 0.0, 3.0)]:
         i = np.arange(1, bonds + 1)
         with mp.workdps(60):
@@ -438,9 +396,6 @@ def test_lifetimes_solve_the_equations_of_first_passage():
         # three roundings a bond, and those of F/(i f_b) up to 30 in the exponent
         lifetime = law.cluster_lifetime(bonds, force * 1e-11, 50.0, 1e-11, beta * 50.0)
         assert_allclose(lifetime, exact / 50.0, rtol=3e-14, atol=0)
-
-
-def test_large_clusters():
     n = np.arange(1, 3001)
     assert_allclose(law.cluster_lifetime(3000, 0.0, 1.0, 1.0, 0.0), math.fsum(1 / n), rtol=1e-13, atol=0)
     assert_allclose(

@@ -119,7 +119,7 @@ def test_radii_with_a_work_linear_in_the_radius_to_sixty_digits(count):
                 assert abs(computed / exact - 1) < room if exact > 0 else computed == 0.0
 
 
-def test_near_the_fold_of_a_reversible_contact_only_half_the_digits_are_lost():
+def test_pull_off_of_a_reversible_contact_and_half_the_digits_lost_near_it():
     for distance in [1e-3, 1e-6, 1e-9, 1e-12]:
         # the lowest load is radii from P(a) in sixty digits, w = w0 (1 - a/2) in Maugis units
         line = 0.5 / math.pi
@@ -138,9 +138,6 @@ def test_near_the_fold_of_a_reversible_contact_only_half_the_digits_are_lost():
         assert abs(computed / exact - 1) < 12.0 * U * (1.0 + amplification)
         beyond = float(fold * (1 + mpmath.mpf(distance)))
         assert np.isnan(reversible.radius_at_load_reversible(beyond, 1.0 / math.pi, stress, 1.0, 1.0, 0.75))
-
-
-def test_pull_off_load_where_the_work_falls_with_the_radius():
     for fall, last_load in [(0.1, -1.337), (1.0, -0.506)]:
         # w = w0 (1 - fall a) in Maugis units
         stress = math.sqrt(fall / math.pi * 0.75 * math.pi / 6.0)
@@ -175,13 +172,10 @@ TABLE = {  # R = w = G = 1, P = 5, stress 0, 0.5, 1, 1.5, 2
 STRESSES = [0.0, 0.5, 1.0, 1.5, 2.0]
 
 
-def test_one_scene_by_every_theory():
+def test_one_scene_by_every_theory_at_a_held_stress_and_force():
     for theory in TABLE:
         computed = theories.compare_at_load(STRESSES, 5.0, **UNIT)[theory]
         assert_allclose(computed[: len(TABLE[theory])], TABLE[theory], rtol=0, atol=6e-6)
-
-
-def test_what_stands_at_a_held_stress_need_not_at_a_held_force():
     # at stress 2 the balance of the reversible law at a force has the root 1.28211; it is narrower than
     # the last contact that a force can hold, 4 E* a^3/(3R) = P + 3 pi w R
     at_stress = reversible.radius_at_load_reversible(5.0, 1.0, 2.0, 1.0 / 3.0, 1.0, 4.0)
@@ -207,7 +201,7 @@ def test_compare_broadcasts_to_one_shape_and_holds_every_theory():
             assert np.all(scene[wider][2] >= (1.0 - 8 * U) * scene[narrower][2])
 
 
-def test_savkoor_briggs_closes_its_own_balance_and_ends_at_its_limit():
+def test_savkoor_briggs_closes_its_own_balance_ends_at_its_limit_and_shrinks_by_its_coefficient():
     load, work, sphere_radius, modulus = 4e-3, 0.042, 2e-3, 6.4e6
     limit = float(theories.savkoor_briggs_limit(load, work, sphere_radius))
     pull = 1.5 * math.pi * work * sphere_radius
@@ -223,9 +217,6 @@ def test_savkoor_briggs_closes_its_own_balance_and_ends_at_its_limit():
     after = theories.savkoor_briggs_at_load(load, work, np.nextafter(limit, 1.0), sphere_radius, modulus)
     assert after == jkr.hertz_radius_at_load(load, sphere_radius, modulus)
     assert np.isnan(theories.savkoor_briggs_at_load(-0.5 * pull, work, limit, sphere_radius, modulus))
-
-
-def test_small_forces_shrink_the_area_by_savkoor_briggs_coefficient():
     force = 1e-4 * theories.savkoor_briggs_limit(5.0, 1.0, 1.0, 0.3)
     before, after = theories.savkoor_briggs_at_load(5.0, 1.0, [0.0, force], 1.0, 4.0, 0.3)
     loss = math.pi * (before**2 - after**2) / force**2
@@ -261,18 +252,7 @@ def test_a_contact_behind_any_stiffness_is_the_contact_at_its_load():
         assert_allclose(shrunk, radius, rtol=40 * U, atol=0)
 
 
-def test_sahlis_area_at_a_stress_is_that_at_its_force_and_never_below_hertz():
-    stress = np.linspace(0.0, 30.0, 31)
-    radii = theories.compare_at_load(stress, 5.0, **UNIT, shrinkage=0.01)
-    force = math.pi * radii["sahli"] ** 2 * stress
-    again = theories.sahli_at_load(5.0, 1.0, force, 0.01, 1.0, 4.0)
-    assert_allclose(again, radii["sahli"], rtol=1e-13, atol=0)
-    assert radii["sahli"][-1] == radii["hertz"][-1]
-    assert np.isnan(theories.sahli_at_load(-1.0, 1.0, 1e3, 0.01, 1.0, 4.0))
-    assert np.isnan(theories.sahli_at_load(5.0, 1.0, 1.0, math.nan, 1.0, 4.0))
-
-
-def test_a_held_force_gives_the_radius_of_its_stress_up_to_the_limit():
+def test_held_forces_give_the_radii_of_their_stresses_and_sahlis_is_never_below_hertz():
     stress = np.linspace(0.0, 3.0, 61)
     at_load = theories.compare_at_load, 5.0
     at_indentation = theories.compare_at_indentation, 1.0
@@ -292,6 +272,14 @@ def test_a_held_force_gives_the_radius_of_its_stress_up_to_the_limit():
             assert np.all(np.diff(force) > 0.0)
             assert law(level, 1.0, 1.2 * force[-1], 1.0, 4.0, poisson_ratio) == radii["hertz"][-1]
             assert 5 < adhesive.sum() < 60
+    stress = np.linspace(0.0, 30.0, 31)
+    radii = theories.compare_at_load(stress, 5.0, **UNIT, shrinkage=0.01)
+    force = math.pi * radii["sahli"] ** 2 * stress
+    again = theories.sahli_at_load(5.0, 1.0, force, 0.01, 1.0, 4.0)
+    assert_allclose(again, radii["sahli"], rtol=1e-13, atol=0)
+    assert radii["sahli"][-1] == radii["hertz"][-1]
+    assert np.isnan(theories.sahli_at_load(-1.0, 1.0, 1e3, 0.01, 1.0, 4.0))
+    assert np.isnan(theories.sahli_at_load(5.0, 1.0, 1.0, math.nan, 1.0, 4.0))
 
 
 def test_energy_of_the_mean_stress_per_new_area_is_the_work_along_the_edge():
@@ -306,16 +294,13 @@ def test_energy_of_the_mean_stress_per_new_area_is_the_work_along_the_edge():
         assert_allclose(2.0 / 3.0 * energy * math.pi * radius**2, stored, rtol=1e-14, atol=0)
 
 
-def test_the_reversible_contact_sits_in_a_minimum_of_the_energy():
+def test_the_reversible_contact_sits_in_a_minimum_of_the_energy_that_pulling_changes():
     load = np.array([-1.5, -0.5, 0.0, 5.0])
     radius = reversible.radius_at_load_reversible(load, 1.0, 1.0, 0.3, 1.0, 4.0)
     factor = np.array([[1.0], [0.98], [0.999], [1.001], [1.02]])
     # potential at a load, with the adhesion and the share of the shear energy that it pays for
     energy = jkr.potential_at_load(-load, 0.0, factor * radius, **UNIT) + 0.3 * 4.0 * (factor * radius) ** 3 / 4.0
     assert np.all(energy[1:] > energy[0])
-
-
-def test_pulling_a_reversible_contact_spends_what_its_energies_gain():
     # from the radius without load to just before the fold, at a held stress
     stress, share, e = 1.0, 0.3, 4.0
     nodes, weights = np.polynomial.legendre.leggauss(60)
