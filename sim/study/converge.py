@@ -298,14 +298,6 @@ def _known_errors(row: Setting, truth: Gammas, power: int) -> Array:
     return np.array([value / exact - 1.0 if exact else 0.0 for value, exact in zip(*sums, strict=True)])
 
 
-def _truth(base: Scenario) -> Gammas:
-    """Return the distribution of ΔΓ by all modes of the cell."""
-    part: Any = base.fluctuations
-    pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)
-    weight, shape, wavenumber = np.broadcast_arrays(pairs.weight, pairs.count.astype(float), pairs.wavenumber)
-    return Gammas(weight, shape, wavenumber)
-
-
 def _errors(values: Array, reference: Array, known: Array | None = None) -> tuple[Array, Array]:
     """Return the largest differences over the run between two settings, and their standard errors.
 
@@ -322,8 +314,8 @@ def _errors(values: Array, reference: Array, known: Array | None = None) -> tupl
     error, standard_error : array, shape (4, 4)
         For each quantity and statistic, in units of the largest mean, for the spread of ΔΓ of its largest spread.
     """
-    (moments, influence), (exact, of_exact) = _moments(values), _moments(reference)
-    difference, influence = moments - exact, influence - of_exact
+    (moments, of_moments), (exact, of_exact) = _moments(values), _moments(reference)
+    difference, influence = moments - exact, of_moments - of_exact
     if known is not None:
         off = of_exact[:, 0]
         along, variance = (np.sum(off[of] * off[_ENERGY], axis=0) for of in (_RADIUS, _ENERGY))
@@ -361,22 +353,25 @@ def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[
     """
     steps, left = _records(max((row.scenario for row in settings), key=_fluctuates)), end - time.process_time()
     fitting, samples = sorted(settings, key=lambda row: (not row.own, row.time)), dict[str, Array]()
-    part, costs = cast(Any, base.fluctuations), {row.label: row.time / base.ensemble.members for row in settings}
-    alike = [row.label for row in settings if not _fluctuates(row.scenario)]  # one member stands for all
-    while sum(costs[row.label] * _FEWEST for row in fitting if row.label not in alike) > left:
+    # one member stands for all if members do not differ
+    costs = {row.label: row.time / base.ensemble.members * _fluctuates(row.scenario) for row in settings}
+    while (cost := sum(costs[row.label] for row in fitting)) * _FEWEST > left:
         _leave_out(fitting.pop(), left_out)
-    noisy = sum(costs[row.label] for row in fitting if row.label not in alike)
-    count = int(np.clip(0.5 * left / max(noisy, 1e-12), _FEWEST, _MOST))
+    count = int(np.clip(0.5 * left / max(cost, 1e-12), _FEWEST, _MOST))
     for row in fitting:
-        row.members = 1 if row.label in alike else count
+        row.members = count if _fluctuates(row.scenario) else 1
         try:
             samples[row.label] = _run(row.scenario, row.members, steps, end)
         except TimeoutError:
             _leave_out(row, left_out)
-    fitting = [row for row in settings if row.label in samples]
-    truth = _truth(base) if fitting[0].part == "shear" and part.per_member and not part.amplitude.relaxing else None
+    fitting, known, part = [row for row in settings if row.label in samples], None, cast(Any, base.fluctuations)
+    has_truth = fitting[0].part == "shear" and part.per_member and not part.amplitude.relaxing
+    if has_truth:  # the distribution of ΔΓ by all modes of the cell
+        pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)
+        terms = np.broadcast_arrays(pairs.weight, pairs.count.astype(float), pairs.wavenumber)
+        truth = Gammas(terms[0], terms[1], terms[2])
     for row in fitting:
-        known = None if truth is None else _known_errors(row, truth, part.correlation.power)
+        known = _known_errors(row, truth, part.correlation.power) if has_truth else None
         row.error, row.standard_error = _errors(samples[row.label], samples[fitting[-1].label], known)
     return fitting
 
@@ -414,17 +409,16 @@ def _at_steps(rows: Sequence[Setting], count: int) -> list[Array]:
 
     Fluctuations have no error in time. Their amplitude and the bonds have, so these are computed at each step.
     """
-    finest, part = rows[0].scenario, rows[0].scenario.fluctuations
-    scenarios = [row.scenario for row in rows]
+    finest, *others = scenarios = [row.scenario for row in rows]
+    part = finest.fluctuations
     if part.per_member and not (part.law.relaxing or part.law.remembers or part.spectrum.bond_made):
         steps = range(0, finest.clock.steps + 1, round(rows[1].ratio / rows[0].ratio))
         _, course = follow(finest, MemberNoise.of(finest.seed, np.arange(count)), None, steps)
         size = part.law.factor(course.speed, course.strength) ** 2
         unit = np.divide(course.energy, size, out=np.zeros(course.energy.shape), where=size > 0.0)
-        for place, row in enumerate(rows[1:], 1):
-            scenarios[place] = row.scenario.with_values({})
-            replayed = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
-            scenarios[place].__dict__["process"] = replayed
+        scenarios[1:] = [scenario.with_values({}) for scenario in others]
+        for scenario, row in zip(scenarios[1:], rows[1:], strict=True):
+            scenario.__dict__["process"] = _Replayed(row.scenario, unit[:: round(row.ratio / rows[1].ratio)])
     return [_run(scenario, count, _records(scenario)) for scenario in scenarios]
 
 
@@ -511,14 +505,14 @@ def _worst(error: Array, deviation: Array) -> tuple[str, int, int]:
 def table(dataset: xr.Dataset) -> list[dict[str, str]]:
     """Return a row for each setting, for the terminal."""
     lines = list[dict[str, str]]()
-    for name in dataset["row"].to_numpy():
-        here = dataset.sel(row=name)
-        cells = {"changed": str(here["part"].values), "setting": str(name) + " *" * int(here["own"])}
-        cells["time"] = engineering(float(f"{float(here['time']):.2g}"), "s")
-        for place, symbol in enumerate(_WORDS):
-            size, _, statistic = _worst(*(here[of].to_numpy()[place : place + 1] for of in ("error", "standard_error")))
+    columns = ("row", "part", "own", "time", "members", "error", "standard_error")
+    for name, part, own, cost, members, *errors in zip(*(dataset[of].to_numpy() for of in columns), strict=True):
+        cells = {"changed": str(part), "setting": str(name) + " *" * int(own)}
+        cells["time"] = engineering(float(f"{cost:.2g}"), "s")
+        for symbol, error, deviation in zip(_WORDS, *errors, strict=True):
+            size, _, statistic = _worst(error[np.newaxis], deviation)
             cells[f"{symbol}\n(%)"] = f"{size} {STATISTICS[statistic]}" if statistic and size != "0" else size
-        lines.append(cells | {"members": f"{int(here['members']):,}"})
+        lines.append(cells | {"members": f"{members:,}"})
     return lines
 
 

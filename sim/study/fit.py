@@ -31,26 +31,12 @@ from sim.scenario.files import parse, written
 from sim.scenario.scenario import Scenario
 from sim.scenario.schema import files_read, quantities
 from sim.scenario.sweep import set_key
-from sim.study.likelihood import (
-    HELD,
-    LEVEL,
-    Free,
-    Interval,
-    Measured,
-    Minimum,
-    Problem,
-    entangled,
-    groups,
-    idle,
-    interval,
-    problem_of,
-    read,
-    with_errors,
-)
+from sim.study import likelihood
+from sim.study.likelihood import HELD, LEVEL, Free, Interval, Measured, Minimum, Problem, idle, with_errors
 from sim.study.mechanisms import WHOLE, Verdict, compare
 from sim.units.errors import BadInput
 from sim.units.notation import concise, engineering, scaled
-from sim.units.quantity import Quantity, read_option
+from sim.units.quantity import read_option
 
 Array = NDArray[np.float64]
 
@@ -140,14 +126,19 @@ def fit(
     free_numbers = [_free(base, text) for text in free]
     if len({item.key for item in free_numbers}) < len(free_numbers):
         raise BadInput(["--free: a key is there twice; give each once"])
-    tables = [read(path, base) for path in data]
-    problem = problem_of(tables, [groups(base, table) for table in tables], free_numbers, common or {})
+    tables = [likelihood.read(path, base) for path in data]
+    groups = [likelihood.groups(base, table) for table in tables]
+    problem = likelihood.problem_of(tables, groups, free_numbers, common or {})
     drive = base.drive
     if steady and drive.solves_motion:
         raise BadInput([f'--steady: drive.model = "{drive.model}" is answered by its own runs alone; leave it out'])
     if drive.solves_motion or (not steady and idle(problem)):
         problem = replace(problem, by_run=True).compared(problem.start)
-    _refuse_entangled(problem)
+    faults = [f"--free {key}: has no effect on what was measured; fix it" for key in idle(problem)]
+    for keys in [] if faults else likelihood.entangled(problem):
+        faults.append(f"--free {', '.join(keys)}: the curves depend on them only together; free one of them")
+    if faults:
+        raise BadInput(faults)
     problem, best = _searched(problem)
     alone, steady = best, steady or problem.by_run
     converged = steady and best.converged
@@ -166,19 +157,14 @@ def _searched(problem: Problem) -> tuple[Problem, Minimum]:
     A contact that is open has no slope that would lead out of there.
     """
     minima = [with_errors(problem, problem.start)]
-    if not problem.by_run and (_poor(*minima[0]) or _open(*minima[0]).size):
-        for k, item in enumerate(problem.free):
-            for sign in (-1.0, 1.0):
-                beside = minima[0][1].x.copy()
-                beside[k] += sign * _BESIDE * item.width
-                minima.append(with_errors(problem, beside))
+    (scattered, best), freedom = minima[0], problem.freedom
+    is_poor = freedom > 0 and best.chi_square > freedom + 4.0 * math.sqrt(2.0 * freedom)
+    if not problem.by_run and (is_poor or _open(scattered, best).size):
+        for (k, item), sign in itertools.product(enumerate(problem.free), (-1.0, 1.0)):
+            beside = best.x.copy()
+            beside[k] += sign * _BESIDE * item.width
+            minima.append(with_errors(problem, beside))
     return min(minima, key=lambda item: item[0].criterion(item[1].chi_square))
-
-
-def _poor(problem: Problem, best: Minimum) -> bool:
-    """Return True if the curves lie further off than their errors."""
-    freedom = problem.freedom
-    return bool(freedom > 0 and best.chi_square > freedom + 4.0 * math.sqrt(2.0 * freedom))
 
 
 def _open(problem: Problem, best: Minimum) -> NDArray[np.int64]:
@@ -190,11 +176,10 @@ def _assembled(scenario: Scenario, problem: Problem, best: Minimum, alone: Minim
     """Return the fit with its intervals and remarks."""
     count, size, known = len(problem.free), len(best.x), best.covariance is not None
     covariance = np.full((size, size), np.nan) if best.covariance is None else best.covariance
-    spread = np.sqrt(np.diag(covariance))
-    estimates = []
+    spread, estimates = np.sqrt(np.diag(covariance)), []
     for k, item in enumerate(problem.free):
-        value, unshifted = item.outer(float(best.x[k])), item.outer(float(alone.x[k]))
-        ends = interval(problem, best, k) if known else Interval(math.nan, math.nan, True, True)
+        value, unshifted = (item.outer(float(least.x[k])) for least in (best, alone))
+        ends = likelihood.interval(problem, best, k) if known else Interval(math.nan, math.nan, True, True)
         error = float(spread[k] * (value if item.logarithmic else 1.0))
         estimates.append(Estimate(item, value, error, ends, unshifted))
     alike = (covariance / np.outer(spread, spread))[:count, :count]
@@ -238,46 +223,26 @@ def _remarks(result: Fit) -> Iterator[str]:
 def _free(scenario: Scenario, text: str) -> Free:
     """Return the free number of a text ``KEY`` or ``KEY=LOW:HIGH``."""
     key, sign, span = text.partition("=")
-    key, known = key.strip(), {
-        key: (quantity, value) for key, (quantity, value) in quantities(scenario).items()
-        if key.partition(".")[0] not in _OTHER and not quantity.whole
-    }  # fmt: skip
+    physical = (item for item in quantities(scenario).items() if item[0].partition(".")[0] not in _OTHER)
+    key, known = key.strip(), {name: number for name, number in physical if not number[0].whole}
     if key not in known:
         near = "".join(f'; did you mean "{name}"?' for name in difflib.get_close_matches(key, known, 1, 0.5))
         raise BadInput([f"--free {key[:80]}: is no physical number of the scenario{near}"])
     quantity, start = known[key]
     low, high = max(quantity.at_least, quantity.above), min(quantity.at_most, quantity.below)
     if sign:
-        low, high = _span(key, span, quantity)
+        bounds = {kind: getattr(quantity, kind) for kind in ("above", "at_least", "below", "at_most")}
+        name = f"--free {key}=LOW:HIGH, bound"
+        low, high = (read_option(end, name, quantity.unit, **bounds) for end in span.partition(":")[::2])
     elif low >= 0.0 and math.isinf(high):
         low, high = start / _WIDE, start * _WIDE
     elif low == quantity.above and low == 0.0:
         low = high / _WIDE**2
     if not low <= start <= high or low == high:
         shown = f"{engineering(low, quantity.unit)} to {engineering(high, quantity.unit)}"
-        cure = "start inside, or give bounds, KEY=LOW:HIGH"
+        cure = "start inside, or give bounds, KEY=LOW:HIGH, the lower one first"
         raise BadInput([f"--free {key}: the scenario's value does not lie within {shown}; {cure}"])
     return Free(key, quantity, start, low, high)
-
-
-def _span(key: str, span: str, quantity: Quantity) -> tuple[float, float]:
-    """Return the bounds in a text ``LOW:HIGH``."""
-    name = f"--free {key}=LOW:HIGH, bound"
-    bounds = {kind: getattr(quantity, kind) for kind in ("above", "at_least", "below", "at_most")}
-    low, high = (read_option(end, name, quantity.unit, **bounds) for end in span.partition(":")[::2])
-    if not low < high:
-        raise BadInput([f"--free {key}={span[:60]}: the bounds are in the wrong order; write the lower one first"])
-    return low, high
-
-
-def _refuse_entangled(problem: Problem) -> None:
-    """Refuse keys that have no effect on the curves, or only together."""
-    faults = [f"--free {key}: has no effect on what was measured; fix it" for key in idle(problem)]
-    for keys in [] if faults else entangled(problem):
-        names = f"{', '.join(keys[:-1])} and {keys[-1]}"
-        faults.append(f"--free {names}: the curves depend on them only together, as on a product; free one of them")
-    if faults:
-        raise BadInput(faults)
 
 
 #: Height of a curve's panel and of that of its residuals [in].
@@ -294,16 +259,16 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     """
     fitted, alone = problem.predicted(best.x), problem.steady(best.x)
     off = (problem.values - fitted) / np.hypot(problem.sigma, problem.noise)
-    curves = [(table, curve) for table in problem.tables for curve in table.curves]
+    curves = [(place, curve) for place, table in enumerate(problem.tables) for curve in table.curves]
     with mpl.rc_context(STYLE):
         picture, panels = rows([_CURVE, _RESIDUALS] * len(curves), shared=False)
-        for number, ((table, curve), upper, lower) in enumerate(zip(curves, panels[::2], panels[1::2], strict=True)):
-            here, (words, si, along), (unit, name, symbol) = problem.curve == number, _along(table), curve.described
+        for number, ((place, curve), upper, lower) in enumerate(zip(curves, panels[::2], panels[1::2], strict=True)):
+            here, (words, si, along), measured = problem.curve == number, _along(problem.tables[place]), curve.variable
             scale, order = axis_scale(along), np.argsort(along, kind="stable")
-            x, y = Unit.of(along, si, logarithmic=scale == "log"), Unit.of(curve.values, unit)
+            x, y = Unit.of(along, si, logarithmic=scale == "log"), Unit.of(curve.values, measured.unit)
             bars: Any = HOLLOW | {"color": BOTH, "elinewidth": 0.7, "zorder": 3, "label": "measured"}
             upper.errorbar(x.factor * along, y.factor * curve.values, yerr=y.factor * problem.sigma[here], **bars)
-            fine, smooth = problem.between(best.x, table, curve.name)
+            fine, smooth = problem.between(best.x, place, curve.name)
             lines = [(fitted, BOTH, "fit", 2.0), (alone, REFERENCE, "in steady sliding", 1.8)]
             for values, color, label, zorder in lines[: 2 if np.any(problem.shift) else 1]:
                 line, over = values[here][order], along[order]
@@ -311,7 +276,7 @@ def figure(problem: Problem, best: Minimum) -> Figure:
                     line, over = smooth + np.interp(fine, over, line - alone[here][order]), fine
                 look: Any = {"color": color, "label": label, "zorder": zorder, "linewidth": 0.9}
                 upper.plot(x.factor * over, y.factor * line, **look)
-            upper.set_ylabel(y.label(f"{name.partition(',')[0]} ${symbol}$"))
+            upper.set_ylabel(y.label(f"{measured.long_name.partition(',')[0]} ${measured.symbol}$"))
             upper.tick_params(labelbottom=False)
             lower.plot(x.factor * along, off[here], color=BOTH, **HOLLOW)
             lower.axhline(0.0, **GUIDE)
@@ -328,8 +293,9 @@ def refuse_units(tables: Sequence[Measured], units: Sequence[str]) -> None:
     try:
         with in_units(units):
             for table in tables:
-                for unit in (_along(table)[1], *(curve.described[0] for curve in table.curves)):
-                    Unit.of(1.0, unit)
+                Unit.of(1.0, _along(table)[1])
+                for curve in table.curves:
+                    Unit.of(1.0, curve.variable.unit)
     except ValueError as fault:
         raise BadInput([f"--units: {fault}"]) from None
 
@@ -365,7 +331,7 @@ def carried_out(
     sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
     outputs = claim(scenario, data, stem, replace)
     if units:
-        refuse_units([read(path, scenario) for path in data], units)
+        refuse_units([likelihood.read(path, scenario) for path in data], units)
     result = fit(scenario, data, free, sizes, steady)
     verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
     save(scenario, result, data, outputs, verdict, units)
@@ -390,12 +356,10 @@ def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -
     A scenario is replaced only if a fit has written it.
     """
     outputs = Outputs(*(stem.with_name(f"{stem.name}_fit.{ending}") for ending in Outputs._fields))
-    inputs = [*files_read(scenario), *data]
-    toml = outputs.toml
-    written_here = toml.is_file() and _MADE.encode() in toml.read_bytes()
-    if not (replace and written_here) or toml.resolve() in [path.resolve() for path in inputs]:
-        files.claim(toml, replace, inputs)
-    for path in outputs[1:]:
+    inputs, toml = [*files_read(scenario), *data], outputs.toml
+    is_replaced = replace and toml.is_file() and _MADE.encode() in toml.read_bytes()
+    is_input = toml.resolve() in [path.resolve() for path in inputs]
+    for path in outputs[1:] if is_replaced and not is_input else outputs:
         files.claim(path, replace, inputs)
     return outputs
 
@@ -474,8 +438,12 @@ def document(fit: Fit, data: Sequence[Path], verdict: Verdict | None) -> dict[st
 
 def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
     """Return the scenario as it was written, its opening comment first, with the estimates, for a file in a folder."""
+
+    def present(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        return {key: value for key, value in pairs if value is not None}
+
     source = scenario.origin
-    text = source.text or written(json.loads(scenario_json(scenario), object_pairs_hook=_present))
+    text = source.text or written(json.loads(scenario_json(scenario), object_pairs_hook=present))
     tables, numbers = copy.deepcopy(parse(text, source.path)), dict[str, Any]()
     for item in fit.numbers:
         unit = item.free.quantity.unit
@@ -489,11 +457,6 @@ def scenario_text(scenario: Scenario, fit: Fit, folder: Path) -> str:
     question = "".join(f"{line}\n" for line in comment if not line.startswith(_MADE)).removesuffix("#\n")
     opening = f"{question}#\n" if question else ""
     return f"{opening}{_MADE}: {', '.join(numbers)} are calibrated to measured curves.\n{written(tables)}"
-
-
-def _present(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the table of pairs of keys and values, without the keys that are left out."""
-    return {key: value for key, value in pairs if value is not None}
 
 
 def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
@@ -511,8 +474,7 @@ def save(
     """Write scenario, numbers and figure, each whole."""
     picture = io.BytesIO()
     with in_units(units):
-        drawn = figure(fit.problem, fit.best)
-    drawn.savefig(picture, format="png")
+        figure(fit.problem, fit.best).savefig(picture, format="png")
     numbers = json.dumps(document(fit, data, verdict), indent=2, allow_nan=False) + "\n"
     texts = scenario_text(scenario, fit, outputs.toml.parent).encode(), numbers.encode(), picture.getvalue()
     for path, content in zip(outputs, texts, strict=True):

@@ -23,7 +23,7 @@ from scipy import optimize, stats
 from sim.engine import MemberNoise, Trajectory, balance, follow
 from sim.ensemble.dataset import variable_name
 from sim.ensemble.plan import together
-from sim.ensemble.variables import VARIABLES
+from sim.ensemble.variables import VARIABLES, Variable
 from sim.laws.theories import compare_at_indentation, compare_at_load
 from sim.parts.exchange import Motion
 from sim.scenario.scenario import Scenario
@@ -39,8 +39,8 @@ Array = NDArray[np.float64]
 HELD = {"load": "normal_load", "indentation": "indentation", "displacement": "displacement"}
 #: What is recorded of a history, or is no measured number; and what is measured of a slider that feels its friction.
 _NOT_MEASURED = ("in_contact", "masked", "detachment_time", "dissipated_energy", "applied_load")
-#: Sizes of the contact, which are never below 0, with their units.
-_SIZES = {"contact_radius": "m", "contact_area": "m^2"}
+#: Sizes of the contact, which are never below 0.
+_SIZES = ("contact_radius", "contact_area")
 _OF_SLIDER = ("speed", "slider_position", "spring_force")
 
 
@@ -52,9 +52,9 @@ class Curve(NamedTuple):
     errors: Array | None
 
     @property
-    def described(self) -> tuple[str, str, str]:
-        """Unit, long name and symbol of the variable."""
-        return next((item.unit, item.long_name, item.symbol) for item in VARIABLES if item.name == self.name)
+    def variable(self) -> Variable:
+        """Declaration of the variable."""
+        return next(item for item in VARIABLES if item.name == self.name)
 
 
 class Measured(NamedTuple):
@@ -74,6 +74,10 @@ class Measured(NamedTuple):
     @property
     def rows(self) -> int:
         return len(self.curves[0].values)
+
+    @property
+    def names(self) -> list[str]:
+        return [curve.name for curve in self.curves]
 
 
 def read(path: Path, scenario: Scenario) -> Measured:
@@ -96,18 +100,21 @@ def read(path: Path, scenario: Scenario) -> Measured:
     BadInput
         With one line.
     """
-    at, outcomes = _conditions(scenario), _outcomes(scenario)
+    at, by_run = _conditions(scenario), scenario.drive.solves_motion
+    outcomes = {
+        item.name: Quantity(item.unit, item.long_name, at_least=0 if item.name in _SIZES else -math.inf)
+        for item in VARIABLES
+        if item.name not in _NOT_MEASURED and item.applies(scenario)
+        and (item.part != "drive" or (by_run and item.name in _OF_SLIDER))
+    }  # fmt: skip
     known = {name: quantity for name, (_, quantity) in at.items()} | outcomes
     result = read_measured(path, known, outcomes)
     conditions = {at[name][0]: points.values for name, points in result.items() if name in at}
     curves = tuple(Curve(name, *points) for name, points in result.items() if name not in at)
     for fault in _faults(scenario, conditions, curves):
         raise BadInput([f"{path}: {fault}"])
-    ranges = ", ".join(
-        f"{name} {points.values.min():.4g} to {points.values.max():.4g} {known[name].unit}"
-        for name, points in result.items()
-    )
-    return Measured(path, scenario.contact.kind, conditions, curves, ranges)
+    ranges = [f"{name} {np.min(x):.4g} to {np.max(x):.4g} {known[name].unit}" for name, (x, _) in result.items()]
+    return Measured(path, scenario.contact.kind, conditions, curves, ", ".join(ranges))
 
 
 def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curve, ...]) -> Iterator[str]:
@@ -131,28 +138,16 @@ def _faults(scenario: Scenario, conditions: dict[str, Array], curves: tuple[Curv
 
 
 def _conditions(scenario: Scenario) -> dict[str, tuple[str, Quantity]]:
-    """Condition and declaration by the name of a column."""
+    """Return condition and declaration by the name of a column."""
     kind = scenario.contact.kind
-    units = {item.name: item.unit for item in VARIABLES}
     result = {variable_name(key): (key, quantity) for key, (quantity, _) in quantities(scenario).items()}
     if not scenario.drive.solves_motion:
-        result |= dict.fromkeys(("speed", "drive_speed"), ("speed", Quantity("m/s", "sliding speed")))
+        result["speed"] = result["drive_speed"] = "speed", Quantity("m/s", "sliding speed")
     elif "drive_stage" in result:
         result["stage_speed"] = result["drive_stage"]
-    held = ("held", Quantity(units[HELD[kind]], f"what holds the sphere, contact.{kind}"))
-    result |= dict.fromkeys((HELD[kind], f"contact_{kind}"), held)
+    held = Quantity("N" if kind == "load" else "m", f"{HELD[kind]} of the sphere, contact.{kind}")
+    result[HELD[kind]] = result[f"contact_{kind}"] = "held", held
     return result | {"t": ("t", Quantity("s", "time since the start", at_least=0, at_most=scenario.clock.duration))}
-
-
-def _outcomes(scenario: Scenario) -> dict[str, Quantity]:
-    """Declaration of each variable that can be measured."""
-    of_slider = _OF_SLIDER if scenario.drive.solves_motion else ()
-    recorded = (
-        item for item in VARIABLES if (item.part != "drive" or item.name in of_slider) and item.applies(scenario)
-    )
-    sizes = {name: Quantity(unit, name, at_least=0) for name, unit in _SIZES.items()}
-    return {item.name: sizes.get(item.name, Quantity(item.unit, item.long_name))
-            for item in recorded if item.name not in _NOT_MEASURED}  # fmt: skip
 
 
 #: Values of keys, by their dotted names.
@@ -204,24 +199,16 @@ def groups(scenario: Scenario, table: Measured) -> list[Group]:
             item = scenario.with_values({key: float(values[place]) for key, values in keyed.items()})
         except BadInput as fault:
             raise BadInput([f"{table.path}: row {place + 1}: {message}" for message in fault.problems]) from None
-        result.append(_group(item, table, rows))
+        conditions = {name: values[rows] for name, values in table.conditions.items()}
+        duration, count = item.clock.duration, len(rows)
+        time = conditions.get("t", np.linspace(0.0, duration, count))  # a course of the rows, as long as the run
+        if (held := conditions.get("held")) is not None:
+            course = float(held[0]) if np.all(held == held[0]) else {"time": time, "value": held}
+            item = item.with_values({f"contact.{table.held}": course})
+        instants = np.repeat(conditions.get("t", np.zeros(count)), 2)
+        speed = conditions.get("speed", item.drive.pieces(instants, duration).joined.last[::2])
+        result.append(Group(item, rows, time[:, np.newaxis], speed[:, np.newaxis]))
     return result
-
-
-def _group(scenario: Scenario, table: Measured, rows: NDArray[np.int64]) -> Group:
-    time = np.linspace(0.0, scenario.clock.duration, len(rows))  # a course of the rows, as long as the run
-    if "t" in table.conditions:
-        time = table.conditions["t"][rows]
-    if "held" in table.conditions:
-        held = table.conditions["held"][rows]
-        course = float(held[0]) if np.all(held == held[0]) else {"time": time, "value": held}
-        scenario = scenario.with_values({f"contact.{scenario.contact.kind}": course})
-    if "speed" in table.conditions:
-        speed = table.conditions["speed"][rows]
-    else:
-        instants = np.repeat(time, 2) if "t" in table.conditions else np.zeros(2 * len(rows))
-        speed = scenario.drive.pieces(instants, scenario.clock.duration).joined.last[::2]
-    return Group(scenario, rows, time[:, np.newaxis], speed[:, np.newaxis])
 
 
 def steady_course(scenario: Scenario, time: Array, speed: Array) -> Trajectory:
@@ -251,8 +238,7 @@ def by_steady_sliding(group: Group, values: Values, names: list[str], theory: st
     ``theory`` is the name of a theory of ``sim.laws.theories`` that gives the radius in place of the contact's balance,
     at the stress of the bonds; its numbers ``"alpha"`` and ``"lambda"`` are among the ``values``.
     """
-    changes = {key: value for key, value in values.items() if "." in key or key in ("seed",)}
-    scenario = changed(group.scenario, changes)
+    scenario = changed(group.scenario, {key: value for key, value in values.items() if "." in key})
     course = steady_course(scenario, group.time, group.speed)
     if theory:
         course = course._replace(radius=_radius_by(theory, scenario, course, values))
@@ -285,17 +271,16 @@ def by_runs(groups: list[Group], values: Values, names: list[str], by_time: bool
     result = {name: np.full((2, count), np.nan) for name in names}
     for group in groups:
         scenario = group.scenario.with_values(dict(values) | {"record": {}})
-        drive = scenario.drive
+        drive, runs = scenario.drive, list[tuple[NDArray[np.int64], Scenario, Weights]]()
         if by_time or not (drive.solves_motion or drive.model == "steady" or scenario.contact.changes):
-            runs = [(group.rows, _members(scenario, names, functools.partial(_places, group, by_time)))]
+            runs = [(group.rows, scenario, functools.partial(_places, group, by_time))]
         else:
-            points = (_still(scenario, group, k) for k in range(len(group.rows)))
-            runs = [(group.rows[k : k + 1], _members(point, names, _second_half)) for k, point in enumerate(points)]
-        for rows, sampled in runs:
-            for name, members in sampled.items():
+            runs = [(group.rows[k : k + 1], _still(scenario, group, k), _second_half) for k in range(len(group.rows))]
+        for rows, point, weights in runs:
+            for name, members in _members(point, names, weights).items():
                 size = members.shape[1]
-                spread = members.std(axis=1, ddof=1) if size > 1 else np.zeros(len(rows))
-                result[name][:, rows] = members.mean(axis=1), spread / math.sqrt(size)
+                spread = members.std(axis=1, ddof=1) if size > 1 else 0.0
+                result[name][:, rows] = members.mean(axis=1), np.broadcast_to(spread / math.sqrt(size), len(rows))
     return result
 
 
@@ -318,25 +303,21 @@ def _second_half(course: Trajectory) -> Array:
 
 def _places(group: Group, by_time: bool, course: Trajectory) -> Array:
     """Weights of the two records between which a row lies, by its time or by the logarithm of its speed."""
-    if by_time:
-        along, at = course.time[:, 0], group.time[:, 0]
-    else:
+    along, at = course.time[:, 0], group.time[:, 0]
+    if not by_time:
         with np.errstate(divide="ignore"):
             along, at = np.log(np.abs(course.speed[:, 0])), np.log(np.abs(group.speed[:, 0]))
     if along[0] > along[-1]:
         along, at = -along, -at
-    rising, near = bool(np.all(np.diff(along) > 0.0)), 1e-9 * max(1.0, float(np.ptp(along)))
-    if not rising or at.min() < along[0] - near or at.max() > along[-1] + near:
-        message = "the run must pass each measured speed once"
-        if rising:
-            ends = (np.abs(course.speed), np.abs(group.speed))
-            run, data = (f"{values.min():.3g} to {values.max():.3g}" for values in ends)
-            message = f"the run goes from {run} m/s, the data from {data}"
-        raise BadInput([f'drive.speed: {message}; fit with a wider drive, or with [drive] model = "steady"'])
-    place = np.clip(np.searchsorted(along, at) - 1, 0, len(along) - 2)
+    near = 1e-9 * max(1.0, float(np.ptp(along)))
+    if not np.all(np.diff(along) > 0.0) or at.min() < along[0] - near or at.max() > along[-1] + near:
+        ends = (np.abs(course.speed), np.abs(group.speed))
+        run, data = (f"{values.min():.3g} to {values.max():.3g} m/s" for values in ends)
+        cure = 'must pass each speed of the data once; widen it, or fit with [drive] model = "steady"'
+        raise BadInput([f"drive.speed: the run goes from {run}, the data from {data}; it {cure}"])
+    place, rows = np.clip(np.searchsorted(along, at) - 1, 0, len(along) - 2), np.arange(len(at))
     part = np.clip((at - along[place]) / (along[place + 1] - along[place]), 0.0, 1.0)
     weights = np.zeros((len(at), len(along)))
-    rows = np.arange(len(at))
     weights[rows, place], weights[rows, place + 1] = 1.0 - part, part
     return weights
 
@@ -454,19 +435,17 @@ class Problem:
             return self.sampled(x)[0]
         numbers, result = self.numbers(x), []
         for table, table_groups in zip(self.tables, self.groups, strict=True):
-            names = [curve.name for curve in table.curves]
-            columns = np.empty((len(names), table.rows))
+            columns = np.empty((len(table.curves), table.rows))
             for group in table_groups:
-                columns[:, group.rows] = [*by_steady_sliding(group, numbers, names, self.theory).values()]
+                columns[:, group.rows] = [*by_steady_sliding(group, numbers, table.names, self.theory).values()]
             result.append(columns.ravel())
         return np.concatenate(result)
 
     def sampled(self, x: Array) -> Array:
         """Return all curves by the scenario's own models and their standard errors, shape (2, numbers)."""
-        result = []
+        result = list[Array]()
         for table, table_groups in zip(self.tables, self.groups, strict=True):
-            names = [curve.name for curve in table.curves]
-            result += [*by_runs(table_groups, self.numbers(x), names, "t" in table.conditions).values()]
+            result += by_runs(table_groups, self.numbers(x), table.names, "t" in table.conditions).values()
         return np.concatenate(result, axis=1)
 
     def predicted(self, x: Array) -> Array:
@@ -476,23 +455,19 @@ class Problem:
             result = np.where(self.of(name), result * (1.0 + size * x[len(self.free) + k]), result)
         return result
 
-    def between(self, x: Array, table: Measured, name: str) -> tuple[Array, Array]:
-        """Speeds from the least to the largest of a table, and its curve there in steady sliding.
-
-        Without any where more than the speed was varied.
-        """
-        table_groups = next(groups for item, groups in zip(self.tables, self.groups, strict=True) if item is table)
-        speeds = table_groups[0].speed
-        if [*table.conditions] != ["speed"] or self.by_run or not np.min(speeds) > 0.0:
+    def between(self, x: Array, table: int, name: str) -> tuple[Array, Array]:
+        """Return speeds between those of a table and its curve in steady sliding; none if more was varied."""
+        group = self.groups[table][0]
+        if [*self.tables[table].conditions] != ["speed"] or self.by_run or not np.min(group.speed) > 0.0:
             return np.empty(0), np.empty(0)
-        fine = np.geomspace(np.min(speeds), np.max(speeds), _DRAWN)[:, np.newaxis]
-        group = table_groups[0]._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
-        return fine[:, 0], by_steady_sliding(group, self.numbers(x), [name], self.theory)[name]
+        fine = np.geomspace(np.min(group.speed), np.max(group.speed), _DRAWN)[:, np.newaxis]
+        course = group._replace(rows=np.arange(_DRAWN), time=0.0 * fine, speed=fine)
+        return fine[:, 0], by_steady_sliding(course, self.numbers(x), [name], self.theory)[name]
 
     @property
     def names(self) -> list[str]:
         """Return the names of all curves."""
-        return [curve.name for table in self.tables for curve in table.curves]
+        return [name for table in self.tables for name in table.names]
 
     def of(self, name: str) -> NDArray[np.bool_]:
         """Return True at the numbers of a variable."""
@@ -548,7 +523,7 @@ def minimum(
         parameters.add(f"p{k}", value=value, min=low, max=high, vary=k not in held)
 
     def numbers(current: Any) -> Array:
-        return np.array([item.value for item in current.values()])
+        return np.array([*current.valuesdict().values()])
 
     if len(held) == len(parameters):
         x = numbers(parameters)

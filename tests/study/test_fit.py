@@ -159,7 +159,7 @@ def inside(truth, seed, keys, error=0.01, **how):
     curves = tuple(Curve(name, values, error * np.abs(truth[name])) for name, values in drawn.items())
     made = Measured(Path("made.csv"), "load", {"speed": SPEEDS}, curves)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(calibration, "read", lambda path, base: made)
+        patched.setattr(likelihood, "read", lambda path, base: made)
         found = fit(scene, [Path("made.csv")], keys, steady=True, **how)
     assert found.converged
     return [one.interval.low < keys[one.free.key] < one.interval.high for one in found.numbers]
@@ -359,7 +359,7 @@ def test_keys_that_enter_only_as_a_product_are_refused_together(curves):
     with pytest.raises(BadInput, match=r"only together") as refused:
         fit(load(LENS), [curves], ["shear.spectrum.rms", "shear.paid_by_adhesion", "bonds.critical_speed"], steady=True)
     (said,) = refused.value.problems
-    assert "shear.spectrum.rms and shear.paid_by_adhesion" in said and "critical_speed" not in said
+    assert "shear.spectrum.rms, shear.paid_by_adhesion" in said and "critical_speed" not in said
 
 
 def test_a_key_without_effect_is_refused(curves):
@@ -409,7 +409,7 @@ def test_what_cannot_be_freed_is_refused(curves):
         ("bonds.crital_speed", 'did you mean "bonds.critical_speed"'),
         ("clock.step", "no physical number"),
         ("bonds.stress=1:2", "start inside"),
-        ("bonds.stress=2 kPa:1 kPa", "wrong order"),
+        ("bonds.stress=2 kPa:1 kPa", "lower one first"),
         ("bonds.critical_speed=0:1 m/s", "LOW:HIGH, bound 0: must be above 0 m/s"),
     ):
         with pytest.raises(BadInput, match=cure):
