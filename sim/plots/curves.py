@@ -3,7 +3,6 @@
 import contextlib
 import difflib
 from collections.abc import Callable, Sequence
-from math import prod
 from typing import Any, NamedTuple, cast
 
 import matplotlib as mpl
@@ -25,11 +24,14 @@ from sim.plots.style import BOTH, HOLLOW, LINES, Unit, axis_scale, fill, swept_v
 #: Largest number of points of a curve that carry markers.
 _MARKED = 25
 
-#: Largest number of curves of a panel: named in a legend, and along a colour bar; and of columns of panels.
-_NAMED, _MOST, _COLUMNS = 10, 20, 4
+#: Largest number of curves of a panel: named in a legend, and along a colour bar.
+_NAMED, _MOST = 10, 20
 
 #: Variables that are zero while the contact is open: lines break there.
 _OF_CONTACT = ("contact_radius", "contact_area", "area_ratio", "friction_force")
+
+#: Colours of many curves, none too light for paper.
+_SHADES = mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
 
 #: Markers that stand for line styles where points are not joined.
 _MARKS = {"-": "o", "--": "s", "-.": "^"}
@@ -48,10 +50,6 @@ class Line(NamedTuple):
     point: dict[str, int]
     label: str
     colour: str
-
-
-#: Columns of panels: a heading and the curves of each.
-Columns = tuple[tuple[str, list[Line]], ...]
 
 
 class Statistics:
@@ -103,7 +101,6 @@ class Scene(NamedTuple):
 
     statistics: Statistics
     lines: list[Line]
-    columns: Columns
     averaged: str
     spread: str
     bar: tuple[ScalarMappable, str] | None = None
@@ -166,8 +163,8 @@ class Scene(NamedTuple):
         return np.broadcast_to(known.isel(line.point, missing_dims="ignore").to_numpy(), points)
 
     def all(self, *names: str) -> np.ndarray:
-        """Return statistics of the curves of all columns, of shape (statistics * curves, points)."""
-        return np.stack([self.values(name, line) for name in names for _, lines in self.columns for line in lines])
+        """Return statistics of all curves, of shape (statistics * curves, points)."""
+        return np.stack([self.values(name, line) for name in names for line in self.lines])
 
     def drawn(self, name: str, line: Line) -> list[np.ndarray]:
         """Return the mean, its standard error, and both sides of the band; nan where there is no contact.
@@ -207,49 +204,34 @@ def _changes(values: np.ndarray) -> bool:
 
 def scene_along(dataset: xr.Dataset, along: str) -> Scene:
     """Return ``Statistics`` along time (``"t"``) or a dimension of the sweep, as curves."""
-    columns, bar, left_out = _columns_of(dataset, [name for name in sweep_dims(dataset) if name != along])
-    lines, statistics = [line for _, lines in columns for line in lines], Statistics(dataset, along)
+    lines, bar, left_out = _lines_of(dataset, [name for name in sweep_dims(dataset) if name != along])
+    statistics = Statistics(dataset, along)
     words = "; ".join(filter(None, [averaging(dataset, statistics.late), left_out]))
     if len(lines) == 1:
         lines = [lines[0]._replace(label=words or "simulated", colour=BOTH)]
-        columns = (("", lines),)
     spread = "± 1 std. dev. of members" if "contact_radius_std" in dataset else "5–95 % of members"
-    return Scene(statistics, lines, columns, words, f"{spread}' means" if statistics.late else spread, bar)
+    return Scene(statistics, lines, words, f"{spread}' means" if statistics.late else spread, bar)
 
 
-def _columns_of(dataset: xr.Dataset, dims: list[str]) -> tuple[Columns, tuple[ScalarMappable, str] | None, str]:
-    """Return columns of panels with their curves, one for each point of some dimensions of the sweep.
+def _lines_of(dataset: xr.Dataset, dims: list[str]) -> tuple[list[Line], tuple[ScalarMappable, str] | None, str]:
+    """Return the curves, one for each point of some dimensions of the sweep, evenly chosen if there are too many.
 
-    The colour bar is that of many curves along one number; the text counts curves and columns that are left out. Of two
-    or more dimensions with many points that with fewer values makes columns.
+    The colour bar is that of many curves along one number; the text counts curves that are left out.
     """
-    fixed = {name: 0 for name in dims if dataset.sizes[name] == 1}
-    sizes = {name: dataset.sizes[name] for name in dims if name not in fixed}
-    apart = min(sizes, key=lambda name: sizes[name]) if len(sizes) > 1 and prod(sizes.values()) > len(LINES) else ""
-    places = _spread(sizes.pop(apart), _COLUMNS) if apart else [0]
-    points = [dict(zip(sizes, at, strict=True)) for at in np.ndindex(*sizes.values())]
-    keyed = [name for name in sizes if len(sizes) == 1 and len(points) > len(LINES) and _is_number(dataset[name])]
-    drawn = _spread(len(points), _MOST if keyed else _NAMED)
+    points = [dict(zip(dims, at, strict=True)) for at in np.ndindex(*(dataset.sizes[name] for name in dims))]
+    varied = [name for name in dims if dataset.sizes[name] > 1]
     shades, bar = list(LINES), None
-    if keyed:
-        bar, shades = _bar(dataset[keyed[0]])
-    elif len(drawn) > len(LINES):
-        shades = [mpl.colors.to_hex(shade) for shade in _shades()(np.linspace(0.0, 1.0, len(points)))]
-    columns: list[tuple[str, list[Line]]] = []
-    for place in places:
-        common, lines = {apart: place} if apart else {}, list[Line]()
-        for k in drawn:
-            words = "" if keyed else ", ".join(swept_value(dataset, name, at) for name, at in points[k].items())
-            lines.append(Line(len(columns) * len(drawn) + len(lines), fixed | common | points[k], words, shades[k]))
-        columns.append((swept_value(dataset, apart, place) if apart else "", lines))
-    counts = {"columns": (len(places), dataset.sizes[apart] if apart else 1), "curves": (len(drawn), len(points))}
-    left_out = [f"{few} of {many} {what} drawn" for what, (few, many) in counts.items() if few < many]
-    return tuple(columns), bar, ", ".join(left_out) and f"{', '.join(left_out)} (--where draws others)"
-
-
-def _spread(count: int, most: int) -> list[int]:
-    """Return at most ``most`` places of a count, evenly spread from the first to the last."""
-    return [int(at) for at in np.rint(np.linspace(0, count - 1, min(count, most)))]
+    if len(points) > len(LINES):
+        shades = [mpl.colors.to_hex(shade) for shade in _SHADES(np.linspace(0.0, 1.0, len(points)))]
+        if len(varied) == 1 and _is_number(dataset[varied[0]]):
+            bar, shades = _bar(dataset[varied[0]])
+    count = min(len(points), _MOST if bar else _NAMED)
+    lines = []
+    for number, k in enumerate(np.rint(np.linspace(0, len(points) - 1, count)).astype(int)):
+        words = "" if bar else ", ".join(swept_value(dataset, name, points[k][name]) for name in varied)
+        lines.append(Line(number, points[k], words, shades[k]))
+    left_out = f"{count} of {len(points)} curves drawn (--where draws others)" if count < len(points) else ""
+    return lines, bar, left_out
 
 
 def _is_number(key: xr.DataArray) -> bool:
@@ -269,14 +251,9 @@ def _bar(key: xr.DataArray) -> tuple[tuple[ScalarMappable, str], list[str]]:
     unit = Unit.of(values, key.attrs.get("units", "1"), logarithmic)
     values = unit.factor * values
     norm = (mpl.colors.LogNorm if logarithmic else mpl.colors.Normalize)(values.min(), values.max())
-    colours = ScalarMappable(norm, _shades())
+    colours = ScalarMappable(norm, _SHADES)
     words = f"{key.attrs.get('long_name', key.name).partition(',')[0]} {symbol(key)}".strip()
     return (colours, unit.label(words)), [mpl.colors.to_hex(shade) for shade in colours.to_rgba(values)]
-
-
-def _shades() -> mpl.colors.Colormap:
-    """Return the colours of many curves, none too light for paper."""
-    return mpl.colors.ListedColormap(mpl.colormaps["viridis"](np.linspace(0.0, 0.92, 256)))
 
 
 def colour_bar(figure: Figure, axes: list[Axes], scene: Scene) -> None:
@@ -366,9 +343,9 @@ def over_key(dataset: xr.Dataset, name: str) -> Scene:
     words = f"{key.attrs.get('long_name', name).partition(',')[0]} {symbol(key)}".strip()
     if not _is_number(key):
         scene = scene.placed(name, np.arange(key.size, dtype=float), words, "1")
-        abreast = len(scene.columns[0][1])
-        width = _CATEGORY / abreast
-        shift = (np.arange(len(scene.lines)) % abreast - 0.5 * (abreast - 1)) * width
+        count = len(scene.lines)
+        width = _CATEGORY / count
+        shift = (np.arange(count) - 0.5 * (count - 1)) * width
         return scene._replace(x=scene.x + shift[:, None], width=width)
     values = key.to_numpy().astype(float)
     return scene.placed(name, values, words, key.attrs["units"], axis_scale(values))
@@ -567,35 +544,27 @@ def stacked(
 ) -> tuple[Figure, list[Axes]]:
     """Return panels of given heights [in] above each other with one x axis, lettered, and a colour bar if there is one.
 
-    Below them are residuals of measured points, if any. The panels of the first column are returned. With ``ax`` the
-    first panel alone is drawn, there.
+    Below them are residuals of measured points, if any. With ``ax`` the first panel alone is drawn, there.
     """
     compared = scene.measured is not None and scene.measured.has_errors and ax is None
-    if ax is None:
-        heights = [height for height, _ in panels] + [0.8] * compared
-        figure, axes = style.grid(heights, len(scene.columns))
-    else:
-        figure, axes, panels = cast(Figure, ax.figure), np.array([[ax]]), panels[:1]
-        if len(scene.columns) > 1:
-            raise ValueError("panels side by side do not fit into one; choose values by where, or leave ax out")
-    for number, (words, lines) in enumerate(scene.columns):
-        part = scene._replace(lines=lines)
-        for panel, (_, drawing) in zip(axes[:, number], panels, strict=False):
-            drawing(panel, part)
-        if scene.measured and compared:
-            scene.measured.residual_panel(axes[-1, number], {line.number for line in lines}, scene.over)
-        edge = 0.03 if scene.marked or scene.measured else 0.0
-        style.across(axes[-1, number], scene.reach, scene.words, scene.scale, edge if room is None else room)
-        if words:
-            axes[0, number].set_title(words)
-    if len(scene.columns) > 1:
-        style.legends_of_first(figure, axes)
-    elif ax is not None:
-        style.moved_legend(ax, ax, loc="best")  # above the panel there may be no room
+    figure, axes = (
+        style.rows([height for height, _ in panels] + [0.8] * compared)
+        if ax is None
+        else (cast(Figure, ax.figure), [ax])
+    )
+    for panel, (_, drawing) in zip(axes, panels, strict=False):
+        drawing(panel, scene)
+    if scene.measured and compared:
+        scene.measured.residual_panel(axes[-1], {line.number for line in scene.lines}, scene.over)
+    edge = 0.03 if scene.marked or scene.measured else 0.0
+    style.across(axes[-1], scene.reach, scene.words, scene.scale, edge if room is None else room)
+    if ax is not None and (legend := ax.get_legend()):  # above the panel there may be no room
+        legend.set_bbox_to_anchor(None)
+        legend.set_loc("best")
     if scene.measured:
         scene.measured.refuse_undrawn(scene.over)
-    colour_bar(figure, list(axes.flat), scene)
-    return figure, list(axes[:, 0])
+    colour_bar(figure, axes, scene)
+    return figure, axes
 
 
 def further_panels(scene: Scene) -> list[tuple[float, Panel]]:

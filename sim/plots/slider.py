@@ -386,8 +386,8 @@ def _marked(panel: Axes, scene: Scene, factor: float) -> list[Line]:
 class Start(NamedTuple):
     """A start from rest: its point of the sweep, rest [s], speed [m/s], and since it began times [s] and stresses [Pa].
 
-    ``peak`` [Pa] is the largest stress, at the time ``when`` [s]; it is ``resolved`` if the stress falls again and
-    more than three steps lead up to it.
+    ``fraction`` is the bond fraction before it. ``peak`` [Pa] is the largest stress, at the time ``when`` [s]; it is
+    ``resolved`` if the stress falls again and more than three steps lead up to it.
     """
 
     at: dict[str, int]
@@ -408,100 +408,92 @@ def _varied(dataset: xr.Dataset) -> list[str]:
 
 
 def starts_of(dataset: xr.Dataset) -> list[Start]:
-    """Return all starts of a sweep over rest and speed, at the first point of further swept keys.
+    """Return all starts of a sweep, from short to long rest and slow to fast, at the first point of further swept keys.
 
     Peaks are those of the clock steps, or where members differ those of their mean over the records.
     """
-    varied, starts, between = _varied(dataset), [], float(dataset["t"][1] - dataset["t"][0])
-    means = [style.mean_of(dataset, name) for name in ("shear_stress", "bond_fraction")]
+    varied, starts, times = _varied(dataset), [], dataset["t"].to_numpy()
     for where in np.ndindex(*(dataset.sizes[name] for name in varied)):
         at = dict.fromkeys(sweep_dims(dataset), 0) | dict(zip(varied, where, strict=True))
         rest, speed = (style.number_at(setting(dataset, f"drive.{key}"), at) for key in ("rest", "speed"))
-        stress, fraction = (mean.isel(at, missing_dims="ignore").to_numpy() for mean in means)
-        time = dataset["t"].to_numpy() - rest
-        slides = time > 1e-9 * (time[-1] + rest)
-        if np.any(slides):
-            before = float(fraction[max(int(np.argmax(slides)) - 1, 0)])
-            time, stress = time[slides], stress[slides]
-            k = int(np.argmax(np.abs(stress)))
-            peak, when, step = float(abs(stress[k])), float(time[k]), between
-            if "peak_stress" in dataset and "member" not in dataset["peak_stress"].dims:
-                names = ("peak_stress", "peak_time", "clock_step")
-                peak, when, step = (style.number_at(dataset[name], at) for name in names)
-                when -= rest
-            resolved = bool(abs(stress[-1]) < peak and when > _STEPS * step)
-            starts.append(Start(at, rest, speed, before, time, stress, float(np.copysign(peak, speed)), when, resolved))
-    return starts
+        first = int(np.searchsorted(times, rest + 1e-9 * times[-1], "right"))
+        if first == times.size:
+            continue
+        stress, fraction = (
+            style.mean_of(dataset, name).isel(at, missing_dims="ignore").to_numpy()
+            for name in ("shear_stress", "bond_fraction")
+        )
+        k = first + int(np.argmax(np.abs(stress[first:])))
+        peak, when, step = abs(stress[k]), times[k], times[1] - times[0]
+        if "peak_stress" in dataset and "member" not in dataset["peak_stress"].dims:
+            peak, when, step = (
+                style.number_at(dataset[name], at) for name in ("peak_stress", "peak_time", "clock_step")
+            )
+        resolved = bool(abs(stress[-1]) < peak and when - rest > _STEPS * step)
+        bound, peak = float(fraction[max(first - 1, 0)]), float(np.copysign(peak, speed))
+        course = times[first:] - rest, stress[first:]
+        starts.append(Start(at, rest, speed, bound, *course, peak, float(when - rest), resolved))
+    return sorted(starts, key=lambda start: (start.rest, abs(start.speed)))
 
 
 def start_figure(dataset: xr.Dataset) -> Figure:
     """Draw the stress since the start at the longest rest, one line a speed, and the peak stress, one line a rest."""
     starts = starts_of(dataset)
     rests, speeds = ({start.rest for start in starts}, {abs(start.speed) for start in starts})
-    longest = sorted((s for s in starts if s.rest == max(rests)), key=lambda s: abs(s.speed))
+    longest = [start for start in starts if start.rest == max(rests)]
     figure, axes = style.rows([2.15]) if len(rests) == len(speeds) == 1 else style.pairs(2.9, shared=True)
     stresses = np.concatenate([start.stress for start in starts])
     factor = style.in_unit(axes[0].yaxis, r"shear stress $\tau_0$", stresses, "Pa")
-    if len(axes) > 1:
-        _peak_panel(axes[1], dataset, starts, len(speeds - {0.0}) > 1, factor)
+    for panel in axes[1:]:
+        _peak_panel(panel, dataset, starts, len(speeds - {0.0}) > 1, factor)
     _time_panel(axes[0], longest, factor)
-    others = [name for name in style.swept(dataset) if name not in _varied(dataset)]
-    after = f"after {style.text_of(longest[0].rest, 's')} at rest, sliding at"
-    style.legend(axes[0], ", ".join([*(style.swept_value(dataset, name, 0) for name in others), after]))
+    others = [style.swept_value(dataset, name, 0) for name in style.swept(dataset) if name not in _varied(dataset)]
+    style.legend(axes[0], ", ".join([*others, f"after {style.text_of(max(rests), 's')} at rest, sliding at"]))
     return figure
 
 
 def _time_panel(panel: Axes, starts: list[Start], factor: float) -> None:
     """Draw the stress over the time since the start; a dot is a peak that is resolved."""
-    many = len(starts) > 1
-    times = starts[0].time
-    length = style.Unit.of(times, "s", many)
+    scale, times = "log" if len(starts) > 1 else "linear", starts[0].time
+    length = style.Unit.of(times, "s", scale == "log")
     for start, colour in zip(starts, mpl.colormaps["viridis"](np.linspace(0.0, 0.88, len(starts))), strict=True):
         words = style.rounded(start.speed, "m/s")
         panel.plot(length.factor * start.time, factor * start.stress, color=colour, label=words)
         if start.resolved:
             panel.plot(length.factor * start.when, factor * start.peak, "o", markersize=3, color=colour)
-    ends = length.factor * np.array([times[0] if many else 0.0, times[-1]])
-    style.across(panel, ends, length.label("time since the start"), "log" if many else "linear")
+    ends = times if scale == "log" else np.append(0.0, times)
+    style.across(panel, length.factor * ends, length.label("time since the start"), scale)
 
 
 def _peak_panel(panel: Axes, dataset: xr.Dataset, starts: list[Start], over_speed: bool, factor: float) -> None:
-    """Draw the peak stress over the speed, one line a rest; over the rest if there is only one speed.
+    """Draw the peak stress over the speed, one line a rest, or over the rest if there is only one speed.
 
-    Beneath it what closed forms say of Bell bonds: their peak if none rebinds, and of any bonds steady sliding.
+    Thin lines over the speed are closed forms: the peak of Bell bonds if none rebinds, and steady sliding.
     """
     places = np.array([abs(start.speed) if over_speed else start.rest for start in starts])
-    order = [k for k in np.argsort(places, kind="stable") if places[k] > 0.0]
+    peaks, resolved = (np.array([getattr(start, name) for start in starts]) for name in ("peak", "resolved"))
+    groups = np.array([start.rest if over_speed else 0.0 for start in starts])
     pace = style.Unit.of(places, "m/s" if over_speed else "s", logarithmic=True)
-    lines = sorted({start.rest for start in starts}) if over_speed else [0.0]
-    for number, rest in enumerate(lines):
-        chosen = [k for k in order if not over_speed or starts[k].rest == rest]
-        grey = mpl.colors.to_hex((0.65 * (1.0 - (number + 1) / len(lines)),) * 3)
-        look: Any = {"color": grey, "marker": _MARKERS[number % len(_MARKERS)], "markersize": 3.5}
-        x, y = pace.factor * places[chosen], factor * np.array([starts[k].peak for k in chosen])
-        panel.plot(x, y, label=f"{style.text_of(rest, 's')} at rest" if over_speed else "", **look)
-        risen = np.array([not starts[k].resolved for k in chosen])
-        panel.plot(x[risen], y[risen], **look | {"linestyle": "none", "mfc": "white"})
-    if not all(start.resolved for start in starts):
-        panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
-    if over_speed:
-        _closed_forms(panel, dataset, starts, pace.factor, factor)
-    panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
-    words = pace.label("sliding speed $V$" if over_speed else "time at rest")
-    style.across(panel, pace.factor * places, words, "log", 0.05)
-    style.legend(panel, "peak of the stress")
-
-
-def _closed_forms(panel: Axes, dataset: xr.Dataset, starts: list[Start], pace: float, factor: float) -> None:
-    """Draw thin lines of closed forms."""
-    speeds = np.array([abs(start.speed) for start in starts if start.speed != 0.0])
-    fine = np.geomspace(speeds.min(), speeds.max(), _FEWER)
+    x, y, rests = pace.factor * places, factor * peaks, np.unique(groups)
+    fine = np.geomspace(places[places > 0.0].min(), places.max(), _FEWER)
     thin: Any = style.GREY | {"linewidth": 0.7}
-    for start in {start.rest: start for start in starts}.values():
+    for number, rest in enumerate(rests):
+        chosen = groups == rest
+        grey = mpl.colors.to_hex((0.65 * (1.0 - (number + 1) / rests.size),) * 3)
+        look: Any = {"color": grey, "marker": _MARKERS[number % len(_MARKERS)], "markersize": 3.5}
+        panel.plot(x[chosen], y[chosen], label=f"{style.text_of(rest, 's')} at rest" if over_speed else "", **look)
+        panel.plot(x[chosen & ~resolved], y[chosen & ~resolved], **look | {"linestyle": "none", "mfc": "white"})
+    if not np.all(resolved):
+        panel.plot([], [], "o", color=style.REFERENCE, mfc="white", label="not resolved")
+    for start in {start.rest: start for start in starts if over_speed}.values():
         bonds = population_of(dataset, start.at)
         if bonds and bonds.pathway:
             force = np.asarray(schallamach.start_up_peak(fine, *bonds.pathway).force)
             peak = start.fraction * (bonds.density * bonds.at_rest * force)
-            panel.plot(pace * fine, factor * peak, linestyle=":", label="none rebinds", **thin)
-    for law in steady_laws(dataset, starts[0].at, fine)[:1]:
-        panel.plot(pace * fine, factor * law.stress, label="steady sliding", **thin)
+            panel.plot(pace.factor * fine, factor * peak, linestyle=":", label="none rebinds", **thin)
+    for law in steady_laws(dataset, starts[0].at, fine)[:1] if over_speed else ():
+        panel.plot(pace.factor * fine, factor * law.stress, label="steady sliding", **thin)
+    panel.set_ylim(bottom=min(0.0, panel.get_ylim()[0]))
+    words = pace.label("sliding speed $V$" if over_speed else "time at rest")
+    style.across(panel, x, words, "log", 0.05)
+    style.legend(panel, "peak of the stress")

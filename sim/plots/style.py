@@ -76,17 +76,10 @@ class Picture(Figure):
 
 def rows(heights: list[float], shared: bool = True) -> tuple[Figure, list[Axes]]:
     """Return a picture of one column: lettered panels of given heights [in], with one x axis if shared."""
-    figure, axes = grid(heights, 1, shared)
-    return figure, list(axes[:, 0])
-
-
-def grid(heights: list[float], columns: int, shared: bool = True) -> tuple[Figure, Any]:
-    """Return a picture of rows of given heights [in], lettered, whose columns share y axes, and x axes if shared."""
-    size = COLUMN if columns == 1 else WIDE, 0.45 + sum(heights)
-    count = len(heights), columns
-    figure, axes = _panels(size, count, sharex=shared, sharey="row", height_ratios=heights)
+    size = COLUMN, 0.45 + sum(heights)
+    figure, axes = _panels(size, (len(heights), 1), sharex=shared, height_ratios=heights)
     figure.align_ylabels(axes)
-    return figure, np.array(axes).reshape(count)
+    return figure, axes
 
 
 def pairs(height: float, count: int = 1, shared: bool = False) -> tuple[Figure, list[Axes]]:
@@ -257,25 +250,6 @@ def legend(panel: Axes, title: str = "", columns: int = 0, handles: Iterable[Any
         ncols=columns or (3 if longest <= 16 else 2 if longest <= 28 else 1),
         title="\n".join(textwrap.wrap(title, 62)) or None, **LEGEND,
     )  # fmt: skip
-
-
-def legends_of_first(figure: Figure, axes: Any) -> None:
-    """Keep one legend a row of panels, and move that of the first row above the whole picture and its titles."""
-    for panel in axes[:, 1:].flat:
-        if panel.get_legend():
-            panel.get_legend().remove()
-    moved_legend(axes[0, 0], figure, loc="outside upper left", ncols=3, **LEGEND)
-    for panel in axes.flat:
-        panel.label_outer()
-
-
-def moved_legend(panel: Axes, to: Figure | Axes, **look: Any) -> None:
-    """Move the legend of a panel, if it has one, to another place."""
-    if old := panel.get_legend():
-        old.remove()
-        words = old.get_title().get_text() or None
-        handles: Any = old.legend_handles
-        to.legend(handles, [text.get_text() for text in old.get_texts()], title=words, **look)
 
 
 def fill(panel: Axes, x: np.ndarray, low: np.ndarray, high: np.ndarray, **look: Any) -> None:
