@@ -262,24 +262,13 @@ def _records(scenario: Scenario) -> range:
     return range(clock.steps % every, clock.steps + 1, every)
 
 
-def _run(scenario: Scenario, count: int, steps: range, end: float = math.inf) -> Array:
-    """Return the ``QUANTITIES`` of the first members at some clock steps, shape (4, members, steps).
-
-    Raises
-    ------
-    TimeoutError
-        If the process has used more CPU time than ``end`` [s] before the run ends.
-    """
-    values, length = list[Array](), 1 + len(steps) // 20
+def _run(scenario: Scenario, count: int, steps: range) -> Array:
+    """Return the ``QUANTITIES`` of the first members at some clock steps, shape (4, members, steps)."""
+    values = list[list[Array]]()
     for members in np.array_split(np.arange(count), -(-count // together(scenario))):
-        noise, state, courses = MemberNoise.of(scenario.seed, members), None, []
-        for piece in (steps[first : first + length] for first in range(0, len(steps), length)):
-            if time.process_time() > end:
-                raise TimeoutError
-            state, course = follow(scenario, noise, state, piece)
-            read = (_READ[name](scenario, course) for name in QUANTITIES)
-            courses.append([np.broadcast_to(variable, (len(piece), len(members))).T for variable in read])
-        values.append(np.concatenate(courses, axis=2))
+        _, course = follow(scenario, MemberNoise.of(scenario.seed, members), None, steps)
+        read, shape = (_READ[name](scenario, course) for name in QUANTITIES), (len(steps), len(members))
+        values.append([np.broadcast_to(variable, shape).T for variable in read])
     return np.concatenate(values, axis=1)
 
 
@@ -352,19 +341,17 @@ def _judged(base: Scenario, settings: list[Setting], end: float, left_out: list[
     As many members are compared as are estimated to fit into half of the time.
     """
     steps, left = _records(max((row.scenario for row in settings), key=_fluctuates)), end - time.process_time()
-    fitting, samples = sorted(settings, key=lambda row: (not row.own, row.time)), dict[str, Array]()
+    fitting, part = sorted(settings, key=lambda row: (not row.own, row.time)), cast(Any, base.fluctuations)
     # one member stands for all if members do not differ
-    costs = {row.label: row.time / base.ensemble.members * _fluctuates(row.scenario) for row in settings}
-    while (cost := sum(costs[row.label] for row in fitting)) * _FEWEST > left:
+    share = {row.label: _FEWEST / base.ensemble.members if _fluctuates(row.scenario) else 1.0 for row in settings}
+    while sum(row.time * share[row.label] for row in fitting) > left:
         _leave_out(fitting.pop(), left_out)
-    count = int(np.clip(0.5 * left / max(cost, 1e-12), _FEWEST, _MOST))
+    noisy = sum(row.time for row in fitting if _fluctuates(row.scenario)) / base.ensemble.members
+    count = int(np.clip(0.5 * left / max(noisy, 1e-12), _FEWEST, _MOST))
+    fitting, samples = [row for row in settings if row in fitting], dict[str, Array]()
     for row in fitting:
         row.members = count if _fluctuates(row.scenario) else 1
-        try:
-            samples[row.label] = _run(row.scenario, row.members, steps, end)
-        except TimeoutError:
-            _leave_out(row, left_out)
-    fitting, known, part = [row for row in settings if row.label in samples], None, cast(Any, base.fluctuations)
+        samples[row.label] = _run(row.scenario, row.members, steps)
     has_truth = fitting[0].part == "shear" and part.per_member and not part.amplitude.relaxing
     if has_truth:  # the distribution of ΔΓ by all modes of the cell
         pairs = cell_pairs(part.spectrum, part.side(base.setting.cell), part.points, *base.solid.effective)

@@ -288,18 +288,6 @@ def figure(problem: Problem, best: Minimum) -> Figure:
     return picture
 
 
-def refuse_units(tables: Sequence[Measured], units: Sequence[str]) -> None:
-    """Refuse a unit that no axis of the figure of some tables can have, before anything is fitted."""
-    try:
-        with in_units(units):
-            for table in tables:
-                Unit.of(1.0, _along(table)[1])
-                for curve in table.curves:
-                    Unit.of(1.0, curve.variable.unit)
-    except ValueError as fault:
-        raise BadInput([f"--units: {fault}"]) from None
-
-
 def _along(table: Measured) -> tuple[str, str, Array]:
     """Return words, unit and values of the condition that varies most from row to row."""
     varied = {name: values for name, values in table.conditions.items() if np.ptp(values) > 0.0}
@@ -330,11 +318,24 @@ def carried_out(
     pairs = [pair.partition("=")[::2] for pair in common]
     sizes = {name: read_option(size, f"--common {name}", "1", above=0, below=1) for name, size in pairs}
     outputs = claim(scenario, data, stem, replace)
-    if units:
-        refuse_units([likelihood.read(path, scenario) for path in data], units)
+    tables = [likelihood.read(path, scenario) for path in data]
+    try:
+        with in_units(units):  # before anything is fitted
+            for table in tables:
+                for unit in (_along(table)[1], *(curve.variable.unit for curve in table.curves)):
+                    Unit.of(1.0, unit)
+    except ValueError as fault:
+        raise BadInput([f"--units: {fault}"]) from None
     result = fit(scenario, data, free, sizes, steady)
     verdict = compare(result.problem, result.best, result.scenario.seed) if judged else None
-    save(scenario, result, data, outputs, verdict, units)
+    picture = io.BytesIO()
+    with in_units(units):
+        figure(result.problem, result.best).savefig(picture, format="png")
+    numbers = json.dumps(document(result, data, verdict), indent=2, allow_nan=False) + "\n"
+    texts = scenario_text(scenario, result, outputs[0].parent).encode(), numbers.encode(), picture.getvalue()
+    for path, content in zip(outputs, texts, strict=True):
+        with files.output(path) as beside:
+            beside.write_bytes(content)
     shown: list[Shown] = [(_table(result), f"\n{_explanation(result)}\n")]
     if verdict is not None:
         doubt = "; but even the scenario as it is lies off: perhaps none of these is true"
@@ -342,24 +343,16 @@ def carried_out(
     return result, [*shown, ([], "\n".join(map(str, outputs)))]
 
 
-class Outputs(NamedTuple):
-    """The files of a fit: scenario, numbers and figure."""
-
-    toml: Path
-    json: Path
-    png: Path
-
-
-def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -> Outputs:
+def claim(scenario: Scenario, data: Sequence[Path], stem: Path, replace: bool) -> list[Path]:
     """Return the files to be written, ``<stem>_fit.toml`` and so on; refuse older ones unless they are replaced.
 
     A scenario is replaced only if a fit has written it.
     """
-    outputs = Outputs(*(stem.with_name(f"{stem.name}_fit.{ending}") for ending in Outputs._fields))
-    inputs, toml = [*files_read(scenario), *data], outputs.toml
+    toml, *others = outputs = [stem.with_name(f"{stem.name}_fit.{ending}") for ending in ("toml", "json", "png")]
+    inputs = [*files_read(scenario), *data]
     is_replaced = replace and toml.is_file() and _MADE.encode() in toml.read_bytes()
     is_input = toml.resolve() in [path.resolve() for path in inputs]
-    for path in outputs[1:] if is_replaced and not is_input else outputs:
+    for path in others if is_replaced and not is_input else outputs:
         files.claim(path, replace, inputs)
     return outputs
 
@@ -394,15 +387,14 @@ def _explanation(fit: Fit) -> str:
 
 
 def _comparison(verdict: Verdict) -> list[dict[str, str]]:
-    """One row for each mechanism, the best first; p and the rejection where there is one to compare with."""
+    """Return one row for each mechanism, the best first."""
     least, rows = verdict.judged[0].aicc, []
     for item in verdict.judged:
-        row = {"mechanism": item.name, "chi^2": f"{item.chi_square:.4g}", "AICc - least": f"{item.aicc - least:.3g}"}
-        if len(verdict.judged) > 1:
-            drawn = f"{item.p_value:.3g}" if math.isfinite(item.p_value) else "by AICc alone"
-            row["p"] = "compared with" if item.name == WHOLE else drawn
-            row["rejected"] = "yes" if item.rejected else ""
-        rows.append(row)
+        drawn = f"{item.p_value:.3g}" if math.isfinite(item.p_value) else "by AICc alone"
+        rows.append({
+            "mechanism": item.name, "chi^2": f"{item.chi_square:.4g}", "AICc - least": f"{item.aicc - least:.3g}",
+            "p": "compared with" if item.name == WHOLE else drawn, "rejected": "yes" if item.rejected else "",
+        })  # fmt: skip
     return rows
 
 
@@ -466,17 +458,3 @@ def _move(table: dict[str, Any], above: Path, folder: Path) -> None:
             _move(value, above, folder)
         elif key == "file" and isinstance(value, str):
             table[key] = os.path.relpath(above / value, folder)
-
-
-def save(
-    scenario: Scenario, fit: Fit, data: Sequence[Path], outputs: Outputs, verdict: Verdict | None, units: Sequence[str]
-) -> None:
-    """Write scenario, numbers and figure, each whole."""
-    picture = io.BytesIO()
-    with in_units(units):
-        figure(fit.problem, fit.best).savefig(picture, format="png")
-    numbers = json.dumps(document(fit, data, verdict), indent=2, allow_nan=False) + "\n"
-    texts = scenario_text(scenario, fit, outputs.toml.parent).encode(), numbers.encode(), picture.getvalue()
-    for path, content in zip(outputs, texts, strict=True):
-        with files.output(path) as beside:
-            beside.write_bytes(content)

@@ -297,7 +297,7 @@ Weights = Callable[[Trajectory], Array]
 
 
 def _second_half(course: Trajectory) -> Array:
-    weights = (np.arange(len(course.time)) >= len(course.time) // 2).astype(float)
+    weights = np.arange(len(course.time)) >= len(course.time) // 2
     return weights[np.newaxis] / weights.sum()
 
 
@@ -402,9 +402,9 @@ class Problem:
     prediction is a run of the scenario's own models, as steady sliding does not depend on all that is free.
     """
 
-    tables: tuple[Measured, ...]
-    groups: tuple[list[Group], ...]
-    free: tuple[Free, ...]
+    tables: Sequence[Measured]
+    groups: Sequence[list[Group]]
+    free: Sequence[Free]
     common: dict[str, float]
     values: Array
     sigma: Array
@@ -659,8 +659,7 @@ def problem_of(
         raise BadInput([f"{tables[0].path}: measured numbers: {len(values)}, free keys: {len(free)}; {cure}"])
     number = np.repeat(np.arange(len(curves)), [len(curve.values) for curve in curves])
     guesses = [0.01 * max(float(np.abs(curve.values).max()), 1e-300) for curve in curves]
-    errors = [guess if curve.errors is None else curve.errors for curve, guess in zip(curves, guesses, strict=True)]
-    sigma = np.concatenate([np.broadcast_to(error, len(c.values)) for error, c in zip(errors, curves, strict=True)])
+    sigma = [np.full_like(curve.values, guess if curve.errors is None else curve.errors)
+             for curve, guess in zip(curves, guesses, strict=True)]  # fmt: skip
     estimated, zero = np.array([curve.errors is None for curve in curves])[number], np.zeros(len(values))
-    parts = tuple(tables), tuple(groups), tuple(free), dict(common)
-    return Problem(*parts, values, sigma, number, estimated, zero, zero, {})
+    return Problem(tables, groups, free, common, values, np.concatenate(sigma), number, estimated, zero, zero, {})

@@ -44,7 +44,6 @@ _THEORIES: dict[str, tuple[str, tuple[Free, ...]]] = {
 WHOLE = "the scenario as it is"
 #: Parts of it by their names, and what they leave out.
 _PARTS = {"bonds only": "fluctuations act", "fluctuations only": "bonds act"}
-
 #: What acts on the work of adhesion, each with an example of its table.
 _TABLES = (
     ("bonds", '[bonds] model = "steady", critical_speed = "10 mm/s", stress = "0.3 MPa"'),
@@ -93,8 +92,7 @@ def compare(problem: Problem, best: Minimum, seed: int, draws: int = DRAWS) -> V
         Curves drawn for each mechanism.
     """
     fits = [(WHOLE, problem, best)]
-    for name, other in _others(problem):
-        fits.append((name, other, _least(other, _starts(other))))
+    fits += [(name, other, _least(other, _starts(other))) for name, other in _others(problem)]
     criteria = [item.criterion(least.chi_square) for _, item, least in fits]
     worst = min(criteria) + _HOPELESS
     judged = []
@@ -124,12 +122,10 @@ def _verdict(judged: list[Judged]) -> tuple[str, str]:
     if len(left) > 1 or (first.name not in _PARTS and ahead < _WORSE):
         return "", f"the data cannot tell: not rejected are {WHOLE}, {', '.join(item.name for item in left)}"
     evidence = f"(p = {first.p_value:.2g}, AICc {-ahead:+.2g} from {WHOLE})"
-    if first.name not in _PARTS:
-        return first.name, f"the data prefer {first.name} {evidence} and reject the others"
-    return (
-        first.name,
-        f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well {evidence}",
-    )
+    words = f"the data prefer {first.name} {evidence} and reject the others"
+    if first.name in _PARTS:
+        words = f"{first.name} is sufficient; the data cannot tell whether {_PARTS[first.name]} as well {evidence}"
+    return first.name, words
 
 
 def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
@@ -138,8 +134,8 @@ def _others(problem: Problem) -> Iterator[tuple[str, Problem]]:
     still = {"shear.paid_by_adhesion": 0.0} if "shear.paid_by_adhesion" in known else {}
     share = {"adhesion.bond_share": 0.0}
     if all(_acting(problem)):
-        left_out = (still, "shear."), (share, "adhesion.bond_share")
-        yield from ((name, _less(problem, *without)) for name, without in zip(_PARTS, left_out, strict=True))
+        yield "bonds only", _less(problem, still, "shear.")
+        yield "fluctuations only", _less(problem, share, "adhesion.bond_share")
     if scene.contact.kind == "displacement" or not scene.population.carries_stress or problem.by_run:
         return  # theories are of a load or an indentation, of a stress, and of equilibrium
     for theory, (words, more) in _THEORIES.items():
@@ -159,7 +155,7 @@ def _lacking(problem: Problem) -> str:
     all_groups = [group for groups in problem.groups for group in groups]
     if not any(group.scenario.drive.solves_motion or np.any(group.speed) for group in all_groups):
         return 'curves at rest tell no mechanism from another; measure while it slides, with a column "speed [mm/s]"'
-    lacks = [item for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts]
+    lacks = (item for item, acts in zip(_TABLES, _acting(problem), strict=True) if not acts)
     return "\n".join(
         f"no {name} act in the scenario; to compare with them, add for example {table}" for name, table in lacks
     )

@@ -75,16 +75,10 @@ class Check(NamedTuple):
 
     @property
     def row(self) -> dict[str, str]:
-        """The line as a row of a table, by its headings."""
-        return {
-            "": "ok" if self.holds else "FAILS",
-            "equation": self.equation,
-            "what": self.name,
-            "computed": f"{self.computed:.9g}",
-            "expected": f"{self.expected:.9g}",
-            "error": f"{self.error:.1e}",
-            "allowed": f"{self.tolerance:.0e}",
-        }
+        """Line as a row of a table, by its headings."""
+        numbers = {"computed": f"{self.computed:.9g}", "expected": f"{self.expected:.9g}"}
+        errors = {"error": f"{self.error:.1e}", "allowed": f"{self.tolerance:.0e}"}
+        return {"": "ok" if self.holds else "FAILS", "equation": self.equation, "what": self.name, **numbers, **errors}
 
 
 #: What ``_check`` takes: name, equation, computed and expected value or values, largest error unless 1e-12.

@@ -622,6 +622,5 @@ def test_a_unit_that_no_axis_has_is_refused_before_the_fit(scenario, curves, mon
 def test_a_fit_that_does_not_converge_exits_1(scenario, curves, monkeypatch):
     monkeypatch.setattr(calibration, "with_errors", lambda problem, start: (
         problem, minimum(problem, start, errors=True)._replace(converged=False)))  # fmt: skip
-    monkeypatch.setattr(calibration, "save", lambda *given: None)
     done = command(scenario, curves, "--free", "bonds.stress", "--steady")
     assert done.exit_code == 1 and "has not converged" in done.output
